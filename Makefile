@@ -1,0 +1,37 @@
+# Two commands for newcomers: `make run` and `make test`. They need Python >= 3.11, make and git, nothing else.
+PYTHON ?= python3
+VENV   := .venv
+PY     := $(VENV)/bin/python
+STAMP  := $(VENV)/.installed
+APP    ?= listing1
+SECONDS ?= 5
+
+firmware.elf: $(STAMP) FORCE
+	$(MAKE) -C firmware APP=$(APP) PYTHON=$(abspath $(PY))
+	cp firmware/build/$(APP)/firmware.elf $@.part && mv $@.part $@
+
+run: firmware.elf
+	$(PY) -m emu run firmware.elf --seconds $(SECONDS)
+
+test: $(STAMP)
+	$(PY) -m ruff check emu toolchain tests bench
+	$(PY) -m mypy emu toolchain
+	$(PY) -m pytest -n auto tests
+
+bench: $(STAMP)
+	$(PY) -m bench
+
+fuzz: $(STAMP)
+	$(PY) -m tests.fuzz
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; set PYTHON=...")'
+	$(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $@
+
+clean:
+	rm -rf firmware.elf firmware/build
+
+FORCE:
+.PHONY: run test bench fuzz clean FORCE

@@ -1,0 +1,90 @@
+"""The only clock: fixed slots of due cycles in the state record (design §4.2).
+
+Time is one integer, Tcy since power-on. A slot belongs to one (device, purpose); its number, given in the order of
+wiring, breaks ties. No heap and no serial numbers, so a copy of the record is a copy of the schedule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.record import Record
+
+NEVER: Final = 0xFFFF_FFFF_FFFF_FFFF
+"""Due cycle of an idle slot."""
+
+SLOTS: Final = 96
+
+
+class Events:
+    """Schedule of a machine. `deadline` is the earliest cycle at which an engine must stop and look.
+
+    The engine keeps `now` at the cycle of the access it is making, so hooks need no time argument.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self._u64 = record.u64
+        self._now = record.reserve("events.now", "Q").index
+        self._deadline = record.reserve("events.deadline", "Q").index
+        self._first = record.reserve("events.due", "Q", SLOTS).index
+        self.names: Final[list[str]] = []
+        self._fire: Final[list[Callable[[int], None]]] = []
+        self._due = record.u64[self._first : self._first + SLOTS]
+        for slot in range(SLOTS):
+            self._due[slot] = NEVER
+        self._u64[self._deadline] = NEVER
+
+    @property
+    def now(self) -> int:
+        """Cycle of the access or event being handled, in Tcy."""
+        return self._u64[self._now]
+
+    @now.setter
+    def now(self, cycle: int) -> None:
+        self._u64[self._now] = cycle
+
+    @property
+    def deadline(self) -> int:
+        """Earliest cycle with work to do: the minimum over the slots, or 0 after `kick`."""
+        return self._u64[self._deadline]
+
+    def slot(self, name: str, fire: Callable[[int], None]) -> int:
+        """Claim the next slot. `fire(due)` gets the cycle it was due at, so periods cannot drift."""
+        if len(self.names) == SLOTS:
+            raise ValueError(f"no event slot left for {name!r}")
+        self.names.append(name)
+        self._fire.append(fire)
+        return len(self.names) - 1
+
+    def set(self, slot: int, due: int) -> None:
+        """Let `slot` fire at cycle `due` (replacing its earlier date)."""
+        self._due[slot] = due
+        if due < self._u64[self._deadline]:
+            self._u64[self._deadline] = due
+
+    def cancel(self, slot: int) -> None:
+        """Make `slot` idle. The deadline may stay too early, which costs one empty look."""
+        self._due[slot] = NEVER
+
+    def due(self, slot: int) -> int:
+        """Cycle `slot` is due at, or NEVER."""
+        return self._due[slot]
+
+    def kick(self) -> None:
+        """Make the engine look at the next instruction boundary (an interrupt flag, enable or priority changed)."""
+        self._u64[self._deadline] = 0
+
+    def fire_until(self, cycle: int) -> None:
+        """Fire everything due at or before `cycle`, in order of (due, slot), and recompute the deadline."""
+        due = self._due
+        count = len(self._fire)
+        while True:
+            first = min(due[:count]) if count else NEVER
+            if first > cycle:
+                break
+            slot = next(index for index in range(count) if due[index] == first)
+            due[slot] = NEVER
+            self.now = first
+            self._fire[slot](first)
+        self._u64[self._deadline] = first

@@ -1,0 +1,88 @@
+"""The one flat record that holds every bit of a machine's state (design: one buffer, two engines).
+
+What enters: names, element kinds and counts, reserved once while a machine is wired together.
+What leaves: byte offsets for native code and typed views for Python. Byte offset 0 is data address 0, so the
+working registers, the SFRs and RAM lie in the record at their own data addresses (isa.md §1.2).
+Snapshot, restore and comparison of two machines are one copy and one comparison.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from typing import Final
+
+DATA_BYTES: Final = 0x2800
+"""SFRs, X RAM and Y RAM: everything below the first unimplemented data address (isa.md §1.2)."""
+
+CAPACITY: Final = 0x80000
+"""Bytes set aside for one record; `Record.used` says how many are taken."""
+
+SIZES: Final = {"B": 1, "H": 2, "I": 4, "Q": 8, "q": 8}
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A named run of elements in the record: byte `offset`, element `kind` (struct letter), `count`."""
+
+    name: str
+    offset: int
+    kind: str
+    count: int
+
+    @property
+    def index(self) -> int:
+        """Index of the first element in the view of this field's kind."""
+        return self.offset // SIZES[self.kind]
+
+
+class Record:
+    """Flat little-endian buffer with views of 8, 16, 32 and 64 bits and a directory of named fields."""
+
+    def __init__(self) -> None:
+        self._memory = (ctypes.c_uint8 * CAPACITY)()
+        self.address: Final = ctypes.addressof(self._memory)
+        self.bytes: Final = memoryview(self._memory).cast("B")
+        self.u8: Final = self.bytes
+        self.u16: Final = self.bytes.cast("H")
+        self.u32: Final = self.bytes.cast("I")
+        self.u64: Final = self.bytes.cast("Q")
+        self.s64: Final = self.bytes.cast("q")
+        self.fields: Final[dict[str, Field]] = {}
+        self.used = DATA_BYTES
+
+    def reserve(self, name: str, kind: str, count: int = 1) -> Field:
+        """Set aside `count` elements of `kind` ("B", "H", "I", "Q" unsigned, "q" signed) under `name`, zeroed.
+
+        Raises ValueError when the name is taken or the record is full.
+        """
+        if name in self.fields:
+            raise ValueError(f"record field {name!r} is reserved already")
+        size = SIZES[kind]
+        offset = -(-self.used // size) * size
+        if offset + size * count > CAPACITY:
+            raise ValueError(f"record field {name!r} does not fit: {size * count} bytes at {offset:#x}")
+        self.used = offset + size * count
+        field = Field(name, offset, kind, count)
+        self.fields[name] = field
+        return field
+
+    def snapshot(self) -> bytes:
+        """A copy of the whole state."""
+        return bytes(self.bytes[: self.used])
+
+    def restore(self, state: bytes) -> None:
+        """Put a copy made by `snapshot` of an equally wired machine back. Raises ValueError if the size differs."""
+        if len(state) != self.used:
+            raise ValueError(f"snapshot has {len(state)} bytes, this machine's record {self.used}")
+        self.bytes[: self.used] = state
+
+    def field_at(self, offset: int) -> str:
+        """Name of what lies at a byte offset, for reports of differences between two records."""
+        if offset < DATA_BYTES:
+            return f"data {offset:#06x}"
+        for field in self.fields.values():
+            size = SIZES[field.kind]
+            if field.offset <= offset < field.offset + size * field.count:
+                return f"{field.name}[{(offset - field.offset) // size}]"
+        return f"gap {offset:#x}"
