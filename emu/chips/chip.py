@@ -1,0 +1,248 @@
+"""What a chip is, as data: registers, memory, vectors, configuration words, and which device sits on which pins.
+
+Nothing here knows how anything behaves: devices, the CPU, the assembler, the linker and the header generator all read
+the same tables. A second chip is a second table (see `dspic30f6014a.py`), not a subclass.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, slots=True)
+class Sfr:
+    """One special function register: data address, size in bytes (1 or 2), and what its bits are."""
+
+    name: str
+    address: int
+    size: int
+    reset: int
+    """Value after a power-on reset; bits the silicon leaves undefined are 0 here."""
+    mask: int
+    """Implemented bits; the others read 0."""
+    fields: Mapping[str, tuple[int, int]]
+    """Field name to (least significant bit, width)."""
+    hw_owned: int
+    """Bits on which a write by software has no effect."""
+    clear_only: int
+    """Bits software can clear but not set."""
+
+    @property
+    def writable(self) -> int:
+        """Bits software can change freely."""
+        return self.mask & ~self.hw_owned & ~self.clear_only
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Half-open address range. Data space counts bytes; program space counts PC units (2 per 24-bit word)."""
+
+    name: str
+    start: int
+    end: int
+
+    def __contains__(self, address: object) -> bool:
+        return isinstance(address, int) and self.start <= address < self.end
+
+    @property
+    def size(self) -> int:
+        """Length in the units of the space."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """One of the 62 exception vectors. C handlers are called `_` + name, object symbols `__` + name."""
+
+    slot: int
+    name: str
+    ivt: int
+    """Program address of the vector word in the interrupt vector table."""
+    aivt: int
+    """Program address of the vector word in the alternate table."""
+    level: int
+    """Fixed priority of a trap (11..14), 0 for interrupts and reserved slots."""
+    implemented: bool
+    """Whether this chip has the source."""
+
+    @property
+    def irq(self) -> int | None:
+        """Interrupt number (natural order), None for traps."""
+        return self.slot - 8 if self.slot >= 8 else None
+
+    @property
+    def symbol(self) -> str:
+        """Linker symbol of the handler."""
+        return "__" + self.name
+
+    @property
+    def alternate_symbol(self) -> str:
+        """Linker symbol of the handler preferred by the alternate table."""
+        return "__Alt" + self.name
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigWord:
+    """A configuration register in program space: address in PC units, implemented bits, fields, erased value."""
+
+    name: str
+    address: int
+    mask: int
+    fields: Mapping[str, tuple[int, int]]
+    erased: int = 0xFFFF
+
+    def field(self, word: int, name: str) -> int:
+        """The named field of a stored word, right-aligned. Raises KeyError for an unknown field."""
+        lsb, width = self.fields[name]
+        return word >> lsb & (1 << width) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class InterruptSource:
+    """Where the flag, enable and priority of one interrupt live."""
+
+    irq: int
+    name: str
+    flag: tuple[str, int]
+    enable: tuple[str, int]
+    priority: tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class TimerSite:
+    """Type A: may count asynchronously; B: low half of a 32-bit pair; C: high half."""
+
+    number: int
+    kind: str
+    clock_pin: str
+    irq: int
+    partner: int
+    """Number of the other half of the pair, 0 for type A."""
+
+
+@dataclass(frozen=True, slots=True)
+class UartSite:
+    number: int
+    tx_pin: str
+    rx_pin: str
+    rx_irq: int
+    tx_irq: int
+    autobaud_capture: int
+    """Input capture module that ABAUD connects the receive pin to."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpiSite:
+    number: int
+    sck_pin: str
+    sdi_pin: str
+    sdo_pin: str
+    ss_pin: str
+    irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class I2cSite:
+    sda_pin: str
+    scl_pin: str
+    slave_irq: int
+    master_irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureSite:
+    number: int
+    pin: str
+    irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class CompareSite:
+    number: int
+    pin: str
+    fault_pin: str
+    irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class AdcSite:
+    pins: tuple[str, ...]
+    irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class DciSite:
+    csdi_pin: str
+    csdo_pin: str
+    csck_pin: str
+    cofs_pin: str
+    irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class CanSite:
+    number: int
+    rx_pin: str
+    tx_pin: str
+    irq: int
+
+
+@dataclass(frozen=True, slots=True)
+class Chip:
+    """Everything the machine, the toolchain and the documentation need to know about one part."""
+
+    name: str
+    sfrs: Mapping[str, Sfr]
+    vectors: tuple[Vector, ...]
+    interrupts: Mapping[int, InterruptSource]
+    config: Mapping[str, ConfigWord]
+    data: Mapping[str, Region]
+    program: Mapping[str, Region]
+    device_id: int
+    revision: int
+    ports: tuple[str, ...]
+    change_pins: tuple[str, ...]
+    """Pin of CN0, CN1, ..."""
+    external_pins: tuple[tuple[str, int], ...]
+    """(pin, irq) of INT0, INT1, ..."""
+    timers: tuple[TimerSite, ...]
+    uarts: tuple[UartSite, ...]
+    spis: tuple[SpiSite, ...]
+    i2c: I2cSite
+    captures: tuple[CaptureSite, ...]
+    compares: tuple[CompareSite, ...]
+    adc: AdcSite
+    dci: DciSite
+    cans: tuple[CanSite, ...]
+    nvm_irq: int
+    lvd_irq: int
+
+
+def _fields(text: str) -> Mapping[str, tuple[int, int]]:
+    """Parse `NAME:lsb:width;...`."""
+    parts = (item.split(":") for item in text.split(";") if item)
+    return MappingProxyType({name: (int(lsb), int(width)) for name, lsb, width in parts})
+
+
+def load_sfrs(path: Path) -> Mapping[str, Sfr]:
+    """Read a chip's register file: columns name, address, size, reset, mask, fields, hw_owned, clear_only."""
+    with path.open(encoding="ascii", newline="") as file:
+        return MappingProxyType(
+            {
+                row["name"]: Sfr(
+                    name=row["name"],
+                    address=int(row["address"], 16),
+                    size=int(row["size"]),
+                    reset=int(row["reset"], 16),
+                    mask=int(row["mask"], 16),
+                    fields=_fields(row["fields"]),
+                    hw_owned=int(row["hw_owned"], 16),
+                    clear_only=int(row["clear_only"], 16),
+                )
+                for row in csv.DictReader(file)
+            }
+        )
