@@ -1,0 +1,133 @@
+"""Source lines of program addresses, from DWARF (abi-elf.md §6.7).
+
+What enters: the raw octets of debug sections. What leaves: file and line per address. Microchip's tools and ours store
+every DWARF byte twice as wide (octet, phantom 0); plain DWARF is understood too. Debug information that cannot be read
+is worth a note, never a failed run.
+"""
+
+from __future__ import annotations
+
+import inspect
+import io
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from elftools.dwarf.dwarfinfo import DWARFInfo
+
+_NEEDED: Final = (".debug_info", ".debug_abbrev", ".debug_line")
+_DOUBLED_SHARE: Final = 0.9
+"""Share of zero odd octets from which a section counts as doubled. Not 1: one attribute of assembler units is stored
+with its high byte in the phantom (abi-elf.md §6.7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Program addresses `start`..`end` (exclusive, PC units) come from `line` of `file`."""
+
+    start: int
+    end: int
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+def undoubled(octets: bytes) -> bytes:
+    """DWARF bytes of a section stored with phantoms; the octets themselves if it is not."""
+    phantoms = octets[1::2]
+    if phantoms and phantoms.count(0) >= _DOUBLED_SHARE * len(phantoms):
+        return octets[::2]
+    return octets
+
+
+class Lines:
+    """Line table of an image. `broken` counts units that could not be read."""
+
+    def __init__(self, sections: Mapping[str, bytes]) -> None:
+        self.broken = 0
+        self.rows: Final[list[Line]] = []
+        if all(sections.get(name) for name in _NEEDED):
+            self._read(sections)
+        self.rows.sort(key=lambda row: (row.start, row.end))
+        self._starts: Final = [row.start for row in self.rows]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def find(self, pc: int) -> Line | None:
+        """The line the instruction at `pc` was made from, None if unknown."""
+        index = bisect_right(self._starts, pc) - 1
+        if index >= 0 and pc < self.rows[index].end:
+            return self.rows[index]
+        return None
+
+    def _read(self, sections: Mapping[str, bytes]) -> None:
+        # pyelftools answers damaged input with exceptions of a dozen unrelated types; each unit stands alone.
+        try:
+            dwarf = _dwarf(sections)
+            units = dwarf.iter_CUs()
+        except Exception:
+            self.broken += 1
+            return
+        while True:
+            try:
+                unit = next(units, None)
+            except Exception:
+                self.broken += 1
+                return
+            if unit is None:
+                return
+            try:
+                self.rows.extend(_unit_rows(dwarf, unit))
+            except Exception:
+                self.broken += 1
+
+
+def _dwarf(sections: Mapping[str, bytes]) -> DWARFInfo:
+    """A pyelftools view of the un-doubled sections."""
+    from elftools.dwarf.dwarfinfo import DebugSectionDescriptor, DwarfConfig, DWARFInfo
+
+    def descriptor(name: str) -> DebugSectionDescriptor | None:
+        if name not in sections:
+            return None
+        octets = undoubled(sections[name])
+        return DebugSectionDescriptor(io.BytesIO(octets), name, 0, len(octets), 0)
+
+    config = DwarfConfig(little_endian=True, machine_arch="dsPIC30F", default_address_size=4)
+    wanted = [name for name in inspect.signature(DWARFInfo).parameters if name.endswith("_sec")]
+    return DWARFInfo(config, **{name: descriptor("." + name.removesuffix("_sec")) for name in wanted})
+
+
+def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[Line]:
+    """The line table of one compilation unit as address ranges."""
+    program = dwarf.line_program_for_CU(unit)
+    if program is None:
+        return []
+    names = _file_names(program.header)
+    rows: list[Line] = []
+    before = None
+    for entry in program.get_entries():
+        state = entry.state
+        if state is None:
+            continue
+        if before is not None and state.address > before.address:
+            name = names[before.file] if 0 <= before.file < len(names) else "?"
+            rows.append(Line(before.address, state.address, name, before.line))
+        before = None if state.end_sequence else state
+    return rows
+
+
+def _file_names(header: Any) -> list[str]:
+    """Path of every file number of a line program; DWARF before version 5 counts files from 1."""
+    folders = [folder.decode("utf-8", "replace") for folder in header["include_directory"]]
+    names = [] if header["version"] >= 5 else ["?"]
+    for entry in header["file_entry"]:
+        name = entry.name.decode("utf-8", "replace")
+        place = entry.dir_index if header["version"] >= 5 else entry.dir_index - 1
+        folder = folders[place] if 0 <= place < len(folders) and not name.startswith("/") else ""
+        names.append(f"{folder}/{name}" if folder else name)
+    return names
