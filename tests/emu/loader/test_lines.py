@@ -1,0 +1,51 @@
+"""Source lines from phantom-doubled DWARF."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from dwarf_samples import debug_sections
+from elf_samples import doubled, xc16_like
+
+from emu.lines import undoubled
+from emu.loader import parse_image
+
+
+def image_with(parts):
+    sample = xc16_like()
+    sample.parts += parts
+    return parse_image(sample.build(), "sample.elf")
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_addresses_map_to_file_and_line(plain):
+    """abi-elf.md §6.7; standard, un-doubled DWARF is understood too."""
+    parts = debug_sections()
+    if plain:
+        parts = [dataclasses.replace(part, content=part.content[::2]) for part in parts]
+    lines = image_with(parts).lines
+    assert [str(lines.find(pc)) for pc in (0x104, 0x106, 0x108)] == ["src/main.c:10", "src/main.c:12", "src/main.c:12"]
+    assert lines.find(0x102) is None
+    assert lines.find(0x10A) is None
+
+
+def test_an_image_without_dwarf_has_no_lines():
+    lines = image_with([]).lines
+    assert len(lines) == 0
+    assert lines.find(0x104) is None
+
+
+def test_one_value_in_a_phantom_does_not_stop_the_un_doubling():
+    """abi-elf.md §6.7: DW_AT_language of assembler units has its high byte in the phantom."""
+    octets = bytearray(doubled(bytes(range(1, 200))))
+    octets[9] = 0x80
+    assert undoubled(bytes(octets)) == bytes(range(1, 200))
+
+
+def test_unreadable_dwarf_is_counted_and_never_fatal():
+    parts = debug_sections()
+    parts[0] = dataclasses.replace(parts[0], content=parts[0].content[:12])
+    lines = image_with(parts).lines
+    assert len(lines) == 0
+    assert lines.broken == 1

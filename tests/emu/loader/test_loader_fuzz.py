@@ -1,0 +1,17 @@
+"""A sample of the fuzz campaign `tests/fuzz/fuzz_loader.py`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fuzz"))
+
+from fuzz_loader import campaign  # noqa: E402
+
+
+def test_mutated_files_are_loaded_or_refused_and_nothing_else_happens():
+    outcomes = campaign(1500, seed=20160)
+    assert sum(outcomes.values()) == 1500
+    assert outcomes["refused"] > 100
+    assert outcomes["loaded"] > 100

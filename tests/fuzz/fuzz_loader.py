@@ -1,0 +1,110 @@
+"""Mutated ELF and HEX files: the loader gives a valid image or a clear refusal, nothing else.
+
+Run `python tests/fuzz/fuzz_loader.py [COUNT [SEED]]`; exits 1 with the first input that made something else happen.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader")]
+
+from dwarf_samples import debug_sections  # noqa: E402
+from elf_samples import words, xc16_like  # noqa: E402
+
+from emu.image import LoadError  # noqa: E402
+from emu.loader import parse_image  # noqa: E402
+
+INTERESTING = (0, 1, 2, 3, 4, 7, 8, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x17FFE, 0x18000, 0x7FF000)
+WIDE = (*INTERESTING, 0xF80000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF)
+
+
+def seeds() -> list[bytes]:
+    """Valid files to start from: ELF with DWARF, and the same program as HEX."""
+    sample = xc16_like()
+    sample.parts += debug_sections()
+    elf = sample.build()
+    lines = []
+    for address, word in parse_image(elf, "seed").words():
+        for kind, place, data in (
+            (4, 0, (2 * address >> 16).to_bytes(2, "big")),
+            (0, 2 * address & 0xFFFF, words(word)),
+        ):
+            body = bytes((len(data), place >> 8, place & 0xFF, kind)) + data
+            lines.append(b":" + (body + bytes((-sum(body) & 0xFF,))).hex().encode())
+    return [elf, b"\n".join([*lines, b":00000001FF", b""])]
+
+
+def mutate(data: bytes, rng: random.Random) -> bytes:
+    """One to four random changes: flipped bits, odd numbers in place of fields, cut, doubled or moved pieces."""
+    out = bytearray(data)
+    for _ in range(rng.randint(1, 4)):
+        if not out:
+            break
+        place, choice = rng.randrange(len(out)), rng.randrange(7)
+        if choice == 0:
+            out[place] ^= 1 << rng.randrange(8)
+        elif choice == 1:
+            out[place] = rng.randrange(256)
+        elif choice == 2:
+            place &= ~1
+            size = rng.choice((2, 4))
+            out[place : place + size] = (rng.choice(WIDE) & (1 << 8 * size) - 1).to_bytes(size, "little")
+        elif choice == 3:
+            del out[place:]
+        elif choice == 4:
+            del out[place : place + rng.randint(1, 40)]
+        elif choice == 5:
+            out[place:place] = out[rng.randrange(len(out)) :][: rng.randint(1, 80)]
+        else:
+            out[place] = rng.choice(b"0123456789abcdef:\r\n \0\xff")
+    return bytes(out)
+
+
+def attempt(data: bytes) -> str:
+    """Load and use everything a command would use; the kind of outcome."""
+    try:
+        image = parse_image(data, "fuzz")
+    except LoadError:
+        return "refused"
+    assert len(image.flash()) == image.chip.program["flash"].size // 2
+    for address, word in image.words():
+        assert address % 2 == 0
+        assert 0 <= word <= 0xFFFFFF
+    image.symbols.text(0x104)
+    image.symbols.data(0x802)
+    image.lines.find(0x104)
+    return "loaded with unreadable debug information" if image.lines.broken else "loaded"
+
+
+def campaign(count: int, seed: int) -> Counter[str]:
+    """Outcomes of `count` mutated files. Raises whatever escapes the loader, with the input in a note."""
+    rng = random.Random(seed)
+    starts = seeds()
+    outcomes: Counter[str] = Counter()
+    for number in range(count):
+        data = mutate(starts[number % len(starts)], rng)
+        try:
+            outcomes[attempt(data)] += 1
+        except Exception as error:
+            error.add_note(f"seed {seed}, input {number}: {data.hex()}")
+            raise
+    return outcomes
+
+
+def main(arguments: list[str]) -> int:
+    count = int(arguments[0]) if arguments else 20_000
+    seed = int(arguments[1]) if len(arguments) > 1 else 1
+    start = time.monotonic()
+    outcomes = campaign(count, seed)
+    print(f"loader: {count} inputs, seed {seed}, {time.monotonic() - start:.1f} s: {dict(outcomes)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
