@@ -59,20 +59,37 @@ class Register:
         self.bus.on_write[self._word] = hook
 
 
+FLAG_WORDS: Final = 4
+"""The flag registers of a chip are consecutive and at most this many."""
+
+
+def flag_since(record: Record, flag_address: int, flag_bit: int) -> int:
+    """Index in `record.u64` of the cycle in which an interrupt flag was first 1: c of isa.md §14.3."""
+    table = record.fields.get("irq.since") or record.reserve("irq.since", "Q", 16 * FLAG_WORDS)
+    return table.index + (flag_address >> 1) % FLAG_WORDS * 16 + flag_bit
+
+
 class Irq:
     """One interrupt request line: setting it sets the IFS bit and makes the engine look."""
 
-    __slots__ = ("_bit", "_events", "_u16", "_word")
+    __slots__ = ("_bit", "_events", "_since", "_u16", "_u64", "_word")
 
     def __init__(self, record: Record, events: Events, flag_address: int, flag_bit: int) -> None:
         self._u16: Final = record.u16
+        self._u64: Final = record.u64
         self._events: Final = events
         self._word: Final = flag_address >> 1
         self._bit: Final = 1 << flag_bit
+        self._since: Final = flag_since(record, flag_address, flag_bit)
 
     def request(self) -> None:
-        """Set the interrupt flag; it first reads 1 in the cycle of the event that calls this."""
-        self._u16[self._word] |= self._bit
+        """Set the interrupt flag: it first reads 1 in the cycle of the event that calls this.
+
+        Called from an access hook instead, it counts as raised one cycle after that access (design §4.2).
+        """
+        if not self._u16[self._word] & self._bit:
+            self._u16[self._word] |= self._bit
+            self._u64[self._since] = self._events.now + (not self._events.firing)
         self._events.kick()
 
     @property

@@ -28,6 +28,8 @@ class Events:
         self._now = record.reserve("events.now", "Q").index
         self._deadline = record.reserve("events.deadline", "Q").index
         self._first = record.reserve("events.due", "Q", SLOTS).index
+        self.firing = False
+        """An event is being handled, as opposed to an access of an instruction or a call from outside."""
         self.names: Final[list[str]] = []
         self._fire: Final[list[Callable[[int], None]]] = []
         self._due = record.u64[self._first : self._first + SLOTS]
@@ -79,12 +81,17 @@ class Events:
         """Fire everything due at or before `cycle`, in order of (due, slot), and recompute the deadline."""
         due = self._due
         count = len(self._fire)
-        while True:
-            first = min(due[:count]) if count else NEVER
-            if first > cycle:
-                break
-            slot = next(index for index in range(count) if due[index] == first)
-            due[slot] = NEVER
-            self.now = first
-            self._fire[slot](first)
+        self.firing = True
+        try:
+            while True:
+                pending = due[:count].tolist()
+                first = min(pending, default=NEVER)
+                if first > cycle:
+                    break
+                slot = pending.index(first)
+                due[slot] = NEVER
+                self.now = first
+                self._fire[slot](first)
+        finally:
+            self.firing = False
         self._u64[self._deadline] = first

@@ -1,0 +1,107 @@
+"""Static facts about one decoded instruction, found by running its row against a builder that only takes notes.
+
+They are what the sequencer needs before and between instructions: which W registers form source addresses, which are
+written on the destination side (RAW stalls, isa.md §13.2), and how many data accesses there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from emu.dspic30f.isa.builder import Context, Side, Size
+from emu.dspic30f.isa.flow import Flow, Value
+from emu.dspic30f.isa.row import Insn
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What an instruction does, whatever the values are. Masks: bit n stands for Wn."""
+
+    source_pointers: int
+    """Registers that form a source EA: a write of one of them just before stalls (isa.md §13.2)."""
+    writes: int
+    """Registers written directly or through a modified destination pointer: sources of stalls."""
+    loads: int
+    stores: int
+    flow: type | None
+    """Class of the Flow returned, None for "next"."""
+
+
+class _Unknown:
+    """A value nobody computes: every operation on it is unknown too."""
+
+    def _same(self, *_operands: object) -> _Unknown:
+        return self
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = _same
+    __and__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = _same
+    __lshift__ = __rlshift__ = __rshift__ = __rrshift__ = __invert__ = __neg__ = _same
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _same  # type: ignore[assignment]
+    __hash__ = None  # type: ignore[assignment]
+
+
+_UNKNOWN = _Unknown()
+
+
+class _Notes:
+    """The builder that takes notes."""
+
+    def __init__(self, pc: int) -> None:
+        self.context = Context()
+        self.pc = pc
+        self.source_pointers = 0
+        self.writes = 0
+        self.loads = 0
+        self.stores = 0
+
+    def _value(self, *_arguments: object) -> Value:
+        return _UNKNOWN
+
+    select = div_trunc = rem_trunc = clz16 = ctz16 = let = w = prog = flag = reg = acc = _value
+
+    def _nothing(self, *_arguments: object, **_flags: object) -> None:
+        """Neither a stall nor a data access."""
+
+    table_write = set_flags = set_reg = set_acc = trap_math = _nothing
+
+    def set_w(self, n: int, v: Value) -> None:
+        self.writes |= 1 << n
+
+    set_wb = set_w
+
+    def ptr(self, n: int, side: Side) -> Value:
+        if side != "dst":
+            self.source_pointers |= 1 << n
+        return _UNKNOWN
+
+    def set_ptr(self, n: int, v: Value, side: Side) -> None:
+        if side == "dst":
+            self.writes |= 1 << n
+
+    def load(self, ea: Value, size: Size, side: Side = "src", ptr: int | None = None) -> Value:
+        self.loads += 1
+        return _UNKNOWN
+
+    def xload(self, ea: Value, ptr: int) -> Value:
+        return _UNKNOWN
+
+    yload = xload
+
+    def store(self, ea: Value, v: Value, size: Size, ptr: int | None = None) -> None:
+        self.stores += 1
+
+    def when(self, c: Value, fn: Callable[[], None]) -> None:
+        fn()
+
+
+@lru_cache(maxsize=65536)
+def facts_of(insn: Insn) -> Facts:
+    """The facts of a decoded instruction; they do not depend on where it stands."""
+    notes: Any = _Notes(0)
+    flow: Flow = insn.row.does(notes, insn.x)
+    return Facts(
+        notes.source_pointers, notes.writes, notes.loads, notes.stores, None if flow is None else type(flow)
+    )
