@@ -1,0 +1,95 @@
+"""`python -m emu COMMAND`: finds the command, turns mistakes of the caller into one line and an exit status.
+
+What enters: arguments. What leaves: an exit status. A command is one module of `emu.commands`, named in COMMANDS and
+imported only when it is asked for, with `parser() -> ArgumentParser` and `run(options) -> int`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Final, NoReturn
+
+COMMANDS: Final = {
+    "run": "run a firmware image and show what its UART says",
+    "disasm": "print a firmware image as assembly with symbols and source lines",
+    "info": "print sections, memory use, vectors and configuration words",
+}
+
+EXIT_OK: Final = 0
+EXIT_FAULT: Final = 1
+EXIT_BAD_INPUT: Final = 2
+"""Exit statuses of design §10."""
+
+_USAGE: Final = """usage: emu COMMAND [options]
+
+{commands}
+
+example: emu run firmware.elf --seconds 5
+`emu COMMAND --help` explains a command."""
+
+
+class CommandError(Exception):
+    """A mistake of the caller, told in one line."""
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse that keeps descriptions as written and ends with status 126 when `--exit-code` is wanted."""
+
+    def __init__(self, command: str, description: str, example: str) -> None:
+        super().__init__(
+            prog=f"emu {command}",
+            description=description,
+            epilog=f"example: {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        self.arguments: Sequence[str] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Print what is wrong in one line and leave."""
+        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        sys.exit(126 if "--exit-code" in self.arguments else EXIT_BAD_INPUT)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if not words or words[0] in ("-h", "--help"):
+        width = max(map(len, COMMANDS))
+        print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
+        return EXIT_OK if words else EXIT_BAD_INPUT
+    name, rest = words[0], words[1:]
+    if name not in COMMANDS:
+        print(f"emu: unknown command {name!r}; known are {', '.join(COMMANDS)}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    return _call(name, rest)
+
+
+def _call(name: str, rest: list[str]) -> int:
+    """Parse and run; refusals become one line on stderr."""
+    from emu.image import LoadError
+
+    bad_input = 126 if "--exit-code" in rest else EXIT_BAD_INPUT
+    command = import_module(f"emu.commands.{name}")
+    parser: Parser = command.parser()
+    parser.arguments = rest
+    options = parser.parse_args(rest)
+    try:
+        status: int = command.run(options)
+        sys.stdout.flush()
+    except (LoadError, CommandError) as error:
+        print(f"emu {name}: {error}", file=sys.stderr)
+        return bad_input
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
+        return EXIT_OK
+    except OSError as error:
+        print(f"emu {name}: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        return bad_input
+    except KeyboardInterrupt:
+        return EXIT_OK
+    return status

@@ -1,0 +1,169 @@
+"""`emu info`: what a firmware image contains, for people and (with --json) for scripts."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from emu.cli import EXIT_OK, Parser
+from emu.image import Image
+from emu.loader import load_image
+
+BYTES_PER_WORD = 3
+"""Flash bytes of one 24-bit program word, as data sheets count them."""
+
+
+def parser() -> Parser:
+    made = Parser("info", "Print sections, ROM and RAM use, vectors and configuration words.", "emu info firmware.elf")
+    made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    made.add_argument("--json", action="store_true", help="print one JSON object")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status: 0 printed, 2 bad input."""
+    facts = describe(load_image(options.image))
+    print(json.dumps(facts, indent=2) if options.json else text(facts))
+    return EXIT_OK
+
+
+def describe(image: Image) -> dict[str, Any]:
+    """Everything the command prints, as plain data. Sizes say their unit in their name."""
+    return {
+        "path": image.path,
+        "format": image.kind,
+        "chip": image.chip.name,
+        "entry": image.entry,
+        "warnings": list(image.warnings),
+        "sections": _sections(image),
+        "memory": _memory(image),
+        "vectors": _vectors(image),
+        "config": _config(image),
+    }
+
+
+def _sections(image: Image) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": section.name,
+            "kind": section.kind,
+            "address": section.address,
+            "load_address": section.load_address,
+            "program_words": section.program_words,
+            "ram_bytes": section.size if section.kind in ("data", "bss") else 0,
+        }
+        for section in image.sections
+        if section.kind != "info" and section.size
+    ]
+
+
+def _memory(image: Image) -> dict[str, Any]:
+    chip = image.chip
+    flash, ram, eeprom = chip.program["flash"], chip.data["ram"], chip.program["eedata"]
+    used = image.used(flash)
+    memory: dict[str, Any] = {
+        "flash_words": used,
+        "flash_words_total": flash.size // 2,
+        "flash_bytes": used * BYTES_PER_WORD,
+        "flash_bytes_total": flash.size // 2 * BYTES_PER_WORD,
+        "eeprom_bytes": 2 * image.used(eeprom),
+        "eeprom_bytes_total": eeprom.size,
+    }
+    if image.kind == "elf":
+        taken = {
+            address
+            for section in image.sections
+            if section.kind in ("data", "bss")
+            for address in range(section.address, min(section.address + section.size, ram.end))
+        }
+        memory |= {"ram_bytes": len(taken), "ram_bytes_total": ram.size}
+    return memory
+
+
+def _vectors(image: Image) -> list[dict[str, Any]]:
+    """Every vector the image defines, main and alternate table."""
+    found = []
+    for vector in image.chip.vectors:
+        for table, address in (("ivt", vector.ivt), ("aivt", vector.aivt)):
+            handler = image.word(address)
+            if handler is not None:
+                found.append(
+                    {
+                        "table": table,
+                        "name": vector.name,
+                        "address": address,
+                        "handler": handler,
+                        "symbol": image.symbols.text(handler) if len(image.symbols) else None,
+                    }
+                )
+    return found
+
+
+def _config(image: Image) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": register.name,
+            "address": register.address,
+            "value": word & 0xFFFF,
+            "fields": {name: register.field(word, name) for name in register.fields},
+        }
+        for register in image.chip.config.values()
+        if (word := image.word(register.address)) is not None
+    ]
+
+
+def text(facts: dict[str, Any]) -> str:
+    """The facts as lines for people."""
+    kind = {"elf": "ELF executable", "hex": "Intel HEX"}[facts["format"]]
+    lines = [f"{facts['path']}: {kind} for {facts['chip']}"]
+    lines += [f"warning: {warning}" for warning in facts["warnings"]]
+    if facts["sections"]:
+        lines += ["", f"{'section':24} {'kind':7} {'address':>8} {'loaded at':>10} {'size':>14}"]
+        lines += [_section_line(section) for section in facts["sections"]]
+    lines += ["", *_memory_lines(facts["memory"])]
+    if facts["vectors"]:
+        lines += ["", *_vector_lines(facts["vectors"])]
+    if facts["config"]:
+        lines.append("")
+    for register in facts["config"]:
+        fields = " ".join(f"{name}={value}" for name, value in register["fields"].items())
+        lines.append(f"{register['name']:8} {register['address']:#08x}  {register['value']:#06x}  {fields}")
+    return "\n".join(lines)
+
+
+def _section_line(section: dict[str, Any]) -> str:
+    loaded = "" if section["load_address"] is None else f"{section['load_address']:#08x}"
+    words = section["program_words"]
+    size = f"{words:8,} words" if words else f"{section['ram_bytes']:8,} bytes"
+    return f"{section['name']:24} {section['kind']:7} {section['address']:#08x} {loaded:>10} {size:>14}"
+
+
+def _memory_lines(memory: dict[str, Any]) -> list[str]:
+    rows = [("flash", "flash_bytes"), ("RAM", "ram_bytes"), ("EEPROM", "eeprom_bytes")]
+    lines = []
+    for name, key in rows:
+        if memory.get(key) is None or (key == "eeprom_bytes" and not memory[key]):
+            continue
+        used, total = memory[key], memory[key + "_total"]
+        note = f", {memory['flash_words']:,} program words" if key == "flash_bytes" else ""
+        lines.append(f"{name:7} {used:8,} of {total:,} bytes ({100 * used / total:.1f} %{note})")
+    return lines
+
+
+def _vector_lines(vectors: list[dict[str, Any]]) -> list[str]:
+    """Vectors with a handler of their own; the one most share is counted."""
+    handlers = [vector["handler"] for vector in vectors]
+    usual = max(set(handlers), key=handlers.count)
+    shared = [vector for vector in vectors if vector["handler"] == usual]
+    lines = []
+    for vector in vectors:
+        if vector["handler"] != usual or len(shared) == 1:
+            where = f"{vector['handler']:#08x}"
+            name = f"  {vector['symbol']}" if vector["symbol"] else ""
+            lines.append(f"{vector['table']:4} {vector['address']:#08x} {vector['name']:18} -> {where}{name}")
+    if len(shared) > 1:
+        name = f" ({shared[0]['symbol']})" if shared[0]["symbol"] else ""
+        other = "other " if lines else ""
+        lines.append(f"{len(shared)} {other}vectors -> {usual:#08x}{name}")
+    return lines
