@@ -1,0 +1,158 @@
+"""Effective addresses and pointer updates: indirect modes, modulo, bit-reversed, the stack (isa.md §3).
+
+The helpers form an address and update the pointer, in that order of a row's phases; the access comes later. They never
+return a masked difference: every address handed to ``load``/``store`` is already modulo 2**16.
+"""
+
+from __future__ import annotations
+
+from .builder import Builder, Side, Size
+from .fields import Operands
+from .flow import Value
+
+INDIRECT, POST_DEC, POST_INC, PRE_DEC, PRE_INC, INDEXED = range(1, 7)  # isa.md §3.1; 0 is register direct
+STACK_POINTER = 15
+
+
+def signed16(m: Builder, v: Value) -> Value:
+    """A 16-bit value read as two's complement."""
+    return m.let((v ^ 0x8000) - 0x8000)
+
+
+def advance(m: Builder, n: int, value: Value, delta: Value, side: Side) -> Value:
+    """The pointer ``value`` of Wn moved by ``delta`` bytes, with modulo addressing if Wn is selected (isa.md §3.6)."""
+    c = m.context
+    moved = value + delta
+    if side == "y":
+        enabled, first, last = bool(c.ymod and c.ywm == n), "YMODSRT", "YMODEND"
+    else:
+        reversed_writes = bool(side == "dst" and c.brev and c.bwm == n)  # they win over modulo, isa.md §3.7
+        enabled, first, last = bool(c.xmod and c.xwm == n and not reversed_writes), "XMODSRT", "XMODEND"
+    if enabled:
+        start, end = m.reg(first), m.reg(last)
+        length = m.let(end - start + 1)
+        moved = m.let(moved)
+        above = (delta > 0) & (moved > end)
+        below = (delta < 0) & (moved < start)
+        moved = m.select(above, moved - length, m.select(below, moved + length, moved))
+    return m.let(moved & 0xFFFF)
+
+
+def reverse_carry(m: Builder, value: Value, modifier: Value) -> Value:
+    """``value``<15:1> + ``modifier``<14:0> with the carry running downwards; bit 0 is kept (isa.md §3.7)."""
+    total = bit_reverse16(m, value & 0xFFFE) + bit_reverse16(m, (modifier << 1) & 0xFFFE)
+    return m.let(bit_reverse16(m, total & 0x7FFF) | (value & 1))
+
+
+def bit_reverse16(m: Builder, v: Value) -> Value:
+    """Bit i to bit 15 - i of a 16-bit value."""
+    for width, mask in ((1, 0x5555), (2, 0x3333), (4, 0x0F0F), (8, 0x00FF)):
+        v = m.let((v >> width) & mask | (v & mask) << width)
+    return v
+
+
+def indirect(
+    m: Builder, n: int, mode: int, step: int, side: Side, index: int | None = None, reversible: bool = False
+) -> Value:
+    """EA of Wn in an indirect ``mode``, and the pointer update.
+
+    ``step`` is the access size in bytes, ``index`` the register of [Wn+Wb], ``reversible`` marks a word write, the only
+    access to which bit-reversed addressing applies.
+    """
+    value = m.ptr(n, side)
+    if mode == INDIRECT:
+        return value
+    if mode == INDEXED:
+        assert index is not None
+        return advance(m, n, value, signed16(m, m.ptr(index, side)), side)
+    c = m.context
+    if reversible and mode in (POST_INC, PRE_INC) and c.brev and c.bwm == n:
+        moved = reverse_carry(m, value, m.reg("XBREV"))
+    else:
+        moved = advance(m, n, value, step if mode in (POST_INC, PRE_INC) else -step, side)
+    m.set_ptr(n, moved, side)
+    return moved if mode in (PRE_DEC, PRE_INC) else value
+
+
+def offset_address(m: Builder, n: int, offset: int, side: Side) -> Value:
+    """EA of [Wn+lit]. UNVERIFIED: modulo addressing is not applied to literal offsets (isa.md §3.6 names [Wn+Wb])."""
+    return m.let((m.ptr(n, side) + offset) & 0xFFFF)
+
+
+def truncated(v: Value, size: Size) -> Value:
+    """The low ``size`` bytes."""
+    return v & (0xFF if size == 1 else 0xFFFF)
+
+
+def set_register(m: Builder, n: int, v: Value, size: Size) -> None:
+    """Write Wn, or only its low byte (isa.md §2.2)."""
+    if size == 1:
+        m.set_wb(n, v)
+    else:
+        m.set_w(n, v)
+
+
+def size_of(x: Operands) -> Size:
+    """Access size chosen by the B field."""
+    return 1 if x.B else 2
+
+
+class Place:
+    """An operand whose address is formed: ``read`` and ``write`` it in the later phases of a row.
+
+    A direct register is read at once, before any pointer moves: the data operand is the old value (isa.md §3.4).
+    """
+
+    __slots__ = ("ea", "held", "m", "register", "size")
+
+    def __init__(self, m: Builder, register: int, ea: Value | None, size: Size) -> None:
+        self.m = m
+        self.register = register
+        self.ea = ea
+        self.size = size
+        self.held: Value = None
+
+    def read(self) -> Value:
+        """The operand, zero-extended."""
+        return self.held if self.ea is None else self.m.load(self.ea, self.size, ptr=self.register)
+
+    def write(self, v: Value) -> None:
+        """Store the low bits of ``v``; of a direct register, a byte write keeps the high byte."""
+        if self.ea is None:
+            set_register(self.m, self.register, v, self.size)
+        else:
+            self.m.store(self.ea, v, self.size, ptr=self.register)
+
+
+def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:
+    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index."""
+    mode = x.p if mode is None else mode
+    if mode:
+        return Place(m, x.s, indirect(m, x.s, mode, size, "src", x.w if mode >= INDEXED else None), size)
+    place = Place(m, x.s, None, size)
+    place.held = truncated(m.w(x.s), size)
+    return place
+
+
+def destination(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:
+    """Wd in mode ``q``, or in ``mode`` of the 8-mode set; only written. Follows ``source``, whose update it sees."""
+    mode = x.q if mode is None else mode
+    if mode:
+        index = x.w if mode >= INDEXED else None
+        return Place(m, x.d, indirect(m, x.d, mode, size, "dst", index, reversible=size == 2), size)
+    return Place(m, x.d, None, size)
+
+
+def push(m: Builder, *values: Value) -> None:
+    """Store words at [W15++] (isa.md §3.5)."""
+    top = m.ptr(STACK_POINTER, "dst")
+    m.set_ptr(STACK_POINTER, (top + 2 * len(values)) & 0xFFFF, "dst")
+    for i, value in enumerate(values):
+        m.store((top + 2 * i) & 0xFFFF, value, 2, ptr=STACK_POINTER)
+
+
+def pop_addresses(m: Builder, count: int) -> list[Value]:
+    """Lower W15 by ``count`` words; the addresses of the popped words, lowest first."""
+    top = m.ptr(STACK_POINTER, "src")
+    m.set_ptr(STACK_POINTER, (top - 2 * count) & 0xFFFF, "src")
+    return [(top - 2 * (count - i)) & 0xFFFF for i in range(count)]

@@ -1,0 +1,103 @@
+"""Row: one instruction form. Insn: one decoded instruction, a row and its field values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+from .builder import Builder
+from .fields import Clause, Field, Operands, Pattern, parse_constraints, parse_pattern, rules_of
+from .flow import Flow
+
+Does = Callable[[Builder, Operands], Flow]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One instruction form, as it stands in the table.
+
+    id           row number of reference isa.csv
+    syntax       operands in assembly order; ``{.B}``: byte form by field B; ``{.W}``: suffix printed, optional to write
+    bits, word2  patterns (fields.py); ``word2`` is empty for one-word instructions
+    flags        SR bits the instruction may change; ``Z=s`` is the sticky Z of ADDC and SUBB (isa.md §5)
+    does         the meaning, against a Builder
+    cycles       without stalls, PSV, skip or taken branch (isa.md §13.1)
+    constraints  rules on field values beyond the pattern and FIELD_RULES
+    repeat_ok    may follow REPEAT (isa.md §7.5)
+    psv_class    "mov": one extra cycle for a PSV read, "other": two (isa.md §13.3)
+    """
+
+    id: int
+    syntax: str
+    bits: str
+    flags: str
+    does: Does = field(repr=False)
+    word2: str = ""
+    cycles: int = 1
+    constraints: str = ""
+    repeat_ok: bool = True
+    psv_class: Literal["mov", "other"] = "other"
+
+    @property
+    def source(self) -> str:
+        """Where the row comes from."""
+        return f"PRM {self.mnemonic}; isa.csv {self.id}"
+
+    @cached_property
+    def mnemonic(self) -> str:
+        """Upper case, without optional suffix: ADD, BTST.C, DIV.S."""
+        return re.split(r"[ {]", self.syntax)[0]
+
+    @cached_property
+    def words(self) -> int:
+        """Length in instruction words."""
+        return 2 if self.word2 else 1
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """Fixed bits and fields of both words."""
+        return parse_pattern(self.bits, self.word2) if self.word2 else parse_pattern(self.bits)
+
+    @cached_property
+    def fields(self) -> Mapping[str, Field]:
+        """Fields by letter."""
+        return {f.letter: f for f in self.pattern.fields}
+
+    @cached_property
+    def clauses(self) -> tuple[Clause, ...]:
+        """The rules of its fields and its own constraints, parsed."""
+        return rules_of(self.pattern) + parse_constraints(self.constraints)
+
+    def broken(self, x: Operands) -> tuple[Clause, ...]:
+        """The clauses that these field values violate; empty for a legal instruction."""
+        return tuple(c for c in self.clauses if not c.holds(lambda letter: getattr(x, letter)))
+
+
+class Insn:
+    """One instruction: ``row``, field values ``x`` and the words it came from. Equal if row and values are equal."""
+
+    __slots__ = ("_key", "row", "word1", "word2", "x")
+
+    def __init__(self, row: Row, x: Operands, word1: int, word2: int) -> None:
+        self.row = row
+        self.x = x
+        self.word1 = word1
+        self.word2 = word2
+        self._key = (row.id, *(getattr(x, letter) for letter in row.fields))
+
+    @property
+    def words(self) -> int:
+        """Length in instruction words, 1 or 2."""
+        return self.row.words
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Insn) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __repr__(self) -> str:
+        return f"<{self.row.syntax}: {self.x}>"
