@@ -1,0 +1,147 @@
+"""The C front end: runs the clang inside the `ziglang` wheel. C in; LLVM IR text, preprocessed text, dependencies out.
+
+The MSP430 target is borrowed for its data layout, which is XC16's (abi-elf.md §1.1); nothing of its code generator is
+used. This is the only module that starts clang.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from toolchain.cc_options import CcOptions, Input
+from toolchain.errors import ToolError
+
+INCLUDE_DIR = Path(__file__).parent / "include"
+
+TARGET_FLAGS = [
+    "--target=msp430",
+    "-fno-unwind-tables",
+    "-fno-asynchronous-unwind-tables",
+    "-fno-stack-protector",
+    "-fno-vectorize",
+    "-fno-slp-vectorize",
+]
+# Plain char is signed (abi-elf.md §1.1; MSP430 says unsigned), wchar_t is unsigned short.
+LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident"]
+# Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
+ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "fwrite", "fputc", "fputs", "exp2", "exp2f", "exp10", "ldexp",
+                    "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf"]  # fmt: skip
+# abi-elf.md §2.9 predefined macros; __XC16__ and __C30__ stay undefined, they select Microchip's attribute spellings.
+PREDEFINED = ["__dsPIC30F6014A__", "__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_CODEGUARD__",
+              "__HAS_5VOLTS__"]  # fmt: skip
+FOREIGN_MACROS = ["MSP430", "__MSP430__"]
+ATTRIBUTE_WORDS = ["interrupt", "auto_psv", "no_auto_psv", "shadow"]
+CLANG_LEVEL = {"0": "-O0", "1": "-O1", "2": "-O2", "s": "-Oz"}
+
+
+class CompileError(Exception):
+    """clang reported errors, which are already on stderr; the driver exits with status 1."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One clang run: `arguments` without the program, the input it is about, and whether it ended well."""
+
+    arguments: list[str]
+    source: Path
+
+
+def clang_program() -> list[str]:
+    """Command prefix that runs clang. Raises ToolError when the `ziglang` package is missing."""
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or spec.origin is None:
+        raise ToolError("the C front end is missing: install the Python package 'ziglang' (pip install ziglang)")
+    zig = Path(spec.origin).parent / ("zig.exe" if os.name == "nt" else "zig")
+    return [str(zig), "clang"]
+
+
+def builtin_include_dir() -> Path:
+    """clang's own headers (stdatomic.h, iso646.h, ...), searched after ours."""
+    return Path(clang_program()[0]).parent / "lib" / "include"
+
+
+def _attribute_macro(word: str, name: str) -> str:
+    keep = "__used__," if word == "interrupt" else ""
+    return f'-D{name}={keep}__annotate__("{word}")'
+
+
+def front_end_flags(options: CcOptions) -> list[str]:
+    """Flags that give C source the meaning it has on this target, followed by the user's own."""
+    flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
+    flags += [f"-U{name}" for name in FOREIGN_MACROS]
+    flags += [f"-D{name}=1" for name in PREDEFINED]
+    flags += [_attribute_macro(word, f"__{word}__") for word in ATTRIBUTE_WORDS]
+    if options.xc16_attributes:
+        flags += [_attribute_macro(word, word) for word in ATTRIBUTE_WORDS]
+    flags += [f"-fno-builtin-{name}" for name in ABSENT_FUNCTIONS]
+    if options.single_constants:
+        flags += ["-Xclang", "-cl-single-precision-constant"]
+    if options.debug:
+        flags += ["-g", "-gdwarf-2"]
+    flags += options.clang
+    return [*flags, "-isystem", str(INCLUDE_DIR), "-isystem", str(builtin_include_dir())]
+
+
+def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
+    """The -MD family: `-MF` defaults to a .d file beside the output, the target to the file the driver writes."""
+    flags = list(options.dependency)
+    if not {"-MD", "-MMD"} & set(flags):
+        return flags
+    output = options.output or Path(item.path.stem + ".o")
+    if "-MF" not in flags:
+        beside = output if len(options.inputs) == 1 else output.parent / item.path.name
+        flags += ["-MF", str(beside.with_suffix(".d"))]
+    if "-MT" not in flags and "-MQ" not in flags:
+        flags += ["-MQ", str(output)]
+    return flags
+
+
+def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
+    """Job that turns one C file into unoptimised IR text carrying the level's attributes."""
+    arguments = [*front_end_flags(options), *_dependency_flags(options, item)]
+    arguments += ["-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S", "-x", item.language, str(item.path)]
+    return Job([*arguments, "-o", str(output)], item.path)
+
+
+def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
+    """Job for -E, -M and -fsyntax-only; output None is stdout."""
+    arguments = [*front_end_flags(options), *_dependency_flags(options, item)]
+    if item.language == "assembler-with-cpp":
+        arguments.append("-D__ASSEMBLER__=1")
+    if "-fsyntax-only" not in options.clang and not {"-M", "-MM"} & set(options.dependency):
+        arguments.append("-E")
+    arguments += ["-x", item.language, str(item.path)]
+    return Job(arguments if output is None else [*arguments, "-o", str(output)], item.path)
+
+
+def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
+    """Job that runs clang's middle end once over IR."""
+    passed = [flag for flag in options.clang if flag.startswith(("-funroll", "-fno-unroll", "-ffast", "-fno-inline"))]
+    arguments = [*TARGET_FLAGS, CLANG_LEVEL[options.level], *passed, "-Wno-override-module", "-x", "ir"]
+    return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
+
+
+def run_jobs(jobs: list[Job], parallel: int) -> None:
+    """Run `jobs`, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
+
+    Raises CompileError after the last job when any of them failed.
+    """
+    program = clang_program()
+    colour = ["-fdiagnostics-color=always"] if os.isatty(2) else []
+
+    def run(job: Job) -> subprocess.CompletedProcess[bytes]:
+        return subprocess.run([*program, *colour, *job.arguments], capture_output=True, check=False)
+
+    with ThreadPoolExecutor(max_workers=parallel or os.cpu_count() or 1) as pool:
+        results = list(pool.map(run, jobs))
+    for result in results:
+        sys.stderr.write(result.stderr.decode(errors="replace").replace("zig: ", "cc: "))
+        sys.stdout.write(result.stdout.decode(errors="replace"))
+    if any(result.returncode != 0 for result in results):
+        raise CompileError

@@ -1,0 +1,96 @@
+"""Writes `include/dspic30f6014a.h` from the chip's register table: `python -m toolchain.device_header`.
+
+Enters: `emu.chips`. Leaves: one C header that both this compiler and XC16 accept. A test compares the committed file
+with the generator's output.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from emu.chips.chip import Chip, Sfr
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from toolchain.files import write_outputs
+
+HEADER = Path(__file__).parent / "include" / "dspic30f6014a.h"
+C_TYPES = {1: "unsigned char", 2: "unsigned int"}
+
+
+def bit_fields(sfr: Sfr, only_bits: bool = False) -> Iterator[str]:
+    """Members of one bit-field struct, low bit first; gaps are unnamed fields.
+
+    With `only_bits` each bit of a wide field is a member of its own (TCKPS -> TCKPS0, TCKPS1), as in XC16's headers.
+    """
+    position = 0
+    for name, (lsb, width) in sorted(sfr.fields.items(), key=lambda item: item[1]):
+        if only_bits and (width == 1 or any(f"{name}{bit}" in sfr.fields for bit in range(width))):
+            continue
+        if lsb > position:
+            yield f"unsigned :{lsb - position};"
+        if only_bits:
+            yield " ".join(f"unsigned {name}{bit}:1;" for bit in range(width))
+        else:
+            yield f"unsigned {name}:{width};"
+        position = lsb + width
+
+
+def struct_type(sfr: Sfr) -> str:
+    """The `typedef` of one register's bit-field struct or union."""
+    whole = " ".join(bit_fields(sfr))
+    single = " ".join(bit_fields(sfr, only_bits=True))
+    name = f"{sfr.name}BITS"
+    if not single:
+        return f"typedef struct {{ {whole} }} {name};"
+    return f"typedef union {{\n  struct {{ {whole} }};\n  struct {{ {single} }};\n}} {name};"
+
+
+def declarations(sfr: Sfr) -> Iterator[str]:
+    """Everything the header says about one register."""
+    yield f"extern volatile {C_TYPES[sfr.size]} {sfr.name} DSPIC_SFR; /* 0x{sfr.address:04X} */"
+    if sfr.fields:
+        yield struct_type(sfr)
+        yield f"extern volatile {sfr.name}BITS {sfr.name}bits DSPIC_SFR;"
+
+
+def bit_macros(chip: Chip) -> Iterator[str]:
+    """`_T1IF` for `IFS0bits.T1IF`: one per field name that belongs to one register only."""
+    uses = Counter(field for sfr in chip.sfrs.values() for field in sfr.fields)
+    for sfr in chip.sfrs.values():
+        for field in sfr.fields:
+            if uses[field] == 1:
+                yield f"#define _{field} {sfr.name}bits.{field}"
+
+
+def header(chip: Chip) -> str:
+    """The whole header as text."""
+    lines = [
+        f"/* Registers of the {chip.name}.",
+        " * Written by `python -m toolchain.device_header` from the chip's register table; do not edit. */",
+        "#ifndef DSPIC30F6014A_H",
+        "#define DSPIC30F6014A_H",
+        "",
+        "#include \"dspic_compiler.h\"",
+        "",
+        "#ifdef __cplusplus",
+        "extern \"C\" {",
+        "#endif",
+        "",
+    ]  # fmt: skip
+    for sfr in chip.sfrs.values():
+        lines += declarations(sfr)
+    lines += ["", "/* Bits whose name is unique on this chip. */", *bit_macros(chip), ""]
+    lines += ["#ifdef __cplusplus", "}", "#endif", "", "#endif", ""]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Rewrite the committed header."""
+    write_outputs([(HEADER, header(DSPIC30F6014A).encode())])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,9 @@
+/* C11 7.2. A failed assertion prints through __putchar and ends the program as abort() does. */
+#undef assert
+#ifdef NDEBUG
+#define assert(condition) ((void)0)
+#else
+_Noreturn void __assert_fail(const char *condition, const char *file, int line);
+#define assert(condition) ((condition) ? (void)0 : __assert_fail(#condition, __FILE__, __LINE__))
+#endif
+#define static_assert _Static_assert

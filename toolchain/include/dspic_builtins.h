@@ -1,0 +1,91 @@
+/* XC16's device builtins (abi-elf.md §2.9) for this compiler; the driver includes this file before every C source. */
+#ifndef DSPIC_BUILTINS_H
+#define DSPIC_BUILTINS_H
+#ifndef __ASSEMBLER__
+
+#define __builtin_nop() __asm__ volatile("nop")
+#define __builtin_clrwdt() __asm__ volatile("clrwdt")
+#define __builtin_pwrsav(mode) __asm__ volatile("pwrsav #%0" ::"i"(mode) : "memory")
+#define __builtin_disi(cycles) __asm__ volatile("disi #%0" ::"i"(cycles) : "memory")
+#define __builtin_software_breakpoint() __asm__ volatile(".pword 0xDA4000" ::: "memory")
+
+/* One unlocked byte write: two keys and the value in consecutive byte moves (dspic30f6014a.md §3). */
+#define __dspic_unlocked_write(address, key1, key2, value)                          \
+  __asm__ volatile("mov.b %0,[%3]\n\tmov.b %1,[%3]\n\tmov.b %2,[%3]" ::"r"(key1),   \
+                   "r"(key2), "r"((unsigned)(value)), "r"((unsigned)(address)) : "memory")
+#define __builtin_write_OSCCONL(value) __dspic_unlocked_write(0x742u, 0x46u, 0x57u, value)
+#define __builtin_write_OSCCONH(value) __dspic_unlocked_write(0x743u, 0x78u, 0x9Au, value)
+#define __builtin_write_NVM()                                                                    \
+  __asm__ volatile("mov %0,_NVMKEY\n\tmov %1,_NVMKEY\n\tbset _NVMCON,#15\n\tnop\n\tnop" ::"r"(0x55u), \
+                   "r"(0xAAu) : "memory")
+
+#define __dspic_table_read(instruction, offset)                                               \
+  (__extension__({                                                                            \
+    unsigned int __value;                                                                     \
+    __asm__ volatile(instruction " [%1],%0" : "=r"(__value) : "r"((unsigned int)(offset)));   \
+    __value;                                                                                  \
+  }))
+#define __builtin_tblrdl(offset) __dspic_table_read("tblrdl", offset)
+#define __builtin_tblrdh(offset) __dspic_table_read("tblrdh", offset)
+#define __builtin_tblrdlb(offset) ((unsigned char)__dspic_table_read("tblrdl.b", offset))
+#define __builtin_tblrdhb(offset) ((unsigned char)__dspic_table_read("tblrdh.b", offset))
+#define __dspic_table_write(instruction, offset, value) \
+  __asm__ volatile(instruction " %0,[%1]" ::"r"((unsigned int)(value)), "r"((unsigned int)(offset)) : "memory")
+#define __builtin_tblwtl(offset, value) __dspic_table_write("tblwtl", offset, value)
+#define __builtin_tblwth(offset, value) __dspic_table_write("tblwth", offset, value)
+#define __builtin_tblwtlb(offset, value) __dspic_table_write("tblwtl.b", offset, value)
+#define __builtin_tblwthb(offset, value) __dspic_table_write("tblwth.b", offset, value)
+
+#define __dspic_address(operator, object)                                     \
+  (__extension__({                                                            \
+    unsigned int __value;                                                     \
+    __asm__("mov #" operator "(%1),%0" : "=r"(__value) : "i"(object));        \
+    __value;                                                                  \
+  }))
+#define __builtin_tblpage(object) __dspic_address("tblpage", object)
+#define __builtin_tbloffset(object) __dspic_address("tbloffset", object)
+#define __builtin_psvpage(object) __dspic_address("psvpage", object)
+#define __builtin_psvoffset(object) __dspic_address("psvoffset", object)
+
+#define __builtin_mulss(a, b) ((long)(int)(a) * (int)(b))
+#define __builtin_muluu(a, b) ((unsigned long)(unsigned int)(a) * (unsigned int)(b))
+#define __builtin_mulsu(a, b) ((long)(int)(a) * (long)(unsigned int)(b))
+#define __builtin_mulus(a, b) ((long)(unsigned int)(a) * (long)(int)(b))
+
+/* 32/16-bit divides in hardware; results are meaningless when the quotient does not fit 16 bits (isa.md §6.7). */
+int __dspic_divsd(long dividend, int divisor);
+unsigned int __dspic_divud(unsigned long dividend, unsigned int divisor);
+int __dspic_modsd(long dividend, int divisor);
+unsigned int __dspic_modud(unsigned long dividend, unsigned int divisor);
+int __dspic_divmodsd(long dividend, int divisor, int *remainder);
+unsigned int __dspic_divmodud(unsigned long dividend, unsigned int divisor, unsigned int *remainder);
+int __dspic_divf(int numerator, int denominator);
+#define __builtin_divsd __dspic_divsd
+#define __builtin_divud __dspic_divud
+#define __builtin_modsd __dspic_modsd
+#define __builtin_modud __dspic_modud
+#define __builtin_divmodsd __dspic_divmodsd
+#define __builtin_divmodud __dspic_divmodud
+#define __builtin_divf __dspic_divf
+
+#define __builtin_btg(object, bit)                                                          \
+  do {                                                                                      \
+    unsigned int __value;                                                                   \
+    __asm__ volatile("mov [%1],%0\n\tbtg %0,#%2\n\tmov %0,[%1]"                            \
+                     : "=&r"(__value) : "r"(object), "i"(bit) : "memory");                  \
+  } while (0)
+
+/* SR<7:5> is the CPU priority (isa.md §2.3). */
+#define __builtin_get_isr_state()                                                       \
+  (__extension__({                                                                      \
+    unsigned int __value;                                                               \
+    __asm__ volatile("mov _SR,%0\n\tlsr %0,#5,%0\n\tand %0,#7,%0" : "=r"(__value));     \
+    __value;                                                                            \
+  }))
+void __dspic_set_isr_state(unsigned int level);
+#define __builtin_set_isr_state(level) __dspic_set_isr_state(level)
+#define __builtin_disable_interrupts() __dspic_set_isr_state(7)
+#define __builtin_enable_interrupts() __dspic_set_isr_state(0)
+
+#endif
+#endif

@@ -1,0 +1,2 @@
+/* Microchip's name of the header that selects the device; there is one device here. */
+#include "dspic30f6014a.h"

@@ -1,0 +1,9 @@
+/* C11 7.13: W8-W15 and the return address (abi-elf.md §2.1). */
+#ifndef SETJMP_H
+#define SETJMP_H
+
+typedef unsigned int jmp_buf[10];
+int setjmp(jmp_buf environment) __attribute__((__returns_twice__));
+_Noreturn void longjmp(jmp_buf environment, int value);
+
+#endif

@@ -1,0 +1,16 @@
+/* C11 7.19. */
+#ifndef STDDEF_H
+#define STDDEF_H
+
+typedef __SIZE_TYPE__ size_t;
+typedef __PTRDIFF_TYPE__ ptrdiff_t;
+typedef __WCHAR_TYPE__ wchar_t;
+typedef struct {
+  long long align_integer;
+  long double align_float;
+} max_align_t;
+
+#define NULL ((void *)0)
+#define offsetof(type, member) __builtin_offsetof(type, member)
+
+#endif

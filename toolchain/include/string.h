@@ -1,0 +1,29 @@
+/* C11 7.24, without locales; plus the POSIX functions that firmware uses. */
+#ifndef STRING_H
+#define STRING_H
+
+#include <stddef.h>
+
+void *memcpy(void *restrict to, const void *restrict from, size_t count);
+void *memmove(void *to, const void *from, size_t count);
+void *memset(void *to, int value, size_t count);
+int memcmp(const void *left, const void *right, size_t count);
+void *memchr(const void *in, int value, size_t count);
+char *strcpy(char *restrict to, const char *restrict from);
+char *strncpy(char *restrict to, const char *restrict from, size_t count);
+char *strcat(char *restrict to, const char *restrict from);
+char *strncat(char *restrict to, const char *restrict from, size_t count);
+int strcmp(const char *left, const char *right);
+int strncmp(const char *left, const char *right, size_t count);
+char *strchr(const char *in, int value);
+char *strrchr(const char *in, int value);
+char *strstr(const char *in, const char *what);
+char *strpbrk(const char *in, const char *accept);
+size_t strspn(const char *in, const char *accept);
+size_t strcspn(const char *in, const char *reject);
+char *strtok(char *restrict in, const char *restrict separators);
+size_t strlen(const char *in);
+size_t strnlen(const char *in, size_t limit);
+char *strerror(int number);
+
+#endif

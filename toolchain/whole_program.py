@@ -1,0 +1,94 @@
+"""Merge LLVM modules and make internal every symbol that nothing outside the merged module can name.
+
+Enters: IR (text or bitcode) per C file and the set of assembler names used by native objects. Leaves: one module.
+IR travels as text: writing bitcode makes clang assemble file-scope asm, which it would read as MSP430 code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import llvmlite.binding as llvm
+
+from toolchain.errors import ToolError
+
+# Functions that code generation may call by name although no IR call exists (abi-elf.md §2.8): a program that brings
+# its own version keeps it visible for them.
+IMPLICIT_CALLEES = re.compile(r"mem(cpy|move|set|cmp)|__\w+[sdht][fi]\d?|__\w+[sd]f[sd]i|abort|exit|__putchar")
+# abi-elf.md §2.7: the linker finds handlers by these names.
+VECTOR_NAME = re.compile(r"_(Alt)?\w*(Interrupt\d*|OscillatorFail|AddressError|StackError|MathError|ReservedTrap\d)")
+VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.weak_odr, llvm.Linkage.linkonce_any,
+                    llvm.Linkage.linkonce_odr, llvm.Linkage.common}  # fmt: skip
+BITCODE_MAGIC = b"BC\xc0\xde"
+ASSEMBLER_NAME = re.compile(r"\b_([A-Za-z_]\w*)")
+
+
+def read_module(source: Path, content: bytes) -> llvm.ModuleRef:
+    """Parse IR text or bitcode. Raises ToolError naming `source`."""
+    try:
+        if is_bitcode(content):
+            return llvm.parse_bitcode(content)
+        return llvm.parse_assembly(content.decode())
+    except (RuntimeError, UnicodeDecodeError) as error:
+        raise ToolError(f"{source}: not readable as LLVM IR: {str(error).strip()}") from error
+
+
+def is_bitcode(content: bytes) -> bool:
+    """True for LLVM bitcode, which is what `-flto -c` writes."""
+    return content.startswith(BITCODE_MAGIC)
+
+
+def merge(modules: list[tuple[Path, llvm.ModuleRef]]) -> llvm.ModuleRef:
+    """Link modules in order; the first one receives the others. Raises ToolError listing every clashing definition."""
+    clashes = _duplicate_definitions(modules)
+    if clashes:
+        raise ToolError.of(clashes)
+    merged = modules[0][1]
+    for source, module in modules[1:]:
+        try:
+            merged.link_in(module)
+        except RuntimeError as error:
+            raise ToolError(f"{source}: {str(error).strip()}") from error
+    return merged
+
+
+def names_in_inline_assembly(text: str) -> set[str]:
+    """C names that inline assembly anywhere in the module's text refers to as `_name`."""
+    names: set[str] = set()
+    for line in text.splitlines():
+        if " asm " in line:
+            quoted = line[line.index(" asm ") :]
+            names.update(ASSEMBLER_NAME.findall(re.sub(r"\\[0-9A-Fa-f]{2}", " ", quoted)))
+    return names
+
+
+def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
+    """Give `internal` linkage to every definition except entry, vectors, implicit callees and the names given.
+
+    `assembler_names` are object-file names, with the leading underscore of C names (abi-elf.md §2.6).
+    """
+    keep = {name[1:] for name in assembler_names if name.startswith("_")} | {"main"}
+    keep |= names_in_inline_assembly(str(module))
+    for value in [*module.functions, *module.global_variables]:
+        if value.is_declaration or value.linkage not in VISIBLE_LINKAGES:
+            continue
+        name = value.name
+        if name in keep or name.startswith("llvm.") or VECTOR_NAME.fullmatch(name) or IMPLICIT_CALLEES.fullmatch(name):
+            continue
+        value.linkage = llvm.Linkage.internal
+
+
+def _duplicate_definitions(modules: list[tuple[Path, llvm.ModuleRef]]) -> list[str]:
+    """One line per strong symbol that more than one module defines, naming all of them."""
+    owners: dict[str, list[Path]] = {}
+    for source, module in modules:
+        for value in [*module.functions, *module.global_variables]:
+            if not value.is_declaration and value.linkage is llvm.Linkage.external:
+                owners.setdefault(value.name, []).append(source)
+    return [
+        f"error: duplicate symbol '{name}': defined in {', '.join(map(str, files))}"
+        for name, files in owners.items()
+        if len(files) > 1
+    ]
