@@ -6,10 +6,10 @@ a rule of their row, for disassembly; ``decode_for_execution`` is what the CPU o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
-from .fields import Operands
+from .fields import Clause, Operands
 from .row import Insn, Row
 from .table import BY_BYTE
 
@@ -17,7 +17,13 @@ CACHE_WORDS = 1 << 17  # more than twice the flash of the chip
 
 
 class EncodeError(ValueError):
-    """The field values do not fit the row; the text says which and why."""
+    """Field values that do not fit the row: a rule of it is broken, or field ``letter`` cannot hold ``value``."""
+
+    def __init__(self, row: Row, letter: str, value: int, clause: Clause | None, text: str) -> None:
+        super().__init__(f"{row.syntax}: {text}")
+        self.letter = letter
+        self.value = value
+        self.clause = clause
 
 
 def _operands(row: Row, word1: int, word2: int) -> Operands:
@@ -70,21 +76,27 @@ def decode_for_execution(word1: int, word2: int = 0) -> Insn | None:
     return insn
 
 
-def encode(row: Row, operands: Operands | Mapping[str, int], strict: bool = True) -> tuple[int, ...]:
-    """The words of an instruction from field values; fields not given are 0. EncodeError if they break a rule."""
-    given = dict(operands) if isinstance(operands, Mapping) else None
+def encode(
+    row: Row, operands: Operands | Mapping[str, int], tolerate: Sequence[tuple[str, int]] = ()
+) -> tuple[int, ...]:
+    """The words of an instruction from field values; fields of a mapping that are not given are 0.
+
+    EncodeError if they break a rule; ``tolerate`` lists (rule, value) pairs to let pass.
+    """
     words = list(row.pattern.value)
     x = Operands()
     for field in row.pattern.fields:
-        value = given.get(field.letter, 0) if given is not None else getattr(operands, field.letter)
-        setattr(x, field.letter, value)
+        letter = field.letter
+        value = operands.get(letter, 0) if isinstance(operands, Mapping) else getattr(operands, letter)
+        setattr(x, letter, value)
         try:
             bits = field.put(value)
         except ValueError as error:
-            raise EncodeError(f"{row.syntax}: field {field.letter}: {error}") from None
+            raise EncodeError(row, letter, value, None, f"field {letter}: {error}") from None
         words[0] |= bits[0]
         words[1] |= bits[1]
-    if strict:
-        for clause in row.broken(x):
-            raise EncodeError(f"{row.syntax}: {clause.text} does not hold")
+    for clause in row.broken(x):
+        value = getattr(x, clause.letter)
+        if (clause.text, value) not in tolerate:
+            raise EncodeError(row, clause.letter, value, clause, f"{clause.text} does not hold")
     return tuple(words[: row.words])

@@ -13,7 +13,7 @@ from .forms import WREG, f_only, f_to_wreg
 from .row import Does, Row
 
 mov = partial(Row, psv_class="mov")
-mvd = partial(mov, cycles=2, repeat_ok=False)
+mvd = partial(mov, cycles=2, repeat_ok=False)  # pairs begin at even registers
 tbr = partial(Row, cycles=2, constraints="p>=1")
 tbw = partial(Row, cycles=2, constraints="q>=1")
 
@@ -146,23 +146,23 @@ def table_write_high(m: Builder, x: Operands) -> None:
 ROWS = (
     Row(169, "MOV{.B} f",                "1011 1111 1B1f ffff ffff ffff", "N Z", f_only(test)),
     Row(170, "MOV{.B} f, WREG",          "1011 1111 1B0f ffff ffff ffff", "N Z", f_to_wreg(test)),
-    Row(171, "MOV{.B} WREG, f",          "1011 0111 1B1f ffff ffff ffff", "",    wreg_to_f),
-    mov(172, "MOV{.W} f, Wnd",           "1000 0fff ffff ffff ffff dddd", "",    f_to_wnd),
-    Row(173, "MOV{.W} Wns, f",           "1000 1fff ffff ffff ffff ssss", "",    wns_to_f),
-    Row(174, "MOV.B #lit8, Wnd",         "1011 0011 1100 kkkk kkkk dddd", "",    literal_byte),
-    Row(175, "MOV{.W} #lit16, Wnd",      "0010 kkkk kkkk kkkk kkkk dddd", "",    literal_word),
-    mov(176, "MOV{.B} [Ws+Slit10], Wnd", "1001 0ooo oBoo oddd dooo ssss", "",    load_with_offset),
-    Row(177, "MOV{.B} Wns, [Wd+Slit10]", "1001 1ooo oBoo oddd dooo ssss", "",      store_with_offset),
-    mov(178, "MOV{.B} Ws, Wd",           "0111 1www wBhh hddd dggg ssss", "",      move),
-    mvd(179, "MOV.D Ws, Wnd",            "1011 1110 0000 0ddd 0ppp ssss", "",      load_pair, constraints="p=0: s even"),
-    mvd(180, "MOV.D Wns, Wd",            "1011 1110 10qq qddd d000 sss0", "",      store_pair, constraints="q>=1"),
-    Row(181, "EXCH Wns, Wnd",            "1111 1101 0000 0ddd d000 ssss", "",      exchange),
-    Row(182, "SWAP{.B} Wn",              "1111 1101 1B00 0000 0000 ssss", "",      swap),
+    Row(171, "MOV{.B} WREG, f",          "1011 0111 1B1f ffff ffff ffff", "",   wreg_to_f),
+    mov(172, "MOV{.W} f, Wnd",           "1000 0fff ffff ffff ffff dddd", "",   f_to_wnd),
+    Row(173, "MOV{.W} Wns, f",           "1000 1fff ffff ffff ffff ssss", "",   wns_to_f),
+    Row(174, "MOV.B #lit8, Wnd",         "1011 0011 1100 kkkk kkkk dddd", "",   literal_byte),
+    Row(175, "MOV{.W} #lit16, Wnd",      "0010 kkkk kkkk kkkk kkkk dddd", "",   literal_word),
+    mov(176, "MOV{.B} [Ws+Slit10], Wnd", "1001 0ooo oBoo oddd dooo ssss", "",   load_with_offset),
+    Row(177, "MOV{.B} Wns, [Wd+Slit10]", "1001 1ooo oBoo oddd dooo ssss", "",     store_with_offset),
+    mov(178, "MOV{.B} Ws, Wd",           "0111 1www wBhh hddd dggg ssss", "",     move),
+    mvd(179, "MOV.D Ws, Wnd",            "1011 1110 0000 0ddd 0ppp ssss", "",     load_pair, constraints="p=0: s even"),
+    mvd(180, "MOV.D Wns, Wd",            "1011 1110 10qq qddd d000 sss0", "",     store_pair, constraints="q>=1"),
+    Row(181, "EXCH Wns, Wnd",            "1111 1101 0000 0ddd d000 ssss", "",     exchange),
+    Row(182, "SWAP{.B} Wn",              "1111 1101 1B00 0000 0000 ssss", "",     swap),
     Row(183, "SE Ws, Wnd",               "1111 1011 0000 0ddd dppp ssss", "N Z C", sign_extend),
     Row(184, "ZE Ws, Wnd",               "1111 1011 1000 0ddd dppp ssss", "N Z C", zero_extend),
-    tbr(211, "TBLRDL{.B} [Ws], Wd",      "1011 1010 0Bqq qddd dppp ssss", "",      table_read(0)),
-    tbr(212, "TBLRDH{.B} [Ws], Wd",      "1011 1010 1Bqq qddd dppp ssss", "",      table_read(16)),
-    tbw(213, "TBLWTL{.B} Ws, [Wd]",      "1011 1011 0Bqq qddd dppp ssss", "",      table_write_low),
-    tbw(214, "TBLWTH{.B} Ws, [Wd]",      "1011 1011 1Bqq qddd dppp ssss", "",      table_write_high),
+    tbr(211, "TBLRDL{.B} [Ws], Wd",      "1011 1010 0Bqq qddd dppp ssss", "",     table_read(0)),
+    tbr(212, "TBLRDH{.B} [Ws], Wd",      "1011 1010 1Bqq qddd dppp ssss", "",     table_read(16)),
+    tbw(213, "TBLWTL{.B} Ws, [Wd]",      "1011 1011 0Bqq qddd dppp ssss", "",     table_write_low),
+    tbw(214, "TBLWTH{.B} Ws, [Wd]",      "1011 1011 1Bqq qddd dppp ssss", "",     table_write_high),
 )
 # fmt: on

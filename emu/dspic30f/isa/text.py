@@ -1,0 +1,184 @@
+"""Instructions as assembly text: ``format`` writes the spelling of binutils, ``parse`` reads what pic30-as accepts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .codec import EncodeError, encode
+from .operands import Expr, Kind, OperandError, Site, SymbolOf
+from .row import Insn, Row
+from .syntax import FORMS, Form, kinds_of, printed_mnemonic
+
+# Broken rules in words; a rule not listed is shown as it stands in the table.
+EXPLANATION = {
+    "d!=14": "the product cannot go to w14",
+    "s>=2": "the divisor cannot be w0",
+    "v even": "the dividend must begin at an even register",
+    "p=0: s even": "a register pair begins at an even register",
+    "p>=1": "the source must be a pointer",
+    "q>=1": "the destination must be a pointer",
+}
+# pic30-as takes w1 as divisor although the manual forbids it (isa.md §6.7); the CPU refuses the word.
+TOLERATED = (("s>=2", 1),)
+
+
+class StatementError(ValueError):
+    """A statement that is no instruction; the text says what was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A numeric operand: ``expression`` is what the caller's parser returned, its value may still be unknown.
+
+    ``relocation`` is the R_PIC30_ name for a plain symbol (abi-elf.md §5), ``PGM_ADDR`` standing for the pair in
+    CALL and GOTO; "" where only a number will do. ``addend`` is to be added to the symbol.
+    """
+
+    kind: Kind
+    expression: Any
+    relocation: str
+    addend: int
+
+
+@dataclass(frozen=True, slots=True)
+class Parsed:
+    """A statement read: the row, the fields already known, and the numeric operands."""
+
+    row: Row
+    fields: Mapping[str, int]
+    byte: bool = False
+    slots: tuple[Slot, ...] = ()
+    statement: str = field(default="", compare=False)
+
+    @property
+    def words(self) -> int:
+        """Length in instruction words, 1 or 2; does not depend on values."""
+        return self.row.words
+
+    def encode(self, pc: int, values: Mapping[int, int | None] | None = None) -> tuple[int, ...]:
+        """The words at program address ``pc``.
+
+        ``values`` gives numbers for slots by position and overrides the expressions' own; a slot without any number
+        leaves its field 0, for a relocation to fill. Raises StatementError if a value or combination is not encodable.
+        """
+        site = Site(self.row, pc, self.byte)
+        fields = dict(self.fields)
+        for i, slot in enumerate(self.slots):
+            value = values.get(i) if values and i in values else slot.expression.value
+            if value is None:
+                continue
+            try:
+                fields |= {
+                    letter: number + slot.addend for letter, number in slot.kind.number(value, site).items()
+                }
+            except OperandError as error:
+                raise StatementError(f"{self.statement}: {error}") from None
+        try:
+            return encode(self.row, fields, tolerate=TOLERATED)
+        except EncodeError as error:
+            raise StatementError(f"{self.statement}: {_reason(error)}") from None
+
+
+def _reason(error: EncodeError) -> str:
+    if error.clause is not None:
+        return EXPLANATION.get(error.clause.text, f"{error.clause.text} does not hold")
+    if error.letter in ("s", "d"):
+        return f"w{error.value} is not an even register"
+    return f"field {error.letter} cannot hold {error.value}"
+
+
+def format(insn: Insn, pc: int = 0, symbol: SymbolOf | None = None, source: bool = False) -> str:
+    """Assembly text of an instruction at program address ``pc``, as binutils prints it.
+
+    ``symbol(address, space)`` may name an address, ``space`` being "code" or "data". With ``source`` the text is fit
+    for ``parse``: negative literals and wrapped targets are printed as such, ignored register fields are left out.
+    """
+    site = Site(insn.row, pc)
+    tokens = [t for kind in kinds_of(insn.row.syntax) for t in kind.write(insn.x, site, symbol, source)]
+    mnemonic = printed_mnemonic(insn.row, getattr(insn.x, "B", 0))
+    return f"{mnemonic} {', '.join(tokens)}" if tokens else mnemonic
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """The expression parser used when none is given: integers with C prefixes."""
+
+    value: int
+
+    @classmethod
+    def read(cls, text: str) -> Number:
+        """StatementError if ``text`` is not a number."""
+        try:
+            return cls(int(re.sub(r"\s", "", text), 0))
+        except ValueError:
+            raise StatementError(f"{text!r} is not a number") from None
+
+
+def parse(statement: str, expr: Expr = Number.read) -> Parsed:
+    """Read one instruction, without label and comment.
+
+    ``expr`` parses the expressions inside operands and may raise its own errors; what it returns needs a ``value``, an
+    int or None. Raises StatementError for unknown mnemonics and operands that fit no form.
+    """
+    mnemonic, _, rest = statement.strip().partition(" ")
+    mnemonic, tab, more = mnemonic.partition("\t")
+    choices = FORMS.get(mnemonic.lower())
+    if choices is None:
+        raise StatementError(f"unknown instruction {mnemonic!r}")
+    tokens = split_operands(more + " " + rest if tab else rest)
+    for form, byte in choices:
+        parsed = _match(form, byte, tokens, expr, statement.strip())
+        if parsed is not None:
+            return parsed
+    accepted = " | ".join(form.syntax for form, _ in choices)
+    raise StatementError(f"{statement.strip()}: operands fit none of {accepted}")
+
+
+def is_mnemonic(name: str) -> bool:
+    """Whether ``name`` is an instruction, in any case."""
+    return name.lower() in FORMS
+
+
+def split_operands(text: str) -> list[str]:
+    """Split at commas outside brackets, parentheses and character literals."""
+    pieces, depth, start, i = [], 0, 0, 0
+    while i < len(text):
+        c = text[i]
+        if c == "'":
+            i += 2 if text[i + 1 : i + 2] == "\\" else 1
+            i += 1 if text[i + 1 : i + 2] == "'" else 0
+        elif c in "([":
+            depth += 1
+        elif c in ")]":
+            depth -= 1
+        elif c == "," and depth == 0:
+            pieces.append(text[start:i].strip())
+            start = i + 1
+        i += 1
+    pieces.append(text[start:].strip())
+    return [] if pieces == [""] else pieces
+
+
+def _match(form: Form, byte: bool, tokens: Sequence[str], expr: Expr, statement: str) -> Parsed | None:
+    site = Site(form.row, 0, byte)
+    fields = dict(form.fixed)
+    if "B" in form.row.fields:
+        fields["B"] = int(byte)
+    slots, rest = [], list(tokens)
+    for kind in kinds_of(form.syntax):
+        try:
+            part = kind.read(rest, site, expr)
+        except OperandError as error:
+            raise StatementError(f"{statement}: {error}") from None
+        if part is None:
+            return None
+        if "w" in part.fields and fields.get("w", part.fields["w"]) != part.fields["w"]:
+            raise StatementError(f"{statement}: both operands must use the same index register")
+        fields |= part.fields
+        if part.expression is not None:
+            slots.append(Slot(kind, part.expression, kind.relocation(site), part.addend))
+        rest = rest[part.taken :]
+    return None if rest else Parsed(form.row, fields, byte, tuple(slots), statement)
