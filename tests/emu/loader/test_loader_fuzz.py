@@ -7,7 +7,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fuzz"))
 
-from fuzz_loader import campaign  # noqa: E402
+from fuzz_loader import campaign
 
 
 def test_mutated_files_are_loaded_or_refused_and_nothing_else_happens():

@@ -1,0 +1,113 @@
+"""`emu disasm`: a firmware image as assembly, with symbols and source lines where the file has them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from emu.cli import EXIT_OK, CommandError, Parser
+from emu.disassembly import Item, items
+from emu.image import Image
+from emu.loader import load_image
+
+
+def parser() -> Parser:
+    made = Parser(
+        "disasm",
+        "Print a firmware image as assembly, with symbols and source lines where the file has them.",
+        "emu disasm firmware.elf --from main --source",
+    )
+    made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    made.add_argument("--from", dest="start", metavar="SYM|ADDR", help="first address; a function alone is shown whole")
+    made.add_argument("--to", dest="end", metavar="SYM|ADDR", help="address behind the last one")
+    made.add_argument("--source", action="store_true", help="show the text of source lines that can be found")
+    made.add_argument("--json", action="store_true", help="print one JSON object per instruction")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status: 0 printed, 2 bad input."""
+    image = load_image(options.image)
+    start, end = _range(image, options.start, options.end)
+    for warning in image.warnings:
+        print(f"emu disasm: warning: {image.path}: {warning}", file=sys.stderr)
+    found = items(image, start, end)
+    lines = _json(image, found) if options.json else listing(image, found, _Sources(options.source))
+    for line in lines:
+        print(line)
+    return EXIT_OK
+
+
+def _range(image: Image, start: str | None, end: str | None) -> tuple[int, int]:
+    """Addresses to show. One function is shown whole when only it is named."""
+    flash = image.chip.program["flash"]
+    first = flash.start if start is None else code_address(image, start)
+    if end is not None:
+        return first, code_address(image, end)
+    symbol = image.symbols.find(start) if start is not None else None
+    return first, first + symbol.size if symbol is not None and symbol.size else flash.end
+
+
+def code_address(image: Image, text: str) -> int:
+    """A program address from a symbol's name or a number. Raises CommandError if it is neither."""
+    symbol = image.symbols.find(text)
+    if symbol is not None:
+        if symbol.space not in ("code", "absolute"):
+            raise CommandError(f"{text!r} is not code but lies in {symbol.space} memory")
+        return symbol.address
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise CommandError(f"{image.path} has no symbol {text!r}, and it is not an address") from None
+
+
+def listing(image: Image, found: Iterator[Item], sources: _Sources) -> Iterator[str]:
+    """Lines for people."""
+    line = None
+    for item in found:
+        labels = image.symbols.labels(item.address)
+        if labels:
+            yield ""
+            yield from (f"{item.address:06x} <{symbol.name}>:" for symbol in labels)
+        here = image.lines.find(item.address)
+        if here is not None and (line is None or (here.file, here.line) != (line.file, line.line)):
+            yield f"{here}{sources.text(here.file, here.line)}"
+        line = here
+        words = " ".join(f"{word:06x}" for word in item.words)
+        yield f"  {item.address:06x}  {words:13}  {item.text}"
+
+
+def _json(image: Image, found: Iterator[Item]) -> Iterator[str]:
+    for item in found:
+        line = image.lines.find(item.address)
+        yield json.dumps(
+            {
+                "address": item.address,
+                "words": list(item.words),
+                "text": item.text,
+                "symbol": image.symbols.text(item.address) if image.symbols.code(item.address) else None,
+                "line": str(line) if line else None,
+            }
+        )
+
+
+class _Sources:
+    """Texts of source files, read once; files that are not there simply have no text."""
+
+    def __init__(self, wanted: bool) -> None:
+        self.wanted = wanted
+        self._files: dict[str, list[str]] = {}
+
+    def text(self, file: str, line: int) -> str:
+        if not self.wanted:
+            return ""
+        if file not in self._files:
+            try:
+                self._files[file] = Path(file).read_text(encoding="utf-8", errors="replace").splitlines()
+            except OSError:
+                self._files[file] = []
+        lines = self._files[file]
+        return f": {lines[line - 1].strip()}" if 0 < line <= len(lines) else ""
