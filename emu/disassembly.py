@@ -11,9 +11,6 @@ from dataclasses import dataclass
 from emu.dspic30f.isa import codec, text
 from emu.image import Block, Image
 
-DATA_SECTIONS = frozenset({"section '.dinit'"})
-"""Sections with code flags that hold no instructions: the table crt0 initialises RAM from (abi-elf.md §3.2)."""
-
 
 @dataclass(frozen=True, slots=True)
 class Item:
@@ -30,7 +27,7 @@ def instruction(image: Image, pc: int, word1: int, word2: int = 0) -> Item | Non
     if insn is None:
         return None
     words = (word1, word2) if insn.words == 2 else (word1,)
-    return Item(pc, words, text.format(insn, pc, lambda address: _name(image, address)))
+    return Item(pc, words, text.format(insn, pc, lambda address, space: _name(image, address, space)))
 
 
 def items(image: Image, start: int, end: int) -> Iterator[Item]:
@@ -53,7 +50,7 @@ def _item(image: Image, block: Block, address: int, vectors: dict[int, str]) -> 
     word = block.words[index]
     if address in vectors:
         return Item(address, (word,), f".pword {word:#08x} ; {vectors[address]} -> {image.symbols.text(word)}")
-    if block.origin not in DATA_SECTIONS:
+    if block.is_code:
         second = block.words[index + 1] if index + 1 < len(block.words) else 0
         found = instruction(image, address, word, second)
         if found is not None and index + len(found.words) <= len(block.words):
@@ -61,6 +58,14 @@ def _item(image: Image, block: Block, address: int, vectors: dict[int, str]) -> 
     return Item(address, (word,), f".pword {word:#08x}")
 
 
-def _name(image: Image, address: int) -> str | None:
-    """A branch target's name, None where no symbol helps."""
-    return image.symbols.text(address) if image.symbols.code(address) else None
+def _name(image: Image, address: int, space: str) -> str | None:
+    """What an operand points to, by the name people know it by; None where there is none."""
+    if space == "code":
+        return image.symbols.text(address) if image.symbols.code(address) else None
+    if address in image.chip.data["sfr"]:
+        return image.register_names.get(address)
+    found = image.symbols.data(address)
+    if found is None:
+        return None
+    symbol, distance = found
+    return f"{symbol.name}+{distance:#x}" if distance else symbol.name

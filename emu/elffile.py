@@ -29,6 +29,8 @@ SHT_PROGBITS, SHT_SYMTAB, SHT_STRTAB, SHT_NOTE, SHT_NOBITS = 1, 2, 3, 7, 8
 PT_LOAD = 1
 SHN_UNDEF, SHN_LORESERVE, SHN_ABS = 0, 0xFF00, 0xFFF1
 STB_LOCAL = 0
+INITIAL_DATA: Final = ".dinit"
+"""Section with code flags that holds no instructions: the table crt0 initialises RAM from (abi-elf.md §3.2)."""
 STT_KINDS: Final = {0: "label", 1: "object", 2: "function"}
 
 _HEADER: Final = struct.Struct("<16sHHIIIIIHHHHHH")
@@ -203,7 +205,7 @@ def _block(reader: _Reader, section: Section) -> Block:
         bad = next(index for index, word in enumerate(words) if word > 0xFFFFFF)
         reader.warnings.append(f"{what}: fourth octet of the word at {base + 2 * bad:#08x} is not 0 (ignored)")
         words = array("I", [word & 0xFFFFFF for word in words])
-    return Block(base, words, what)
+    return Block(base, words, what, section.kind == "code" and section.name != INITIAL_DATA)
 
 
 def _symbols(reader: _Reader, headers: list[_Header], sections: list[Section]) -> tuple[Symbol, ...]:

@@ -41,6 +41,8 @@ class Block:
     words: array[int]
     origin: str
     """Where they came from, for messages: a section or a line."""
+    is_code: bool = True
+    """False for constants and tables; the loader cannot tell in a HEX file."""
 
     @property
     def end(self) -> int:
@@ -110,6 +112,16 @@ class Image:
             if block.base <= address < block.end:
                 return block.words[(address - block.base) // 2]
         return None
+
+    @cached_property
+    def register_names(self) -> dict[int, str]:
+        """Names of the bytes of all special function registers by data address."""
+        names = {}
+        for sfr in self.chip.sfrs.values():
+            names[sfr.address] = sfr.name
+            if sfr.size == 2:
+                names[sfr.address + 1] = f"{sfr.name}+1"
+        return names
 
     @cached_property
     def symbols(self) -> Symbols:
