@@ -73,12 +73,31 @@ class Events:
         """Cycle `slot` is due at, or NEVER."""
         return self._due[slot]
 
+    def next_due(self) -> int:
+        """Earliest due cycle of all slots, NEVER if all are idle."""
+        return min(self._due[: len(self._fire)].tolist(), default=NEVER)
+
     def kick(self) -> None:
         """Make the engine look at the next instruction boundary (an interrupt flag, enable or priority changed)."""
         self._u64[self._deadline] = 0
 
     def fire_until(self, cycle: int) -> None:
-        """Fire everything due at or before `cycle`, in order of (due, slot), and recompute the deadline."""
+        """Fire everything due at or before `cycle`, in order of (due, slot). A kick stays in force."""
+        first = self._fire_until(cycle)
+        if self._u64[self._deadline]:
+            self._u64[self._deadline] = first
+
+    def settle(self, cycle: int) -> None:
+        """As `fire_until`, and the engine has looked: the deadline becomes the earliest due cycle."""
+        self._u64[self._deadline] = self._fire_until(cycle)
+
+    def arrive(self, cycle: int) -> None:
+        """Bring devices up to the accesses of `cycle`: what is due by then fires, `now` becomes `cycle`."""
+        if self._u64[self._deadline] <= cycle:
+            self.fire_until(cycle)
+        self._u64[self._now] = cycle
+
+    def _fire_until(self, cycle: int) -> int:
         due = self._due
         count = len(self._fire)
         self.firing = True
@@ -87,11 +106,10 @@ class Events:
                 pending = due[:count].tolist()
                 first = min(pending, default=NEVER)
                 if first > cycle:
-                    break
+                    return first
                 slot = pending.index(first)
                 due[slot] = NEVER
                 self.now = first
                 self._fire[slot](first)
         finally:
             self.firing = False
-        self._u64[self._deadline] = first

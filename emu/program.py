@@ -127,6 +127,10 @@ class ProgramMemory:
         if self.on_table_write is not None:
             self.on_table_write(address)
 
+    def announce_all(self) -> None:
+        """Tell the listeners that any flash word may have changed (a snapshot was put back)."""
+        self._announce(0, self._flash_end)
+
     def _announce(self, start: int, end: int) -> None:
         for listener in self.changed:
             listener(start, end)

@@ -105,3 +105,9 @@ def facts_of(insn: Insn) -> Facts:
     return Facts(
         notes.source_pointers, notes.writes, notes.loads, notes.stores, None if flow is None else type(flow)
     )
+
+
+def flow_of(insn: Insn, pc: int) -> Flow:
+    """The flow a decoded instruction at `pc` asks for, with its static targets; what is computed stays unknown."""
+    notes: Any = _Notes(pc)
+    return insn.row.does(notes, insn.x)

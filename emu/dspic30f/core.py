@@ -1,0 +1,64 @@
+"""The CPU, assembled: everything of `emu.dspic30f` that one machine has, wired to its record, clock and bus."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.bus import Bus
+from emu.chips.chip import Chip
+from emu.dspic30f.data import DataSpace
+from emu.dspic30f.interp import Interpreter
+from emu.dspic30f.interrupts import Exceptions
+from emu.dspic30f.registers import CoreRegisters
+from emu.dspic30f.sequencer import Sequencer
+from emu.dspic30f.state import State
+from emu.dspic30f.traps import Traps
+from emu.events import Events
+from emu.program import ProgramMemory
+from emu.record import Record
+
+
+class WRegisters:
+    """W0..W15 for people and tests: writing one counts as a word write by the program."""
+
+    def __init__(self, state: State) -> None:
+        self._state: Final = state
+
+    def __len__(self) -> int:
+        return 16
+
+    def __getitem__(self, number: int) -> int:
+        if not 0 <= number < 16:
+            raise IndexError(f"there is no W{number}")
+        return self._state.u16[number]
+
+    def __setitem__(self, number: int, value: int) -> None:
+        if not 0 <= number < 16:
+            raise IndexError(f"there is no W{number}")
+        self._state.set_w(number, value)
+
+
+class Core:
+    """One CPU."""
+
+    def __init__(self, record: Record, events: Events, bus: Bus, program: ProgramMemory, chip: Chip) -> None:
+        self.record: Final = record
+        self.events: Final = events
+        self.bus: Final = bus
+        self.program: Final = program
+        self.chip: Final = chip
+        self.state: Final = State(record, chip)
+        self.w: Final = WRegisters(self.state)
+        self.data: Final = DataSpace(self.state, bus, program, chip)
+        self.registers: Final = CoreRegisters(self.state, bus, events)
+        self.traps: Final = Traps(self.state, events, chip)
+        self.exceptions: Final = Exceptions(self.state, events, bus, self.data, program, self.traps, chip)
+        self.builder: Final = Interpreter(self.state, events, self.data, program, self.exceptions)
+        self.sequencer: Final = Sequencer(
+            self.state, events, program, self.registers, self.exceptions, self.builder
+        )
+
+    def reset(self) -> None:
+        """Core state after any reset; SFRs have their reset values already."""
+        self.state.reset()
+        self.exceptions.reset()

@@ -1,0 +1,46 @@
+"""Engines: ways to run instructions between two boundaries. All give the same state in the same cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, Protocol
+
+from emu.dspic30f.core import Core
+
+NAMES: Final = ("plain", "interp", "jit", "auto")
+
+
+class Engine(Protocol):
+    """What the machine's loop needs."""
+
+    name: str
+
+    def run(self, limit: int) -> None:
+        """Run at least one instruction, from PC on, as long as no boundary has work, no hooked PC is reached and the
+        cycle is below `limit`. Raises DeviceReset and Breakpoint as `Sequencer.execute` does."""
+
+    def forget(self) -> None:
+        """Hooks have changed: whatever was prepared for them is stale."""
+
+
+class PlainEngine:
+    """One instruction at a time through the sequencer."""
+
+    name = "plain"
+
+    def __init__(self, core: Core) -> None:
+        self._sequencer: Final = core.sequencer
+
+    def run(self, limit: int) -> None:
+        """One instruction."""
+        self._sequencer.execute()
+
+    def forget(self) -> None:
+        """Nothing is prepared."""
+
+
+def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:
+    """The engine called `name`. Raises ValueError for a name that is not one of NAMES."""
+    if name not in NAMES:
+        raise ValueError(f"there is no engine {name!r}; expected one of {', '.join(NAMES)}")
+    return PlainEngine(core)

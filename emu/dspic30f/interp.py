@@ -1,0 +1,237 @@
+"""The plain interpreter's builder: rows run directly on Python ints and the state record.
+
+Slow and obviously right: the yardstick for the specialised interpreter and for native code. One `Interpreter` serves
+one CPU; the sequencer prepares it for each instruction with `begin` and lets the stores happen with `commit`.
+Stores are kept back until the row is done, because an address error anywhere inhibits all of them (isa.md §14.4), and
+because a data write wins over what the same instruction does to the register (isa.md §2.2, §2.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Final
+
+from emu.bus import SFR_END
+from emu.dspic30f.data import DataSpace
+from emu.dspic30f.interrupts import Exceptions
+from emu.dspic30f.isa.builder import Context, Side, Size
+from emu.dspic30f.isa.flow import Value
+from emu.dspic30f.state import FLAGS, OA, OAB, OB, SA, SAB, SB, STACK_POINTER, State
+from emu.events import Events
+from emu.program import ProgramMemory
+
+ACC_SIGN: Final = 1 << 39
+
+
+class UninitialisedPointer(Exception):
+    """A W register that was never written is used as an address pointer: the device resets (isa.md §2.2)."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"W{number} is used as an address pointer before it was written")
+
+
+@lru_cache(maxsize=4096)
+def context_of(corcon: int, modcon: int, bren: int, intcon1: int) -> Context:
+    """The modes a translation may rely on, from the stored registers (isa.md §2.4, §2.5, §14.4)."""
+    return Context(
+        us=corcon >> 12 & 1,
+        if_=corcon & 1,
+        rnd=corcon >> 1 & 1,
+        satdw=corcon >> 5 & 1,
+        sata=corcon >> 7 & 1,
+        satb=corcon >> 6 & 1,
+        accsat=corcon >> 4 & 1,
+        psv=corcon >> 2 & 1,
+        xmod=modcon >> 15,
+        ymod=modcon >> 14 & 1,
+        brev=bren,
+        xwm=modcon & 15,
+        ywm=modcon >> 4 & 15,
+        bwm=modcon >> 8 & 15,
+        ovate=intcon1 >> 10 & 1,
+        ovbte=intcon1 >> 9 & 1,
+        covte=intcon1 >> 8 & 1,
+    )
+
+
+class Interpreter:
+    """The builder on ints; see isa/builder.py for what each method means."""
+
+    def __init__(
+        self, state: State, events: Events, data: DataSpace, program: ProgramMemory, exceptions: Exceptions
+    ) -> None:
+        self._state: Final = state
+        self._u16: Final = state.u16
+        self._at: Final = state.at
+        self._events: Final = events
+        self._data: Final = data
+        self._program: Final = program
+        self._exceptions: Final = exceptions
+        self._accumulators: Final = (state.at["ACCAL"], state.at["ACCBL"])
+        self._corcon: Final = state.at["CORCON"]
+        self._modcon: Final = state.at["MODCON"]
+        self._xbrev: Final = state.at["XBREV"]
+        self._intcon1: Final = state.at["INTCON1"]
+        self.context = Context()
+        self.pc = 0
+        self.last = 0
+        """Last cycle of the instruction as far as known: PSV reads move it."""
+        self.window = False
+        """The instruction has read the PSV window."""
+        self.faulted = False
+        """The instruction has made an address error."""
+        self.math = False
+        """The instruction asks for a math error trap."""
+        self._window_extra = 0
+        self._loads_ahead = 0
+        self._stores: list[tuple[int, int, Size]] = []
+
+    def begin(self, pc: int, last: int, loads: int, window_extra: int) -> None:
+        """Prepare for the instruction at `pc` whose accesses fall in cycle `last`, or `window_extra` cycles later if
+        it reads the PSV window. Of two loads the first is made one cycle earlier (design §4.2)."""
+        u16 = self._u16
+        self.context = context_of(
+            u16[self._corcon], u16[self._modcon], u16[self._xbrev] >> 15, u16[self._intcon1] & 0x700
+        )
+        self.pc = pc
+        self.last = last
+        self.window = self.faulted = self.math = False
+        self._window_extra = window_extra
+        self._loads_ahead = loads - 1 if loads > 1 else 0
+        self._stores.clear()
+        self._state.stall = 0
+
+    def commit(self) -> None:
+        """Let the stores happen, unless one of them or a load was an address error. Raises TrapConflict."""
+        data = self._data
+        if not self.faulted and any(data.faulty(ea, size) for ea, _value, size in self._stores):
+            self.faulted = True
+        if not self.faulted:
+            cycle = self.last - len(self._stores) + 1
+            for ea, value, size in self._stores:
+                if ea < SFR_END:
+                    self._events.arrive(cycle)
+                data.write(ea, value, size)
+                cycle += 1
+        if self.faulted:
+            self._exceptions.trap(self._exceptions.traps.address, self.last)
+        if self.math:
+            self._exceptions.trap(self._exceptions.traps.math, self.last + 1)
+
+    def select(self, c: Value, a: Value, b: Value) -> Value:
+        return a if c else b
+
+    def div_trunc(self, a: Value, b: Value) -> Value:
+        if b == 0:
+            return 0
+        quotient = abs(a) // abs(b)
+        return quotient if (a < 0) == (b < 0) else -quotient
+
+    def rem_trunc(self, a: Value, b: Value) -> Value:
+        return 0 if b == 0 else a - self.div_trunc(a, b) * b
+
+    def clz16(self, v: Value) -> Value:
+        return 16 - int(v).bit_length()
+
+    def ctz16(self, v: Value) -> Value:
+        return (v & -v).bit_length() - 1 if v else 16
+
+    def let(self, v: Value) -> Value:
+        return v
+
+    def w(self, n: int) -> Value:
+        return self._u16[n]
+
+    def set_w(self, n: int, v: Value) -> None:
+        self._state.set_w(n, v)
+        self._state.stall |= 1 << n
+
+    def set_wb(self, n: int, v: Value) -> None:
+        self._state.set_w_low(n, v)
+        self._state.stall |= 1 << n
+
+    def ptr(self, n: int, side: Side) -> Value:
+        if not self._state.initialised >> n & 1:
+            raise UninitialisedPointer(n)
+        return self._u16[n]
+
+    def set_ptr(self, n: int, v: Value, side: Side) -> None:
+        self._state.set_w(n, v)
+        if side == "dst":
+            self._state.stall |= 1 << n
+
+    def load(self, ea: Value, size: Size, side: Side = "src", ptr: int | None = None) -> Value:
+        if ptr == STACK_POINTER:
+            self._exceptions.check_stack(ea, self.last)
+        return self._read(ea, size)
+
+    def xload(self, ea: Value, ptr: int) -> Value:
+        if self._data.in_window(ea) or ea < SFR_END or self._data.faulty(ea, 2):
+            return self._read(ea, 2)
+        return self._data.read_x(ea)
+
+    def yload(self, ea: Value, ptr: int) -> Value:
+        if self._data.faulty(ea, 2):
+            self.faulted = True
+        return self._data.read_y(ea)
+
+    def store(self, ea: Value, v: Value, size: Size, ptr: int | None = None) -> None:
+        if ptr == STACK_POINTER:
+            self._exceptions.check_stack(ea, self.last)
+        self._stores.append((ea, v, size))
+
+    def _read(self, ea: int, size: int) -> int:
+        if self._data.faulty(ea, size):
+            self.faulted = True
+        if self._data.in_window(ea) and not self.window:
+            self.window = True
+            self.last += self._window_extra
+        if ea < SFR_END:
+            self._events.arrive(self.last - self._loads_ahead)
+        if self._loads_ahead:
+            self._loads_ahead -= 1
+        return self._data.read(ea, size)
+
+    def prog(self, address: Value) -> Value:
+        return self._program.word(address)
+
+    def table_write(self, address: Value, byte_mask: Value, v: Value) -> None:
+        self._events.arrive(self.last)
+        self._program.table_write(address, byte_mask, v)
+
+    def flag(self, name: str) -> Value:
+        return self._state.sr >> FLAGS[name] & 1
+
+    def set_flags(self, **flags: Value) -> None:
+        sr = self._state.sr
+        for name, value in flags.items():
+            bit = 1 << FLAGS[name]
+            sr = sr | bit if value else sr & ~bit
+        sr = sr | OAB if sr & (OA | OB) else sr & ~OAB
+        self._state.sr = sr | SAB if sr & (SA | SB) else sr & ~SAB
+
+    def reg(self, name: str) -> Value:
+        return self._u16[self._at[name]]
+
+    def set_reg(self, name: str, v: Value) -> None:
+        self._u16[self._at[name]] = v & 0xFFFF
+
+    def acc(self, i: int) -> Value:
+        low = self._accumulators[i]
+        value = self._u16[low] | self._u16[low + 1] << 16 | (self._u16[low + 2] & 0xFF) << 32
+        return (value ^ ACC_SIGN) - ACC_SIGN
+
+    def set_acc(self, i: int, v: Value) -> None:
+        low = self._accumulators[i]
+        self._u16[low] = v & 0xFFFF
+        self._u16[low + 1] = v >> 16 & 0xFFFF
+        self._u16[low + 2] = v >> 32 & 0xFF
+
+    def when(self, c: Value, fn: Callable[[], None]) -> None:
+        if c:
+            fn()
+
+    def trap_math(self, c: Value) -> None:
+        if c:
+            self.math = True

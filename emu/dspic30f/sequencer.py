@@ -1,0 +1,375 @@
+"""The rules of order and time of the dsPIC30F core, once. Every engine behaves as this module says.
+
+Time. An instruction that starts in cycle s occupies s..e: a RAW stall first (isa.md §13.2), then its base cycles
+(§13.1), then PSV cycles (§13.3); a taken branch or a skip adds cycles behind its data access. Data accesses fall in e
+(of two, the first in e - 1); devices are brought up to the cycle of an access before it is made, and a write in cycle t
+affects them from t + 1 (design §4.2; UNVERIFIED on silicon).
+
+Boundaries. Between two instructions, after last cycle e, the engine looks if something is due by e or somebody kicked
+(`Events.deadline` <= e): events fire, then an acceptable exception is entered, handler first in max(c + 4, e + 3)
+(isa.md §14.3, interrupts.py). Entering one is itself followed by a boundary, so a higher one can win at once.
+RETURN, RETLW and RETFIE look one cycle early: they take 2 cycles instead of 3 if an exception is acceptable then.
+
+Within REPEAT the target stays at PC; every iteration is followed by a boundary. RA is 0 during the last iteration
+(isa.md §7.5, UNVERIFIED). At the end of the instruction at DOEND, if it falls through, the loop goes on or ends (§7.6).
+A flow change out of a REPEAT target or out of the last instruction of a DO loop simply happens (undefined on silicon).
+
+Faults. An address error inhibits the stores of its instruction, which otherwise completes; stack and math errors are
+visible from e + 1, hard traps from e. An illegal opcode, an uninitialised pointer and a trap conflict reset the device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from emu.dspic30f.facts import Facts, facts_of
+from emu.dspic30f.interp import Interpreter, UninitialisedPointer
+from emu.dspic30f.interrupts import Exceptions
+from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.debug import is_debug_word
+from emu.dspic30f.isa.flow import (
+    Branch,
+    Call,
+    ClearWatchdog,
+    Disi,
+    Do,
+    Flow,
+    Goto,
+    Repeat,
+    Reset,
+    Return,
+    Skip,
+    Sleep,
+)
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.registers import CoreRegisters
+from emu.dspic30f.state import (
+    DA,
+    FIRST,
+    IDLE,
+    IPL3,
+    LAST,
+    MIDDLE,
+    NOT_REPEATING,
+    PC_MASK,
+    RA,
+    RUN,
+    SLEEP,
+    State,
+)
+from emu.dspic30f.traps import TrapConflict
+from emu.events import NEVER, Events
+from emu.program import ProgramMemory
+
+EDT_MATURE: Final = 3
+"""`State.edt` from which the end test of a DO loop obeys: two instructions have completed since the one that wrote EDT,
+so it was latched before the penultimate instruction (isa.md §7.6)."""
+
+
+class DeviceReset(Exception):
+    """The core resets the device; `cause` is the RCON bit, `detail` says why in words."""
+
+    def __init__(self, cause: str, detail: str, fault: bool) -> None:
+        super().__init__(detail)
+        self.cause: Final = cause
+        self.detail: Final = detail
+        self.fault: Final = fault
+
+
+class Breakpoint(Exception):
+    """A debugger word was executed: the run stops behind it (isa.md §4.1)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """An instruction as the sequencer needs it, by address."""
+
+    insn: Insn
+    facts: Facts
+    next_pc: int
+    cycles: int
+    window_extra: int
+    """PSV cycles outside REPEAT (isa.md §13.3)."""
+
+
+@dataclass(slots=True)
+class Wires:
+    """Lines from the core to whoever wired it."""
+
+    clear_watchdog: Callable[[], None] = lambda: None
+    power: Callable[[int, int], None] = lambda mode, cycle: None
+    """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
+
+
+class Sequencer:
+    """Fetches, decodes and runs instructions one at a time; the plain engine, and the last resort of the others."""
+
+    def __init__(
+        self,
+        state: State,
+        events: Events,
+        program: ProgramMemory,
+        registers: CoreRegisters,
+        exceptions: Exceptions,
+        builder: Interpreter,
+    ) -> None:
+        self.state: Final = state
+        self.events: Final = events
+        self.program: Final = program
+        self.registers: Final = registers
+        self.exceptions: Final = exceptions
+        self.builder: Final = builder
+        self.wires: Final = Wires()
+        self._hold: Final = state.record.reserve("cpu.hold", "Q").index
+        self._steps: Final[dict[int, Step]] = {}
+        program.changed.append(self._forget)
+
+    def _forget(self, start: int, end: int) -> None:
+        """Flash words in [start, end) changed."""
+        for pc in [pc for pc in self._steps if start - 2 <= pc < end]:
+            del self._steps[pc]
+
+    def hold_until(self, cycle: int) -> None:
+        """Let no instruction start before `cycle`: flash is being programmed (dspic30f6014a.md §16)."""
+        self.state.record.u64[self._hold] = cycle
+        self.events.kick()
+
+    # Boundaries
+
+    def boundary(self, limit: int) -> bool:
+        """Do what is to be done between two instructions. False: the CPU sleeps and nothing will ever wake it.
+
+        While the CPU sleeps, time passes up to `limit`.
+        """
+        state, events = self.state, self.events
+        hold = state.record.u64[self._hold]
+        if hold:
+            state.cycle = max(state.cycle, hold)
+            state.record.u64[self._hold] = 0
+        while True:
+            if state.mode != RUN and not self._sleep(limit):
+                return events.next_due() != NEVER
+            last = state.cycle - 1
+            if events.deadline > last:
+                return True
+            events.settle(last)
+            accepted = self.exceptions.acceptable(last)
+            if accepted is not None:
+                self.exceptions.enter(accepted, last)
+                events.kick()
+
+    def _sleep(self, limit: int) -> bool:
+        """Let time pass until something wakes the CPU, at most to `limit`. True if it runs again (isa.md §11).
+
+        The cycle in which the waking flag is first 1 counts as that of an instruction: UNVERIFIED.
+        """
+        state, events = self.state, self.events
+        while state.mode != RUN:
+            since = self.exceptions.waking()
+            if since is not None:
+                state.cycle = max(state.cycle, since + 1)
+                self.wake()
+                break
+            due = events.next_due()
+            if due >= limit:
+                if due != NEVER:
+                    state.cycle = max(state.cycle, limit)
+                return False
+            state.cycle = max(state.cycle, due + 1)
+            events.settle(due)
+        return True
+
+    def wake(self) -> None:
+        """Leave Idle or Sleep: execution goes on."""
+        if self.state.mode != RUN:
+            self.state.mode = RUN
+            self.wires.power(RUN, self.state.cycle)
+            self.events.kick()
+
+    # Instructions
+
+    def fetch(self, pc: int) -> Step:
+        """The instruction at `pc`. Raises DeviceReset if it is illegal, Breakpoint if it is a debugger word."""
+        step = self._steps.get(pc)
+        if step is None:
+            word1 = self.program.word(pc)
+            insn = decode_for_execution(word1, self.program.word(pc + 2 & PC_MASK))
+            if insn is None:
+                if is_debug_word(word1):
+                    raise Breakpoint(f"debugger word {word1:06X}")
+                raise DeviceReset("IOPUWR", f"illegal opcode {word1:06X}", fault=True)
+            extra = 1 if insn.row.psv_class == "mov" else 2
+            after = pc + 2 * insn.words & PC_MASK
+            step = self._steps[pc] = Step(insn, facts_of(insn), after, insn.row.cycles, extra)
+        return step
+
+    def execute(self) -> None:
+        """Run the instruction at PC, from its stall to its last cycle.
+
+        Raises DeviceReset (PC still at the culprit) and Breakpoint (PC and cycle behind the word).
+        """
+        state = self.state
+        pc = state.pc
+        if not self.program.executable(pc):
+            self._fetch_error()
+            return
+        try:
+            step = self.fetch(pc)
+        except Breakpoint:
+            state.pc = pc + 2
+            state.cycle += 1
+            state.stall = 0
+            raise
+        facts, builder = step.facts, self.builder
+        start = state.cycle + (state.stall & facts.source_pointers != 0)
+        repeat = state.repeat
+        extra = step.window_extra if repeat == NOT_REPEATING else 0 if repeat == MIDDLE else 2
+        access = start + (1 if facts.flow is Return else step.cycles - 1)
+        builder.begin(pc, access, facts.loads, extra)
+        try:
+            state.pc = step.next_pc
+            flow = step.insn.row.does(builder, step.insn.x)
+            builder.commit()
+        except UninitialisedPointer as error:
+            state.pc = pc
+            raise DeviceReset("IOPUWR", str(error), fault=True) from None
+        except TrapConflict as error:
+            state.pc = pc
+            raise DeviceReset("TRAPR", f"trap conflict: {error}", fault=True) from None
+        last = builder.last if flow is None else self._follow(flow, pc, builder.last)
+        if state.sr & RA or repeat != NOT_REPEATING:
+            last = self._after_target(step, flow, pc, last)
+        if state.sr & DA and pc == state.pair("DOENDL") and state.pc == step.next_pc:
+            self._after_loop_end()
+        if state.edt and state.edt < EDT_MATURE:
+            state.edt += 1
+        state.cycle = last + 1
+
+    def _fetch_error(self) -> None:
+        """PC points where no instruction may be fetched: a hard trap at this boundary (isa.md §14.4, causes 4, 5).
+
+        UNVERIFIED: with an equal or higher trap in progress the device resets, as it could not go on.
+        """
+        state = self.state
+        traps = self.exceptions.traps
+        if state.ipl >= traps.address.vector.level:
+            raise DeviceReset("TRAPR", f"no instruction can be fetched at {state.pc:06X}", fault=True)
+        try:
+            traps.request(traps.address, max(state.cycle, 1) - 1)
+        except TrapConflict as error:
+            raise DeviceReset("TRAPR", f"trap conflict: {error}", fault=True) from None
+
+    # Flow
+
+    def _follow(self, flow: Flow, pc: int, last: int) -> int:
+        """Change PC and the loop registers as a row asks; returns the last cycle of the instruction."""
+        state = self.state
+        match flow:
+            case Branch(cond, target):
+                if cond:
+                    state.pc = target
+                    last += 1
+            case Skip(cond):
+                if cond:
+                    last += self._skip()
+            case Goto(target) | Call(target):
+                state.pc = target
+            case Return():
+                return self._return(flow, last)
+            case Repeat(count):
+                if count:
+                    state.rcount = count
+                    state.sr |= RA
+                    state.repeat = FIRST
+                else:
+                    state.rcount = 0
+            case Do(count, end):
+                state.push_do()
+                state.dcount = count
+                state.set_pair("DOSTARTL", pc + 4)
+                state.set_pair("DOENDL", end)
+                state.do_level = min(state.do_level + 1, 7)
+            case Disi(count):
+                self.registers.disi(count, last)
+            case ClearWatchdog():
+                self.events.arrive(last)
+                self.wires.clear_watchdog()
+            case Sleep(mode):
+                self.events.arrive(last)
+                state.mode = IDLE if mode == "idle" else SLEEP
+                self.wires.power(state.mode, last + 1)
+                self.events.kick()
+            case Reset():
+                state.cycle = last + 1
+                state.pc = pc
+                raise DeviceReset("SWR", "RESET instruction", fault=False)
+        return last
+
+    def _skip(self) -> int:
+        """Step over the next instruction; a word that is none counts as one word."""
+        pc = self.state.pc
+        insn = decode_for_execution(self.program.word(pc), self.program.word(pc + 2 & PC_MASK))
+        words = 1 if insn is None else insn.words
+        self.state.pc = pc + 2 * words & PC_MASK
+        return words
+
+    def _return(self, flow: Return, second: int) -> int:
+        """RETURN, RETLW, RETFIE, whose second cycle is `second`: ends there if an exception can be entered."""
+        state, events = self.state, self.events
+        state.pc = flow.target
+        if flow.kind == "retfie":
+            state.sr = state.sr & 0xFF00 | flow.srl
+            state.corcon = state.corcon & ~IPL3 | (IPL3 if flow.ipl3 else 0)
+            if state.sr & RA:
+                state.repeat = FIRST
+            events.kick()
+        return second if self._exception_at(second) else second + 1
+
+    def _exception_at(self, last: int) -> bool:
+        """Whether an exception could be entered after cycle `last`; if so the boundary there will look."""
+        if self.events.deadline > last:
+            return False
+        self.events.settle(last)
+        if self.exceptions.acceptable(last) is None:
+            return False
+        self.events.kick()
+        return True
+
+    def _after_target(self, step: Step, flow: Flow, pc: int, last: int) -> int:
+        """Count an iteration of a REPEAT target (isa.md §7.5); returns its last cycle, which PSV may move (§13.3)."""
+        state = self.state
+        if isinstance(flow, Repeat | Return) or state.pc != step.next_pc:
+            return last
+        if not state.sr & RA:
+            state.repeat = NOT_REPEATING
+            return last
+        middle = state.repeat == MIDDLE
+        if state.rcount:
+            state.rcount -= 1
+            state.pc = pc
+            if state.rcount:
+                state.repeat = MIDDLE
+            else:
+                state.sr &= ~RA
+                state.repeat = LAST
+        else:
+            state.sr &= ~RA
+            state.repeat = NOT_REPEATING
+        if self.builder.window and middle and self._exception_at(last):
+            last += 2
+        return last
+
+    def _after_loop_end(self) -> None:
+        """The instruction at DOEND has completed: next iteration, or out of the loop (isa.md §7.6)."""
+        state = self.state
+        if state.dcount and state.edt < EDT_MATURE:
+            state.dcount -= 1
+            state.pc = state.pair("DOSTARTL")
+            return
+        state.edt = 0
+        level = state.do_level
+        if level == 2:
+            state.pop_do()
+        state.do_level = level - 1

@@ -1,0 +1,299 @@
+"""One microcontroller: record, clock, bus, CPU and devices wired together, and THE loop that runs them.
+
+What enters: an image, pin levels, bytes. What leaves: `Stop`s, registers and memory, callbacks of devices. Time is
+`Machine.cycle`, in Tcy since power-on; it only grows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from emu.bus import SFR_END, Bus
+from emu.chips.chip import Chip
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.core import Core
+from emu.dspic30f.engines import Engine, make_engine
+from emu.dspic30f.sequencer import Breakpoint, DeviceReset
+from emu.events import NEVER, Events
+from emu.image import Image
+from emu.program import ProgramMemory
+from emu.record import Record
+
+REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted")
+
+KEPT_OVER_RESET: Final = ("RCON", "OSCCON")
+"""Registers a reset other than power-on does not touch (dspic30f6014a.md §4)."""
+
+PcHook = Callable[[], bool | None]
+SfrHook = Callable[[bool, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Why and where a run ended. `pc` is the next instruction, of a fault the culprit, of a debugger word that word."""
+
+    reason: str
+    pc: int
+    cycle: int
+    detail: str = ""
+
+
+class _WRegisters(Protocol):
+    def __getitem__(self, number: int) -> int: ...
+    def __setitem__(self, number: int, value: int) -> None: ...
+
+
+class Machine:
+    """A chip with a program. See engine documentation in README.md for the choice of `engine`.
+
+    `ipl_slip` = 1 lets an interrupt slip through right after a write that raises IPL or clears IEC (isa.md §14.3).
+    """
+
+    def __init__(self, chip: Chip = DSPIC30F6014A, *, engine: str = "auto", ipl_slip: int = 0) -> None:
+        self.chip: Final = chip
+        self.record: Final = Record()
+        self.events: Final = Events(self.record)
+        self.bus: Final = Bus(self.record, self.events)
+        for sfr in chip.sfrs.values():
+            if sfr.size == 2:
+                word = sfr.address >> 1
+                self.bus.name[word] = sfr.name
+                self.bus.writable[word] = sfr.writable
+                self.bus.clear_only[word] = sfr.clear_only
+                self.bus.reset_value[word] = sfr.reset
+        self.program: Final = ProgramMemory(self.record, chip)
+        self.core: Final = Core(self.record, self.events, self.bus, self.program, chip)
+        self.core.exceptions.ipl_slip = ipl_slip
+        self.state: Final = self.core.state
+        self.w: Final[_WRegisters] = self.core.w
+        self.stop_on_fault = True
+        """Whether a reset for a fault (illegal opcode, uninitialised pointer, trap conflict) ends a run."""
+        self.resets: Final[list[tuple[int, str]]] = []
+        """(cycle, cause) of the resets since construction, at most the last 16."""
+        self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
+        self._resumed: int | None = None
+        self._interrupt = False
+        self._engine: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
+        self.reset("POR")
+
+    @property
+    def engine(self) -> str:
+        """Name of the engine in use."""
+        return self._engine.name
+
+    @property
+    def cycle(self) -> int:
+        """Cycle in which the next instruction starts, in Tcy since power-on."""
+        return self.state.cycle
+
+    @property
+    def pc(self) -> int:
+        """Program address of the next instruction."""
+        return self.state.pc
+
+    @pc.setter
+    def pc(self, address: int) -> None:
+        self.state.pc = address & 0x7FFFFE
+        self.state.stall = 0
+
+    # Running
+
+    def run_until(self, cycle: int) -> Stop | None:
+        """Run to the first instruction boundary at or after `cycle`; None if nothing stopped the run before."""
+        state, sequencer, engine, hooks = self.state, self.core.sequencer, self._engine, self._pc_hooks
+        stop = None
+        while stop is None and state.cycle < cycle:
+            try:
+                if not sequencer.boundary(cycle):
+                    stop = self.stopped("halt")
+                elif state.cycle >= cycle:
+                    break
+                elif state.pc in hooks and self._hit():
+                    stop = self.stopped("breakpoint")
+                else:
+                    engine.run(cycle)
+            except Breakpoint as word:
+                stop = Stop("breakpoint", state.pc - 2, state.cycle, str(word))
+            except DeviceReset as reset:
+                stop = self._reset_by(reset)
+            if self._interrupt:
+                self._interrupt = False
+                stop = stop or self.stopped("interrupted")
+        self.events.arrive(state.cycle)
+        return stop
+
+    def run(self, cycles: int | None = None, until: Callable[[], bool] | int | None = None) -> Stop:
+        """Run until something stops the machine: at most `cycles` Tcy; `until` is a program address or a condition,
+        tested between instructions."""
+        limit = NEVER if cycles is None else self.cycle + cycles
+        if until is None:
+            return self.run_until(limit) or self.stopped("limit")
+        reached = until if callable(until) else lambda: self.pc == until
+        while self.cycle < limit:
+            stop = self.step()
+            if stop is not None:
+                return stop
+            if reached():
+                return self.stopped("until")
+        return self.stopped("limit")
+
+    def step(self) -> Stop | None:
+        """One instruction, after whatever is to be done at the boundary before it; None if nothing stopped it.
+
+        A sleeping CPU sleeps until something wakes it.
+        """
+        state = self.state
+        stop = None
+        try:
+            if not self.core.sequencer.boundary(NEVER):
+                stop = self.stopped("halt")
+            elif state.pc in self._pc_hooks and self._hit():
+                stop = self.stopped("breakpoint")
+            else:
+                self.core.sequencer.execute()
+        except Breakpoint as word:
+            stop = Stop("breakpoint", state.pc - 2, state.cycle, str(word))
+        except DeviceReset as reset:
+            stop = self._reset_by(reset)
+        self.events.arrive(state.cycle)
+        return stop
+
+    def interrupt(self) -> None:
+        """Make the current run end at its next boundary (signal handlers)."""
+        self._interrupt = True
+        self.events.kick()
+
+    def stopped(self, reason: str, detail: str = "") -> Stop:
+        """A `Stop` for the present state."""
+        return Stop(reason, self.pc, self.cycle, detail)
+
+    def _hit(self) -> bool:
+        """Call the hooks of the present PC, once per arrival; True if one of them wants to stop."""
+        pc = self.state.pc
+        if self._resumed == pc:
+            self._resumed = None
+            return False
+        hit = False
+        for hook in self._pc_hooks[pc]:
+            hit = bool(hook()) or hit
+        self._resumed = pc
+        return hit
+
+    # Resets
+
+    def reset(self, cause: str = "EXTR") -> None:
+        """Reset for `cause`: the RCON bit POR, BOR, EXTR (MCLR pin), SWR, WDTO, TRAPR or IOPUWR (isa.md §14.6)."""
+        power_on = cause == "POR"
+        u16 = self.record.u16
+        for word, name in enumerate(self.bus.name):
+            if name and (power_on or name not in KEPT_OVER_RESET):
+                u16[word] = self.bus.reset_value[word]
+        if power_on:
+            ram = self.chip.data["ram"]
+            self.record.bytes[ram.start : ram.end] = bytes(ram.size)
+        else:
+            rcon = self.chip.sfrs["RCON"]
+            u16[rcon.address >> 1] |= 1 << rcon.fields[cause][0]
+        self.core.reset()
+        self.events.kick()
+        self.resets.append((self.cycle, cause))
+        del self.resets[:-16]
+
+    def _reset_by(self, reset: DeviceReset) -> Stop | None:
+        """Carry out a reset the core asked for; a fault ends the run."""
+        culprit = self.pc
+        if reset.fault:
+            self.state.cycle += 1
+        self.reset(reset.cause)
+        return Stop("fault", culprit, self.cycle, reset.detail) if reset.fault and self.stop_on_fault else None
+
+    # Memory
+
+    def load(self, image: Image) -> None:
+        """Put an image into program memory and reset as after power-on."""
+        self.program.erase()
+        for block in image.blocks:
+            if block.end <= self.chip.program["flash"].end:
+                self.program.put_flash(block.base, list(block.words))
+            else:
+                for index, word in enumerate(block.words):
+                    self.program.put(block.base + 2 * index, word)
+        self.reset("POR")
+
+    def address_of(self, place: str | int) -> int:
+        """Data address of a register by name, or the address itself. Raises KeyError for an unknown name."""
+        return self.chip.sfrs[place].address if isinstance(place, str) else place
+
+    def read(self, place: str | int, size: int = 2) -> int:
+        """Data space as an instruction reads it, side effects included."""
+        return self.core.data.read(self.address_of(place), size)
+
+    def write(self, place: str | int, value: int, size: int = 2) -> None:
+        """Data space as an instruction writes it, side effects included."""
+        self.core.data.write(self.address_of(place), value, size)
+
+    def peek(self, place: str | int, size: int = 2) -> int:
+        """Data space without side effects. An odd address with size 2 reads the word that holds it."""
+        address = self.address_of(place)
+        word = self.bus.peek(address & ~1) if address < SFR_END else self.record.u16[address >> 1]
+        if size == 2:
+            return word
+        return word >> 8 if address & 1 else word & 0xFF
+
+    def poke(self, place: str | int, value: int, size: int = 2) -> None:
+        """Set what is stored in data space, telling nobody."""
+        address = self.address_of(place)
+        if size == 2:
+            self.record.u16[address >> 1] = value & 0xFFFF
+        else:
+            self.record.u8[address] = value & 0xFF
+
+    # State
+
+    def snapshot(self) -> bytes:
+        """A copy of the whole state."""
+        return self.record.snapshot()
+
+    def restore(self, state: bytes) -> None:
+        """Continue from a snapshot of an equally wired machine, whatever engine made it. Raises ValueError."""
+        flash = self.program.flash.tobytes()
+        self.record.restore(state)
+        if self.program.flash.tobytes() != flash:
+            self.program.announce_all()
+        self._resumed = None
+
+    # Hooks
+
+    def hook_pc(self, address: int, hook: PcHook) -> Callable[[], None]:
+        """Call `hook` before the instruction at `address`; a true result stops the run. Returns how to remove it."""
+        self._pc_hooks.setdefault(address, []).append(hook)
+        self._engine.forget()
+
+        def remove() -> None:
+            self._pc_hooks[address].remove(hook)
+            if not self._pc_hooks[address]:
+                del self._pc_hooks[address]
+            self._engine.forget()
+
+        return remove
+
+    def hook_sfr(self, place: str | int, hook: SfrHook) -> None:
+        """Call hook(is_write, word) after every access of an instruction to a register."""
+        word = self.address_of(place) >> 1
+        bus = self.bus
+        read, written = bus.on_read[word] or bus.compute[word], bus.on_write[word]
+
+        def on_read() -> int:
+            value = read() if read is not None else self.record.u16[word]
+            hook(False, value)
+            return value
+
+        def on_write(old: int, new: int, lanes: int) -> None:
+            if written is not None:
+                written(old, new, lanes)
+            hook(True, self.record.u16[word])
+
+        bus.on_read[word], bus.on_write[word] = on_read, on_write
+        self._engine.forget()
