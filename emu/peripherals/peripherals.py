@@ -1,0 +1,143 @@
+"""All peripherals of a chip, wired to each other: what the machine builds, resets, and puts to sleep."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.bus import Bus
+from emu.chips.chip import Chip
+from emu.peripherals.interrupts import Interrupts
+from emu.peripherals.kit import Kit, Peripheral, Wires
+from emu.peripherals.lvd import LowVoltageDetect
+from emu.peripherals.nvm import Nvm
+from emu.peripherals.oscillator import Oscillator
+from emu.peripherals.pins import PORTS, Pins
+from emu.peripherals.pmd import ModuleDisable
+from emu.peripherals.ports import ChangeNotice, ExternalInterrupts, Port
+from emu.peripherals.resets import Resets, Watchdog
+from emu.peripherals.timers import Timers
+from emu.peripherals.uart import Uart
+from emu.program import ProgramMemory
+
+CRYSTAL_HZ: Final = 7_372_800
+"""Crystal of the e-puck (§3); other boards pass their own."""
+
+_CHANGE_NOTICE_IRQ: Final = "CN"
+
+
+class Peripherals:
+    """The devices by role. Order of construction is the priority of events that fall due in the same cycle."""
+
+    def __init__(self, kit: Kit) -> None:
+        self.kit: Final = kit
+        chip = kit.chip
+        numbers = {source.name: irq for irq, source in chip.interrupts.items()}
+        self.pins: Final = kit.pins
+        self.interrupts: Final = Interrupts(kit)
+        self.oscillator: Final = Oscillator(kit)
+        self.resets: Final = Resets(kit)
+        self.watchdog: Final = Watchdog(kit, self.resets)
+        self.lvd: Final = LowVoltageDetect(kit, self.interrupts, self.resets.rcon)
+        self.nvm: Final = Nvm(kit, self.interrupts)
+        self.ports: Final = {PORTS.index(letter): Port(letter, kit) for letter in chip.ports}
+        self.change_notice: Final = ChangeNotice(kit, numbers[_CHANGE_NOTICE_IRQ])
+        self.external: Final = ExternalInterrupts(kit, self.interrupts)
+        self.timer: Final = Timers(kit, self.interrupts).by_number
+        self.uart: Final = {site.number: Uart(site, kit, self.interrupts, self.ports) for site in chip.uarts}
+        self.pmd: Final = ModuleDisable(kit, self._modules())
+        self.all: Final[tuple[Peripheral, ...]] = (
+            self.oscillator,
+            self.resets,
+            self.watchdog,
+            self.lvd,
+            self.nvm,
+            *self.ports.values(),
+            self.change_notice,
+            self.external,
+            *self.timer.values(),
+            *self.uart.values(),
+            self.pmd,
+        )
+
+    def _modules(self) -> dict[str, Peripheral]:
+        """Peripherals by the name their PMD bit carries."""
+        modules: dict[str, Peripheral] = {}
+        modules |= {f"T{number}": timer for number, timer in self.timer.items()}
+        modules |= {f"U{number}": uart for number, uart in self.uart.items()}
+        return modules
+
+    def reset(self, cause: str) -> None:
+        """Every peripheral register to its reset value, every device to its reset state; RCON tells the cause.
+
+        `cause` is an RCON bit name: POR, BOR, EXTR, SWR, WDTO, TRAPR or IOPUWR (§4). The CPU resets its own registers
+        (below INTCON1). Raises ValueError for another cause.
+        """
+        bus = self.kit.bus
+        first = self.kit.chip.sfrs["INTCON1"].address >> 1
+        kept = self.resets.rcon.value
+        osccon = self.oscillator.con.value
+        for word in range(first, len(bus.reset_value)):
+            bus.record.u16[word] = bus.reset_value[word]
+        self.resets.record_cause(cause, kept)
+        if cause != "POR":  # the clock selection survives (§4)
+            self.oscillator.con.value = osccon
+        for device in self.all:
+            device.power_up(power_on=cause == "POR")
+        self.nvm.interrupted()
+
+    def sleep(self, mode: int, cycle: int) -> None:
+        """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""
+        self.watchdog.clear(cycle)
+        self.watchdog.power_mode(mode)
+        for device in self.all:
+            if device.stops_in(mode):
+                device.freeze(cycle, mode)
+
+    def wake(self, cycle: int) -> None:
+        """The CPU runs again; `cycle` is the first in which the stopped clocks tick."""
+        self.watchdog.power_mode(0)
+        for device in self.all:
+            if device.is_frozen:
+                device.thaw(cycle)
+
+    def clear_watchdog(self, cycle: int) -> None:
+        """CLRWDT in `cycle`."""
+        self.watchdog.clear(cycle)
+
+    def restored(self) -> None:
+        """Call after the record was replaced by a snapshot."""
+        for device in self.all:
+            device.restored()
+
+    def seconds(self, cycle: int) -> float:
+        """Seconds since power-on at `cycle`."""
+        return self.oscillator.seconds(cycle)
+
+    @property
+    def fcy(self) -> float:
+        """Instruction cycles per second at present."""
+        return self.oscillator.fcy()
+
+
+def wire_bus(chip: Chip, bus: Bus) -> None:
+    """Tell the bus which bits exist, which of them software can change, and what a reset makes of them."""
+    for sfr in chip.sfrs.values():
+        if sfr.size != 2:
+            continue
+        word = sfr.address >> 1
+        bus.name[word] = sfr.name
+        bus.writable[word] = sfr.writable
+        bus.clear_only[word] = sfr.clear_only
+        bus.reset_value[word] = sfr.reset
+
+
+def build(
+    chip: Chip, bus: Bus, program: ProgramMemory, wires: Wires | None = None, crystal: int = CRYSTAL_HZ
+) -> Peripherals:
+    """Fill in the bus from the chip's data and put every device on it. `crystal` in Hz.
+
+    The caller keeps `wires` and may fill in its callbacks later. Call `reset("POR")` once before the first cycle.
+    """
+    wire_bus(chip, bus)
+    pins = Pins(bus.record, bus.events)
+    return Peripherals(Kit(chip, bus, pins, program, wires or Wires(), crystal))

@@ -1,0 +1,163 @@
+"""The package pins: the interface between the chip and the world around it.
+
+Everything is an array in the record with one word per port (A..G = 0..6), so a simulation reads and writes levels
+without calls per pin:
+
+- `input`: level the outside applies; `open`: 1 where nothing outside drives the pin (a pull-up decides then);
+- `drive`, `output`: what the chip drives, and with which level;
+- `level`: what the digital input buffers see (0 where the pin is analog).
+
+A simulation that writes `input` calls `apply(port, cycle)` once afterwards, or uses `set`. A fast input (a pixel bus)
+is not pushed edge by edge: it is attached as a `Waveform`, a function of the cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from emu.events import Events
+from emu.record import Record
+
+PORTS: Final = "ABCDEFG"
+
+Watcher = Callable[[int, int, int], None]
+"""Called as watcher(cycle, changed, levels): pins in `changed` have the given levels from `cycle` on."""
+
+
+class Waveform(Protocol):
+    """Levels of some pins of one port as a function of the cycle."""
+
+    def bits(self, cycle: int) -> int:
+        """Levels of the port's pins in `cycle`; only bits of the attached mask count."""
+
+    def rises(self, mask: int, after: int, until: int) -> int:
+        """Number of rising edges of the one pin in `mask` in cycles after < c <= until."""
+
+    def nth_rise(self, mask: int, after: int, count: int) -> int:
+        """Cycle of the `count`-th rising edge (1 = next) of the pin in `mask` behind cycle `after`, or NEVER."""
+
+
+def parse_pin(name: str) -> tuple[int, int]:
+    """("RC14") -> (port index, bit mask). Raises ValueError for anything that is not a pin name."""
+    if len(name) >= 3 and name[0] == "R" and name[1] in PORTS and name[2:].isdecimal() and int(name[2:]) < 16:
+        return PORTS.index(name[1]), 1 << int(name[2:])
+    raise ValueError(f"{name!r} is not a pin name like RC14")
+
+
+class Pins:
+    """Levels of all pins, who drives them, and who wants to hear of edges."""
+
+    def __init__(self, record: Record, events: Events) -> None:
+        self._events: Final = events
+
+        def words(name: str) -> memoryview[int]:
+            first = record.reserve(f"pins.{name}", "H", len(PORTS)).index
+            return record.u16[first : first + len(PORTS)]
+
+        self.input: Final = words("input")
+        self.open: Final = words("open")
+        self.drive: Final = words("drive")
+        self.output: Final = words("output")
+        self.level: Final = words("level")
+        self.pullup: Final = words("pullup")
+        self.analog: Final = words("analog")
+        self.before: Final = words("before")
+        """What PORT reads still return in the cycle after the chip changed its outputs (§6)."""
+        first = record.reserve("pins.changed", "Q", len(PORTS)).index
+        self.changed: Final = record.u64[first : first + len(PORTS)]
+        """First cycle of the newest output levels."""
+        self.edges: list[tuple[int, int, int]] | None = None
+        """Set to a list to log (cycle, port, levels) at every change."""
+        self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
+        self._waveforms: Final[list[list[tuple[int, Waveform]]]] = [[] for _ in PORTS]
+        self._on_waveform: Final[list[tuple[Callable[[int], None], Callable[[], None]]]] = []
+
+    def watch(self, name: str, watcher: Watcher) -> None:
+        """Tell `watcher` of every edge on one pin."""
+        port, mask = parse_pin(name)
+        self.watch_port(port, mask, watcher)
+
+    def watch_port(self, port: int, mask: int, watcher: Watcher) -> None:
+        """Tell `watcher` of every edge on the pins in `mask` of a port."""
+        self._watchers[port].append((mask, watcher))
+
+    def attach(self, port: int, mask: int, waveform: Waveform) -> None:
+        """Let a function of the cycle supply the levels of the pins in `mask`; edge watchers do not hear of them."""
+        if all(entry[1] is not waveform for entry in self._waveforms[port]):
+            self._waveforms[port].append((mask, waveform))
+
+    def detach(self, port: int, waveform: Waveform) -> None:
+        """Undo `attach`."""
+        self._waveforms[port] = [entry for entry in self._waveforms[port] if entry[1] is not waveform]
+
+    def waveform(self, port: int, mask: int) -> Waveform | None:
+        """The waveform on the pins in `mask`, if one is attached."""
+        return next((wave for pins, wave in self._waveforms[port] if pins & mask), None)
+
+    def on_waveform_change(self, before: Callable[[int], None], after: Callable[[], None]) -> None:
+        """Have `before(cycle)` and `after()` called around every change of a waveform's future."""
+        self._on_waveform.append((before, after))
+
+    def change_waveform(self, cycle: int, change: Callable[[], None]) -> None:
+        """Run `change`, which gives an attached waveform a new future from `cycle` on; clocks keep their counts."""
+        for before, _ in self._on_waveform:
+            before(cycle)
+        change()
+        for _, after in self._on_waveform:
+            after()
+
+    def set(self, name: str, level: int, cycle: int | None = None) -> None:
+        """The outside drives one pin with `level` (0 or 1) from `cycle` on (default: now)."""
+        port, mask = parse_pin(name)
+        self.set_port(port, mask, mask if level else 0, cycle)
+
+    def set_port(self, port: int, mask: int, levels: int, cycle: int | None = None) -> None:
+        """The outside drives the pins in `mask` of a port."""
+        self.input[port] = self.input[port] & ~mask | levels & mask
+        self.open[port] &= ~mask
+        self.apply(port, self._events.now if cycle is None else cycle)
+
+    def release(self, name: str, cycle: int | None = None) -> None:
+        """The outside lets go of one pin."""
+        port, mask = parse_pin(name)
+        self.open[port] |= mask
+        self.apply(port, self._events.now if cycle is None else cycle)
+
+    def get(self, name: str) -> int:
+        """Level of one pin in the current cycle, 0 or 1."""
+        port, mask = parse_pin(name)
+        return int(bool(self.levels(port, self._events.now) & mask))
+
+    def levels(self, port: int, cycle: int) -> int:
+        """Digital levels of a port in `cycle` (the present or, on waveforms, any cycle)."""
+        return self._with_waveforms(port, cycle, self.level[port])
+
+    def _with_waveforms(self, port: int, cycle: int, level: int) -> int:
+        for mask, waveform in self._waveforms[port]:
+            level = level & ~mask | waveform.bits(cycle) & mask
+        return level
+
+    def read_port(self, port: int, cycle: int) -> int:
+        """What an instruction reads from PORT in `cycle`: outputs show one cycle late (§6)."""
+        stored = self.before if cycle <= self.changed[port] else self.level
+        return self._with_waveforms(port, cycle, stored[port])
+
+    def apply(self, port: int, cycle: int, by_chip: bool = False) -> None:
+        """Recompute a port's levels after any of the arrays changed; they hold from `cycle` on."""
+        outside = self.input[port] & ~self.open[port] | self.pullup[port] & self.open[port]
+        drive = self.drive[port]
+        level = (self.output[port] & drive | outside & ~drive) & ~self.analog[port]
+        old = self.level[port]
+        if by_chip and cycle != self.changed[port]:
+            self.before[port] = old
+            self.changed[port] = cycle
+        changed = old ^ level
+        if not changed:
+            return
+        self.level[port] = level
+        if self.edges is not None:
+            self.edges.append((cycle, port, level))
+        for mask, watcher in self._watchers[port]:
+            if changed & mask:
+                watcher(cycle, changed & mask, level)

@@ -1,0 +1,112 @@
+"""Peripheral module disable (§17): a module switched off reads 0, ignores writes and forgets its state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from emu.bus import ReadHook, WriteHook
+from emu.peripherals.kit import Kit, Peripheral
+
+_PREFIXES: Final = {
+    "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
+    "DCI": ("DCI", "TSCON", "RSCON", "RXBUF", "TXBUF"),
+}
+"""Modules whose registers do not start with the module's own name."""
+
+
+def _zero() -> int:
+    return 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Access:
+    """How a register word is wired on the bus."""
+
+    writable: int
+    clear_only: int
+    compute: ReadHook | None
+    on_read: ReadHook | None
+    on_write: WriteHook | None
+
+
+class ModuleDisable(Peripheral):
+    """PMD1 and PMD2. What is off follows from the registers, so a restored record needs no more than `restored`."""
+
+    def __init__(self, kit: Kit, modules: dict[str, Peripheral]) -> None:
+        super().__init__("pmd", kit)
+        self._modules: Final = modules
+        self._off: Final[dict[int, _Access]] = {}
+        self._bits: Final[list[tuple[Callable[[], int], str]]] = []
+        for name in ("PMD1", "PMD2"):
+            register = self.register(name)
+            register.written_by(lambda _old, _new, _lanes: self._written())
+            for field in register_fields(kit, name):
+                self._bits.append((lambda register=register, field=field: register[field], field[:-2]))  # type: ignore[misc]
+        self.register("PMD3")
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: these are switches."""
+        return False
+
+    def _words(self, module: str) -> list[int]:
+        """Word indices of a module's registers."""
+        timer = module[1:] if module[0] == "T" else None
+        prefixes = _PREFIXES.get(module, (module,))
+        return sorted(
+            {
+                sfr.address >> 1
+                for name, sfr in self.kit.chip.sfrs.items()
+                if (name in (f"TMR{timer}", f"PR{timer}", f"T{timer}CON") if timer else name.startswith(prefixes))
+            }
+        )
+
+    def _written(self) -> None:
+        for is_off, module in self._bits:
+            first = self._words(module)[0]
+            if is_off() and first not in self._off:
+                self._clear(module)
+        self.restored()
+
+    def _clear(self, module: str) -> None:
+        """The module loses its state, as by a reset of its own."""
+        for word in self._words(module):
+            self.record.u16[word] = self.bus.reset_value[word]
+        if module in self._modules:
+            self._modules[module].restart()
+
+    def restored(self) -> None:
+        """Wire the registers of each module as its bit says."""
+        for is_off, module in self._bits:
+            for word in self._words(module):
+                if is_off() and word not in self._off:
+                    self._cut(word)
+                elif not is_off() and word in self._off:
+                    self._mend(word)
+
+    def reset(self, power_on: bool) -> None:
+        """All modules on."""
+        self.restored()
+
+    def _cut(self, word: int) -> None:
+        bus = self.bus
+        self._off[word] = _Access(
+            bus.writable[word], bus.clear_only[word], bus.compute[word], bus.on_read[word], bus.on_write[word]
+        )
+        bus.writable[word] = bus.clear_only[word] = 0
+        bus.compute[word] = _zero
+        bus.on_read[word] = None
+        bus.on_write[word] = None
+
+    def _mend(self, word: int) -> None:
+        access = self._off.pop(word)
+        bus = self.bus
+        bus.writable[word], bus.clear_only[word] = access.writable, access.clear_only
+        bus.compute[word], bus.on_read[word], bus.on_write[word] = access.compute, access.on_read, access.on_write
+
+
+def register_fields(kit: Kit, name: str) -> list[str]:
+    """Field names of a register, least significant first."""
+    fields = kit.chip.sfrs[name].fields
+    return sorted(fields, key=lambda field: fields[field][0])

@@ -1,0 +1,102 @@
+"""RCON and the watchdog (§4)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.events import NEVER
+from emu.peripherals.kit import IDLE, SLEEP, Kit, Peripheral
+
+WDT_HZ: Final = 128_000
+"""The LPRC divided by 4 clocks the watchdog's 8-bit counter (§4)."""
+_COUNTER: Final = 256
+_PRESCALE_A: Final = (1, 8, 64, 512)
+
+CAUSES: Final = ("TRAPR", "IOPUWR", "EXTR", "SWR", "WDTO", "BOR", "POR")
+"""RCON bits that name a reset (§4)."""
+
+
+class Resets(Peripheral):
+    """RCON: why the chip was reset, and what it slept through. Bits stay until software clears them."""
+
+    def __init__(self, kit: Kit) -> None:
+        super().__init__("rcon", kit)
+        self.rcon: Final = self.register("RCON")
+
+    def stops_in(self, mode: int) -> bool:
+        """Never."""
+        return False
+
+    def record_cause(self, cause: str, kept: int) -> None:
+        """RCON after a reset by `cause`; `kept` is its value before. A power-on clears everything else (§4)."""
+        if cause not in CAUSES:
+            raise ValueError(f"{cause!r} is no reset cause; expected one of {', '.join(CAUSES)}")
+        if cause == "POR":  # POR and BOR set, LVDL = 0101
+            self.rcon.value = self.kit.chip.sfrs["RCON"].reset
+            return
+        self.rcon.value = kept
+        self.rcon[cause] = 1
+
+
+class Watchdog(Peripheral):
+    """Free-running from the LPRC: resets the running chip, wakes the sleeping one."""
+
+    def __init__(self, kit: Kit, resets: Resets) -> None:
+        super().__init__("wdt", kit)
+        self._resets: Final = resets
+        self._mode: Final = self.cell("mode", "B")
+        self._timeout: Final = self.slot("timeout", self._expired)
+        resets.rcon.written_by(self._rcon_written)
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: the LPRC runs in every power mode."""
+        return False
+
+    @property
+    def is_enabled(self) -> bool:
+        """FWDTEN in the configuration word, or SWDTEN."""
+        word = self.kit.chip.config["FWDT"]
+        return bool(word.field(self.kit.program.config[1], "FWDTEN") or self._resets.rcon["SWDTEN"])
+
+    @property
+    def period(self) -> int:
+        """Time-out in Tcy: 2 ms x A x B (§4)."""
+        word = self.kit.chip.config["FWDT"]
+        stored = self.kit.program.config[1]
+        counts = _COUNTER * _PRESCALE_A[word.field(stored, "FWPSA")] * (word.field(stored, "FWPSB") + 1)
+        return round(counts / WDT_HZ * self.kit.fcy())
+
+    def clear(self, cycle: int) -> None:
+        """CLRWDT or PWRSAV in `cycle`: counter and prescalers restart, WDTO falls (§4)."""
+        self._resets.rcon["WDTO"] = 0  # UNVERIFIED: the family manual says so (§4)
+        self._arm(cycle)
+
+    def _arm(self, cycle: int) -> None:
+        if self.is_enabled:
+            self.events.set(self._timeout, cycle + self.period)
+        else:
+            self.events.cancel(self._timeout)
+
+    def _rcon_written(self, old: int, new: int, _lanes: int) -> None:
+        swdten = 1 << self.kit.chip.sfrs["RCON"].fields["SWDTEN"][0]
+        if (old ^ new) & swdten and (not self.is_enabled or self.events.due(self._timeout) == NEVER):
+            self._arm(self.now)
+
+    def power_mode(self, mode: int) -> None:
+        """The CPU goes to sleep (IDLE or SLEEP) or runs again (0)."""
+        self._mode.value = mode
+        if mode:
+            self._resets.rcon["SLEEP" if mode == SLEEP else "IDLE"] = 1
+
+    def _expired(self, due: int) -> None:
+        if self._mode.value in (IDLE, SLEEP):
+            self._resets.rcon["WDTO"] = 1
+            self._arm(due)
+            self.kit.wires.wake()
+        else:
+            self.kit.wires.reset("WDTO")
+
+    def reset(self, power_on: bool) -> None:
+        """Any reset clears the counter and both prescalers (§4)."""
+        self._mode.value = 0
+        self._arm(self.now)

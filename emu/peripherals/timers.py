@@ -1,0 +1,411 @@
+"""Timers 1-5 (§7): timer, gated and counter modes, 32-bit pairs. TMR is computed on read, never ticked.
+
+The stored TMR word is the count at cycle `base`; `tick` Tcy make one count. A match posts one event, whose due date is
+the cycle the interrupt flag first reads 1: one Tcy after TMR became equal to PR (§7 rule 2). README.md tells native
+code how to fire the simple periodic case from the record alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.chips.chip import TimerSite
+from emu.device import Register
+from emu.events import NEVER
+from emu.peripherals.interrupts import Interrupts
+from emu.peripherals.kit import IDLE, SLEEP, Kit, Peripheral
+from emu.peripherals.pins import parse_pin
+
+PRESCALE: Final = (1, 8, 64, 256)
+"""Clocks per count for TCKPS = 0..3 (§7)."""
+
+STOPPED: Final = 0
+TCY: Final = 1
+PIN: Final = 2
+WAVE: Final = 3
+"""Clock sources: none, the instruction clock, edges pushed by a pin, edges of a described waveform."""
+
+
+def advance(start: int, counts: int, period: int, top: int) -> int:
+    """Count `counts` steps from `start`; after `period` (PR) comes 0, after `top` (all ones) comes 0 too."""
+    if start > period:
+        if start + counts <= top:
+            return start + counts
+        counts -= top + 1 - start
+        start = 0
+    return (start + counts) % (period + 1)
+
+
+def counts_until(start: int, target: int, period: int, top: int) -> int | None:
+    """Counts (at least 1) until the counter becomes `target`, or None if it never does."""
+    if start > period:
+        if start < target:
+            return target - start
+        return top + 1 - start + target if target <= period and (target or period) else None
+    if target > period or period == 0:
+        return None
+    return target - start if target > start else target - start + period + 1
+
+
+class Timer(Peripheral):
+    """One 16-bit timer, or, with T32 set, a 32-bit timer that owns its partner's registers too."""
+
+    def __init__(self, site: TimerSite, kit: Kit, interrupts: Interrupts) -> None:
+        super().__init__(f"t{site.number}", kit)
+        self.site: Final = site
+        self._interrupts: Final = interrupts
+        self.tmr: Final = self.register(f"TMR{site.number}")
+        self.pr: Final = self.register(f"PR{site.number}")
+        self.con: Final = self.register(f"T{site.number}CON")
+        self.idle_bit = (self.con, "TSIDL")
+        self.line: Final = self.irq(site.irq)
+        self.low: Timer | None = None
+        """For a type C timer: the type B timer that takes it over with T32."""
+        self.high: Timer | None = None
+        self._hold: Register | None = None
+        self.base: Final = self.moment("base")
+        """Cycle at which the count was the stored TMR word, with an empty prescaler if the source is Tcy."""
+        self.tick: Final = self.cell("tick")
+        """Tcy per count; 0 while stopped or clocked from outside."""
+        self.period: Final = self.cell("period", "Q")
+        """Tcy from one match to the next; 0 if the event is not simply periodic."""
+        self._source: Final = self.cell("source", "B")
+        self._phase: Final = self.cell("phase", "H")
+        self._before: Final = self.cell("before", "I")
+        self._port, self._pin = parse_pin(site.clock_pin)
+        self._match: Final = self.slot("match", self._fire)
+        self._on_match: Final[list[Callable[[int], None]]] = []
+        self.on_change: Final[list[Callable[[], None]]] = []
+        """Called after the course of the count has changed: output compare plans anew (§9)."""
+        self.tmr.computed(self.read)
+        self.tmr.written_by(self._tmr_written)
+        self.pr.written_by(self._course_written)
+        self.con.written_by(self._con_written)
+        kit.pins.watch(site.clock_pin, self._edge)
+        kit.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
+
+    def pair(self, high: Timer) -> None:
+        """Join with the type C partner (T2 with T3, T4 with T5)."""
+        self.high, high.low = high, self
+        self._hold = self.register(f"TMR{high.site.number}HLD")
+
+    # -- count -------------------------------------------------------------------------------------------------------
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether this timer and its partner form a 32-bit timer."""
+        return self.high is not None and bool(self.con["T32"])
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether this timer is the upper half of a 32-bit timer."""
+        return self.low is not None and self.low.is_wide
+
+    @property
+    def _start(self) -> int:
+        return self.tmr.value | (self.high.tmr.value << 16 if self.high is not None and self.is_wide else 0)
+
+    @_start.setter
+    def _start(self, count: int) -> None:
+        self.tmr.value = count
+        if self.high is not None and self.is_wide:
+            self.high.tmr.value = count >> 16
+
+    @property
+    def limit(self) -> int:
+        """PR, 32 bits wide in 32-bit mode."""
+        return self.pr.value | (self.high.pr.value << 16 if self.high is not None and self.is_wide else 0)
+
+    @property
+    def top(self) -> int:
+        """Largest count: all ones."""
+        return 0xFFFF_FFFF if self.is_wide else 0xFFFF
+
+    def _ticks(self, cycle: int) -> int:
+        """Clocks (before the prescaler) from `base` to `cycle`."""
+        source = self._source.value
+        if source == TCY:
+            return max(cycle - self.base.value, 0)
+        if source == WAVE:
+            waveform = self.kit.pins.waveform(self._port, self._pin)
+            if waveform is not None:  # an edge in cycle c is counted in c + 1 (§7 rule 9)
+                return waveform.rises(self._pin, self.base.value - 1, cycle - 1)
+        return 0
+
+    def count(self, cycle: int) -> int:
+        """The count in `cycle`, which is not before the last write to the timer."""
+        if self.is_taken:
+            assert self.low is not None
+            return self.low.count(cycle) >> 16
+        if self._source.value == PIN:
+            return self._before.value if cycle < self.base.value else self._start
+        clocks = self._phase.value + self._ticks(cycle)
+        return advance(self._start, clocks // self._prescale, self.limit, self.top)
+
+    def read(self) -> int:
+        """TMR as an instruction reads it in the current cycle."""
+        return self.count(self.clock) & 0xFFFF
+
+    def next_cycle_at(self, target: int, after: int) -> int:
+        """First cycle behind `after` in which the count *becomes* `target`, or NEVER."""
+        if self.is_taken:
+            return NEVER
+        source = self._source.value
+        if source not in (TCY, WAVE):
+            return NEVER
+        done = (self._phase.value + self._ticks(after)) // self._prescale
+        now = advance(self._start, done, self.limit, self.top)
+        more = counts_until(now, target, self.limit, self.top)
+        if more is None:
+            return NEVER
+        clocks = (done + more) * self._prescale - self._phase.value
+        if source == TCY:
+            return self.base.value + clocks
+        waveform = self.kit.pins.waveform(self._port, self._pin)
+        edge = NEVER if waveform is None else waveform.nth_rise(self._pin, self.base.value - 1, clocks)
+        return NEVER if edge == NEVER else edge + 1
+
+    @property
+    def _prescale(self) -> int:
+        return PRESCALE[self.con["TCKPS"]]
+
+    # -- changes of course -------------------------------------------------------------------------------------------
+
+    def _fold(self, cycle: int, prescale: int, limit: int) -> None:
+        """Make `cycle` the base: count what has passed with the given (old) prescaler and period."""
+        clocks = self._phase.value + self._ticks(cycle)
+        self._start = advance(self._start, clocks // prescale, limit, self.top)
+        self._phase.value = clocks % prescale
+        self.base.value = cycle
+
+    def _plan(self, rewritten: bool = False) -> None:
+        """Publish tick and period, and post the next match behind the current cycle."""
+        source = self._source.value
+        simple = source == TCY and not self.is_taken
+        if simple:  # an empty prescaler lets native code compute the count from base and tick alone
+            self.base.value -= self._phase.value
+            self._phase.value = 0
+        self.tick.value = self._prescale if simple else 0
+        flagged = not self.is_taken and self.limit != 0 and not self._is_gated
+        self.period.value = (self.limit + 1) * self._prescale if simple and flagged and not self._on_match else 0
+        if not self._match_stands(rewritten):
+            self._post(self.now)
+        for listener in self.on_change:
+            listener()
+
+    def _match_stands(self, rewritten: bool) -> bool:
+        """Whether the posted match happens in the current cycle, or in the next whatever was just written."""
+        due = self.events.due(self._match)
+        if due == self.now + 1:
+            return True
+        running = self._source.value in (TCY, WAVE)
+        return due == self.now + 2 and running and not rewritten and self.count(self.now + 1) == self.limit
+
+    def _post(self, after: int) -> None:
+        if self._is_gated or self.is_frozen:
+            self.events.cancel(self._match)
+            return
+        match = self.next_cycle_at(self.limit, after)
+        self.events.set(self._match, match + 1) if match != NEVER else self.events.cancel(self._match)
+
+    @property
+    def _is_gated(self) -> bool:
+        return bool(self.con["TGATE"]) and not self.con["TCS"]
+
+    def _choose_source(self) -> int:
+        if self.is_taken or not self.con["TON"]:
+            return STOPPED
+        if self.con["TCS"]:
+            return WAVE if self.kit.pins.waveform(self._port, self._pin) is not None else PIN
+        if self.con["TGATE"] and not self.kit.pins.level[self._port] & self._pin:
+            return STOPPED
+        return TCY
+
+    def _tmr_written(self, _old: int, new: int, lanes: int) -> None:
+        """The written count stands from the next cycle; the prescaler restarts (§7 rules 6, 8)."""
+        if self.is_taken:
+            assert self.low is not None
+            self.low.high_written(new, lanes)
+            return
+        count = self.count(self.now)  # the stored word was replaced, but only in the written lanes
+        written = count & ~lanes & 0xFFFF | new & lanes
+        if self.is_wide:
+            assert self.high is not None
+            assert self._hold is not None
+            self.high.tmr.value = self._hold.value
+        self.tmr.value = written
+        self._before.value = written
+        self._phase.value = 0
+        self.base.value = self.now + 1
+        self._plan(rewritten=True)
+
+    def high_written(self, new: int, lanes: int) -> None:
+        """A direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
+        assert self.high is not None
+        self._fold(self.now + 1, self._prescale, self.limit)
+        self.high.tmr.value = self.high.tmr.value & ~lanes | new & lanes
+        self._plan()
+
+    def _course_written(self, old: int, new: int, _lanes: int) -> None:
+        """PR changed: what was counted until the next cycle was counted with the old PR."""
+        owner = self.low if self.is_taken and self.low is not None else self
+        shift = 0 if owner is self else 16
+        previous = owner.limit & ~(0xFFFF << shift) | old << shift
+        if old != new:
+            owner.recourse(previous)
+
+    def recourse(self, previous_limit: int) -> None:
+        """Count up to the next cycle with `previous_limit`, then plan with the present registers."""
+        self._fold(self.now + 1, self._prescale, previous_limit)
+        self._plan()
+
+    def _con_written(self, old: int, new: int, _lanes: int) -> None:
+        if self.high is not None and (old ^ new) & self._t32:
+            self._join_changed(old, new)
+            return
+        self._switch(old)
+
+    @property
+    def _t32(self) -> int:
+        return 1 << self.kit.chip.sfrs[self.con.name].fields["T32"][0] if self.high is not None else 0
+
+    def _join_changed(self, old: int, new: int) -> None:
+        """T32 was set or cleared: both halves freeze their counts under the old arrangement, then start anew."""
+        assert self.high is not None
+        cycle = self.now + 1
+        self.con.value = old
+        halves = (self, self.high)
+        counts = [half.count(cycle) & 0xFFFF for half in halves]
+        self.con.value = new
+        for half, count in zip(halves, counts, strict=True):
+            half.tmr.value = count
+            half._phase.value = 0
+            half.base.value = cycle
+            half._before.value = count
+            half._source.value = half._choose_source()
+        self.restored()
+        for half in halves:
+            half._plan()
+
+    def _switch(self, old_con: int) -> None:
+        """TxCON changed. The prescaler empties when TON falls or the clock is chosen anew (§7 rule 6).
+
+        UNVERIFIED: the data sheet lists any write to TxCON as clearing it; here only those that change the clock.
+        """
+        present = self.con.value
+        lsb, width = self.kit.chip.sfrs[self.con.name].fields["TCKPS"]
+        old_prescale = PRESCALE[old_con >> lsb & (1 << width) - 1]
+        self._fold(self.now + 1, old_prescale, self.limit)
+        clock_bits = sum(((1 << w) - 1) << b for b, w in map(self._field, ("TON", "TCKPS", "TCS", "TGATE")))
+        if (present ^ old_con) & clock_bits:
+            self._phase.value = 0
+        self._before.value = self._start
+        self._source.value = self._choose_source()
+        self._plan()
+
+    def _field(self, name: str) -> tuple[int, int]:
+        return self.kit.chip.sfrs[self.con.name].fields[name]
+
+    # -- outside clock and gate --------------------------------------------------------------------------------------
+
+    def _edge(self, cycle: int, _changed: int, levels: int) -> None:
+        if self.is_frozen or self.is_taken or not self.con["TON"]:
+            return
+        rising = bool(levels & self._pin)
+        if self.con["TCS"]:
+            if rising and self._source.value == PIN:
+                self._count_edge(cycle)
+        elif self.con["TGATE"]:
+            self._gate(cycle, rising)
+
+    def _count_edge(self, cycle: int) -> None:
+        """One rising edge in `cycle` is counted in the cycle behind it (§7 rule 9)."""
+        self._before.value = self.count(cycle)
+        self.base.value = cycle + 1
+        phase = self._phase.value + 1
+        if phase < self._prescale:
+            self._phase.value = phase
+            return
+        self._phase.value = 0
+        start = self._start
+        self._start = count = advance(start, 1, self.limit, self.top)
+        if count == self.limit and count != 0:
+            self.events.set(self._match, cycle + 2)
+        for listener in self.on_change:
+            listener()
+
+    def _gate(self, cycle: int, opened: bool) -> None:
+        """The gate is synchronised for one Tcy; its falling edge raises the flag (§7)."""
+        self._fold(cycle + 1, self._prescale, self.limit)
+        self._source.value = TCY if opened else STOPPED
+        self._plan()
+        if not opened:
+            self.events.set(self._match, cycle + 2)
+
+    def _waveform_changes(self, cycle: int) -> None:
+        """A described clock is about to change: count what came before, then look at the pins again."""
+        if self._source.value in (WAVE, PIN) and not self.is_frozen:
+            self._fold(cycle, self._prescale, self.limit)
+
+    def _waveform_changed(self) -> None:
+        """A described clock has changed its future."""
+        if self._source.value in (WAVE, PIN):
+            self._source.value = self._choose_source()
+            self._plan()
+
+    def listen(self, on_match: Callable[[int], None], wanted: bool) -> None:
+        """Call `on_match(due)` at each match from now on, or no longer (ADC trigger, §13)."""
+        if wanted != (on_match in self._on_match):
+            self._on_match.append(on_match) if wanted else self._on_match.remove(on_match)
+            self._plan()
+
+    # -- match -------------------------------------------------------------------------------------------------------
+
+    def _fire(self, due: int) -> None:
+        (self.high or self).line.request() if self.is_wide else self.line.request()
+        for listener in self._on_match:
+            listener(due)
+        if self._source.value in (TCY, WAVE):
+            self._post(due - 1)
+
+    # -- power and reset ---------------------------------------------------------------------------------------------
+
+    def reset(self, power_on: bool) -> None:
+        """Stopped; the count survives every reset but power-on in silicon, and reads 0 here."""
+        for cell in (self.base, self.tick, self.period, self._source, self._phase, self._before):
+            cell.value = 0
+        self.restored()
+
+    def stops_in(self, mode: int) -> bool:
+        """Only timer 1 as asynchronous counter runs in Sleep (§7)."""
+        if mode == SLEEP:
+            return not (self.site.kind == "A" and self.con["TCS"] and not self.con["TSYNC"])
+        owner = self.low if self.is_taken and self.low is not None else self
+        return mode == IDLE and bool(owner.con["TSIDL"])
+
+    def freeze(self, cycle: int, mode: int) -> None:
+        """Count what came before, so that only the remainder waits."""
+        self._fold(max(cycle, self.base.value), self._prescale, self.limit)
+        super().freeze(cycle, mode)
+
+    def restored(self) -> None:
+        """Reading TMR of the lower half latches the upper half in 32-bit mode only (§7)."""
+        if self.high is not None:
+            self.bus.on_read[self.tmr.address >> 1] = self._read_and_latch if self.is_wide else None
+
+    def _read_and_latch(self) -> int:
+        count = self.count(self.clock)
+        assert self._hold is not None
+        self._hold.value = count >> 16
+        return count & 0xFFFF
+
+
+class Timers:
+    """The timers of a chip by number, paired."""
+
+    def __init__(self, kit: Kit, interrupts: Interrupts) -> None:
+        self.by_number: Final = {site.number: Timer(site, kit, interrupts) for site in kit.chip.timers}
+        for site in kit.chip.timers:
+            if site.kind == "B":
+                self.by_number[site.number].pair(self.by_number[site.partner])

@@ -1,0 +1,455 @@
+"""UART1/2 (§10): FIFOs, bit-exact line timing, error flags, interrupt modes, loopback, break, autobaud.
+
+The outside is bytes with cycles: `on_byte(byte, start_cycle)` when a frame has left the pin, `feed(bytes)` for frames
+that arrive at line rate. The level of the TX pin is a function of the cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from emu.chips.chip import UartSite
+from emu.events import NEVER
+from emu.peripherals.interrupts import Interrupts
+from emu.peripherals.kit import SLEEP, Kit, Peripheral
+from emu.peripherals.pins import parse_pin
+from emu.peripherals.ports import Port
+from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR, PATIENT, Frame, SerialLine
+
+FIFO: Final = 4
+"""Depth of the transmit and receive FIFOs (§10.1, §10.2)."""
+_PARITY: Final = 0x400
+_FRAMING: Final = 0x200
+"""Error marks of a received character, above its nine data bits."""
+
+_QUIET: Final = 0
+_COMING: Final = 1
+_SAMPLING: Final = 2
+"""Receiver states: no frame, start bit posted (loopback), inside a frame."""
+
+
+class Uart(Peripheral):
+    """One UART. Bit time is 16 (BRG + 1) Tcy (§10)."""
+
+    def __init__(self, site: UartSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__(f"u{site.number}", kit)
+        self.site: Final = site
+        self._interrupts: Final = interrupts
+        prefix = f"U{site.number}"
+        self.mode: Final = self.register(prefix + "MODE")
+        self.sta: Final = self.register(prefix + "STA")
+        self.txreg: Final = self.register(prefix + "TXREG")
+        self.rxreg: Final = self.register(prefix + "RXREG")
+        self.brg: Final = self.register(prefix + "BRG")
+        self.idle_bit = (self.mode, "USIDL")
+        self.mode.written_by(self._mode_written)
+        self.sta.written_by(self._sta_written)
+        self.txreg.written_by(self._tx_written)
+        self.txreg.computed(lambda: 0)
+        self.rxreg.read_by(self._rx_read)
+        self.rxreg.computed(lambda: self._rx[0])
+        self.brg.written_by(self._brg_written)
+        self.on_byte: Callable[[int, int], None] | None = None
+        """on_byte(byte, start_cycle): a frame has left TX; its start bit began in start_cycle."""
+        self.on_edge: Callable[[int, int], None] | None = None
+        """on_edge(cycle, level): the RX pin as seen by the capture module ABAUD routes it to."""
+        tx_port, self._tx_pin = parse_pin(site.tx_pin)
+        rx_port, self._rx_pin = parse_pin(site.rx_pin)
+        self._tx_port: Final = ports[tx_port]
+        self._rx_port: Final = ports[rx_port]
+
+        self._clock: Final = self.moment("clock")
+        """Cycle the baud generator last started from 0."""
+        self._tx: Final = self.array("tx", "H", FIFO)
+        self._tx_count: Final = self.cell("tx_count", "B")
+        self._shifting: Final = self.cell("shifting", "B")
+        self._frame: Final = self.cell("frame", "H")
+        self._wave: Final = self.cell("wave", "H")
+        self._start: Final = self.moment("start", NEVER)
+        """Cycle the start bit in TSR began or begins."""
+        self._end: Final = self.moment("end", NEVER)
+        self._tx_event: Final = self.slot("tx", self._tx_due)
+
+        self._rx: Final = self.array("rx", "H", FIFO + 1)
+        """FIFO; data in bits 8:0, errors above. The last element is the character in the shift register."""
+        self._rx_count: Final = self.cell("rx_count", "B")
+        self._held: Final = self.cell("held", "B")
+        """The shift register holds a character that found the FIFO full."""
+        self._receiving: Final = self.cell("receiving", "B")
+        self._incoming: Final = self.cell("incoming", "H")
+        self._done: Final = self.moment("done", NEVER)
+        self._rx_event: Final = self.slot("rx", self._rx_due)
+        self._rx_wave: Final = self.cell("rx_wave", "H")
+        self._rx_start: Final = self.moment("rx_start", NEVER)
+        self._edge_bit: Final = self.cell("edge_bit", "B")
+        self._edge_event: Final = self.slot("edge", self._edge_due)
+
+        self.line: Final = SerialLine(self.record, self.name)
+        self._line_free: Final = self.cell("line_free", "Q")
+        """First cycle the line is free for the next frame."""
+        self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
+
+    # -- settings ----------------------------------------------------------------------------------------------------
+
+    @property
+    def bit_time(self) -> int:
+        """Length of a bit in Tcy: 16 (BRG + 1)."""
+        return 16 * (self.brg.value + 1)
+
+    @property
+    def is_enabled(self) -> bool:
+        """UARTEN."""
+        return bool(self.mode["UARTEN"])
+
+    @property
+    def is_sending_enabled(self) -> bool:
+        """UARTEN and UTXEN."""
+        return self.is_enabled and bool(self.sta["UTXEN"])
+
+    @property
+    def _data_bits(self) -> int:
+        return 9 if self.mode["PDSEL"] == 3 else 8
+
+    def _parity(self, data: int) -> int | None:
+        """Parity bit of a character, None without parity. PDSEL 1 = even, 2 = odd (§10)."""
+        kind = self.mode["PDSEL"]
+        return None if kind in (0, 3) else (data & 0xFF).bit_count() + (kind == 2) & 1
+
+    def _pack(self, data: int) -> tuple[int, int]:
+        """(levels, number of bits) of a frame, start bit in bit 0, up to and with the stop bits."""
+        bits = (data & (1 << self._data_bits) - 1) << 1
+        length = 1 + self._data_bits
+        parity = self._parity(data)
+        if parity is not None:
+            bits |= parity << length
+            length += 1
+        stops = 1 + self.mode["STSEL"]
+        return bits | ((1 << stops) - 1) << length, length + stops
+
+    # -- transmit ----------------------------------------------------------------------------------------------------
+
+    def _tx_written(self, _old: int, new: int, _lanes: int) -> None:
+        if not self.is_enabled or self._tx_count.value == FIFO:
+            return  # a full FIFO drops the character (§10.1)
+        self._tx[self._tx_count.value] = new & (1 << self._data_bits) - 1
+        self._tx_count.value += 1
+        self.sta["UTXBF"] = self._tx_count.value == FIFO
+        self.sta["TRMT"] = 0
+        if self.is_sending_enabled and not self._shifting.value:
+            self.events.set(self._tx_event, self.now + 1)
+
+    def _tx_due(self, due: int) -> None:
+        """A frame has ended, or a character waits for the idle shift register."""
+        if self._shifting.value and due < self._end.value:
+            return
+        if self._shifting.value:
+            self._shifting.value = 0
+            self._sent(self._start.value)
+        if self._tx_count.value:
+            self._load(due)
+        else:
+            self.sta["TRMT"] = 1
+            self._start.value = self._end.value = NEVER
+
+    def _load(self, cycle: int) -> None:
+        """FIFO to TSR; the start bit begins at the next edge of the free-running bit clock (§10.1)."""
+        data = self._tx[0]
+        count = self._tx_count.value - 1
+        for index in range(count):
+            self._tx[index] = self._tx[index + 1]
+        self._tx_count.value = count
+        self.sta["UTXBF"] = 0
+        if not self.sta["UTXISEL"] or count == 0:
+            self._interrupts.line(self.site.tx_irq).request()
+        bits, length = self._pack(data)
+        bit = self.bit_time
+        start = cycle if self._end.value == cycle else self._clock.value + -(-(cycle - self._clock.value) // bit) * bit
+        if start == self._clock.value:
+            start += bit
+        self._frame.value = data
+        self._wave.value = bits
+        self._start.value = start
+        self._end.value = start + length * bit
+        self._shifting.value = 1
+        self.events.set(self._tx_event, self._end.value)
+        self._log_frame(start, bits, length)
+        if self.mode["LPBACK"]:
+            self._arrive(start, data, 0)
+
+    def _sent(self, start: int) -> None:
+        data = 0 if self.sta["UTXBRK"] else self._frame.value
+        if self.on_byte is not None and not self.mode["LPBACK"]:
+            self.on_byte(data, start)
+
+    def drain(self) -> None:
+        """Deliver what is still in the transmitter as a robot would: the pins outlive a stopped program."""
+        while self._shifting.value or (self._tx_count.value and self.is_sending_enabled):
+            self.events.cancel(self._tx_event)
+            self._tx_due(self._end.value if self._shifting.value else self.now + 1)
+
+    def tx_level(self, cycle: int) -> int:
+        """Level of TX in `cycle`, 1 = idle."""
+        if self.sta["UTXBRK"]:
+            return 0
+        if not self._shifting.value or cycle < self._start.value:
+            return 1
+        return self._wave.value >> (cycle - self._start.value) // self.bit_time & 1
+
+    def bits(self, cycle: int) -> int:
+        """The TX pin as a waveform."""
+        return self._tx_pin if self.tx_level(cycle) else 0
+
+    def rises(self, mask: int, after: int, until: int) -> int:
+        """Edges of TX do not clock anything inside the chip."""
+        return 0
+
+    def nth_rise(self, mask: int, after: int, count: int) -> int:
+        """Edges of TX do not clock anything inside the chip."""
+        return NEVER
+
+    def _log_frame(self, start: int, bits: int, length: int) -> None:
+        edges = self.kit.pins.edges
+        if edges is None:
+            return
+        port = self._tx_port.index
+        others = self.kit.pins.level[port] & ~self._tx_pin
+        previous = 1
+        for index in range(length):
+            level = bits >> index & 1
+            if level != previous:
+                edges.append((start + index * self.bit_time, port, others | (self._tx_pin if level else 0)))
+            previous = level
+
+    # -- receive -----------------------------------------------------------------------------------------------------
+
+    def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0, baud: float = 0) -> None:
+        """Let frames arrive back to back on RX, at this UART's own bit time or at `baud` bits per second.
+
+        With `cycle` the first start bit is not before that cycle and a closed receiver loses the frames; without it
+        the sender waits until the receiver is enabled. `errors` may combine FRAMING_ERROR, PARITY_ERROR and BREAK.
+        """
+        bit = round(self.kit.fcy() * 256 / baud) if baud else 0
+        marks = errors | (PATIENT if cycle is None else 0)
+        self.line.put(Frame(cycle or 0, byte & 0x1FF | marks, bit) for byte in data)
+        self._plan_line()
+
+    def _plan_line(self) -> None:
+        """Post the start bit of the frame at the head of the line."""
+        frame = self.line.head()
+        if frame is None or (frame.data & PATIENT and not self._is_listening):
+            self.events.cancel(self._line_event)
+            return
+        self.events.set(self._line_event, max(frame.earliest, self._line_free.value, self.now + 1))
+
+    @property
+    def _is_listening(self) -> bool:
+        return self.is_enabled and (not self.is_frozen or bool(self.mode["WAKE"]))
+
+    def _line_due(self, due: int) -> None:
+        """A start bit falls on the RX pin."""
+        frame = self.line.head()
+        if frame is None:
+            return
+        self.line.drop()
+        _, length = self._pack(frame.data)
+        self._line_free.value = due + (length * frame.bit + 255 >> 8 if frame.bit else length * self.bit_time)
+        if self.mode["WAKE"] and self.is_frozen:
+            self._interrupts.line(self.site.rx_irq).request()
+            self.mode["WAKE"] = 0
+        elif self.is_enabled and not self.is_frozen and not self.mode["LPBACK"] and self._receiving.value == _QUIET:
+            self._arrive(due, frame.data, frame.bit)
+        self._plan_line()
+
+    def _arrive(self, start: int, data: int, bit_q8: int) -> None:
+        """Sample a frame whose start bit falls in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
+        wave, length = self._pack(data)
+        stop = length - 1 - self.mode["STSEL"]
+        if data & PARITY_ERROR and self._parity(data) is not None:
+            wave ^= 1 << stop - 1
+        if data & (FRAMING_ERROR | BREAK):
+            wave &= 0 if data & BREAK else (1 << stop) - 1
+        tick = self.brg.value + 1
+        detected = self._clock.value + -(-(start - self._clock.value) // tick) * tick
+        sampled = wave if not bit_q8 else self._sample(wave, length, detected - start, tick, bit_q8)
+        self._incoming.value = self._judge(sampled, stop)
+        self._done.value = detected + (16 * stop + 8) * tick  # the middle of the first stop bit (§10.2)
+        self._rx_wave.value = wave
+        self._rx_start.value = start
+        self._receiving.value = _COMING
+        if start > self.now:
+            self.events.set(self._rx_event, start)
+        else:
+            self._rx_due(start)
+
+    @staticmethod
+    def _sample(wave: int, length: int, offset: int, tick: int, bit_q8: int) -> int:
+        """What a receiver with 16 clocks of `tick` Tcy per bit sees: the majority of clocks 7, 8 and 9 (§10.2)."""
+        sampled = 0
+        for index in range(length):
+            times = (offset + (16 * index + clock) * tick for clock in (7, 8, 9))
+            votes = sum(wave >> min(time * 256 // bit_q8, length - 1) & 1 for time in times)
+            sampled |= (votes >= 2) << index
+        return sampled
+
+    def _judge(self, sampled: int, stop: int) -> int:
+        """Data and error marks of a sampled frame whose first stop bit has index `stop`."""
+        data = sampled >> 1 & (1 << self._data_bits) - 1
+        parity = self._parity(data)
+        marks = 0 if sampled >> stop & 1 else _FRAMING
+        if parity is not None and sampled >> stop - 1 & 1 != parity:
+            marks |= _PARITY
+        return data | marks
+
+    def _rx_due(self, due: int) -> None:
+        if self._receiving.value == _COMING:
+            self._receiving.value = _SAMPLING
+            self.sta["RIDLE"] = 0
+            self.events.set(self._rx_event, self._done.value)
+            if self.mode["ABAUD"] and self.on_edge is not None:
+                self._edge_bit.value = 0
+                self.events.set(self._edge_event, due)
+            return
+        self._receiving.value = _QUIET
+        self.sta["RIDLE"] = 1
+        self._received(self._incoming.value)
+
+    def _received(self, character: int) -> None:
+        """A character is complete: FIFO, or the shift register when the FIFO is full (§10.2)."""
+        if self._held.value or self.sta["OERR"]:
+            return
+        if self.sta["ADDEN"] and self._data_bits == 9 and not character & 0x100:
+            return
+        count = self._rx_count.value
+        if count == FIFO:
+            self._rx[FIFO] = character
+            self._held.value = 1
+            self.sta["OERR"] = 1
+            return
+        self._rx[count] = character
+        self._rx_count.value = count + 1
+        self._show_top()
+        wanted = {2: 3, 3: 4}.get(self.sta["URXISEL"], 0)
+        if not wanted or count + 1 == wanted:
+            self._interrupts.line(self.site.rx_irq).request()
+
+    def _show_top(self) -> None:
+        """URXDA, PERR and FERR belong to the character at the top of the FIFO (§10.2)."""
+        top = self._rx[0] if self._rx_count.value else 0
+        self.sta["URXDA"] = self._rx_count.value > 0
+        self.sta["PERR"] = bool(top & _PARITY)
+        self.sta["FERR"] = bool(top & _FRAMING)
+
+    def _rx_read(self) -> int:
+        """Reading pops; an empty FIFO returns the last character again."""
+        data = self._rx[0] & 0x1FF
+        count = self._rx_count.value
+        if count:
+            for index in range(count - 1):
+                self._rx[index] = self._rx[index + 1]
+            self._rx_count.value = count - 1
+            self._show_top()
+        return data
+
+    def _edge_due(self, due: int) -> None:
+        """Autobaud: pass the edges of the RX pin to the capture module, starting with the start bit."""
+        bit = self._edge_bit.value
+        wave = self._rx_wave.value
+        if self.on_edge is not None:
+            self.on_edge(due, wave >> bit & 1)
+        for index in range(bit + 1, 12):
+            if wave >> index & 1 != wave >> bit & 1:
+                self._edge_bit.value = index
+                self.events.set(self._edge_event, self._rx_start.value + index * self.bit_time)
+                return
+
+    # -- control -----------------------------------------------------------------------------------------------------
+
+    def _mode_written(self, old: int, new: int, _lanes: int) -> None:
+        enable = 1 << self.kit.chip.sfrs[self.mode.name].fields["UARTEN"][0]
+        if (old ^ new) & enable:
+            if new & enable:
+                self._clock.value = self.now + 1
+                self._rx_port.own(self._rx_pin, drive=False, level=0)
+                self._sender_switched(self.is_sending_enabled)
+            else:
+                self._abort()
+        self._plan_line()
+
+    def _sta_written(self, old: int, new: int, _lanes: int) -> None:
+        fields = self.kit.chip.sfrs[self.sta.name].fields
+        utxen, oerr = (1 << fields[name][0] for name in ("UTXEN", "OERR"))
+        if (old ^ new) & utxen and self.is_enabled:
+            self._sender_switched(bool(new & utxen))
+        if old & oerr and not new & oerr:  # only 1 -> 0 flushes (§10.2)
+            self._rx_count.value = 0
+            self._held.value = 0
+            self._show_top()
+
+    def _sender_switched(self, on: bool) -> None:
+        """UTXEN and UARTEN became both 1, or no longer are (§10.1)."""
+        self.restored()
+        if on:
+            self._tx_port.own(self._tx_pin, drive=True, level=1)
+            self._interrupts.line(self.site.tx_irq).request()
+            if self._tx_count.value:
+                self._clock.value = self.now + 1
+                self.events.set(self._tx_event, self.now + 1)
+            return
+        self._tx_port.disown(self._tx_pin)
+        self._tx_count.value = 0
+        self._shifting.value = 0
+        self._start.value = self._end.value = NEVER
+        self.events.cancel(self._tx_event)
+        self.sta["UTXBF"] = 0
+        self.sta["TRMT"] = 1
+
+    def _abort(self) -> None:
+        """UARTEN fell: FIFOs, flags and the baud counter are cleared, MODE and BRG are kept (§10.1)."""
+        self._sender_switched(False)
+        self._rx_port.disown(self._rx_pin)
+        self._rx_count.value = 0
+        self._held.value = 0
+        self._receiving.value = _QUIET
+        for slot in (self._rx_event, self._edge_event):
+            self.events.cancel(slot)
+        for flag in ("URXDA", "OERR", "FERR", "PERR", "UTXEN", "UTXBRK"):
+            self.sta[flag] = 0
+        self.sta["RIDLE"] = 1
+
+    def _brg_written(self, _old: int, _new: int, _lanes: int) -> None:
+        """Writing BRG restarts the baud counter (§10)."""
+        self._clock.value = self.now + 1
+
+    # -- power and reset ---------------------------------------------------------------------------------------------
+
+    def reset(self, power_on: bool) -> None:
+        """Disabled and empty. Frames on the line are the outside's affair and stay."""
+        self.restored()
+        self._tx_count.value = self._shifting.value = 0
+        self._rx_count.value = self._held.value = self._receiving.value = 0
+        self._start.value = self._end.value = NEVER
+        self._clock.value = 0
+        self._plan_line()
+
+    def freeze(self, cycle: int, mode: int) -> None:
+        """In Idle with USIDL everything waits; Sleep cuts a transmission off, TX rests high."""
+        if mode == SLEEP and (self._shifting.value or self._tx_count.value):
+            self.events.cancel(self._tx_event)
+            self._tx_count.value = self._shifting.value = 0
+            self._start.value = self._end.value = NEVER
+            self.sta["UTXBF"] = 0
+            self.sta["TRMT"] = 1
+        super().freeze(cycle, mode)
+
+    def restored(self) -> None:
+        """The TX pin carries the waveform while the sender is enabled."""
+        if self.is_sending_enabled:
+            self.kit.pins.attach(self._tx_port.index, self._tx_pin, self)
+        else:
+            self.kit.pins.detach(self._tx_port.index, self)
+
+    def thaw(self, cycle: int) -> None:
+        """Frames that waited for the receiver may come."""
+        super().thaw(cycle)
+        self._plan_line()
