@@ -15,16 +15,18 @@ from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.core import Core
 from emu.dspic30f.engines import Engine, make_engine
-from emu.dspic30f.sequencer import Breakpoint, DeviceReset
+from emu.dspic30f.faults import Breakpoint, DeviceReset
+from emu.dspic30f.state import RUN
 from emu.events import NEVER, Events
 from emu.image import Image
+from emu.peripherals import Wires, build
 from emu.program import ProgramMemory
 from emu.record import Record
 
 REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted")
 
-KEPT_OVER_RESET: Final = ("RCON", "OSCCON")
-"""Registers a reset other than power-on does not touch (dspic30f6014a.md §4)."""
+RESETS_KEPT: Final = 16
+"""Length of `Machine.resets`."""
 
 PcHook = Callable[[], bool | None]
 SfrHook = Callable[[bool, int], None]
@@ -56,22 +58,20 @@ class Machine:
         self.record: Final = Record()
         self.events: Final = Events(self.record)
         self.bus: Final = Bus(self.record, self.events)
-        for sfr in chip.sfrs.values():
-            if sfr.size == 2:
-                word = sfr.address >> 1
-                self.bus.name[word] = sfr.name
-                self.bus.writable[word] = sfr.writable
-                self.bus.clear_only[word] = sfr.clear_only
-                self.bus.reset_value[word] = sfr.reset
         self.program: Final = ProgramMemory(self.record, chip)
+        wires = Wires()
+        self.peripherals: Final = build(chip, self.bus, self.program, wires)
+        self.pins: Final = self.peripherals.pins
+        self.uart: Final = self.peripherals.uart
         self.core: Final = Core(self.record, self.events, self.bus, self.program, chip)
         self.core.exceptions.ipl_slip = ipl_slip
+        self._connect(wires)
         self.state: Final = self.core.state
         self.w: Final[_WRegisters] = self.core.w
         self.stop_on_fault = True
         """Whether a reset for a fault (illegal opcode, uninitialised pointer, trap conflict) ends a run."""
         self.resets: Final[list[tuple[int, str]]] = []
-        """(cycle, cause) of the resets since construction, at most the last 16."""
+        """(cycle, cause) of the last resets."""
         self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
         self._resumed: int | None = None
         self._interrupt = False
@@ -97,6 +97,27 @@ class Machine:
     def pc(self, address: int) -> None:
         self.state.pc = address & 0x7FFFFE
         self.state.stall = 0
+
+    def _connect(self, wires: Wires) -> None:
+        """The few lines between the CPU and the devices."""
+        sequencer = self.core.sequencer
+        wires.reset = self._device_reset
+        wires.wake = sequencer.wake
+        wires.stall_until = sequencer.hold_until
+        wires.trap = self.core.traps.request_flag
+        sequencer.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
+        sequencer.wires.power = self._power
+
+    def _power(self, mode: int, cycle: int) -> None:
+        """The CPU stops after `cycle` - 1, or runs again from `cycle`."""
+        if mode == RUN:
+            self.peripherals.wake(cycle)
+        else:
+            self.peripherals.sleep(mode, cycle - 1)
+
+    def _device_reset(self, cause: str) -> None:
+        """A peripheral resets the chip in the middle of whatever goes on."""
+        raise DeviceReset(cause, f"reset by {cause}", fault=False)
 
     # Running
 
@@ -185,21 +206,18 @@ class Machine:
 
     def reset(self, cause: str = "EXTR") -> None:
         """Reset for `cause`: the RCON bit POR, BOR, EXTR (MCLR pin), SWR, WDTO, TRAPR or IOPUWR (isa.md §14.6)."""
-        power_on = cause == "POR"
+        self.events.now = self.cycle
         u16 = self.record.u16
-        for word, name in enumerate(self.bus.name):
-            if name and (power_on or name not in KEPT_OVER_RESET):
-                u16[word] = self.bus.reset_value[word]
-        if power_on:
+        for word in range(self.chip.sfrs["INTCON1"].address >> 1):
+            u16[word] = self.bus.reset_value[word]
+        if cause == "POR":
             ram = self.chip.data["ram"]
             self.record.bytes[ram.start : ram.end] = bytes(ram.size)
-        else:
-            rcon = self.chip.sfrs["RCON"]
-            u16[rcon.address >> 1] |= 1 << rcon.fields[cause][0]
         self.core.reset()
+        self.peripherals.reset(cause)
         self.events.kick()
         self.resets.append((self.cycle, cause))
-        del self.resets[:-16]
+        del self.resets[:-RESETS_KEPT]
 
     def _reset_by(self, reset: DeviceReset) -> Stop | None:
         """Carry out a reset the core asked for; a fault ends the run."""
@@ -262,6 +280,7 @@ class Machine:
         self.record.restore(state)
         if self.program.flash.tobytes() != flash:
             self.program.announce_all()
+        self.peripherals.restored()
         self._resumed = None
 
     # Hooks

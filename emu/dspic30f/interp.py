@@ -14,6 +14,7 @@ from typing import Final
 
 from emu.bus import SFR_END
 from emu.dspic30f.data import DataSpace
+from emu.dspic30f.faults import UninitialisedPointer
 from emu.dspic30f.interrupts import Exceptions
 from emu.dspic30f.isa.builder import Context, Side, Size
 from emu.dspic30f.isa.flow import Value
@@ -22,13 +23,6 @@ from emu.events import Events
 from emu.program import ProgramMemory
 
 ACC_SIGN: Final = 1 << 39
-
-
-class UninitialisedPointer(Exception):
-    """A W register that was never written is used as an address pointer: the device resets (isa.md §2.2)."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(f"W{number} is used as an address pointer before it was written")
 
 
 @lru_cache(maxsize=4096)

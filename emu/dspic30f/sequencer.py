@@ -25,7 +25,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from emu.dspic30f.facts import Facts, facts_of
-from emu.dspic30f.interp import Interpreter, UninitialisedPointer
+from emu.dspic30f.faults import Breakpoint, DeviceReset, IllegalOpcode, TrapConflict
+from emu.dspic30f.interp import Interpreter
 from emu.dspic30f.interrupts import Exceptions
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.debug import is_debug_word
@@ -59,27 +60,12 @@ from emu.dspic30f.state import (
     SLEEP,
     State,
 )
-from emu.dspic30f.traps import TrapConflict
 from emu.events import NEVER, Events
 from emu.program import ProgramMemory
 
 EDT_MATURE: Final = 3
 """`State.edt` from which the end test of a DO loop obeys: two instructions have completed since the one that wrote EDT,
 so it was latched before the penultimate instruction (isa.md §7.6)."""
-
-
-class DeviceReset(Exception):
-    """The core resets the device; `cause` is the RCON bit, `detail` says why in words."""
-
-    def __init__(self, cause: str, detail: str, fault: bool) -> None:
-        super().__init__(detail)
-        self.cause: Final = cause
-        self.detail: Final = detail
-        self.fault: Final = fault
-
-
-class Breakpoint(Exception):
-    """A debugger word was executed: the run stops behind it (isa.md §4.1)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +177,7 @@ class Sequencer:
     # Instructions
 
     def fetch(self, pc: int) -> Step:
-        """The instruction at `pc`. Raises DeviceReset if it is illegal, Breakpoint if it is a debugger word."""
+        """The instruction at `pc`. Raises IllegalOpcode, or Breakpoint if it is a debugger word."""
         step = self._steps.get(pc)
         if step is None:
             word1 = self.program.word(pc)
@@ -199,7 +185,7 @@ class Sequencer:
             if insn is None:
                 if is_debug_word(word1):
                     raise Breakpoint(f"debugger word {word1:06X}")
-                raise DeviceReset("IOPUWR", f"illegal opcode {word1:06X}", fault=True)
+                raise IllegalOpcode(word1)
             extra = 1 if insn.row.psv_class == "mov" else 2
             after = pc + 2 * insn.words & PC_MASK
             step = self._steps[pc] = Step(insn, facts_of(insn), after, insn.row.cycles, extra)
@@ -232,12 +218,9 @@ class Sequencer:
             state.pc = step.next_pc
             flow = step.insn.row.does(builder, step.insn.x)
             builder.commit()
-        except UninitialisedPointer as error:
+        except DeviceReset:
             state.pc = pc
-            raise DeviceReset("IOPUWR", str(error), fault=True) from None
-        except TrapConflict as error:
-            state.pc = pc
-            raise DeviceReset("TRAPR", f"trap conflict: {error}", fault=True) from None
+            raise
         last = builder.last if flow is None else self._follow(flow, pc, builder.last)
         if state.sr & RA or repeat != NOT_REPEATING:
             last = self._after_target(step, flow, pc, last)
@@ -255,11 +238,8 @@ class Sequencer:
         state = self.state
         traps = self.exceptions.traps
         if state.ipl >= traps.address.vector.level:
-            raise DeviceReset("TRAPR", f"no instruction can be fetched at {state.pc:06X}", fault=True)
-        try:
-            traps.request(traps.address, max(state.cycle, 1) - 1)
-        except TrapConflict as error:
-            raise DeviceReset("TRAPR", f"trap conflict: {error}", fault=True) from None
+            raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}")
+        traps.request(traps.address, max(state.cycle, 1) - 1)
 
     # Flow
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from emu.chips.chip import Chip, Vector
+from emu.dspic30f.faults import TrapConflict
 from emu.dspic30f.state import OA, OB, State
 from emu.events import Events
 
@@ -23,10 +24,6 @@ class Trap:
     flag: int
     vector: Vector
     since: int
-
-
-class TrapConflict(Exception):
-    """A lower hard trap arose while a higher one is pending or in progress: the device resets (RCON.TRAPR)."""
 
 
 class Traps:
@@ -48,6 +45,7 @@ class Traps:
         self.stack: Final = trap(2, "STKERR", "StackError")
         self.math: Final = trap(3, "MATHERR", "MathError")
         self.all: Final = (self.oscillator, self.address, self.stack, self.math)
+        self._by_flag: Final = {"OSCFAIL": self.oscillator, "ADDRERR": self.address, "STKERR": self.stack}
         self.flags: Final = sum(trap.flag for trap in self.all)
         self._overflow: Final = tuple(
             (1 << fields[enable][0], overflow) for enable, overflow in (("OVATE", OA), ("OVBTE", OB))
@@ -57,14 +55,21 @@ class Traps:
         """Set a trap flag that is first 1 in `cycle`. Raises TrapConflict."""
         state = self._state
         if trap.vector.level >= HARD_LEVEL and state.ipl > trap.vector.level:
-            raise TrapConflict(trap.vector.name)
+            raise TrapConflict(f"{trap.vector.name} below a higher trap")
         for higher in self.all:
             if higher.vector.level > trap.vector.level >= HARD_LEVEL and state.intcon1 & higher.flag:
-                raise TrapConflict(trap.vector.name)
+                raise TrapConflict(f"{trap.vector.name} below a higher trap")
         if not state.intcon1 & trap.flag:
             state.intcon1 |= trap.flag
             self._u64[trap.since] = cycle
         self._events.kick()
+
+    def request_flag(self, flag: str) -> None:
+        """A device requests the trap whose INTCON1 flag has this name; visible as `Irq.request` says.
+
+        Raises TrapConflict, KeyError for an unknown flag.
+        """
+        self.request(self._by_flag[flag], self._events.now + (not self._events.firing))
 
     def written(self, old: int, new: int) -> None:
         """Software wrote INTCON1: flags it set are requests; an accumulator overflow that lasts asks again."""
