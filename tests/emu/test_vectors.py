@@ -1,0 +1,140 @@
+"""Every recorded vector: single instructions and short programs, word by word against their outcome.
+
+``pytest tests/emu --vectors DIR`` runs another folder of the same format, ``--engine NAME`` one engine only.
+Formats: README of the vectors. The engine "rows" is the instruction table alone, on the builder of rowmachine.py.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from engines import ENGINES, Engine
+
+from emu.dspic30f.isa import codec, text
+
+RAM_START = 0x0800
+NOT_STARTED = 100_000  # instructions after which a program that never gets to its end is given up
+CALL_WN_ROWS = {159: "goto", 161: "rcall"}  # a known defect of the disassembler that wrote the vectors
+
+
+def semantics(folder: Path) -> Iterator[dict[str, Any]]:
+    for file in sorted(folder.glob("semantics*.jsonl.gz")):
+        with gzip.open(file, "rt") as lines:
+            yield from map(json.loads, lines)
+
+
+def differences(engine: Engine, vector: dict[str, Any]) -> list[str]:
+    """Run one vector; what came out differently."""
+    before, after = vector["in"], vector["out"]
+    engine.prepare(vector)
+    ram = bytearray(engine.ram())
+    engine.step()
+    steps = 1
+    while "until" in vector and engine.pc != vector["until"] and steps < NOT_STARTED:
+        engine.step()
+        steps += 1
+    for address, value in after.get("mem", {}).items():
+        offset = int(address, 16) - RAM_START
+        ram[offset : offset + 2] = value.to_bytes(2, "little")
+    found = []
+
+    def compare(name: str, got: int, expected: int, mask: int = -1) -> None:
+        if (got ^ expected) & mask:
+            found.append(f"{name} {got:#x}, expected {expected:#x}")
+
+    compare("PC", engine.pc, after["pc"])
+    for n in range(16):
+        compare(f"W{n}", engine.w(n), after.get("W", {}).get(str(n), before["W"][n]))
+    compare("SR", engine.register("SR"), after.get("SR", before["SR"]), vector.get("srmask", 0xFFFF))
+    compare("CORCON", engine.register("CORCON"), after.get("CORCON", before["CORCON"]))
+    for name in ("ACCA", "ACCB"):
+        compare(name, engine.accumulator(name), after.get(name, before.get(name, 0)))
+    if engine.ram() != ram:
+        found += [f"RAM {a + RAM_START:#06x}" for a, (x, y) in enumerate(zip(engine.ram(), ram, strict=True)) if x != y]
+    return found
+
+
+@pytest.fixture(params=sorted(ENGINES))
+def engine(request: pytest.FixtureRequest) -> Engine:
+    chosen = request.config.getoption("--engine", default=None)
+    if chosen and chosen not in ENGINES:
+        pytest.fail(f"--engine {chosen}: there are {', '.join(sorted(ENGINES))}")
+    if chosen and chosen != request.param:
+        pytest.skip(f"--engine {chosen} was asked for")
+    return ENGINES[request.param]()
+
+
+def report(capsys: pytest.CaptureFixture[str], message: str) -> None:
+    with capsys.disabled():
+        print(f"\n{message}")
+
+
+def test_every_semantic_vector_gives_its_recorded_state(
+    engine: Engine, vectors: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Vectors README; isa.md §6-§8. None is skipped: the count is printed."""
+    count, failed = 0, []
+    for vector in semantics(vectors):
+        count += 1
+        if found := differences(engine, vector):
+            failed.append(f"{vector['t']} ({vector['f']}): {'; '.join(found)}")
+    report(capsys, f"{count - len(failed)} of {count} semantic vectors pass, engine {engine.name}")
+    assert count, f"no semantics*.jsonl.gz in {vectors}"
+    assert not failed, f"{len(failed)} of {count} differ:\n" + "\n".join(failed[:20])
+
+
+def encodings(folder: Path) -> list[dict[str, str]]:
+    with open(folder / "encodings.csv", newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def words_of(row: dict[str, str]) -> tuple[int, ...]:
+    return tuple(int(row[word], 16) for word in ("word1", "word2") if row[word])
+
+
+def failures(rows: list[dict[str, str]], check: Callable[[dict[str, str]], str | None]) -> list[str]:
+    return [problem for row in rows if (problem := check(row)) is not None]
+
+
+def test_every_encoding_decodes_to_its_recorded_text(vectors: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Vectors README, encodings.csv."""
+
+    def check(row: dict[str, str]) -> str | None:
+        words = words_of(row)
+        insn = codec.decode_loosely(*words)
+        if insn is None:
+            return f"{row['word1']}: no instruction, expected {row['text']}"
+        expected = row["text"]
+        if insn.row.id in CALL_WN_ROWS:
+            expected = expected.replace("call", CALL_WN_ROWS[insn.row.id])
+        got = text.format(insn, int(row["at"], 16))
+        return None if got == expected else f"{row['word1']}: {got}, expected {expected}"
+
+    rows = encodings(vectors)
+    failed = failures(rows, check)
+    report(capsys, f"{len(rows) - len(failed)} of {len(rows)} encodings decode to their text")
+    assert rows
+    assert not failed, "\n".join(failed[:20])
+
+
+def test_every_encoding_marked_yes_assembles_to_its_words(vectors: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Vectors README, encodings.csv, column assembles."""
+
+    def check(row: dict[str, str]) -> str | None:
+        try:
+            got = text.parse(row["text"]).encode(int(row["at"], 16))
+        except text.StatementError as error:
+            return str(error)
+        return None if got == words_of(row) else f"{row['text']}: {got}, expected {words_of(row)}"
+
+    rows = [row for row in encodings(vectors) if row["assembles"] == "yes"]
+    failed = failures(rows, check)
+    report(capsys, f"{len(rows) - len(failed)} of {len(rows)} texts assemble to their words")
+    assert rows
+    assert not failed, "\n".join(failed[:20])
