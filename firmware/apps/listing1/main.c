@@ -1,0 +1,73 @@
+/* Listing 1 of the paper with its misprints corrected (README.md lists them): a reactive controller in an event handler,
+ * and a thread that logs "time:(left,right)" every 250 ms. */
+#include <openswarm.h>
+
+#include <stdio.h>
+#include <string.h>
+
+enum { LOG_PERIOD_MS = 250 };
+
+/* Table of the clustering controller: percent of the maximum wheel speed, 129 mm/s (openswarm-original.md §8). */
+#define SPEED(percent) ((uint16)((percent) * 129L / 100))
+#define ROBOT_LEFT SPEED(89)
+#define ROBOT_RIGHT SPEED(53)
+#define OBJECT_LEFT SPEED(98)
+#define OBJECT_RIGHT SPEED(50)
+#define NOTHING_LEFT SPEED(55)
+#define NOTHING_RIGHT SPEED(99)
+
+static bool wait250times(sys_event_data *data)
+{
+    static uint16 counter = 0;
+    (void)data;
+    if (++counter < LOG_PERIOD_MS) {
+        return false;
+    }
+    counter = 0;
+    return true;
+}
+
+static void loggingThread(void)
+{
+    char message[29]; /* "4294967295:(-32768,-32768)\r\n" and its end: the range of the types */
+    for (;;) {
+        sys_event_data *data = Sys_Wait_for_Condition(SYS_1ms_TIMER, wait250times);
+        Sys_Clear_EventData(&data);
+        snprintf(message, sizeof message, "%lu:(%d,%d)\r\n", (unsigned long)Sys_Get_SystemTime(),
+                 Sys_Get_MotorSpeed_Left(), Sys_Get_MotorSpeed_Right());
+        Sys_Send_Event(SYS_SEND_UART1, message, (uint16)strlen(message));
+    }
+}
+
+static bool reactiveController(uint16 pid, uint16 eventID, sys_event_data *data)
+{
+    (void)pid;
+    (void)eventID;
+    switch ((sys_colour)data->value) {
+    case GREEN: /* another robot */
+        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, ROBOT_LEFT);
+        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, ROBOT_RIGHT);
+        break;
+    case RED: /* an object */
+        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, OBJECT_LEFT);
+        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, OBJECT_RIGHT);
+        break;
+    case WHITE: /* nothing, or a wall */
+        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, NOTHING_LEFT);
+        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, NOTHING_RIGHT);
+        break;
+    default: /* any other colour: keep the speed */
+        break;
+    }
+    return true;
+}
+
+int main(void)
+{
+    Sys_Init_Kernel();
+    Sys_Start_Process(loggingThread);
+    Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, reactiveController, 0);
+    Sys_Start_Kernel();
+    Sys_Run_SystemThread();
+    return 0;
+}

@@ -1,0 +1,14 @@
+/* What tests may do to, and see of, the host board. */
+#ifndef HOST_BOARD_H
+#define HOST_BOARD_H
+
+#include "openswarm.h"
+
+void host_uart_sink(void (*sink)(uint8 uart, uint8 byte)); /* instead of standard output */
+void host_hold_line(bool hold);                            /* nothing leaves the transmit rings */
+void host_receive(uint8 uart, uint8 byte);                 /* as the receive ISR */
+void host_set_selector(uint8 position);
+int16_t host_left(void); /* mm/s at the stepper driver */
+int16_t host_right(void);
+
+#endif

@@ -1,0 +1,194 @@
+/* OpenSwarm: public interface of the kernel.
+ *
+ * Threads are preempted every 10 ms. Event handlers run to completion between two threads, on the kernel stack, and
+ * are charged to no thread. Interrupt service routines (ISRs) only record and send.
+ *
+ * Each function below carries one contract line:
+ *     callers | blocks? | worst-case Tcy on the dsPIC30F | stack bytes | error codes (Sys_Get_LastError)
+ * Callers: M = main before Sys_Start_Kernel, T = thread, H = event handler or condition, I = ISR of priority 4.
+ * n threads, m registered events, s subscriptions of one event, d payload bytes. A call from a context that is not
+ * listed is refused: it returns failure, sets SYS_ERROR_CONTEXT and adds one to sys_statistics.refused.
+ */
+#ifndef OPENSWARM_H
+#define OPENSWARM_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "openswarm_config.h"
+
+typedef uint8_t uint8;
+typedef uint16_t uint16;
+typedef uint32_t uint32;
+typedef int8_t sint8;
+typedef int16_t sint16;
+typedef int32_t sint32;
+
+/* Bit 2 is red, bit 1 green, bit 0 blue. */
+typedef enum { BLACK, BLUE, GREEN, CYAN, RED, MAGENTA, YELLOW, WHITE } sys_colour;
+
+/* What a handler, a condition or a wait receives. Shared between its readers: do not write to it. */
+typedef struct {
+    uint16 value;        /* the first min(size, 2) payload bytes, zero-extended */
+    uint16 size;         /* payload bytes */
+    const void *payload; /* word-aligned copy of what was sent; valid until cleared or until the handler returns */
+} sys_event_data;
+
+typedef void (*sys_function)(void);
+typedef bool (*sys_handler)(uint16 pid, uint16 event, sys_event_data *data); /* false: unsubscribe me */
+typedef bool (*sys_condition)(sys_event_data *data); /* once per event and waiter, on the kernel stack; never blocks */
+
+/* Why the last failing call failed. */
+typedef enum {
+    SYS_OK,
+    SYS_ERROR_CONTEXT,  /* the call is not allowed from here */
+    SYS_ERROR_MEMORY,   /* the heap is exhausted */
+    SYS_ERROR_EVENT,    /* the event is not registered */
+    SYS_ERROR_PROCESS,  /* no thread has this PID, or it may not be killed */
+    SYS_ERROR_ARGUMENT, /* a value out of its documented range */
+    SYS_ERROR_BUSY      /* a bounded buffer is full; try again after the device's ready event */
+} sys_error;
+
+/* Events the system registers. Values 1-7 are the published ones; payloads in brackets. */
+enum {
+    SYS_EVENT_TERMINATION = 0x01,
+    SYS_LEFTMOTOR_SPEED = 0x02,     /* [sint16 mm/s] request, by anyone */
+    SYS_RIGHTMOTOR_SPEED = 0x03,    /* [sint16 mm/s] */
+    SYS_IO_1PXSENSOR = 0x04,        /* [sys_colour] from the camera */
+    SYS_IO_REMOTECONTROL = 0x05,    /* [uint8 RC-5 command] */
+    SYS_SEND_UART1 = 0x06,          /* [bytes] request, by anyone; one message, whole or not at all */
+    SYS_1ms_TIMER = 0x07,           /* [uint16, low word of the system time] */
+    SYS_IO_SELECTOR = 0x08,         /* [uint8 0-15] on change */
+    SYS_UART1_RECEIVED = 0x09,      /* [bytes] one chunk or frame */
+    SYS_UART1_READY = 0x0A,         /* [uint16 free bytes] the transmit buffer drained after a refusal */
+    SYS_SEND_UART2 = 0x0B,
+    SYS_UART2_RECEIVED = 0x0C,
+    SYS_UART2_READY = 0x0D,
+    SYS_DEADLINE_MISSED = 0x0E,     /* [uint16 pid] from the earliest-deadline-first scheduler, if registered */
+    SYS_FIRST_USER_EVENT = 0x40
+};
+
+/* ---- Start-up ----------------------------------------------------------------------------------------------- */
+
+/* M | no | - | 60 | MEMORY.  Kernel, board and devices become ready; the caller becomes PID 0. No interrupt is enabled. */
+void Sys_Init_Kernel(void);
+/* M | no | - | 40 | none.  Enables clock, slices and devices. The caller goes on as the system thread. */
+void Sys_Start_Kernel(void);
+/* T (PID 0 only) | never returns | - | 30 | CONTEXT.  The system thread gives way for good: from now on the kernel
+ * idles whenever no thread is ready. The stack of main is not used any more. */
+void Sys_Run_SystemThread(void);
+
+/* ---- Threads ------------------------------------------------------------------------------------------------ */
+
+typedef enum { SYS_NEW, SYS_READY, SYS_BLOCKED, SYS_ZOMBIE, SYS_RUNNING, SYS_UNKNOWN } sys_state;
+
+enum {
+    SYS_DSP = 0x0010,     /* preserve accumulators, CORCON and DO loops of this thread, at a cost per switch */
+    SYS_PERIODIC = 0x0008 /* has period_ms and deadline_ms */
+};
+
+typedef struct {
+    void (*entry)(void *); /* may return: the thread then ends */
+    void *arg;
+    uint16 stack;          /* bytes, even, >= SYS_MINIMUM_STACK; 0 = SYS_DEFAULT_STACK */
+    uint8 priority;        /* 0 lowest; read by the fixed-priority scheduler only */
+    uint16 flags;          /* SYS_DSP, SYS_PERIODIC */
+    uint16 period_ms;      /* 1..32767 with SYS_PERIODIC */
+    uint16 deadline_ms;    /* relative to each release; 1..period_ms */
+} sys_process_config;
+
+/* MTH | no | 300 + painting the stack | 40 | MEMORY.  PID, or 0 = failed (PID 0 is the system thread). */
+uint16 Sys_Start_Process(sys_function f);
+/* MTH | no | 300 + painting the stack | 44 | MEMORY, ARGUMENT.  As above. */
+uint16 Sys_Start_ProcessWith(const sys_process_config *config);
+/* MTH | own PID: never returns | 150 + 30 per subscription in the system | 40 | PROCESS.  Also ends its
+ * subscriptions, its wait and its uncleared wait result. */
+bool Sys_Kill_Process(uint16 pid);
+/* T | no | 65 with no event pending | 26 | CONTEXT.  Hands the rest of the slice on. */
+void Sys_Yield(void);
+/* T | yes, ms rounded up to the next 1 ms tick | 120 + 20 n | 40 | CONTEXT.  0 ms = Sys_Yield. */
+void Sys_Sleep(uint16 ms);
+/* T with SYS_PERIODIC | until its next release | 140 + 20 n | 40 | CONTEXT, PROCESS.  True: the deadline was met. */
+bool Sys_Wait_for_Period(void);
+/* MTHI | no | 12 | 4 | none.  Nests. No thread switch and no handler runs until the matching End; a tick that falls
+ * inside is taken there. Interrupts stay enabled. */
+void Sys_Start_CriticalSection(void);
+void Sys_End_CriticalSection(void);
+/* MTHI | no | 6 | 4 | none.  In a handler: the interrupted thread; use the pid argument of the handler instead. */
+uint16 Sys_Get_ProcessID(void);
+/* MTHI | no | 30 n | 20 | none.  SYS_UNKNOWN: no such thread. */
+sys_state Sys_Get_ProcessState(uint16 pid);
+/* MTH | no | 4 per byte | 24 | none.  Stack bytes never used so far; 0 also for an unknown PID and PID 0. */
+uint16 Sys_Get_UnusedStack(uint16 pid);
+/* MTH | no | 4 per byte | 20 | none.  The same for the stack of handlers, ISRs and scheduler. */
+uint16 Sys_Get_UnusedKernelStack(void);
+
+/* ---- Scheduling --------------------------------------------------------------------------------------------- */
+
+/* Chooses among the ready threads; see openswarm_scheduler.h to write one. */
+typedef struct sys_scheduler sys_scheduler;
+extern const sys_scheduler sys_round_robin, sys_fixed_priority, sys_earliest_deadline;
+/* MTH | no | 12 | 4 | none.  Takes effect at the next thread switch. */
+void Sys_Set_Scheduler(const sys_scheduler *scheduler);
+
+/* ---- Events ------------------------------------------------------------------------------------------------- */
+
+/* MTH | no | 60 + 8 m | 30 | MEMORY.  True also if already registered. */
+bool Sys_Register_Event(uint16 event);
+/* MTH | no | 100 + 8 m + 30 s + 20 n | 36 | EVENT.  Its subscriptions end, its undelivered messages are dropped,
+ * its waiters wake with NULL. */
+bool Sys_Unregister_Event(uint16 event);
+/* MTHI | no | 20 + 8 m | 12 | none. */
+bool Sys_IsEventRegistered(uint16 event);
+/* MTH | no | 90 + 8 m + 8 s + 8 n | 40 | EVENT, PROCESS, MEMORY, ARGUMENT.  Once per (event, pid, handler):
+ * subscribing again replaces the condition. condition NULL = always. */
+bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_condition condition);
+/* MTH | no | 40 + 8 m + 30 s | 36 | EVENT.  All handlers of this thread; false: there was none. */
+bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
+/* MTH | no | 40 + 8 m + 30 s | 36 | EVENT.  One handler; false: it was not subscribed. */
+bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
+/* MTHI | no | 110 + 8 m + 2 d | 40 | EVENT, MEMORY, ARGUMENT.  Copies the payload and queues it. True also if nobody
+ * listens; then nothing is stored. False: nothing was queued. Payloads above SYS_SMALL_PAYLOAD: not from an ISR. */
+bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
+/* MTHI | no | 110 + 8 m | 44 | EVENT, MEMORY. */
+bool Sys_Send_IntEvent(uint16 event, uint16 value);
+/* T | yes | 150 + 8 m + 8 n | 44 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
+ * result at a time: its next wait, sleep excepted, frees the previous one. */
+sys_event_data *Sys_Wait_for_Event(uint16 event);
+sys_event_data *Sys_Wait_for_Condition(uint16 event, sys_condition condition);
+/* As above; NULL with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
+sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 event, sys_condition condition, uint16 ms);
+/* T | no | 60 + 8 n | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler it only sets NULL. */
+void Sys_Clear_EventData(sys_event_data **data);
+/* MTHI | no | 30 | 12 | none.  Messages of this event that found no memory; saturates at 65535. */
+uint16 Sys_Get_LostEvents(uint16 event);
+
+/* ---- Information -------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    uint16 heap_used;   /* bytes taken from the heap now; free lists are not counted */
+    uint16 heap_peak;   /* largest heap_used so far */
+    uint16 events_lost; /* messages refused for lack of memory; saturates */
+    uint16 refused;     /* calls from a context that may not make them; saturates */
+    uint16 deadlines_missed;
+    uint16 overflows;   /* threads stopped by their stack limit */
+} sys_statistics;
+
+/* MTHI | no | 10 | 4 | none. */
+const sys_statistics *Sys_Get_Statistics(void);
+/* MTHI | no | 12 | 8 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
+uint32 Sys_Get_SystemTime(void);
+/* MTHI | no | 4 | 4 | none.  A sys_error; stays until the next failing call. Shared by all contexts. */
+uint16 Sys_Get_LastError(void);
+/* MTHI | no | 6 | 4 | none.  The speed in force, mm/s, after the post-processor. */
+sint16 Sys_Get_MotorSpeed_Left(void);
+sint16 Sys_Get_MotorSpeed_Right(void);
+
+/* ---- Assertions --------------------------------------------------------------------------------------------- */
+
+/* Stops the motors, reports "file:line" over the board's report channel and stops the system. */
+void Sys_Assertion_Failed(const char *file, uint16 line);
+#define SYS_ASSERT(condition) ((condition) ? (void)0 : Sys_Assertion_Failed(__FILE__, __LINE__))
+
+#endif

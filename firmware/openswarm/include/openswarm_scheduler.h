@@ -1,0 +1,20 @@
+/* How to write a scheduler: one function that picks from the ring of ready threads. */
+#ifndef OPENSWARM_SCHEDULER_H
+#define OPENSWARM_SCHEDULER_H
+
+#include "openswarm.h"
+
+typedef struct sys_pcb sys_pcb;
+
+struct sys_scheduler {
+    /* Kernel stack, slice locked. first is the ready thread whose turn it is by round robin; the ring through
+     * Sys_Next_Ready comes back to it. Returns the thread to run, which must be on the ring. NULL = round robin. */
+    sys_pcb *(*pick)(sys_pcb *first);
+    bool eager; /* a message ends the running slice at once, so that a thread it wakes can preempt */
+};
+
+sys_pcb *Sys_Next_Ready(const sys_pcb *process);
+uint16 Sys_Pid_Of(const sys_pcb *process);
+uint8 Sys_Priority_Of(const sys_pcb *process);
+
+#endif

@@ -1,0 +1,77 @@
+/* Motors: speed events through a replaceable post-processor to the stepper driver. */
+#include "hal_cpu.h"
+#include "io.h"
+
+static sys_motor_processor processor;
+static sys_wheel_speeds speeds;
+
+bool Sys_Default_MotorProcessor(uint16 event, const sys_event_data *data, sys_wheel_speeds *wanted)
+{
+    if (event == SYS_LEFTMOTOR_SPEED) {
+        wanted->left = (sint16)data->value;
+    } else if (event == SYS_RIGHTMOTOR_SPEED) {
+        wanted->right = (sint16)data->value;
+    }
+    return event == SYS_LEFTMOTOR_SPEED || event == SYS_RIGHTMOTOR_SPEED;
+}
+
+static sint16 clamp(sint16 mm_s)
+{
+    return mm_s > SYS_MAXIMUM_SPEED ? SYS_MAXIMUM_SPEED : mm_s < -SYS_MAXIMUM_SPEED ? -SYS_MAXIMUM_SPEED : mm_s;
+}
+
+/* Messages are applied in the order they were sent, so the newest one wins. */
+static bool on_speed(uint16 pid, uint16 event, sys_event_data *data)
+{
+    sys_wheel_speeds wanted = speeds;
+    (void)pid;
+    if (processor(event, data, &wanted)) {
+        speeds.left = clamp(wanted.left);
+        speeds.right = clamp(wanted.right);
+        hal_motors_drive(speeds.left, speeds.right);
+    }
+    return true;
+}
+
+bool Sys_Connect_Motors(uint16 event)
+{
+    return Sys_Subscribe_to_Event(event, 0, on_speed, NULL);
+}
+
+sys_motor_processor Sys_Set_MotorProcessor(sys_motor_processor wanted)
+{
+    hal_lock_state lock = hal_lock_slice();
+    sys_motor_processor before = processor;
+    processor = wanted != NULL ? wanted : Sys_Default_MotorProcessor;
+    hal_unlock(lock);
+    return before;
+}
+
+void motors_init(void)
+{
+    speeds.left = 0;
+    speeds.right = 0;
+    processor = Sys_Default_MotorProcessor;
+    hal_motors_init();
+    (void)Sys_Register_Event(SYS_LEFTMOTOR_SPEED);
+    (void)Sys_Register_Event(SYS_RIGHTMOTOR_SPEED);
+    (void)Sys_Connect_Motors(SYS_LEFTMOTOR_SPEED);
+    (void)Sys_Connect_Motors(SYS_RIGHTMOTOR_SPEED);
+}
+
+void motors_stop(void)
+{
+    speeds.left = 0;
+    speeds.right = 0;
+    hal_motors_drive(0, 0);
+}
+
+sint16 Sys_Get_MotorSpeed_Left(void)
+{
+    return speeds.left;
+}
+
+sint16 Sys_Get_MotorSpeed_Right(void)
+{
+    return speeds.right;
+}

@@ -1,0 +1,89 @@
+/* System time, the 1 ms event and everything that waits for a moment.
+ *
+ * os_clock_tick compares one alarm per tick; the threads behind it are looked at only when it rings, on the kernel stack.
+ * Moments are low words of the system time, ordered by their distance from base, the time of the last look. */
+#include "kernel.h"
+
+static volatile uint32 now_ms;
+static uint16 base;
+static uint16 alarm;
+static bool alarm_set;
+
+void clock_init(void)
+{
+    now_ms = 0;
+    base = 0;
+    alarm_set = false;
+}
+
+uint32 Sys_Get_SystemTime(void)
+{
+    hal_lock_state lock = hal_lock_devices();
+    uint32 now = now_ms;
+    hal_unlock(lock);
+    return now;
+}
+
+uint16 clock_now(void)
+{
+    return (uint16)now_ms;
+}
+
+void os_clock_tick(void)
+{
+    uint16 now = (uint16)++now_ms;
+    if (alarm_set && now == alarm) {
+        alarm_set = false;
+        os_pending |= OS_ALARM;
+        if (os_eager) {
+            hal_slice_force();
+        }
+    }
+    (void)Sys_Send_IntEvent(SYS_1ms_TIMER, now);
+    board_tick();
+}
+
+static void set_alarm(uint16 moment)
+{
+    hal_lock_state lock = hal_lock_devices();
+    if (!alarm_set || (uint16)(moment - base) < (uint16)(alarm - base)) {
+        alarm = moment;
+        alarm_set = true;
+        if ((uint16)((uint16)now_ms - base) >= (uint16)(moment - base)) { /* the tick overtook the caller */
+            alarm_set = false;
+            os_pending |= OS_ALARM;
+        }
+    }
+    hal_unlock(lock);
+}
+
+/* Slice locked. Wakes what is due and sets the alarm to the next moment. */
+void clock_wake_due(void)
+{
+    uint16 now = clock_now();
+    uint16 elapsed = (uint16)(now - base);
+    sys_pcb *next;
+    base = now;
+    for (sys_pcb *p = os_blocked; p != NULL; p = next) {
+        next = p->next;
+        if (!(p->status & OS_TIMED)) {
+            continue;
+        }
+        if ((uint16)(p->wake - now + elapsed) <= elapsed) {
+            if (p->awaited != NULL) {
+                p->wait.result = NULL;
+            }
+            process_make_ready(p);
+        } else {
+            set_alarm(p->wake);
+        }
+    }
+}
+
+void clock_set_wake(sys_pcb *process, uint16 ms)
+{
+    clock_wake_due(); /* base becomes the present, so that 65,535 ms fit behind it */
+    process->wake = (uint16)(base + ms);
+    process->status |= OS_TIMED;
+    set_alarm(process->wake);
+}

@@ -1,0 +1,78 @@
+/* What went wrong, and how often: the last error, saturating counters, and losses per event. */
+#include "kernel.h"
+
+sys_statistics os_statistics;
+
+static volatile uint16 last_error;
+
+/* Losses of the first SYS_LOSS_COUNTERS events that lost something; further ones share the entry before. */
+static struct {
+    uint16 event, count;
+} losses[SYS_LOSS_COUNTERS + 1];
+
+bool os_fail(sys_error error)
+{
+    last_error = (uint16)error;
+    return false;
+}
+
+void os_count(uint16 *counter)
+{
+    hal_lock_state lock = hal_lock_devices();
+    if (*counter != 0xFFFFu) {
+        ++*counter;
+    }
+    hal_unlock(lock);
+}
+
+bool os_refuse(void)
+{
+    os_count(&os_statistics.refused);
+    return os_fail(SYS_ERROR_CONTEXT);
+}
+
+void event_lost(uint16 id)
+{
+    uint16 i = 1;
+    os_count(&os_statistics.events_lost);
+    hal_lock_state lock = hal_lock_devices();
+    while (i <= SYS_LOSS_COUNTERS && losses[i].count != 0 && losses[i].event != id) {
+        i++;
+    }
+    if (i > SYS_LOSS_COUNTERS) {
+        i = 0;
+    } else {
+        losses[i].event = id;
+    }
+    hal_unlock(lock);
+    os_count(&losses[i].count);
+}
+
+void event_forget_losses(uint16 id)
+{
+    for (uint16 i = 1; i <= SYS_LOSS_COUNTERS; i++) {
+        if (losses[i].event == id) {
+            losses[i].count = 0;
+        }
+    }
+}
+
+uint16 Sys_Get_LostEvents(uint16 id)
+{
+    for (uint16 i = 1; i <= SYS_LOSS_COUNTERS; i++) {
+        if (losses[i].count != 0 && losses[i].event == id) {
+            return losses[i].count;
+        }
+    }
+    return id == 0 ? losses[0].count : 0;
+}
+
+uint16 Sys_Get_LastError(void)
+{
+    return last_error;
+}
+
+const sys_statistics *Sys_Get_Statistics(void)
+{
+    return &os_statistics;
+}

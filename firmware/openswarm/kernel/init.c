@@ -1,0 +1,19 @@
+/* Start-up: a list of what becomes ready, in order. */
+#include "kernel.h"
+
+void Sys_Init_Kernel(void)
+{
+    heap_init();
+    clock_init();
+    event_init();
+    process_init(); /* the caller becomes PID 0; everything is masked */
+    (void)Sys_Register_Event(SYS_EVENT_TERMINATION);
+    (void)Sys_Register_Event(SYS_1ms_TIMER);
+    board_init();
+}
+
+void Sys_Start_Kernel(void)
+{
+    board_start();
+    hal_start();
+}

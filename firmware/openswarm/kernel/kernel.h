@@ -1,0 +1,140 @@
+/* Private to the kernel, its ports and its schedulers.
+ *
+ * Who may touch what:
+ *   slice locked     ring, blocked list, events, subscriptions, large heap blocks   (threads and kernel stack)
+ *   devices locked   small heap blocks, message queue, os_pending, alarm            (ISRs as well)
+ * ISRs walk events, subscriptions and the blocked list without a lock: links are changed by single stores, in an order
+ * (hal_barrier) that leaves every list well-formed at each instruction.
+ */
+#ifndef OS_KERNEL_H
+#define OS_KERNEL_H
+
+#include "hal_board.h"
+#include "hal_cpu.h"
+#include "openswarm.h"
+#include "openswarm_scheduler.h"
+
+typedef struct event event;
+typedef struct subscription subscription;
+typedef union message message;
+
+struct event { /* C of the memory equation: 6 B */
+    uint16 id;
+    event *next;
+    subscription *subscribers;
+};
+
+struct subscription { /* D: 8 B */
+    subscription *next;
+    sys_handler handler;
+    sys_condition condition; /* NULL = always */
+    uint16 pid;
+};
+
+/* E: 6 B in front of the payload. While queued it is a list element, once delivered the data its readers see. */
+union message {
+    struct {
+        message *next;
+        event *event; /* NULL: unregistered meanwhile */
+        uint16 size;
+    } queued;
+    sys_event_data data;
+};
+
+/* B: 18 B above the thread's stack. The port knows the offsets of sp, limit and status. A stack overflow spills into
+ * the first 8 bytes at most (port/dspic30f/README.md); what is needed to bury the thread comes after them. */
+struct sys_pcb {
+    void *sp;
+    hal_limit limit;
+    event *awaited; /* blocked: what it waits for; NULL = only for time, or its event was unregistered */
+    uint16 wake;    /* blocked with OS_TIMED: low word of the system time */
+    uint8 status;   /* OS_* bits */
+    uint8 priority;
+    uint8 *block; /* start of the heap block; NULL for the system thread */
+    union {
+        sys_condition condition; /* while blocked on an event */
+        message *result;         /* otherwise: uncleared wait result */
+    } wait;
+    sys_pcb *next; /* ring of ready threads, or blocked list */
+    uint16 pid;
+};
+
+enum {
+    OS_STATE = 0x03, /* SYS_NEW..SYS_ZOMBIE; OS_OFF_RING is set in the last two */
+    OS_OFF_RING = 0x02,
+    OS_TIMED = 0x04,
+    OS_MISSED = 0x20 /* this period's miss is reported */
+    /* 0x08 SYS_PERIODIC, 0x10 SYS_DSP */
+};
+
+/* In front of the stack of a SYS_PERIODIC thread. Times are low words of the system time. */
+typedef struct {
+    uint16 period, deadline, release, due;
+} periodic;
+
+/* os_pending: what the kernel has to do before the next thread runs. */
+enum { OS_MESSAGES = 1, OS_ALARM = 2 };
+
+extern volatile uint16 os_pending;
+extern sys_pcb *os_running;   /* &os_system while idle */
+extern sys_pcb os_system;     /* PID 0 */
+extern sys_pcb *os_ring;      /* ring member before the running one (or before the next, if it blocked); NULL = empty */
+extern sys_pcb *os_blocked;   /* in order of blocking */
+extern bool os_eager;         /* a message ends the slice */
+extern bool os_delivering;    /* handlers, conditions and wake-ups are at work on the kernel stack */
+extern sys_statistics os_statistics;
+
+/* memory.c: one array, so that the kernel stack lies below the heap and with it below every thread stack */
+typedef union {
+    void *align;
+    uint8 bytes[SYS_KERNEL_STACK + SYS_HEAP];
+} os_memory_space;
+extern os_memory_space os_memory;
+void heap_init(void);
+void *heap_take(uint16 size);            /* NULL: none left. Sizes above HEAP_CLASSES * HEAP_STEP: not in an ISR */
+void heap_give(void *block, uint16 size); /* the size it was taken with */
+
+/* event.c */
+void event_init(void);
+void event_deliver_queued(void);           /* kernel stack: all messages queued when it began */
+void event_drop_subscriptions(uint16 pid);
+void event_release(message *result);       /* frees a wait result nobody else holds */
+event *event_find(uint16 id);              /* any context */
+
+/* process.c */
+void process_init(void);
+sys_pcb *process_find(uint16 pid);             /* any live thread; slice locked */
+void process_make_ready(sys_pcb *process);     /* from the blocked list to the end of the ring */
+void process_block(event *awaited, uint16 ms); /* the running thread; comes back at thread level */
+sys_pcb *process_end_running(void);            /* kernel stack: buries the running thread, picks the next */
+periodic *process_periodic(const sys_pcb *process);
+HAL_NORETURN HAL_USED void os_thread_returned(void);
+
+/* A walk over the blocked list during which any of its threads may be woken or killed; one at a time. */
+sys_pcb *process_scan_blocked(void);
+sys_pcb *process_scan_next(void);
+bool process_scan_holds(const sys_pcb *process); /* still blocked */
+
+/* scheduler.c: the two ways into the kernel stack; both pick the next thread */
+HAL_USED sys_pcb *os_slice_end(void); /* the running thread stays ready */
+HAL_USED sys_pcb *os_schedule(void);  /* it does not */
+
+/* clock.c */
+void clock_init(void);
+void clock_set_wake(sys_pcb *process, uint16 ms); /* process is on the blocked list; slice locked */
+void clock_wake_due(void);
+uint16 clock_now(void);  /* low word; any context */
+HAL_USED void os_clock_tick(void); /* ISR, every 1 ms */
+
+/* error.c */
+bool os_fail(sys_error error); /* sets the last error, returns false */
+bool os_refuse(void);          /* as os_fail(SYS_ERROR_CONTEXT), counted */
+void os_count(uint16 *counter); /* saturating */
+void event_lost(uint16 id);
+void event_forget_losses(uint16 id);
+
+/* fault.c */
+HAL_USED sys_pcb *os_overflow(void); /* kernel stack: the running thread hit its stack limit; picks the next */
+HAL_NORETURN HAL_USED void os_trap(const char *cause, uint32 pc);
+
+#endif

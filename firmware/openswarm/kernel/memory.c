@@ -1,0 +1,216 @@
+/* All dynamic memory: bounded, deterministic, without headers, because the kernel knows the size of what it frees.
+ *
+ *      os_memory                brk                 top                       end
+ *      | kernel stack | small blocks |   untouched   | large blocks: threads |
+ *
+ * Small blocks are cut upwards from brk and go back to a free list of exactly their size: O(1), safe in ISRs. Large
+ * blocks are cut downwards from top, kept in an address-ordered, coalescing first-fit list; no ISR touches it. */
+#include "kernel.h"
+
+typedef struct block block;
+struct block { /* what a free block holds */
+    block *next;
+    uint16 size; /* large blocks only */
+};
+
+#define END (os_memory.bytes + sizeof os_memory.bytes)
+#define CLASS(size) ((size) / HEAP_STEP - 1u)
+
+os_memory_space os_memory;
+
+static block *small[HEAP_CLASSES];
+static block *large;
+static uint8 *brk, *top;
+
+void heap_init(void)
+{
+    for (uint16 i = 0; i < HEAP_CLASSES; i++) {
+        small[i] = NULL;
+    }
+    large = NULL;
+    brk = os_memory.bytes + SYS_KERNEL_STACK;
+    top = END;
+}
+
+static uint16 round_up(uint16 size)
+{
+    return (uint16)((size + (HEAP_STEP - 1u)) & ~(HEAP_STEP - 1u));
+}
+
+/* Devices locked by the caller of the two functions below: a few instructions each. */
+static void count_taken(uint16 size)
+{
+    os_statistics.heap_used += size;
+    if (os_statistics.heap_used > os_statistics.heap_peak) {
+        os_statistics.heap_peak = os_statistics.heap_used;
+    }
+}
+
+static void push_small(void *freed, uint16 size)
+{
+    block *b = freed;
+    if ((uint8 *)freed + size == brk) {
+        brk = freed;
+    } else {
+        b->next = small[CLASS(size)];
+        small[CLASS(size)] = b;
+    }
+}
+
+static void *pop_small(uint16 size)
+{
+    hal_lock_state lock = hal_lock_devices();
+    block *b = small[CLASS(size)];
+    if (b != NULL) {
+        small[CLASS(size)] = b->next;
+    } else if ((uint16)(top - brk) >= size) {
+        b = (block *)brk;
+        brk += size;
+    }
+    if (b != NULL) {
+        count_taken(size);
+    }
+    hal_unlock(lock);
+    return b;
+}
+
+/* Slow path, nothing of this size is left: cut a larger free block. At most HEAP_CLASSES short locks. */
+static void *split_small(uint16 size)
+{
+    for (uint16 bigger = (uint16)(size + HEAP_STEP); bigger <= HEAP_CLASSES * HEAP_STEP; bigger += HEAP_STEP) {
+        hal_lock_state lock = hal_lock_devices();
+        block *b = small[CLASS(bigger)];
+        if (b != NULL) {
+            small[CLASS(bigger)] = b->next;
+            push_small((uint8 *)b + size, (uint16)(bigger - size));
+            count_taken(size);
+        }
+        hal_unlock(lock);
+        if (b != NULL) {
+            return b;
+        }
+    }
+    return NULL;
+}
+
+/* Moves brk down over free blocks that touch it, so that small memory can become large again. Takes each list apart
+ * and pushes it back, which returns every block that ends at brk; repeats while that helps. */
+static void shrink_small(void)
+{
+    uint8 *before;
+    do {
+        before = brk;
+        for (uint16 size = HEAP_STEP; size <= HEAP_CLASSES * HEAP_STEP; size += HEAP_STEP) {
+            hal_lock_state lock = hal_lock_devices();
+            block *b = small[CLASS(size)];
+            small[CLASS(size)] = NULL;
+            hal_unlock(lock);
+            while (b != NULL) {
+                block *next = b->next;
+                lock = hal_lock_devices();
+                push_small(b, size);
+                hal_unlock(lock);
+                b = next;
+            }
+        }
+    } while (brk < before);
+}
+
+static bool lower_top(uint16 size)
+{
+    hal_lock_state lock = hal_lock_devices();
+    bool fits = (uint16)(top - brk) >= size;
+    if (fits) {
+        top -= size;
+    }
+    hal_unlock(lock);
+    return fits;
+}
+
+static void *take_large(uint16 size)
+{
+    for (block **link = &large; *link != NULL; link = &(*link)->next) {
+        block *b = *link;
+        if (b->size == size) {
+            *link = b->next;
+            return b;
+        }
+        if (b->size >= size + sizeof(block)) {
+            b->size -= size;
+            return (uint8 *)b + b->size;
+        }
+    }
+    if (!lower_top(size)) {
+        shrink_small();
+        if (!lower_top(size)) {
+            return NULL;
+        }
+    }
+    return top;
+}
+
+static void give_large(uint8 *freed, uint16 size)
+{
+    block *b = (block *)freed;
+    block **link = &large;
+    block *below = NULL;
+    while (*link != NULL && (uint8 *)*link < freed) {
+        below = *link;
+        link = &below->next;
+    }
+    b->size = size;
+    b->next = *link;
+    *link = b;
+    if (b->next != NULL && freed + size == (uint8 *)b->next) {
+        b->size += b->next->size;
+        b->next = b->next->next;
+    }
+    if (below != NULL && (uint8 *)below + below->size == freed) {
+        below->size += b->size;
+        below->next = b->next;
+    }
+    if ((uint8 *)large == top) {
+        uint16 lowest = large->size;
+        large = large->next;
+        hal_lock_state lock = hal_lock_devices();
+        top += lowest;
+        hal_unlock(lock);
+    }
+}
+
+void *heap_take(uint16 size)
+{
+    if (HAL_ALLOCATION_FAILS()) {
+        return NULL;
+    }
+    size = round_up(size);
+    if (size <= HEAP_CLASSES * HEAP_STEP) {
+        void *taken = pop_small(size);
+        return taken != NULL ? taken : split_small(size);
+    }
+    if (hal_in_isr()) {
+        return NULL;
+    }
+    void *taken = take_large(size);
+    if (taken != NULL) {
+        hal_lock_state lock = hal_lock_devices();
+        count_taken(size);
+        hal_unlock(lock);
+    }
+    return taken;
+}
+
+void heap_give(void *freed, uint16 size)
+{
+    size = round_up(size);
+    bool is_large = size > HEAP_CLASSES * HEAP_STEP;
+    if (is_large) {
+        give_large(freed, size);
+    }
+    hal_lock_state lock = hal_lock_devices();
+    if (!is_large) {
+        push_small(freed, size);
+    }
+    os_statistics.heap_used -= size;
+    hal_unlock(lock);
+}

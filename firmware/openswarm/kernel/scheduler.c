@@ -1,0 +1,173 @@
+/* The two ways into the kernel stack, and the schedulers. */
+#include "kernel.h"
+
+volatile uint16 os_pending;
+bool os_eager;
+bool os_delivering;
+
+static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
+
+/* ---- Dispatch: kernel stack, slice level ------------------------------------------------------------------------ */
+
+static void work(void)
+{
+    uint16 todo = os_pending;
+    os_delivering = true;
+    event_deliver_queued();
+    if (todo & OS_ALARM) {
+        hal_lock_state lock = hal_lock_devices();
+        os_pending &= (uint16)~OS_ALARM;
+        hal_unlock(lock);
+        clock_wake_due();
+    }
+    os_delivering = false;
+}
+
+static sys_pcb *dispatch(sys_pcb *next)
+{
+    os_running = next;
+    hal_slice_restart(); /* handlers are over: the whole slice belongs to next */
+    return next;
+}
+
+sys_pcb *os_schedule(void)
+{
+    if (os_pending != 0) {
+        work();
+    }
+    while (os_ring == NULL) {
+        os_running = &os_system;
+        hal_idle(&os_pending);
+        work();
+    }
+    if (pick_thread != NULL) {
+        const sys_pcb *next = pick_thread(os_ring->next);
+        while (os_ring->next != next) {
+            os_ring = os_ring->next;
+        }
+    }
+    return dispatch(os_ring->next);
+}
+
+sys_pcb *os_slice_end(void)
+{
+    os_ring = os_ring->next;
+    if (os_pending != 0 || pick_thread != NULL) {
+        return os_schedule();
+    }
+    return dispatch(os_ring->next);
+}
+
+void Sys_Yield(void)
+{
+    if (!hal_in_thread()) {
+        os_refuse();
+    } else {
+        (void)hal_lock_slice();
+        hal_switch(os_slice_end);
+    }
+}
+
+void Sys_Set_Scheduler(const sys_scheduler *scheduler)
+{
+    hal_lock_state lock = hal_lock_slice();
+    pick_thread = scheduler->pick;
+    os_eager = scheduler->eager;
+    hal_unlock(lock);
+}
+
+/* ---- Schedulers ------------------------------------------------------------------------------------------------- */
+
+sys_pcb *Sys_Next_Ready(const sys_pcb *process)
+{
+    return process->next;
+}
+
+uint16 Sys_Pid_Of(const sys_pcb *process)
+{
+    return process->pid;
+}
+
+uint8 Sys_Priority_Of(const sys_pcb *process)
+{
+    return process->priority;
+}
+
+static sys_pcb *highest_priority(sys_pcb *first)
+{
+    sys_pcb *best = first;
+    for (sys_pcb *p = first->next; p != first; p = p->next) {
+        if (p->priority > best->priority) {
+            best = p;
+        }
+    }
+    return best;
+}
+
+static void report_miss(sys_pcb *p)
+{
+    p->status |= OS_MISSED;
+    os_count(&os_statistics.deadlines_missed);
+    (void)Sys_Send_IntEvent(SYS_DEADLINE_MISSED, p->pid);
+}
+
+static bool is_late(const periodic *timing, uint16 now)
+{
+    return (sint16)(now - timing->due) > 0;
+}
+
+/* Threads without a period run when no periodic thread is ready. */
+static sys_pcb *earliest_deadline(sys_pcb *first)
+{
+    uint16 now = clock_now();
+    sys_pcb *best = first;
+    const periodic *earliest = NULL;
+    sys_pcb *p = first;
+    do {
+        const periodic *timing = process_periodic(p);
+        if (timing != NULL) {
+            if (is_late(timing, now) && !(p->status & OS_MISSED)) {
+                report_miss(p);
+            }
+            if (earliest == NULL || (sint16)(timing->due - earliest->due) < 0) {
+                earliest = timing;
+                best = p;
+            }
+        }
+        p = p->next;
+    } while (p != first);
+    return best;
+}
+
+bool Sys_Wait_for_Period(void)
+{
+    sys_pcb *self = os_running;
+    periodic *timing = process_periodic(self);
+    if (!hal_in_thread()) {
+        return os_refuse();
+    }
+    if (timing == NULL) {
+        return os_fail(SYS_ERROR_PROCESS);
+    }
+    hal_lock_state lock = hal_lock_slice();
+    uint16 now = clock_now();
+    bool met = !is_late(timing, now);
+    if (!met && !(self->status & OS_MISSED)) {
+        report_miss(self);
+    }
+    self->status &= (uint8)~OS_MISSED;
+    timing->release = (uint16)(timing->release + timing->period);
+    timing->due = (uint16)(timing->release + timing->deadline);
+    uint16 ahead = (uint16)(timing->release - now);
+    if ((sint16)ahead > 0) {
+        process_block(NULL, ahead);
+    } else {
+        hal_unlock(lock); /* overrun: the next job is already released */
+        Sys_Yield();
+    }
+    return met;
+}
+
+const sys_scheduler sys_round_robin = {NULL, false};
+const sys_scheduler sys_fixed_priority = {highest_priority, true};
+const sys_scheduler sys_earliest_deadline = {earliest_deadline, true};
