@@ -1,0 +1,105 @@
+"""The assembler proper: reads statements one by one and dispatches them; `finish` turns the result into an object.
+
+pic30-as syntax (abi-elf.md §4).
+"""
+
+from __future__ import annotations
+
+import re
+
+from toolchain.asm.conditionals import CONDITIONALS
+from toolchain.asm.directives import DIRECTIVES, REJECTED
+from toolchain.asm.encode import StatementError, assemble_instruction
+from toolchain.asm.expr import ExprError
+from toolchain.asm.finish import finish
+from toolchain.asm.macro import Macro, bind, substitute
+from toolchain.asm.source import SourceError
+from toolchain.asm.state import Assembler, Options
+from toolchain.elf.model import ObjectFile
+from toolchain.errors import ToolError
+
+_LABEL = re.compile(r"\s*([A-Za-z_.$][\w.$]*|\d+)\s*:")
+_ASSIGN = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*=(?!=)\s*(.*)", re.DOTALL)
+_STATEMENT = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*(.*?)\s*$", re.DOTALL)
+
+
+def assemble(text: str, file: str = "<text>", options: Options | None = None) -> tuple[ObjectFile, list[str]]:
+    """Assemble `text` to an object; return it and the warnings.  Raises `ToolError` listing every error found."""
+    asm = Assembler(text, file, options or Options())
+    _read_all(asm)
+    if asm.findings:
+        raise ToolError.of(asm.findings)
+    obj = finish(asm)
+    if asm.findings:
+        raise ToolError.of(asm.findings)
+    return obj, asm.messages
+
+
+def _read_all(asm: Assembler) -> None:
+    while not asm.ended:
+        line = asm.source.next()
+        if line is None:
+            break
+        try:
+            _statement(asm, line)
+        except (ExprError, SourceError, StatementError) as error:
+            asm.error(str(error))
+
+
+def _statement(asm: Assembler, line: str) -> None:
+    """Assemble one line: labels, then an assignment, directive, macro call or instruction."""
+    if not asm.conditionals.active:
+        _skip(asm, line)
+        return
+    position = 0
+    while match := _LABEL.match(line, position):
+        asm.define_label(match[1])
+        position = match.end()
+    if position:
+        line = line[position:]
+    match = _STATEMENT.match(line)
+    if match is None:
+        rest = line.strip()
+        if rest:
+            raise ExprError(f"cannot read {rest!r}: expected a label, directive or instruction")
+        return
+    word, operands = match.groups()
+    if operands[:1] == "=" and (assignment := _ASSIGN.match(line)):
+        asm.assign(assignment[1], assignment[2])
+    elif (macro := asm.macros.get(word.lower())) is not None:
+        _call_macro(asm, macro, operands)
+    elif word[0] == ".":
+        _directive(asm, word.lower(), operands)
+    elif not asm.section.is_code:
+        raise ExprError(f"instruction {word} in section {asm.section.name}, which is not a code section")
+    else:
+        assemble_instruction(asm, word, operands)
+
+
+def _directive(asm: Assembler, word: str, operands: str) -> None:
+    handler = DIRECTIVES.get(word)
+    if handler is not None:
+        handler(asm, operands)
+    elif word in CONDITIONALS:
+        asm.conditionals.obey(word, operands, asm.source.place, asm)
+    elif word in REJECTED:
+        raise ExprError(f"directive {word} does not exist in this assembler: {REJECTED[word]}")
+    else:
+        raise ExprError(f"unknown directive {word}")
+
+
+def _skip(asm: Assembler, line: str) -> None:
+    """Look at a line inside a false conditional: only conditionals count."""
+    match = _STATEMENT.match(line)
+    if match and match[1][0] == "." and match[1].lower() in CONDITIONALS:
+        asm.conditionals.obey(match[1].lower(), match[2], asm.source.place, asm)
+
+
+def _call_macro(asm: Assembler, macro: Macro, operands: str) -> None:
+    """Read the expansion of `macro` next."""
+    lines = substitute(macro.body, bind(macro, operands), asm.serial)
+    asm.serial += 1
+    asm.source.expand(lines, asm.conditionals.depth, macro.name)
+
+
+__all__ = ["Options", "assemble"]

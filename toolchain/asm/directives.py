@@ -1,0 +1,403 @@
+"""Directives that are not data: sections, symbols, blocks, messages (abi-elf.md §4.3).  The table is at the end."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+from toolchain.asm import attributes
+from toolchain.asm.data import DATA_DIRECTIVES, string_argument
+from toolchain.asm.expr import ExprError
+from toolchain.asm.macro import (
+    CLOSE_MACRO,
+    CLOSE_REPEAT,
+    OPEN_MACRO,
+    OPEN_REPEAT,
+    Macro,
+    parse_head,
+    split_arguments,
+    substitute,
+)
+from toolchain.asm.sections import AsmSection
+from toolchain.asm.source import SourceError
+from toolchain.asm.state import Assembler
+from toolchain.elf import constants as c
+from toolchain.elf.model import Bind
+from toolchain.errors import ToolError
+from toolchain.files import read_text
+
+Handler = Callable[[Assembler, str], None]
+_NAME = re.compile(r"[A-Za-z_.$][\w.$]*")
+MAX_REPEAT = 1_000_000
+
+
+def _names(text: str) -> list[str]:
+    names = [n.strip() for n in text.split(",")]
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise ExprError(f"expected a symbol, got {name!r}")
+    return names
+
+
+def _name_and_rest(text: str, directive: str) -> tuple[str, str]:
+    name, comma, rest = text.partition(",")
+    if not comma or not _NAME.fullmatch(name.strip()):
+        raise ExprError(f"{directive} expects a symbol, a comma and a value")
+    return name.strip(), rest
+
+
+# -- sections ----------------------------------------------------------------------------------------------------
+
+
+def _enter(asm: Assembler, section: AsmSection) -> None:
+    asm.previous, asm.section = asm.section, section
+    asm.after_repeat = ""
+
+
+def _section(asm: Assembler, text: str) -> None:
+    name, comma, rest = text.partition(",")
+    name = name.strip()
+    if len(name) >= 2 and name[0] == name[-1] == '"':
+        name = name[1:-1]
+    if not name or re.search(r"[\s\"'()\[\]]", name):
+        raise ExprError(f"bad section name {name!r}")
+    if name == "*":  # a private section: the name is made up and unique within the object (§1.4)
+        name = f"*_{len(asm.sections):08x}"
+    existing = asm.sections.get(name)
+    if existing is None:
+        _enter(asm, _create(asm, name, rest if comma else attributes.implied(name)))
+        return
+    if comma:
+        wanted = attributes.parse(rest)
+        if (
+            wanted.flags != existing.flags
+            or wanted.type != existing.type
+            or wanted.address not in (None, existing.load)
+        ):
+            raise ExprError(f"section {name} already exists with other attributes (first used at {existing.place})")
+    _enter(asm, existing)
+
+
+def _create(asm: Assembler, name: str, text: str) -> AsmSection:
+    wanted = attributes.parse(text)
+    section = AsmSection(name, wanted.flags, wanted.type, asm.source.place)
+    section.extended, section.load, section.keep = wanted.extended, wanted.address, wanted.keep
+    if wanted.align is not None:
+        section.align = max(section.align, wanted.align)
+    asm.sections[name] = section
+    return section
+
+
+def _fixed_section(name: str) -> Handler:
+    def enter(asm: Assembler, text: str) -> None:
+        if text:
+            raise ExprError(f"{name} takes no operands")
+        _enter(asm, asm.sections[name])
+
+    return enter
+
+
+def _push_section(asm: Assembler, text: str) -> None:
+    state = (asm.section, asm.previous)
+    _section(asm, text)
+    asm.section_stack.append(state)
+
+
+def _pop_section(asm: Assembler, text: str) -> None:
+    if not asm.section_stack:
+        raise ExprError(".popsection without .pushsection")
+    asm.section, asm.previous = asm.section_stack.pop()
+
+
+def _previous(asm: Assembler, text: str) -> None:
+    _enter(asm, asm.previous)
+
+
+# -- symbols -----------------------------------------------------------------------------------------------------
+
+
+def _binder(bind: Bind) -> Handler:
+    def set_bind(asm: Assembler, text: str) -> None:
+        for name in _names(text):
+            symbol = asm.symbol(name)
+            if bind is Bind.LOCAL and symbol.bind not in (None, Bind.LOCAL):
+                raise ExprError(f"symbol {name} is already global")
+            if bind is Bind.WEAK or symbol.bind is not Bind.WEAK:
+                symbol.bind = bind
+
+    return set_bind
+
+
+def _visibility(value: int) -> Handler:
+    def set_visibility(asm: Assembler, text: str) -> None:
+        for name in _names(text):
+            asm.symbol(name).visibility = value
+
+    return set_visibility
+
+
+def _equate(once: bool) -> Handler:
+    def assign(asm: Assembler, text: str) -> None:
+        name, value = _name_and_rest(text, ".equiv" if once else ".equ")
+        asm.assign(name, value, once)
+
+    return assign
+
+
+def _common(asm: Assembler, text: str) -> None:
+    name, size, align = _sized(asm, text, ".comm")
+    symbol = asm.symbol(name)
+    if symbol.place is not None:
+        raise ExprError(f"symbol {name} is already defined")
+    symbol.common, symbol.bind, symbol.type = (size, align), symbol.bind or Bind.GLOBAL, c.STT_OBJECT
+
+
+def _local_common(asm: Assembler, text: str) -> None:
+    name, size, align = _sized(asm, text, ".lcomm")
+    current = asm.section
+    asm.section = asm.sections[".bss"]
+    try:
+        asm.section.align_to(align, 0)
+        asm.define_label(name)
+        asm.section.skip(size, 0)
+    finally:
+        asm.section = current
+
+
+def _sized(asm: Assembler, text: str, directive: str) -> tuple[str, int, int]:
+    name, rest = _name_and_rest(text, directive)
+    numbers = [asm.constant(part) for part in rest.split(",")]
+    size, align = numbers[0], numbers[1] if len(numbers) > 1 else 2
+    if not 0 <= size <= 0x10000:
+        raise ExprError(f"{directive} size {size} is outside the data space")
+    if align < 1 or align & (align - 1):
+        raise ExprError(f"alignment {align} is not a power of two")
+    return name, size, align
+
+
+_SYMBOL_TYPES = {"function": c.STT_FUNC, "object": c.STT_OBJECT, "notype": c.STT_NOTYPE}
+
+
+def _type(asm: Assembler, text: str) -> None:
+    name, kind = _name_and_rest(text, ".type")
+    key = kind.strip().lstrip("@%").strip('"').lower().removeprefix("stt_").replace("func", "function", 1)
+    key = "function" if key.startswith("function") else key
+    if key not in _SYMBOL_TYPES:
+        raise ExprError(f"unknown symbol type {kind.strip()!r}: expected @function or @object")
+    asm.symbol(name).type = _SYMBOL_TYPES[key]
+
+
+def _size(asm: Assembler, text: str) -> None:
+    name, value = _name_and_rest(text, ".size")
+    asm.symbol(name).size = asm.evaluate(value)
+
+
+# -- blocks and files --------------------------------------------------------------------------------------------
+
+
+def _macro(asm: Assembler, text: str) -> None:
+    name, parameters = parse_head(text)
+    if name.lower() in asm.macros:
+        asm.source.block(OPEN_MACRO, CLOSE_MACRO, f".macro {name}")
+        raise ExprError(f"macro {name} is already defined (use .purgem first)")
+    asm.macros[name.lower()] = Macro(name, parameters, asm.source.block(OPEN_MACRO, CLOSE_MACRO, f".macro {name}"))
+
+
+def _purge_macro(asm: Assembler, text: str) -> None:
+    for name in _names(text):
+        if asm.macros.pop(name.lower(), None) is None:
+            raise ExprError(f"no macro is called {name}")
+
+
+def _exit_macro(asm: Assembler, text: str) -> None:
+    frame = asm.source.leave_macro()
+    if frame is None:
+        raise ExprError(".exitm outside a macro")
+    asm.conditionals.cut(frame.conditionals)
+
+
+def _repeat(asm: Assembler, text: str) -> None:
+    body = asm.source.block(OPEN_REPEAT, CLOSE_REPEAT, ".rept")
+    count = asm.constant(text, ".rept count")
+    if not 0 <= count <= MAX_REPEAT:
+        raise ExprError(f".rept count {count} is outside 0..{MAX_REPEAT}")
+    if count * max(len(body), 1) > MAX_REPEAT:
+        raise ExprError(f".rept expands to more than {MAX_REPEAT} lines")
+    asm.source.expand(body * count, asm.conditionals.depth)
+
+
+def _iterate(characters: bool) -> Handler:
+    directive = ".irpc" if characters else ".irp"
+
+    def expand(asm: Assembler, text: str) -> None:
+        body = asm.source.block(OPEN_REPEAT, CLOSE_REPEAT, directive)
+        match = re.match(r"\s*([A-Za-z_$][\w$]*)\s*,?\s*(.*)", text, re.DOTALL)
+        if match is None:
+            raise ExprError(f"{directive} expects a symbol and values")
+        values = list(match[2].strip().strip('"')) if characters else split_arguments(match[2])
+        if len(values) * max(len(body), 1) > MAX_REPEAT:
+            raise ExprError(f"{directive} expands to more than {MAX_REPEAT} lines")
+        lines: list[str] = []
+        for value in values or [""]:
+            lines += substitute(body, {match[1]: value}, asm.serial)
+        asm.source.expand(lines, asm.conditionals.depth)
+
+    return expand
+
+
+def _stray(directive: str, opener: str) -> Handler:
+    def refuse(asm: Assembler, text: str) -> None:
+        raise ExprError(f"{directive} without {opener}")
+
+    return refuse
+
+
+def _include(asm: Assembler, text: str) -> None:
+    name = string_argument(text, ".include")
+    path = asm.find_file(name)
+    try:
+        content = read_text(path)
+    except ToolError as error:
+        raise SourceError(str(error).removeprefix("error: ")) from None
+    asm.source.include(content, path, asm.conditionals.depth)
+
+
+# -- control and messages ----------------------------------------------------------------------------------------
+
+
+def _end(asm: Assembler, text: str) -> None:
+    asm.ended = True
+
+
+def _error(asm: Assembler, text: str) -> None:
+    raise ExprError(string_argument(text, ".error") if text.strip() else ".err encountered")
+
+
+def _abort(asm: Assembler, text: str) -> None:
+    asm.error(".abort: assembly ends here")
+    asm.ended = True
+
+
+def _print(asm: Assembler, text: str) -> None:
+    asm.messages.append(string_argument(text, ".print"))
+
+
+def _ignore(asm: Assembler, text: str) -> None:
+    """Listing and note directives have no effect on the object."""
+
+
+def _file(asm: Assembler, text: str) -> None:
+    numbered = re.match(r"\s*\d+\s+", text)
+    name = string_argument(text[numbered.end() :] if numbered else text, ".file")
+    if not numbered:
+        asm.file_name = name
+
+
+def _line(asm: Assembler, text: str) -> None:
+    number = asm.constant(text, ".line")
+    frame = asm.source.frames[-1]
+    if number < 0:
+        raise ExprError(f"line number {number} is negative")
+    if not frame.fixed:
+        frame.line = number - 1
+        asm.source.place = replace(asm.source.place, line=number)
+
+
+def _fill_upper(asm: Assembler, text: str) -> None:
+    asm.section.fill_upper = _byte(asm, text, 0)
+
+
+def _fill_value(asm: Assembler, text: str) -> None:
+    asm.fill_value = _byte(asm, text, 0)
+
+
+def _packed_fill_value(asm: Assembler, text: str) -> None:
+    asm.packed_fill_value = _byte(asm, text, 0)
+
+
+def _byte(asm: Assembler, text: str, default: int) -> int:
+    value = asm.constant(text) if text.strip() else default
+    if not -128 <= value <= 255:
+        raise ExprError(f"fill value {value} does not fit a byte")
+    return value & 0xFF
+
+
+def _unsupported(reason: str) -> Handler:
+    def refuse(asm: Assembler, text: str) -> None:
+        raise ExprError(reason)
+
+    return refuse
+
+
+DIRECTIVES: dict[str, Handler] = {
+    ".text": _fixed_section(".text"),
+    ".data": _fixed_section(".data"),
+    ".bss": _fixed_section(".bss"),
+    ".section": _section,
+    ".sect": _section,
+    ".pushsection": _push_section,
+    ".popsection": _pop_section,
+    ".previous": _previous,
+    ".attribute": _unsupported(".attribute is not supported: write the attributes on .section"),
+    ".memory": _unsupported(".memory is not supported: the 30F6014A has no user-defined memory regions"),
+    ".global": _binder(Bind.GLOBAL),
+    ".globl": _binder(Bind.GLOBAL),
+    ".weak": _binder(Bind.WEAK),
+    ".local": _binder(Bind.LOCAL),
+    ".extern": _ignore,
+    ".hidden": _visibility(c.STV_HIDDEN),
+    ".internal": _visibility(c.STV_INTERNAL),
+    ".protected": _visibility(c.STV_PROTECTED),
+    ".equ": _equate(once=False),
+    ".set": _equate(once=False),
+    ".equiv": _equate(once=True),
+    ".comm": _common,
+    ".lcomm": _local_common,
+    ".type": _type,
+    ".size": _size,
+    ".macro": _macro,
+    ".endm": _stray(".endm", ".macro"),
+    ".exitm": _exit_macro,
+    ".purgem": _purge_macro,
+    ".rept": _repeat,
+    ".irp": _iterate(characters=False),
+    ".irpc": _iterate(characters=True),
+    ".endr": _stray(".endr", ".rept, .irp or .irpc"),
+    ".include": _include,
+    ".end": _end,
+    ".abort": _abort,
+    ".err": _error,
+    ".error": _error,
+    ".print": _print,
+    ".file": _file,
+    ".line": _line,
+    ".fillupper": _fill_upper,
+    ".fillvalue": _fill_value,
+    ".pfillvalue": _packed_fill_value,
+    **dict.fromkeys((".list", ".nolist", ".eject", ".psize", ".title", ".sbttl", ".ident", ".version"), _ignore),
+    **DATA_DIRECTIVES,
+}
+
+REJECTED: dict[str, str] = {  # abi-elf.md §4.3: refused by pic30-as, so refused here
+    ".zero": "use .space",
+    ".balign": "use .align",
+    ".balignw": "use .align",
+    ".balignl": "use .align",
+    ".p2align": "use .align",
+    ".p2alignw": "use .align",
+    ".p2alignl": "use .align",
+    ".ds": "use .space",
+    ".ds.b": "use .space",
+    ".ds.w": "use .space",
+    ".ds.l": "use .space",
+    ".dcb": "use .fill",
+    ".dcb.b": "use .fill",
+    ".dcb.w": "use .fill",
+    ".dcb.l": "use .fill",
+    ".quad": "use two .long",
+    ".octa": "use four .long",
+    ".loc": "write .debug_line as data",
+    ".ln": "use .line",
+    ".warning": "use .print",
+}

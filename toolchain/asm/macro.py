@@ -1,0 +1,112 @@
+"""Macros: definition heads, arguments, substitution (GNU as 2.14 rules: `\\name`, `\\@`, `\\()`, defaults)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from toolchain.asm.source import SourceError
+
+OPEN_MACRO = re.compile(r"\s*(?:[\w.$]+:\s*)*\.macro\b", re.IGNORECASE)
+CLOSE_MACRO = re.compile(r"\s*\.endm(?:acro)?\b", re.IGNORECASE)
+OPEN_REPEAT = re.compile(r"\s*(?:[\w.$]+:\s*)*\.(?:rept|irpc?)\b", re.IGNORECASE)
+CLOSE_REPEAT = re.compile(r"\s*\.endr\b", re.IGNORECASE)
+
+_PARAMETER = re.compile(r"\s*([A-Za-z_.$][\w.$]*)\s*(?:=\s*(\"(?:\\.|[^\"\\])*\"|[^\s,]*))?\s*,?")
+_USE = re.compile(r"\\(?:([A-Za-z_$][\w$]*)|(@)|(\(\)))")  # a dot ends the name: `\\reg.b`
+
+
+@dataclass(slots=True)
+class Macro:
+    """A macro: parameters in order with their defaults, and the body's lines."""
+
+    name: str
+    parameters: dict[str, str]
+    body: list[str]
+
+
+def parse_head(text: str) -> tuple[str, dict[str, str]]:
+    """Return (name, parameters with defaults) of what follows `.macro`."""
+    match = re.match(r"\s*([A-Za-z_.$][\w.$]*)\s*,?", text)
+    if match is None:
+        raise SourceError("expected a name after .macro")
+    parameters: dict[str, str] = {}
+    position = match.end()
+    rest = text.rstrip()
+    while position < len(rest):
+        parameter = _PARAMETER.match(rest, position)
+        if parameter is None or parameter.end() == position:
+            raise SourceError(f"cannot read macro parameter {rest[position:].strip()!r}")
+        if parameter[1] in parameters:
+            raise SourceError(f"macro parameter {parameter[1]} is named twice")
+        parameters[parameter[1]] = _unquote(parameter[2] or "")
+        position = parameter.end()
+    return match[1], parameters
+
+
+def _unquote(text: str) -> str:
+    return text[1:-1] if len(text) >= 2 and text[0] == text[-1] == '"' else text
+
+
+def split_arguments(text: str, spaces: bool = True) -> list[str]:
+    """Split at commas outside quotes and brackets and, when `spaces`, at blanks that touch no operator."""
+    parts: list[str] = [""]
+    depth, index = 0, 0
+    pieces = re.findall(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\\])\'?|\s+|.', text.strip(), re.DOTALL)
+    while index < len(pieces):
+        piece = pieces[index]
+        if piece in "([":
+            depth += 1
+        elif piece in ")]":
+            depth -= 1
+        if piece == "," and depth <= 0:
+            parts.append("")
+        elif piece.isspace() and depth <= 0 and spaces and _splits_at_blank(parts[-1], pieces[index + 1 :]):
+            parts.append("")
+        else:
+            parts[-1] += piece
+        index += 1
+    return [p.strip() for p in parts] if text.strip() else []
+
+
+_OPERATOR_CHARACTERS = "-+*/%|&^~<>()=[]"
+
+
+def _splits_at_blank(before: str, after: list[str]) -> bool:
+    """Whether a blank between `before` and `after` separates two macro arguments."""
+    following = after[0] if after else ","
+    if not before.strip() or following == ",":
+        return False
+    return before[-1] not in _OPERATOR_CHARACTERS and following[0] not in _OPERATOR_CHARACTERS
+
+
+def bind(macro: Macro, text: str) -> dict[str, str]:
+    """Return parameter values for a call of `macro` with argument text `text`."""
+    values = dict(macro.parameters)
+    names = list(values)
+    position = 0
+    for argument in split_arguments(text):
+        keyword = re.match(r"([A-Za-z_.$][\w.$]*)\s*=(?!=)\s*(.*)", argument, re.DOTALL)
+        if keyword and keyword[1] in values:
+            values[keyword[1]] = _unquote(keyword[2])
+            continue
+        if position >= len(names):
+            raise SourceError(f"macro {macro.name} takes {len(names)} arguments, got more")
+        if argument:
+            values[names[position]] = _unquote(argument)
+        position += 1
+    return values
+
+
+def substitute(lines: list[str], values: dict[str, str], serial: int) -> list[str]:
+    """Return `lines` with `\\name`, `\\@` (the expansion's number) and `\\()` replaced."""
+
+    def replace(match: re.Match[str]) -> str:
+        name, at, nothing = match.groups()
+        if at:
+            return str(serial)
+        if nothing:
+            return ""
+        return values.get(str(name), match[0])
+
+    return [_USE.sub(replace, line) if "\\" in line else line for line in lines]

@@ -1,0 +1,54 @@
+"""Relaxation, only with --relax: CALL -> RCALL and GOTO -> BRA within a section (abi-elf.md §5).
+
+Before: every relaxable call sits alone in its piece, in its two-word form.  After: pieces have their final start.
+All calls begin short and grow when out of reach; a call that has grown stays long, so the loop ends.
+"""
+
+from __future__ import annotations
+
+from toolchain.asm.sections import AsmSection, Relaxable
+from toolchain.asm.symbols import Label
+from toolchain.elf.model import Bind
+
+REACH = (-0x8000, 0x7FFF)  # words, isa.md §3.2 Slit16
+
+
+def _candidates(section: AsmSection) -> list[Relaxable]:
+    return [
+        r
+        for r in section.relaxables
+        if isinstance(r.target.place, Label)
+        and r.target.place.frag.section is section
+        and r.target.bind is not Bind.WEAK
+    ]
+
+
+def _place(section: AsmSection, short: set[int]) -> None:
+    start = 0
+    for piece in section.pieces:
+        piece.start = start
+        octets = 4 if id(piece) in short else len(piece.data)
+        start += octets // 2 if section.is_code else octets
+
+
+def relax(section: AsmSection) -> None:
+    """Choose the form of every relaxable call and give all pieces their final place."""
+    candidates = _candidates(section)
+    short = {id(r.piece) for r in candidates}
+    while True:
+        _place(section, short)
+        grown = [r for r in candidates if id(r.piece) in short and not _reaches(r)]
+        if not grown:
+            break
+        short -= {id(r.piece) for r in grown}
+    for entry in section.relaxables:
+        if id(entry.piece) in short:
+            entry.piece.data = bytearray(entry.short)
+        section.fixups.append(entry.short_fixup if id(entry.piece) in short else entry.fixup)
+
+
+def _reaches(entry: Relaxable) -> bool:
+    place = entry.target.place
+    assert isinstance(place, Label)
+    distance = place.frag.start + place.offset - (entry.piece.start + 2)
+    return REACH[0] <= distance // 2 <= REACH[1]

@@ -1,0 +1,206 @@
+"""Sections under construction: location counting of abi-elf.md §4.4 and the octet layout of §6.2.
+
+In code a location is a PC unit; data bytes fill the low then the middle byte of consecutive words, `.p` data all
+three.  Everywhere else a location is a byte, and the phantom octets are added when the section is finished.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from emu.elffacts import OCTETS_PER_WORD, ExtendedAttribute, RelocationType, SectionFlag
+from toolchain.asm.expr import ExprError, Known
+from toolchain.asm.symbols import AsmSymbol, Frag, Label
+from toolchain.elf import constants as c
+from toolchain.errors import Place
+
+CODE_LIMIT = 1 << 24  # PC units: no program address is longer than 24 bits (isa.md §1.1)
+DATA_LIMIT = 1 << 16  # data space is 64 KB (isa.md §1.2)
+INFO_LIMIT = 1 << 24  # debug sections are not in any address space; a limit against runaway .space
+
+
+@dataclass(slots=True)
+class Fixup:
+    """A field whose value was not a number when it was emitted."""
+
+    frag: Frag
+    offset: int  # octets (code) or bytes (elsewhere) from the frag start
+    kind: RelocationType
+    value: Known
+    place: Place
+    next_word: bool = False  # CALL/GOTO: the high part goes into the following word
+
+
+@dataclass(slots=True, eq=False)
+class Piece(Frag):
+    """A frag with its content: octets in code, plain bytes elsewhere."""
+
+    data: bytearray = field(default_factory=bytearray)
+
+
+@dataclass(slots=True)
+class Relaxable:
+    """CALL or GOTO alone in `piece`, with the one-word branch that may replace it."""
+
+    piece: Piece
+    target: AsmSymbol
+    short: bytes
+    fixup: Fixup
+    short_fixup: Fixup
+    is_short: bool = False
+
+
+class AsmSection:
+    """One section of the object being assembled."""
+
+    def __init__(self, name: str, flags: int, kind: int, place: Place) -> None:
+        self.name, self.flags, self.type, self.place = name, flags, kind, place
+        self.extended = ExtendedAttribute(0)
+        self.align = 2 if flags & SectionFlag.ALLOC else 1
+        self.load: int | None = None
+        self.keep = False
+        self.is_code = bool(flags & SectionFlag.EXECINSTR)
+        self.pieces: list[Piece] = [Piece(self)]
+        self.piece = self.pieces[0]
+        self.fixups: list[Fixup] = []
+        self.relaxables: list[Relaxable] = []
+        self.fill_upper = 0
+        self._data_bytes = 0  # data bytes in the last word, 0 or 1
+        self._packed_bytes = 0  # .p bytes in the last word, 0..2
+        self._waiting: list[Label] = []  # labels since the last content, to move when an instruction aligns
+        if kind == c.SHT_NOBITS or not flags & SectionFlag.ALLOC:
+            limit = INFO_LIMIT
+        else:
+            limit = CODE_LIMIT if self.is_code else DATA_LIMIT
+        self.limit = DATA_LIMIT if kind == c.SHT_NOBITS else limit
+        self.closed_units = 0  # length of all pieces but the current one, as long as nothing is relaxed
+
+    def here(self) -> int:
+        """Location within the current piece, in address units."""
+        if not self.is_code:
+            return len(self.piece.data)
+        whole = len(self.piece.data) // 2
+        return whole - 2 + self._data_bytes if self._data_bytes else whole
+
+    def location(self) -> int:
+        """Location from the section start, before relaxation."""
+        return self.closed_units + self.here()
+
+    def label(self) -> Label:
+        """Return a label for the current location; it moves along when an instruction has to be aligned."""
+        if self._packed_bytes:
+            raise ExprError("a label inside a run of .p bytes needs .palign 2 before it")
+        label = Label(self.piece, self.here())
+        if self._data_bytes:
+            self._waiting.append(label)
+        return label
+
+    def put_word(self, word: int) -> int:
+        """Append one program word, aligned; return its octet offset in the current piece."""
+        if self._data_bytes or self._packed_bytes:
+            self.align_word()
+        data = self.piece.data
+        data += word.to_bytes(OCTETS_PER_WORD, "little")
+        return len(data) - OCTETS_PER_WORD
+
+    def align_word(self) -> None:
+        """Go to the next program word; labels just set on the odd location move with it."""
+        if self._data_bytes:
+            end = len(self.piece.data) // 2
+            for label in self._waiting:
+                label.offset = end
+        self._data_bytes = self._packed_bytes = 0
+        self._waiting.clear()
+
+    def put_bytes(self, data: bytes) -> int:
+        """Append data bytes; return the offset of the first one within the piece, in octets (code) or bytes."""
+        self._check_room(len(data))
+        if not self.is_code:
+            offset = len(self.piece.data)
+            self.piece.data += data
+            return offset
+        if self._packed_bytes:
+            raise ExprError("data after a run of .p bytes needs .palign 2 before it")
+        self._waiting.clear()
+        octets, position = self.piece.data, 0
+        first = len(octets) - 3 if self._data_bytes else len(octets)
+        if self._data_bytes and data:
+            octets[-3] = data[0]
+            position = 1
+        for start in range(position, len(data), 2):
+            pair = data[start : start + 2]
+            octets += pair + bytes(2 - len(pair)) + bytes((self.fill_upper, 0))
+        self._data_bytes = (self._data_bytes + len(data)) & 1
+        return first
+
+    def put_packed(self, data: bytes) -> int:
+        """Append `.p` bytes, three to a word; return the octet offset of the first one within the piece."""
+        if not self.is_code:
+            raise ExprError(f"section {self.name} holds no program words: .p directives belong into code sections")
+        self._check_room(len(data))
+        if self._data_bytes:
+            raise ExprError(".p data after an odd number of data bytes needs .align 2 before it")
+        octets = self.piece.data
+        first = len(octets) - OCTETS_PER_WORD + self._packed_bytes if self._packed_bytes else len(octets)
+        room = -self._packed_bytes % 3
+        if room:
+            head = data[:room]
+            octets[first : first + len(head)] = head
+            data = data[room:]
+            self._packed_bytes = (self._packed_bytes + len(head)) % 3
+        for start in range(0, len(data), 3):
+            octets += data[start : start + 3].ljust(OCTETS_PER_WORD, b"\0")
+        if data:
+            self._packed_bytes = len(data) % 3
+        return first
+
+    def _check_room(self, units: int) -> None:
+        if self.closed_units + len(self.piece.data) + units > 2 * self.limit + 8:
+            raise ExprError(f"section {self.name} grows beyond {self.limit:#x} address units")
+
+    def skip(self, units: int, fill: int) -> None:
+        """Advance by `units` locations, bytes of value `fill`."""
+        if units < 0:
+            raise ExprError(f"cannot advance by {units}")
+        self._check_room(units)
+        self.put_bytes(bytes((fill & 0xFF,)) * units)
+
+    def align_to(self, units: int, fill: int) -> None:
+        """Advance to the next multiple of `units` (a power of two)."""
+        if units <= 0 or units & (units - 1):
+            raise ExprError(f"alignment {units} is not a power of two")
+        if units > self.limit:
+            raise ExprError(f"alignment {units} is beyond the address space")
+        if self.is_code and units >= 2:
+            self.align_word()
+        if self.relaxables and units > 2:
+            raise ExprError("alignment beyond 2 after a call that --relax may shorten: use a section of its own")
+        self.align = max(self.align, units)
+        self.skip(-self.location() % units, fill)
+
+    def add_fixup(self, offset: int, kind: RelocationType, value: Known, place: Place) -> Fixup:
+        """Remember that the field at `offset` of the current piece is to be filled with `value`."""
+        fixup = Fixup(self.piece, offset, kind, value, place)
+        self.fixups.append(fixup)
+        return fixup
+
+    def close_piece(self) -> Piece:
+        """End the current piece and start the next one; return the new piece."""
+        self.align_word()
+        self.closed_units += self.here()
+        self.piece = Piece(self, self.closed_units)
+        self.pieces.append(self.piece)
+        return self.piece
+
+    def octets(self, piece: Piece, offset: int) -> int:
+        """File offset, in octets from the section start, of a fixup's `offset` (abi-elf.md §5)."""
+        return piece.start * 2 + (offset if self.is_code else offset * 2)
+
+    def content(self) -> bytearray:
+        """Return the finished octets of the section."""
+        data = bytearray().join(p.data for p in self.pieces)
+        if self.is_code:
+            return data
+        doubled = bytearray(2 * len(data))
+        doubled[::2] = data
+        return doubled

@@ -1,0 +1,185 @@
+"""What an assembly knows while it runs: symbols, sections, location, errors.
+
+Errors are collected, so that one run shows all of them; after MAX_ERRORS it stops.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass, field
+
+from emu.elffacts import PROCESSOR_30F6014A, SectionFlag
+from toolchain.asm import expr
+from toolchain.asm.conditionals import Conditionals
+from toolchain.asm.expr import ExprError, Known, Value
+from toolchain.asm.macro import Macro
+from toolchain.asm.sections import AsmSection
+from toolchain.asm.source import Frame, Source
+from toolchain.asm.symbols import AsmSymbol, Label
+from toolchain.elf import constants as c
+from toolchain.errors import Place, ToolError
+
+MAX_ERRORS = 50
+DEVICE_SYMBOLS = (
+    "__30F6014A",
+    "__dsPIC30F",
+    "__HAS_DSP",
+    "__HAS_EEDATA",
+    "__HAS_CODEGUARD",
+    "__HAS_5VOLTS",
+    "__C30ELF",
+)
+"""Absolute symbols of value 1, always defined for this part (abi-elf.md §4.3)."""
+
+_NUMERIC_LABEL = re.compile(r"(\d+)([fb])$")
+
+
+@dataclass(slots=True)
+class Options:
+    """What the command line can choose."""
+
+    include: list[str] = field(default_factory=list)
+    define: dict[str, int] = field(default_factory=dict)
+    relax: bool = False
+    debug: bool = False
+    processor: int = PROCESSOR_30F6014A
+
+
+class Assembler:
+    """One assembly: state shared by directives and instructions."""
+
+    def __init__(self, text: str, file: str, options: Options) -> None:
+        self.options = options
+        self.source = Source(text, file)
+        self.conditionals = Conditionals()
+        self.source.on_end = self._frame_ended
+        self.symbols: dict[str, AsmSymbol] = {}
+        self.macros: dict[str, Macro] = {}
+        self.serial = 0  # number of macro expansions so far, `\@`
+        self.findings: list[str] = []
+        self.messages: list[str] = []  # .print, .ident and warnings, for the caller to show
+        self.sections: dict[str, AsmSection] = {}
+        self.section_stack: list[tuple[AsmSection, AsmSection]] = []
+        self.numeric: dict[str, int] = {}
+        self.anonymous = 0
+        self.after_repeat = ""  # mnemonic REPEAT when the previous instruction was one
+        self.fill_value = 0
+        self.packed_fill_value = 0
+        self.file_name = ""
+        self.line_rows: list[tuple[Label, Place]] = []
+        self.ended = False
+        place = Place(file, 0)
+        code = int(SectionFlag.ALLOC | SectionFlag.EXECINSTR)
+        data = int(SectionFlag.ALLOC | SectionFlag.WRITE)
+        for name, flags, kind in (
+            (".text", code, c.SHT_PROGBITS),
+            (".data", data, c.SHT_PROGBITS),
+            (".bss", data, c.SHT_NOBITS),
+        ):
+            self.sections[name] = AsmSection(name, flags, kind, place)  # always emitted, even if empty (§7 item 8)
+        self.section = self.previous = self.sections[".text"]
+        for name in DEVICE_SYMBOLS:
+            self.symbols[name] = AsmSymbol(name, 1)
+        for name, value in options.define.items():
+            self.symbols[name] = AsmSymbol(name, value)
+
+    # -- errors ------------------------------------------------------------------------------------------------
+
+    def error(self, message: str, place: Place | None = None) -> None:
+        """Record a finding at `place`, by default the current line; stop when there are too many."""
+        self.findings.append(f"{place or self.source.place}: error: {message}")
+        if len(self.findings) >= MAX_ERRORS:
+            self.findings.append(f"{self.source.place.file}: error: more than {MAX_ERRORS} errors, giving up")
+            raise ToolError.of(self.findings)
+
+    def warn(self, message: str, place: Place | None = None) -> None:
+        """Record a warning for the caller to print."""
+        self.messages.append(f"{place or self.source.place}: warning: {message}")
+
+    # -- symbols and expressions ---------------------------------------------------------------------------------
+
+    def symbol(self, name: str) -> AsmSymbol:
+        """Return the symbol called `name`, creating it as undefined."""
+        found = self.symbols.get(name)
+        if found is None:
+            found = self.symbols[name] = AsmSymbol(name)
+        return found
+
+    def lookup(self, name: str) -> Known:
+        """Value of a name as of now; numeric local labels become their unique name."""
+        if name[0].isdigit():
+            match = _NUMERIC_LABEL.fullmatch(name)
+            if match is None:
+                raise ExprError(f"bad local label {name}")
+            count = self.numeric.get(match[1], 0)
+            if match[2] == "b" and count == 0:
+                raise ExprError(f"local label {match[1]}: is not defined before this line")
+            name = f".LN{match[1]}.{count + (match[2] == 'f')}"
+        symbol = self.symbol(name)
+        if symbol.place is None or isinstance(symbol.place, Label):
+            symbol.used = True
+            if symbol.first_use is None:
+                symbol.first_use = self.source.place
+            return Value(symbol)
+        return symbol.place
+
+    def here(self) -> Known:
+        """A label for the current location."""
+        self.anonymous += 1
+        return Value(AsmSymbol(f".LH{self.anonymous}", self.section.label()))
+
+    def evaluate(self, text: str) -> Known:
+        """Value of expression `text` as far as it is known now."""
+        return self.value_of(expr.parse(text))
+
+    def value_of(self, tree: expr.Tree) -> Known:
+        """Value of a parsed expression as far as it is known now."""
+        if isinstance(tree, int):
+            return tree
+        return expr.settle(expr.evaluate(tree, self.lookup, self.here), final=False)
+
+    def constant(self, text: str, what: str = "expression") -> int:
+        """Value of `text`, which must be a number already on this line."""
+        value = self.evaluate(text)
+        if not isinstance(value, int):
+            raise ExprError(f"{what} {text.strip()!r} must be a constant at this point")
+        return value
+
+    def define_label(self, name: str) -> None:
+        """Place label `name` at the current location."""
+        if name.isdigit():
+            self.numeric[name] = self.numeric.get(name, 0) + 1
+            name = f".LN{name}.{self.numeric[name]}"
+        symbol = self.symbol(name)
+        if symbol.place is not None or symbol.common is not None:
+            raise ExprError(f"symbol {name} is already defined")
+        symbol.place = self.section.label()
+
+    def assign(self, name: str, text: str, once: bool = False) -> None:
+        """Set `name` to the value of `text` (.set, .equ, =; `once` for .equiv)."""
+        symbol = self.symbol(name)
+        if isinstance(symbol.place, Label) or symbol.constant or (once and symbol.place is not None):
+            raise ExprError(f"symbol {name} is already defined")
+        value = self.evaluate(text)
+        if isinstance(value, Value) and value.add is symbol:
+            raise ExprError(f"symbol {name} is defined in terms of itself")
+        symbol.place, symbol.constant = value, once
+
+    def find_file(self, name: str) -> str:
+        """Return the path of an included file: beside the including file, then the current folder, then each -I."""
+        beside = os.path.dirname(self.source.place.file)
+        for folder in (beside, "", *self.options.include):
+            path = os.path.join(folder, name)
+            if os.path.isfile(path):
+                return path
+        raise ExprError(f"cannot find {name!r} beside the source, here, or in the -I folders")
+
+    # -- frames ------------------------------------------------------------------------------------------------------
+
+    def _frame_ended(self, frame: Frame) -> None:
+        if self.conditionals.depth > frame.conditionals:
+            opened = self.conditionals.innermost()
+            self.conditionals.cut(frame.conditionals)
+            if not self.ended:
+                self.error(".if is never closed by .endif", opened)

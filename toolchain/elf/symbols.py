@@ -1,0 +1,39 @@
+"""Questions about symbol tables that several tools ask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from toolchain.elf import constants as c
+from toolchain.elf.model import Section, Symbol
+
+_COMPILER_LABELS = (".L", "L0", "___PA___", "___BP___")  # abi-elf.md §6.5: thousands of meaningless locals
+
+
+def is_named(symbol: Symbol) -> bool:
+    """Whether the symbol names something a person knows, rather than a compiler's label."""
+    return (
+        bool(symbol.name)
+        and symbol.type not in (c.STT_SECTION, c.STT_FILE)
+        and not symbol.name.startswith(_COMPILER_LABELS)
+    )
+
+
+def symbol_sizes(symbols: Iterable[Symbol], relative: bool = True) -> list[tuple[Symbol, int]]:
+    """Return (symbol, size in address units) for named symbols in sections, by section and value.
+
+    Where no size is recorded, as for library assembly (abi-elf.md §6.5), a symbol reaches to the next one or to the
+    end of its section.  `relative`: values count from the section start, as in objects.
+    """
+    by_section: dict[Section, list[Symbol]] = {}
+    for symbol in symbols:
+        if symbol.section is not None and is_named(symbol):
+            by_section.setdefault(symbol.section, []).append(symbol)
+    result: list[tuple[Symbol, int]] = []
+    for section, members in by_section.items():
+        members.sort(key=lambda s: (s.value, s.name))
+        end = section.units + (0 if relative else section.address)
+        for index, symbol in enumerate(members):
+            following = next((m.value for m in members[index + 1 :] if m.value > symbol.value), end)
+            result.append((symbol, symbol.size or max(following - symbol.value, 0)))
+    return result

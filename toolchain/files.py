@@ -1,0 +1,58 @@
+"""Reading inputs and writing outputs: a failed tool never leaves a half-written file behind."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from toolchain.errors import ToolError
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Return the content of `path`; raise `ToolError` naming the file and the reason."""
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise ToolError(f"cannot read {path}: {error.strerror or error}") from None
+
+
+def read_text(path: str | Path) -> str:
+    """Return `path` as text.  Bytes that are not UTF-8 are read as Latin-1: old sources carry both."""
+    data = read_bytes(path)
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
+    """Write all files or none: each goes to a temporary beside its target, then all are renamed.
+
+    Raises `ToolError` when a target cannot be written; temporaries are removed in every case.
+    """
+    pending: list[tuple[str, Path]] = []
+    try:
+        for path, data in outputs:
+            target = Path(path)
+            handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            pending.append((temporary, target))
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(data)
+            os.chmod(temporary, 0o666 & ~_umask())
+        for temporary, target in pending:
+            os.replace(temporary, target)
+    except OSError as error:
+        name = pending[-1][1] if pending else "output"
+        raise ToolError(f"cannot write {name}: {error.strerror or error}") from None
+    finally:
+        for temporary, _ in pending:
+            if os.path.exists(temporary):
+                os.unlink(temporary)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

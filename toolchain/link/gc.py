@@ -1,0 +1,56 @@
+"""--gc-sections: which input sections can be reached from the roots."""
+
+from __future__ import annotations
+
+from emu.elffacts import SectionFlag
+from toolchain.asm.finish import KEEP_PREFIX
+from toolchain.elf.model import Home, Section
+from toolchain.link.memory import CHIP, config_sections
+from toolchain.link.resolve import Resolution
+
+ROOT_NAMES = frozenset((".reset", ".init", ".user_init", ".ivt", ".aivt"))
+
+
+def vector_names() -> set[str]:
+    """Symbols that become vectors just by existing (abi-elf.md §2.7)."""
+    names = {"__DefaultInterrupt"}
+    for vector in CHIP.vectors:
+        names |= {vector.symbol, vector.alternate_symbol}
+    return names
+
+
+def _roots(resolution: Resolution, names: list[str]) -> list[Section]:
+    roots: list[Section] = []
+    config = config_sections()
+    for obj in resolution.objects:
+        kept = {s.name.removeprefix(KEEP_PREFIX) for s in obj.symbols if s.name.startswith(KEEP_PREFIX)}
+        for section in obj.sections:
+            always = section.name in ROOT_NAMES or section.name in config or section.name in kept
+            fixed = section.flags & (SectionFlag.ABSOLUTE | SectionFlag.EEDATA) and section.units
+            if always or fixed or not section.flags & SectionFlag.ALLOC:
+                roots.append(section)
+    for name in names:
+        symbol = resolution.globals.get(name)
+        if symbol is not None and symbol.section is not None:
+            roots.append(symbol.section)
+    return roots
+
+
+def live_sections(resolution: Resolution, names: list[str], collect: bool) -> set[Section]:
+    """Return the sections to link: all of them, or with `collect` those reachable from `names` and the fixed roots."""
+    if not collect:
+        return set(resolution.owner)
+    live: set[Section] = set()
+    work = _roots(resolution, names)
+    while work:
+        section = work.pop()
+        if section in live:
+            continue
+        live.add(section)
+        if not section.flags & SectionFlag.ALLOC:
+            continue  # debug information mentions everything and keeps nothing
+        for reloc in section.relocs:
+            target = resolution.lookup(reloc.symbol)
+            if target.home is Home.SECTION and target.section is not None and target.section not in live:
+                work.append(target.section)
+    return live

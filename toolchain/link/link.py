@@ -1,0 +1,232 @@
+"""The linker: objects and libraries -> an image.  `link` lists the steps in order."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass
+
+from emu.elffacts import OCTETS_PER_UNIT, PSV_PAGE_UNITS, ExtendedAttribute, SectionFlag
+from toolchain.elf import constants as c
+from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Section, Symbol
+from toolchain.errors import ToolError
+from toolchain.link import dinit, synthesize
+from toolchain.link.archive import Archive
+from toolchain.link.gc import live_sections, vector_names
+from toolchain.link.image import Output, build_executable, build_outputs
+from toolchain.link.memory import script_symbols
+from toolchain.link.options import LinkOptions
+from toolchain.link.place import Layout, Placer, even, is_const, space_of
+from toolchain.link.relocate import Relocator
+from toolchain.link.resolve import Resolution, check, resolve
+
+LINKER_OBJECT = "<linker>"
+_LIMITS = re.compile(r"\.(startof|sizeof|endof)\.(.+)")
+
+
+@dataclass(slots=True)
+class Linked:
+    """A finished link: the image, and what the map file and reports are made from."""
+
+    image: Executable
+    resolution: Resolution
+    layout: Layout
+    outputs: list[Output]
+    records: list[dinit.Record]
+    live: set[Section]
+    stack: tuple[int, int]  # first address of the stack, limit (SPLIM)
+    messages: list[str]
+
+
+def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions) -> Linked:
+    """Link `objects` and what they need of `archives`.  Raises `ToolError` listing everything that is wrong."""
+    roots = [options.entry, *options.undefined]
+    resolution = resolve(objects, archives, roots)
+    own = ObjectFile(LINKER_OBJECT)
+    resolution.objects.append(own)
+    if options.isr and "__DefaultInterrupt" not in resolution.globals:
+        synthesize.default_interrupt(own)
+    _adopt(resolution, own)
+    live = live_sections(resolution, roots + sorted(vector_names()), options.gc_sections)
+    _common_sections(resolution, own)
+    _fixed_sections(resolution, own, live, options)
+    handle, slots = synthesize.handle_section(resolution, live | set(own.sections))
+    if options.handles:
+        own.sections.append(handle)
+    else:
+        slots = {}
+    _adopt(resolution, own)
+    live |= set(own.sections)
+    absolute = script_symbols() | options.define
+    absolute |= dict.fromkeys(_LINKER_SYMBOLS, 0)
+    provided = set(absolute) | {n for n in resolution.wanted if _LIMITS.fullmatch(n)}
+    check(resolution, provided, live)
+    messages = _misnamed_handlers(resolution, live)
+
+    order = [s for obj in resolution.objects for s in obj.sections if s in live]
+    placer = Placer(resolution, order)
+    placer.place_data()
+    records = dinit.plan(placer.layout, options.pack_data) if options.data_init else []
+    table = dinit.empty_section(records)
+    if options.data_init:
+        own.sections.append(table)
+        resolution.owner[table] = own
+        placer.by_space.setdefault("program", []).append(table)
+    placer.place_fixed_program()
+    placer.place_program()
+    placer.place_eeprom()
+    placer.place_info()
+    layout = placer.layout
+
+    stack = _stack(layout, order, options)
+    absolute |= _linker_symbols(resolution, layout, table if options.data_init else None, stack, options)
+    absolute |= _section_limits(resolution, layout)
+    relocator = Relocator(resolution, layout, absolute, slots, handle)
+    contents = {s: relocator.apply(s) for s in layout.placed}
+    relocator.check()
+    if options.data_init:
+        dinit.fill(table, records, contents, options.fill_upper)
+        contents[table] = table.data
+    outputs = build_outputs(layout, contents, options.fill_upper)
+    entry = relocator.target(synthesize.wanted(options.entry)).address
+    image = build_executable(resolution, outputs, relocator, entry, options.processor)
+    return Linked(image, resolution, layout, outputs, records, live, stack, messages)
+
+
+def _adopt(resolution: Resolution, own: ObjectFile) -> None:
+    """Enter what the linker made itself into the tables."""
+    for section in own.sections:
+        resolution.owner[section] = own
+    for symbol in own.symbols:
+        resolution.globals.setdefault(symbol.name, symbol)
+        resolution.defined_in.setdefault(symbol.name, own)
+
+
+def _common_sections(resolution: Resolution, own: ObjectFile) -> None:
+    """Give every COMMON symbol a zeroed section; near when there is room is what small-data code assumes (§1.4)."""
+    for name, symbol in resolution.globals.items():
+        if symbol.home is not Home.COMMON:
+            continue
+        flags = SectionFlag.ALLOC | SectionFlag.WRITE | SectionFlag.NEAR
+        section = Section("COMMON", flags, c.SHT_NOBITS, nobits_units=symbol.size, align=max(symbol.value, 2))
+        own.sections.append(section)
+        placed = Symbol(name, Home.SECTION, section, 0, symbol.size, symbol.bind, c.STT_OBJECT)
+        resolution.globals[name] = placed
+        own.symbols.append(placed)
+
+
+def _fixed_sections(resolution: Resolution, own: ObjectFile, live: set[Section], options: LinkOptions) -> None:
+    """Reset, vector tables, heap, the end of .user_init: unless the program brings its own."""
+    present = {s.name for s in live if s.units}
+    if ".reset" not in present:
+        own.sections.append(synthesize.reset_section(options.entry))
+    for table in synthesize.vector_tables(resolution, options.isr):
+        if table.name not in present:
+            own.sections.append(table)
+    if options.heap:
+        flags = SectionFlag.ALLOC | SectionFlag.WRITE
+        heap = Section(".heap", flags, c.SHT_NOBITS, nobits_units=even(options.heap), extended=ExtendedAttribute.HEAP)
+        own.sections.append(heap)
+    if ".user_init" in present:
+        own.sections.append(synthesize.user_init_return())
+
+
+_LINKER_SYMBOLS = (
+    "__SP_init", "__SPLIM_init", "__MIN_STACK_SIZE", "__STACKGUARD_SIZE", "__heap", "__eheap", "__const_psvpage",
+    "__const_length", "__dinit_tblpage", "__dinit_tbloffset", "__user_init", "__has_user_init",
+    "__bootconst_psvpage", "__secureconst_psvpage", "__enable_fixed",
+)  # fmt: skip
+"""Absolute symbols the linker defines, abi-elf.md §3.3; `__enable_fixed` is 0 = no fixed-point types (§3.1)."""
+
+
+def _linker_symbols(
+    resolution: Resolution, layout: Layout, table: Section | None, stack: tuple[int, int], options: LinkOptions
+) -> dict[str, int]:
+    values = dict.fromkeys(_LINKER_SYMBOLS, 0)
+    values["__SP_init"], values["__SPLIM_init"] = stack
+    values["__MIN_STACK_SIZE"], values["__STACKGUARD_SIZE"] = options.stack, options.stack_guard
+    heaps = [p for s, p in layout.placed.items() if s.extended & ExtendedAttribute.HEAP]
+    if heaps:
+        values["__heap"] = min(p.address for p in heaps)
+        values["__eheap"] = max(p.address + p.size for p in heaps)
+    const = [p for s, p in layout.placed.items() if s.is_psv and is_const(s) and p.size]
+    if const:
+        start = min(p.load for p in const)
+        values["__const_psvpage"] = start // PSV_PAGE_UNITS
+        values["__const_length"] = max(p.load + p.size for p in const) - start
+    if table is not None:
+        load = layout.placed[table].load
+        values["__dinit_tblpage"], values["__dinit_tbloffset"] = load >> 16, load & 0xFFFF
+    calls = sorted((p.load, p.size) for s, p in layout.placed.items() if s.name == ".user_init" and p.size)
+    if calls:
+        gaps = [a for (a, size), (b, _) in zip(calls, calls[1:], strict=False) if a + size != b]
+        if gaps:
+            raise ToolError(f".user_init is torn apart at {gaps[0]:#x} by a section with a fixed address")
+        values["__user_init"], values["__has_user_init"] = calls[0][0], 1
+    return {name: value for name, value in values.items() if name not in resolution.globals}
+
+
+def _section_limits(resolution: Resolution, layout: Layout) -> dict[str, int]:
+    """Values of `.startof.(x)`, `.sizeof.(x)`, `.endof.(x)` in address units (abi-elf.md §4.2)."""
+    result: dict[str, int] = {}
+    for name in resolution.wanted:
+        match = _LIMITS.fullmatch(name)
+        if match is None:
+            continue
+        parts = [p for s, p in layout.placed.items() if s.name == match[2] or s.name.startswith(match[2] + ".")]
+        start = min((p.address for p in parts), default=0)
+        end = max((p.address + p.size for p in parts), default=0)
+        result[name] = {"startof": start, "endof": end, "sizeof": end - start}[match[1]]
+    return result
+
+
+def _stack(layout: Layout, order: list[Section], options: LinkOptions) -> tuple[int, int]:
+    """Return (first address, limit): a stack section of the program, else the largest free block (abi-elf.md §3.3)."""
+    given = [s for s in order if s.extended & ExtendedAttribute.STACK and s.units]
+    if given:
+        size = even(sum(s.units for s in given))
+        at = layout.data.allocate(size, max(2, *(s.align for s in given)), layout.data.start, layout.data.end)
+        if at is None:
+            raise ToolError(f"the stack section of {size} bytes does not fit into data memory")
+        return at, at + size - options.stack_guard
+    low, high = layout.data.largest()
+    low = even(low)
+    if high - low < options.stack + options.stack_guard:
+        needed = options.stack + options.stack_guard
+        raise ToolError(f"no room for the stack: {high - low} bytes of data memory are free, {needed} needed (--stack)")
+    return low, high - options.stack_guard
+
+
+_HANDLER = re.compile(r"__(?:Alt)?[A-Z]\w*(?:Interrupt|Fail|Error)")
+
+
+def _misnamed_handlers(resolution: Resolution, live: set[Section]) -> list[str]:
+    """Refuse a function that is spelled like an interrupt handler but that no vector of the chip takes."""
+    vectors = vector_names()
+    called = {r.symbol.name for s in resolution.owner if s in live for r in s.relocs}
+    findings: list[str] = []
+    for name, symbol in resolution.globals.items():
+        if not _HANDLER.fullmatch(name) or name in vectors or name in called or symbol.bind is Bind.LOCAL:
+            continue
+        if symbol.section is None or not symbol.section.is_code:
+            continue
+        near = difflib.get_close_matches(name, vectors, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        owner = resolution.defined_in[name].name
+        findings.append(f"{owner}: error: {name} looks like an interrupt handler but the chip has no such vector{hint}")
+    if findings:
+        raise ToolError.of(findings)
+    return []
+
+
+def memory_use(linked: Linked) -> dict[str, int]:
+    """Return bytes used: "flash" (three per instruction word), "data", "eeprom", and "stack" left over."""
+    used = {"flash": 0, "data": 0, "eeprom": 0}
+    for section, placed in linked.layout.placed.items():
+        space = space_of(section)
+        if space == "program":
+            used["flash"] += placed.size // OCTETS_PER_UNIT * 3
+        elif space in ("data", "eeprom"):
+            used[space] += placed.size
+    used["stack"] = linked.stack[1] - linked.stack[0]
+    return used

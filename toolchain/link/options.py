@@ -1,0 +1,29 @@
+"""What a link can be told; names and defaults follow Microchip's linker (abi-elf.md §3.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from emu.elffacts import PROCESSOR_30F6014A
+
+STACK_GUARD = 16  # abi-elf.md §3.3: --stackguard default
+MINIMUM_STACK = 16  # --stack default
+
+
+@dataclass(slots=True)
+class LinkOptions:
+    """Options of one link."""
+
+    entry: str = "__reset"
+    gc_sections: bool = False
+    heap: int = 0
+    stack: int = MINIMUM_STACK
+    stack_guard: int = STACK_GUARD
+    data_init: bool = True
+    pack_data: bool = True
+    handles: bool = True
+    isr: bool = True
+    fill_upper: int = 0
+    undefined: list[str] = field(default_factory=list)
+    define: dict[str, int] = field(default_factory=dict)
+    processor: int = PROCESSOR_30F6014A

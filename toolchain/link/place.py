@@ -1,0 +1,270 @@
+"""Placement: every live input section gets an address and a load address (abi-elf.md §3.3, "Allocation").
+
+Before: sections with their sizes.  After: `Placed` for each, no overlaps, all rules of psv windows, near, X, Y,
+`address()`, alignment kept, or a `ToolError` that says by how many bytes what does not fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from emu.elffacts import PSV_PAGE_UNITS, PSV_WINDOW, ExtendedAttribute, SectionFlag
+from toolchain.elf.model import Section
+from toolchain.elf.symbols import symbol_sizes
+from toolchain.errors import ToolError
+from toolchain.link.memory import (
+    AIVT,
+    EEPROM,
+    HANDLE_LIMIT,
+    IVT,
+    NEAR,
+    PROGRAM,
+    RAM,
+    RESET,
+    X_RAM,
+    Y_RAM,
+    Pool,
+    config_sections,
+)
+from toolchain.link.resolve import Resolution
+
+_FIRST_CODE = (".init", ".user_init", ".handle", ".isr", ".libc", ".libm", ".libdsp", ".lib")
+"""Order of what opens the program region (abi-elf.md §3.3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """Where a section ended up, in address units; `size` is even."""
+
+    address: int
+    load: int
+    size: int
+
+
+@dataclass(slots=True)
+class Layout:
+    """The result: places by section, and what is left of the memories."""
+
+    placed: dict[Section, Placed] = field(default_factory=dict)
+    data: Pool = field(default_factory=lambda: Pool(RAM.start, RAM.end))
+    program: Pool = field(default_factory=lambda: Pool(PROGRAM.start, PROGRAM.end))
+    eeprom: Pool = field(default_factory=lambda: Pool(EEPROM.start, EEPROM.end))
+
+
+def even(units: int) -> int:
+    """Sections are padded to whole words (abi-elf.md §3.2)."""
+    return (units + 1) // 2 * 2
+
+
+def space_of(section: Section) -> str:
+    """Return "data", "program", "eeprom", "config", or "info" for what is in no memory."""
+    if section.name in config_sections():
+        return "config"
+    if section.flags & SectionFlag.EEDATA:
+        return "eeprom"
+    if section.flags & (SectionFlag.EXECINSTR | SectionFlag.PSV):
+        return "program"
+    return "data" if section.is_ram else "info"
+
+
+class Placer:
+    """Places sections space by space; largest constraints first."""
+
+    def __init__(self, resolution: Resolution, sections: list[Section]) -> None:
+        self.resolution, self.layout = resolution, Layout()
+        self.by_space: dict[str, list[Section]] = {}
+        for section in sections:
+            self.by_space.setdefault(space_of(section), []).append(section)
+
+    def _record(self, section: Section, address: int, load: int | None = None) -> None:
+        self.layout.placed[section] = Placed(address, address if load is None else load, even(section.units))
+
+    def _name(self, section: Section) -> str:
+        return f"{self.resolution.owner[section].name}:({section.name})"
+
+    # -- data ----------------------------------------------------------------------------------------------------
+
+    def place_data(self) -> None:
+        """RAM: fixed addresses, X and Y memory, near from the bottom, then the rest (abi-elf.md §3.3)."""
+        sections = [s for s in self.by_space.get("data", []) if not s.extended & ExtendedAttribute.STACK]
+        fixed = [s for s in sections if s.flags & SectionFlag.ABSOLUTE]
+        free = [s for s in sections if not s.flags & SectionFlag.ABSOLUTE]
+        for section in fixed:
+            self._fix(section, self.layout.data, section.load, section.load, "data memory")
+        groups = (
+            ([s for s in free if s.flags & SectionFlag.YMEM], Y_RAM.start, Y_RAM.end, True),
+            ([s for s in free if s.flags & SectionFlag.XMEM], X_RAM.start, X_RAM.end, False),
+            ([s for s in free if _is_near(s)], RAM.start, NEAR.end, False),
+            ([s for s in free if not _is_near(s) and not s.flags & _XY], RAM.start, RAM.end, False),
+        )
+        for members, low, high, from_top in groups:
+            for section in sorted(members, key=_data_order):
+                top = from_top or section.flags & SectionFlag.REVERSE
+                take = self._take_top if top else self._take
+                at = take(section, low, high)
+                if at is None:
+                    raise self._overflow(members, self.layout.data, low, high, section)
+                self._record(section, at)
+
+    def _take(self, section: Section, low: int, high: int) -> int | None:
+        return self.layout.data.allocate(even(section.units), max(section.align, 2), low, high)
+
+    def _take_top(self, section: Section, low: int, high: int) -> int | None:
+        reverse = bool(section.flags & SectionFlag.REVERSE)
+        return self.layout.data.allocate_top(even(section.units), max(section.align, 2), low, high, reverse)
+
+    def _fix(self, section: Section, pool: Pool, load: int, address: int, what: str) -> None:
+        if load % 2 or not pool.reserve(load, even(section.units)):
+            end = load + even(section.units)
+            raise ToolError(f"{self._name(section)} at {load:#x}..{end:#x} overlaps another section or leaves {what}")
+        self._record(section, address, load)
+
+    # -- program -------------------------------------------------------------------------------------------------
+
+    def place_fixed_program(self) -> None:
+        """Reset, vector tables, `address()` code and constants, configuration words."""
+        starts = {".reset": RESET, ".ivt": IVT, ".aivt": AIVT}
+        for section in self.by_space.get("program", []):
+            if section.name in starts:
+                region = starts[section.name]
+                if section.units > region.size:
+                    raise ToolError(f"{self._name(section)} is {section.units - region.size} address units too long")
+                self._record(section, region.start)
+            elif section.flags & SectionFlag.ABSOLUTE:
+                address = psv_address(section.load) if section.is_psv else section.load
+                self._fix(section, self.layout.program, section.load, address, "program memory")
+        for section in self.by_space.get("config", []):
+            self._config(section)
+
+    def _config(self, section: Section) -> None:
+        address = config_sections()[section.name]
+        if section.units > 2:
+            raise ToolError(f"{self._name(section)} holds {section.units // 2} words, a configuration register is one")
+        for other, placed in self.layout.placed.items():
+            if placed.address == address and space_of(other) == "config" and section.units:
+                raise ToolError(f"{self._name(section)}: error: already set by {self._name(other)}")
+        if section.units:
+            self._record(section, address)
+
+    def place_program(self) -> None:
+        """Start-up and library code first, then .const in one window, other psv sections, the remaining code."""
+        free = [s for s in self.by_space.get("program", []) if s not in self.layout.placed]
+        code = [s for s in free if not s.is_psv]
+        const = [s for s in free if s.is_psv and is_const(s)]
+        first = sorted((s for s in code if _first_rank(s) < len(_FIRST_CODE)), key=_first_rank)
+        for section in first:
+            high = HANDLE_LIMIT if section.name == ".handle" else PROGRAM.end
+            self._program(section, free, high)
+        self._const_group(const, free)
+        for section in sorted((s for s in free if s.is_psv and not is_const(s)), key=lambda s: -s.units):
+            self._program(section, free, PROGRAM.end, PSV_PAGE_UNITS)
+        for section in code:
+            if section not in self.layout.placed:
+                window = HANDLE_LIMIT if section.name == ".dinit" and section.units <= HANDLE_LIMIT else 0
+                self._program(section, free, PROGRAM.end, window)
+
+    def _program(self, section: Section, everything: list[Section], high: int, window: int = 0) -> None:
+        size, align = even(section.units), max(section.align, 2)
+        at = self.layout.program.allocate(size, align, PROGRAM.start, high, window)
+        if at is None:
+            raise self._overflow(everything, self.layout.program, PROGRAM.start, high, section)
+        self._record(section, psv_address(at) if section.is_psv else at, at)
+
+    def _const_group(self, const: list[Section], everything: list[Section]) -> None:
+        """All of .const shares one PSV page, so that one PSVPAG value serves every object (abi-elf.md §1.4)."""
+        if not const:
+            return
+        align = max(2, *(s.align for s in const))
+        offsets, size = [], 0
+        for section in const:
+            size = -(-size // max(section.align, 2)) * max(section.align, 2)
+            offsets.append(size)
+            size += even(section.units)
+        if size > PSV_PAGE_UNITS:
+            largest = _largest(self.resolution, const)
+            raise ToolError(
+                f"constants (.const) are {size - PSV_PAGE_UNITS} bytes too large for one PSV window of 32 KB{largest}"
+            )
+        at = self.layout.program.allocate(size, align, PROGRAM.start, PROGRAM.end, PSV_PAGE_UNITS)
+        if at is None:
+            raise self._overflow(everything, self.layout.program, PROGRAM.start, PROGRAM.end, const[0])
+        for section, offset in zip(const, offsets, strict=True):
+            self._record(section, psv_address(at + offset), at + offset)
+
+    def place_eeprom(self) -> None:
+        """EEPROM contents; the address seen by code is the low half, 0xF000.. (abi-elf.md §6.4)."""
+        members = self.by_space.get("eeprom", [])
+        for section in members:
+            if section.flags & SectionFlag.ABSOLUTE:
+                self._fix(section, self.layout.eeprom, section.load, psv_address(section.load), "data EEPROM")
+        for section in members:
+            if section not in self.layout.placed:
+                at = self.layout.eeprom.allocate(even(section.units), max(section.align, 2), EEPROM.start, EEPROM.end)
+                if at is None:
+                    raise self._overflow(members, self.layout.eeprom, EEPROM.start, EEPROM.end, section)
+                self._record(section, psv_address(at), at)
+
+    def place_info(self) -> None:
+        """Debug sections: offsets within the joined section of the same name, not addresses."""
+        ends: dict[str, int] = {}
+        for section in self.by_space.get("info", []):
+            start = ends.get(section.name, 0)
+            self.layout.placed[section] = Placed(start, start, section.units)
+            ends[section.name] = start + section.units
+
+    # -- errors --------------------------------------------------------------------------------------------------
+
+    def _overflow(self, group: list[Section], pool: Pool, low: int, high: int, failed: Section) -> ToolError:
+        waiting = sum(even(s.units) for s in group if s not in self.layout.placed)
+        missing = waiting - pool.room(low, high)
+        program = space_of(failed) == "program"
+        what = f"{low:#x}..{high - 1:#x}"
+        if missing <= 0:
+            reason = f"no free block of {even(failed.units)} units is left between {what}"
+        elif program:
+            reason = f"program memory {what} overflows by {missing // 2 * 3} bytes ({missing // 2} instruction words)"
+        else:
+            kind = (
+                "EEPROM" if space_of(failed) == "eeprom" else "near data memory" if high == NEAR.end else "data memory"
+            )
+            reason = f"{kind} {what} overflows by {missing} bytes"
+        return ToolError(f"{self._name(failed)} does not fit: {reason}{_largest(self.resolution, group)}")
+
+
+_XY = SectionFlag.XMEM | SectionFlag.YMEM
+
+
+def _is_near(section: Section) -> bool:
+    return bool(section.flags & SectionFlag.NEAR) and not section.flags & _XY
+
+
+def _data_order(section: Section) -> tuple[int, int]:
+    """Largest alignment first, to lose no gaps; then zeroed, initialised, never initialised: short .dinit tables."""
+    kind = 2 if section.flags & (SectionFlag.PERSIST | SectionFlag.NOLOAD) else 0 if section.nobits_units else 1
+    return -section.align if section.align > 2 else 0, kind
+
+
+def _first_rank(section: Section) -> int:
+    names = enumerate(_FIRST_CODE)
+    return next((i for i, n in names if section.name == n or section.name.startswith(n + ".")), len(_FIRST_CODE))
+
+
+def is_const(section: Section) -> bool:
+    """Whether a psv section belongs to the constants every object shares."""
+    return section.name == ".const" or section.name.startswith(".const.")
+
+
+def psv_address(load: int) -> int:
+    """Address under which data sees a program location (abi-elf.md §6.4)."""
+    return PSV_WINDOW | load & (PSV_PAGE_UNITS - 1)
+
+
+def _largest(resolution: Resolution, group: Iterable[Section]) -> str:
+    """The five largest symbols of the sections that compete for the space."""
+    members = set(group)
+    sizes: list[tuple[int, str]] = []
+    for obj in resolution.objects:
+        sizes += [(size, s.name) for s, size in symbol_sizes(obj.symbols) if s.section in members]
+    top = sorted(sizes, key=lambda entry: (-entry[0], entry[1]))[:5]
+    return "; largest symbols: " + ", ".join(f"{name} ({size})" for size, name in top) if top else ""

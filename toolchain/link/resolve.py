@@ -1,0 +1,117 @@
+"""Symbol resolution: which definition each name means, which archive members are needed.
+
+After: every global name has one definition, or all undefined and duplicate ones are reported together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from toolchain.elf.model import Bind, Home, ObjectFile, Section, Symbol
+from toolchain.elf.read import read_object
+from toolchain.errors import ToolError
+from toolchain.link.archive import Archive
+
+MAX_REFERENCES = 4  # places shown per undefined symbol
+
+
+@dataclass(slots=True)
+class Resolution:
+    """Objects of the link in order, definitions by name, and the object each section came from."""
+
+    objects: list[ObjectFile] = field(default_factory=list)
+    globals: dict[str, Symbol] = field(default_factory=dict)
+    owner: dict[Section, ObjectFile] = field(default_factory=dict)
+    defined_in: dict[str, ObjectFile] = field(default_factory=dict)
+    wanted: dict[str, bool] = field(default_factory=dict)  # name -> strongly referenced
+    duplicates: dict[str, list[str]] = field(default_factory=dict)
+
+    def add(self, obj: ObjectFile) -> None:
+        """Enter an object: its sections, definitions and references."""
+        self.objects.append(obj)
+        for section in obj.sections:
+            self.owner[section] = obj
+        for symbol in obj.symbols:
+            if symbol.bind is Bind.LOCAL or not symbol.name:
+                continue
+            if symbol.home is Home.UNDEFINED:
+                self.wanted[symbol.name] = self.wanted.get(symbol.name, False) or symbol.bind is Bind.GLOBAL
+            else:
+                self._define(symbol, obj)
+
+    def _define(self, symbol: Symbol, obj: ObjectFile) -> None:
+        known = self.globals.get(symbol.name)
+        if known is None or _rank(symbol) > _rank(known):
+            self.globals[symbol.name] = symbol
+            self.defined_in[symbol.name] = obj
+        elif _rank(known) == _rank(symbol) == _STRONG:
+            first = self.defined_in[symbol.name].name
+            self.duplicates.setdefault(symbol.name, [first]).append(obj.name)
+        elif known.home is Home.COMMON and symbol.home is Home.COMMON:
+            known.size = max(known.size, symbol.size)
+            known.value = max(known.value, symbol.value)
+
+    def lookup(self, symbol: Symbol) -> Symbol:
+        """Return the definition `symbol` stands for: itself when local, else the global one, else itself."""
+        if symbol.bind is Bind.LOCAL:
+            return symbol
+        return self.globals.get(symbol.name, symbol)
+
+
+_STRONG = 3
+
+
+def _rank(symbol: Symbol) -> int:
+    """Strong definitions win over common ones, those over weak ones."""
+    if symbol.home is Home.COMMON:
+        return 2
+    return 1 if symbol.bind is Bind.WEAK else _STRONG
+
+
+def resolve(objects: list[ObjectFile], archives: list[Archive], roots: list[str]) -> Resolution:
+    """Enter all `objects`, then archive members as long as one defines a wanted name (one group, abi-elf.md §2.8)."""
+    result = Resolution()
+    for obj in objects:
+        result.add(obj)
+    for name in roots:
+        result.wanted[name] = True
+    loaded: set[tuple[str, int]] = set()
+    progress = True
+    while progress:
+        progress = False
+        for name, strong in list(result.wanted.items()):
+            if not strong or name in result.globals:
+                continue
+            for archive in archives:
+                member = archive.index.get(name)
+                if member is not None and (archive.name, member.offset) not in loaded:
+                    loaded.add((archive.name, member.offset))
+                    result.add(read_object(member.data, f"{archive.name}({member.name})"))
+                    progress = True
+                    break
+    return result
+
+
+def check(result: Resolution, provided: set[str], live: set[Section]) -> None:
+    """Raise `ToolError` listing every duplicate and every undefined symbol that live sections refer to."""
+    findings = [
+        f"{objects[-1]}: error: duplicate symbol {name}, defined in {', '.join(objects)}"
+        for name, objects in result.duplicates.items()
+    ]
+    missing: dict[str, list[str]] = {}
+    for obj in result.objects:
+        for section in obj.sections:
+            if section not in live:
+                continue
+            for reloc in section.relocs:
+                symbol = reloc.symbol
+                if symbol.home is not Home.UNDEFINED or symbol.bind is Bind.WEAK or not symbol.name:
+                    continue
+                if symbol.name not in result.globals and symbol.name not in provided:
+                    missing.setdefault(symbol.name, []).append(f"{obj.name}:({section.name}+{reloc.offset // 2:#x})")
+    for name, places in missing.items():
+        shown = ", ".join(places[:MAX_REFERENCES])
+        more = f" and {len(places) - MAX_REFERENCES} more" if len(places) > MAX_REFERENCES else ""
+        findings.append(f"{places[0].split(':(')[0]}: error: undefined symbol {name}, referenced at {shown}{more}")
+    if findings:
+        raise ToolError.of(findings)

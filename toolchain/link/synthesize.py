@@ -1,0 +1,88 @@
+"""Sections the linker makes itself: reset, vector tables, default handler, handles, RETURN of .user_init, .dinit.
+
+Each is an ordinary section with ordinary relocations, so that placing and relocating know no special cases.
+"""
+
+from __future__ import annotations
+
+from emu.dspic30f.isa import codec
+from emu.dspic30f.isa.debug import HALT
+from emu.dspic30f.isa.table import ROWS
+from emu.elffacts import OCTETS_PER_WORD, RELOCATION_BY_NAME, RELOCATIONS, Formula, SectionFlag
+from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
+from toolchain.link.memory import CHIP
+from toolchain.link.resolve import Resolution
+
+CODE = SectionFlag.ALLOC | SectionFlag.EXECINSTR
+_LSB, _MSB = RELOCATION_BY_NAME["PGM_ADDR_LSB"].number, RELOCATION_BY_NAME["PGM_ADDR_MSB"].number
+_PADDR = RELOCATION_BY_NAME["P_PADDR"].number
+HANDLES = frozenset(number for number, kind in RELOCATIONS.items() if kind.formula is Formula.HANDLE)
+_BY_SYNTAX = {row.syntax: row for row in ROWS}
+
+
+def code_words(syntax: str, **fields: int) -> bytes:
+    """Return the octets of one instruction, given as a row's syntax and its fields."""
+    return words_octets(*codec.encode(_BY_SYNTAX[syntax], fields))
+
+
+def words_octets(*words: int) -> bytes:
+    """Return program words as file octets (abi-elf.md §6.2)."""
+    return b"".join(word.to_bytes(OCTETS_PER_WORD, "little") for word in words)
+
+
+def _goto(section: Section, symbol: Symbol) -> None:
+    at = len(section.data)
+    section.data += code_words("GOTO Expr")
+    section.relocs += [Reloc(at, _LSB, symbol), Reloc(at + OCTETS_PER_WORD, _MSB, symbol)]
+
+
+def wanted(name: str) -> Symbol:
+    """Return a reference to a global symbol."""
+    return Symbol(name, Home.UNDEFINED, bind=Bind.GLOBAL)
+
+
+def reset_section(entry: str) -> Section:
+    """GOTO entry, at address 0 (abi-elf.md §3.1)."""
+    section = Section(".reset", CODE)
+    _goto(section, wanted(entry))
+    return section
+
+
+def default_interrupt(obj: ObjectFile) -> None:
+    """`__DefaultInterrupt` where the program has none: breakpoint word, RESET (abi-elf.md §3.3)."""
+    section = Section(".isr", CODE, data=bytearray(words_octets(HALT) + code_words("RESET")))
+    obj.sections.append(section)
+    obj.symbols.append(Symbol("__DefaultInterrupt", Home.SECTION, section, 0, section.units, Bind.GLOBAL))
+
+
+def vector_tables(resolution: Resolution, filled: bool) -> tuple[Section, Section]:
+    """Return .ivt and .aivt: slot X holds `__X`, the alternate one `__AltX`, else the default (abi-elf.md §2.7)."""
+    tables = (Section(".ivt", CODE), Section(".aivt", CODE))
+    for vector in CHIP.vectors:
+        choices = ((vector.symbol,), (vector.alternate_symbol, vector.symbol))
+        for table, names in zip(tables, choices, strict=True):
+            name = next((n for n in names if n in resolution.globals), "__DefaultInterrupt" if filled else "")
+            if name:
+                table.relocs.append(Reloc(len(table.data), _PADDR, wanted(name)))
+            table.data += words_octets(0)
+    return tables
+
+
+def handle_section(resolution: Resolution, live: set[Section]) -> tuple[Section, dict[Symbol, int]]:
+    """Return .handle, a GOTO per function whose address is taken, and the slot offset of each (abi-elf.md §1.5)."""
+    section = Section(".handle", CODE)
+    slots: dict[Symbol, int] = {}
+    for obj in resolution.objects:
+        for source in obj.sections:
+            if source not in live:
+                continue
+            for reloc in source.relocs:
+                if reloc.type in HANDLES and (target := resolution.lookup(reloc.symbol)) not in slots:
+                    slots[target] = section.units
+                    _goto(section, target)
+    return section, slots
+
+
+def user_init_return() -> Section:
+    """RETURN that ends the collected .user_init calls (abi-elf.md §3.3)."""
+    return Section(".user_init", CODE, data=bytearray(code_words("RETURN")))
