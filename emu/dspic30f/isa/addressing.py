@@ -1,7 +1,6 @@
 """Effective addresses and pointer updates: indirect modes, modulo, bit-reversed, the stack (isa.md §3).
 
-The helpers form an address and update the pointer, in that order of a row's phases; the access comes later. They never
-return a masked difference: every address handed to ``load``/``store`` is already modulo 2**16.
+Every address and pointer value handed to the builder is already modulo 2**16.
 """
 
 from __future__ import annotations
@@ -53,25 +52,24 @@ def bit_reverse16(m: Builder, v: Value) -> Value:
 
 def indirect(
     m: Builder, n: int, mode: int, step: int, side: Side, index: int | None = None, reversible: bool = False
-) -> Value:
-    """EA of Wn in an indirect ``mode``, and the pointer update.
+) -> tuple[Value, Value | None]:
+    """EA of Wn in an indirect ``mode``, and what the pointer becomes; None if it stays.
 
     ``step`` is the access size in bytes, ``index`` the register of [Wn+Wb], ``reversible`` marks a word write, the only
     access to which bit-reversed addressing applies.
     """
     value = m.ptr(n, side)
     if mode == INDIRECT:
-        return value
+        return value, None
     if mode == INDEXED:
         assert index is not None
-        return advance(m, n, value, signed16(m, m.ptr(index, side)), side)
+        return advance(m, n, value, signed16(m, m.ptr(index, side)), side), None
     c = m.context
     if reversible and mode in (POST_INC, PRE_INC) and c.brev and c.bwm == n:
         moved = reverse_carry(m, value, m.reg("XBREV"))
     else:
         moved = advance(m, n, value, step if mode in (POST_INC, PRE_INC) else -step, side)
-    m.set_ptr(n, moved, side)
-    return moved if mode in (PRE_DEC, PRE_INC) else value
+    return (moved if mode in (PRE_DEC, PRE_INC) else value), moved
 
 
 def offset_address(m: Builder, n: int, offset: int, side: Side) -> Value:
@@ -101,15 +99,19 @@ class Place:
     """An operand whose address is formed: ``read`` and ``write`` it in the later phases of a row.
 
     A direct register is read at once, before any pointer moves: the data operand is the old value (isa.md §3.4).
+    The update of a destination pointer waits until the write, behind all reads.
     """
 
-    __slots__ = ("ea", "held", "m", "register", "size")
+    __slots__ = ("ea", "held", "m", "moved", "register", "size")
 
-    def __init__(self, m: Builder, register: int, ea: Value | None, size: Size) -> None:
+    def __init__(
+        self, m: Builder, register: int, size: Size, ea: Value | None = None, moved: Value | None = None
+    ) -> None:
         self.m = m
         self.register = register
-        self.ea = ea
         self.size = size
+        self.ea = ea
+        self.moved = moved
         self.held: Value = None
 
     def read(self) -> Value:
@@ -120,27 +122,32 @@ class Place:
         """Store the low bits of ``v``; of a direct register, a byte write keeps the high byte."""
         if self.ea is None:
             set_register(self.m, self.register, v, self.size)
-        else:
-            self.m.store(self.ea, v, self.size, ptr=self.register)
+            return
+        if self.moved is not None:
+            self.m.set_ptr(self.register, self.moved, "dst")
+        self.m.store(self.ea, v, self.size, ptr=self.register)
 
 
 def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:
-    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index."""
+    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index. Its pointer moves at once."""
     mode = x.p if mode is None else mode
-    if mode:
-        return Place(m, x.s, indirect(m, x.s, mode, size, "src", x.w if mode >= INDEXED else None), size)
-    place = Place(m, x.s, None, size)
-    place.held = truncated(m.w(x.s), size)
-    return place
+    if mode == 0:
+        place = Place(m, x.s, size)
+        place.held = truncated(m.w(x.s), size)
+        return place
+    ea, moved = indirect(m, x.s, mode, size, "src", x.w if mode >= INDEXED else None)
+    if moved is not None:
+        m.set_ptr(x.s, moved, "src")
+    return Place(m, x.s, size, ea)
 
 
 def destination(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:
     """Wd in mode ``q``, or in ``mode`` of the 8-mode set; only written. Follows ``source``, whose update it sees."""
     mode = x.q if mode is None else mode
-    if mode:
-        index = x.w if mode >= INDEXED else None
-        return Place(m, x.d, indirect(m, x.d, mode, size, "dst", index, reversible=size == 2), size)
-    return Place(m, x.d, None, size)
+    if mode == 0:
+        return Place(m, x.d, size)
+    index = x.w if mode >= INDEXED else None
+    return Place(m, x.d, size, *indirect(m, x.d, mode, size, "dst", index, reversible=size == 2))
 
 
 def push(m: Builder, *values: Value) -> None:

@@ -2,8 +2,9 @@
 
 A value is an exact integer, |v| < 2**62. Rows use + - * & | ^ ~ << >> (arithmetic) and the comparisons, which yield
 0 or 1; never ``if``, ``and``, ``not`` on a value. Operand fields and ``context`` are static: ints at translation time.
-A row first reads its register operands, then forms every effective address (pointer updates included), then loads,
-computes, stores and writes registers; so a builder may probe all addresses before anything is committed.
+Phases of a row: read register operands; form every effective address (source pointers move here); load; compute; move
+destination pointers, store, write registers. So a builder may probe all addresses before anything but source pointers
+is committed, and reads see registers as they were before the destination side acts.
 """
 
 from __future__ import annotations

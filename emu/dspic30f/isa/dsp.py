@@ -198,7 +198,6 @@ def mac_class(
         target = None
         if write_back and x.a == WRITE_BACK_INDIRECT:
             target = m.ptr(WRITE_BACK, "dst")
-            m.set_ptr(WRITE_BACK, advance(m, WRITE_BACK, target, 2, "dst"), "dst")
         x_data, y_data = prefetch.read_x(), prefetch.read_y()
         if op is not None:
             accumulate(m, x.A, op(m.acc(x.A), product(m, a, b)))
@@ -207,6 +206,7 @@ def mac_class(
             if target is None:
                 m.set_w(WRITE_BACK, word)
             else:
+                m.set_ptr(WRITE_BACK, advance(m, WRITE_BACK, target, 2, "dst"), "dst")
                 m.store(target, word, 2, ptr=WRITE_BACK)
         if x_data is not None:
             m.set_w(4 + x.x, x_data)

@@ -59,7 +59,9 @@ def move(m: Builder, x: Operands) -> None:
 def load_pair(m: Builder, x: Operands) -> None:
     """Wnd+1:Wnd <- Ws+1:Ws or two words, the low one at the lower address (isa.md §7.4)."""
     if x.p:
-        ea = indirect(m, x.s, x.p, 4, "src")
+        ea, moved = indirect(m, x.s, x.p, 4, "src")
+        if moved is not None:
+            m.set_ptr(x.s, moved, "src")
         low, high = m.load(ea, 2, ptr=x.s), m.load((ea + 2) & 0xFFFF, 2, ptr=x.s)
     else:
         low, high = m.w(x.s), m.w(x.s + 1)
@@ -69,7 +71,9 @@ def load_pair(m: Builder, x: Operands) -> None:
 
 def store_pair(m: Builder, x: Operands) -> None:
     low, high = m.w(x.s), m.w(x.s + 1)
-    ea = indirect(m, x.d, x.q, 4, "dst")
+    ea, moved = indirect(m, x.d, x.q, 4, "dst")
+    if moved is not None:
+        m.set_ptr(x.d, moved, "dst")
     m.store(ea, low, 2, ptr=x.d)
     m.store((ea + 2) & 0xFFFF, high, 2, ptr=x.d)
 

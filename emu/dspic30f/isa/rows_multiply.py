@@ -93,6 +93,7 @@ def divide(dividend: Dividend, reading: Reading) -> Does:
     def does(m: Builder, x: Operands) -> None:
         count = m.reg("RCOUNT")
         last = m.let(count == 0)
+        old = m.w(0), m.w(1)
         n, d = m.let(dividend(m, x)), m.let(reading(m, m.w(x.s)))
         m.trap_math((d == 0) & (count == 17))
         q, r = m.let(m.div_trunc(n, d)), m.let(m.rem_trunc(n, d))
@@ -102,8 +103,8 @@ def divide(dividend: Dividend, reading: Reading) -> Does:
             overflow, negative = q > 0xFFFF, 0
         results = {"N": negative, "OV": overflow, "Z": r == 0, "C": 0}
         m.set_flags(**{name: m.select(last, v, m.flag(name)) for name, v in results.items()})
-        m.set_w(0, m.select(last, q, m.w(0)))
-        m.set_w(1, m.select(last, r, m.w(1)))
+        m.set_w(0, m.select(last, q, old[0]))
+        m.set_w(1, m.select(last, r, old[1]))
 
     return does
 

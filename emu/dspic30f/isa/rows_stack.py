@@ -15,8 +15,9 @@ DC_BIT = 8
 
 def push_f(m: Builder, x: Operands) -> None:
     top = m.ptr(STACK_POINTER, "dst")
+    v = m.load(x.f, 2)
     m.set_ptr(STACK_POINTER, (top + 2) & 0xFFFF, "dst")
-    m.store(top, m.load(x.f, 2), 2, ptr=STACK_POINTER)
+    m.store(top, v, 2, ptr=STACK_POINTER)
 
 
 def pop_f(m: Builder, x: Operands) -> None:
@@ -28,9 +29,9 @@ def link(m: Builder, x: Operands) -> None:
     """Push W14, make it point behind the pushed word, reserve k bytes; W15 ends as a plain sum (isa.md §10.4)."""
     top = m.ptr(STACK_POINTER, "dst")
     old = m.w(FRAME_POINTER)
+    m.set_ptr(STACK_POINTER, (top + 2 + x.k) & 0xFFFF, "dst")
     m.store(top, old, 2, ptr=STACK_POINTER)
     m.set_w(FRAME_POINTER, top + 2)
-    m.set_ptr(STACK_POINTER, (top + 2 + x.k) & 0xFFFF, "dst")
 
 
 def unlink(m: Builder, x: Operands) -> None:

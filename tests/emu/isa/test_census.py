@@ -1,0 +1,119 @@
+"""The whole space of first words: which are legal, and that no two rows claim the same one (isa.md §4, §4.1)."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from emu.dspic30f.isa import codec
+from emu.dspic30f.isa.row import Row
+from emu.dspic30f.isa.table import BY_BYTE, BY_ID, ROWS
+
+LEGAL_WORDS = 11_165_253  # isa.md §4
+REFERENCE = Path(__file__).resolve().parents[4] / "shared" / "reference"
+
+
+def claimed(row: Row, words: np.ndarray) -> np.ndarray:
+    """Which of the words belong to the row: fixed bits and every rule."""
+    mine = (words & row.pattern.mask[0]) == row.pattern.value[0]
+    for clause in row.clauses:
+        mine &= clause.holds(lambda letter: row.fields[letter].get(words))
+    return mine
+
+
+@cache
+def census() -> tuple[np.ndarray, dict[int, int]]:
+    """Rows per first word, and words per row."""
+    rows_per_word = np.zeros(1 << 24, dtype=np.uint8)
+    words_per_row: Counter[int] = Counter()
+    for byte, bucket in enumerate(BY_BYTE):
+        words = np.arange(byte << 16, byte + 1 << 16, dtype=np.int64)
+        for row in bucket:
+            mine = claimed(row, words)
+            rows_per_word[byte << 16 : byte + 1 << 16] += mine
+            words_per_row[row.id] += int(mine.sum())
+    return rows_per_word, dict(words_per_row)
+
+
+def test_the_number_of_legal_first_words_is_that_of_the_reference() -> None:
+    """isa.md §4: exhaustive enumeration of 2**24 words."""
+    assert int((census()[0] > 0).sum()) == LEGAL_WORDS
+
+
+def test_no_word_is_claimed_by_two_rows() -> None:
+    """isa.md §4."""
+    doubled = np.flatnonzero(census()[0] > 1)
+    assert not len(doubled), [f"{word:06x}" for word in doubled[:10]]
+
+
+def test_every_row_claims_words() -> None:
+    """A row without words would be a row that can never run."""
+    assert set(census()[1]) == set(BY_ID)
+    assert all(census()[1].values())
+
+
+def test_decode_agrees_with_the_census() -> None:
+    """``decode`` goes through operands and rules one word at a time; the census through arrays."""
+    generator = np.random.default_rng(20)
+    for word in map(int, generator.integers(0, 1 << 24, 20_000)):
+        assert (codec.decode.__wrapped__(word) is not None) == bool(census()[0][word]), f"{word:06x}"
+
+
+def test_legal_words_per_opcode_byte_are_those_of_the_reference() -> None:
+    """isa.md §4, table: byte or range of bytes, instructions, legal words of 65536 each."""
+    text = REFERENCE / "isa.md"
+    if not text.exists():
+        pytest.skip(f"no reference at {text}")
+    section = text.read_text().split("## 4. Encoding map")[1].split("### 4.1")[0]
+    checked = 0
+    line = re.compile(r"^\| ([0-9A-F]{2})(?:–([0-9A-F]{2}))? \|.*\| (\d+) \|$", re.MULTILINE)
+    for first, last, count in line.findall(section):
+        for byte in range(int(first, 16), int(last or first, 16) + 1):
+            legal = int((census()[0][byte << 16 : byte + 1 << 16] > 0).sum())
+            assert legal == int(count), f"opcode byte {byte:02x}"
+            checked += 1
+    assert checked == 256
+
+
+@cache
+def reference_rows() -> dict[int, dict[str, str]]:
+    file = REFERENCE / "isa.csv"
+    if not file.exists():
+        pytest.skip(f"no reference at {file}")
+    with open(file, newline="") as lines:
+        return {int(row["id"]): row for row in csv.DictReader(lines) if row["status"] == "base"}
+
+
+def fixed_bits(pattern: str) -> tuple[int, int]:
+    mask = int("".join("1" if c in "01" else "0" for c in pattern) or "0", 2)
+    return mask, int("".join(c if c in "01" else "0" for c in pattern) or "0", 2)
+
+
+def test_the_table_has_the_rows_of_the_reference() -> None:
+    """isa.csv: 226 base forms of 83 mnemonics."""
+    assert set(BY_ID) == set(reference_rows())
+    assert len(ROWS) == 226
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
+def test_bits_cycles_flags_and_repeat_are_those_of_the_reference(row: Row) -> None:
+    """isa.csv, columns word1, word2, words, cycles, repeat, psv_extra and the flags."""
+    reference = reference_rows()[row.id]
+    masks, values = zip(fixed_bits(reference["word1"]), fixed_bits(reference["word2"]), strict=True)
+    assert row.pattern.mask == masks
+    assert row.pattern.value == values
+    assert row.words == int(reference["words"])
+    assert row.cycles == int(reference["cycles"].split()[0])
+    assert row.repeat_ok == (reference["repeat"] != "no")
+    if reference["psv_extra"][:1] in ("1", "2"):
+        assert row.psv_class == ("mov" if reference["psv_extra"][0] == "1" else "other")
+    flags = [f if reference[f] != "s" else f"{f}=s" for f in ("DC", "N", "OV", "Z", "C") if reference[f] != "-"]
+    sticky_too = row.mnemonic == "MPY.N"  # flags as MPY: isa.md §22 item 20
+    flags += [f for f in ("OA", "OB", "SA", "SB") if reference[f] != "-" or sticky_too]
+    assert row.flags.split() == flags
