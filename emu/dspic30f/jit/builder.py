@@ -1,0 +1,438 @@
+"""The builder that turns an instruction row into LLVM IR (contract: isa/builder.py).
+
+Nothing an instruction does is committed before all its addresses have been probed. A probe that fails, or an access
+that only Python can make (a register with side effects, a trap, a cold memory), leaves through the instruction's
+*slow exit* with the machine as it was before the instruction; the interpreter then runs it whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+from emu.dspic30f.isa.builder import Context, Side, Size
+from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.variables import Variables, pointer
+from emu.dspic30f.registers import NSTDIS
+from emu.dspic30f.state import FIRST, FLAGS, LAST, MIDDLE, RA, SA, SAB, SB
+from emu.record import DATA_BYTES
+
+RAM: Final = 0x0800  # first data address behind the SFRs, isa.md §1.2
+Y_RAM: Final = 0x1800
+W_END: Final = 0x20  # W0..W15 are data addresses 0x00..0x1F, isa.md §2.2
+STACK_POINTER: Final = 15
+
+NEXT, INTERPRET, DEADLINE, SERVICE, MISS = range(5)
+"""Why native code came back: go on at PC; interpret the instruction at PC; the block at PC reaches the deadline;
+look at events and interrupts before PC; no native code at PC."""
+
+Access = Literal["plain", "slow", "irq", "flags", "sr"]
+"""How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;
+interrupt flags, which native code only clears; SR."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What the translator knows of the machine around an instruction."""
+
+    offset: Mapping[str, int]
+    """Byte offsets in the record of registers and hidden state by name."""
+    reads: Mapping[int, Access]
+    """By even SFR address; absent: slow."""
+    writes: Mapping[int, tuple[Access, int]]
+    """By even SFR address: how, and the bits a write can change; absent: slow."""
+    initialised: int
+    """W registers known to have been written since reset: they need no check as pointers (isa.md §2.2)."""
+    limit_armed: bool
+    """SPLIM has been written since reset (isa.md §10.2)."""
+    flash_words: int
+    flag_words: tuple[tuple[int, int], ...]
+    """Addresses of interrupt flag registers, each with that of its enables."""
+    trap_flags: int
+    """Bits of INTCON1 that request a trap."""
+    do_start: int = -1
+    do_end: int = -1
+    """The DO loop that is active: its first and last instruction; -1: none."""
+
+
+@dataclass
+class Pending:
+    """What the instruction being translated will commit."""
+
+    w: dict[int, Number] = field(default_factory=dict)
+    flags: dict[str, Number] = field(default_factory=dict)
+    acc: dict[int, Number] = field(default_factory=dict)
+    registers: dict[str, Number] = field(default_factory=dict)
+    stores: list[Callable[[], None]] = field(default_factory=list)
+    initialises: int = 0
+    psv: list[Value] = field(default_factory=list)
+    """Truth values: the instruction read the PSV window."""
+    stop: bool = False
+    """The next boundary must look at interrupts."""
+    touches_sfr: bool = False
+    """An SFR that events may change, or that devices hear of, is accessed."""
+    sr: Number | None = None
+    mapped: int = 0
+    """W registers written through their data addresses: stall sources like any written register."""
+
+
+class NeedsInterpreter(Exception):
+    """This instruction is left to the interpreter in every case."""
+
+
+class LlvmBuilder:
+    """One per function; `begin` and `commit` frame each instruction."""
+
+    def __init__(self, emitter: Emitter, variables: Variables, around: Surroundings, context: Context) -> None:
+        self.e: Final = emitter
+        self.v: Final = variables
+        self.around: Final = around
+        self.context: Final = context
+        self.pc = 0
+        self.psv_cycles: int | None = 2
+        self.pending = Pending()
+        self.repeating: tuple[Number, Number] | None = None
+        self.dsp_region = False
+        """Some instruction of the function writes accumulator flags, so SR in the record may lack them."""
+        self._slow: str | None = None
+
+    # -- instruction frame ------------------------------------------------------------------------------------------
+    def begin(self, pc: int, psv_cycles: int | None) -> None:
+        """Start the instruction at `pc`; `psv_cycles` is what a PSV read adds to it (isa.md §13.3).
+
+        None: it is a REPEAT target, of which PSV reads are the interpreter's; `repeating` is (count, iterations left).
+        """
+        self.pc = pc
+        self.psv_cycles = psv_cycles
+        self.pending = Pending()
+        self._slow = None
+
+    def commit(self) -> None:
+        """All probes have been made: write registers, flags and memory."""
+        p = self.pending
+        for store in p.stores:
+            store()
+        for n, value in p.w.items():
+            self.v.set(f"W{n}", value)
+        if p.flags:
+            self.v.set_flags(p.flags)
+        for i, value in p.acc.items():
+            self.v.set(f"A{i}", value)
+        for name, value in p.registers.items():
+            self.e.store(pointer(self.e, self.around.offset[name]), value, 16)
+        unknown = p.initialises & ~self.around.initialised
+        if unknown:
+            place = pointer(self.e, self.around.offset["cpu.initialised"])
+            self.e.store(place, self.e.load(place, 16) | unknown, 16)
+        if p.sr is not None:
+            self._commit_sr(p.sr)
+
+    @property
+    def slow_label(self) -> str:
+        """Label of the slow exit, which is made on first use."""
+        if self._slow is None:
+            self._slow = self.e.fresh("slow")
+            current = self.e.block
+            self.e.start(self._slow)
+            if self.repeating is not None:
+                self._leave_repeat(*self.repeating)
+            self.v.leave(self.pc, INTERPRET)
+            self.e.block = current
+        return self._slow
+
+    def _leave_repeat(self, count: Number, left: Number) -> None:
+        """REPEAT state in the record, as the sequencer keeps it before an iteration with RCOUNT = `left`."""
+        e, offset = self.e, self.around.offset
+        phase = self.select(left == 0, LAST, self.select(left == count, FIRST, MIDDLE))
+        e.store(pointer(e, offset["RCOUNT"]), left, 16)
+        e.store(pointer(e, offset["cpu.repeat"]), phase, 16)
+        place = pointer(e, offset["SR"])
+        e.store(place, (e.load(place, 16) & (0xFFFF & ~RA)) | self.select(left == 0, 0, RA), 16)
+
+    def guard(self, ok: Number) -> None:
+        """Leave through the slow exit unless `ok`."""
+        if isinstance(ok, int):
+            if not ok:
+                raise NeedsInterpreter
+            return
+        label = self.e.fresh("ok")
+        self.e.end(f"br i1 {truth(ok)}, label %{label}, label %{self.slow_label}, !prof !0")
+        self.e.start(label)
+
+    # -- pure -------------------------------------------------------------------------------------------------------
+    def select(self, c: Number, a: Number, b: Number) -> Number:
+        """`a` if `c` else `b`."""
+        if isinstance(c, int):
+            return a if c else b
+        if isinstance(a, Value) and isinstance(b, Value) and a.bit and b.bit:
+            return self.e.let(f"select i1 {truth(c)}, i1 {a.text}, i1 {b.text}", bit=True)
+        return self.e.let(f"select i1 {truth(c)}, i64 {wide(a)}, i64 {wide(b)}")
+
+    def let(self, v: Number) -> Number:
+        """Names are free in SSA."""
+        return v
+
+    def div_trunc(self, a: Number, b: Number) -> Number:
+        """Quotient towards zero; 0 if b is 0."""
+        return self._divide("sdiv", a, b)
+
+    def rem_trunc(self, a: Number, b: Number) -> Number:
+        """Remainder with the sign of a; 0 if b is 0."""
+        return self._divide("srem", a, b)
+
+    def _divide(self, op: str, a: Number, b: Number) -> Number:
+        zero = self.e.let(f"icmp eq i64 {wide(b)}, 0", bit=True)
+        safe = self.select(zero, 1, b)
+        return self.select(zero, 0, self.e.let(f"{op} i64 {wide(a)}, {wide(safe)}"))
+
+    def clz16(self, v: Number) -> Number:
+        """Leading zeros of a 16-bit value; 16 for 0."""
+        return self._count("ctlz", v)
+
+    def ctz16(self, v: Number) -> Number:
+        """Trailing zeros of a 16-bit value; 16 for 0."""
+        return self._count("cttz", v)
+
+    def _count(self, which: str, v: Number) -> Value:
+        half = self.e.let(f"trunc i64 {wide(v)} to i16").text
+        count = self.e.let(f"call i16 @llvm.{which}.i16(i16 {half}, i1 false)").text
+        return self.e.let(f"zext i16 {count} to i64")
+
+    # -- working registers ------------------------------------------------------------------------------------------
+    def w(self, n: int) -> Number:
+        """Wn as data."""
+        return self.pending.w[n] if n in self.pending.w else self.v.get(f"W{n}")
+
+    def set_w(self, n: int, v: Number) -> None:
+        """Word write."""
+        self.pending.w[n] = v & (0xFFFE if n == STACK_POINTER else 0xFFFF)
+        self.pending.initialises |= 1 << n
+
+    def set_wb(self, n: int, v: Number) -> None:
+        """Byte write."""
+        self.pending.w[n] = (self.w(n) & 0xFF00) | (v & (0xFE if n == STACK_POINTER else 0xFF))
+
+    def ptr(self, n: int, side: Side) -> Number:
+        """Wn as address pointer; the reset of an uninitialised one is the interpreter's."""
+        if not (self.around.initialised | self.pending.initialises) >> n & 1:
+            flags = self.e.load(pointer(self.e, self.around.offset["cpu.initialised"]), 16)
+            self.guard((flags & (1 << n)) != 0)
+        return self.w(n)
+
+    def set_ptr(self, n: int, v: Number, side: Side) -> None:
+        """Pointer update."""
+        self.pending.w[n] = v & (0xFFFE if n == STACK_POINTER else 0xFFFF)
+        self.pending.initialises |= 1 << n
+
+    # -- data memory ------------------------------------------------------------------------------------------------
+    def load(self, ea: Number, size: Size, side: Side = "src", ptr: int | None = None) -> Number:
+        """Data read."""
+        if isinstance(ea, int):
+            return self._load_static(ea, size)
+        in_ram = self._in_ram(ea, size, ptr)
+        if not self.context.psv or ptr == STACK_POINTER or self.psv_cycles is None:
+            self.guard(in_ram)
+            return self.e.load(pointer(self.e, ea), 8 * size)
+        return self._load_ram_or_psv(ea, size, in_ram)
+
+    def _in_ram(self, ea: Value, size: int, ptr: int | None) -> Value:
+        """Aligned, in RAM and, for the stack pointer, not above SPLIM: one comparison plus one (design §4.3)."""
+        half = self.e.let(f"trunc i64 {wide(ea - RAM)} to i16").text
+        if size == 2:
+            half = self.e.let(f"call i16 @llvm.fshl.i16(i16 {half}, i16 {half}, i16 15)").text
+        span = (DATA_BYTES - RAM) // size
+        ok = self.e.let(f"icmp ult i16 {half}, {span}", bit=True)
+        if ptr == STACK_POINTER and self.around.limit_armed:
+            limit = self.e.load(pointer(self.e, self.around.offset["SPLIM"]), 16)
+            return ok & (ea <= limit)
+        return ok
+
+    def _load_ram_or_psv(self, ea: Value, size: int, in_ram: Value) -> Value:
+        e = self.e
+        ram, other, window, done = (e.fresh(s) for s in ("ram", "other", "psv", "done"))
+        e.end(f"br i1 {truth(in_ram)}, label %{ram}, label %{other}, !prof !0")
+        e.start(other)
+        fits = (ea & 0x8000) != 0
+        if size == 2:
+            fits = fits & ((ea & 1) == 0)
+        page = e.load(pointer(e, self.around.offset["PSVPAG"]), 16)
+        word = ((page << 15) | (ea & 0x7FFE)) >> 1
+        fits = fits & (word < self.around.flash_words)
+        e.end(f"br i1 {truth(fits)}, label %{window}, label %{self.slow_label}")
+        e.start(window)
+        code = e.load(pointer(e, (word << 2) + self.around.offset["flash"]), 32)
+        shifted = code >> ((ea & 1) << 3) if size == 1 else code
+        from_flash = wide(shifted & (0xFF if size == 1 else 0xFFFF))
+        e.end(f"br label %{done}")
+        e.start(ram)
+        from_ram = wide(e.load(pointer(e, ea), 8 * size))
+        e.end(f"br label %{done}")
+        e.start(done)
+        self.pending.psv.append(e.let(f"phi i1 [ true, %{window} ], [ false, %{ram} ]", bit=True))
+        return e.let(f"phi i64 [ {from_flash}, %{window} ], [ {from_ram}, %{ram} ]")
+
+    def _load_static(self, ea: int, size: Size) -> Number:
+        if size == 2 and ea & 1:
+            raise NeedsInterpreter
+        word_address = ea & ~1
+        if word_address < W_END:
+            word = self.w(word_address >> 1)
+            return word if size == 2 else (word >> 8 if ea & 1 else word & 0xFF)
+        if word_address == self.around.offset["SR"]:
+            value = self._sr_word()
+            return value if size == 2 else (value >> 8 if ea & 1 else value & 0xFF)
+        self.pending.touches_sfr |= self.around.offset["SR"] < word_address < RAM
+        if word_address == self.around.offset["RCOUNT"] and self.repeating is not None and size == 2:
+            return self.repeating[1]
+        if word_address < RAM and (self.around.reads.get(word_address) != "plain" or self.repeating is not None):
+            raise NeedsInterpreter
+        if ea >= DATA_BYTES:
+            raise NeedsInterpreter
+        return self.e.load(pointer(self.e, ea), 8 * size)
+
+    def store(self, ea: Number, v: Number, size: Size, ptr: int | None = None) -> None:
+        """Data write."""
+        if isinstance(ea, int):
+            self._store_static(ea, v, size)
+            return
+        self.guard(self._in_ram(ea, size, ptr))
+        target = ea
+
+        def now() -> None:
+            self.e.store(pointer(self.e, target), v, 8 * size)
+
+        self.pending.stores.append(now)
+
+    def _store_static(self, ea: int, v: Number, size: Size) -> None:
+        if (size == 2 and ea & 1) or ea >= DATA_BYTES:
+            raise NeedsInterpreter
+        word_address = ea & ~1
+        if word_address < W_END:
+            self._store_w(word_address >> 1, ea & 1, v, size)
+            return
+        if word_address >= RAM:
+            self.pending.stores.append(lambda: self.e.store(pointer(self.e, ea), v, 8 * size))
+            return
+        self.pending.touches_sfr = True
+        how, mask = self.around.writes.get(word_address, ("slow", 0))
+        if how == "slow" or self.repeating is not None:
+            raise NeedsInterpreter
+        lanes = 0xFFFF if size == 2 else (0xFF00 if ea & 1 else 0x00FF)
+        placed = v << 8 if lanes == 0xFF00 else v
+        if how == "sr":
+            old = self._sr_word()
+            nstdis = self.e.load(pointer(self.e, self.around.offset["INTCON1"]), 16) & NSTDIS
+            self.guard(((old & (SA | SB | SAB)) | nstdis) == 0)
+            free = mask & lanes
+            self.pending.sr = (old & (0xFFFF & ~free)) | (placed & free)
+            self.pending.stop = True
+            return
+        if how == "flags":
+            old = self.e.load(pointer(self.e, word_address), 16)
+            self.guard((placed & (mask & lanes) & (old ^ 0xFFFF)) == 0)
+        if how in ("irq", "flags"):
+            self.pending.stop = True
+        self.pending.stores.append(lambda: self._store_masked(word_address, placed, mask & lanes))
+
+    def _store_masked(self, address: int, v: Number, free: int) -> None:
+        place = pointer(self.e, address)
+        old = self.e.load(place, 16)
+        self.e.store(place, (old & (0xFFFF & ~free)) | (v & free), 16)
+
+    def _store_w(self, n: int, odd: int, v: Number, size: Size) -> None:
+        """The data write to a memory-mapped register wins over a pointer update (isa.md §2.2)."""
+
+        def now() -> None:
+            keep = 0xFFFE if n == STACK_POINTER else 0xFFFF
+            if size == 2:
+                self.pending.w[n] = v & keep
+            elif odd:
+                self.pending.w[n] = (self.w(n) & 0x00FF) | ((v & 0xFF) << 8)
+            else:
+                self.pending.w[n] = (self.w(n) & 0xFF00) | (v & 0xFF & keep)
+
+        self.pending.stores.append(now)
+        self.pending.mapped |= 1 << n
+        if size == 2:
+            self.pending.initialises |= 1 << n
+
+    def xload(self, ea: Number, ptr: int) -> Number:
+        """MAC X prefetch: 0 from Y RAM; PSV prefetches are the interpreter's."""
+        assert isinstance(ea, Value)
+        self.guard(self._in_ram(ea, 2, None))
+        return self.select(ea < Y_RAM, self.e.load(pointer(self.e, ea), 16), 0)
+
+    def yload(self, ea: Number, ptr: int) -> Number:
+        """MAC Y prefetch: 0 from outside Y RAM."""
+        assert isinstance(ea, Value)
+        self.guard(self._in_ram(ea, 2, None))
+        return self.select(ea >= Y_RAM, self.e.load(pointer(self.e, ea), 16), 0)
+
+    # -- program memory ---------------------------------------------------------------------------------------------
+    def prog(self, address: Number) -> Number:
+        """Table read from flash; everything else is the interpreter's."""
+        word = address >> 1
+        self.guard(word < self.around.flash_words)
+        return self.e.load(pointer(self.e, (word << 2) + self.around.offset["flash"]), 32)
+
+    def table_write(self, address: Number, byte_mask: Number, v: Number) -> None:
+        """Programming latches: always the interpreter's."""
+        raise NeedsInterpreter
+
+    # -- status, core registers -------------------------------------------------------------------------------------
+    def flag(self, name: str) -> Number:
+        """An SR bit."""
+        return self.pending.flags[name] if name in self.pending.flags else self.v.get(name)
+
+    def set_flags(self, **flags: Number) -> None:
+        """Change SR bits."""
+        self.pending.flags.update(flags)
+
+    def _sr_word(self) -> Value:
+        """SR as an instruction reads it: flags from the variables, the rest from the record."""
+        if self.dsp_region or self.repeating is not None:
+            raise NeedsInterpreter
+        word: Number = self.e.load(pointer(self.e, self.around.offset["SR"]), 16)
+        ordinary = ("C", "Z", "OV", "N", "DC")
+        word = word & (0xFFFF & ~sum(1 << FLAGS[name] for name in ordinary))
+        for name in ordinary:
+            bit = self.v.get(name)
+            word = word | (bit << FLAGS[name])
+        assert isinstance(word, Value)
+        return word
+
+    def _commit_sr(self, word: Number) -> None:
+        self.e.store(pointer(self.e, self.around.offset["SR"]), word, 16)
+        self.v.set_flags({name: (word & (1 << FLAGS[name])) != 0 for name in ("C", "Z", "OV", "N", "DC")})
+
+    def reg(self, name: str) -> Number:
+        """A core register."""
+        if name == "RCOUNT" and self.repeating is not None:
+            return self.repeating[1]
+        if name in self.pending.registers:
+            return self.pending.registers[name]
+        return self.e.load(pointer(self.e, self.around.offset[name]), 16)
+
+    def set_reg(self, name: str, v: Number) -> None:
+        """Write a core register."""
+        self.pending.registers[name] = v
+
+    def acc(self, i: int) -> Number:
+        """An accumulator."""
+        return self.pending.acc[i] if i in self.pending.acc else self.v.get(f"A{i}")
+
+    def set_acc(self, i: int, v: Number) -> None:
+        """Write an accumulator."""
+        self.pending.acc[i] = v
+
+    def when(self, c: Number, fn: Callable[[], None]) -> None:
+        """Conditional effects: only constant conditions are native."""
+        if not isinstance(c, int):
+            raise NeedsInterpreter
+        if c:
+            fn()
+
+    def trap_math(self, c: Number) -> None:
+        """A math trap is the interpreter's."""
+        self.guard(c == 0)

@@ -1,0 +1,80 @@
+"""Machine code kept between runs: one file per translated piece, named by the hash of all that went into it.
+
+A file is a checksum followed by an object file. Several processes may share the folder: files appear by atomic
+rename, and one that is short, damaged or foreign counts as absent. Objects contain no absolute address (the record
+and the table of callbacks are arguments), so they can be loaded by any later process on the same kind of CPU.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+CHECKSUM_BYTES: Final = 32
+
+
+def folder() -> Path:
+    """Where objects are kept: `$OPENSWARM_CACHE`, else the user's cache folder (XDG Base Directory)."""
+    own = os.environ.get("OPENSWARM_CACHE")
+    if own:
+        return Path(own) / "jit"
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "openswarm" / "jit"
+
+
+@cache
+def sources_hash() -> bytes:
+    """Hash of every module whose text decides what is generated: table, translator, device descriptions."""
+    root = Path(__file__).resolve().parents[2]
+    digest = hashlib.sha256()
+    for part in ("dspic30f", "peripherals", "chips"):
+        for path in sorted((root / part).rglob("*.py")):
+            digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    for name in ("record.py", "events.py", "bus.py", "device.py"):
+        digest.update((root / name).read_bytes())
+    return digest.digest()
+
+
+class ObjectCache:
+    """Objects on disk by key. A folder that cannot be written only costs speed: objects are then not kept."""
+
+    def __init__(self, where: Path | None = None) -> None:
+        self.where: Final = where if where is not None else folder()
+        self.hits = 0
+        self.stores = 0
+
+    def key(self, *parts: bytes) -> str:
+        """Name of the object that the given inputs lead to."""
+        digest = hashlib.sha256(sources_hash())
+        for part in parts:
+            digest.update(len(part).to_bytes(4, "little") + part)
+        return digest.hexdigest()
+
+    def get(self, key: str) -> bytes | None:
+        """The object kept under `key`, or None when there is none that is whole."""
+        try:
+            blob = (self.where / key[:2] / key).read_bytes()
+        except OSError:
+            return None
+        checksum, code = blob[:CHECKSUM_BYTES], blob[CHECKSUM_BYTES:]
+        if hashlib.sha256(code).digest() != checksum:
+            return None
+        self.hits += 1
+        return code
+
+    def put(self, key: str, code: bytes) -> None:
+        """Keep `code` under `key`; readers see all of it or nothing."""
+        try:
+            parent = self.where / key[:2]
+            parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=parent)
+            with os.fdopen(handle, "wb") as file:
+                file.write(hashlib.sha256(code).digest() + code)
+            os.replace(name, parent / key)
+        except OSError:
+            return
+        self.stores += 1

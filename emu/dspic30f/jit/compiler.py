@@ -1,0 +1,185 @@
+"""From IR text to callable code: disk cache, compile process, loading.
+
+`request` never waits: cached objects are ready at once, others come back from the compile process and are collected
+by `poll`. `now` compiles at once, in this process, for the few pieces the engine cannot start without.
+"""
+
+from __future__ import annotations
+
+import os
+import selectors
+import struct
+import subprocess
+import sys
+from dataclasses import dataclass
+from typing import Any, Final
+
+from emu.dspic30f.jit.cache import ObjectCache
+from emu.dspic30f.jit.worker import REFUSED, REPLY, REQUEST, Backend
+
+
+@dataclass(slots=True)
+class Statistics:
+    """What translation cost so far."""
+
+    requested: int = 0
+    compiled: int = 0
+    from_disk: int = 0
+    loaded: int = 0
+
+
+class Refused(RuntimeError):
+    """LLVM did not accept generated IR: a defect of the translator."""
+
+
+class Compiler:
+    """Objects by name. Every module exports one function, called `entry`."""
+
+    def __init__(self, cache: ObjectCache | None = None) -> None:
+        self.cache: Final = cache if cache is not None else ObjectCache()
+        self.statistics: Final = Statistics()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._selector = selectors.DefaultSelector()
+        self._received = bytearray()
+        self._waiting: dict[int, tuple[str, object]] = {}
+        self._tickets = 0
+        self._loader: Any = None
+        self._modules = 0
+        self._ready: list[tuple[object, int]] = []
+        self._keep: dict[int, Any] = {}
+        self._backend: Backend | None = None
+        self._host = b""
+
+    def _host_name(self) -> bytes:
+        if not self._host:
+            import llvmlite
+            import llvmlite.binding as llvm
+
+            name = f"{llvmlite.__version__} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+            self._host = name.encode()
+        return self._host
+
+    def key(self, level: int, *identity: bytes) -> str:
+        """Name of the object for a piece of code identified by what it is made from (not by its IR text)."""
+        return self.cache.key(self._host_name(), bytes([level]), *identity)
+
+    def from_disk(self, key: str) -> int | None:
+        """Address of the cached code for `key`, or None."""
+        code = self.cache.get(key)
+        if code is None:
+            return None
+        self.statistics.from_disk += 1
+        return self.load(code)
+
+    def now(self, text: str, level: int, key: str) -> int:
+        """Compile `text` in this process and return its address."""
+        address = self.from_disk(key)
+        if address is not None:
+            return address
+        if self._backend is None:
+            self._backend = Backend()
+        code = self._backend.compile(text, level)
+        self.statistics.compiled += 1
+        self.cache.put(key, code)
+        return self.load(code)
+
+    def request(self, text: str, level: int, key: str, tag: object) -> None:
+        """Have `text` compiled in the background; `poll` will yield (tag, address)."""
+        self.statistics.requested += 1
+        process = self._start()
+        self._tickets += 1
+        self._waiting[self._tickets] = (key, tag)
+        data = text.encode()
+        assert process.stdin is not None
+        process.stdin.write(REQUEST.pack(self._tickets, level, len(data)) + data)
+        process.stdin.flush()
+
+    def poll(self) -> list[tuple[object, int]]:
+        """Code that has arrived since the last call, loaded. Raises Refused on a translator defect."""
+        if not self._waiting:
+            return []
+        while self._selector.select(0):
+            assert self._process is not None and self._process.stdout is not None
+            data = os.read(self._process.stdout.fileno(), 1 << 20)
+            if not data:
+                raise RuntimeError("the compile process ended unexpectedly")
+            self._received += data
+            if len(data) < 1 << 16:
+                break
+        while self._take():
+            pass
+        ready, self._ready = self._ready, []
+        return ready
+
+    def wait(self) -> list[tuple[object, int]]:
+        """Block until nothing is being compiled any more (benchmarks and tests)."""
+        ready: list[tuple[object, int]] = []
+        while self._waiting:
+            self._selector.select(1.0)
+            ready += self.poll()
+        return ready
+
+    @property
+    def busy(self) -> int:
+        """Number of pieces under way in the compile process."""
+        return len(self._waiting)
+
+    def load(self, code: bytes) -> int:
+        """Address of `entry` in an object file."""
+        import llvmlite.binding as llvm
+
+        if self._loader is None:
+            llvm.initialize_native_target()
+            llvm.initialize_native_asmprinter()
+            self._loader = llvm.create_lljit_compiler()
+        self._modules += 1
+        library = llvm.JITLibraryBuilder().add_object_img(code).export_symbol("entry").link(
+            self._loader, f"m{self._modules}")
+        address = int(library["entry"])
+        self._keep[address] = library
+        self.statistics.loaded += 1
+        return address
+
+    def unload(self, address: int) -> None:
+        """Give the memory of a piece of code back (its flash words were rewritten)."""
+        del self._keep[address]
+
+    def close(self) -> None:
+        """End the compile process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+            self._waiting.clear()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "emu.dspic30f.jit.worker"],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+            assert self._process.stdout is not None
+            self._selector.register(self._process.stdout, selectors.EVENT_READ)
+        return self._process
+
+    def _take(self) -> bool:
+        received = self._received
+        if len(received) < REPLY.size:
+            return False
+        ticket, length = REPLY.unpack_from(received)
+        if length == REFUSED:
+            if len(received) < REPLY.size + 4:
+                return False
+            (size,) = struct.unpack_from("<I", received, REPLY.size)
+            if len(received) < REPLY.size + 4 + size:
+                return False
+            raise Refused(bytes(received[REPLY.size + 4 : REPLY.size + 4 + size]).decode())
+        end = REPLY.size + length
+        if len(received) < end:
+            return False
+        code = bytes(received[REPLY.size : end])
+        del received[:end]
+        key, tag = self._waiting.pop(ticket)
+        self.statistics.compiled += 1
+        self.cache.put(key, code)
+        self._ready.append((tag, self.load(code)))
+        return True

@@ -1,0 +1,253 @@
+"""The native engine: translated regions, found by PC and processor modes, run between two boundaries.
+
+Python only sees what native code hands back: instructions with side effects, events, and addresses that have no code
+yet. Code arrives from the disk cache at once or from the compile process later; until then `cold` runs.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, Protocol
+
+from emu.bus import SFR_END
+from emu.dspic30f.core import Core
+from emu.dspic30f.interp import context_of
+from emu.dspic30f.isa.builder import Context
+from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, W_END, Access, Surroundings
+from emu.dspic30f.jit.compiler import Compiler
+from emu.dspic30f.jit.region import discover
+from emu.dspic30f.jit.runtime import BLOCKS, ENV_WORDS, LIMIT, STEPS, dispatch_text
+from emu.dspic30f.jit.translate import Translator
+from emu.dspic30f.state import DA, NOT_REPEATING, RA
+
+BLOCK_LEVEL, STEP_LEVEL = 2, 0
+"""LLVM effort for blocks and for single-step code."""
+
+COLD_CYCLES: Final = 1000
+"""Longest cold run before native code is looked for again, in Tcy."""
+
+Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
+
+
+class Cold(Protocol):
+    """What runs where no native code exists."""
+
+    def run(self, limit: int) -> None:
+        """As `Engine.run`."""
+
+    def forget(self) -> None:
+        """As `Engine.forget`."""
+
+
+@dataclass
+class Code:
+    """Native code for one set of processor modes: tables of addresses by program word, and what they came from."""
+
+    context: Context
+    around: Surroundings
+    blocks: Any
+    steps: Any
+    regions: dict[int, set[int]] = field(default_factory=dict)
+    """Start of each requested region to the program words it was made from."""
+    heat: dict[int, int] = field(default_factory=dict)
+    """How often an address without code was reached."""
+
+
+@dataclass
+class Counts:
+    """How often native code came back, and why (`emu run --stats`)."""
+
+    runs: int = 0
+    interpreted: int = 0
+    cold: int = 0
+    regions: int = 0
+
+
+class JitEngine:
+    """`Engine` that runs native code for addresses reached `threshold` times; `wait`: not before it is compiled."""
+
+    name = "jit"
+
+    def __init__(
+        self, core: Core, pc_hooks: Mapping[int, Any], cold: Cold, *, threshold: int = 4, wait: bool = False
+    ) -> None:
+        self._core: Final = core
+        self._hooks: Final = pc_hooks
+        self._cold: Final = cold
+        self._wait: Final = wait
+        self._threshold: Final = threshold
+        self._state: Final = core.state
+        self._u16: Final = core.record.u16
+        self._words: Final = core.chip.program["flash"].end // 2
+        self._compiler: Final = Compiler()
+        self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
+        self._env_address: Final = ctypes.addressof(self._env)
+        self._codes: Final[dict[object, Code]] = {}
+        self._code: Code | None = None
+        self._key: object = None
+        self._dispatch: Any = None
+        self._at: Final = {name: core.state.at[name] for name in ("CORCON", "MODCON", "XBREV", "INTCON1", "SR")}
+        self.counts: Final = Counts()
+        core.program.changed.append(self._flash_changed)
+
+    # -- the engine -------------------------------------------------------------------------------------------------
+    def run(self, limit: int) -> None:
+        """At least one instruction, natively where possible."""
+        state = self._state
+        sequencer = self._core.sequencer
+        if state.repeat != NOT_REPEATING or state.sr & RA or state.edt:
+            sequencer.execute()
+            return
+        self._select()
+        if self._dispatch is None:
+            self._prepare()
+        self._env[LIMIT] = limit
+        why = self._dispatch(self._core.record.address, self._env_address)
+        self.counts.runs += 1
+        if why == INTERPRET:
+            self.counts.interpreted += 1
+            sequencer.execute()
+        elif why in (MISS, DEADLINE):
+            self._miss(limit)
+
+    def forget(self) -> None:
+        """Hooked addresses must come back to Python: translate anew around them."""
+        self._codes.clear()
+        self._key = None
+        self._cold.forget()
+
+    def _miss(self, limit: int) -> None:
+        """No code at PC: ask for some, meanwhile run cold."""
+        pc = self._state.pc
+        code = self._code
+        assert code is not None
+        for tag, address in self._compiler.poll():
+            self._install(tag, address)
+        heat = code.heat.get(pc, 0) + 1
+        code.heat[pc] = heat
+        if heat >= self._threshold and pc not in code.regions and pc >> 1 < self._words and pc not in self._hooks:
+            self._request(code, pc)
+            if self._wait:
+                for tag, address in self._compiler.wait():
+                    self._install(tag, address)
+            if code.steps[pc >> 1]:
+                return
+        self.counts.cold += 1
+        self._cold.run(min(limit, self._state.cycle + COLD_CYCLES))
+
+    # -- modes ------------------------------------------------------------------------------------------------------
+    def _select(self) -> None:
+        """Make the tables of the present processor modes current."""
+        u16, at, state = self._u16, self._at, self._state
+        loop = (state.pair("DOSTARTL"), state.pair("DOENDL")) if u16[at["SR"]] & DA else None
+        key = (u16[at["CORCON"]] & ~0x0F08, u16[at["MODCON"]], u16[at["XBREV"]] & 0x8000,
+               u16[at["INTCON1"]] & 0x700, state.limit_armed, state.initialised, loop)
+        if key == self._key:
+            return
+        self._key = key
+        code = self._codes.get(key)
+        if code is None:
+            context = context_of(u16[at["CORCON"]], u16[at["MODCON"]], u16[at["XBREV"]] >> 15,
+                                 u16[at["INTCON1"]] & 0x700)
+            code = self._codes[key] = self._new_code(context, loop)
+        self._code = code
+        self._env[BLOCKS] = ctypes.addressof(code.blocks)
+        self._env[STEPS] = ctypes.addressof(code.steps)
+
+    def _new_code(self, context: Context, loop: tuple[int, int] | None) -> Code:
+        core, chip = self._core, self._core.chip
+        offset = {name: sfr.address for name, sfr in chip.sfrs.items()}
+        offset |= {name: reserved.offset for name, reserved in core.record.fields.items()}
+        for number, name in enumerate(("W0S", "W1S", "W2S", "W3S", "SRS")):
+            offset[name] = offset["cpu.shadow"] + 2 * number
+        offset["flash"] = core.program.flash_offset
+        words: dict[int, int] = {}
+        for source in chip.interrupts.values():
+            words[chip.sfrs[source.flag[0]].address] = chip.sfrs[source.enable[0]].address
+        reads, writes = access_kinds(core)
+        start, end = loop if loop is not None else (-1, -1)
+        around = Surroundings(offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
+                              self._words, tuple(sorted(words.items())), core.traps.flags, start, end)
+        table = ctypes.c_uint64 * self._words
+        return Code(context, around, table(), table())
+
+    # -- translation ------------------------------------------------------------------------------------------------
+    def _prepare(self) -> None:
+        text = dispatch_text(self._core.record.fields["cpu.pc"].offset, 2 * self._words)
+        address = self._compiler.now(text, BLOCK_LEVEL, self._compiler.key(BLOCK_LEVEL, text.encode()))
+        self._dispatch = Call(address)
+
+    def _fetch(self, pc: int) -> Insn | None:
+        """Decoded instruction for the translator; none where Python must see the program counter."""
+        if pc >> 1 >= self._words or pc in self._hooks:
+            return None
+        flash = self._core.program.flash
+        second = flash[(pc >> 1) + 1] if (pc >> 1) + 1 < self._words else 0
+        return decode_for_execution(flash[pc >> 1], second)
+
+    def _request(self, code: Code, pc: int) -> None:
+        """Get native code for the region at `pc`, from disk or from the compile process."""
+        region = discover(pc, self._fetch)
+        code.regions[pc] = set()
+        if not region.steps:
+            return
+        code.regions[pc] = {word for at, step in region.steps.items() for word in (at >> 1, (at >> 1) + 1)}
+        self.counts.regions += 1
+        identity = (region.words(), pc, code.context, sorted(code.around.offset.items()),
+                    sorted(code.around.reads.items()), sorted(code.around.writes.items()), code.around.initialised,
+                    code.around.limit_armed, code.around.do_start, code.around.do_end)
+        name = repr(identity).encode()
+        for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
+            translator = Translator(region, code.around, code.context, exact)
+            key = self._compiler.key(level, b"exact" if exact else b"block", name)
+            text = translator.text()
+            tag = (code, translator.entries, exact)
+            address = self._compiler.from_disk(key)
+            if address is not None:
+                self._install(tag, address)
+            else:
+                self._compiler.request(text, level, key, tag)
+
+    def _install(self, tag: Any, address: int) -> None:
+        code, entries, exact = tag
+        table = code.steps if exact else code.blocks
+        for pc in entries:
+            if not table[pc >> 1]:
+                table[pc >> 1] = address
+
+    def _flash_changed(self, start: int, end: int) -> None:
+        """Program words in [start, end) are new: whatever was made from the old ones is stale."""
+        self._codes.clear()
+        self._key = None
+
+    def close(self) -> None:
+        """End the compile process."""
+        self._compiler.close()
+
+
+def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access, int]]]:
+    """How native code may touch each SFR, from what stands behind it on the bus."""
+    bus, sfrs = core.bus, core.chip.sfrs
+    sources = core.chip.interrupts.values()
+    special: dict[int, Access] = {}
+    if not core.exceptions.ipl_slip:
+        special |= {sfrs[name].address: "irq" for s in sources for name in (s.enable[0], s.priority[0])}
+        special |= {sfrs[source.flag[0]].address: "flags" for source in sources}
+        special[sfrs["SR"].address] = "sr"
+    if core.state.limit_armed:
+        special[sfrs["SPLIM"].address] = "plain"
+    reads: dict[int, Access] = {}
+    writes: dict[int, tuple[Access, int]] = {}
+    for address in range(W_END, SFR_END, 2):
+        word = address >> 1
+        if bus.modelled[word] and bus.on_read[word] is None and bus.compute[word] is None:
+            reads[address] = "plain"
+        if address in special:
+            writes[address] = (special[address], bus.writable[word])
+        elif bus.modelled[word] and bus.on_write[word] is None and not bus.clear_only[word]:
+            writes[address] = ("plain", bus.writable[word])
+    return reads, writes

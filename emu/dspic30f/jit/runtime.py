@@ -1,0 +1,69 @@
+"""The native loop around translated code: from PC to code and back, until Python is needed.
+
+`ENV` is what native code needs that is not machine state, as 64-bit words: it never enters the record or an object.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT
+
+LIMIT, BLOCKS, STEPS, HOPS = range(4)
+"""Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single steps; hops."""
+ENV_WORDS: Final = 8
+
+DISPATCH: Final = """
+define i64 @entry(ptr noalias %rec, ptr %env) {{
+first:
+  %pc_place = getelementptr i8, ptr %rec, i64 {pc}
+  %blocks_place = getelementptr i64, ptr %env, i64 {blocks}
+  %steps_place = getelementptr i64, ptr %env, i64 {steps}
+  %blocks = load ptr, ptr %blocks_place
+  %steps = load ptr, ptr %steps_place
+  br label %loop
+loop:
+  %pc = load i32, ptr %pc_place
+  %known = icmp ult i32 %pc, {flash_end}
+  br i1 %known, label %look, label %miss, !prof !0
+look:
+  %half = lshr i32 %pc, 1
+  %word = zext i32 %half to i64
+  %place = getelementptr ptr, ptr %blocks, i64 %word
+  %code = load ptr, ptr %place
+  %none = icmp eq ptr %code, null
+  br i1 %none, label %single, label %call
+call:
+  %why = call i64 %code(ptr %rec, ptr %env)
+  switch i64 %why, label %back [ i64 {next}, label %loop
+                                 i64 {deadline}, label %again ]
+again:
+  %pc2 = load i32, ptr %pc_place
+  %half2 = lshr i32 %pc2, 1
+  %word2 = zext i32 %half2 to i64
+  br label %single
+single:
+  %at = phi i64 [ %word, %look ], [ %word2, %again ]
+  %place2 = getelementptr ptr, ptr %steps, i64 %at
+  %code2 = load ptr, ptr %place2
+  %none2 = icmp eq ptr %code2, null
+  br i1 %none2, label %miss, label %step
+step:
+  %why2 = call i64 %code2(ptr %rec, ptr %env)
+  %on = icmp eq i64 %why2, {next}
+  br i1 %on, label %loop, label %back2
+back:
+  ret i64 %why
+back2:
+  ret i64 %why2
+miss:
+  ret i64 {miss}
+}}
+!0 = !{{!"branch_weights", i32 2000, i32 1}}
+"""
+
+
+def dispatch_text(pc_offset: int, flash_end: int) -> str:
+    """The dispatch loop for records whose PC is at `pc_offset`, with flash up to `flash_end` (PC units)."""
+    return DISPATCH.format(pc=pc_offset, flash_end=flash_end, blocks=BLOCKS, steps=STEPS,
+                           next=NEXT, deadline=DEADLINE, miss=MISS)
