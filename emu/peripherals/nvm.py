@@ -28,6 +28,8 @@ ERASE_WORD, ERASE_ROW, ERASE_ALL = 0x44, 0x45, 0x46
 PROGRAM_WORD, PROGRAM_ROW = 0x04, 0x05
 WRITE_CONFIG: Final = 0x08
 """PROGOP codes (§16)."""
+_ERASING: Final = 0x40
+"""Set in the codes that erase."""
 _FLASH: Final = (ERASE_FLASH_ROW, PROGRAM_FLASH_ROW)
 _EEPROM: Final = (ERASE_WORD, ERASE_ROW, ERASE_ALL, PROGRAM_WORD, PROGRAM_ROW)
 
@@ -59,24 +61,21 @@ class Nvm(Peripheral):
         return False
 
     def reset(self, power_on: bool) -> None:
-        """NVMCON was reset; the latches are empty."""
-        self._stage.value = 0
+        """NVMCON was reset; an operation that was under way is cut off and WRERR tells (§16)."""
+        if self._operation.value and not power_on:
+            if not self._operation.value & _ERASING:
+                self._operation.value = 0
+            else:
+                self._apply()  # a row erased half way reads as erased
+            self.con["WRERR"] = 1
         self._operation.value = 0
+        self._stage.value = 0
         self.kit.program.clear_latches()
 
     @property
     def is_busy(self) -> bool:
         """An operation is under way."""
         return bool(self.con["WR"])
-
-    def interrupted(self) -> None:
-        """A reset cuts an operation off: WRERR tells (§16). Call after the registers were reset."""
-        if self._operation.value:
-            if self._operation.value in (PROGRAM_FLASH_ROW, PROGRAM_WORD, PROGRAM_ROW):
-                self._operation.value = 0
-            else:
-                self._apply()
-            self.con["WRERR"] = 1
 
     def _table_written(self, address: int) -> None:
         """A table write captures its address (§16)."""
@@ -131,7 +130,7 @@ class Nvm(Peripheral):
             self._apply_eeprom(operation, address)
         elif address in self.kit.chip.program["config"]:
             self.kit.program.put(address & ~1, self._data[address >> 1 & EEPROM_LATCHES - 1])
-        if operation & 0x40 == 0:
+        if not operation & _ERASING:
             self.kit.program.clear_latches()
 
     def _apply_flash(self, operation: int, row: int) -> None:

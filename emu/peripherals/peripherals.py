@@ -83,7 +83,6 @@ class Peripherals:
             self.oscillator.con.value = osccon
         for device in self.all:
             device.power_up(power_on=cause == "POR")
-        self.nvm.interrupted()
 
     def sleep(self, mode: int, cycle: int) -> None:
         """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""

@@ -274,7 +274,7 @@ class Uart(Peripheral):
         sampled = wave if not bit_q8 else self._sample(wave, length, detected - start, tick, bit_q8)
         self._incoming.value = self._judge(sampled, stop)
         self._done.value = detected + (16 * stop + 8) * tick  # the middle of the first stop bit (§10.2)
-        self._rx_wave.value = wave
+        self._rx_wave.value = (wave | 0xFFFF << length) & 0xFFFF  # behind the frame the line is high
         self._rx_start.value = start
         self._receiving.value = _COMING
         if start > self.now:
@@ -357,7 +357,7 @@ class Uart(Peripheral):
         wave = self._rx_wave.value
         if self.on_edge is not None:
             self.on_edge(due, wave >> bit & 1)
-        for index in range(bit + 1, 12):
+        for index in range(bit + 1, 16):
             if wave >> index & 1 != wave >> bit & 1:
                 self._edge_bit.value = index
                 self.events.set(self._edge_event, self._rx_start.value + index * self.bit_time)

@@ -1,0 +1,78 @@
+"""A rig to run devices without a CPU: register accesses at chosen cycles on a real bus and clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from emu.bus import Bus
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.events import Events
+from emu.peripherals import Peripherals, Wires, build
+from emu.program import ProgramMemory
+from emu.record import Record
+
+XT_PLL8 = 0xFFE6
+"""FOSC of the e-puck (§2): Fcy = 14.7456 MHz."""
+
+
+class Rig:
+    """Time only moves by `at`; everything else happens in the current cycle."""
+
+    def __init__(self, fosc: int = XT_PLL8, fwdt: int = 0x7FFF) -> None:
+        self.record = Record()
+        self.events = Events(self.record)
+        self.bus = Bus(self.record, self.events)
+        self.program = ProgramMemory(self.record, DSPIC30F6014A)
+        self.program.config[0] = fosc
+        self.program.config[1] = fwdt
+        self.wires = Wires()
+        self.dev: Peripherals = build(DSPIC30F6014A, self.bus, self.program, self.wires)
+        self.dev.reset("POR")
+
+    def at(self, cycle: int) -> Rig:
+        """Make `cycle` the cycle of the next access."""
+        assert cycle >= self.events.now
+        self.events.arrive(cycle)
+        self.events.settle(cycle)
+        return self
+
+    def address(self, name: str) -> int:
+        return DSPIC30F6014A.sfrs[name].address
+
+    def read(self, name: str) -> int:
+        return self.bus.read(self.address(name))
+
+    def peek(self, name: str) -> int:
+        return self.bus.peek(self.address(name))
+
+    def write(self, name: str, value: int, lanes: int = 0xFFFF) -> None:
+        self.bus.write(self.address(name), value, lanes)
+
+    def field(self, register: str, name: str) -> int:
+        lsb, width = DSPIC30F6014A.sfrs[register].fields[name]
+        return self.peek(register) >> lsb & (1 << width) - 1
+
+    def flag(self, source: str) -> int:
+        """Interrupt flag by its name, for example "T1IF"."""
+        return next(
+            self.field(word, source) for word in ("IFS0", "IFS1", "IFS2") if source in DSPIC30F6014A.sfrs[word].fields
+        )
+
+    def clear_flags(self) -> None:
+        for word in ("IFS0", "IFS1", "IFS2"):
+            self.write(word, 0)
+
+    def first_cycle(self, condition: Callable[[], object], start: int, end: int) -> int:
+        """First cycle in start..end in which `condition()` holds."""
+        for cycle in range(start, end + 1):
+            self.at(cycle)
+            if condition():
+                return cycle
+        raise AssertionError(f"never true in cycles {start}..{end}")
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()

@@ -1,0 +1,144 @@
+"""Ports, change notification and external interrupts (dspic30f6014a.md §6, §5.5)."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu.peripherals.pins import parse_pin
+
+
+def test_output_pin_follows_the_latch_in_the_next_cycle(rig):
+    """§18: output pins change in the cycle behind the write."""
+    changes = []
+    rig.dev.pins.watch("RD5", lambda cycle, changed, levels: changes.append((cycle, changed, levels & changed)))
+    rig.at(10).write("TRISD", 0xFFDF)
+    rig.at(20).write("LATD", 0x20)
+    assert changes == [(21, 0x20, 0x20)]
+
+
+def test_port_read_right_behind_a_latch_write_sees_the_old_pin(rig):
+    """§6: insert one NOP."""
+    rig.write("TRISD", 0)
+    rig.at(20).write("LATD", 0x20)
+    assert rig.at(21).read("PORTD") == 0
+    assert rig.at(22).read("PORTD") == 0x20
+    assert rig.read("LATD") == 0x20
+
+
+def test_port_write_goes_to_the_latch_and_reads_come_from_the_pins(rig):
+    """§6: input pins read what the outside applies."""
+    rig.write("PORTF", 0x0AA)
+    assert rig.read("LATF") == 0x0AA
+    rig.dev.pins.set("RF1", 1)
+    rig.dev.pins.set("RF8", 1)
+    assert rig.at(5).read("PORTF") == 0x102
+
+
+def test_byte_write_to_a_port_keeps_the_other_half_of_the_latch(rig):
+    """§18."""
+    rig.write("LATD", 0x1234)
+    rig.write("PORTD", 0xAB00, lanes=0xFF00)
+    assert rig.read("LATD") == 0xAB34
+
+
+def test_read_modify_write_on_the_port_copies_pins_to_latches(rig):
+    """§6: the well-known hazard: LATD bit 0 was 1 on an input pin that is low."""
+    rig.write("LATD", 0x0001)
+    rig.at(5).write("PORTD", rig.read("PORTD") | 0x0100)
+    assert rig.read("LATD") == 0x0100
+
+
+def test_unimplemented_port_bits_read_0(rig):
+    """§6: port C has bits 1-4 and 13-15."""
+    rig.dev.pins.set_port(2, 0xFFFF, 0xFFFF)
+    assert rig.at(3).read("TRISC") == 0xE01E
+    rig.write("LATC", 0xFFFF)
+    assert rig.read("LATC") == 0xE01E
+
+
+@pytest.mark.parametrize("name", ["RD16", "RH1", "D3", "RA"])
+def test_bad_pin_names_are_refused(name):
+    """Pins are named like RC14."""
+    with pytest.raises(ValueError, match="not a pin name"):
+        parse_pin(name)
+
+
+def test_change_notice_rises_one_cycle_behind_either_edge_of_an_enabled_input(rig):
+    """§6.2: CN13 = RD4."""
+    rig.write("CNEN1", 1 << 13)
+    rig.at(100).dev.pins.set("RD4", 1)
+    assert not rig.at(100).flag("CNIF")
+    assert rig.at(101).flag("CNIF")
+    rig.clear_flags()
+    rig.at(200).dev.pins.set("RD4", 0)
+    assert rig.at(201).flag("CNIF")
+
+
+def test_change_notice_ignores_outputs_and_disabled_pins(rig):
+    """§6.2: only enabled pins with TRIS = 1; enabling raises nothing."""
+    rig.write("TRISD", 0xFFEF)
+    rig.dev.pins.set("RD5", 1)
+    rig.at(1).write("CNEN1", 0xFFFF & ~(1 << 14))
+    rig.at(10).write("LATD", 0x10)
+    rig.at(20).dev.pins.set("RD5", 0)
+    assert not rig.at(100).flag("CNIF")
+
+
+CN_PINS = "RC14 RC13 RB0 RB1 RB2 RB3 RB4 RB5 RG6 RG7 RG8 RG9 RB15 RD4 RD5 RD6 RD7 RF4 RF5 RD13 RD14 RD15 RA6 RA7"
+
+
+@pytest.mark.parametrize(("number", "pin"), list(enumerate(CN_PINS.split())))
+def test_every_change_notice_input_sits_on_its_pin(rig, number, pin):
+    """§6.2 CN map."""
+    register, bit = ("CNEN1", number) if number < 16 else ("CNEN2", number - 16)
+    rig.write("ADPCFG", 0xFFFF)
+    rig.dev.pins.analog[1] = 0
+    rig.write(register, 1 << bit)
+    rig.at(10).dev.pins.set(pin, 1)
+    assert rig.at(12).flag("CNIF")
+
+
+def test_pull_up_lifts_a_pin_nothing_drives(rig):
+    """§6.2: CNPU."""
+    rig.dev.pins.release("RG6")
+    assert rig.at(2).read("PORTG") & 0x40 == 0
+    rig.write("CNPU1", 1 << 8)
+    assert rig.at(4).read("PORTG") & 0x40
+    rig.dev.pins.set("RG6", 0)
+    assert rig.at(5).read("PORTG") & 0x40 == 0
+
+
+@pytest.mark.parametrize(("number", "pin"), list(enumerate(["RF6", "RA12", "RA13", "RA14", "RA15"])))
+def test_external_interrupt_takes_the_edge_intcon2_chooses(rig, number, pin):
+    """§5.5: 0 = rising, 1 = falling; the flag rises one cycle behind the edge."""
+    name = f"INT{number}IF"
+    rig.at(10).dev.pins.set(pin, 1)
+    assert rig.at(11).flag(name)
+    rig.clear_flags()
+    rig.at(20).dev.pins.set(pin, 0)
+    assert not rig.at(25).flag(name)
+    rig.write("INTCON2", 1 << number)
+    rig.at(30).dev.pins.set(pin, 1)
+    assert not rig.at(35).flag(name)
+    rig.at(40).dev.pins.set(pin, 0)
+    assert rig.at(41).flag(name)
+
+
+def test_external_interrupt_hears_the_chip_drive_its_own_pin(rig):
+    """§5.5: detection works on the pin whatever drives it."""
+    rig.write("TRISA", 0)
+    rig.at(10).write("LATA", 1 << 12)
+    assert not rig.at(11).flag("INT1IF")
+    assert rig.at(12).flag("INT1IF")
+
+
+def test_uart_owns_its_pins_while_enabled(rig):
+    """§6: TX overrides LAT and TRIS while UARTEN and UTXEN are set."""
+    rig.write("TRISF", 0)
+    rig.at(5)
+    assert rig.dev.pins.get("RF3") == 0
+    rig.write("U1MODE", 0x8000)
+    rig.write("U1STA", 0x400)
+    assert rig.at(7).dev.pins.get("RF3") == 1
+    rig.write("U1MODE", 0)
+    assert rig.at(9).dev.pins.get("RF3") == 0

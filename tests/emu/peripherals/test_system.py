@@ -1,0 +1,293 @@
+"""Oscillator, resets, watchdog, low-voltage detect, module disable (dspic30f6014a.md §3, §4, §17)."""
+
+from __future__ import annotations
+
+import pytest
+
+from .conftest import Rig
+
+HIGH, LOW = 0xFF00, 0x00FF
+
+
+def unlock_high(rig, cycle, value):
+    for step, byte in enumerate((0x78, 0x9A, value)):
+        rig.at(cycle + step).write("OSCCON", byte << 8, HIGH)
+
+
+def unlock_low(rig, cycle, value):
+    for step, byte in enumerate((0x46, 0x57, value)):
+        rig.at(cycle + step).write("OSCCON", byte, LOW)
+
+
+@pytest.mark.parametrize(
+    ("fosc", "fcy", "osccon"),
+    [
+        (0xFFE6, 14_745_600, 0x7720),  # XT with PLL x 8: the e-puck (§3)
+        (0xFFE5, 7_372_800, 0x7720),  # XT with PLL x 4
+        (0xFFE7, 29_491_200, 0x7720),  # XT with PLL x 16
+        (0xC103, 7_370_000 / 4, 0x1100),  # FRC
+        (0xC704, 7_370_000 / 4 * 0 + 14_745_600, 0x7720),  # FPR 00100 is reserved with FOS = 7
+        (0xC304, 1_843_200, 0x3300),  # XT without PLL
+        (0xC200, 128_000, 0x2200),  # LPRC
+    ],
+)
+def test_clock_follows_the_configuration_word(fosc, fcy, osccon):
+    """§2, §3: Fcy = Fosc / 4; OSCCON shows the source and the lock."""
+    rig = Rig(fosc=fosc)
+    assert rig.dev.fcy == pytest.approx(fcy, rel=1e-12)
+    assert rig.read("OSCCON") == osccon
+
+
+def test_osccon_accepts_a_byte_right_behind_its_two_keys(rig):
+    """§3: POST = 01 makes Tcy four times as long."""
+    unlock_low(rig, 10, 0x40)
+    assert rig.at(20).read("OSCCON") == 0x7760
+    assert rig.dev.fcy == 14_745_600 / 4
+
+
+def test_osccon_ignores_a_byte_one_instruction_late(rig):
+    """§3: any other instruction between leaves OSCCON unchanged."""
+    rig.at(10).write("OSCCON", 0x46, LOW)
+    rig.at(11).write("OSCCON", 0x57, LOW)
+    rig.at(13).write("OSCCON", 0x40, LOW)
+    assert rig.read("OSCCON") == 0x7720
+    rig.at(20).write("OSCCON", 0x46, LOW)
+    rig.at(22).write("OSCCON", 0x57, LOW)
+    rig.at(23).write("OSCCON", 0x40, LOW)
+    assert rig.read("OSCCON") == 0x7720
+
+
+def test_osccon_ignores_words_wrong_keys_and_a_second_write(rig):
+    """§3: byte writes only, one per key."""
+    rig.at(10).write("OSCCON", 0x7740)
+    assert rig.read("OSCCON") == 0x7720
+    for step, byte in enumerate((0x46, 0x58, 0x40)):
+        rig.at(20 + step).write("OSCCON", byte, LOW)
+    assert rig.read("OSCCON") == 0x7720
+    unlock_low(rig, 30, 0x40)
+    rig.at(33).write("OSCCON", 0x80, LOW)
+    assert rig.read("OSCCON") == 0x7760
+
+
+def test_clock_switch_is_ignored_unless_fcksm_allows_it(rig):
+    """§3: FCKSM = 1x on the e-puck: OSWEN reads 0, COSC stays."""
+    unlock_high(rig, 10, 0x01)
+    unlock_low(rig, 20, 0x01)
+    assert rig.at(100000).read("OSCCON") == 0x7120
+    assert rig.dev.fcy == 14_745_600
+
+
+def test_clock_switch_to_the_frc():
+    """§3: FCKSM = 01: OSWEN falls and COSC follows NOSC; seconds stay continuous."""
+    rig = Rig(fosc=0x7FE6)
+    unlock_high(rig, 10, 0x01)
+    unlock_low(rig, 20, 0x01)
+    assert rig.at(23).read("OSCCON") == 0x1100
+    assert rig.dev.fcy == 7_370_000 / 4
+    assert rig.dev.seconds(23 + 1_842_500) == pytest.approx(23 / 14_745_600 + 1.0, rel=1e-9)
+
+
+def test_clock_switch_back_to_the_pll_waits_for_crystal_and_lock():
+    """§3: 1024 crystal periods and 20 us, counted in Tcy of the FRC: 0.15889 ms x 1.8425 MHz = 293 Tcy."""
+    rig = Rig(fosc=0x4106 | 0x0100)
+    assert rig.read("OSCCON") == 0x1100
+    unlock_high(rig, 10, 0x07)
+    unlock_low(rig, 20, 0x01)
+    assert rig.at(23 + 292).field("OSCCON", "OSWEN") == 1
+    assert rig.at(23 + 293).read("OSCCON") == 0x7720
+
+
+def test_pending_clock_switch_is_aborted_by_clearing_oswen():
+    """§3."""
+    rig = Rig(fosc=0x4106)
+    unlock_high(rig, 10, 0x07)
+    unlock_low(rig, 20, 0x01)
+    unlock_low(rig, 50, 0x00)
+    assert rig.at(5000).read("OSCCON") == 0x1700
+
+
+def test_clock_failure_with_the_monitor_runs_from_the_frc_and_traps():
+    """§3: FCKSM = 00."""
+    rig = Rig(fosc=0x07E6)
+    traps = []
+    rig.wires.trap = traps.append
+    rig.at(100).dev.oscillator.fail()
+    assert traps == ["OSCFAIL"]
+    assert rig.field("OSCCON", "CF") == 1
+    assert rig.field("OSCCON", "COSC") == 1
+    unlock_low(rig, 200, 0x00)
+    assert rig.field("OSCCON", "CF") == 0
+
+
+# -- resets -----------------------------------------------------------------------------------------------------------
+
+
+def test_power_on_sets_por_and_bor(rig):
+    """§4: RCON 0x0503 with LVDL = 0101."""
+    assert rig.read("RCON") == 0x0503
+
+
+@pytest.mark.parametrize(
+    ("cause", "bit"), [("EXTR", 7), ("SWR", 6), ("WDTO", 4), ("BOR", 1), ("TRAPR", 15), ("IOPUWR", 14)]
+)
+def test_other_resets_add_their_bit_and_keep_the_rest(rig, cause, bit):
+    """§4: the demo firmware clears POR, executes RESET and must find POR = 0, SWR = 1."""
+    rig.write("RCON", 0x0500)
+    rig.write("PR1", 5)
+    rig.at(50).dev.reset(cause)
+    assert rig.read("RCON") == 0x0500 | 1 << bit
+    assert rig.read("PR1") == 0xFFFF
+    assert rig.read("TRISD") == 0xFFFF
+
+
+def test_reset_stops_every_device(rig):
+    """§4: nothing that was under way happens after a reset."""
+    rig.write("PR1", 100)
+    rig.write("T1CON", 0x8000)
+    rig.write("U1MODE", 0x8000)
+    rig.write("U1STA", 0x400)
+    rig.at(5).write("U1TXREG", 1)
+    rig.at(20).dev.reset("SWR")
+    rig.at(5000)
+    assert rig.read("TMR1") == 0
+    assert rig.read("IFS0") == 0
+    assert rig.read("U1STA") == 0x110
+
+
+def test_unknown_reset_cause_is_refused(rig):
+    """§4."""
+    with pytest.raises(ValueError, match="no reset cause"):
+        rig.dev.reset("NAP")
+
+
+# -- watchdog ---------------------------------------------------------------------------------------------------------
+
+TWO_MS = 29_491  # 2 ms x 14.7456 MHz
+
+
+def test_watchdog_resets_the_running_chip():
+    """§4: 2 ms x 1 x 1."""
+    rig = Rig(fwdt=0x8000)
+    causes = []
+    rig.wires.reset = causes.append
+    rig.at(TWO_MS - 1)
+    assert causes == []
+    rig.at(TWO_MS)
+    assert causes == ["WDTO"]
+
+
+@pytest.mark.parametrize(("word", "factor"), [(0x8010, 8), (0x8020, 64), (0x8003, 4), (0x803F, 512 * 16)])
+def test_watchdog_prescalers(word, factor):
+    """§4: A in 1, 8, 64, 512; B = 1..16; at most 16.384 s."""
+    rig = Rig(fwdt=word)
+    assert rig.dev.watchdog.period == round(0.002 * factor * 14_745_600)
+
+
+def test_clrwdt_restarts_the_watchdog_and_clears_wdto():
+    """§4."""
+    rig = Rig(fwdt=0x8000)
+    causes = []
+    rig.wires.reset = causes.append
+    rig.at(20000).write("RCON", 0x0510)
+    rig.dev.clear_watchdog(20000)
+    assert rig.field("RCON", "WDTO") == 0
+    rig.at(20000 + TWO_MS - 1)
+    assert causes == []
+    rig.at(20000 + TWO_MS)
+    assert causes == ["WDTO"]
+
+
+def test_watchdog_wakes_the_sleeping_chip_without_reset():
+    """§4: WDTO and SLEEP are set."""
+    rig = Rig(fwdt=0x8000)
+    woken, causes = [], []
+    rig.wires.wake = lambda: woken.append(rig.events.now)
+    rig.wires.reset = causes.append
+    rig.at(100).dev.sleep(2, 100)
+    rig.at(100 + TWO_MS)
+    assert woken == [100 + TWO_MS]
+    assert causes == []
+    assert (rig.field("RCON", "WDTO"), rig.field("RCON", "SLEEP")) == (1, 1)
+
+
+def test_software_enables_the_watchdog_with_swdten(rig):
+    """§4: FWDTEN = 0, prescalers 512 and 16 in the e-puck's word: 16.384 s."""
+    causes = []
+    rig.wires.reset = causes.append
+    rig.at(1000).write("RCON", 0x0523)
+    rig.at(1000 + 241_591_910)
+    assert causes == ["WDTO"]
+
+
+# -- low voltage ------------------------------------------------------------------------------------------------------
+
+
+def test_low_voltage_interrupt_needs_a_stable_band_gap(rig):
+    """§17, §4: BGST 20 us (295 Tcy) after LVDEN."""
+    rig.write("RCON", 0x1503)
+    assert rig.at(295).field("RCON", "BGST") == 0
+    assert rig.at(296).field("RCON", "BGST") == 1
+    rig.dev.lvd.set_supply(3300)
+    assert not rig.at(400).flag("LVDIF")
+    rig.dev.lvd.set_supply(2000)
+    assert rig.at(401).flag("LVDIF")
+
+
+# -- module disable ---------------------------------------------------------------------------------------------------
+
+
+def test_disabled_module_reads_0_and_ignores_writes(rig):
+    """§17: PMD1 T1MD."""
+    rig.write("PR1", 7)
+    rig.write("PMD1", 1 << 11)
+    assert rig.read("PR1") == 0
+    rig.write("PR1", 9)
+    rig.write("PMD1", 0)
+    assert rig.read("PR1") == 0xFFFF
+
+
+def test_disabled_timer_stops_counting(rig):
+    """§17."""
+    rig.write("PR1", 100)
+    rig.write("T1CON", 0x8000)
+    rig.at(50).write("PMD1", 1 << 11)
+    rig.at(500).write("PMD1", 0)
+    assert not rig.flag("T1IF")
+    assert rig.read("T1CON") == 0
+
+
+def test_module_switches_follow_a_restored_snapshot(rig):
+    """Derived state: what is off follows from PMD1 in the record."""
+    rig.write("PR1", 7)
+    before = rig.record.snapshot()
+    rig.write("PMD1", 1 << 11)
+    rig.record.restore(before)
+    rig.dev.restored()
+    assert rig.read("PR1") == 7
+
+
+# -- idle -------------------------------------------------------------------------------------------------------------
+
+
+def test_pwrsav_sets_the_status_bit_of_its_mode(rig):
+    """§4, §17."""
+    rig.at(10).dev.sleep(1, 10)
+    rig.at(20).dev.wake(20)
+    assert (rig.field("RCON", "IDLE"), rig.field("RCON", "SLEEP")) == (1, 0)
+    rig.at(30).dev.sleep(2, 30)
+    rig.at(40).dev.wake(40)
+    assert (rig.field("RCON", "IDLE"), rig.field("RCON", "SLEEP")) == (1, 1)
+
+
+def test_uart_with_usidl_waits_in_idle(rig):
+    """§17: the frame that would end in 1409 ends 1000 cycles later."""
+    sent = []
+    rig.dev.uart[1].on_byte = lambda byte, start: sent.append(rig.events.now)
+    rig.write("U1BRG", 7)
+    rig.write("U1MODE", 0xA000)
+    rig.at(1).write("U1STA", 0x400)
+    rig.at(10).write("U1TXREG", 1)
+    rig.at(200).dev.sleep(1, 200)
+    rig.at(1200).dev.wake(1200)
+    rig.at(5000)
+    assert sent == [2409]

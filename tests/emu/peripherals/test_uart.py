@@ -1,0 +1,376 @@
+"""UART1/2. Sections are those of the chip reference (dspic30f6014a.md §10)."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR
+
+UARTEN, LPBACK, WAKE, ABAUD = 0x8000, 0x40, 0x80, 0x20
+UTXISEL, UTXBRK, UTXEN, ADDEN, OERR = 0x8000, 0x800, 0x400, 0x20, 2
+
+
+def enable(rig, cycle=0, brg=7, mode=0, sta=0, number=1):
+    """UARTEN written in `cycle`, UTXEN in the next: the baud generator starts from 0 in cycle + 1."""
+    rig.at(cycle).write(f"U{number}BRG", brg)
+    rig.write(f"U{number}MODE", UARTEN | mode)
+    rig.at(cycle + 1).write(f"U{number}STA", UTXEN | sta)
+    rig.at(cycle + 2).clear_flags()
+
+
+def collect(rig, number=1):
+    sent = []
+    rig.dev.uart[number].on_byte = lambda byte, start: sent.append((byte, start))
+    return sent
+
+
+# -- transmit ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("written", "start"), [(50, 129), (128, 129), (129, 257), (300, 385)])
+def test_start_bit_begins_at_the_next_edge_of_the_free_running_bit_clock(rig, written, start):
+    """§10.1: BRG 7, bit 128 Tcy; the clock started in cycle 1, so its edges are in 129, 257, 385, ..."""
+    enable(rig)
+    sent = collect(rig)
+    rig.at(written).write("U1TXREG", 0x55)
+    assert rig.at(start - 1).dev.pins.get("RF3") == 1
+    assert rig.at(start).dev.pins.get("RF3") == 0
+    rig.at(start + 1280)
+    assert sent == [(0x55, start)]
+
+
+def test_frames_follow_each_other_without_a_gap(rig):
+    """§10.1: five characters in flight, 10 bits of 128 Tcy each."""
+    enable(rig)
+    sent = collect(rig)
+    rig.at(10).write("U1TXREG", 1)
+    for offset in range(4):
+        rig.at(20 + offset).write("U1TXREG", 2 + offset)
+    assert rig.field("U1STA", "UTXBF") == 1
+    rig.at(129 + 5 * 1280)
+    assert sent == [(1, 129), (2, 1409), (3, 2689), (4, 3969), (5, 5249)]
+
+
+def test_write_to_a_full_fifo_is_dropped(rig):
+    """§10.1."""
+    enable(rig)
+    sent = collect(rig)
+    rig.at(10)
+    for value in range(7):
+        rig.at(10 + value).write("U1TXREG", value)
+    rig.at(20000)
+    assert [byte for byte, _ in sent] == [0, 1, 2, 3, 4]
+
+
+def test_levels_on_the_pin_are_start_data_lsb_first_and_stop(rig):
+    """§10.1: 0x53 = 1 1 0 0 1 0 1 0 from bit 0."""
+    enable(rig)
+    rig.at(10).write("U1TXREG", 0x53)
+    levels = [rig.at(129 + 128 * bit + 64).dev.pins.get("RF3") for bit in range(10)]
+    assert levels == [0, 1, 1, 0, 0, 1, 0, 1, 0, 1]
+
+
+@pytest.mark.parametrize(("mode", "bits"), [(0, 10), (1, 11), (2, 11), (4, 11), (3, 12), (6, 11)])
+def test_frame_length_follows_parity_and_stop_bits(rig, mode, bits):
+    """§10: PDSEL and STSEL; TRMT rises at the end of the last stop bit."""
+    enable(rig, mode=mode)
+    rig.at(10).write("U1TXREG", 0x41)
+    assert rig.at(129 + bits * 128 - 1).field("U1STA", "TRMT") == 0
+    assert rig.at(129 + bits * 128).field("U1STA", "TRMT") == 1
+
+
+@pytest.mark.parametrize(("mode", "parity"), [(2, 0), (4, 1)])
+def test_parity_bit(rig, mode, parity):
+    """§10: 01 even, 10 odd; 0x41 has two ones."""
+    enable(rig, mode=mode)
+    rig.at(10).write("U1TXREG", 0x41)
+    assert rig.at(129 + 9 * 128 + 64).dev.pins.get("RF3") == parity
+
+
+def test_transmit_interrupt_with_every_transfer_or_with_the_last(rig):
+    """§10.1: UTXISEL = 0: at each FIFO to TSR transfer; 1: when it leaves the FIFO empty."""
+    enable(rig, sta=UTXISEL)
+    rig.at(10).write("U1TXREG", 1)
+    assert rig.at(11).flag("U1TXIF") == 1  # the first write to an idle transmitter empties the FIFO at once
+    rig.clear_flags()
+    rig.at(20).write("U1TXREG", 2)
+    rig.at(21).write("U1TXREG", 3)
+    assert rig.at(1409).flag("U1TXIF") == 0
+    assert rig.at(2689).flag("U1TXIF") == 1
+
+
+def test_transmit_interrupt_when_the_sender_is_first_enabled(rig):
+    """§10.1: UTXEN 0 -> 1 with UARTEN = 1, either order."""
+    rig.write("U1MODE", UARTEN)
+    assert rig.flag("U1TXIF") == 0
+    rig.at(5).write("U1STA", UTXEN)
+    assert rig.at(6).flag("U1TXIF") == 1
+
+
+def test_data_loaded_before_utxen_starts_from_a_cleared_baud_clock(rig):
+    """§10.1: UTXEN written in 1000, clock from 1001, start bit one bit later in 1129."""
+    rig.write("U1BRG", 7)
+    rig.write("U1MODE", UARTEN)
+    rig.at(10).write("U1TXREG", 0x41)
+    sent = collect(rig)
+    rig.at(1000).write("U1STA", UTXEN)
+    rig.at(4000)
+    assert sent == [(0x41, 1129)]
+
+
+def test_disabling_the_sender_aborts_and_flushes(rig):
+    """§10.1."""
+    enable(rig)
+    sent = collect(rig)
+    rig.at(10).write("U1TXREG", 1)
+    rig.at(11).write("U1TXREG", 2)
+    rig.at(500).write("U1STA", 0)
+    rig.at(20000)
+    assert sent == []
+    assert rig.field("U1STA", "TRMT") == 1
+
+
+def test_disabling_the_uart_clears_flags_and_keeps_mode_and_brg(rig):
+    """§10.1."""
+    enable(rig, mode=6)
+    rig.at(10).write("U1TXREG", 1)
+    rig.at(500).write("U1MODE", 6)
+    assert rig.read("U1STA") == 0x0110
+    assert rig.read("U1BRG") == 7
+    assert rig.read("U1MODE") == 6
+
+
+def test_break_holds_the_line_low(rig):
+    """§10.1."""
+    enable(rig)
+    rig.at(10).write("U1STA", UTXEN | UTXBRK)
+    assert rig.at(12).dev.pins.get("RF3") == 0
+
+
+def test_drain_delivers_what_the_stopped_program_left_in_the_transmitter(rig):
+    """README: the pins outlive the program."""
+    enable(rig)
+    sent = collect(rig)
+    for value in (1, 2, 3):
+        rig.at(10 + value).write("U1TXREG", value)
+    rig.dev.uart[1].drain()
+    assert sent == [(1, 129), (2, 1409), (3, 2689)]
+
+
+def test_edge_log_shows_every_bit_of_a_frame(rig):
+    """Pins: 0x55 alternates, so all ten bits are edges 128 Tcy apart, but for the idle line before."""
+    enable(rig)
+    rig.dev.pins.edges = []
+    rig.at(10).write("U1TXREG", 0x55)
+    rig.at(2000)
+    assert [cycle for cycle, port, _ in rig.dev.pins.edges if port == 5] == [129 + 128 * bit for bit in range(10)]
+
+
+# -- receive ----------------------------------------------------------------------------------------------------------
+
+
+def test_received_character_is_complete_in_the_middle_of_the_stop_bit(rig):
+    """§10.2: 9.5 bits = 1216 Tcy behind the start edge, plus up to 1/16 bit: edge 1000, sampled in 1001."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"A", cycle=1000)
+    assert rig.at(999).field("U1STA", "RIDLE") == 1
+    assert rig.at(1000).field("U1STA", "RIDLE") == 0
+    assert rig.at(2216).flag("U1RXIF") == 0
+    assert rig.at(2217).flag("U1RXIF") == 1
+    assert rig.field("U1STA", "URXDA") == 1
+    assert rig.field("U1STA", "RIDLE") == 1
+    assert rig.read("U1RXREG") == 0x41
+    assert rig.field("U1STA", "URXDA") == 0
+
+
+def test_bytes_arrive_back_to_back_at_line_rate(rig):
+    """§10: 1280 Tcy per frame."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"ab", cycle=1001)
+    assert rig.at(2217).read("U1RXREG") == 0x61
+    assert rig.at(3496).field("U1STA", "URXDA") == 0
+    assert rig.at(3497).read("U1RXREG") == 0x62
+
+
+@pytest.mark.parametrize(("sel", "counts"), [(0, [1, 2, 3, 4]), (1, [1, 2, 3, 4]), (2, [3]), (3, [4])])
+def test_receive_interrupt_modes(rig, sel, counts):
+    """§10.2: URXISEL 0x every character, 10 at three, 11 at four."""
+    enable(rig, sta=sel << 6)
+    rig.dev.uart[1].feed(b"wxyz", cycle=1001)
+    seen = []
+    for number in range(1, 5):
+        rig.at(1001 + 1280 * number)
+        if rig.flag("U1RXIF"):
+            seen.append(number)
+            rig.clear_flags()
+    assert seen == counts
+
+
+def test_fifth_character_overruns_and_clearing_oerr_flushes(rig):
+    """§10.2."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"123456", cycle=1001)
+    assert rig.at(1001 + 1280 * 4).field("U1STA", "OERR") == 0
+    assert rig.at(1001 + 1280 * 5).field("U1STA", "OERR") == 1
+    assert rig.read("U1RXREG") == 0x31
+    rig.at(20000)
+    assert [rig.read("U1RXREG") for _ in range(3)] == [0x32, 0x33, 0x34]
+    rig.dev.uart[1].feed(b"7", cycle=20001)
+    rig.at(22000)
+    assert rig.field("U1STA", "URXDA") == 0  # no transfers until OERR is cleared
+    rig.write("U1STA", UTXEN)
+    rig.dev.uart[1].feed(b"8", cycle=22001)
+    rig.at(24000)
+    assert rig.read("U1RXREG") == 0x38
+
+
+def test_clearing_oerr_throws_unread_characters_away(rig):
+    """§10.2: only the change 1 -> 0 does."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"12345", cycle=1001)
+    rig.at(9000).write("U1STA", UTXEN)
+    assert rig.field("U1STA", "URXDA") == 0
+
+
+def test_writing_oerr_0_when_it_is_0_changes_nothing(rig):
+    """§10.2: the e-puck receive handler does it on every entry."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"12", cycle=1001)
+    rig.at(9000).write("U1STA", rig.read("U1STA") & ~OERR)
+    assert [rig.read("U1RXREG") for _ in range(2)] == [0x31, 0x32]
+
+
+def test_software_cannot_set_oerr_or_receive_flags(rig):
+    """§10: OERR is clear-only, URXDA, FERR, PERR, RIDLE, TRMT, UTXBF belong to hardware."""
+    enable(rig)
+    rig.at(10).write("U1STA", 0xFFFF & ~UTXBRK)
+    assert rig.read("U1STA") == 0x8000 | UTXEN | 0xC0 | ADDEN | 0x110
+
+
+def test_framing_error_belongs_to_the_character_at_the_top(rig):
+    """§10.2: the character is still pushed."""
+    enable(rig)
+    uart = rig.dev.uart[1]
+    uart.feed(b"\x81", cycle=1001, errors=FRAMING_ERROR)
+    uart.feed(b"\x82", cycle=4000)
+    rig.at(9000)
+    assert rig.field("U1STA", "FERR") == 1
+    assert rig.read("U1RXREG") == 0x81
+    assert rig.field("U1STA", "FERR") == 0
+    assert rig.read("U1RXREG") == 0x82
+
+
+def test_parity_error(rig):
+    """§10.2."""
+    enable(rig, mode=2)
+    rig.dev.uart[1].feed(b"\x01", cycle=1001, errors=PARITY_ERROR)
+    rig.at(9000)
+    assert rig.field("U1STA", "PERR") == 1
+    assert rig.read("U1RXREG") == 1
+
+
+def test_break_is_received_as_0_with_a_framing_error(rig):
+    """§10.2."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"\xff", cycle=1001, errors=BREAK)
+    rig.at(9000)
+    assert rig.field("U1STA", "FERR") == 1
+    assert rig.read("U1RXREG") == 0
+
+
+@pytest.mark.parametrize(("baud", "clean"), [(115200, True), (118600, True), (111800, True), (130000, False)])
+def test_senders_at_another_rate_are_sampled_as_the_16_fold_clock_sees_them(rig, baud, clean):
+    """§10.2: samples 7, 8, 9 of each bit; about 5 % of error is the limit for ten bits."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"\x55", cycle=1001, baud=baud)
+    rig.at(9000)
+    assert (rig.field("U1STA", "FERR"), rig.read("U1RXREG")) == (0, 0x55) or not clean
+    if not clean:
+        rig.dev.uart[1].feed(b"\x55", cycle=9001, baud=baud)
+        rig.at(20000)
+        assert rig.read("U1RXREG") != 0x55 or rig.field("U1STA", "FERR")
+
+
+def test_nine_bit_address_detection_drops_data(rig):
+    """§10.2 ADDEN: only characters with bit 8 set are pushed."""
+    enable(rig, mode=6, sta=ADDEN)
+    rig.dev.uart[1].feed([0x055, 0x1AA], cycle=1001)
+    rig.at(9000)
+    assert rig.read("U1RXREG") == 0x1AA
+    assert rig.field("U1STA", "URXDA") == 0
+
+
+def test_loopback_receives_its_own_frames_and_not_the_pin(rig):
+    """§10.2 LPBACK."""
+    enable(rig, mode=LPBACK)
+    sent = collect(rig)
+    rig.dev.uart[1].feed(b"z", cycle=100)
+    rig.at(200).write("U1TXREG", 0x42)
+    assert rig.at(257 + 1216).flag("U1RXIF") == 1
+    assert rig.read("U1RXREG") == 0x42
+    rig.at(5000)
+    assert rig.field("U1STA", "URXDA") == 0
+    assert sent == []
+
+
+def test_closed_receiver_loses_timed_bytes_and_patient_senders_wait(rig):
+    """The line does not care about UARTEN; `feed` without a cycle does."""
+    rig.dev.uart[1].feed(b"a", cycle=100)
+    rig.at(5000)
+    rig.dev.uart[1].feed(b"b")
+    enable(rig, cycle=9000)
+    rig.at(15000)
+    assert rig.read("U1RXREG") == 0x62
+    assert rig.field("U1STA", "URXDA") == 0
+
+
+def test_wake_raises_the_interrupt_at_the_start_edge_in_sleep(rig):
+    """§10.2 WAKE."""
+    enable(rig, mode=WAKE)
+    rig.at(100).dev.sleep(2, 100)
+    rig.dev.uart[1].feed(b"x", cycle=500)
+    assert rig.at(499).flag("U1RXIF") == 0
+    assert rig.at(500).flag("U1RXIF") == 1
+    assert rig.field("U1MODE", "WAKE") == 0
+
+
+def test_autobaud_passes_the_edges_of_the_pin_on(rig):
+    """§10 ABAUD: 0x55 has ten edges, one bit apart."""
+    enable(rig, mode=ABAUD)
+    edges = []
+    rig.dev.uart[1].on_edge = lambda cycle, level: edges.append((cycle, level))
+    rig.dev.uart[1].feed(b"\x55", cycle=1001)
+    rig.at(9000)
+    assert edges == [(1001 + 128 * bit, bit % 2) for bit in range(10)]
+
+
+def test_long_feeds_do_not_lose_bytes(rig):
+    """The line holds any number of frames."""
+    enable(rig)
+    rig.dev.uart[1].feed(bytes(range(256)) * 5)
+    received = []
+    cycle = 10
+    while len(received) < 1280:
+        cycle += 1280
+        rig.at(cycle)
+        while rig.field("U1STA", "URXDA"):
+            received.append(rig.read("U1RXREG"))
+    assert bytes(received) == bytes(range(256)) * 5
+
+
+def test_snapshot_in_the_middle_of_a_frame_continues_identically(rig):
+    """Hidden state is in the record: the same bytes at the same cycles after a restore."""
+    enable(rig)
+    sent = collect(rig)
+    rig.at(10).write("U1TXREG", 0x41)
+    rig.at(11).write("U1TXREG", 0x42)
+    rig.dev.uart[1].feed(b"q", cycle=600)
+    rig.at(700)
+    state = rig.record.snapshot()
+    rig.at(9000)
+    first = list(sent), rig.record.snapshot()
+    sent.clear()
+    rig.record.restore(state)
+    rig.dev.restored()
+    rig.at(9000)
+    assert (sent, rig.record.snapshot()) == first
