@@ -9,7 +9,7 @@ from emu.chips.dspic30f6014a import CONFIG, DSPIC30F6014A, UNIT_ID
 from emu.elffacts import UNITS_PER_WORD
 
 CHIP = DSPIC30F6014A
-PROGRAM = CHIP.program["program"]
+FLASH, PROGRAM = CHIP.program["flash"], CHIP.program["program"]
 RESET, IVT, AIVT = CHIP.program["reset"], CHIP.program["ivt"], CHIP.program["aivt"]
 EEPROM = CHIP.program["eedata"]
 RAM, NEAR, X_RAM, Y_RAM = CHIP.data["ram"], CHIP.data["near"], CHIP.data["xram"], CHIP.data["yram"]

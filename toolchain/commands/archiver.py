@@ -1,0 +1,62 @@
+"""`ar`: static libraries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from toolchain.commands.parser import parser
+from toolchain.errors import ToolError
+from toolchain.files import read_bytes, write_outputs
+from toolchain.link.archive import Member, archive_bytes, read_members
+
+
+def main(arguments: list[str]) -> int:
+    """Run one operation (first letter of the key, as in GNU ar); returns 0."""
+    p = parser(
+        "ar",
+        "Make, list and extract static libraries.  Operations: r replace or add, d delete, t list, x extract;\n"
+        "letters c, s, u, v are accepted and need nothing: an index is always written.",
+        "python -m toolchain ar rcs libswarm.a wheel.o camera.o",
+    )
+    p.add_argument("operation", help="r, d, t or x, with modifiers")
+    p.add_argument("archive")
+    p.add_argument("members", nargs="*", metavar="FILE")
+    options = p.parse_args(arguments)
+    letters = options.operation.lstrip("-")
+    action = [letter for letter in letters if letter in "rdtx"]
+    if len(action) != 1 or set(letters) - set("rdtxcsuvD"):
+        raise ToolError(f"operation {options.operation!r}: expected one of r, d, t, x with modifiers c, s, u, v")
+    path = Path(options.archive)
+    exists = path.exists()
+    members = read_members(read_bytes(path), str(path)) if exists else []
+    if not exists and action[0] != "r":
+        raise ToolError(f"{path}: no such archive")
+    names = [Path(name).name for name in options.members]
+    if action[0] == "t":
+        print("\n".join(m.name for m in members))
+    elif action[0] == "x":
+        _extract(members, names, str(path))
+    else:
+        kept = [m for m in members if m.name not in names]
+        if action[0] == "r":
+            kept = _replace(members, options.members)
+        write_outputs([(path, archive_bytes(kept))])
+    return 0
+
+
+def _replace(members: list[Member], files: list[str]) -> list[Member]:
+    """Return members with `files` put in place of those of the same name, new ones at the end."""
+    fresh = {Path(name).name: Member(Path(name).name, read_bytes(name)) for name in files}
+    result = [fresh.pop(m.name, m) for m in members]
+    return result + list(fresh.values())
+
+
+def _extract(members: list[Member], names: list[str], archive: str) -> None:
+    wanted = [m for m in members if not names or m.name in names]
+    missing = set(names) - {m.name for m in wanted}
+    if missing:
+        raise ToolError(f"{archive}: no member {', '.join(sorted(missing))}")
+    unsafe = [m.name for m in wanted if Path(m.name).name != m.name or m.name in ("", ".", "..")]
+    if unsafe:
+        raise ToolError(f"{archive}: member name {unsafe[0]!r} is not a plain file name")
+    write_outputs([(m.name, m.data) for m in wanted])

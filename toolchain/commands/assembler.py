@@ -1,0 +1,43 @@
+"""`as`: one assembly source to one object."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from toolchain.asm.assemble import assemble
+from toolchain.asm.state import Options
+from toolchain.commands.parser import definition, parser
+from toolchain.elf.write import object_bytes
+from toolchain.errors import ToolError
+from toolchain.files import read_text, write_outputs
+
+PART = "30F6014A"
+
+
+def main(arguments: list[str]) -> int:
+    """Assemble; returns 0.  Raises `ToolError` with every finding."""
+    p = parser("as", "Assemble a source in pic30-as syntax to an ELF object.", "python -m toolchain as start.s -o start.o")
+    p.add_argument("source", help="assembly source, - for standard input")
+    p.add_argument("-o", dest="output", default="", help="object file (default: source name with .o)")
+    p.add_argument("-I", dest="include", action="append", default=[], metavar="DIR", help="search .include files here")
+    p.add_argument("--defsym", action="append", default=[], metavar="NAME=VALUE", help="define an absolute symbol")
+    p.add_argument("--relax", action="store_true", help="shorten CALL and GOTO within a section")
+    p.add_argument("-g", dest="debug", action="store_true", help="write a DWARF line table for this source")
+    p.add_argument("-p", dest="part", default=PART, help=f"processor; only {PART} is supported")
+    options = p.parse_args(arguments)
+    if options.part.upper().removeprefix("DSPIC") != PART:
+        raise ToolError(f"-p{options.part}: the only processor supported is {PART}")
+    if options.source == "-":
+        name, text = "<stdin>", sys.stdin.read()
+    else:
+        name, text = options.source, read_text(options.source)
+    output = options.output or ("a.out" if options.source == "-" else str(Path(name).with_suffix(".o").name))
+    if Path(output) == Path(name):
+        raise ToolError(f"the output {output} would overwrite the source")
+    asm_options = Options(options.include, dict(map(definition, options.defsym)), options.relax, options.debug)
+    obj, messages = assemble(text, name, asm_options)
+    for message in messages:
+        print(message, file=sys.stderr)
+    write_outputs([(output, object_bytes(obj))])
+    return 0

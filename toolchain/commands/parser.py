@@ -1,0 +1,35 @@
+"""argparse as every sub-command wants it: description kept as written, an example, usage errors with status 2."""
+
+from __future__ import annotations
+
+import argparse
+
+from toolchain.errors import ToolError
+
+
+def parser(command: str, description: str, example: str) -> argparse.ArgumentParser:
+    """Return an empty parser for `python -m toolchain COMMAND`."""
+    return argparse.ArgumentParser(
+        prog=f"python -m toolchain {command}",
+        description=description,
+        epilog=f"example: {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+
+
+def integer(text: str) -> int:
+    """A number in C notation, for argparse."""
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+
+
+def definition(text: str) -> tuple[str, int]:
+    """NAME=VALUE of --defsym; raises `ToolError`."""
+    name, equals, value = text.partition("=")
+    try:
+        return name, int(value, 0) if equals else 1
+    except ValueError:
+        raise ToolError(f"--defsym {text}: {value!r} is not a number") from None

@@ -1,0 +1,94 @@
+"""What `ld` and the compiler driver share: linker options, inputs by content, output files."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from toolchain.commands.parser import definition, integer, parser
+from toolchain.elf.read import read_object
+from toolchain.elf.write import executable_bytes
+from toolchain.link.archive import MAGIC, Archive, open_archive
+from toolchain.link.hexfile import hex_text
+from toolchain.link.link import Linked, link
+from toolchain.link.mapfile import map_text
+from toolchain.link.options import MINIMUM_STACK, STACK_GUARD, LinkOptions
+
+
+def add_options(p: argparse.ArgumentParser) -> None:
+    """Add the options that steer a link (names as in Microchip's linker, abi-elf.md §3.3)."""
+    p.add_argument("-e", "--entry", default="__reset", help="start symbol (default __reset)")
+    p.add_argument("--gc-sections", action="store_true", help="leave out sections nothing refers to")
+    p.add_argument("--no-gc-sections", dest="gc_sections", action="store_false", help=argparse.SUPPRESS)
+    p.add_argument("-u", "--undefined", action="append", default=[], metavar="SYM", help="keep and look for SYM")
+    p.add_argument("--defsym", action="append", default=[], metavar="NAME=VALUE", help="define an absolute symbol")
+    p.add_argument("--heap", type=integer, default=0, metavar="N", help="bytes of heap")
+    p.add_argument("--stack", type=integer, default=MINIMUM_STACK, metavar="N", help="smallest stack accepted, bytes")
+    p.add_argument("--stackguard", type=integer, default=STACK_GUARD, metavar="N", help="bytes kept above SPLIM")
+    p.add_argument("--no-data-init", dest="data_init", action="store_false", help="leave out the .dinit table")
+    p.add_argument("--data-init", dest="data_init", action="store_true", help=argparse.SUPPRESS)
+    p.add_argument("--no-pack-data", dest="pack_data", action="store_false", help="two data bytes per .dinit word")
+    p.add_argument("--pack-data", dest="pack_data", action="store_true", help=argparse.SUPPRESS)
+    p.add_argument("--no-handles", dest="handles", action="store_false", help="no GOTO slots for function pointers")
+    p.add_argument("--handles", dest="handles", action="store_true", help=argparse.SUPPRESS)
+    p.add_argument("--no-isr", dest="isr", action="store_false", help="leave vectors without handler empty")
+    p.add_argument("--isr", dest="isr", action="store_true", help=argparse.SUPPRESS)
+    p.add_argument("--fill-upper", type=integer, default=0, metavar="BYTE", help="upper byte of data words in flash")
+    p.add_argument("--report-mem", action="store_true", help="print memory use")
+    for word in ("--start-group", "--end-group", "-(", "-)"):  # all libraries are one group anyway
+        p.add_argument(word, action="store_true", help=argparse.SUPPRESS)
+    p.add_argument("-p", "--processor", default="30F6014A", help=argparse.SUPPRESS)
+
+
+def link_options(options: argparse.Namespace) -> LinkOptions:
+    """Return the linker's options from parsed arguments; raises `ToolError` for values out of range."""
+    from toolchain.errors import ToolError
+
+    for name in ("heap", "stack", "stackguard"):
+        if not 0 <= getattr(options, name) <= 0xFFFF:
+            raise ToolError(f"--{name} {getattr(options, name)} is outside 0..65535")
+    if not 0 <= options.fill_upper <= 0xFF:
+        raise ToolError(f"--fill-upper {options.fill_upper} is not a byte")
+    return LinkOptions(
+        entry=options.entry,
+        gc_sections=options.gc_sections,
+        heap=options.heap,
+        stack=options.stack,
+        stack_guard=options.stackguard,
+        data_init=options.data_init,
+        pack_data=options.pack_data,
+        handles=options.handles,
+        isr=options.isr,
+        fill_upper=options.fill_upper,
+        undefined=options.undefined,
+        define=dict(map(definition, options.defsym)),
+    )
+
+
+def parse_link_words(words: Sequence[str]) -> LinkOptions:
+    """Return linker options from words such as `--heap=64`; an unknown one exits with a usage message."""
+    p = parser("ld", "Linker options.", "cc -Wl,--heap=64")
+    add_options(p)
+    return link_options(p.parse_args(list(words)))
+
+
+def link_files(inputs: Sequence[tuple[str, bytes]], options: LinkOptions) -> Linked:
+    """Link files given as (name, content), objects and archives mixed.  Raises `ToolError`."""
+    objects = [read_object(data, name) for name, data in inputs if data[: len(MAGIC)] != MAGIC]
+    archives: list[Archive] = [open_archive(data, name) for name, data in inputs if data[: len(MAGIC)] == MAGIC]
+    return link(objects, archives, options)
+
+
+def output_files(
+    linked: Linked, output: Path, map_file: str | Path | None = None, hex_file: str | Path | None = None
+) -> list[tuple[str | Path, bytes]]:
+    """Return (path, content) of everything a link writes; `output` in .hex becomes Intel HEX instead of ELF."""
+    is_hex = output.suffix.lower() == ".hex"
+    content = hex_text(linked.image).encode() if is_hex else executable_bytes(linked.image)
+    files: list[tuple[str | Path, bytes]] = [(output, content)]
+    if hex_file:
+        files.append((hex_file, hex_text(linked.image).encode()))
+    if map_file:
+        files.append((map_file, map_text(linked).encode()))
+    return files
