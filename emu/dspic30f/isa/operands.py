@@ -9,20 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeAlias
+from typing import TypeAlias
 
 from .fields import Operands
 from .row import Row
 
 SymbolOf: TypeAlias = Callable[[int, str], str | None]  # address, "code" or "data" -> name
-Expr: TypeAlias = Callable[[str], "Expression"]
-
-
-class Expression(Protocol):
-    """What the caller's expression parser returns: a number now, or ``value`` None and known later."""
-
-    @property
-    def value(self) -> int | None: ...
 
 
 class OperandError(ValueError):
@@ -31,12 +23,15 @@ class OperandError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a kind made of some tokens: fields already known, and an expression for ``Kind.number``."""
+    """What a kind made of some tokens: fields already known, and expressions still to be parsed.
+
+    Nothing is parsed before the whole statement fits a form, so that trying a form has no effect on the caller.
+    """
 
     taken: int
     fields: Mapping[str, int] = field(default_factory=dict)
-    expression: Any = None
-    addend: int = 0  # added to the number: the odd byte of a word in f-bit forms
+    text: str | None = None  # becomes a number, which ``Kind.number`` turns into fields
+    bit: str = ""  # becomes the bit number of an f-bit form
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +60,7 @@ def register_number(token: str) -> int | None:
 class Kind:
     """One operand, or an optional group of operands."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         """Take tokens from the front; None if their shape does not fit."""
         raise NotImplementedError
 
@@ -88,7 +83,7 @@ class Fixed(Kind):
 
     word: str
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         return Part(1) if tokens and tokens[0].upper() == self.word else None
 
     def write(self, x: Operands, at: Site, symbol: SymbolOf | None, source: bool) -> list[str]:
@@ -104,7 +99,7 @@ class Register(Kind):
     def letter(self, row: Row) -> str:
         return next(letter for letter in self.letters if letter in row.fields)
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         n = register_number(tokens[0]) if tokens else None
         if n is None:
             return None
@@ -125,7 +120,7 @@ class Address(Kind):
     mode3: str
     mode8: str
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         if not tokens:
             return None
         mode = self.mode8 if self.mode8 in at.row.fields else self.mode3
@@ -153,11 +148,11 @@ class OffsetAddress(Kind):
 
     register: str
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         match = OFFSET.fullmatch(tokens[0]) if tokens else None
         if match is None or INDIRECT.fullmatch(tokens[0]) or INDEXED.fullmatch(tokens[0]):
             return None
-        return Part(1, {self.register: int(match[1])}, expr(match[2]))
+        return Part(1, {self.register: int(match[1])}, match[2].strip())
 
     def number(self, value: int, at: Site) -> dict[str, int]:
         size = 1 if at.byte else 2
@@ -194,10 +189,10 @@ class Literal(Kind):
     high: int
     byte: bool = False
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         if not tokens or not tokens[0].startswith("#"):
             return None
-        return Part(1, expression=expr(tokens[0][1:].strip()))
+        return Part(1, text=tokens[0][1:].strip())
 
     def number(self, value: int, at: Site) -> dict[str, int]:
         field = at.row.fields[self.letter]
@@ -231,8 +226,8 @@ class Literal(Kind):
 class Bit(Kind):
     """#bit4 of a W register; of a byte only 0..7."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
-        return Part(1, expression=expr(tokens[0][1:].strip())) if tokens and tokens[0].startswith("#") else None
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
+        return Part(1, text=tokens[0][1:].strip()) if tokens and tokens[0].startswith("#") else None
 
     def number(self, value: int, at: Site) -> dict[str, int]:
         high = 7 if at.byte else 15
@@ -256,8 +251,8 @@ def is_expression(token: str) -> bool:
 class FileAddress(Kind):
     """f: a data address. 13-bit forms reach 0x1FFF; words are even."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
-        return Part(1, expression=expr(tokens[0])) if tokens and is_expression(tokens[0]) else None
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
+        return Part(1, text=tokens[0]) if tokens and is_expression(tokens[0]) else None
 
     def number(self, value: int, at: Site) -> dict[str, int]:
         low, high = at.row.fields["f"].limits
@@ -270,7 +265,7 @@ class FileAddress(Kind):
     def relocation(self, at: Site) -> str:
         if at.row.fields["f"].width == 13:
             return "FILE_REG_BYTE" if at.byte else "FILE_REG"
-        return "FILE_REG_WORD_WITH_DST" if at.row.fields["f"].runs[0].shift else "FILE_REG_WORD"
+        return "FILE_REG_WORD_WITH_DST" if {"s", "d"} & at.row.fields.keys() else "FILE_REG_WORD"
 
     def write(self, x: Operands, at: Site, symbol: SymbolOf | None, source: bool) -> list[str]:
         return [(symbol and symbol(x.f, "data")) or f"{x.f:#x}"]
@@ -280,16 +275,17 @@ class FileAddress(Kind):
 class FileBit(Kind):
     """``f, #bit4`` of the f-bit forms: two tokens. A word bit 8..15 is a bit of the byte behind f (isa.md §16)."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         if len(tokens) < 2 or not is_expression(tokens[0]) or not tokens[1].startswith("#"):
             return None
-        bit = expr(tokens[1][1:].strip()).value
-        if bit is None:
-            raise OperandError("the bit number must be a number")
+        return Part(2, text=tokens[0], bit=tokens[1][1:].strip())
+
+    def bit(self, number: int | None, at: Site) -> tuple[int, int]:
+        """Field b, and what to add to the address."""
         high = 7 if at.byte else 15
-        if not 0 <= bit <= high:
-            raise OperandError(f"bit #{bit} is not in 0..{high}")
-        return Part(2, {"b": bit & 7}, expr(tokens[0]), bit >> 3)
+        if number is None or not 0 <= number <= high:
+            raise OperandError(f"bit number must be a number in 0..{high}")
+        return number & 7, number >> 3
 
     def number(self, value: int, at: Site) -> dict[str, int]:
         return FileAddress().number(value, at)
@@ -305,8 +301,8 @@ class FileBit(Kind):
 class Target(Kind):
     """Expr: a program address. Relative in branches and DO, absolute in CALL and GOTO."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
-        return Part(1, expression=expr(tokens[0])) if tokens and is_expression(tokens[0]) else None
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
+        return Part(1, text=tokens[0]) if tokens and is_expression(tokens[0]) else None
 
     def number(self, value: int, at: Site) -> dict[str, int]:
         if value % 2:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from .dsp import MULTIPLICANDS, NO_PREFETCH, OFFSET_REGISTER, PREFETCH_STEP, WITH_OFFSET
 from .fields import Operands
-from .operands import Expr, Kind, Part, Site, SymbolOf, register_number
+from .operands import Kind, Part, Site, SymbolOf, register_number
 from .row import Row
 
 PREFETCH = re.compile(r"\[\s*w(8|9|10|11)\s*\](?:\s*([+-])=\s*([246]))?", re.IGNORECASE)
@@ -24,7 +24,7 @@ UNKNOWN = "???"
 class Accumulator(Kind):
     """A or B."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         return Part(1, {"A": "AB".index(tokens[0].upper())}) if tokens and tokens[0].upper() in ("A", "B") else None
 
     def write(self, x: Operands, at: Site, symbol: SymbolOf | None, source: bool) -> list[str]:
@@ -37,7 +37,7 @@ class Product(Kind):
 
     square: bool
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         match = PRODUCT.fullmatch(tokens[0]) if tokens else None
         if match is None:
             return None
@@ -58,7 +58,7 @@ class Prefetch(Kind):
     data: str  # field: x or y; "" if the data register is a separate operand
     first: int  # 8 or 10: the lower of the two pointer registers
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         code = self.code(tokens[0]) if tokens else None
         if not self.data:
             return None if code is None else Part(1, {self.pointer: code})
@@ -99,7 +99,7 @@ class Prefetch(Kind):
 class PrefetchData(Kind):
     """Wxd of ED and EDAC."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         n = register_number(tokens[0]) if tokens else None
         return Part(1, {"x": n - 4}) if n is not None and 4 <= n <= 7 else None
 
@@ -111,7 +111,7 @@ class PrefetchData(Kind):
 class WriteBack(Kind):
     """Optional accumulator write-back: W13 or [W13]+=2."""
 
-    def read(self, tokens: Sequence[str], at: Site, expr: Expr) -> Part | None:
+    def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         code = WRITE_BACK.get(re.sub(r"\s", "", tokens[0]).lower()) if tokens else None
         return Part(0, {"a": 2}) if code is None else Part(1, {"a": code})
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 from .codec import EncodeError, encode
-from .operands import Expr, Kind, OperandError, Site, SymbolOf
+from .operands import FileBit, Kind, OperandError, Part, Site, SymbolOf
 from .row import Insn, Row
 from .syntax import FORMS, Form, kinds_of, printed_mnemonic
 
@@ -23,6 +23,16 @@ EXPLANATION = {
 }
 # pic30-as takes w1 as divisor although the manual forbids it (isa.md §6.7); the CPU refuses the word.
 TOLERATED = (("s>=2", 1),)
+
+
+class Expression(Protocol):
+    """What the caller's expression parser returns: a number now, or ``value`` None and known later."""
+
+    @property
+    def value(self) -> int | None: ...
+
+
+Expr: TypeAlias = Callable[[str], Expression]
 
 
 class StatementError(ValueError):
@@ -85,6 +95,8 @@ class Parsed:
 def _reason(error: EncodeError) -> str:
     if error.clause is not None:
         return EXPLANATION.get(error.clause.text, f"{error.clause.text} does not hold")
+    if error.letter == "t":  # W16 as the high half
+        return EXPLANATION["v even"]
     if error.letter in ("s", "d"):
         return f"w{error.value} is not an even register"
     return f"field {error.letter} cannot hold {error.value}"
@@ -130,9 +142,13 @@ def parse(statement: str, expr: Expr = Number.read) -> Parsed:
         raise StatementError(f"unknown instruction {mnemonic!r}")
     tokens = split_operands(more + " " + rest if tab else rest)
     for form, byte in choices:
-        parsed = _match(form, byte, tokens, expr, statement.strip())
-        if parsed is not None:
-            return parsed
+        site = Site(form.row, 0, byte)
+        parts = _match(form, site, tokens)
+        if parts is not None:
+            try:
+                return _parsed(form, site, parts, expr, statement.strip())
+            except OperandError as error:
+                raise StatementError(f"{statement.strip()}: {error}") from None
     accepted = " | ".join(form.syntax for form, _ in choices)
     raise StatementError(f"{statement.strip()}: operands fit none of {accepted}")
 
@@ -162,23 +178,30 @@ def split_operands(text: str) -> list[str]:
     return [] if pieces == [""] else pieces
 
 
-def _match(form: Form, byte: bool, tokens: Sequence[str], expr: Expr, statement: str) -> Parsed | None:
-    site = Site(form.row, 0, byte)
-    fields = dict(form.fixed)
-    if "B" in form.row.fields:
-        fields["B"] = int(byte)
-    slots, rest = [], list(tokens)
+def _match(form: Form, site: Site, tokens: Sequence[str]) -> list[tuple[Kind, Part]] | None:
+    """The operands by kind, if the tokens have the shape of the form."""
+    parts, rest = [], list(tokens)
     for kind in kinds_of(form.syntax):
-        try:
-            part = kind.read(rest, site, expr)
-        except OperandError as error:
-            raise StatementError(f"{statement}: {error}") from None
+        part = kind.read(rest, site)
         if part is None:
             return None
-        if "w" in part.fields and fields.get("w", part.fields["w"]) != part.fields["w"]:
-            raise StatementError(f"{statement}: both operands must use the same index register")
-        fields |= part.fields
-        if part.expression is not None:
-            slots.append(Slot(kind, part.expression, kind.relocation(site), part.addend))
+        parts.append((kind, part))
         rest = rest[part.taken :]
-    return None if rest else Parsed(form.row, fields, byte, tuple(slots), statement)
+    return None if rest else parts
+
+
+def _parsed(form: Form, site: Site, parts: Sequence[tuple[Kind, Part]], expr: Expr, statement: str) -> Parsed:
+    fields = dict(form.fixed)
+    if "B" in form.row.fields:
+        fields["B"] = int(site.byte)
+    slots = []
+    for kind, part in parts:
+        if "w" in part.fields and fields.get("w", part.fields["w"]) != part.fields["w"]:
+            raise OperandError("both operands must use the same index register")
+        fields |= part.fields
+        addend = 0
+        if isinstance(kind, FileBit):
+            fields["b"], addend = kind.bit(expr(part.bit).value, site)
+        if part.text is not None:
+            slots.append(Slot(kind, expr(part.text), kind.relocation(site), addend))
+    return Parsed(form.row, fields, site.byte, tuple(slots), statement)
