@@ -73,7 +73,7 @@ class Machine:
         self.resets: Final[list[tuple[int, str]]] = []
         """(cycle, cause) of the last resets."""
         self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
-        self._resumed: int | None = None
+        self._stopped_at: tuple[int, int] | None = None
         self._interrupt = False
         self._engine: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
         self.reset("POR")
@@ -191,15 +191,15 @@ class Machine:
         return Stop(reason, self.pc, self.cycle, detail)
 
     def _hit(self) -> bool:
-        """Call the hooks of the present PC, once per arrival; True if one of them wants to stop."""
-        pc = self.state.pc
-        if self._resumed == pc:
-            self._resumed = None
+        """Call the hooks of the present PC; true if one of them wants to stop, at most once per arrival."""
+        here = (self.state.pc, self.state.cycle)
+        if self._stopped_at == here:
+            self._stopped_at = None
             return False
         hit = False
-        for hook in self._pc_hooks[pc]:
+        for hook in list(self._pc_hooks[self.state.pc]):
             hit = bool(hook()) or hit
-        self._resumed = pc
+        self._stopped_at = here if hit else None
         return hit
 
     # Resets
@@ -281,7 +281,7 @@ class Machine:
         if self.program.flash.tobytes() != flash:
             self.program.announce_all()
         self.peripherals.restored()
-        self._resumed = None
+        self._stopped_at = None
 
     # Hooks
 

@@ -72,7 +72,7 @@ class CoreRegisters:
         """EDT is remembered, not stored: it reads 0 (isa.md §2.4). IPL3 may have been cleared."""
         if new & EDT:
             self._state.corcon = new & ~EDT
-            if self._state.sr & DA:
+            if self._state.sr & DA and not self._state.edt:
                 self._state.edt = 1
         self._events.kick()
 

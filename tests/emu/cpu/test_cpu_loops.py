@@ -1,0 +1,180 @@
+"""REPEAT and DO: counting, nesting, early ends, and interrupts at every point (isa.md §7.5, §7.6)."""
+
+from __future__ import annotations
+
+import pytest
+from cpu_rig import Rig
+
+ISR = "isr: inc 0x1100\nbclr 0x84, #3\nretfie"
+ISR_CYCLES = 1 + 1 + 3
+DA, RA = 0x0200, 0x0010
+
+
+def interrupted(engine: str, text: str, cycle: int, **w: int) -> Rig:
+    rig = Rig(f"{text}\nend: nop\nhalt: bra halt\n{ISR}", engine, **w)
+    rig.vector(0x1A, "isr")
+    rig.interrupt_at(cycle)
+    rig.note("isr")
+    return rig
+
+
+def test_repeat_with_count_zero_is_a_nop(engine: str) -> None:
+    """isa.md §7.5: RA stays 0."""
+    rig = Rig("repeat #0\nmov 0x42, w1\nend: nop", engine)
+    assert rig.cycles_to() == 2
+    assert rig.machine.w[1] & RA == 0
+
+
+def test_the_target_sees_the_counter_fall_to_zero(engine: str) -> None:
+    """isa.md §7.5: the first iteration sees RCOUNT = count, the last 0."""
+    rig = Rig("mov #0x36, w1\nrepeat #3\nmov [w1], [w2++]\nend: nop", engine, w2=0x1000)
+    rig.cycles_to()
+    assert [rig.machine.peek(0x1000 + 2 * index) for index in range(4)] == [3, 2, 1, 0]
+
+
+def test_repeat_takes_its_count_from_a_register(engine: str) -> None:
+    """isa.md §7.5: Wn<13:0>."""
+    rig = Rig("repeat w3\ninc w0, w0\nend: nop", engine, w0=0, w3=0xC004)
+    assert rig.cycles_to() == 6
+    assert rig.machine.w[0] == 5
+
+
+@pytest.mark.parametrize("cycle", range(0, 9))
+def test_repeat_can_be_interrupted_between_any_two_iterations(engine: str, cycle: int) -> None:
+    """isa.md §7.5, §14.3: cycle 0 is REPEAT, 1..6 the iterations; each costs one cycle, so the handler starts at c + 4;
+    the whole run takes 7 cycles + 3 of entry + the handler."""
+    rig = interrupted(engine, "repeat #5\ninc w0, w0", cycle, w0=0)
+    rig.machine.hook_pc(rig.labels["halt"], lambda: rig.machine.cycle > 10)
+    rig.run()
+    assert rig.first("isr") == cycle + 4
+    assert rig.machine.w[0] == 6
+    assert rig.machine.peek(0x1100) == 1
+
+
+def test_an_interrupted_repeat_stacks_its_target_with_ra_set(engine: str) -> None:
+    """isa.md §7.5: stacked PC = target, stacked SRL has RA = 1, RA is cleared in SR."""
+    rig = interrupted(engine, "repeat #5\ninc w0, w0", 2, w0=0)
+    rig.machine.hook_pc(rig.labels["isr"], lambda: True)
+    rig.run()
+    machine = rig.machine
+    assert machine.peek(0x0900) == 0x202
+    assert machine.peek(0x0902) & RA << 8
+    assert machine.peek("SR") & RA == 0
+    assert machine.peek("RCOUNT") == 3
+
+
+def test_a_handler_ends_a_repeat_early_by_clearing_rcount(engine: str) -> None:
+    """isa.md §7.5: one more execution follows. Two iterations ran before (cycles 1, 2), one after."""
+    rig = Rig("repeat #9\ninc w0, w0\nend: nop\nisr: bclr 0x84, #3\nclr 0x36\nretfie", engine, w0=0)
+    rig.vector(0x1A, "isr")
+    rig.interrupt_at(2)
+    rig.cycles_to()
+    assert rig.machine.w[0] == 3
+
+
+def test_a_handler_may_use_repeat_if_it_saves_rcount(engine: str) -> None:
+    """isa.md §7.5: RCOUNT is not saved by hardware."""
+    isr = "isr: bclr 0x84, #3\npush 0x36\nrepeat #2\ninc w1, w1\npop 0x36\nretfie"
+    rig = Rig(f"repeat #9\ninc w0, w0\nend: nop\n{isr}", engine, w0=0, w1=0)
+    rig.vector(0x1A, "isr")
+    rig.interrupt_at(4)
+    rig.cycles_to()
+    assert (rig.machine.w[0], rig.machine.w[1]) == (10, 3)
+
+
+@pytest.mark.parametrize("cycle", range(0, 20))
+def test_a_divide_survives_a_handler_that_divides(engine: str, cycle: int) -> None:
+    """isa.md §6.7: interrupts between any two iterations; the handler saves W0, W1, RCOUNT."""
+    isr = (
+        "isr: bclr 0x84, #3\npush w0\npush w1\npush 0x36\nrepeat #17\ndiv.u w6, w7\nmov w0, w8\n"
+        "pop 0x36\npop w1\npop w0\nretfie"
+    )
+    rig = Rig(f"repeat #17\ndiv.u w4, w2\nend: nop\nhalt: bra halt\n{isr}", engine, w4=0x3000, w2=0x27, w6=100, w7=7)
+    rig.vector(0x1A, "isr")
+    rig.interrupt_at(cycle)
+    rig.machine.run(120)
+    assert (rig.machine.w[0], rig.machine.w[1], rig.machine.w[8]) == (0x013B, 0x0003, 14)
+
+
+def test_a_do_loop_costs_nothing_per_iteration(engine: str) -> None:
+    """isa.md §7.6: DO 2 cycles, count + 1 iterations, no extra cycle at the end."""
+    rig = Rig("do #4, last\ninc w0, w0\nlast: inc w1, w1\nend: nop", engine, w0=0, w1=0)
+    assert rig.cycles_to() == 2 + 5 * 2
+    assert (rig.machine.w[0], rig.machine.w[1]) == (5, 5)
+    assert rig.machine.peek("SR") & DA == 0
+    assert rig.machine.peek("CORCON") == 0x0020
+
+
+def test_a_do_loop_shows_its_level_and_registers(engine: str) -> None:
+    """isa.md §7.6: DOSTART = PC + 4, DOEND, DCOUNT, DL = 1, DA = 1."""
+    rig = Rig("do #4, last\nbody: nop\nlast: nop\nend: nop", engine)
+    rig.note("body", stop=True)
+    rig.run()
+    machine = rig.machine
+    assert machine.peek("DOSTARTL") == rig.labels["body"]
+    assert machine.peek("DOENDL") == rig.labels["last"]
+    assert machine.peek("DCOUNT") == 4
+    assert machine.peek("CORCON") >> 8 & 7 == 1
+    assert machine.peek("SR") & DA
+
+
+def test_do_loops_nest_once_in_hardware(engine: str) -> None:
+    """isa.md §7.6: the shadows bring the outer loop back. 2 + 3 x (1 + 2 + 4 x 2 + 1) cycles."""
+    text = "do #2, last\ninc w0, w0\ndo #3, inner\ninc w1, w1\ninner: inc w2, w2\nlast: inc w3, w3\nend: nop"
+    rig = Rig(text, engine, w0=0, w1=0, w2=0, w3=0)
+    assert rig.cycles_to() == 2 + 3 * (1 + 2 + 4 * 2 + 1)
+    assert [rig.machine.w[number] for number in range(4)] == [3, 12, 12, 3]
+
+
+@pytest.mark.parametrize(
+    ("place", "rounds"),
+    [("first", 1), ("middle", 1), ("penultimate", 2), ("last", 2)],
+)
+def test_edt_ends_the_loop_after_this_iteration_or_the_next(engine: str, place: str, rounds: int) -> None:
+    """isa.md §7.6: written in the penultimate or last instruction, one more iteration runs."""
+    body = dict.fromkeys(("first", "middle", "penultimate", "last"), "nop")
+    body[place] = "mov w4, 0x44"
+    text = "do #9, last\ninc w0, w0\n" + "\n".join(f"{name}: {statement}" for name, statement in body.items())
+    rig = Rig(f"{text}\nend: nop", engine, w0=0, w4=0x0820)
+    rig.cycles_to()
+    assert rig.machine.w[0] == rounds
+    assert rig.machine.peek("CORCON") == 0x0020
+
+
+@pytest.mark.parametrize("cycle", range(0, 18))
+def test_a_do_loop_can_be_interrupted_anywhere(engine: str, cycle: int) -> None:
+    """isa.md §7.6: DA, DL and the counters are left alone; the handler runs once, the loop five times."""
+    text = "do #4, last\ninc w0, w0\nmov.d w4, w6\nlast: inc w1, w1"
+    rig = interrupted(engine, text, cycle, w0=0, w1=0)
+    rig.machine.run(100)
+    assert (rig.machine.w[0], rig.machine.w[1], rig.machine.peek(0x1100)) == (5, 5, 1)
+    assert rig.machine.peek("SR") & DA == 0
+
+
+def test_a_handler_may_run_a_do_loop_of_its_own(engine: str) -> None:
+    """isa.md §7.6: while DL stays <= 2."""
+    isr = "isr: bclr 0x84, #3\ndo #2, isrlast\ninc w2, w2\nisrlast: inc w3, w3\nretfie"
+    text = f"do #4, last\ninc w0, w0\nlast: inc w1, w1\nend: nop\nhalt: bra halt\n{isr}"
+    rig = Rig(text, engine, w0=0, w1=0, w2=0, w3=0)
+    rig.vector(0x1A, "isr")
+    rig.interrupt_at(5)
+    rig.machine.run(100)
+    assert [rig.machine.w[number] for number in range(4)] == [5, 5, 3, 3]
+
+
+def test_a_branch_out_leaves_the_loop_armed(engine: str) -> None:
+    """isa.md §7.6: DA and DL stay set; a later pass over DOEND loops again."""
+    text = "do #4, last\ninc w0, w0\nbra z, out\nlast: nop\nend: nop\nout: nop\nleft: bra last"
+    rig = Rig(text, engine, w0=0xFFFF)
+    rig.note("left", stop=True)
+    rig.run()
+    assert rig.machine.peek("SR") & DA
+    rig.cycles_to()
+    assert rig.machine.w[0] == 4
+
+
+def test_repeat_inside_do(engine: str) -> None:
+    """isa.md §7.6: allowed except at the end. 2 + 3 x (1 + 4 + 1)."""
+    rig = Rig("do #2, last\nrepeat #3\ninc w0, w0\nlast: inc w1, w1\nend: nop", engine, w0=0, w1=0)
+    assert rig.cycles_to() == 2 + 3 * 6
+    assert (rig.machine.w[0], rig.machine.w[1]) == (12, 3)
