@@ -14,9 +14,6 @@ import llvmlite.binding as llvm
 
 from toolchain.errors import ToolError
 
-# Functions that code generation may call by name although no IR call exists (abi-elf.md §2.8): a program that brings
-# its own version keeps it visible for them.
-IMPLICIT_CALLEES = re.compile(r"mem(cpy|move|set|cmp)|__\w+[sdht][fi]\d?|__\w+[sd]f[sd]i|abort|exit|__putchar")
 # abi-elf.md §2.7: the linker finds handlers by these names.
 VECTOR_NAME = re.compile(r"_(Alt)?\w*(Interrupt\d*|OscillatorFail|AddressError|StackError|MathError|ReservedTrap\d)")
 VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.weak_odr, llvm.Linkage.linkonce_any,
@@ -54,6 +51,18 @@ def merge(modules: list[tuple[Path, llvm.ModuleRef]]) -> llvm.ModuleRef:
     return merged
 
 
+def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
+    """Names that native objects, given as (name, content), want from elsewhere."""
+    from toolchain.elf.model import Home
+    from toolchain.elf.read import is_object, read_object
+
+    names: set[str] = set()
+    for name, content in objects:
+        if is_object(content):
+            names.update(s.name for s in read_object(content, name).symbols if s.home is Home.UNDEFINED)
+    return names
+
+
 def names_in_inline_assembly(text: str) -> set[str]:
     """C names that inline assembly anywhere in the module's text refers to as `_name`."""
     names: set[str] = set()
@@ -65,9 +74,10 @@ def names_in_inline_assembly(text: str) -> set[str]:
 
 
 def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
-    """Give `internal` linkage to every definition except entry, vectors, implicit callees and the names given.
+    """Give `internal` linkage to every definition except `main`, vectors and the names given.
 
-    `assembler_names` are object-file names, with the leading underscore of C names (abi-elf.md §2.6).
+    `assembler_names` are object-file names, with the leading underscore of C names (abi-elf.md §2.6). They include what
+    the run-time library defines: generated code may call its functions without any call in the IR.
     """
     keep = {name[1:] for name in assembler_names if name.startswith("_")} | {"main"}
     keep |= names_in_inline_assembly(str(module))
@@ -75,7 +85,7 @@ def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
         if value.is_declaration or value.linkage not in VISIBLE_LINKAGES:
             continue
         name = value.name
-        if name in keep or name.startswith("llvm.") or VECTOR_NAME.fullmatch(name) or IMPLICIT_CALLEES.fullmatch(name):
+        if name in keep or name.startswith("llvm.") or VECTOR_NAME.fullmatch(name):
             continue
         value.linkage = llvm.Linkage.internal
 

@@ -1,0 +1,218 @@
+"""`python -m toolchain cc`: C, assembly and objects in; object, ELF or Intel HEX out, used like gcc.
+
+Stages: front end (clang, in parallel) → merge and optimise (whole program) → `pipeline.compile_module` → assembler →
+linker. Heavy parts are imported when their stage runs, so that `-E` and error messages come at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from toolchain.cc_options import HELP, CcOptions, Input, parse
+from toolchain.errors import ToolError
+from toolchain.files import read_bytes, read_text, write_outputs
+
+if TYPE_CHECKING:
+    from toolchain.cc_link import Program
+
+EXIT_DONE, EXIT_C_ERRORS, EXIT_BAD_INPUT = 0, 1, 2
+IR_SOURCES = {"c", "cpp-output"}
+
+
+def main(argv: list[str]) -> int:
+    """Run the compiler driver on `argv` (without program name); return the exit status, never raise on bad input."""
+    from toolchain.clang import CompileError
+
+    try:
+        options = parse(argv)
+        if options.action == "help":
+            sys.stdout.write(HELP)
+        elif options.action == "version":
+            _print_version()
+        else:
+            with tempfile.TemporaryDirectory(prefix="dspic-cc-") as scratch:
+                _run(options, Path(scratch))
+    except CompileError:
+        return EXIT_C_ERRORS
+    except ToolError as error:
+        for finding in error.findings:
+            print(finding if "error:" in finding else f"error: {finding}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    return EXIT_DONE
+
+
+def _print_version() -> None:
+    from importlib.metadata import version
+
+    import llvmlite
+
+    print(f"dspic cc (openswarm {version('openswarm')}), clang from ziglang {version('ziglang')}, "
+          f"llvmlite {llvmlite.__version__}")  # fmt: skip
+    print("Target: dsPIC30F6014A")
+
+
+def _run(options: CcOptions, scratch: Path) -> None:
+    if options.stage == "preprocess":
+        _preprocess(options)
+    elif options.stage == "link":
+        from toolchain.cc_link import link_program
+
+        link_program(options, _compile_program(options, scratch))
+    else:
+        modules = _front_end(options, scratch)
+        write_outputs([_translate(options, item, modules, scratch) for item in options.inputs])
+
+
+def _preprocess(options: CcOptions) -> None:
+    from toolchain.clang import preprocess_job, run_jobs
+
+    jobs = [preprocess_job(options, item, options.output) for item in options.inputs
+            if item.language in IR_SOURCES | {"assembler-with-cpp"}]  # fmt: skip
+    run_jobs(jobs, options.jobs)
+
+
+def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
+    """Unoptimised IR of every input that has any; all C files are compiled before an error ends the run."""
+    from toolchain.clang import ir_job, run_jobs
+    from toolchain.whole_program import is_bitcode
+
+    sources = [item for item in options.inputs if item.language in IR_SOURCES]
+    targets = {item: scratch / f"{number}.front.ll" for number, item in enumerate(sources)}
+    if targets:
+        run_jobs([ir_job(options, item, target) for item, target in targets.items()], options.jobs)
+    modules: dict[Input, bytes] = {}
+    for item in options.inputs:
+        if item in targets:
+            modules[item] = targets[item].read_bytes()
+        elif item.language in ("ir", "object"):
+            content = read_bytes(item.path)
+            if item.language == "ir" or is_bitcode(content):
+                modules[item] = content
+    return modules
+
+
+def _optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
+    """One run of clang's middle end over a module (text or bitcode)."""
+    from toolchain.clang import optimise_job, run_jobs
+
+    handle, before = tempfile.mkstemp(suffix=".ll", dir=scratch)
+    os.write(handle, ir)
+    os.close(handle)
+    after = Path(before).with_suffix(".opt.ll")
+    run_jobs([optimise_job(options, Path(before), after)], 1)
+    return after.read_text()
+
+
+def _to_assembly(options: CcOptions, ir_text: str) -> str:
+    from toolchain import pipeline
+    from toolchain.isr_names import check
+
+    check(ir_text)
+    return pipeline.compile_module(ir_text, options)
+
+
+def _assemble(options: CcOptions, text: str, name: str, relax: bool) -> bytes:
+    """Object bytes. Branch shortening only for compiled code, as XC16's driver does (abi-elf.md §5 Relaxation)."""
+    from toolchain.asm.assemble import assemble
+    from toolchain.asm.state import Options
+    from toolchain.elf.write import object_bytes
+
+    folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
+    folders += [b for a, b in zip(options.clang, options.clang[1:], strict=False) if a == "-I"]
+    obj, messages = assemble(text, name, Options(include=folders, relax=relax, debug=options.debug))
+    for message in messages:
+        print(message, file=sys.stderr)
+    return object_bytes(obj)
+
+
+def _assembly_text(options: CcOptions, item: Input, scratch: Path) -> str:
+    """Text of an assembly input, preprocessed when it is one of the `.S` kind."""
+    if item.language == "assembler":
+        return read_text(item.path)
+    from toolchain.clang import preprocess_job, run_jobs
+
+    target = scratch / f"{item.path.name}.i"
+    run_jobs([preprocess_job(options, item, target)], 1)
+    return target.read_text()
+
+
+def object_of(options: CcOptions, item: Input, scratch: Path) -> bytes:
+    """Native object of one C, IR or assembly input."""
+    modules = _front_end(replace(options, inputs=[item]), scratch)
+    return _object(options, item, modules, scratch)
+
+
+def _object(options: CcOptions, item: Input, modules: dict[Input, bytes], scratch: Path) -> bytes:
+    if item in modules:
+        text = _to_assembly(options, _optimise(options, modules[item], scratch))
+        return _assemble(options, text, item.path.name, relax=True)
+    if item.language == "object":
+        return read_bytes(item.path)
+    return _assemble(options, _assembly_text(options, item, scratch), str(item.path), relax=False)
+
+
+def _translate(options: CcOptions, item: Input, modules: dict[Input, bytes], scratch: Path) -> tuple[Path, bytes]:
+    """Output file of one input for -c and -S."""
+    if item.language in ("object", "archive"):
+        raise ToolError(f"{item.path}: nothing to compile here (-c and -S take sources)")
+    if options.stage == "assemble" and options.lto and item in modules:
+        from toolchain.whole_program import read_module
+
+        return _output(options, item, ".o"), read_module(item.path, modules[item]).as_bitcode()
+    if options.stage == "assemble":
+        return _output(options, item, ".o"), _object(options, item, modules, scratch)
+    if item not in modules:
+        return _output(options, item, ".s"), _assembly_text(options, item, scratch).encode()
+    ir_text = _optimise(options, modules[item], scratch)
+    if options.emit_llvm:
+        return _output(options, item, ".ll"), ir_text.encode()
+    return _output(options, item, ".s"), _to_assembly(options, ir_text).encode()
+
+
+def _output(options: CcOptions, item: Input, suffix: str) -> Path:
+    return options.output or Path(item.path.stem + suffix)
+
+
+def _compile_program(options: CcOptions, scratch: Path) -> Program:
+    """Everything the linker needs: native objects in command-line order, merged C code last, archives."""
+    from toolchain.cc_link import Program, find_library, output_path
+    from toolchain.runtime_archive import library
+
+    modules = _front_end(options, scratch)
+    program = Program(runtime=library(options.jobs) if options.runtime or options.startup else b"")
+    for item in options.inputs:
+        if item.language == "archive":
+            program.archives.append((str(item.path), read_bytes(item.path)))
+        elif item not in modules or not options.whole_program:
+            program.objects.append((str(item.path), _object(options, item, modules, scratch)))
+    program.archives += [archive for name in options.libraries if (archive := find_library(options, name))]
+    if modules and options.whole_program:
+        ir_text = _optimise(options, _merge(modules, program), scratch)
+        assembly = _to_assembly(options, ir_text)
+        if options.save_temps:
+            base = output_path(options)
+            write_outputs([(base.with_suffix(".ll"), ir_text.encode()), (base.with_suffix(".s"), assembly.encode())])
+        name = next(iter(modules)).path.name if len(modules) == 1 else "program.c"
+        program.objects.append((name, _assemble(options, assembly, name, relax=True)))
+    return program
+
+
+def _merge(modules: dict[Input, bytes], program: Program) -> bytes:
+    """One module of all C inputs, with everything internal that assembly, archives and the library do not name."""
+    from toolchain.link.archive import open_archive
+    from toolchain.runtime_archive import defined_names
+    from toolchain.whole_program import internalise, merge, names_used, read_module
+
+    module = merge([(item.path, read_module(item.path, content)) for item, content in modules.items()])
+    outside = names_used(program.objects)
+    for name, content in program.archives:
+        outside |= names_used([(member.name, member.data) for member in open_archive(content, name).members])
+    if program.runtime:
+        outside |= defined_names(program.runtime)
+    internalise(module, outside)
+    return str(module).encode()

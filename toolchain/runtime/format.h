@@ -1,0 +1,38 @@
+/* Inside of the printf family. */
+#ifndef FORMAT_H
+#define FORMAT_H
+
+#include <stdarg.h>
+#include <stddef.h>
+
+/* Where characters go. `put` stores one; `count` is what printf will return. */
+typedef struct sink {
+    void (*put)(struct sink *sink, char character);
+    char *at, *end;
+    int count;
+} sink_t;
+
+/* One conversion specification (C11 7.21.6.1p4). */
+enum { LEFT = 1, PLUS = 2, SPACE = 4, ALTERNATE = 8, ZERO = 16, LONG = 32, WIDE = 64, BYTE = 128 };
+typedef struct {
+    unsigned char flags;
+    char conversion;
+    int width;
+    int precision; /* -1: none given */
+} spec_t;
+
+/* Runs `format` into `sink`; returns the count. */
+int __format(sink_t *sink, const char *format, va_list arguments);
+
+/* Emits prefix, zeros and digits padded to the field width. `digits` are in reverse order; `prefix` holds up to two
+ * characters, the first one in the low byte, 0 for none. */
+void __format_field(sink_t *sink, const spec_t *spec, unsigned prefix, const char *digits, int count);
+
+void __format_pad(sink_t *sink, char character, int count);
+
+/* The conversions that need 64-bit integers and doubles. The driver links them when a format string of the program
+ * mentions them; until then they are null. They take their argument from *arguments. */
+void __format_wide(sink_t *sink, const spec_t *spec, unsigned long long value, int negative);
+void __format_double(sink_t *sink, const spec_t *spec, double value);
+
+#endif

@@ -1,0 +1,252 @@
+/* Elementary functions in double precision (C11 7.12.4-7.12.7). Polynomials are Chebyshev interpolants computed for
+ * these intervals with 60 digits; errors stay below 2 units in the last place for |x| < 1e5 in the trigonometric
+ * functions, whose argument reduction uses 99 bits of pi/2. */
+#include "softfloat.h"
+
+#include <math.h>
+
+/* c[0] + c[1] z + ... + c[count-1] z^(count-1) */
+static double polynomial(const double *c, int count, double z)
+{
+    double sum = c[--count];
+    while (count)
+        sum = sum * z + c[--count];
+    return sum;
+}
+
+/* pi/2 and ln 2 in parts whose products with small integers are exact. */
+#define PIO2_1 1.5707963267341256
+#define PIO2_2 6.077100506303966e-11
+#define PIO2_3 2.0222662487959506e-21
+#define TWO_OVER_PI 0.63661977236758134308
+#define LN2_1 0.6931471803691238
+#define LN2_2 1.9082149292705877e-10
+#define ONE_OVER_LN2 1.44269504088896340736
+
+static const double sine[] = {-0.16666666666666666,    0.0083333333333309185,   -0.00019841269836712495,
+                              2.755731607868067e-06,   -2.5051126876085335e-08, 1.5917771759341687e-10};
+static const double cosine[] = {0.041666666666666664,    -0.0013888888888887378, 2.4801587298736822e-05,
+                                -2.7557317256781059e-07, 2.087614315748681e-09,  -1.1382408611707654e-11};
+
+/* x = quadrant * pi/2 + *rest, |*rest| <= pi/4; returns quadrant mod 4. */
+static int reduce(double x, double *rest)
+{
+    double turns = round(x * TWO_OVER_PI);
+    *rest = ((x - turns * PIO2_1) - turns * PIO2_2) - turns * PIO2_3;
+    return (int)fmod(turns, 4) & 3;
+}
+
+/* sin(x + quadrant * pi/2) for |x| <= pi/4. */
+static double sine_of(double x, int quadrant)
+{
+    double z = x * x;
+    double value = quadrant & 1 ? 1 - (0.5 * z - z * z * polynomial(cosine, 6, z)) : x + x * z * polynomial(sine, 6, z);
+    return quadrant & 2 ? -value : value;
+}
+
+double sin(double x)
+{
+    double rest;
+    if (!isfinite(x))
+        return f64_value(F64_NAN);
+    int quadrant = reduce(x, &rest);
+    return sine_of(rest, quadrant);
+}
+
+double cos(double x)
+{
+    double rest;
+    if (!isfinite(x))
+        return f64_value(F64_NAN);
+    int quadrant = reduce(x, &rest);
+    return sine_of(rest, quadrant + 1);
+}
+
+double tan(double x)
+{
+    double rest;
+    if (!isfinite(x))
+        return f64_value(F64_NAN);
+    int quadrant = reduce(x, &rest);
+    return sine_of(rest, quadrant & 1) / sine_of(rest, (quadrant & 1) + 1);
+}
+
+static const double arc[] = {-0.33333333333333331,  0.19999999999995505,   -0.14285714284662937, 0.1111111101496651,
+                             -0.090909045663502733, 0.076921829173827644,  -0.066645075966273781, 0.058581154692669106,
+                             -0.050852747691745775, 0.039226604671811355,  -0.019170699464250367};
+
+/* tan(pi/8): below it the polynomial holds; between it and its inverse, atan x = pi/4 + atan((x-1)/(x+1)). */
+#define TAN_PI_8 0.41421356237309503
+
+double atan(double x)
+{
+    double z = fabs(x), base = 0;
+    if (isnan(x))
+        return x;
+    if (z > 1 / TAN_PI_8) {
+        base = M_PI_2;
+        z = -1 / z;
+    } else if (z > TAN_PI_8) {
+        base = M_PI_4;
+        z = (z - 1) / (z + 1);
+    }
+    double square = z * z;
+    return copysign(base + (z + z * square * polynomial(arc, 11, square)), x);
+}
+
+double atan2(double y, double x)
+{
+    if (isnan(x) || isnan(y))
+        return f64_value(F64_NAN);
+    double angle;
+    if (y == 0)
+        angle = signbit(x) ? M_PI : 0;
+    else if (x == 0)
+        angle = M_PI_2;
+    else if (isinf(x) && isinf(y))
+        angle = x > 0 ? M_PI_4 : 3 * M_PI_4;
+    else {
+        angle = atan(fabs(y / x));
+        if (x < 0)
+            angle = M_PI - angle;
+    }
+    return copysign(angle, y);
+}
+
+double asin(double x)
+{
+    return fabs(x) > 1 ? f64_value(F64_NAN) : atan2(x, sqrt((1 - x) * (1 + x)));
+}
+
+double acos(double x)
+{
+    return fabs(x) > 1 ? f64_value(F64_NAN) : atan2(sqrt((1 - x) * (1 + x)), x);
+}
+
+static const double exponential[] = {0.5,
+                                     0.16666666666666671,
+                                     0.041666666666666671,
+                                     0.0083333333333260699,
+                                     0.0013888888888883703,
+                                     0.00019841269875048905,
+                                     2.4801587325710759e-05,
+                                     2.7557255110978891e-06,
+                                     2.7557273436570519e-07,
+                                     2.5105337244665209e-08,
+                                     2.0914772832237191e-09};
+
+/* exp(x + tail) for a tail below one unit in the last place of x. */
+static double exponential_of(double x, double tail)
+{
+    if (isnan(x))
+        return x;
+    if (x > 710)
+        return HUGE_VAL;
+    if (x < -750)
+        return 0;
+    double twos = round(x * ONE_OVER_LN2);
+    double rest = ((x - twos * LN2_1) - twos * LN2_2) + tail;
+    return ldexp(1 + (rest + rest * rest * polynomial(exponential, 11, rest)), (int)twos);
+}
+
+double exp(double x)
+{
+    return exponential_of(x, 0);
+}
+
+static const double logarithm[] = {0.66666666666666696, 0.39999999999899311, 0.28571428626063622, 0.22222211120421034,
+                                   0.18182890171914962, 0.15331686825116089, 0.14616879374036285};
+
+/* The upper 26 bits, so that products of two such numbers are exact. */
+static double upper(double x)
+{
+    return f64_value(f64_bits(x) & ~0x7FFFFFFULL);
+}
+
+/* log(x) = result + *tail for finite x > 0; with s = f / (2 + f), log(1 + f) = 2 atanh(s) = 2 s + s^3 (...). */
+static double logarithm_of(double x, double *tail)
+{
+    int twos;
+    double m = frexp(x, &twos);
+    if (m < M_SQRT2 / 2) {
+        m *= 2;
+        twos--;
+    }
+    double f = m - 1, sum = m + 1;
+    double s = f / sum, s_high = upper(s);
+    double sum_high = upper(sum), sum_low = m - (sum_high - 1);
+    double s_low = ((f - s_high * sum_high) - s_high * sum_low) / sum;
+    double z = s * s;
+    double small = 2 * s_low + s * z * polynomial(logarithm, 7, z) + twos * LN2_2;
+    double large = twos * LN2_1, high = large + 2 * s_high;
+    double low = (large != 0 ? 2 * s_high - (high - large) : 0) + small;
+    double result = high + low;
+    *tail = low - (result - high);
+    return result;
+}
+
+double log(double x)
+{
+    double tail;
+    if (isnan(x) || x < 0)
+        return f64_value(F64_NAN);
+    if (x == 0)
+        return -HUGE_VAL;
+    return isinf(x) ? x : logarithm_of(x, &tail);
+}
+
+double log10(double x)
+{
+    return log(x) * 0.43429448190325182765;
+}
+
+/* 2 for even integers, 1 for odd ones, 0 for other numbers. */
+static int parity(double y)
+{
+    if (fmod(y, 1) != 0 || isinf(y))
+        return isinf(y) ? 2 : 0;
+    return fmod(y, 2) == 0 ? 2 : 1;
+}
+
+double pow(double x, double y)
+{
+    if (y == 0 || x == 1)
+        return 1;
+    if (isnan(x) || isnan(y))
+        return f64_value(F64_NAN);
+    int kind = parity(y);
+    double sign = x;
+    if (!(signbit(x) && kind == 1))
+        sign = 1;
+    double base = fabs(x);
+    if (isinf(y)) {
+        if (base == 1)
+            return 1;
+        return (base > 1) == (y > 0) ? HUGE_VAL : 0;
+    }
+    if (base == 0 || isinf(base))
+        return copysign((base == 0) == (y > 0) ? 0 : HUGE_VAL, sign);
+    if (x < 0 && kind == 0)
+        return f64_value(F64_NAN);
+    double tail, high = logarithm_of(base, &tail);
+    double product = y * high;
+    if (fabs(product) > 800)
+        return copysign(product > 0 ? HUGE_VAL : 0, sign);
+    double y_high = upper(y), log_high = upper(high);
+    double error = ((y_high * log_high - product) + y_high * (high - log_high) + (y - y_high) * log_high) +
+                   (y - y_high) * (high - log_high);
+    return copysign(exponential_of(product, error + y * tail), sign);
+}
+
+double hypot(double x, double y)
+{
+    x = fabs(x);
+    y = fabs(y);
+    if (isinf(x) || isinf(y))
+        return HUGE_VAL;
+    double large = fmax(x, y), small = fmin(x, y);
+    if (large == 0 || isnan(x) || isnan(y))
+        return x + y;
+    double ratio = small / large;
+    return large * sqrt(1 + ratio * ratio);
+}

@@ -1,0 +1,39 @@
+/* printf, vprintf, puts, putchar: all through __putchar (stdio.h). */
+#include "format.h"
+
+#include <stdio.h>
+
+static void send(sink_t *sink, char character)
+{
+    __putchar(character);
+    sink->count++;
+}
+
+int vprintf(const char *restrict format, va_list arguments)
+{
+    sink_t sink = {send, NULL, NULL, 0};
+    return __format(&sink, format, arguments);
+}
+
+int printf(const char *restrict format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    int count = vprintf(format, arguments);
+    va_end(arguments);
+    return count;
+}
+
+int putchar(int character)
+{
+    __putchar((unsigned char)character);
+    return (unsigned char)character;
+}
+
+int puts(const char *text)
+{
+    for (; *text; text++)
+        __putchar(*text);
+    __putchar('\n');
+    return 0;
+}

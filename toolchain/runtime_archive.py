@@ -1,0 +1,101 @@
+"""The run-time library as an archive, built from `runtime/` on first use and kept in the user's cache folder.
+
+Enters: assembly and C sources. Leaves: archive bytes. The cache file's name is a hash of everything the archive depends
+on, and it appears by rename, so two builds at once are harmless.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from importlib.metadata import version
+from pathlib import Path
+
+from toolchain.cc_options import CcOptions, Input
+
+RUNTIME_DIR = Path(__file__).parent / "runtime"
+PACKAGE_DIRS = ("toolchain", "emu/dspic30f/isa", "emu/chips")
+"""What the compiled library depends on, relative to the folder that holds `toolchain`."""
+UNRELATED = ("toolchain/link", "toolchain/cli.py", "toolchain/README.md")
+LEVEL = "s"
+
+
+def library(jobs: int = 0) -> bytes:
+    """The archive's bytes. Builds it (seconds, once) when the cache has none for these sources and this compiler."""
+    cached = cache_dir() / f"libdspic-{fingerprint()}.a"
+    try:
+        return cached.read_bytes()
+    except OSError:
+        pass
+    content = build(jobs)
+    _store(cached, content)
+    return content
+
+
+def cache_dir() -> Path:
+    """`$XDG_CACHE_HOME/openswarm-toolchain`, by default below `~/.cache`."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "openswarm-toolchain"
+
+
+def fingerprint() -> str:
+    """Hash of the library's sources, the headers, the compiler's code and the packages it runs on."""
+    root = Path(__file__).parent.parent
+    digest = hashlib.sha256(f"{version('ziglang')} {version('llvmlite')} {sys.version_info[:2]}".encode())
+    for path in sorted(_dependencies(root)):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:20]
+
+
+def _dependencies(root: Path) -> Iterator[Path]:
+    for folder in PACKAGE_DIRS:
+        for path in (root / folder).rglob("*"):
+            name = path.relative_to(root).as_posix()
+            if path.suffix in (".py", ".c", ".h", ".s", ".csv") and not name.startswith(UNRELATED):
+                yield path
+
+
+def build(jobs: int = 0) -> bytes:
+    """Compile and assemble every file of `runtime/`, one archive member each."""
+    from toolchain.link.archive import Member, archive_bytes
+
+    sources = sorted(path for path in RUNTIME_DIR.iterdir() if path.suffix in (".c", ".s"))
+    with ProcessPoolExecutor(max_workers=jobs or os.cpu_count() or 1) as pool:
+        members = [
+            Member(path.stem + ".o", data) for path, data in zip(sources, pool.map(_member, sources), strict=True)
+        ]
+    return archive_bytes(members)
+
+
+def _member(source: Path) -> bytes:
+    from toolchain import driver
+
+    item = Input(source, "c" if source.suffix == ".c" else "assembler")
+    options = CcOptions(inputs=[item], stage="assemble", level=LEVEL, clang=["-std=c11", "-ffreestanding", "-Wall"])
+    with tempfile.TemporaryDirectory(prefix="dspic-rt-") as scratch:
+        return driver.object_of(options, item, Path(scratch))
+
+
+def _store(path: Path, content: bytes) -> None:
+    """Keep the archive for the next run; a cache folder that cannot be written only costs time."""
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=".libdspic.", dir=path.parent)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        os.replace(temporary, path)
+        for old in sorted(path.parent.glob("libdspic-*.a"), key=lambda p: p.stat().st_mtime)[:-8]:
+            old.unlink(missing_ok=True)
+    except OSError:
+        return
+
+
+def defined_names(content: bytes) -> set[str]:
+    """Assembler names the library defines: a program's own versions of them must stay visible to it."""
+    from toolchain.link.archive import open_archive
+
+    return set(open_archive(content, "run-time library").index)
