@@ -30,9 +30,9 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   void hal_slice_force(void);               the slice ends as soon as the level allows; any context
  */
 
-/* Before any other call. Everything masked. Adopts the running context as process's; fills its sp and limit. */
+/* Before any other call. No interrupt is enabled until hal_start(); the level is thread. Adopts the running context as process's; fills its sp and limit. */
 void hal_init(sys_pcb *process);
-/* 1 ms clock (calls os_clock_tick at level device) and slice timer start; level drops to thread. */
+/* 1 ms clock (calls os_clock_tick at level device) and slice timer start, interrupts are enabled. */
 void hal_start(void);
 
 /* Builds the first frame of a thread that will call entry(arg), then os_thread_returned(). stack..stack + bytes ends
@@ -44,6 +44,7 @@ void hal_stack_release(sys_pcb *process);
 uint16_t hal_stack_unused(const sys_pcb *process, const uint8_t *stack);
 
 uint16_t hal_kernel_stack_unused(void); /* since hal_init */
+bool hal_kernel_stack_intact(void);     /* its last word was never written; asserted after every round of handlers */
 
 /* Thread at level slice: save it, run pick() on the kernel stack and resume what it returns. Comes back when the caller
  * is resumed, at thread level. */

@@ -6,7 +6,7 @@ void Sys_Init_Kernel(void)
     heap_init();
     clock_init();
     event_init();
-    process_init(); /* the caller becomes PID 0; everything is masked */
+    process_init(); /* the caller becomes PID 0; no interrupt is enabled */
     (void)Sys_Register_Event(SYS_EVENT_TERMINATION);
     (void)Sys_Register_Event(SYS_1ms_TIMER);
     board_init();

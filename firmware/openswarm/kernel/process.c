@@ -295,11 +295,23 @@ static void bury(sys_pcb *p)
     heap_give(p->block, (uint16)((uint8 *)p - p->block + (ptrdiff_t)sizeof *p));
 }
 
+static void take_off(sys_pcb *p)
+{
+    if ((p->status & OS_STATE) == SYS_BLOCKED) {
+        unlink_blocked(p);
+        if (p->awaited != NULL) {
+            p->wait.result = NULL; /* it was the condition */
+        }
+    } else {
+        ring_remove(p);
+    }
+}
+
 sys_pcb *process_end_running(void)
 {
     sys_pcb *p = os_running;
     critical_depth = 0;
-    ring_remove(p);
+    take_off(p); /* it may have overflown its stack on the way to sleep */
     bury(p);
     return os_schedule();
 }
@@ -321,14 +333,7 @@ bool Sys_Kill_Process(uint16 pid)
     }
     sys_pcb *p = pid != 0 ? process_find(pid) : NULL;
     if (p != NULL) {
-        if ((p->status & OS_STATE) == SYS_BLOCKED) {
-            unlink_blocked(p);
-            if (p->awaited != NULL) {
-                p->wait.result = NULL; /* it was the condition */
-            }
-        } else {
-            ring_remove(p);
-        }
+        take_off(p);
         bury(p);
     }
     hal_unlock(lock);

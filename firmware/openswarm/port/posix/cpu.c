@@ -10,7 +10,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
-enum { THREAD, SLICE, DEVICE, MASKED, DEVICES_WAITING = 8, SLICE_MS = 10 };
+enum { THREAD, SLICE, DEVICE, DEVICES_WAITING = 8, SLICE_MS = 10 };
 
 typedef struct {
     fiber *fiber;
@@ -157,7 +157,7 @@ void hal_init(sys_pcb *process)
     main_context.fiber = &main_fiber;
     process->sp = &main_context;
     process->limit = NULL;
-    level = MASKED;
+    level = THREAD;
     kernel = fiber_new(HOST_STACK, kernel_loop);
 }
 
@@ -210,6 +210,11 @@ uint16_t hal_stack_unused(const sys_pcb *process, const uint8_t *stack)
 uint16_t hal_kernel_stack_unused(void)
 {
     return HAL_KERNEL_STACK;
+}
+
+bool hal_kernel_stack_intact(void)
+{
+    return true;
 }
 
 void hal_switch(hal_pick pick)

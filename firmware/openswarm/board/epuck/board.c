@@ -1,0 +1,64 @@
+/* The e-puck: clock and configuration words, pins, and the list of its devices. */
+#include "hal_board.h"
+#include "io.h"
+#include "kernel.h"
+#include "pins.h"
+
+/* 7.3728 MHz crystal, PLL x8: 14.7456 MHz instruction clock (epuck.md §2, openswarm-original.md §10). */
+_FOSC(CSW_FSCM_OFF & XT_PLL8);
+_FWDT(WDT_OFF);
+_FBORPOR(PBOR_OFF & MCLR_EN);
+_FGS(CODE_PROT_OFF);
+
+/* Everything off before it becomes an output. */
+static void pins_init(void)
+{
+    LATA &= (uint16)~PIN_LED_RING_ALL;
+    LATC &= (uint16)~(PIN_FRONT_LED | PIN_BODY_LED | PIN_CAMERA_RESET);
+    LATD &= (uint16)~PIN_MOTORS;
+    LATF &= (uint16)~(PIN_PULSE_IR_F | PIN_AUDIO_ON);
+    LATG &= (uint16)~(PIN_PULSE_IR_G | PIN_I2C);
+    TRISA &= (uint16)~PIN_LED_RING_ALL;
+    TRISC &= (uint16)~(PIN_FRONT_LED | PIN_BODY_LED | PIN_CAMERA_RESET);
+    TRISD &= (uint16)~PIN_MOTORS;
+    TRISF &= (uint16)~(PIN_PULSE_IR_F | PIN_AUDIO_ON);
+    TRISG &= (uint16)~(PIN_PULSE_IR_G | PIN_I2C);
+}
+
+void board_init(void)
+{
+    pins_init();
+    motors_init();
+    uart_init(SYS_UART1);
+    uart_init(SYS_UART2);
+    hal_led_init();
+    selector_init();
+}
+
+void board_start(void)
+{
+    uart_start(SYS_UART1);
+    uart_start(SYS_UART2);
+}
+
+void board_tick(void)
+{
+    uart_tick();
+    selector_tick();
+}
+
+void board_failsafe(void)
+{
+    motors_stop();
+}
+
+void board_report(const char *text)
+{
+    while (*text != '\0') {
+        while (U1STAbits.UTXBF) {
+        }
+        U1TXREG = (uint8)*text++;
+    }
+    while (!U1STAbits.TRMT) {
+    }
+}

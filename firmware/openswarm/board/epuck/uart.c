@@ -1,0 +1,117 @@
+/* UART1 (Bluetooth) and UART2 of the e-puck, both 115,200 baud 8N1 (epuck.md §2). The interrupt entries are in the port's
+ * switch.S. */
+#include "io.h"
+#include "kernel.h"
+
+enum {
+    BAUD_DIVISOR = 7, /* 14.7456 MHz / 16 / 115,200 - 1 (dspic30f6014a.md §10) */
+    ENABLE = 0x8000,  /* UxMODE: UARTEN, 8N1 */
+    TRANSMIT = 0x8400, /* UxSTA: UTXEN; interrupt when the last byte leaves the FIFO */
+    HAS_BYTE = 0x0001,
+    OVERRUN = 0x0002,
+    FRAMING_ERROR = 0x0004,
+    FIFO_FULL = 0x0200
+};
+
+typedef struct {
+    uint16 mode, status, transmit, receive, baud;
+} registers;
+
+#define REGISTERS(uart) ((volatile registers *)((uart) == SYS_UART1 ? &U1MODE : &U2MODE))
+
+void hal_uart_init(uint8_t uart)
+{
+    volatile registers *r = REGISTERS(uart);
+    r->baud = BAUD_DIVISOR;
+    r->mode = ENABLE;
+    r->status = TRANSMIT;
+}
+
+void hal_uart_start(uint8_t uart)
+{
+    if (uart == SYS_UART1) {
+        IPC2bits.U1RXIP = 4;
+        IPC2bits.U1TXIP = 4;
+        IFS0bits.U1RXIF = 0;
+        IEC0bits.U1RXIE = 1;
+    } else {
+        IPC6bits.U2RXIP = 4;
+        IPC6bits.U2TXIP = 4;
+        IFS1bits.U2RXIF = 0;
+        IEC1bits.U2RXIE = 1;
+    }
+}
+
+/* The transmit interrupt is enabled while there is something to send; setting its flag makes it run at once. */
+void hal_uart_transmit(uint8_t uart)
+{
+    if (uart == SYS_UART1) {
+        if (!IEC0bits.U1TXIE) {
+            IFS0bits.U1TXIF = 1;
+            IEC0bits.U1TXIE = 1;
+        }
+    } else if (!IEC1bits.U2TXIE) {
+        IFS1bits.U2TXIF = 1;
+        IEC1bits.U2TXIE = 1;
+    }
+}
+
+/* Fills the FIFO; true: nothing was left to send. */
+static bool fill(uint8 uart)
+{
+    volatile registers *r = REGISTERS(uart);
+    while (!(r->status & FIFO_FULL)) {
+        sint16 byte = uart_next_byte(uart);
+        if (byte < 0) {
+            return true;
+        }
+        r->transmit = (uint16)byte;
+    }
+    return false;
+}
+
+static void empty(uint8 uart)
+{
+    volatile registers *r = REGISTERS(uart);
+    uint16 status;
+    while ((status = r->status) & HAS_BYTE) {
+        uint8 byte = (uint8)r->receive;
+        if (status & FRAMING_ERROR) {
+            uart_overrun(uart);
+        } else {
+            uart_received(uart, byte);
+        }
+    }
+    if (status & OVERRUN) {
+        r->status = (uint16)(status & ~OVERRUN); /* also empties the FIFO */
+        uart_overrun(uart);
+    }
+}
+
+HAL_USED void uart1_transmit_isr(void)
+{
+    IFS0bits.U1TXIF = 0;
+    if (fill(SYS_UART1)) {
+        IEC0bits.U1TXIE = 0;
+    }
+}
+
+HAL_USED void uart2_transmit_isr(void)
+{
+    IFS1bits.U2TXIF = 0;
+    if (fill(SYS_UART2)) {
+        IEC1bits.U2TXIE = 0;
+    }
+}
+
+HAL_USED void uart1_receive_isr(void)
+{
+    IFS0bits.U1RXIF = 0;
+    empty(SYS_UART1);
+}
+
+HAL_USED void uart2_receive_isr(void)
+{
+    IFS1bits.U2RXIF = 0;
+    empty(SYS_UART2);
+}

@@ -1,0 +1,121 @@
+/* dsPIC30F port of hal_cpu.h: timers, first frames, stack paint. The rest is in switch.S and hal_port.h. */
+#include "kernel.h"
+
+/* 1 ms is 14,745.6 Tcy at 14.7456 MHz: five periods are exactly 5 ms (kernel time, README.md). */
+static const uint16 clock_period[5] = {14745, 14746, 14746, 14745, 14746};
+enum { SLICE_PERIOD = 18432 /* counts of 8 Tcy: 10 ms */, PAINT = 0xA5A5 };
+
+/* What switch.S assumes. */
+#define ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
+ASSUME(sp_is_first, offsetof(sys_pcb, sp) == 0);
+ASSUME(limit_is_second, offsetof(sys_pcb, limit) == 2);
+ASSUME(status_is_fifth, offsetof(sys_pcb, status) == 8);
+ASSUME(pcb_is_18_bytes, sizeof(sys_pcb) == 18);
+ASSUME(dsp_is_bit_4, SYS_DSP == 1 << 4 && SYS_READY == 1);
+ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
+#undef ASSUME
+
+extern void os_resume_yielded(void), os_thread_start(void);
+
+static uint8 clock_phase;
+
+HAL_USED void cpu_clock_isr(void)
+{
+    IFS0bits.T1IF = 0;
+    PR1 = clock_period[clock_phase] - 1u; /* of the period that has just begun */
+    clock_phase = (uint8)(clock_phase == 4 ? 0 : clock_phase + 1);
+    os_clock_tick();
+}
+
+static void paint(uint16 *from, const uint16 *end)
+{
+    while (from < end) {
+        *from++ = PAINT;
+    }
+}
+
+static uint16 painted(const uint16 *lowest, const uint16 *end)
+{
+    const uint16 *p = end;
+    while (p > lowest && p[-1] == PAINT) {
+        p--;
+    }
+    return (uint16)((const uint8 *)end - (const uint8 *)p);
+}
+
+#define KERNEL_STACK_END ((uint16 *)(void *)(os_memory.bytes + SYS_KERNEL_STACK))
+
+void hal_init(sys_pcb *process)
+{
+    process->limit = SPLIM;
+    paint((uint16 *)(void *)os_memory.bytes, KERNEL_STACK_END);
+}
+
+uint16_t hal_kernel_stack_unused(void)
+{
+    return painted((uint16 *)(void *)os_memory.bytes, KERNEL_STACK_END);
+}
+
+bool hal_kernel_stack_intact(void)
+{
+    return KERNEL_STACK_END[-1] == PAINT;
+}
+
+void hal_start(void)
+{
+    clock_phase = 1;
+    PR1 = 14745u - 1u;
+    TMR1 = 0;
+    PR2 = SLICE_PERIOD - 1u;
+    IPC0bits.T1IP = 4;
+    IPC1bits.T2IP = 1;
+    IFS0bits.T1IF = 0;
+    IEC0bits.T1IE = 1;
+    IEC0bits.T2IE = 1;
+    T2CON = 0x8010; /* on, 1:8 */
+    hal_slice_restart();
+    T1CON = 0x8000; /* on, 1:1 */
+}
+
+/* Frame of a yielded thread (switch.S) that returns into os_thread_start with W8 = entry, W9 = argument. */
+bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg)
+{
+    uint16 *frame = (uint16 *)(void *)stack;
+    paint(frame, (uint16 *)process);
+    (void)bytes;
+    *frame++ = (uint16)os_thread_start;
+    *frame++ = 0;
+    *frame++ = (uint16)entry;
+    *frame++ = (uint16)arg;
+    frame += 5; /* W10-W14 */
+    *frame++ = (uint16)os_resume_yielded;
+    process->sp = frame;
+    process->limit = (uint16)process - HAL_STACK_GUARD - 2u; /* the last word that may be written */
+    return true;
+}
+
+void hal_stack_release(sys_pcb *process)
+{
+    (void)process;
+}
+
+uint16_t hal_stack_unused(const sys_pcb *process, const uint8_t *stack)
+{
+    const uint8 *end = (const uint8 *)process - HAL_STACK_GUARD;
+    return painted((const uint16 *)(const void *)stack, (const uint16 *)(const void *)end);
+}
+
+HAL_NORETURN HAL_USED void cpu_trap(uint16 number, uint32 pc)
+{
+    static const char *const causes[] = {"oscillator failure", "address error", "math error", "unexpected interrupt",
+                                         "kernel stack overflow"};
+    os_trap(causes[number], pc);
+}
+
+void hal_stop(void)
+{
+    for (;;) {
+        CPU_SRL |= CPU_IPL;
+        __asm__ volatile("pwrsav #1");
+    }
+}

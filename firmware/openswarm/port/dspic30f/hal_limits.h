@@ -1,0 +1,15 @@
+/* Sizes on the dsPIC30F6014A, bytes. Also read by switch.S. */
+#ifndef HAL_LIMITS_H
+#define HAL_LIMITS_H
+
+#define HAL_KERNEL_STACK 224
+#define HAL_HEAP 3072
+#define HAL_DEFAULT_STACK 128
+#define HAL_MINIMUM_STACK 96
+/* Above a stack limit: what a frame of up to 8 bytes without probe, two more instructions and the trap itself may write
+ * goes 12 bytes into the stack's own end and 8 into the PCB (kernel.h). */
+#define HAL_STACK_GUARD 12
+/* What a kernel function may need on the caller's stack; checked at its first lock, before it changes anything. */
+#define HAL_CALL_DEPTH 40
+
+#endif

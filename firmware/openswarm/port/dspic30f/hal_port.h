@@ -1,0 +1,77 @@
+/* dsPIC30F: the level is the CPU's interrupt priority (IPL, SR<7:5>). 0 thread, 1 slice and kernel stack, 4 devices; 5 is
+ * the stepper and 6 the camera, which never call the kernel and are masked by nothing but idle (kernel level 4 only). */
+#ifndef HAL_PORT_H
+#define HAL_PORT_H
+
+#include <p30F6014A.h>
+
+#include "hal_limits.h"
+
+#define HAL_USED __attribute__((used))
+#define HAL_NORETURN __attribute__((noreturn))
+#define HAL_ALLOCATION_FAILS() false
+
+typedef uint8_t hal_lock_state; /* low byte of SR */
+typedef uint16_t hal_limit;
+
+#define CPU_SRL (*(volatile uint8_t *)&SR)
+enum { CPU_IPL_SLICE = 0x20, CPU_IPL_DEVICE = 0x80, CPU_IPL = 0xE0 };
+
+/* After a write that raises the IPL one more instruction may run at the old one (isa.md §14.3): give it a harmless one. */
+static inline void cpu_raise_ipl(uint8_t bit)
+{
+    CPU_SRL |= bit;
+    __asm__ volatile("nop" ::: "memory");
+}
+
+static inline hal_lock_state hal_lock_slice(void)
+{
+    hal_lock_state before = CPU_SRL;
+    /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. */
+    __asm__ volatile("mov [w15+%0], w0" ::"i"(HAL_CALL_DEPTH) : OS_W0);
+    if (!(before & CPU_IPL_DEVICE)) {
+        cpu_raise_ipl(CPU_IPL_SLICE);
+    }
+    return before;
+}
+
+static inline hal_lock_state hal_lock_devices(void)
+{
+    hal_lock_state before = CPU_SRL;
+    cpu_raise_ipl(CPU_IPL_DEVICE);
+    return before;
+}
+
+static inline void hal_unlock(hal_lock_state before)
+{
+    __asm__ volatile("" ::: "memory");
+    CPU_SRL = before;
+}
+
+static inline bool hal_in_thread(void)
+{
+    return (CPU_SRL & CPU_IPL) == 0;
+}
+
+static inline bool hal_in_isr(void)
+{
+    return (CPU_SRL & CPU_IPL_DEVICE) != 0;
+}
+
+static inline void hal_barrier(void)
+{
+    __asm__ volatile("" ::: "memory");
+}
+
+static inline void hal_slice_restart(void)
+{
+    TMR2 = 0; /* also clears the prescaler */
+    IFS0bits.T2IF = 0;
+}
+
+static inline void hal_slice_force(void)
+{
+    IFS0bits.T2IF = 1;
+}
+
+#endif

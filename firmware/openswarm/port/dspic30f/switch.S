@@ -1,0 +1,262 @@
+; Context switch, entry of interrupts to the kernel stack, and traps, for pic30-as.
+;
+; Two kinds of frame lie on the stack of a thread that does not run, each under the address of the code that resumes it:
+;     preempted  PC, SRL (by hardware), W0-W14, RCOUNT, TBLPAG, PSVPAG, tag                   42 bytes
+;     yielded    return address, W8-W14, tag                                                  20 bytes
+; A SYS_DSP thread has accumulators, CORCON and its DO levels, under a tag of their own, on top of either.
+; The kernel stack is the start of os_memory; it is empty whenever a thread runs. It lies below all thread stacks, so a
+; thread's SPLIM, which stays set, never trips there.
+#include "hal_limits.h"
+
+        .equ    PCB_SP, 0               ; offsets in sys_pcb and bits of its status, checked by cpu.c
+        .equ    PCB_LIMIT, 2
+        .equ    PCB_STATUS, 8
+        .equ    STATUS_READY, 0
+        .equ    STATUS_DSP, 4
+        .equ    T2IE, 6                 ; bits of IEC0, INTCON1 and CORCON (dspic30f6014a.md §5, isa.md §2.4)
+        .equ    STKERR, 2
+        .equ    IPL3, 3
+
+        .text
+
+; ---- Preemption: 10 ms timer, IPL 1 -----------------------------------------------------------------------------
+        .global __T2Interrupt
+__T2Interrupt:
+        bset    SR, #7                  ; IPL 5: only the camera may still stack on this thread
+        push.d  w0
+        push.d  w2
+        push.d  w4
+        push.d  w6
+        push.d  w8
+        push.d  w10
+        push.d  w12
+        push    w14
+        push    RCOUNT
+        push    TBLPAG
+        push    PSVPAG
+        mov     _os_running, w1
+        mov     #handle(resume_preempted), w2
+        mov     [w1+PCB_STATUS], w3
+        btsc    w3, #STATUS_DSP
+        rcall   save_dsp
+        push    w2
+        mov     w15, [w1]               ; PCB_SP
+        mov     #_os_memory, w15
+        bclr    SR, #7                  ; IPL 1, on the kernel stack
+        rcall   _os_slice_end
+
+; ---- W0 = thread to resume; kernel stack, IPL 1 ------------------------------------------------------------------
+resume:
+        bset    SR, #7                  ; IPL 5
+        mov     [w0+PCB_LIMIT], w1      ; harmless if one more interrupt slips in
+        mov     w1, SPLIM               ; above the kernel stack, where W15 still is
+        mov     [w0], w15
+        pop     w1
+        goto    w1
+
+resume_preempted:
+        pop     PSVPAG
+        pop     TBLPAG
+        pop     RCOUNT
+        pop     w14
+        pop.d   w12
+        pop.d   w10
+        pop.d   w8
+        pop.d   w6
+        pop.d   w4
+        pop.d   w2
+        pop.d   w0
+        retfie
+
+; ---- void hal_switch(hal_pick): thread stack, IPL 1 ----------------------------------------------------------------
+        .global _hal_switch
+_hal_switch:
+        push.d  w8
+        push.d  w10
+        push.d  w12
+        push    w14
+        mov     _os_running, w1
+        mov     #handle(resume_yielded), w2
+        mov     [w1+PCB_STATUS], w3
+        btsc    w3, #STATUS_DSP
+        rcall   save_dsp
+        push    w2
+        mov     w15, [w1]               ; PCB_SP
+
+; ---- void hal_abandon(hal_pick): any stack, IPL 1 ------------------------------------------------------------------
+        .global _hal_abandon
+_hal_abandon:
+        mov     #_os_memory, w15
+        call    w0
+        bra     resume
+
+        .global _os_resume_yielded
+_os_resume_yielded:
+resume_yielded:
+        pop     w14
+        pop.d   w12
+        pop.d   w10
+        pop.d   w8
+        retfie                          ; the high word of a return address holds SRL = 0: back to IPL 0
+
+; First instructions of every thread; the initial frame puts entry into W8 and its argument into W9.
+        .global _os_thread_start
+_os_thread_start:
+        mov     _os_running, w1
+        mov     [w1+PCB_STATUS], w0
+        bset    w0, #STATUS_READY
+        mov     w0, [w1+PCB_STATUS]
+        mov     w9, w0
+        call    w8
+        bra     _os_thread_returned
+
+; ---- DSP state, W2 = tag of the frame below, W0 and W1 kept; IPL >= 1 -----------------------------------------------
+; CORCON.DL cannot be written and the outer level of two nested DO loops is not mapped. So each level is left by running
+; off the end of a two-instruction loop with DCOUNT = 0, and entered again by DO; the registers that appear in between
+; belong to that level. DOSTART is taken as writable (UNVERIFIED on silicon). Lost: OA OB SA SB and the PUSH.S shadow.
+save_dsp:
+        pop.d   w4                      ; return address
+        push    w2
+        push    ACCAL
+        push    ACCAH
+        push    ACCAU
+        push    ACCBL
+        push    ACCBH
+        push    ACCBU
+        push    CORCON
+        clr     w6                      ; levels
+        mov     #0x0700, w7             ; CORCON.DL
+1:      mov     CORCON, w3
+        and     w3, w7, w3
+        bra     z, 2f
+        push    DCOUNT
+        push    DOSTARTL
+        push    DOSTARTH
+        push    DOENDL
+        push    DOENDH
+        clr     DCOUNT
+        mov     #tbloffset(leave_loop), w3
+        mov     w3, DOENDL
+        mov     #tblpage(leave_loop), w3
+        mov     w3, DOENDH
+        inc     w6, w6
+        nop
+        nop
+leave_loop:
+        nop                             ; DL - 1; the next outer level, if any, is back in the registers
+        bra     1b
+2:      push    w6
+        mov     #handle(resume_dsp), w2
+        push.d  w4
+        return
+
+resume_dsp:
+        pop     w6
+1:      cp0     w6
+        bra     z, 3f
+        do      #0, 2f                  ; DL + 1
+        pop     DOENDH
+        pop     DOENDL
+        pop     DOSTARTH
+        pop     DOSTARTL
+        pop     DCOUNT
+        dec     w6, w6
+2:      nop
+        bra     1b
+3:      pop     CORCON
+        pop     ACCBU
+        pop     ACCBH
+        pop     ACCBL
+        pop     ACCAU
+        pop     ACCAH
+        pop     ACCAL
+        pop     w1
+        goto    w1
+
+; ---- void hal_idle(const volatile uint16_t *pending): kernel stack, IPL 1 -------------------------------------------
+; At IPL 7 an interrupt ends PWRSAV without being taken, so none slips in between the test and the sleep.
+        .global _hal_idle
+_hal_idle:
+        bclr    IEC0, #T2IE             ; no slice while nothing runs
+        bset    SR, #6
+        bset    SR, #7
+        nop
+        cp0     [w0]
+        bra     nz, 1f
+        pwrsav  #1
+1:      bclr    SR, #7
+        bclr    SR, #6
+        bset    IEC0, #T2IE
+        return
+
+; ---- Device interrupts, IPL 4 -----------------------------------------------------------------------------------------
+; Moves to the kernel stack unless W15 is there already; a test of a counter instead would fail between test and move.
+; Costs 8 Tcy beside saving what a C function may change. The interrupted W15 is kept below the saved registers.
+        .macro  isr vector, handler
+        .global \vector
+\vector:
+        push.d  w0
+        mov     w15, w1
+        mov     #_os_memory+HAL_KERNEL_STACK, w0
+        cpslt   w15, w0
+        mov     #_os_memory, w15
+        push    w1
+        push    RCOUNT
+        push.d  w2
+        push.d  w4
+        push.d  w6
+        rcall   \handler
+        pop.d   w6
+        pop.d   w4
+        pop.d   w2
+        pop     RCOUNT
+        pop     w0
+        mov     w0, w15
+        pop.d   w0
+        retfie
+        .endm
+
+        isr     __T1Interrupt, _cpu_clock_isr
+        isr     __U1RXInterrupt, _uart1_receive_isr
+        isr     __U1TXInterrupt, _uart1_transmit_isr
+        isr     __U2RXInterrupt, _uart2_receive_isr
+        isr     __U2TXInterrupt, _uart2_transmit_isr
+
+; ---- Traps --------------------------------------------------------------------------------------------------------
+; Stack limit. A soft trap: the write has happened, within the thread's own block. The thread is given up, and with it an
+; ISR entry that had not yet left its stack; that interrupt's flag is still set. On the kernel stack it is the end.
+        .global __StackError
+__StackError:
+        setm    SPLIM
+        nop
+        mov     #_os_memory+HAL_KERNEL_STACK, w0
+        cpsgt   w15, w0
+        bra     kernel_stack_error
+        bclr    INTCON1, #STKERR
+        mov     #_os_memory, w15
+        bclr    CORCON, #IPL3
+        bset    SR, #5                  ; IPL 4 (level 12) -> 5 -> 1
+        bclr    SR, #7
+        rcall   _os_overflow
+        bra     resume
+
+        .macro  trap vector, number
+        .global \vector
+\vector:
+        mov     #\number, w0
+        bra     fatal
+        .endm
+
+        trap    __OscillatorFail, 0
+        trap    __AddressError, 1
+        trap    __MathError, 2
+        trap    __DefaultInterrupt, 3
+kernel_stack_error:
+        mov     #4, w0
+fatal:
+        setm    SPLIM
+        mov     [w15-4], w2             ; stacked PC
+        mov     [w15-2], w3
+        and     #0x7F, w3
+        mov     #_os_memory, w15
+        bra     _cpu_trap
