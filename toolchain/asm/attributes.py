@@ -44,7 +44,7 @@ _RESERVED: dict[str, str] = {
     ".eedata": "eedata",
     ".const": "psv,page",  # Microchip's assembler mis-types a bare .const; psv,page is what is meant (§4.3)
 }
-_OTHER_PARTS = frozenset("eds dma boot secure auxflash packedflash memory".split())
+_OTHER_PARTS = frozenset(("eds", "dma", "boot", "secure", "auxflash", "packedflash", "memory"))
 
 
 @dataclass(slots=True)

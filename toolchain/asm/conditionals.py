@@ -11,10 +11,10 @@ from toolchain.asm.macro import split_arguments
 from toolchain.asm.symbols import AsmSymbol
 from toolchain.errors import Place
 
-CONDITIONALS = frozenset(
-    ".if .ifdef .ifndef .ifnotdef .ifeq .ifne .ifgt .ifge .iflt .ifle .ifc .ifnc .ifeqs .ifnes "
-    ".else .elseif .endif .elsec .endc".split()
-)
+_COMPARISONS = (".if", ".ifne", ".ifeq", ".ifgt", ".ifge", ".iflt", ".ifle")
+_TESTS = (".ifdef", ".ifndef", ".ifnotdef", ".ifc", ".ifnc", ".ifeqs", ".ifnes")
+_PARTS = (".else", ".elsec", ".elseif", ".endif", ".endc")
+CONDITIONALS = frozenset(_COMPARISONS + _TESTS + _PARTS)
 
 
 class Context(Protocol):

@@ -20,7 +20,8 @@ _DATA_KINDS: dict[int, dict[str, str]] = {
     1: {"": "8"},
     2: {
         "": "16", "handle": "HANDLE", "psvoffset": "PSVOFFSET", "tbloffset": "TBLOFFSET", "psvpage": "PSVPAGE",
-        "tblpage": "TBLPAGE", "edspage": "EDSPAGE", "edsoffset": "EDSOFFSET", "addr_lo": "ADDR_LO", "addr_hi": "ADDR_HI",
+        "tblpage": "TBLPAGE", "edspage": "EDSPAGE", "edsoffset": "EDSOFFSET", "addr_lo": "ADDR_LO",
+        "addr_hi": "ADDR_HI",
     },
     4: {"": "32", "paddr": "PADDR"},
 }  # fmt: skip

@@ -102,7 +102,7 @@ def _put(asm: Assembler, parsed: Parsed) -> None:
         asm.options.relax
         and parsed.row.mnemonic in _SHORT
         and open_slots
-        and _put_relaxable(asm, parsed, words, open_slots)
+        and _put_relaxable(asm, parsed, words, open_slots[0][1])
     ):
         return
     section = asm.section
@@ -133,11 +133,8 @@ def _kind(slot: Slot, value: Known) -> tuple[RelocationType, int]:
     return RELOCATION_BY_NAME[name], 4 if name == "PCREL_DO" else 0
 
 
-def _put_relaxable(
-    asm: Assembler, parsed: Parsed, words: tuple[int, ...], open_slots: list[tuple[Slot, Known]]
-) -> bool:
+def _put_relaxable(asm: Assembler, parsed: Parsed, words: tuple[int, ...], value: Known) -> bool:
     """Emit CALL or GOTO in a piece of its own, ready to become RCALL or BRA; False when the target forbids it."""
-    value = open_slots[0][1]
     if not isinstance(value, Value) or value.add is None or value.offset or value.sub or value.op:
         return False
     if value.add.bind is Bind.WEAK:

@@ -19,7 +19,7 @@ from toolchain.asm.symbols import AsmSymbol, Label
 MASK64 = 0xFFFF_FFFF_FFFF_FFFF
 MAX_DEPTH = 64  # parentheses and prefixes; a limit, so that hostile input ends in a message
 OPERATORS = frozenset(
-    "tbloffset tblpage psvoffset psvpage handle paddr edspage edsoffset addr_lo addr_hi".split()
+    ["tbloffset", "tblpage", "psvoffset", "psvpage", "handle", "paddr", "edspage", "edsoffset", "addr_lo", "addr_hi"]
 )  # abi-elf.md §4.2; dmaoffset, boot, secure serve other parts and are refused by name
 _REFUSED = {
     "lo": "lo() is not an operator of this assembler: use & 0xFFFF",
@@ -165,9 +165,8 @@ class _Parser:
 
     def take(self) -> tuple[str, str]:
         if self.next >= len(self.tokens):
-            raise ExprError(
-                f"expression {self.text.strip()!r} ends too early" if self.text.strip() else "missing expression"
-            )
+            whole = self.text.strip()
+            raise ExprError(f"expression {whole!r} ends too early" if whole else "missing expression")
         self.next += 1
         return self.tokens[self.next - 1]
 

@@ -223,7 +223,7 @@ class _Finisher:
             self.asm.error(f"symbol {symbol.name} cannot be exported: {_describe(value)} is not known in this file")
 
     def _symbol_table(self) -> list[Symbol]:
-        """Emit what the file defines or exports.  Names in .L and local equates stay inside unless relocated against."""
+        """Emit what the file defines or exports; .L names and local equates only when a relocation needs them."""
         for symbol in self.asm.symbols.values():
             if symbol in self.symbols:
                 continue

@@ -48,33 +48,34 @@ def _unquote(text: str) -> str:
     return text[1:-1] if len(text) >= 2 and text[0] == text[-1] == '"' else text
 
 
-def split_arguments(text: str, spaces: bool = True) -> list[str]:
-    """Split at commas outside quotes and brackets and, when `spaces`, at blanks that touch no operator."""
-    parts: list[str] = [""]
-    depth, index = 0, 0
-    pieces = re.findall(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\\])\'?|\s+|.', text.strip(), re.DOTALL)
-    while index < len(pieces):
-        piece = pieces[index]
-        if piece in "([":
-            depth += 1
-        elif piece in ")]":
-            depth -= 1
-        if piece == "," and depth <= 0:
-            parts.append("")
-        elif piece.isspace() and depth <= 0 and spaces and _splits_at_blank(parts[-1], pieces[index + 1 :]):
-            parts.append("")
-        else:
-            parts[-1] += piece
-        index += 1
-    return [p.strip() for p in parts] if text.strip() else []
-
-
+_PIECE = re.compile(r'"(?:\\.|[^"\\])*"|\'(?:\\.|[^\\])\'?|\s+|.', re.DOTALL)
+_GROUPING = re.compile(r"[\"'(\[]")
 _OPERATOR_CHARACTERS = "-+*/%|&^~<>()=[]"
 
 
-def _splits_at_blank(before: str, after: list[str]) -> bool:
-    """Whether a blank between `before` and `after` separates two macro arguments."""
-    following = after[0] if after else ","
+def split_arguments(text: str, spaces: bool = True) -> list[str]:
+    """Split at commas outside quotes and brackets and, when `spaces`, at blanks that touch no operator."""
+    text = text.strip()
+    if not text:
+        return []
+    if not spaces and not _GROUPING.search(text):
+        return [part.strip() for part in text.split(",")]
+    parts: list[str] = [""]
+    depth = 0
+    pieces: list[str] = _PIECE.findall(text)
+    for piece, following in zip(pieces, [*pieces[1:], ","], strict=True):
+        depth += (piece in ("(", "[")) - (piece in (")", "]"))
+        comma = piece == ","
+        blank = spaces and piece.isspace() and _separates(parts[-1], following)
+        if depth <= 0 and (comma or blank):
+            parts.append("")
+        else:
+            parts[-1] += piece
+    return [part.strip() for part in parts]
+
+
+def _separates(before: str, following: str) -> bool:
+    """Whether a blank between `before` and `following` stands between two macro arguments."""
     if not before.strip() or following == ",":
         return False
     return before[-1] not in _OPERATOR_CHARACTERS and following[0] not in _OPERATOR_CHARACTERS

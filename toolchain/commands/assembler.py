@@ -17,7 +17,9 @@ PART = "30F6014A"
 
 def main(arguments: list[str]) -> int:
     """Assemble; returns 0.  Raises `ToolError` with every finding."""
-    p = parser("as", "Assemble a source in pic30-as syntax to an ELF object.", "python -m toolchain as start.s -o start.o")
+    p = parser(
+        "as", "Assemble a source in pic30-as syntax to an ELF object.", "python -m toolchain as start.s -o start.o"
+    )
     p.add_argument("source", help="assembly source, - for standard input")
     p.add_argument("-o", dest="output", default="", help="object file (default: source name with .o)")
     p.add_argument("-I", dest="include", action="append", default=[], metavar="DIR", help="search .include files here")

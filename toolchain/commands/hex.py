@@ -12,7 +12,9 @@ from toolchain.link.hexfile import hex_text
 
 def main(arguments: list[str]) -> int:
     """Convert; returns 0."""
-    p = parser("hex", "Convert an ELF executable, ours or XC16's, to Intel HEX.", "python -m toolchain hex firmware.elf")
+    p = parser(
+        "hex", "Convert an ELF executable, ours or XC16's, to Intel HEX.", "python -m toolchain hex firmware.elf"
+    )
     p.add_argument("image")
     p.add_argument("-o", dest="output", default="", help="HEX file (default: image name with .hex)")
     options = p.parse_args(arguments)

@@ -24,7 +24,9 @@ def main(arguments: list[str]) -> int:
     example = "python -m toolchain ld start.o main.o -L lib -lc -o firmware.elf -Map firmware.map"
     p = parser("ld", "Link ELF objects and archives for the dsPIC30F6014A.", example)
     p.add_argument("inputs", nargs="*", metavar="FILE", help="objects (.o) and archives (.a)")
-    p.add_argument("-o", dest="output", default="a.elf", help="executable; a name in .hex gives Intel HEX (default a.elf)")
+    p.add_argument(
+        "-o", dest="output", default="a.elf", help="executable; a name in .hex gives Intel HEX (default a.elf)"
+    )
     p.add_argument("--hex", metavar="FILE", help="write Intel HEX as well")
     p.add_argument("-Map", "--Map", dest="map", metavar="FILE", help="write a link map with per-symbol sizes")
     p.add_argument("-L", dest="folders", action="append", default=[], metavar="DIR", help="search -l libraries here")

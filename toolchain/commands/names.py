@@ -35,7 +35,9 @@ def letter(symbol: Symbol) -> str:
 
 def main(arguments: list[str]) -> int:
     """Print the symbols; returns 0."""
-    p = parser("nm", "List symbols: address, size in address units, class, name.", "python -m toolchain nm -S firmware.elf")
+    p = parser(
+        "nm", "List symbols: address, size in address units, class, name.", "python -m toolchain nm -S firmware.elf"
+    )
     p.add_argument("files", nargs="+", metavar="FILE")
     p.add_argument("-n", "--numeric-sort", action="store_true", help="sort by address instead of name")
     p.add_argument("--size-sort", action="store_true", help="sort by size")
@@ -62,7 +64,9 @@ def main(arguments: list[str]) -> int:
             print(f"{value} {f'{size:08x} ' if options.print_size else ''}{letter(symbol)} {symbol.name}")
     if options.json:
         keys = ("name", "value", "size", "class")
-        table = {n: [dict(zip(keys, (s.name, s.value, z, letter(s)), strict=True)) for s, z in r] for n, r in listing.items()}
+        table = {
+            n: [dict(zip(keys, (s.name, s.value, z, letter(s)), strict=True)) for s, z in r] for n, r in listing.items()
+        }
         print(json.dumps(table, indent=1))
     return 0
 
@@ -71,5 +75,5 @@ def _rows(name: str, everything: bool) -> list[tuple[Symbol, int]]:
     data = read_bytes(name)
     relative = is_object(data)
     symbols = (read_object if relative else read_executable)(data, name).symbols
-    sizes = {s: size for s, size in symbol_sizes(symbols, relative)}
+    sizes = dict(symbol_sizes(symbols, relative))
     return [(s, sizes.get(s, s.size)) for s in symbols if is_named(s) or (everything and s.name)]

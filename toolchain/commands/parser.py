@@ -7,15 +7,20 @@ import argparse
 from toolchain.errors import ToolError
 
 
-def parser(command: str, description: str, example: str) -> argparse.ArgumentParser:
+def parser(
+    command: str, description: str, example: str, help_switches: tuple[str, ...] = ("-h", "--help")
+) -> argparse.ArgumentParser:
     """Return an empty parser for `python -m toolchain COMMAND`."""
-    return argparse.ArgumentParser(
+    result = argparse.ArgumentParser(
         prog=f"python -m toolchain {command}",
         description=description,
         epilog=f"example: {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
+        add_help=False,
     )
+    result.add_argument(*help_switches, action="help", help="show this text")
+    return result
 
 
 def integer(text: str) -> int:

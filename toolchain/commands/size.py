@@ -30,7 +30,9 @@ def totals(sections: list[Section]) -> dict[str, int]:
 
 def main(arguments: list[str]) -> int:
     """Print a table, or JSON; returns 0."""
-    p = parser("size", "Show flash bytes (three per instruction word) and RAM bytes.", "python -m toolchain size firmware.elf")
+    p = parser(
+        "size", "Show flash bytes (three per instruction word) and RAM bytes.", "python -m toolchain size firmware.elf"
+    )
     p.add_argument("files", nargs="+", metavar="FILE")
     p.add_argument("-A", "--sections", action="store_true", help="one line per section")
     p.add_argument("--json", action="store_true", help="machine-readable output")

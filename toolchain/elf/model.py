@@ -13,6 +13,9 @@ from emu.elffacts import OCTETS_PER_UNIT, ExtendedAttribute, SectionFlag
 from toolchain.elf import constants as c
 
 
+NO_ATTRIBUTES = ExtendedAttribute(0)
+
+
 class Bind(Enum):
     """Symbol binding, as ELF numbers it."""
 
@@ -66,7 +69,7 @@ class Section:
     address: int = 0
     load: int = 0
     relocs: list[Reloc] = field(default_factory=list, repr=False)
-    extended: ExtendedAttribute = ExtendedAttribute(0)
+    extended: ExtendedAttribute = NO_ATTRIBUTES
 
     @property
     def units(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 
 from emu.elffacts import OCTETS_PER_UNIT, PSV_PAGE_UNITS, ExtendedAttribute, SectionFlag
 from toolchain.elf import constants as c
@@ -159,7 +160,7 @@ def _linker_symbols(
         values["__dinit_tblpage"], values["__dinit_tbloffset"] = load >> 16, load & 0xFFFF
     calls = sorted((p.load, p.size) for s, p in layout.placed.items() if s.name == ".user_init" and p.size)
     if calls:
-        gaps = [a for (a, size), (b, _) in zip(calls, calls[1:], strict=False) if a + size != b]
+        gaps = [a for (a, size), (b, _) in pairwise(calls) if a + size != b]
         if gaps:
             raise ToolError(f".user_init is torn apart at {gaps[0]:#x} by a section with a fixed address")
         values["__user_init"], values["__has_user_init"] = calls[0][0], 1

@@ -47,7 +47,9 @@ def map_text(linked: Linked) -> str:
             lines.append(f"  {source.name:18} {placed.address:#08x} {placed.size:#7x} {used:6} bytes  {owner}")
             for symbol, size in sizes.get(source, []):
                 address = placed.address + symbol.value
-                lines.append(f"    {'':16} {address:#08x} {size:#7x} {byte_size(source, size):6} bytes    {symbol.name}")
+                lines.append(
+                    f"    {'':16} {address:#08x} {size:#7x} {byte_size(source, size):6} bytes    {symbol.name}"
+                )
     lines += ["", "Data initialisation (.dinit): address, bytes, how"]
     lines += [f"  {r.address:#06x} {r.size:6}  {r.format.name.lower()}" for r in linked.records]
     left_out = [

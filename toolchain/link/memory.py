@@ -26,7 +26,7 @@ def config_sections() -> dict[str, int]:
 
 
 def script_symbols() -> dict[str, int]:
-    """Absolute symbols a device's linker script defines (abi-elf.md §3.3): bases, config words, SFRs in two spellings."""
+    """Absolute symbols of a device's linker script (abi-elf.md §3.3): bases, config words, SFRs in two spellings."""
     symbols = {
         "__CODE_BASE": PROGRAM.start,
         "__IVT_BASE": IVT.start,

@@ -1,0 +1,32 @@
+"""Source lines of an executable, for `objdump -S`; the DWARF reader (phantom octets, pyelftools) is `emu.lines`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from emu.lines import Line, Lines
+from toolchain.elf.model import Executable
+
+__all__ = ["Line", "Lines", "SourceText", "lines_of"]
+
+
+def lines_of(image: Executable) -> Lines:
+    """Return the line table of `image`; empty when it carries no DWARF."""
+    return Lines({s.name: bytes(s.data) for s in image.sections if s.name.startswith(".debug_")})
+
+
+class SourceText:
+    """Source files by the names DWARF gives them; a file that is gone shows only its line numbers."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, list[str] | None] = {}
+
+    def line(self, file: str, number: int) -> str | None:
+        """Return the text of a line, None when the file or the line is not there."""
+        if file not in self._files:
+            try:
+                self._files[file] = Path(file).read_text("utf-8", "replace").splitlines()
+            except OSError:
+                self._files[file] = None
+        text = self._files[file]
+        return text[number - 1] if text is not None and 0 < number <= len(text) else None
