@@ -6,6 +6,7 @@ from typing import Final
 
 from emu.bus import Bus
 from emu.chips.chip import Chip
+from emu.peripherals.adc import Adc
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import Kit, Peripheral, Wires
 from emu.peripherals.lvd import LowVoltageDetect
@@ -44,6 +45,8 @@ class Peripherals:
         self.external: Final = ExternalInterrupts(kit, self.interrupts)
         self.timer: Final = Timers(kit, self.interrupts).by_number
         self.uart: Final = {site.number: Uart(site, kit, self.interrupts, self.ports) for site in chip.uarts}
+        self.adc: Final = Adc(chip.adc, kit, self.interrupts, self.timer)
+        self.external.on_int0 = self.adc.int0
         self.pmd: Final = ModuleDisable(kit, self._modules())
         self.all: Final[tuple[Peripheral, ...]] = (
             self.oscillator,
@@ -56,12 +59,13 @@ class Peripherals:
             self.external,
             *self.timer.values(),
             *self.uart.values(),
+            self.adc,
             self.pmd,
         )
 
     def _modules(self) -> dict[str, Peripheral]:
         """Peripherals by the name their PMD bit carries."""
-        modules: dict[str, Peripheral] = {}
+        modules: dict[str, Peripheral] = {"ADC": self.adc}
         modules |= {f"T{number}": timer for number, timer in self.timer.items()}
         modules |= {f"U{number}": uart for number, uart in self.uart.items()}
         return modules

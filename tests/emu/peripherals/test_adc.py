@@ -1,0 +1,214 @@
+"""12-bit ADC (dspic30f6014a.md §13)."""
+
+from __future__ import annotations
+
+import pytest
+
+ADON, ASAM, SAMP, DONE = 0x8000, 4, 2, 1
+AUTO, TIMER3, INT0 = 7 << 5, 2 << 5, 1 << 5
+
+
+def code(rig, channel, value):
+    rig.dev.adc.set_input(channel, value << 4)
+
+
+def test_polled_conversion_of_the_library_takes_133_cycles(rig):
+    """§13: ADCS = 18, TAD 9.5 Tcy, 14 TAD = 133 Tcy from the end of sampling; DONE and ADIF rise together."""
+    code(rig, 9, 1234)
+    rig.write("ADCHS", 9)
+    rig.write("ADCON3", 18)
+    rig.write("ADCON1", ADON)
+    rig.at(10).write("ADCON1", ADON | SAMP)
+    rig.at(100).write("ADCON1", ADON)
+    assert rig.at(101).read("ADCON1") == ADON
+    assert rig.at(233).read("ADCON1") == ADON
+    assert not rig.flag("ADIF")
+    assert rig.at(234).read("ADCON1") == ADON | DONE
+    assert rig.flag("ADIF")
+    assert rig.read("ADCBUF0") == 1234
+
+
+@pytest.mark.parametrize(("adcs", "channels"), [(39, 0x001C), (23, 0x111C), (19, 0x00FC)])
+def test_scans_of_the_epuck_take_900_cycles(rig, adcs, channels):
+    """§13: SAMC = 1; 3 x 15 x 20, 5 x 15 x 12, 6 x 15 x 10 Tcy; buffers in ascending channel order."""
+    scanned = [number for number in range(16) if channels >> number & 1]
+    for number in range(16):
+        code(rig, number, 100 * number)
+    rig.write("ADCSSL", channels)
+    rig.write("ADCON2", 0x0400 | len(scanned) - 1 << 2)
+    rig.write("ADCON3", 0x0100 | adcs)
+    rig.at(10).write("ADCON1", ADON | ASAM | AUTO)
+    assert not rig.at(910).flag("ADIF")
+    assert rig.at(911).flag("ADIF")
+    assert [rig.read(f"ADCBUF{n}") for n in range(len(scanned))] == [100 * number for number in scanned]
+    rig.clear_flags()
+    assert not rig.at(1810).flag("ADIF")
+    assert rig.at(1811).flag("ADIF")
+
+
+def test_buffer_fills_while_the_scan_runs(rig):
+    """§13: each result is in its buffer as soon as its conversion ends: 300 Tcy per channel."""
+    code(rig, 2, 22)
+    code(rig, 3, 33)
+    rig.write("ADCSSL", 0x000C)
+    rig.write("ADCON2", 0x0404)
+    rig.write("ADCON3", 0x0127)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    assert rig.at(300).read("ADCBUF0") == 0
+    assert rig.at(301).read("ADCBUF0") == 22
+    assert rig.read("ADCBUF1") == 0
+    assert rig.at(601).read("ADCBUF1") == 33
+
+
+def test_half_cycle_tad_adds_up_without_drift(rig):
+    """§13: ADCS = 0, SAMC = 1: 7.5 Tcy a conversion, so every second one ends in a full cycle."""
+    rig.write("ADCON3", 0x0100)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    seen = []
+    for cycle in range(1, 40):
+        rig.at(cycle)
+        if rig.flag("ADIF"):
+            seen.append(cycle)
+            rig.clear_flags()
+    assert seen == [9, 16, 24, 31, 39]  # 1 + 7.5 n, rounded up
+
+
+@pytest.mark.parametrize(
+    ("form", "results"),
+    [(0, [0, 0x800, 0xFFF]), (1, [0xF800, 0, 0x7FF]), (2, [0, 0x8000, 0xFFF0]), (3, [0x8000, 0, 0x7FF0])],
+)
+def test_result_formats(rig, form, results):
+    """§13 FORM: unsigned, signed, fractional, signed fractional."""
+    rig.write("ADCON3", 1)
+    for value, expected in zip((0, 2048, 4095), results, strict=True):
+        code(rig, 0, value)
+        rig.write("ADCON1", ADON | form << 8 | SAMP)
+        rig.write("ADCON1", ADON | form << 8)
+        rig.at(rig.events.now + 20)
+        assert rig.read("ADCBUF0") == expected
+        rig.write("ADCON1", 0)
+
+
+def test_alternating_inputs(rig):
+    """§13 ALTS: A, B, A, B."""
+    code(rig, 3, 3)
+    code(rig, 12, 12)
+    rig.write("ADCHS", 0x0C03)
+    rig.write("ADCON2", 0x000D)
+    rig.write("ADCON3", 0x0101)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.at(1 + 4 * 15)
+    assert [rig.read(f"ADCBUF{n}") for n in range(4)] == [3, 12, 3, 12]
+
+
+def test_buffer_halves_take_turns(rig):
+    """§13 BUFM: 0..7, then 8..F; BUFS tells the half being filled."""
+    rig.write("ADCON2", 0x0006)  # SMPI = 1
+    rig.write("ADCON3", 0x0101)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    for index, level in enumerate((10, 20, 30, 40, 50)):
+        code(rig, 0, level)
+        rig.at(1 + 15 * (index + 1))
+        if index == 1:
+            assert rig.read("ADCON2") & 0x80
+    assert [rig.read(f"ADCBUF{n}") for n in "0189"] == [50, 20, 30, 40]
+    assert not rig.read("ADCON2") & 0x80
+
+
+def test_timer_3_match_ends_sampling(rig):
+    """§13 SSRC = 010: T3 flag in cycle 101, conversion 7 (ADCS + 1) = 70 Tcy."""
+    rig.write("PR3", 99)
+    rig.write("ADCON3", 9)
+    rig.write("ADCON1", ADON | ASAM | TIMER3)
+    rig.write("T3CON", 0x8000)
+    assert rig.at(101).flag("T3IF")
+    assert not rig.at(170).flag("ADIF")
+    assert rig.at(171).flag("ADIF")
+    rig.clear_flags()
+    assert rig.at(271).flag("ADIF")
+
+
+def test_timer_2_and_3_as_a_pair_trigger_too(rig):
+    """§7: T2:T3 match."""
+    rig.write("PR2", 99)
+    rig.write("PR3", 0)
+    rig.write("ADCON3", 9)
+    rig.write("ADCON1", ADON | ASAM | TIMER3)
+    rig.write("T2CON", 0x8008)
+    assert rig.at(171).flag("ADIF")
+
+
+def test_int0_edge_ends_sampling(rig):
+    """§13 SSRC = 001: edge 100, flag 101, result 171."""
+    rig.write("ADCON3", 9)
+    rig.write("ADCON1", ADON | ASAM | INT0)
+    rig.at(100).dev.pins.set("RF6", 1)
+    assert not rig.at(170).flag("ADIF")
+    assert rig.at(171).flag("ADIF")
+
+
+def test_switching_off_aborts_and_restarts_the_pointers(rig):
+    """§13: no result; the next ADON begins with buffer 0; ADCBUF is kept."""
+    code(rig, 0, 77)
+    rig.write("ADCON2", 2 << 2)
+    rig.write("ADCON3", 0x0101)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.at(20).write("ADCON1", ASAM | AUTO)
+    assert rig.at(500).read("ADCBUF0") == 77
+    assert rig.read("ADCBUF1") == 0
+    code(rig, 0, 88)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.at(516)
+    assert rig.read("ADCBUF0") == 88
+
+
+def test_negative_input_an1_is_subtracted(rig):
+    """§13 CH0NA; negative differences clip to 0."""
+    code(rig, 5, 1000)
+    code(rig, 1, 400)
+    rig.write("ADCHS", 0x15)
+    rig.write("ADCON3", 1)
+    rig.write("ADCON1", ADON | SAMP)
+    rig.write("ADCON1", ADON)
+    assert rig.at(50).read("ADCBUF0") == 600
+
+
+def test_external_references_scale_the_result(rig):
+    """§13 VCFG = 011: code = floor(4096 (V - VREF-) / (VREF+ - VREF-))."""
+    rig.dev.adc.set_references(0x4000, 0xC000)
+    rig.dev.adc.set_input(0, 0x6000)
+    rig.write("ADCON2", 3 << 13)
+    rig.write("ADCON3", 1)
+    rig.write("ADCON1", ADON | SAMP)
+    rig.write("ADCON1", ADON)
+    assert rig.at(50).read("ADCBUF0") == 1024
+
+
+def test_analog_pins_read_0_on_the_port(rig):
+    """§6: ADPCFG = 0 is the reset state."""
+    rig.dev.pins.set("RB4", 1)
+    assert rig.at(3).read("PORTB") == 0
+    rig.write("ADPCFG", 0x0010)
+    assert rig.at(5).read("PORTB") == 0x10
+
+
+def test_source_is_evaluated_at_the_end_of_each_sampling(rig):
+    """§13: sampling ends SAMC TAD after it began: cycles 21, 321 for SAMC = 1, TAD 20."""
+    seen = []
+    rig.dev.adc.source[0] = lambda cycle: seen.append(cycle) or 0
+    rig.write("ADCON2", 4)
+    rig.write("ADCON3", 0x0127)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.at(602)
+    assert seen == [21, 321]
+
+
+def test_idle_with_adsidl_waits(rig):
+    """§17."""
+    rig.write("ADCON3", 9)
+    rig.write("ADCON1", ADON | 0x2000 | SAMP)
+    rig.at(10).write("ADCON1", ADON | 0x2000)
+    rig.at(20).dev.sleep(1, 20)
+    rig.at(1020).dev.wake(1020)
+    assert not rig.at(1080).flag("ADIF")
+    assert rig.at(1081).flag("ADIF")
