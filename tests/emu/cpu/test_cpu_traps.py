@@ -11,7 +11,7 @@ HANDLER = "trap: nop\nstay: bra stay"
 
 
 def trapped(engine: str, text: str, vector: int, **w: int) -> Rig:
-    rig = Rig(f"{text}\nend: nop\nnop\nnop\nnop\n{HANDLER}", engine, **w)
+    rig = Rig(f"{text}\nend: nop\nnop\nnop\nnop\nhold: bra hold\n{HANDLER}", engine, **w)
     rig.vector(vector, "trap")
     return rig
 
@@ -170,9 +170,9 @@ def test_a_lower_trap_waits_for_a_higher_one(engine: str) -> None:
     """isa.md §14.4: a stack error raised in the address error handler is taken after it."""
     text = (
         "mov [w1], w2\nend: nop\nstay: bra stay\naddr: bclr 0x80, #3\npush w0\nnop\nretfie\n"
-        "stack: bclr 0x80, #2\ninc w3, w3\nretfie"
+        "stack: mov w4, 0x20\nbclr 0x80, #2\nretfie"
     )
-    rig = Rig(text, engine, w1=RAM + 1, w3=0)
+    rig = Rig(text, engine, w1=RAM + 1, w4=0x1F00)
     rig.vector(ADDRESS, "addr")
     rig.vector(STACK_ERROR, "stack")
     rig.machine.write("SPLIM", STACK + 2)
