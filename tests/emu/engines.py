@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol
 
 from rowmachine import REGISTERS, RowMachine
+
+from emu.dspic30f.engines import NAMES
+from emu.machine import Machine
 
 RAM_START, RAM_END = 0x0800, 0x2800
 CORE = ("TBLPAG", "MODCON", "XMODSRT", "XMODEND", "YMODSRT", "YMODEND", "XBREV")
@@ -85,4 +89,67 @@ class Rows:
         return bytes(self.m.data[RAM_START:RAM_END])
 
 
-ENGINES: dict[str, Callable[[], Engine]] = {"rows": Rows}
+class OnMachine:
+    """A whole machine with one of its engines."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.machine = Machine(engine=name)
+        for half in range(len(self.machine.program.flash)):
+            self.machine.program.flash[half] = 0
+        self.machine.program.announce_all()
+        for n in range(16):
+            self.machine.w[n] = 0
+        flash = self.machine.record.fields["program.flash"]
+        self.state = (slice(0, flash.offset), slice(flash.offset + 4 * flash.count, self.machine.record.used))
+        self.clean = [bytes(self.machine.record.bytes[part]) for part in self.state]
+        self.used: list[int] = []
+
+    def prepare(self, vector: dict[str, Any]) -> None:
+        m, state = self.machine, vector["in"]
+        for address in self.used:
+            m.program.put_flash(address, [0])
+        for part, content in zip(self.state, self.clean, strict=True):  # all but flash, which is large
+            m.record.bytes[part] = content
+        program = program_of(vector)
+        for address, word in program.items():
+            m.program.put_flash(address, [word])
+        self.used = list(program)
+        for n, value in enumerate(state["W"]):
+            m.w[n] = value
+        for name in ("SR", "CORCON"):
+            m.poke(name, state[name])
+        for name in CORE:
+            m.poke(name, state.get(name, 0))
+        for name in ("ACCA", "ACCB"):
+            for i, part in enumerate("LHU"):
+                m.poke(name + part, state.get(name, 0) >> 16 * i & 0xFFFF)
+        for address, value in state.get("mem", {}).items():
+            m.poke(int(address, 16), value)
+        m.pc = vector["pc"]
+
+    def step(self) -> None:
+        stop = self.machine.run_until(self.machine.cycle + 1)
+        assert stop is None, stop
+
+    @property
+    def pc(self) -> int:
+        return self.machine.pc
+
+    def w(self, n: int) -> int:
+        return self.machine.w[n]
+
+    def register(self, name: str) -> int:
+        return self.machine.peek(name)
+
+    def accumulator(self, name: str) -> int:
+        low, high, upper = (self.machine.peek(name + part) for part in "LHU")
+        return low | high << 16 | (upper & 0xFF) << 32
+
+    def ram(self) -> bytes:
+        return bytes(self.machine.record.bytes[RAM_START:RAM_END])
+
+
+ENGINES: dict[str, Callable[[], Engine]] = {"rows": Rows} | {
+    name: partial(OnMachine, name) for name in NAMES if name != "auto"
+}
