@@ -1,0 +1,1 @@
+"""Worst-case stack use of a linked image, from its instructions."""

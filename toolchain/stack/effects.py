@@ -1,0 +1,133 @@
+"""What one instruction does to the stack pointer and to the flow of control.
+
+Stack depth counts bytes above the value of W15 at function entry, behind the return address; the stack grows upward
+(isa.md §3.5).  Rows are told apart by mnemonic and operand fields only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from emu.dspic30f.isa.row import Insn
+
+SP = 15
+FRAME = 14
+CALL_BYTES = 4  # isa.md §7.4: CALL, RCALL and exceptions push two words
+_SP_ADDRESSES = (2 * SP, 2 * SP + 1)  # W15 through its data address, isa.md §2.2
+_STEP = {2: -1, 3: 1, 4: -1, 5: 1}  # addressing modes [Wn--] [Wn++] [--Wn] [++Wn], isa.md §3.1
+_READS_F = ("MOV f, Wnd", "PUSH f", "CP", "CPB", "CP0", "BTST", "BTSS", "BTSC", "MUL")
+
+
+class Flow(Enum):
+    """Where control goes next."""
+
+    NEXT = "next"
+    BRANCH = "branch or next"
+    JUMP = "jump"
+    CALL = "call, then next"
+    SKIP = "next or the one behind it"
+    TABLE = "computed branch"
+    CALL_POINTER = "call through a register"
+    JUMP_POINTER = "jump through a register"
+    END = "return or reset"
+
+
+class Pointer(Enum):
+    """How the stack pointer changes, apart from a known number of bytes."""
+
+    MOVED = "moved by a number of bytes"
+    LINK = "LNK: W14 pushed, then a frame"
+    UNLINK = "ULNK: back to the frame"
+    FROM_FRAME = "copied from W14"
+    FRESH = "loaded with a constant: the start of another stack"
+    UNKNOWN = "set to a value not known here"
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """`delta` in bytes; `target` is a program address for BRANCH, JUMP and CALL."""
+
+    flow: Flow
+    pointer: Pointer = Pointer.MOVED
+    delta: int = 0
+    target: int = 0
+
+
+def effect_of(insn: Insn, address: int) -> Effect:
+    """Return the effect of the instruction at program address `address`."""
+    flow, target = _flow(insn, address)
+    pointer, delta = _pointer(insn)
+    return Effect(flow, pointer, delta, target)
+
+
+def _flow(insn: Insn, address: int) -> tuple[Flow, int]:
+    name, x = insn.row.mnemonic, insn.x
+    fields = insn.row.fields
+    if name in ("RETURN", "RETFIE", "RETLW", "RESET"):
+        return Flow.END, 0
+    if name in ("BTSS", "BTSC") or name.startswith("CPS"):
+        return Flow.SKIP, 0
+    if name in ("CALL", "RCALL", "GOTO", "BRA"):
+        calls = name in ("CALL", "RCALL")
+        if "n" not in fields:
+            return (Flow.CALL_POINTER if calls else Flow.TABLE if name == "BRA" else Flow.JUMP_POINTER), 0
+        target = x.n if not fields["n"].signed else address + 2 + 2 * x.n & 0x7FFFFE
+        if calls:
+            return Flow.CALL, target
+        conditional = name == "BRA" and "," in insn.row.syntax
+        return (Flow.BRANCH if conditional else Flow.JUMP), target
+    return Flow.NEXT, 0
+
+
+def _pointer(insn: Insn) -> tuple[Pointer, int]:
+    name, x, fields = insn.row.mnemonic, insn.x, insn.row.fields
+    if name == "LNK":
+        return Pointer.LINK, x.k
+    if name == "ULNK":
+        return Pointer.UNLINK, 0
+    if name in ("PUSH", "POP") and "f" in fields:
+        if name == "POP" and x.f in _SP_ADDRESSES:
+            return Pointer.UNKNOWN, 0
+        return Pointer.MOVED, 2 if name == "PUSH" else -2
+    if "f" in fields and x.f in _SP_ADDRESSES and not insn.row.syntax.startswith(_READS_F):
+        return Pointer.UNKNOWN, 0
+    return _register_effect(insn)
+
+
+def _register_effect(insn: Insn) -> tuple[Pointer, int]:
+    """Push and pop by addressing mode, arithmetic on W15, copies into it."""
+    x, fields = insn.x, insn.row.fields
+    size = 4 if insn.row.mnemonic == "MOV.D" else 1 if getattr(x, "B", 0) else 2
+    delta = 0
+    for register, modes in (("s", "pg"), ("d", "qh")):
+        mode = next((getattr(x, m) for m in modes if m in fields), 0)
+        if register in fields and getattr(x, register) == SP and mode:
+            delta += _STEP.get(mode, 0) * size
+    if not _writes_sp(insn):
+        return Pointer.MOVED, delta
+    return _arithmetic(insn)
+
+
+def _writes_sp(insn: Insn) -> bool:
+    """Whether W15 is the direct destination."""
+    x, fields = insn.x, insn.row.fields
+    if "d" not in fields or ("o" in fields and "[Wd" in insn.row.syntax):
+        return False
+    direct = not any(m in fields and getattr(x, m) for m in "qh")
+    pair = insn.row.mnemonic in ("MOV.D", "MUL.SS", "MUL.SU", "MUL.US", "MUL.UU")
+    return direct and (x.d == SP or (pair and x.d == SP - 1))
+
+
+def _arithmetic(insn: Insn) -> tuple[Pointer, int]:
+    """`add #n, w15`, `sub w15, #n, w15`, `inc2 w15, w15`, `mov w14, w15`; everything else is unknown."""
+    name, x, fields = insn.row.mnemonic, insn.x, insn.row.fields
+    sign = {"ADD": 1, "SUB": -1}.get(name)
+    if sign and "k" in fields and ("w" not in fields or x.w == SP):
+        return Pointer.MOVED, sign * x.k
+    step = {"INC": 1, "INC2": 2, "DEC": -1, "DEC2": -2}.get(name)
+    if step and x.s == SP and x.p == 0:
+        return Pointer.MOVED, step
+    if name == "MOV" and "g" in fields and x.s == FRAME and x.g == 0:
+        return Pointer.FROM_FRAME, 0
+    return (Pointer.FRESH if insn.row.syntax.startswith("MOV #lit16") else Pointer.UNKNOWN), 0
