@@ -271,7 +271,8 @@ class Machine:
     # State
 
     def snapshot(self) -> bytes:
-        """A copy of the whole state."""
+        """A copy of the whole state. Whoever continues from it looks for work first: the deadline is derived data."""
+        self.events.kick()
         return self.record.snapshot()
 
     def restore(self, state: bytes) -> None:
