@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Final
 
 from emu.bus import SFR_END
-from emu.dspic30f.data import DataSpace
+from emu.dspic30f.data import W_END, DataSpace
 from emu.dspic30f.faults import UninitialisedPointer
 from emu.dspic30f.interrupts import Exceptions
 from emu.dspic30f.isa.builder import Context, Side, Size
@@ -104,7 +104,7 @@ class Interpreter:
         if not self.faulted:
             cycle = self.last - len(self._stores) + 1
             for ea, value, size in self._stores:
-                if ea < SFR_END:
+                if W_END <= ea < SFR_END:
                     self._events.arrive(cycle)
                 data.write(ea, value, size)
                 cycle += 1
@@ -181,7 +181,7 @@ class Interpreter:
         if self._data.in_window(ea) and not self.window:
             self.window = True
             self.last += self._window_extra
-        if ea < SFR_END:
+        if W_END <= ea < SFR_END:
             self._events.arrive(self.last - self._loads_ahead)
         if self._loads_ahead:
             self._loads_ahead -= 1

@@ -169,7 +169,7 @@ def test_a_higher_trap_interrupts_a_lower_one(engine: str) -> None:
 def test_a_lower_trap_waits_for_a_higher_one(engine: str) -> None:
     """isa.md §14.4: a stack error raised in the address error handler is taken after it."""
     text = (
-        "mov [w1], w2\nend: nop\nstay: bra stay\naddr: bclr 0x80, #3\npush w0\nnop\nretfie\n"
+        "mov [w1], w2\nend: nop\nstay: bra stay\naddr: bclr 0x80, #3\nmov w0, [w15]\nnop\nretfie\n"
         "stack: mov w4, 0x20\nbclr 0x80, #2\nretfie"
     )
     rig = Rig(text, engine, w1=RAM + 1, w4=0x1F00)
