@@ -1,0 +1,371 @@
+"""Typed SSA form of one LLVM module, as plain Python objects.
+
+Enters: nothing. Leaves: the classes every other module of `ir` and `lower` speaks in. The layout rules are those of
+the front end's data layout, which equals XC16's (abi-elf.md §1.1, §1.2): nothing is aligned to more than 2 bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+
+class UnsupportedError(Exception):
+    """A construct this compiler refuses. `where` is "file:line" or a function name when known."""
+
+    def __init__(self, what: str, where: str = "") -> None:
+        super().__init__(f"{where}: {what}" if where else what)
+        self.what = what
+        self.where = where
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Types. Equal types are equal objects by value; `bits` is 0 for everything that is not an integer or a float.
+
+
+@dataclass(frozen=True, slots=True)
+class Type:
+    """One LLVM first-class type. kind: void int float ptr array struct func label meta vector opaque."""
+
+    kind: str
+    bits: int = 0
+    elems: tuple[Type, ...] = ()
+    count: int = 0
+    packed: bool = False
+    vararg: bool = False
+
+    def __str__(self) -> str:
+        match self.kind:
+            case "int":
+                return f"i{self.bits}"
+            case "float":
+                return {16: "half", 32: "float", 64: "double"}.get(self.bits, f"f{self.bits}")
+            case "array":
+                return f"[{self.count} x {self.elems[0]}]"
+            case "vector":
+                return f"<{self.count} x {self.elems[0]}>"
+            case "struct":
+                body = "{ " + ", ".join(map(str, self.elems)) + " }" if self.elems else "{}"
+                return f"<{body}>" if self.packed else body
+            case "func":
+                params = [str(t) for t in self.elems[1:]] + (["..."] if self.vararg else [])
+                return f"{self.elems[0]} ({', '.join(params)})"
+            case "meta":
+                return "metadata"
+            case _:
+                return self.kind
+
+
+VOID = Type("void")
+PTR = Type("ptr", 16)
+LABEL = Type("label")
+META = Type("meta")
+FLOAT = Type("float", 32)
+DOUBLE = Type("float", 64)
+_INTS = {n: Type("int", n) for n in range(1, 129)}
+I1, I8, I16, I32, I64 = (_INTS[n] for n in (1, 8, 16, 32, 64))
+
+
+def int_type(bits: int) -> Type:
+    """The integer type of that many bits, 1..128 (design §5: the legaliser accepts any N up to 128)."""
+    found = _INTS.get(bits)
+    if found is None:
+        raise UnsupportedError(f"integer type i{bits}: wider than 128 bits")
+    return found
+
+
+def align_of(t: Type) -> int:
+    """Alignment in bytes, 1 or 2 (abi-elf.md §1.1)."""
+    match t.kind:
+        case "int":
+            return 1 if t.bits <= 8 else 2
+        case "array" | "vector":
+            return align_of(t.elems[0])
+        case "struct":
+            return 1 if t.packed or not t.elems else max(align_of(e) for e in t.elems)
+        case _:
+            return 2
+
+
+def store_size(t: Type) -> int:
+    """Bytes a load or store of the type touches."""
+    return (t.bits + 7) // 8 if t.kind in ("int", "float", "ptr") else size_of(t)
+
+
+def size_of(t: Type) -> int:
+    """Bytes from one array element of the type to the next."""
+    match t.kind:
+        case "int" | "float" | "ptr":
+            n, a = (t.bits + 7) // 8, align_of(t)
+            return (n + a - 1) // a * a
+        case "array" | "vector":
+            return t.count * size_of(t.elems[0])
+        case "struct":
+            end = struct_offsets(t)[-1] if t.elems else 0
+            a = align_of(t)
+            return (end + a - 1) // a * a
+        case "opaque":
+            return 0
+        case _:
+            raise UnsupportedError(f"size of type {t}")
+
+
+def struct_offsets(t: Type) -> list[int]:
+    """Byte offset of every field, then the end of the last one (abi-elf.md §1.2)."""
+    at, out = 0, []
+    for e in t.elems:
+        a = 1 if t.packed else align_of(e)
+        at = (at + a - 1) // a * a
+        out.append(at)
+        at += size_of(e)
+    return [*out, at]
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Values
+
+
+class Value:
+    """Anything an operand can be."""
+
+    __slots__ = ("type",)
+
+    def __init__(self, type_: Type) -> None:
+        self.type = type_
+
+
+class Const(Value):
+    """A value known at link time."""
+
+    __slots__ = ()
+
+
+class ConstInt(Const):
+    """Integer, null pointer (type ptr, value 0) or the bits of a float. `value` is 0 .. 2^bits-1."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, type_: Type, value: int) -> None:
+        super().__init__(type_)
+        self.value = value & ((1 << type_.bits) - 1)
+
+    @property
+    def signed(self) -> int:
+        """The value as two's complement."""
+        return self.value - (1 << self.type.bits) if self.value >> (self.type.bits - 1) else self.value
+
+    def __repr__(self) -> str:
+        return f"{self.type} {self.signed}"
+
+
+class Undef(Const):
+    """undef or poison: any bit pattern will do."""
+
+    __slots__ = ()
+
+
+class ConstZero(Const):
+    """zeroinitializer of an aggregate."""
+
+    __slots__ = ()
+
+
+class ConstAgg(Const):
+    """Array or struct of constants."""
+
+    __slots__ = ("elems",)
+
+    def __init__(self, type_: Type, elems: list[Value]) -> None:
+        super().__init__(type_)
+        self.elems = elems
+
+
+class ConstBytes(Const):
+    """c"..." array of i8."""
+
+    __slots__ = ("data",)
+
+    def __init__(self, type_: Type, data: bytes) -> None:
+        super().__init__(type_)
+        self.data = data
+
+
+class GlobalRef(Const):
+    """Address of a global variable or function, plus a byte offset."""
+
+    __slots__ = ("name", "offset")
+
+    def __init__(self, name: str, offset: int = 0) -> None:
+        super().__init__(PTR)
+        self.name = name
+        self.offset = offset
+
+    def __repr__(self) -> str:
+        return f"@{self.name}+{self.offset}" if self.offset else f"@{self.name}"
+
+
+class BlockAddress(Const):
+    """Address of a basic block (GNU computed goto)."""
+
+    __slots__ = ("block", "function")
+
+    def __init__(self, function: str, block: str) -> None:
+        super().__init__(PTR)
+        self.function = function
+        self.block = block
+
+
+class ConstExpr(Const):
+    """A constant operation the reader did not fold."""
+
+    __slots__ = ("args", "op")
+
+    def __init__(self, type_: Type, op: str, args: list[Value]) -> None:
+        super().__init__(type_)
+        self.op = op
+        self.args = args
+
+
+class MetaRef(Value):
+    """`metadata !N`, or a value wrapped as metadata."""
+
+    __slots__ = ("ref",)
+
+    def __init__(self, ref: str) -> None:
+        super().__init__(META)
+        self.ref = ref
+
+
+class Arg(Value):
+    """Function parameter."""
+
+    __slots__ = ("attrs", "index", "name")
+
+    def __init__(self, type_: Type, name: str, index: int, attrs: dict[str, object]) -> None:
+        super().__init__(type_)
+        self.name = name
+        self.index = index
+        self.attrs = attrs
+
+    def __repr__(self) -> str:
+        return f"%{self.name}"
+
+
+class InlineAsm(Value):
+    """Callee of a call that is inline assembly."""
+
+    __slots__ = ("constraints", "sideeffect", "text")
+
+    def __init__(self, text: str, constraints: str, sideeffect: bool) -> None:
+        super().__init__(PTR)
+        self.text = text
+        self.constraints = constraints
+        self.sideeffect = sideeffect
+
+
+class Instr(Value):
+    """One instruction; itself the value it defines.
+
+    op      LLVM opcode, or `add`-like spelling after legalisation
+    args    operands; for phi the incoming values, in the order of `blocks`
+    blocks  successor names (br, switch, indirectbr) or incoming block names (phi)
+    Everything rarer sits in `extra` (predicate, source element type, call attributes, switch cases...).
+    """
+
+    __slots__ = ("args", "blocks", "extra", "line", "name", "op", "volatile")
+
+    def __init__(self, op: str, type_: Type, args: list[Value], name: str = "") -> None:
+        super().__init__(type_)
+        self.op = op
+        self.args = args
+        self.name = name
+        self.blocks: list[str] = []
+        self.extra: dict[str, object] = {}
+        self.volatile = False
+        self.line: str | None = None  # !dbg metadata reference
+
+    def __repr__(self) -> str:
+        return f"%{self.name}" if self.name else self.op
+
+    @property
+    def pred(self) -> str:
+        """Predicate of icmp and fcmp."""
+        return str(self.extra["pred"])
+
+
+@dataclass(slots=True)
+class Block:
+    """Basic block: phis first, one terminator last."""
+
+    name: str
+    instrs: list[Instr] = field(default_factory=list)
+
+    @property
+    def succs(self) -> list[str]:
+        """Names of the successors, each once, in order of first mention."""
+        return list(dict.fromkeys(self.instrs[-1].blocks))
+
+    def phis(self) -> Iterator[Instr]:
+        """Leading phi instructions."""
+        for i in self.instrs:
+            if i.op != "phi":
+                return
+            yield i
+
+
+@dataclass(slots=True)
+class Function:
+    """Definition or declaration. `blocks` is empty for declarations."""
+
+    name: str
+    ret: Type
+    args: list[Arg]
+    vararg: bool
+    linkage: str = ""
+    section: str = ""
+    attrs: frozenset[str] = frozenset()
+    blocks: list[Block] = field(default_factory=list)
+    dbg: str | None = None
+    align: int = 0
+    text: str = ""  # the IR as read: key of the code cache
+    dbg_records: list[DbgRecord] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class DbgRecord:
+    """#dbg_value / #dbg_declare: where a source variable lives from here on."""
+
+    kind: str
+    value: Value | None
+    variable: str
+    expression: str
+    block: str
+    index: int
+
+
+@dataclass(slots=True)
+class GlobalVar:
+    """Global variable; `init` is None for declarations."""
+
+    name: str
+    type: Type
+    init: Value | None
+    constant: bool
+    linkage: str = ""
+    section: str = ""
+    align: int = 0
+    dbg: str | None = None
+    attrs: frozenset[str] = frozenset()
+
+
+@dataclass(slots=True)
+class Module:
+    """Everything in one .ll file."""
+
+    source: str = ""
+    globals: dict[str, GlobalVar] = field(default_factory=dict)
+    functions: dict[str, Function] = field(default_factory=dict)
+    aliases: dict[str, Value] = field(default_factory=dict)
+    metadata: dict[str, str] = field(default_factory=dict)
+    named_metadata: dict[str, str] = field(default_factory=dict)
+    module_asm: list[str] = field(default_factory=list)

@@ -1,0 +1,234 @@
+"""Selection of calls, returns and function entry by abi-elf.md §2.2-2.4, and of builtins and inline assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ..ir.model import Arg, ConstInt, GlobalRef, Instr, Type, Undef, Value, align_of, size_of
+from ..target import CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
+from . import asm_inline, builtins
+from .abi import Place, Shape, place_arguments, scalar_shape, struct_shape
+from .mir import Imm, Mem, Slot
+from .names import symbol
+
+if TYPE_CHECKING:
+    from .select import Selector
+
+BLOCK_PUSH_WORDS = 5
+
+
+def _byval(attrs: dict[str, object]) -> Type | None:
+    t = attrs.get("byval")
+    return t if isinstance(t, Type) else None
+
+
+def _shape(v: Value, attrs: dict[str, object]) -> Shape:
+    t = _byval(attrs)
+    return scalar_shape(v.type) if t is None else struct_shape(t)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# function entry
+
+
+def incoming(s: Selector) -> None:
+    """Decide where every parameter lives before any code is selected."""
+    f = s.f
+    s.places = place_arguments([_shape(a, a.attrs) for a in f.args], f.vararg)
+    low = RETURN_ADDRESS_BYTES
+    for a, place in zip(f.args, s.places, strict=True):
+        t = _byval(a.attrs)
+        if place.stack:
+            low = max(low, place.stack)
+            slot = s.new_slot(2 * place.words, -place.stack)
+            s.arg_slots[id(a)] = slot
+            if t is not None:
+                s.slots[id(a)] = slot
+        elif t is not None:
+            s.slots[id(a)] = s.new_slot(max(2 * place.words, 1))
+    s.variadic_anchor = s.new_slot(2, -low) if f.vararg else 0
+
+
+def receive(s: Selector) -> None:
+    """Entry code: parameters from registers and stack to virtual registers or their slots."""
+    late: list[tuple[Arg, Place]] = []
+    for a, place in zip(s.f.args, s.places, strict=True):
+        if place.register is None:
+            late.append((a, place))
+            continue
+        if id(a) in s.slots:
+            for k in range(place.words):
+                s.emit("mov", place.register + k, Slot(s.slots[id(a)], 2 * k))
+        elif id(a) in s.needed:
+            for k, r in enumerate(s.value_regs(a)):
+                s.copy(place.register + k, r)
+    for a, place in late:
+        if place.stack and id(a) not in s.slots and id(a) in s.needed:
+            for k, r in enumerate(s.value_regs(a)):
+                s.emit("mov", Slot(s.arg_slots[id(a)], 2 * k), r)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# calls
+
+
+def select_call(s: Selector, i: Instr) -> None:
+    """Stack arguments last to first, then register arguments, the call, the result."""
+    callee, args = i.args[-1], i.args[:-1]
+    attrs = i.extra["attrs"]
+    assert isinstance(attrs, list)
+    variadic = bool(i.extra.get("vararg"))
+    if variadic:
+        args = [_private_copy(s, a, t) if (t := _byval(k)) is not None else a for a, k in zip(args, attrs, strict=True)]
+        fixed = i.extra.get("fixed", 0)
+        assert isinstance(fixed, int)
+        places = place_arguments([scalar_shape(a.type) if isinstance(a, Value) else Shape(1, True) for a in args], True)
+    else:
+        places = place_arguments([_shape(a, k) for a, k in zip(args, attrs, strict=True)], False)
+    target: int | str
+    if isinstance(callee, GlobalRef):
+        target = symbol(s.module, callee.name)
+    else:
+        target = s.reg(callee)
+    pushed = _push_stack_arguments(s, args, attrs, places, variadic)
+    used = _load_register_arguments(s, args, attrs, places)
+    if isinstance(target, int):
+        mi = s.emit("callr", target)
+    else:
+        mi = s.emit("call", target)
+    mi.also_uses = tuple(used)
+    mi.also_defs = CALLER_SAVED
+    if pushed:
+        s.emit("spadd", Imm(-pushed))
+    if id(i) in s.needed:
+        for k, r in enumerate(s.value_regs(i)):
+            s.copy(k, r)
+
+
+def _private_copy(s: Selector, a: Value, t: Type) -> int:
+    """Variadic structs travel as the address of a copy (design §5); returns a register with that address."""
+    slot = s.new_slot(size_of(t))
+    dest, source = s.temp(), s.temp()
+    s.emit("lea", Slot(slot), dest)
+    s.copy(s.reg(a), source)
+    result = s.temp()
+    s.copy(dest, result)
+    size = size_of(t)
+    byte = align_of(t) == 1
+    count = size if byte else size // 2
+    if count:
+        s.emit("repmov", Imm(count - 1), source, dest, byte=byte)
+    return result
+
+
+def _push_stack_arguments(
+    s: Selector, args: list[Value | int], attrs: list[dict[str, object]], places: list[Place], variadic: bool
+) -> int:
+    """Push in descending distance; returns the bytes pushed."""
+    pushed = 0
+    for k in sorted((k for k in range(len(args)) if places[k].stack), key=lambda k: -places[k].stack):
+        v = args[k]
+        t = None if variadic else _byval(attrs[k])
+        if isinstance(v, int):
+            s.emit("mov", v, Mem("++", SP))
+        elif t is not None:
+            _push_struct(s, v, t)
+        elif s.is_leaf(v):
+            for word in range(places[k].words):
+                if isinstance(v, ConstInt) and not v.value >> 16 * word & 0xFFFF:
+                    s.emit("clr", Mem("++", SP))
+                else:
+                    s.emit("mov", s.leaf_word(v, word), Mem("++", SP))
+        else:
+            for r in s.regs(v):
+                s.emit("mov", r, Mem("++", SP))
+        pushed += 2 * places[k].words
+    return pushed
+
+
+def _push_struct(s: Selector, v: Value, t: Type) -> None:
+    words = (size_of(t) + 1) // 2
+    if align_of(t) == 2 and words >= BLOCK_PUSH_WORDS:
+        source = s.temp()
+        s.copy(s.reg(v), source)
+        s.emit("repmov", Imm(words - 1), source, SP)
+        return
+    for r in _struct_words(s, v, t):
+        s.emit("mov", r, Mem("++", SP))
+
+
+def _struct_words(s: Selector, v: Value, t: Type) -> list[int]:
+    """Registers with the words of a struct in memory; the padding byte of an odd size is not read."""
+    base, size = s.reg(v), size_of(t)
+    out = []
+    for at in range(0, size, 2):
+        r = s.temp()
+        if align_of(t) == 2:
+            s.emit("mov", s.offset_operand(base, at, False), r)
+        elif at + 1 == size:
+            s.emit("mov", s.offset_operand(base, at, True), r, byte=True)
+        else:
+            low, high, shifted = s.temp(), s.temp(), s.temp()
+            raw = s.temp()
+            s.emit("mov", s.offset_operand(base, at, True), raw, byte=True)
+            s.emit("ze", raw, low)
+            s.emit("mov", s.offset_operand(base, at + 1, True), high, byte=True)
+            s.emit("sl", high, Imm(8), shifted)
+            s.emit("ior", low, shifted, r)
+        out.append(r)
+    return out
+
+
+def _load_register_arguments(
+    s: Selector, args: list[Value | int], attrs: list[dict[str, object]], places: list[Place]
+) -> list[int]:
+    """Copies into W0-W7; everything that needs work is computed before the first copy."""
+    moves: list[tuple[int, int]] = []
+    leaves: list[tuple[Value, int, int]] = []
+    used: list[int] = []
+    for v, a, place in zip(args, attrs, places, strict=True):
+        if place.register is None:
+            continue
+        if isinstance(v, Undef):
+            continue
+        used += range(place.register, place.register + place.words)
+        assert isinstance(v, Value)
+        t = _byval(a)
+        if t is not None:
+            moves += [(r, place.register + k) for k, r in enumerate(_struct_words(s, v, t))]
+        elif s.is_leaf(v):
+            leaves += [(v, k, place.register + k) for k in range(place.words)]
+        else:
+            moves += [(r, place.register + k) for k, r in enumerate(s.regs(v))]
+    for source, dest in moves:
+        s.copy(source, dest)
+    for leaf, word, dest in leaves:
+        s.load_leaf(leaf, word, dest)
+    return used
+
+
+def select_ret(s: Selector, i: Instr) -> None:
+    """Result in W0.. (abi-elf.md §2.3)."""
+    used: list[int] = []
+    if i.args and not isinstance(i.args[0], Undef):
+        v = i.args[0]
+        words = max(1, v.type.bits // 16)
+        if s.is_leaf(v):
+            for k in range(words):
+                s.load_leaf(v, k, k)
+        else:
+            for k, r in enumerate(s.regs(v)):
+                s.copy(r, k)
+        used = list(range(words))
+    s.emit("ret").also_uses = tuple(used)
+
+
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+    "call": select_call,
+    "ret": select_ret,
+    "builtin": builtins.select_builtin,
+    "asm": asm_inline.select_asm,
+    "asmresult": asm_inline.select_asmresult,
+}
+

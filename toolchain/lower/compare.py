@@ -1,0 +1,251 @@
+"""Selection of comparisons, conditional values and select."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ..ir.model import I1, ConstInt, Instr, Undef, Value
+from .build import SWAPPED
+from .mir import CC_INVERSE, File, Imm
+from .rules import CONDITION
+
+if TYPE_CHECKING:
+    from .select import Selector
+
+# Comparisons with 0 that CP0 answers, N being the sign because CP0 clears OV (isa.md §6.1).
+ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "sle": "le", "ugt": "nz", "ule": "z"}
+
+
+def condition(s: Selector, c: Value, user: Instr) -> str:
+    """Emit a comparison for the truth of `c` and return the branch condition."""
+    if isinstance(c, Instr) and c.op == "icmp" and s.same_block(c):
+        return compare(s, c, user)
+    if isinstance(c, Instr) and c.op == "xor" and c.type is I1 and isinstance(c.args[1], ConstInt):
+        inner = condition(s, c.args[0], user)
+        return CC_INVERSE[inner] if c.args[1].value else inner
+    s.emit("cp0", s.reg(c), byte=True)
+    return "nz"
+
+
+def compare(s: Selector, c: Instr, at: Instr) -> str:
+    """CP or a relative of it, emitted at `at`; returns the condition under which the icmp holds.
+
+    A comparison may be repeated at several users, so loads fold into it only when it has one.
+    """
+    a, b = c.args
+    pred = c.pred
+    bits = a.type.bits
+    if isinstance(a, ConstInt) or s.is_leaf(a) and not s.is_leaf(b):
+        a, b, pred = b, a, SWAPPED[pred]
+    if bits > 16:
+        return _compare_wide(s, a, b, pred)
+    byte = bits <= 8
+    fold = at if s.single_use(c) else None
+    if isinstance(b, Undef):
+        return CONDITION[pred]
+    if isinstance(b, ConstInt):
+        return _compare_constant(s, a, b, pred, byte, fold)
+    if fold is not None and s.foldable_load(a, fold) is not None and s.foldable_load(b, fold) is None:
+        a, b, pred = b, a, SWAPPED[pred]
+    right = s.source(b, fold) if fold is not None else s.reg(b)
+    s.emit("cp", s.reg(a), right, byte=byte)
+    return CONDITION[pred]
+
+
+def _compare_constant(s: Selector, a: Value, b: ConstInt, pred: str, byte: bool, fold: Instr | None) -> str:
+    k, bits = b.value, max(b.type.bits, 8)
+    ones = (1 << bits) - 1
+    if pred in ("slt", "sge") and k == 1:
+        pred, k = ("sle" if pred == "slt" else "sgt"), 0
+    elif pred in ("sgt", "sle") and k == ones:
+        pred, k = ("sge" if pred == "sgt" else "slt"), 0
+    elif pred in ("ult", "uge") and k == 1:
+        pred, k = ("eq" if pred == "ult" else "ne"), 0
+    elif pred in ("ugt", "ule") and k < 31 and k + 1 <= ones:
+        pred, k = ("uge" if pred == "ugt" else "ult"), k + 1
+    elif pred in ("sgt", "sle") and k < 31:
+        pred, k = ("sge" if pred == "sgt" else "slt"), k + 1
+    if k == 0 and pred in ZERO_CONDITION:
+        return _compare_zero(s, a, pred, byte, fold)
+    if k <= 31:
+        s.emit("cp", s.reg(a), Imm(k), byte=byte)
+    elif pred in ("eq", "ne") and -k & ones <= 31:
+        s.emit("add", s.reg(a), Imm(-k & ones), s.temp(), byte=byte)
+    else:
+        t = s.temp()
+        s.load_imm(k, t)
+        right = s.source(a, fold) if fold is not None else s.reg(a)
+        if isinstance(right, int):
+            s.emit("cp", right, t, byte=byte)
+        else:
+            s.emit("cp", t, right, byte=byte)
+            pred = SWAPPED[pred]
+    return CONDITION[pred]
+
+
+def _compare_zero(s: Selector, a: Value, pred: str, byte: bool, fold: Instr | None) -> str:
+    """Against 0: bit tests, near objects, CP0."""
+    if fold is None:
+        s.emit("cp0", s.reg(a), byte=byte)
+        return ZERO_CONDITION[pred]
+    if pred in ("eq", "ne") and isinstance(a, Instr) and a.op == "and" and s.single_use(a) and s.same_block(a):
+        if isinstance(a.args[1], ConstInt) and _test_bits(s, a, fold):
+            return CONDITION[pred]
+    operand = _near_operand(s, a, fold)
+    if operand is not None:
+        s.emit("cp0f", operand, byte=byte)
+    else:
+        s.emit("cp0", s.source(a, fold), byte=byte)
+    return ZERO_CONDITION[pred]
+
+
+def _near_operand(s: Selector, v: Value, user: Instr) -> File | None:
+    """Near address of a load that may fold into `user`."""
+    load = s.foldable_load(v, user)
+    if load is None or load.type.bits not in (8, 16):
+        return None
+    base, _ = s.decompose(load.args[0])
+    if not s.is_leaf(base) or id(base) in s.slots:
+        return None
+    mark = len(s.out)
+    operand = s.address(load.args[0], load.type.bits == 8)
+    if isinstance(operand, File) and operand.near:
+        s.folded.add(id(load))
+        return operand
+    del s.out[mark:]
+    return None
+
+
+def _test_bits(s: Selector, a: Instr, at: Instr) -> bool:
+    """BTST for one bit of a register or near object."""
+    mask = a.args[1]
+    assert isinstance(mask, ConstInt)
+    if mask.value and mask.value & (mask.value - 1) == 0:
+        bit = mask.value.bit_length() - 1
+        near = _near_operand(s, a.args[0], at)
+        if near is not None:
+            s.emit("btstf", near, Imm(bit), byte=a.type.bits == 8)
+        else:
+            s.emit("btst", s.source(a.args[0], at) if a.type.bits == 16 else s.reg(a.args[0]), Imm(bit))
+        return True
+    return False
+
+
+def _compare_wide(s: Selector, a: Value, b: Value, pred: str) -> str:
+    """Several words: CP, then CPB; Z is sticky (isa.md §6.1)."""
+    left = s.regs(a)
+    if isinstance(b, ConstInt):
+        if b.value == 0 and pred in ("eq", "ne"):
+            _or_words(s, left)
+            return CONDITION[pred]
+        if b.value == 0 and pred in ("slt", "sge") or b.signed == -1 and pred in ("sgt", "sle"):
+            s.emit("cp0", left[-1])
+            return "n" if pred in ("slt", "sle") else "nn"
+    op = "cp"
+    for k, x in enumerate(left):
+        if isinstance(b, ConstInt):
+            word = b.value >> 16 * k & 0xFFFF
+            if word <= 31:
+                s.emit(op, x, Imm(word))
+            else:
+                t = s.temp()
+                s.load_imm(word, t)
+                s.emit(op, x, t)
+        else:
+            s.emit(op, x, s.regs(b)[k] if k == 0 or not s.is_leaf(b) else s.leaf_word(b, k))
+        op = "cpb"
+    return CONDITION[pred]
+
+
+def _or_words(s: Selector, words: tuple[int, ...]) -> None:
+    """Z says whether all words are 0."""
+    total = words[0]
+    for x in words[1:]:
+        t = s.temp()
+        s.emit("ior", total, x, t)
+        total = t
+
+
+def select_icmp(s: Selector, i: Instr) -> None:
+    """A truth value: 1, unless the condition fails."""
+    d = s.result(i)
+    a, b = i.args
+    if i.pred == "slt" and isinstance(b, ConstInt) and b.value == 0:
+        _sign_bit(s, a, d)
+        return
+    cc = compare(s, i, i)
+    before = len(s.out)
+    s.emit("mov", Imm(1), d)
+    _move_before_compare(s, before)
+    skip = s.emit("skip", "", cc=cc)
+    skip.count = 1
+    s.emit("clr", d).pred = True
+
+
+def _sign_bit(s: Selector, a: Value, d: int) -> None:
+    """a < 0 as 0 or 1."""
+    top = s.regs(a)[-1]
+    if a.type.bits == 8:
+        wide = s.temp()
+        s.emit("se", top, wide)
+        top = wide
+    s.emit("lsr", top, Imm(15), d)
+
+
+def _move_before_compare(s: Selector, at: int) -> None:
+    """Keep the comparison next to its skip: what was emitted after it moves before its first instruction."""
+    first = at
+    while first > 0 and s.out[first - 1].op in ("cp", "cpb", "cp0", "cp0f", "btst", "btstf"):
+        first -= 1
+    s.out[first:] = s.out[at:] + s.out[first:at]
+
+
+def select_select(s: Selector, i: Instr) -> None:
+    """d = a; when the condition fails, d = b. The second value is loaded under a skip."""
+    c, a, b = i.args
+    d = s.value_regs(i)
+    if isinstance(a, Undef) or isinstance(b, Undef):
+        _assign(s, b if isinstance(a, Undef) else a, d)
+        return
+    outer, s.out = s.out, []
+    cc = condition(s, c, i)
+    test, s.out = s.out, outer
+    if s.is_leaf(a) and not s.is_leaf(b) or not s.is_leaf(a) and not s.is_leaf(b) and _dies_here(s, b, i, a):
+        a, b, cc = b, a, CC_INVERSE[cc]
+    right = None if s.is_leaf(b) else s.value_regs(b)
+    _assign(s, a, d)
+    s.out += test
+    skip = s.emit("skip", "", cc=cc)
+    start = len(s.out)
+    if right is not None:
+        for x, r in zip(right, d, strict=True):
+            if x != r:
+                s.emit("mov", x, r)
+    else:
+        for k, r in enumerate(d):
+            s.load_leaf(b, k, r)
+    skip.count = len(s.out) - start
+    for mi in s.out[start:]:
+        mi.pred = True
+    if skip.count == 0:
+        s.out.remove(skip)
+
+
+def _dies_here(s: Selector, b: Value, i: Instr, a: Value) -> bool:
+    """Whether starting from `b` saves the copy that starting from `a` needs."""
+    return s.single_use(b) and not s.single_use(a)
+
+
+def _assign(s: Selector, v: Value, d: tuple[int, ...]) -> None:
+    """d = v, as copies or constant loads."""
+    if s.is_leaf(v):
+        for k, r in enumerate(d):
+            s.load_leaf(v, k, r)
+    else:
+        for x, r in zip(s.value_regs(v), d, strict=True):
+            s.copy(x, r)
+
+
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {"icmp": select_icmp, "select": select_select}
+

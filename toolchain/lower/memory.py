@@ -1,0 +1,318 @@
+"""Selection of loads, stores, read-modify-write forms and block operations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ..ir.model import ConstInt, Instr, Value
+from .mir import File, Imm, Mem, Operand, Slot
+from .rules import COMMUTES, FILE_BINARY, FILE_UNARY, REGISTER_OP, immediate_rule
+
+if TYPE_CHECKING:
+    from .select import Selector
+
+INLINE_WORDS = 3  # copies and fills of up to this many units are written out
+
+
+def _words(v: Value) -> int:
+    return max(1, v.type.bits // 16)
+
+
+def move_in(s: Selector, source: Operand, d: int, byte: bool) -> None:
+    """d = memory operand. Near bytes pass through W0 (isa.md §3.3)."""
+    if byte and isinstance(source, File):
+        s.emit("mov", source, 0, byte=True)
+        s.emit("mov", 0, d)
+    else:
+        s.emit("mov", source, d, byte=byte)
+
+
+def move_out(s: Selector, r: int, dest: Operand, byte: bool) -> None:
+    """memory operand = r."""
+    if byte and isinstance(dest, File):
+        s.emit("mov", r, 0)
+        s.emit("mov", 0, dest, byte=True)
+    else:
+        s.emit("mov", r, dest, byte=byte)
+
+
+def select_load(s: Selector, i: Instr) -> None:
+    """One MOV a word. A dead volatile load still reads."""
+    d = s.value_regs(i)
+    p, byte = i.args[0], i.type.bits == 8
+    if len(d) == 1:
+        move_in(s, s.address(p, byte), d[0], byte)
+        return
+    for operand, r in zip(_run(s, p, len(d)), d, strict=True):
+        s.emit("mov", operand, r)
+
+
+def _run(s: Selector, p: Value, count: int) -> list[Operand]:
+    """Operands of `count` consecutive words at p."""
+    first = s.address(p, False, 0, count)
+    if isinstance(first, Mem):
+        start = first.off if first.mode == "off" else 0
+        if first.mode in ("ind", "off") and start + 2 * count <= 1024:
+            return [Mem("off", first.base, start + 2 * k) if start + 2 * k else Mem("ind", first.base) for k in range(count)]
+        return [first, *(s.offset_operand(first.base, start + 2 * k, False) for k in range(1, count))]
+    if isinstance(first, Slot):
+        return [Slot(first.index, first.off + 2 * k) for k in range(count)]
+    assert isinstance(first, File)
+    return [first, *(s.address(p, False, 2 * k, count) for k in range(1, count))]
+
+
+def select_store(s: Selector, i: Instr) -> None:
+    """Read-modify-write forms first, then constants with CLR and SETM, then plain moves."""
+    v, p = i.args
+    if _store_modified(s, i):
+        return
+    byte = v.type.bits == 8
+    if _words(v) == 1:
+        _store_word(s, v, s.address(p, byte), byte)
+        return
+    operands = _run(s, p, _words(v))
+    registers = None if s.is_leaf(v) else s.regs(v)
+    for k, operand in enumerate(operands):
+        if isinstance(v, ConstInt):
+            _store_constant(s, v.value >> 16 * k & 0xFFFF, operand, False)
+        else:
+            s.emit("mov", registers[k] if registers is not None else s.leaf_word(v, k), operand)
+
+
+def _store_word(s: Selector, v: Value, operand: Operand, byte: bool) -> None:
+    if isinstance(v, ConstInt):
+        _store_constant(s, v.value, operand, byte)
+        return
+    move_out(s, s.reg(v), operand, byte)
+
+
+def _store_constant(s: Selector, k: int, operand: Operand, byte: bool) -> None:
+    """CLR and SETM reach memory directly where the form exists (isa.md §5.1)."""
+    ones = 0xFF if byte else 0xFFFF
+    if k in (0, ones):
+        op = "clr" if k == 0 else "setm"
+        if isinstance(operand, File) and operand.near:
+            s.emit(op + "f", operand, byte=byte)
+            return
+        if isinstance(operand, Mem) and operand.mode == "ind":
+            s.emit(op, operand, byte=byte)
+            return
+    t = s.temp()
+    s.load_imm(k, t)
+    move_out(s, t, operand, byte)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# read-modify-write
+
+
+def _store_modified(s: Selector, i: Instr) -> bool:
+    """store (load p op x), p as one instruction on memory, when nothing else needs the values."""
+    op, p = i.args
+    if not isinstance(op, Instr) or op.type.bits not in (8, 16) or not s.single_use(op) or not s.same_block(op):
+        return False
+    if id(op) in s.needed or op.op not in ("add", "sub", "and", "or", "xor", "shl", "lshr", "ashr"):
+        return False
+    a, b = op.args
+    load = _load_of(s, a, p, i)
+    if load is None and op.op in COMMUTES:
+        a, b = b, a
+        load = _load_of(s, a, p, i)
+    if load is None:
+        return False
+    byte = op.type.bits == 8
+    if isinstance(b, ConstInt):
+        return _modify_constant(s, op, b, load, p, byte)
+    if op.op in FILE_BINARY:
+        return _modify_register(s, op, b, load, p, byte)
+    return False
+
+
+def _load_of(s: Selector, v: Value, p: Value, store: Instr) -> Instr | None:
+    """The load behind `v` when it reads where the store writes and may move to it."""
+    load = s.foldable_load(v, store)
+    if load is None:
+        return None
+    same = s.decompose(load.args[0])
+    other = s.decompose(p)
+    if same[1] != other[1]:
+        return None
+    x, y = same[0], other[0]
+    if x is y:
+        return load
+    if s.is_leaf(x) and s.is_leaf(y) and not isinstance(x, Instr) and repr(x) == repr(y):
+        return load
+    return None
+
+
+def _target(s: Selector, p: Value, byte: bool) -> File | Mem | None:
+    """Near address or [Wn] for a read-modify-write; None when only MOV reaches it."""
+    base, offset = s.decompose(p)
+    if id(base) in s.slots:
+        return None
+    if s.is_leaf(base):
+        mark = len(s.out)
+        operand = s.address(p, byte)
+        if isinstance(operand, File) and operand.near:
+            return operand
+        del s.out[mark:]
+        return None
+    if offset == 0 and not (isinstance(base, Instr) and base.op == "add" and s.address_only(base)):
+        return Mem("ind", s.reg(base))
+    return None
+
+
+def _modify_constant(s: Selector, op: Instr, b: ConstInt, load: Instr, p: Value, byte: bool) -> bool:
+    name, k, bits = op.op, b.value, op.type.bits
+    if name == "sub":
+        name, k = "add", -k & ((1 << bits) - 1)
+    signed = k - (1 << bits) if k >> (bits - 1) else k
+    unary = FILE_UNARY.get((name, signed))
+    rule = immediate_rule(name, k, bits)
+    bit = _single_bit(name, k, bits)
+    if unary is None and bit is None and name not in FILE_BINARY:
+        return False
+    target = _target(s, p, byte)
+    if target is None:
+        return False
+    if isinstance(target, File):
+        s.folded.add(id(load))
+        if unary is not None:
+            s.emit(unary, target, byte=byte)
+        elif bit is not None:
+            s.emit(bit[0] + "f", target, Imm(bit[1]), byte=byte)
+        else:
+            s.load_imm(k, 0)
+            s.emit(FILE_BINARY[name], target, 0, byte=byte)
+        return True
+    if bit is not None:
+        s.emit(bit[0], target, Imm(bit[1]), byte=byte)
+    elif unary is not None and rule is not None and rule.form == "unary":
+        s.emit(rule.op, target, target, byte=byte)
+    elif unary in ("slf", "lsrf", "asrf"):
+        s.emit(unary[:-1] + "1", target, target, byte=byte)
+    elif name in REGISTER_OP:
+        t = s.temp()
+        s.load_imm(k, t)
+        s.emit(REGISTER_OP[name], t, target, target, byte=byte)
+    else:
+        return False
+    s.folded.add(id(load))
+    return True
+
+
+def _single_bit(name: str, k: int, bits: int) -> tuple[str, int] | None:
+    """("bset" | "bclr" | "btg", bit number) for operations on one bit."""
+    inverse = ~k & ((1 << bits) - 1)
+    if name == "and" and inverse and inverse & (inverse - 1) == 0:
+        return "bclr", inverse.bit_length() - 1
+    if name in ("or", "xor") and k and k & (k - 1) == 0:
+        return ("bset" if name == "or" else "btg"), k.bit_length() - 1
+    return None
+
+
+def _modify_register(s: Selector, op: Instr, b: Value, load: Instr, p: Value, byte: bool) -> bool:
+    target = _target(s, p, byte)
+    if target is None:
+        return False
+    value = s.reg(b)
+    s.folded.add(id(load))
+    if isinstance(target, File):
+        s.copy(value, 0)
+        s.emit(FILE_BINARY[op.op], target, 0, byte=byte)
+    else:
+        name = "subr" if op.op == "sub" else REGISTER_OP[op.op]
+        s.emit(name, value, target, target, byte=byte)
+    return True
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# blocks and the stack pointer
+
+
+def _pointer(s: Selector, p: Value) -> int:
+    """A private copy of a pointer, to be advanced."""
+    r = s.temp()
+    if s.is_leaf(p):
+        s.load_leaf(p, 0, r)
+    else:
+        s.copy(s.reg(p), r)
+    return r
+
+
+def select_blockcopy(s: Selector, i: Instr) -> None:
+    """MOV [Ws++],[Wd++], under REPEAT when long (isa.md §15)."""
+    count, unit = i.extra["count"], i.extra["unit"]
+    assert isinstance(count, int)
+    dest, source = _pointer(s, i.args[0]), _pointer(s, i.args[1])
+    byte = unit == 1
+    if count <= INLINE_WORDS:
+        for k in range(count):
+            mode = "++" if k < count - 1 else "ind"
+            s.emit("mov", Mem(mode, source), Mem(mode, dest), byte=byte)
+        return
+    s.emit("repmov", Imm(count - 1), source, dest, byte=byte)
+
+
+def select_blockfill(s: Selector, i: Instr) -> None:
+    """CLR [Wd++] or MOV Ws,[Wd++], under REPEAT when long."""
+    count, unit = i.extra["count"], i.extra["unit"]
+    assert isinstance(count, int)
+    value, byte = i.args[1], unit == 1
+    zero = isinstance(value, ConstInt) and value.value == 0
+    source = None if zero else s.reg(value)
+    dest = _pointer(s, i.args[0])
+    if count <= INLINE_WORDS:
+        for k in range(count):
+            mode = "++" if k < count - 1 else "ind"
+            if source is None:
+                s.emit("clr", Mem(mode, dest), byte=byte)
+            else:
+                s.emit("mov", source, Mem(mode, dest), byte=byte)
+    elif source is None:
+        s.emit("repclr", Imm(count - 1), dest, byte=byte)
+    else:
+        s.emit("repfill", Imm(count - 1), dest, source, byte=byte)
+
+
+def select_dynalloca(s: Selector, i: Instr) -> None:
+    """The block starts at W15, which moves up by the rounded size (abi-elf.md §2.4)."""
+    s.m.dynamic_stack = True
+    d, t, u = s.value_regs(i)[0], s.temp(), s.temp()
+    s.emit("inc", s.reg(i.args[0]), t)
+    s.copy(t, u)
+    s.emit("bclr", u, Imm(0))
+    s.emit("mov", 15, d)
+    top = s.temp()
+    s.emit("add", d, u, top)
+    s.emit("setsp", top)
+
+
+def select_getsp(s: Selector, i: Instr) -> None:
+    """llvm.stacksave."""
+    s.m.dynamic_stack = True
+    s.emit("mov", 15, s.value_regs(i)[0])
+
+
+def select_setsp(s: Selector, i: Instr) -> None:
+    """llvm.stackrestore."""
+    s.m.dynamic_stack = True
+    s.emit("setsp", s.reg(i.args[0]))
+
+
+def select_vastart(s: Selector, i: Instr) -> None:
+    """Address of the last named argument (abi-elf.md §2.4)."""
+    s.emit("lea", Slot(s.variadic_anchor), s.value_regs(i)[0])
+
+
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+    "load": select_load,
+    "store": select_store,
+    "blockcopy": select_blockcopy,
+    "blockfill": select_blockfill,
+    "dynalloca": select_dynalloca,
+    "getsp": select_getsp,
+    "setsp": select_setsp,
+    "vastart": select_vastart,
+}

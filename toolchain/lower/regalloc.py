@@ -1,0 +1,319 @@
+"""Register allocation: graph colouring with conservative coalescing, pairs and rematerialisation.
+
+Terms. Nodes are registers; W0-W14 are nodes with their own colour. Two nodes interfere when one is written while the
+other is live. A word node may take any of W0-W14, a pair node an even register below W14 and the one after it.
+Method. Build the graph; merge copies when the merged node stays colourable (Briggs for two virtual registers, George
+against a real one); remove nodes in order of colourability, spilling candidates optimistically (Briggs, Cooper,
+Torczon 1994; the weights for pairs follow Smith, Ramsey, Holloway 2004); colour in reverse, preferring the register of
+a copy partner. What finds no colour is rematerialised when it is a constant, else kept in a frame slot, and all is
+repeated.
+"""
+
+from __future__ import annotations
+
+from ..ir.model import UnsupportedError
+from ..target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
+from .liveness import bits, live_out, members, remove_dead
+from .mir import FIRST_VIRTUAL, MI, MFunction
+from .spill import rewrite_spills
+
+WORD_COLOURS = bits(list(ALLOCATABLE))
+PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
+REAL = (1 << FIRST_VIRTUAL) - 1
+LOOP_WEIGHT = 8
+MAX_ROUNDS = 12
+
+
+class Graph:
+    """Interference graph of one round."""
+
+    def __init__(self, m: MFunction) -> None:
+        self.m = m
+        self.adjacent: dict[int, int] = {}
+        self.alias: dict[int, int] = {}
+        self.moves: list[tuple[int, int, int]] = []  # weight, source, destination
+        self.cost: dict[int, float] = {}
+        self.hints: dict[int, list[tuple[int, int]]] = {}  # node -> (partner, colour offset from the partner)
+        self.pair_mask = bits(sorted(m.pairs))
+        self._build()
+
+    def _build(self) -> None:
+        out = live_out(self.m)
+        adjacent = self.adjacent
+        for r in range(FIRST_VIRTUAL):
+            adjacent[r] = REAL & ~(1 << r)
+        for b in self.m.blocks:
+            live = out[b.name]
+            weight = LOOP_WEIGHT ** min(b.depth, 4)
+            for mi in reversed(b.insts):
+                live = self._instruction(mi, live, weight)
+        for n, mask in list(adjacent.items()):
+            for t in members(mask):
+                adjacent[t] = adjacent.get(t, 0) | 1 << n
+
+    def _instruction(self, mi: MI, live: int, weight: int) -> int:
+        adjacent, cost = self.adjacent, self.cost
+        defs, uses = mi.defs(), mi.uses()
+        after = live
+        if mi.is_copy():
+            after &= ~(1 << uses[0])
+            self.moves.append((weight, uses[0], defs[0]))
+        for k in mi.late:
+            a = mi.args[k]
+            if isinstance(a, int):
+                after |= 1 << a
+        d = bits(defs)
+        for r in defs:
+            adjacent[r] = adjacent.get(r, 0) | (after | d) & ~(1 << r)
+            cost[r] = cost.get(r, 0) + weight
+        for r in uses:
+            adjacent.setdefault(r, 0)
+            cost[r] = cost.get(r, 0) + weight
+        if mi.op == "split":
+            low, high, pair = mi.args
+            assert isinstance(low, int) and isinstance(high, int) and isinstance(pair, int)
+            self._pair_hints(pair, low, high)
+        elif mi.op == "join":
+            pair, low, high = mi.args
+            assert isinstance(low, int) and isinstance(high, int) and isinstance(pair, int)
+            self._pair_hints(pair, low, high)
+        return live & ~d | bits(uses)
+
+    def _pair_hints(self, pair: int, low: int, high: int) -> None:
+        for part, offset in ((low, 0), (high, 1)):
+            self.hints.setdefault(part, []).append((pair, offset))
+            self.hints.setdefault(pair, []).append((part, -offset))
+
+    def find(self, n: int) -> int:
+        """Representative of a node."""
+        while n in self.alias:
+            n = self.alias[n]
+        return n
+
+    def pressure(self, n: int, mask: int) -> int:
+        """How many colours of n's class the nodes in `mask` can take away at most."""
+        if n in self.m.pairs:
+            return mask.bit_count()
+        return mask.bit_count() + (mask & self.pair_mask).bit_count()
+
+    def limit(self, n: int) -> int:
+        """Colours in n's class."""
+        return 7 if n in self.m.pairs else 15
+
+    # -- coalescing ---------------------------------------------------------------------------------------------------
+
+    def coalesce(self) -> None:
+        """Merge copies, most frequent first, until no more can be merged safely."""
+        pending = sorted(self.moves, key=lambda m: -m[0])
+        changed = True
+        while changed and pending:
+            changed = False
+            rest = []
+            for weight, source, dest in pending:
+                a, b = self.find(source), self.find(dest)
+                if a == b:
+                    continue
+                if self._mergeable(a, b):
+                    self._merge(a, b)
+                    changed = True
+                else:
+                    rest.append((weight, source, dest))
+            pending = rest
+        for _, source, dest in pending:
+            a, b = self.find(source), self.find(dest)
+            if a != b and not self.adjacent[a] >> b & 1:
+                self.hints.setdefault(a, []).append((b, 0))
+                self.hints.setdefault(b, []).append((a, 0))
+
+    def _mergeable(self, a: int, b: int) -> bool:
+        if a == 15 or b == 15 or self.adjacent[a] >> b & 1:
+            return False
+        if a < FIRST_VIRTUAL and b < FIRST_VIRTUAL or (a in self.m.pairs) != (b in self.m.pairs):
+            return False
+        if b < FIRST_VIRTUAL:
+            a, b = b, a
+        if a < FIRST_VIRTUAL:  # George: every neighbour of b already lives with a, or cannot cause trouble
+            trouble = self.adjacent[b] & ~self.adjacent[a] & ~REAL
+            return all(self.pressure(t, self.adjacent[t]) < self.limit(t) for t in members(trouble))
+        both = self.adjacent[a] | self.adjacent[b]
+        if self.pressure(a, both) < self.limit(a):
+            return True
+        significant = (both & REAL).bit_count()
+        for t in members(both & ~REAL):
+            mask = self.adjacent[t]
+            shared = mask >> a & 1 and mask >> b & 1
+            if self.pressure(t, mask) - (1 if shared else 0) >= self.limit(t):
+                significant += 2 if t in self.m.pairs else 1
+        return significant < self.limit(a)
+
+    def _merge(self, a: int, b: int) -> None:
+        if b < FIRST_VIRTUAL:
+            a, b = b, a
+        self.alias[b] = a
+        mask = self.adjacent.pop(b)
+        self.adjacent[a] |= mask
+        bit_a, bit_b = 1 << a, 1 << b
+        for t in members(mask):
+            self.adjacent[t] = self.adjacent[t] & ~bit_b | bit_a
+        self.cost[a] = self.cost.get(a, 0) + self.cost.get(b, 0)
+        if b in self.m.temps:
+            self.m.temps.add(a)
+        if b in self.hints:
+            self.hints.setdefault(a, []).extend(self.hints.pop(b))
+
+    # -- simplification -----------------------------------------------------------------------------------------------
+
+    def simplify(self) -> list[int]:
+        """Order of removal; colour in reverse."""
+        remaining = {n for n in self.adjacent if n >= FIRST_VIRTUAL}
+        active = bits(sorted(remaining)) | REAL
+        stack: list[int] = []
+        ready = [n for n in remaining if self.pressure(n, self.adjacent[n] & active) < self.limit(n)]
+        queued = set(ready)
+        while remaining:
+            if not ready:
+                victim = min(remaining, key=lambda n: (self._spill_metric(n, active), n))
+                ready.append(victim)
+                queued.add(victim)
+            n = ready.pop()
+            if n not in remaining:
+                continue
+            remaining.discard(n)
+            active &= ~(1 << n)
+            stack.append(n)
+            for t in members(self.adjacent[n] & active & ~REAL):
+                if t not in queued and self.pressure(t, self.adjacent[t] & active) < self.limit(t):
+                    queued.add(t)
+                    ready.append(t)
+        return stack
+
+    def _spill_metric(self, n: int, active: int) -> float:
+        if n in self.m.temps:
+            return float("inf")
+        return self.cost.get(n, 0) / (1 + self.pressure(n, self.adjacent[n] & active))
+
+
+class Colouring:
+    """Assignment of real registers to the nodes of a simplified graph."""
+
+    def __init__(self, g: Graph) -> None:
+        self.g = g
+        self.m = g.m
+        self.colour: dict[int, int] = {r: r for r in range(FIRST_VIRTUAL)}
+        self.used_saved = 0
+        self.spilled: list[int] = []
+        self.partner: dict[int, list[tuple[int, int]]] = {}
+        for low, high in g.m.pair_hints.items():
+            a, b = g.find(low), g.find(high)
+            self.partner.setdefault(a, []).append((b, -1))
+            self.partner.setdefault(b, []).append((a, 1))
+
+    def run(self, order: list[int]) -> None:
+        """Colour nodes last removed first."""
+        for n in reversed(order):
+            allowed = self._allowed(n)
+            if not allowed:
+                self.spilled.append(n)
+                continue
+            c = self._choose(n, allowed)
+            self.colour[n] = c
+            self.used_saved |= (1 << c | (2 << c if n in self.m.pairs else 0)) & bits(list(CALLEE_SAVED))
+
+    def _allowed(self, n: int) -> int:
+        taken = 0
+        for t in members(self.g.adjacent[n]):
+            c = self.colour.get(t)
+            if c is not None:
+                taken |= (3 if t in self.m.pairs else 1) << c
+        if n in self.m.pairs:
+            return PAIR_COLOURS & ~taken & ~(taken >> 1)
+        if self.m.uses_fp:
+            taken |= 1 << FP
+        return WORD_COLOURS & ~taken
+
+    def _choose(self, n: int, allowed: int) -> int:
+        votes: dict[int, int] = {}
+        for partner, offset in self.g.hints.get(n, ()):
+            c = self.colour.get(self.g.find(partner))
+            if c is not None and c + offset >= 0 and allowed >> (c + offset) & 1:
+                votes[c + offset] = votes.get(c + offset, 0) + 4
+        for partner, offset in self.partner.get(n, ()):
+            c = self.colour.get(self.g.find(partner))
+            if c is not None and c + offset >= 0 and allowed >> (c + offset) & 1 and (c + offset) % 2 == (offset > 0):
+                votes[c + offset] = votes.get(c + offset, 0) + 3
+        if votes:
+            best = max(votes, key=lambda c: (votes[c], -self._fresh(c), -c))
+            if not self._fresh(best) or votes[best] > 3:
+                return best
+        return min(members(allowed), key=lambda c: self._rank(n, c))
+
+    def _fresh(self, c: int) -> int:
+        """1 when the register would have to be saved only for this node."""
+        return int(c in CALLEE_SAVED and not self.used_saved >> c & 1)
+
+    def _rank(self, n: int, c: int) -> tuple[int, int, int]:
+        if self.m.interrupt:
+            return (0, 0, c)
+        wants_pair = n in self.partner
+        low = self.partner.get(n, [(0, 0)])[0][1] < 0
+        mismatch = int(wants_pair and (c % 2 == 0) != low)
+        order = 7 - c if c in CALLER_SAVED and not wants_pair else c
+        return (self._fresh(c) * (1 + (c == 14)), mismatch, order)
+
+
+def allocate(m: MFunction) -> None:
+    """Replace virtual registers by W0-W14. Ensures: pairs are even-aligned, split and join are moves or gone."""
+    remove_dead(m)
+    for _ in range(MAX_ROUNDS):
+        g = Graph(m)
+        g.coalesce()
+        colouring = Colouring(g)
+        colouring.run(g.simplify())
+        if not colouring.spilled:
+            _apply(m, g, colouring.colour)
+            return
+        groups = {n: [r for r in g_members(g, n)] for n in colouring.spilled}
+        rewrite_spills(m, groups)
+    raise UnsupportedError("register allocation does not converge", m.name)
+
+
+def g_members(g: Graph, n: int) -> list[int]:
+    """Virtual registers merged into node n."""
+    return [r for r in [n, *g.alias] if r >= FIRST_VIRTUAL and g.find(r) == n]
+
+
+def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
+    rename = {r: colour[g.find(r)] for r in [*g.adjacent, *g.alias] if g.find(r) in colour}
+    for b in m.blocks:
+        out: list[MI] = []
+        for mi in b.insts:
+            mi.map_registers(rename)
+            if mi.op == "split":
+                out += _pair_moves(mi, ((mi.args[2], mi.args[0], 0), (mi.args[2], mi.args[1], 1)), False)
+            elif mi.op == "join":
+                out += _pair_moves(mi, ((mi.args[0], mi.args[1], 0), (mi.args[0], mi.args[2], 1)), True)
+            elif mi.is_copy() and mi.args[0] == mi.args[1]:
+                continue
+            else:
+                out.append(mi)
+        b.insts = out
+    m.pairs = set()
+
+
+def _pair_moves(mi: MI, parts: tuple[tuple[object, object, int], ...], into_pair: bool) -> list[MI]:
+    """Two moves as if at once; EXCH for a swap."""
+    moves = []
+    for pair, word, offset in parts:
+        assert isinstance(pair, int) and isinstance(word, int)
+        source, dest = (word, pair + offset) if into_pair else (pair + offset, word)
+        if source != dest:
+            moves.append((source, dest))
+    if len(moves) == 2:
+        (s0, d0), (s1, d1) = moves
+        if d0 == s1 and d1 == s0:
+            return [MI("exch", s0, s1, line=mi.line)]
+        if d0 == s1:
+            moves.reverse()
+    return [MI("mov", s, d, line=mi.line) for s, d in moves]
+
+

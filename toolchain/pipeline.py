@@ -1,0 +1,181 @@
+"""Optimised LLVM IR text -> pic30-as assembly text: the ordered list of passes.
+
+Each pass sits in its own file and states what it needs and ensures. FUNCTION_PASSES is the order; `check_order` verifies
+the constraints at import, so a pass cannot be moved to where its needs do not hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from .ir.model import Function, Module, UnsupportedError
+from .ir.read import read_module
+from .lower import cfg, data, emit, frame, isr, legalize, peephole, regalloc, select, switch
+from .lower.mir import MFunction
+from .lower.names import symbol
+
+
+class CompileOptions(Protocol):
+    """What the back end needs to know of the command line."""
+
+    level: str  # "0" "1" "2" "s"
+    debug: bool
+    stack_check: bool
+
+
+@dataclass(frozen=True)
+class Options:
+    """Stand-alone CompileOptions."""
+
+    level: str = "s"
+    debug: bool = False
+    stack_check: bool = False
+
+
+@dataclass
+class Context:
+    """One function on its way through the passes."""
+
+    module: Module
+    function: Function
+    options: CompileOptions
+    interrupt: str
+    machine: MFunction | None = None
+
+    @property
+    def m(self) -> MFunction:
+        """The machine form; exists after selection."""
+        assert self.machine is not None
+        return self.machine
+
+    @property
+    def for_size(self) -> bool:
+        """-Os, and -O0 where nobody measures speed."""
+        return self.options.level in ("0", "s")
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One step. `needs` and `gives` name properties of the function; order constraints follow from them."""
+
+    name: str
+    run: Callable[[Context], None]
+    needs: tuple[str, ...] = ()
+    gives: tuple[str, ...] = ()
+
+
+def _legalize(c: Context) -> None:
+    legalize.legalize(c.module, c.function, lambda line: where(c.module, c.function, line))
+
+
+def _select(c: Context) -> None:
+    c.machine = select.Selector(c.module, c.function, c.for_size).run()
+    c.machine.interrupt = c.interrupt
+    c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
+
+
+FUNCTION_PASSES = [
+    Pass("unreachable", lambda c: cfg.remove_unreachable(c.function), ("ssa",), ("reachable",)),
+    Pass("legalize", _legalize, ("ssa", "reachable"), ("legal",)),
+    Pass("unreachable-again", lambda c: cfg.remove_unreachable(c.function), ("legal",)),
+    Pass("dead-code", lambda c: cfg.dead_code(c.function), ("legal",)),
+    Pass("split-logical", lambda c: cfg.split_logical_branches(c.function), ("legal",), ("no-logical-branches",)),
+    Pass("sink-compares", lambda c: cfg.sink_compares(c.function), ("legal",)),
+    Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ("legal",), ("no-switch",)),
+    Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ("no-switch",), ("no-critical-edges",)),
+    Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
+    Pass("allocate", lambda c: regalloc.allocate(c.m), ("machine",), ("real-registers",)),
+    Pass("frame", lambda c: frame.build_frame(c.m, c.options.stack_check), ("real-registers",), ("framed",)),
+    Pass("peephole", lambda c: peephole.run(c.m), ("framed",), ("tidy",)),
+]
+
+
+def check_order(passes: list[Pass]) -> None:
+    """Every need is given by an earlier pass. Raises AssertionError naming the pass otherwise."""
+    have = {"ssa"}
+    for p in passes:
+        missing = set(p.needs) - have
+        assert not missing, f"pass {p.name} needs {missing}"
+        have |= set(p.gives)
+
+
+check_order(FUNCTION_PASSES)
+
+
+def where(module: Module, f: Function, line: str | None) -> str:
+    """ "file:line" of a !dbg reference, or the function's name."""
+    from .lower.debuginfo import source_position
+
+    found = source_position(module, line)
+    return f"{found[0]}:{found[1]}" if found is not None else f"in function '{f.name}'"
+
+
+class ModuleCompiler:
+    """State of one module: text so far and label numbers."""
+
+    def __init__(self, module: Module, options: CompileOptions) -> None:
+        self.module = module
+        self.options = options
+        self.notes = isr.annotations(module)
+        self.lines: list[str] = []
+        self.serial = 0
+
+    def run(self) -> str:
+        """All functions, then all data, then aliases."""
+        for text in self.module.module_asm:
+            self.lines.append(text)
+        for f in self.module.functions.values():
+            if f.blocks and f.linkage != "available_externally":
+                self.function(f)
+            elif f.linkage == "extern_weak":
+                self.lines.append(f"\t.weak {symbol(self.module, f.name)}")
+        self.lines += data.emit_data(self.module)
+        self.aliases()
+        return "\n".join(self.lines) + "\n"
+
+    def function(self, f: Function) -> None:
+        """Compile one definition."""
+        self.serial += 1
+        interrupt = isr.interrupt_kind(f.name, self.notes.get(f.name, set()))
+        if interrupt and (f.args or f.ret.kind != "void"):
+            raise UnsupportedError("an interrupt function takes and returns nothing", f"function '{f.name}'")
+        c = Context(self.module, f, self.options, interrupt)
+        try:
+            for p in FUNCTION_PASSES:
+                p.run(c)
+        except UnsupportedError as e:
+            raise UnsupportedError(e.what, e.where or where(self.module, f, f.dbg)) from e
+        self.header(f, interrupt)
+        self.lines += emit.Emitter(c.m, str(self.serial), False).text(lambda line: "")
+        self.lines.append(f"\t.size {symbol(self.module, f.name)},.-{symbol(self.module, f.name)}")
+
+    def header(self, f: Function, interrupt: str) -> None:
+        """Section, symbol and type. Each function has a section of its own for --gc-sections."""
+        name = symbol(self.module, f.name)
+        section = f.section or (".isr.text." if interrupt else ".text.") + name
+        self.lines.append(f"\t.section {section},code")
+        self.lines.append("\t.align 2")
+        if f.linkage in data.WEAK:
+            self.lines.append(f"\t.weak {name}")
+        elif f.linkage not in ("internal", "private"):
+            self.lines.append(f"\t.global {name}")
+        self.lines.append(f"\t.type {name},@function")
+        self.lines.append(f"{name}:")
+
+    def aliases(self) -> None:
+        """alias = target."""
+        for name, target in self.module.aliases.items():
+            s = symbol(self.module, name)
+            image = data.Image(self.module)
+            text = image.expression(target)
+            if text.startswith("handle("):
+                text = text[len("handle(") : -1]
+            self.lines.append(f"\t.global {s}")
+            self.lines.append(f"\t.set {s},{text}")
+
+
+def compile_module(ll_text: str, options: CompileOptions) -> str:
+    """Translate one module. Raises UnsupportedError naming the construct and its source line."""
+    return ModuleCompiler(read_module(ll_text), options).run()
