@@ -215,12 +215,13 @@ def test_operands_are_split_outside_brackets_and_character_literals() -> None:
     assert text.split_operands("") == []
 
 
-def test_odd_word_addresses_are_executable_but_not_legal() -> None:
-    """isa.md §3.3: such a word runs and then traps; other broken rules are illegal opcodes (§4.1)."""
-    assert codec.decode(0xB42843) is None
-    assert codec.decode_for_execution(0xB42843) is not None
-    assert codec.decode_for_execution(0xB055D1) is None
-    assert codec.decode_for_execution(0xDA4000) is None
+def test_words_that_trap_when_run_are_executable_but_not_legal() -> None:
+    """isa.md §3.3, §8.5; other broken rules are illegal opcodes (§4.1)."""
+    for word in (0xB42843, 0xC80060):  # add.w 0x843; sftac A, #-32
+        assert codec.decode(word) is None
+        assert codec.decode_for_execution(word) is not None
+    for word in (0xB055D1, 0xDA4000, 0xD80781):  # a byte literal above 255; no row; divisor w1
+        assert codec.decode_for_execution(word) is None
 
 
 def test_the_second_word_must_fit_its_pattern() -> None:
