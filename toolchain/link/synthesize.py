@@ -5,9 +5,8 @@ Each is an ordinary section with ordinary relocations, so that placing and reloc
 
 from __future__ import annotations
 
-from emu.dspic30f.isa import codec
+from emu.dspic30f.isa import text
 from emu.dspic30f.isa.debug import HALT
-from emu.dspic30f.isa.table import ROWS
 from emu.elffacts import OCTETS_PER_WORD, RELOCATION_BY_NAME, RELOCATIONS, Formula, SectionFlag
 from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
 from toolchain.link.memory import CHIP
@@ -17,12 +16,11 @@ CODE = SectionFlag.ALLOC | SectionFlag.EXECINSTR
 _LSB, _MSB = RELOCATION_BY_NAME["PGM_ADDR_LSB"].number, RELOCATION_BY_NAME["PGM_ADDR_MSB"].number
 _PADDR = RELOCATION_BY_NAME["P_PADDR"].number
 HANDLES = frozenset(number for number, kind in RELOCATIONS.items() if kind.formula is Formula.HANDLE)
-_BY_SYNTAX = {row.syntax: row for row in ROWS}
 
 
-def code_words(syntax: str, **fields: int) -> bytes:
-    """Return the octets of one instruction, given as a row's syntax and its fields."""
-    return words_octets(*codec.encode(_BY_SYNTAX[syntax], fields))
+def code_words(statement: str) -> bytes:
+    """Return the octets of one instruction."""
+    return words_octets(*text.parse(statement).encode(0))
 
 
 def words_octets(*words: int) -> bytes:
@@ -32,7 +30,7 @@ def words_octets(*words: int) -> bytes:
 
 def _goto(section: Section, symbol: Symbol) -> None:
     at = len(section.data)
-    section.data += code_words("GOTO Expr")
+    section.data += code_words("goto 0")
     section.relocs += [Reloc(at, _LSB, symbol), Reloc(at + OCTETS_PER_WORD, _MSB, symbol)]
 
 
@@ -50,7 +48,7 @@ def reset_section(entry: str) -> Section:
 
 def default_interrupt(obj: ObjectFile) -> None:
     """`__DefaultInterrupt` where the program has none: breakpoint word, RESET (abi-elf.md §3.3)."""
-    section = Section(".isr", CODE, data=bytearray(words_octets(HALT) + code_words("RESET")))
+    section = Section(".isr", CODE, data=bytearray(words_octets(HALT) + code_words("reset")))
     obj.sections.append(section)
     obj.symbols.append(Symbol("__DefaultInterrupt", Home.SECTION, section, 0, section.units, Bind.GLOBAL))
 
@@ -85,4 +83,4 @@ def handle_section(resolution: Resolution, live: set[Section]) -> tuple[Section,
 
 def user_init_return() -> Section:
     """RETURN that ends the collected .user_init calls (abi-elf.md §3.3)."""
-    return Section(".user_init", CODE, data=bytearray(code_words("RETURN")))
+    return Section(".user_init", CODE, data=bytearray(code_words("return")))

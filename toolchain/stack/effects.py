@@ -16,7 +16,7 @@ FRAME = 14
 CALL_BYTES = 4  # isa.md §7.4: CALL, RCALL and exceptions push two words
 _SP_ADDRESSES = (2 * SP, 2 * SP + 1)  # W15 through its data address, isa.md §2.2
 _STEP = {2: -1, 3: 1, 4: -1, 5: 1}  # addressing modes [Wn--] [Wn++] [--Wn] [++Wn], isa.md §3.1
-_READS_F = ("MOV f, Wnd", "PUSH f", "CP", "CPB", "CP0", "BTST", "BTSS", "BTSC", "MUL")
+_READS_F = frozenset(("CP", "CPB", "CP0", "BTST", "BTSS", "BTSC", "MUL"))
 
 
 class Flow(Enum):
@@ -90,7 +90,8 @@ def _pointer(insn: Insn) -> tuple[Pointer, int]:
         if name == "POP" and x.f in _SP_ADDRESSES:
             return Pointer.UNKNOWN, 0
         return Pointer.MOVED, 2 if name == "PUSH" else -2
-    if "f" in fields and x.f in _SP_ADDRESSES and not insn.row.syntax.startswith(_READS_F):
+    only_read = name in _READS_F or (name == "MOV" and "d" in fields)
+    if "f" in fields and x.f in _SP_ADDRESSES and not only_read:
         return Pointer.UNKNOWN, 0
     return _register_effect(insn)
 
@@ -130,4 +131,5 @@ def _arithmetic(insn: Insn) -> tuple[Pointer, int]:
         return Pointer.MOVED, step
     if name == "MOV" and "g" in fields and x.s == FRAME and x.g == 0:
         return Pointer.FROM_FRAME, 0
-    return (Pointer.FRESH if insn.row.syntax.startswith("MOV #lit16") else Pointer.UNKNOWN), 0
+    constant = name == "MOV" and "k" in fields
+    return (Pointer.FRESH if constant else Pointer.UNKNOWN), 0
