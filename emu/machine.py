@@ -6,10 +6,12 @@ What enters: an image, pin levels, bytes. What leaves: `Stop`s, registers and me
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from emu.boards import epuck
 from emu.bus import SFR_END, Bus
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -76,6 +78,8 @@ class Machine:
         self._stopped_at: tuple[int, int] | None = None
         self._interrupt = False
         self._engine: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
+        self.image: Image | None = None
+        """What `load` was given last."""
         self.reset("POR")
 
     @property
@@ -230,8 +234,15 @@ class Machine:
     # Memory
 
     def load(self, image: Image) -> None:
-        """Put an image into program memory and reset as after power-on."""
+        """Put an image into program memory and reset as after power-on.
+
+        Configuration words the image leaves out are those of the robot (`emu.boards.epuck`). Its symbols become names
+        for `read`, `write`, `peek` and `poke`.
+        """
+        self.image = image
         self.program.erase()
+        for name, word in epuck.CONFIG.items():
+            self.program.put(self.chip.config[name].address, word)
         for block in image.blocks:
             if block.end <= self.chip.program["flash"].end:
                 self.program.put_flash(block.base, list(block.words))
@@ -241,8 +252,17 @@ class Machine:
         self.reset("POR")
 
     def address_of(self, place: str | int) -> int:
-        """Data address of a register by name, or the address itself. Raises KeyError for an unknown name."""
-        return self.chip.sfrs[place].address if isinstance(place, str) else place
+        """Data address of a register (`U1STA`, `W3`) or of a variable of the loaded image by name, or the address
+        itself. Raises KeyError for an unknown name."""
+        if not isinstance(place, str):
+            return place
+        sfr = self.chip.sfrs.get(place) or self.chip.sfrs.get(re.sub(r"^[Ww](?=\d+$)", "WREG", place))
+        if sfr is not None:
+            return sfr.address
+        symbol = self.image.symbols.find(place) if self.image is not None else None
+        if symbol is None or symbol.space not in ("data", "absolute"):
+            raise KeyError(f"there is no register or variable {place!r}")
+        return symbol.address
 
     def read(self, place: str | int, size: int = 2) -> int:
         """Data space as an instruction reads it, side effects included."""

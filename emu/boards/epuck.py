@@ -1,0 +1,18 @@
+"""The e-puck as data: the configuration words its chip keeps when firmware arrives without any."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+CONFIG: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "FOSC": 0xFFE6,  # switching and monitor off, XT crystal with PLL x8
+        "FWDT": 0x7FFF,  # watchdog off
+        "FBORPOR": 0xFF7F,  # brown-out reset off, MCLR on, power-up timer 64 ms
+        "FGS": 0xFFFF,  # no code protection
+    }
+)
+"""What the robot's library and boot loader program (dspic30f6014a.md §2). Firmware images often leave these words out,
+because a boot loader cannot write them; an erased FWDT would mean a running watchdog."""
