@@ -29,12 +29,17 @@ class Port:
         self.out_fd = out_fd
         self.in_fd = in_fd
         self.patient: Final = patient
+        self.capture: bytearray | None = None
+        """If set, what the firmware sends is collected here instead."""
         self.lost = 0
         """Bytes the firmware sent that nobody took."""
         self._close: Final = close
 
     def write(self, data: bytes) -> None:
         """Pass on what the firmware sent. Raises BrokenPipeError when standard output was closed by its reader."""
+        if self.capture is not None:
+            self.capture += data
+            return
         while data and self.out_fd is not None:
             try:
                 data = data[os.write(self.out_fd, data) :]

@@ -1,7 +1,7 @@
 """One run of a machine with people attached: slices of cycles, live or recorded input, pace, a clean stop.
 
 What enters: a machine, ports, stamps, limits. What leaves: a `Stop`. Slices change nothing the firmware can see: input
-is stamped with the cycle it is handed over, and the same stamps give the same run.
+is stamped with the cycle it is handed over in, and the same stamps give the same run.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
@@ -22,10 +23,13 @@ SLICE_SECONDS: Final = 0.02
 """Host time a slice should take: output and Ctrl-C wait no longer than this."""
 FIRST_SLICE, SHORTEST_SLICE, LONGEST_SLICE = 20_000, 2_000, 100_000_000
 """Tcy."""
+PACED_SLICES_PER_SECOND: Final = 200
 POLL_SECONDS: Final = 0.1
 """Longest wait without looking for Ctrl-C."""
 FOREVER: Final = 1 << 62
 """Limit in Tcy when there is none: 10,000 years."""
+RESET_LOOP: Final = 16
+"""So many resets without a second of simulated time between first and last are a loop."""
 
 
 class Session:
@@ -39,55 +43,62 @@ class Session:
         limit: int = FOREVER,
         replay: list[Stamp] | None = None,
         record: TextIO | None = None,
-        realtime_hz: int = 0,
+        realtime: bool = False,
         advance: Callable[[int], Stop | None] | None = None,
     ) -> None:
-        """`realtime_hz`: cycles per second of the wall clock, 0 for as fast as possible. `advance(cycle)` replaces
-        the machine's `run_until`, for traces."""
+        """`limit`: last cycle. `realtime`: no faster than the wall clock. `advance(cycle)` replaces the machine's
+        `run_until`, for traces."""
         self.machine: Final = machine
         self.ports: Final = ports
         self.limit: Final = limit
         self.interrupted = False
         self._replay: Final = list(reversed(replay or []))
         self._record: Final = record
-        self._hz: Final = realtime_hz
+        self._realtime: Final = realtime
+        self._hz: Final = machine.peripherals.fcy
         self._advance: Final = advance or machine.run_until
         self._sent: Final = {number: bytearray() for number in ports}
-        self._held: Final = {number: bytearray() for number in ports}
+        self._start = 0.0
+        self._first_cycle: Final = machine.cycle
         for number in ports:
             machine.uart[number].on_byte = self._collector(number)
 
     def run(self) -> tuple[Stop, float]:
         """Run to the end; returns how it ended and the seconds of host time it took."""
         earlier = [(number, signal.signal(number, self._on_signal)) for number in (signal.SIGINT, signal.SIGTERM)]
-        start = time.perf_counter()
+        self._start = time.perf_counter()
         try:
-            stop = self._loop(start)
+            stop = self._loop()
+            if stop.reason not in ("limit", "interrupted"):
+                for number in self.ports:
+                    self.machine.uart[number].drain()
+            self._show_output()
         finally:
             for number, handler in earlier:
                 signal.signal(number, handler)
-        return stop, time.perf_counter() - start
+        return stop, time.perf_counter() - self._start
 
-    def _loop(self, start: float) -> Stop:
+    def _loop(self) -> Stop:
+        machine = self.machine
         slice_cycles = FIRST_SLICE
-        first_cycle = self.machine.cycle
         while not self.interrupted:
-            self._take_input()
+            self._take_input(machine.cycle)
             before = time.perf_counter()
-            stop = self._advance(min(self.limit, self.machine.cycle + slice_cycles, self._next_stamp()))
+            stop = self._advance(min(self.limit, machine.cycle + slice_cycles, self._next_stamp()))
             self._show_output()
-            if stop is not None and stop.reason not in ("limit", "halt"):
+            if stop is not None and stop.reason == "halt":
+                stop = self._outlive(stop)
+            stop = stop or self._reset_loop()
+            if stop is not None:
                 return stop
-            if stop is not None and stop.reason == "halt" and not self._outlive(stop):
-                return stop
-            if self.machine.cycle >= self.limit:
-                break
-            if self._hz:
-                slice_cycles = self._hz // 200
-                self._keep_pace(start, first_cycle)
+            if machine.cycle >= self.limit:
+                return machine.stopped("limit")
+            if self._realtime:
+                slice_cycles = round(self._hz / PACED_SLICES_PER_SECOND)
+                wait_for_input(list(self.ports.values()), (machine.cycle - self._wall_cycle()) / self._hz)
             else:
                 slice_cycles = _adapted(slice_cycles, time.perf_counter() - before)
-        return self.machine.stopped("interrupted" if self.interrupted else "limit")
+        return machine.stopped("interrupted")
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         if self.interrupted:
@@ -105,34 +116,79 @@ class Session:
                 sent.clear()
                 self.ports[number].write(data)
 
+    # Input
+
     def _next_stamp(self) -> int:
         return self._replay[-1].cycle if self._replay else FOREVER
 
-    def _take_input(self) -> None:
-        """Hand over what has arrived, or what the record says arrived by now."""
-        machine = self.machine
-        while self._replay and self._replay[-1].cycle <= machine.cycle:
-            stamp = self._replay.pop()
-            machine.uart[stamp.uart].feed(stamp.data, stamp.cycle)
+    def _take_input(self, cycle: int) -> bool:
+        """Hand over what has arrived by now, stamped with `cycle`; whether there was any."""
+        taken = False
+        while self._replay and self._replay[-1].cycle <= cycle:
+            self._hand_over(self._replay.pop())
+            taken = True
         for number, port in self.ports.items():
-            held = self._held[number]
-            held += port.read()
-            if held and machine.uart[number].receiving:
-                self._feed(Stamp(machine.cycle, number, bytes(held)))
-                held.clear()
+            data = port.read()
+            if data:
+                self._hand_over(Stamp(cycle, number, data))
+                taken = True
+        return taken
 
-    def _feed(self, stamp: Stamp) -> None:
-        self.machine.uart[stamp.uart].feed(stamp.data, stamp.cycle)
+    def _hand_over(self, stamp: Stamp) -> None:
+        """Bytes for a running machine wait until its receiver is on; for a sleeping one they come at their date."""
+        late = stamp.cycle > self.machine.cycle
+        self.machine.uart[stamp.uart].feed(stamp.data, stamp.cycle if late else None)
         if self._record is not None:
             stamp.write(self._record)
 
-    def _outlive(self, stop: Stop) -> bool:
-        """Whether a machine that sleeps with nothing of its own to wake it goes on: input is still to come."""
+    def _wall_cycle(self) -> int:
+        """The cycle a robot started together with this run would be in."""
+        return self._first_cycle + round((time.perf_counter() - self._start) * self._hz)
+
+    def _outlive(self, stop: Stop) -> Stop | None:
+        """A machine sleeps with nothing of its own to wake it. None if input brings it back, else how the run ends."""
+        machine = self.machine
         if self._replay:
-            self._feed(self._replay.pop())
-            return True
-        waiting = [port for number, port in self.ports.items() if self.machine.uart[number].wakes]
-        while any(port.in_fd is not None for port in waiting) and not self.interrupted:
-            if wait_for_input(waiting, POLL_SECONDS):
-                return True
-        return False
+            return None if self._take_input(self._next_stamp()) else stop
+        sources = [port for number, port in self.ports.items() if self._can_wake(number)]
+        while any(port.in_fd is not None for port in sources):
+            if self.interrupted:
+                return machine.stopped("interrupted")
+            patient = self._realtime or self.limit == FOREVER
+            ready = wait_for_input(sources, POLL_SECONDS if patient else 0)
+            now = max(machine.cycle, self._wall_cycle() if self._realtime else 0)
+            if now >= self.limit or not (ready or patient):
+                return replace(stop, reason="limit", cycle=self.limit)
+            if ready and self._take_input(now):
+                return None
+        return stop
+
+    def _can_wake(self, number: int) -> bool:
+        """Whether a byte for this UART would wake the CPU: receiver on, its interrupt enabled above priority 0."""
+        machine = self.machine
+        uart = machine.uart[number]
+        source = machine.chip.interrupts[uart.site.rx_irq]
+        enabled = machine.peek(source.enable[0]) >> source.enable[1] & 1
+        priority = machine.peek(source.priority[0]) >> source.priority[1] & 7
+        return bool(uart.is_enabled and enabled and priority)
+
+    # Health
+
+    def _reset_loop(self) -> Stop | None:
+        """A fault if the firmware does nothing but reset."""
+        resets = self.machine.resets
+        if len(resets) < RESET_LOOP or any(cause in ("POR", "EXTR") for _, cause in resets[-RESET_LOOP:]):
+            return None
+        (first, _), (last, cause) = resets[-RESET_LOOP], resets[-1]
+        if last - first >= self._hz:
+            return None
+        return self.machine.stopped("fault", f"reset loop: {RESET_LOOP} resets ({cause}) in {last - first:,} cycles")
+
+
+def _adapted(cycles: int, seconds: float) -> int:
+    """Length of the next slice after one of `cycles` took `seconds`."""
+    if seconds < SLICE_SECONDS / 2:
+        return min(2 * cycles, LONGEST_SLICE)
+    if seconds > SLICE_SECONDS * 2:
+        return max(cycles // 2, SHORTEST_SLICE)
+    return cycles

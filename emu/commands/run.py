@@ -1,0 +1,261 @@
+"""`emu run`: run a firmware image and show what its UART says."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Final, TextIO
+
+from emu.cli import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.console import SPECIFICATIONS, Port, open_port
+from emu.faults import Fault, fault_of
+from emu.image import Image
+from emu.loader import load_image
+from emu.outfile import whole_text_file
+from emu.session import FOREVER, Session
+from emu.stamps import HEADER, Stamp, read_stamps
+
+if TYPE_CHECKING:
+    from emu.machine import Machine, Stop
+
+FAULT_STATUS: Final = 125
+LIMIT_STATUS: Final = 124
+INTERRUPTED_STATUS: Final = 130
+"""Exit statuses with --exit-code (design §10; 124 and 130 as `timeout` and shells use them)."""
+
+EXIT_SYMBOL: Final = "__exit_status"
+"""Where start-up code leaves what main returned, before it sleeps for ever."""
+
+DESCRIPTION: Final = """\
+Run a firmware image and show what its UART says.
+
+The run ends when the firmware sleeps with nothing left that could wake it, executes the debugger word DA4000,
+faults, or reaches the limit; Ctrl-C ends it cleanly. The last line, on stderr, says why, where and when.
+
+Exit status: 0 ended by itself or limit reached, 1 firmware fault, 2 bad input.
+With --exit-code: the firmware's own status (main's result, low 8 bits), 124 limit, 125 fault, 126 bad input."""
+
+
+def parser() -> Parser:
+    made = Parser("run", DESCRIPTION, "emu run firmware.elf --seconds 5 --uart2 log.txt")
+    made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    limit = made.add_mutually_exclusive_group()
+    limit.add_argument("--seconds", metavar="S", type=_positive_fraction, help="stop after S simulated seconds")
+    limit.add_argument("--cycles", metavar="N", type=_positive_int, help="stop after N instruction cycles")
+    made.add_argument("--uart1", metavar="WHERE", default="-", help=f"{SPECIFICATIONS} (default -: stdout and stdin)")
+    made.add_argument("--uart2", metavar="WHERE", default="none", help=f"{SPECIFICATIONS} (default none)")
+    made.add_argument("--break", dest="breaks", metavar="SYM|ADDR", action="append", default=[], help="stop there")
+    made.add_argument("--trace", metavar="FILE", help="write cycle, PC, disassembly and changed registers (slow)")
+    made.add_argument("--json", action="store_true", help="print one JSON object instead of text; UARTs go into it")
+    made.add_argument("--exit-code", action="store_true", help="let the firmware's status be the exit status")
+    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit, interp or plain (default auto)")
+    made.add_argument(
+        "--ipl-slip", type=int, choices=(0, 1), default=0, help="1: one interrupt may slip through after raising IPL"
+    )
+    made.add_argument("--record", metavar="FILE", help="write every input with the cycle of its arrival")
+    made.add_argument("--replay", metavar="FILE", help="take input from a recorded file instead")
+    made.add_argument("--pace", choices=("realtime",), help="run no faster than the robot would")
+    made.add_argument("--stats", action="store_true", help="print what the engine did")
+    return made
+
+
+def _positive_int(text: str) -> int:
+    number = int(text, 0)
+    if number <= 0:
+        raise ValueError
+    return number
+
+
+def _positive_fraction(text: str) -> Fraction:
+    number = Fraction(text)
+    if number <= 0:
+        raise ValueError
+    return number
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says."""
+    image = load_image(options.image)
+    for warning in image.warnings:
+        print(f"emu run: warning: {image.path}: {warning}", file=sys.stderr)
+    machine = _machine(options, image)
+    replay = _replay(options, machine) if options.replay else []
+    captured: dict[int, bytearray] = {}
+    with ExitStack() as stack:
+        ports = _ports(options, stack, captured)
+        trace = stack.enter_context(whole_text_file(options.trace)) if options.trace else None
+        record = stack.enter_context(_recording(options.record)) if options.record else None
+        session = Session(
+            machine,
+            ports,
+            limit=_limit(options, machine),
+            replay=replay,
+            record=record,
+            realtime=options.pace == "realtime",
+            advance=_tracer(machine, image, trace) if trace is not None else None,
+        )
+        stop, host_seconds = session.run()
+        lost = {number: port.lost for number, port in ports.items() if port.lost}
+    fault = fault_of(machine, image, stop) if stop.pc not in _addresses(image, options.breaks) else None
+    status = exit_status(machine, image, stop, fault) if options.exit_code else EXIT_FAULT if fault else EXIT_OK
+    facts = _facts(machine, image, stop, fault, host_seconds)
+    if options.stats:
+        facts["stats"] = _statistics(machine)
+    for number, count in lost.items():
+        print(f"emu run: UART{number}: {count} bytes lost, nobody read them", file=sys.stderr)
+    if options.json:
+        facts |= {f"uart{number}": bytes(data).decode("latin-1") for number, data in captured.items()}
+        print(json.dumps(facts | {"status": status}))
+    else:
+        _print_end(facts)
+    return status
+
+
+def _machine(options: argparse.Namespace, image: Image) -> Machine:
+    """A machine with the image, breakpoints set, telling about registers nobody models."""
+    from emu.machine import Machine
+
+    try:
+        machine = Machine(image.chip, engine=options.engine, ipl_slip=options.ipl_slip)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+    machine.load(image)
+    for address in _addresses(image, options.breaks):
+        machine.hook_pc(address, lambda: True)
+
+    def report(address: int, is_write: bool) -> None:
+        name = image.register_names.get(address, f"address {address:#06x}")
+        what = "written" if is_write else "read"
+        print(
+            f"emu run: note: {name} is {what} at {machine.pc:#08x} ({image.symbols.text(machine.pc)}) but has no model;"
+            " it behaves as plain memory",
+            file=sys.stderr,
+        )
+
+    machine.bus.report = report
+    return machine
+
+
+def _addresses(image: Image, places: list[str]) -> set[int]:
+    if not places:
+        return set()
+    from emu.commands.disasm import code_address
+
+    return {code_address(image, place) for place in places}
+
+
+def _replay(options: argparse.Namespace, machine: Machine) -> list[Stamp]:
+    try:
+        return read_stamps(options.replay, tuple(machine.uart))
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+
+
+def _ports(options: argparse.Namespace, stack: ExitStack, captured: dict[int, bytearray]) -> dict[int, Port]:
+    """Both UARTs' host ends; with --json what would go to standard output is captured."""
+    places = {1: options.uart1, 2: options.uart2}
+    if list(places.values()).count("-") > 1:
+        raise CommandError("only one UART can have standard output")
+    ports = {}
+    for number, place in places.items():
+        if options.json and place == "-":
+            captured[number] = bytearray()
+            place = "none"
+        try:
+            port = open_port(place, number, with_input=not options.replay)
+        except ValueError as error:
+            raise CommandError(str(error)) from None
+        stack.callback(port.close)
+        if number in captured:
+            port.capture = captured[number]
+        ports[number] = port
+    return ports
+
+
+@contextlib.contextmanager
+def _recording(path: str) -> Iterator[TextIO]:
+    with whole_text_file(path) as stream:
+        print(HEADER, file=stream)
+        yield stream
+
+
+def _limit(options: argparse.Namespace, machine: Machine) -> int:
+    if options.cycles is not None:
+        return int(options.cycles)
+    if options.seconds is not None:
+        return max(1, round(options.seconds * Fraction(machine.peripherals.fcy)))
+    return FOREVER
+
+
+def _tracer(machine: Machine, image: Image, stream: TextIO) -> Any:
+    from emu.trace import Tracer
+
+    return Tracer(machine, image, stream).advance
+
+
+def exit_status(machine: Machine, image: Image, stop: Stop, fault: Fault | None) -> int:
+    """What the shell gets with --exit-code."""
+    if fault is not None:
+        return FAULT_STATUS
+    if stop.reason == "breakpoint":
+        return machine.peek("W0") & 0xFF
+    if stop.reason == "halt":
+        symbol = image.symbols.find(EXIT_SYMBOL)
+        return machine.peek(symbol.address) & 0xFF if symbol is not None else EXIT_OK
+    return INTERRUPTED_STATUS if stop.reason == "interrupted" else LIMIT_STATUS
+
+
+def _facts(machine: Machine, image: Image, stop: Stop, fault: Fault | None, host_seconds: float) -> dict[str, Any]:
+    """What the last line says, as data."""
+    seconds = machine.peripherals.seconds(stop.cycle)
+    facts: dict[str, Any] = {
+        "reason": "fault" if fault else stop.reason,
+        "pc": stop.pc,
+        **_place(image, stop.pc),
+        "cycles": stop.cycle,
+        "seconds": seconds,
+        "host_seconds": host_seconds,
+        "speed": seconds / host_seconds if host_seconds else None,
+        "engine": machine.engine,
+    }
+    if fault is not None:
+        facts["fault"] = {"cause": fault.cause, "pc": fault.pc, "cycle": fault.cycle, **_place(image, fault.pc)}
+    return facts
+
+
+def _statistics(machine: Machine) -> dict[str, Any]:
+    """What the engine counted, plus the resets seen."""
+    counted: dict[str, Any] = getattr(machine, "stats", dict)()
+    return {"engine": machine.engine, "resets": len(machine.resets), **counted}
+
+
+def _place(image: Image, pc: int) -> dict[str, str | None]:
+    line = image.lines.find(pc)
+    return {
+        "symbol": image.symbols.text(pc) if image.symbols.code(pc) else None,
+        "line": str(line) if line else None,
+    }
+
+
+def _where(place: dict[str, Any]) -> str:
+    names = ", ".join(place[key] for key in ("symbol", "line") if place[key])
+    return f"{place['pc']:#08x} ({names})" if names else f"{place['pc']:#08x}"
+
+
+def _print_end(facts: dict[str, Any]) -> None:
+    """The fault, if any, and the last line."""
+    sys.stdout.flush()
+    if "fault" in facts:
+        print(f"emu run: firmware fault: {facts['fault']['cause']} at {_where(facts['fault'])}", file=sys.stderr)
+    for name, value in facts.get("stats", {}).items():
+        print(f"emu run: {name}: {value}", file=sys.stderr)
+    print(
+        f"{facts['reason']} at {_where(facts)} after {facts['cycles']:,} cycles,"
+        f" {facts['seconds']:.6f} s simulated, {facts['speed'] or 0:.2f} x real time",
+        file=sys.stderr,
+    )

@@ -1,0 +1,77 @@
+"""Why a run ended badly, in words: resets the core asked for, and traps or interrupts nobody handles.
+
+What enters: a machine that stopped, its image. What leaves: a `Fault`, or None when the firmware simply ended.
+An unhandled exception is seen as its vector's handler being a debugger word: both XC16's linker and ours put one into
+vectors without a function (abi-elf.md §3.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from emu.chips.chip import Vector
+from emu.dspic30f.state import IPL3
+from emu.image import Image
+
+if TYPE_CHECKING:
+    from emu.machine import Machine, Stop
+
+TRAP_FLAGS: Final = {
+    "OscillatorFail": ("OSCFAIL", "oscillator failure trap"),
+    "AddressError": ("ADDRERR", "address error trap (odd word address, unimplemented memory, or a wild jump)"),
+    "StackError": ("STKERR", "stack error trap (W15 above SPLIM or below RAM)"),
+    "MathError": ("MATHERR", "math error trap (division by zero, accumulator overflow or bad shift)"),
+}
+"""Vector name to flag of INTCON1 (isa.md §14.4) and what to call it."""
+RETURN_BYTES: Final = 4
+"""What an exception pushes (isa.md §14.2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What went wrong and where. `pc` is the culprit, as well as the hardware lets one know."""
+
+    cause: str
+    pc: int
+    cycle: int
+
+
+def fault_of(machine: Machine, image: Image, stop: Stop) -> Fault | None:
+    """The fault behind `stop`, None if it is none."""
+    if stop.reason == "fault":
+        return Fault(stop.detail, stop.pc, stop.cycle)
+    if stop.reason != "breakpoint":
+        return None
+    vectors = [vector for vector in image.chip.vectors if stop.pc in (image.word(vector.ivt), image.word(vector.aivt))]
+    if not vectors:
+        return None
+    return _unhandled(machine, vectors, stop)
+
+
+def _unhandled(machine: Machine, vectors: list[Vector], stop: Stop) -> Fault | None:
+    """The exception that led to the shared default handler, told by flags; None if the code was merely called."""
+    stacked = machine.w[15] - RETURN_BYTES
+    low, high = machine.peek(stacked), machine.peek(stacked + 2)
+    back = (high & 0x7F) << 16 | low & 0xFFFE
+    if machine.peek("CORCON") & IPL3:
+        intcon1 = machine.peek("INTCON1")
+        fields = machine.chip.sfrs["INTCON1"].fields
+        for vector in vectors:
+            flag, words = TRAP_FLAGS.get(vector.name, ("", ""))
+            if flag and intcon1 >> fields[flag][0] & 1:
+                # Only a division stacks its own address; the others stack what follows (isa.md §14.4).
+                culprit = back if flag == "MATHERR" else back - 2
+                return Fault(f"{words} without a handler", culprit, stop.cycle)
+        return Fault("trap without a handler", back, stop.cycle)
+    for vector in vectors:
+        if vector.irq in machine.chip.interrupts and _is_pending(machine, vector.irq):
+            return Fault(f"{vector.name} without a handler", back, stop.cycle)
+    return None
+
+
+def _is_pending(machine: Machine, irq: int | None) -> bool:
+    """Whether flag and enable of an interrupt are set."""
+    assert irq is not None
+    source = machine.chip.interrupts[irq]
+    return all(machine.peek(register) >> bit & 1 for register, bit in (source.flag, source.enable))

@@ -1,0 +1,116 @@
+"""Small assembly programs as ELF files, for tests of the command line."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "loader"))
+
+from elf_samples import ElfSample, Name, Part, words
+
+from emu.chips.dspic30f6014a import SFRS
+from emu.dspic30f.isa.text import parse
+
+START = 0x100
+DEBUG_WORD = 0xDA4000
+
+
+def assembled(source: str, start: int = START) -> tuple[list[int], dict[str, int]]:
+    """Words and labels of `source`: one statement per line, `label:`, `.pword N`, and names of registers in braces."""
+    lines = [line.split(";")[0].strip() for line in source.splitlines()]
+    labels: dict[str, int] = {}
+    for final in (False, True):
+        out: list[int] = []
+        for line in filter(None, lines):
+            pc = start + 2 * len(out)
+            if line.endswith(":"):
+                labels[line[:-1]] = pc
+            elif line.startswith(".pword"):
+                out.append(int(line.split()[1], 0))
+            else:
+                out += parse(_filled(line, labels, pc)).encode(pc)
+    assert final
+    return out, labels
+
+
+def _filled(line: str, labels: dict[str, int], pc: int) -> str:
+    """Replace `{NAME}` by a register's address and `@label` by a label's."""
+    line = re.sub(r"\{(\w+)\}", lambda found: hex(SFRS[found[1]].address), line)
+    return re.sub(r"@(\w+)", lambda found: hex(labels.get(found[1], pc)), line)
+
+
+def executable(source: str, vectors: dict[str, str] | None = None) -> bytes:
+    """An ELF file that starts with `source`; `vectors` maps vector names to labels, the others go to a debugger word."""
+    from emu.chips.dspic30f6014a import VECTORS
+
+    code, labels = assembled(source)
+    default = START + 2 * len(code)
+    handlers = {name: labels[label] for name, label in (vectors or {}).items()}
+    table = [handlers.get(vector.name, default) for vector in VECTORS]
+    return ElfSample(
+        parts=[
+            Part(".reset", 0, words(0x040000 | START, 0)),
+            Part(".ivt", VECTORS[0].ivt, words(*table)),
+            Part(".text", START, words(*code)),
+            Part(".isr", default, words(DEBUG_WORD, 0xFE0000)),
+            Part(".nbss", 0x800, b"", 0x01000003, 8, size=8),
+        ],
+        names=[
+            *(Name("_" + label, address, 2) for label, address in labels.items()),
+            Name("__DefaultInterrupt", default, 3),
+            Name("__exit_status", 0x802, 4, size=2, kind=1),
+            Name("_counter", 0x800, 4, size=2, kind=1),
+        ],
+    ).build()
+
+
+SETUP = """
+    mov #7, w0
+    mov w0, {U1BRG}
+    bset {U1MODE}, #15
+    bset {U1STA}, #10
+"""
+"""UART1 at 115,200 baud on the e-puck (dspic30f6014a.md §10)."""
+
+HELLO = (
+    "main:"
+    + SETUP
+    + "".join(f"mov #{ord(letter)}, w1\nmov w1, {{U1TXREG}}\n" for letter in "hi!\n")
+    + """
+    mov #5, w0
+    mov w0, 0x802
+    pwrsav #1
+forever:
+    bra @forever
+"""
+)
+"""Sends a line and sleeps with nothing left to wake it, leaving status 5."""
+
+ECHO = (
+    "main:"
+    + SETUP
+    + """
+    bset {IEC0}, #9
+loop:
+    pwrsav #1
+    bra @loop
+receive:
+    mov {U1RXREG}, w1
+    inc w1, w1
+    mov w1, {U1TXREG}
+    bclr {IFS0}, #9
+    retfie
+"""
+)
+"""Sends back every byte plus one; vector U1RXInterrupt -> receive."""
+
+SPIN = """
+main:
+    clr w0
+spin:
+    inc w0, w0
+    mov w0, 0x800
+    bra @spin
+"""
