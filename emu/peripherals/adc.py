@@ -216,11 +216,20 @@ class Adc(Peripheral):
         elif self._state.value == _WAITING and (new & samp or self.con1["ASAM"]):
             self._enter(_SAMPLING, start)
         elif self._state.value == _SAMPLING and not new & samp:
-            self._enter(_CONVERTING if self.con1["SSRC"] == _MANUAL else _WAITING, start)
+            self._sampling_ended_by_software(start)
         elif self._state.value == _CONVERTING:
             self.con1["SAMP"] = 0  # UNVERIFIED: SAMP = 1 while converting is ignored (§13)
         self.restored()
         self._plan()
+
+    def _sampling_ended_by_software(self, start: int) -> None:
+        """SAMP = 0 starts the conversion if nothing else does. UNVERIFIED: otherwise it only ends sampling (§13)."""
+        if self.con1["SSRC"] == _MANUAL:
+            self._enter(_CONVERTING, start)
+        elif self.con1["ASAM"]:
+            self.con1["SAMP"] = 1
+        else:
+            self._enter(_WAITING, start)
 
     def _switch_off(self) -> None:
         """ADON = 0 aborts without a result; ADCBUF stays (§13)."""

@@ -76,6 +76,8 @@ class Kit:
     """Frequency at OSC1 in Hz."""
     fcy: Callable[[], float] = lambda: 0.0
     """Tcy per second at present; supplied by the oscillator."""
+    power_mode: Callable[[], int] = lambda: 0
+    """0 while the CPU runs, IDLE or SLEEP; supplied by the watchdog."""
 
 
 class Peripheral(Device):

@@ -7,6 +7,8 @@ from typing import Final
 from emu.bus import Bus
 from emu.chips.chip import Chip
 from emu.peripherals.adc import Adc
+from emu.peripherals.capture import Capture
+from emu.peripherals.compare import Compare
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import Kit, Peripheral, Wires
 from emu.peripherals.lvd import LowVoltageDetect
@@ -16,6 +18,7 @@ from emu.peripherals.pins import PORTS, Pins
 from emu.peripherals.pmd import ModuleDisable
 from emu.peripherals.ports import ChangeNotice, ExternalInterrupts, Port
 from emu.peripherals.resets import Resets, Watchdog
+from emu.peripherals.spi import Spi
 from emu.peripherals.timers import Timers
 from emu.peripherals.uart import Uart
 from emu.program import ProgramMemory
@@ -47,6 +50,13 @@ class Peripherals:
         self.uart: Final = {site.number: Uart(site, kit, self.interrupts, self.ports) for site in chip.uarts}
         self.adc: Final = Adc(chip.adc, kit, self.interrupts, self.timer)
         self.external.on_int0 = self.adc.int0
+        self.spi: Final = {site.number: Spi(site, kit, self.interrupts, self.ports) for site in chip.spis}
+        self.capture: Final = {site.number: Capture(site, kit, self.interrupts, self.timer) for site in chip.captures}
+        self.compare: Final = {
+            site.number: Compare(site, kit, self.interrupts, self.timer, self.ports) for site in chip.compares
+        }
+        for uart in self.uart.values():
+            uart.connect_capture(self.capture[uart.site.autobaud_capture])
         self.pmd: Final = ModuleDisable(kit, self._modules())
         self.all: Final[tuple[Peripheral, ...]] = (
             self.oscillator,
@@ -60,6 +70,9 @@ class Peripherals:
             *self.timer.values(),
             *self.uart.values(),
             self.adc,
+            *self.spi.values(),
+            *self.capture.values(),
+            *self.compare.values(),
             self.pmd,
         )
 
@@ -67,6 +80,9 @@ class Peripherals:
         """Peripherals by the name their PMD bit carries."""
         modules: dict[str, Peripheral] = {"ADC": self.adc}
         modules |= {f"T{number}": timer for number, timer in self.timer.items()}
+        modules |= {f"SPI{number}": spi for number, spi in self.spi.items()}
+        modules |= {f"IC{number}": capture for number, capture in self.capture.items()}
+        modules |= {f"OC{number}": compare for number, compare in self.compare.items()}
         modules |= {f"U{number}": uart for number, uart in self.uart.items()}
         return modules
 

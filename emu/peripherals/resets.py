@@ -47,6 +47,7 @@ class Watchdog(Peripheral):
         self._mode: Final = self.cell("mode", "B")
         self._timeout: Final = self.slot("timeout", self._expired)
         resets.rcon.written_by(self._rcon_written)
+        kit.power_mode = lambda: self._mode.value
 
     def stops_in(self, mode: int) -> bool:
         """Never: the LPRC runs in every power mode."""

@@ -152,6 +152,9 @@ class Timer(Peripheral):
         if self.is_taken:
             return NEVER
         source = self._source.value
+        if source == PIN:  # only an edge that is on its way is known
+            arriving = after < self.base.value and self._before.value != target == self._start
+            return self.base.value if arriving else NEVER
         if source not in (TCY, WAVE):
             return NEVER
         done = (self._phase.value + self._ticks(after)) // self._prescale

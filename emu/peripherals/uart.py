@@ -11,6 +11,7 @@ from typing import Final
 
 from emu.chips.chip import UartSite
 from emu.events import NEVER
+from emu.peripherals.capture import Capture
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import SLEEP, Kit, Peripheral
 from emu.peripherals.pins import parse_pin
@@ -52,8 +53,7 @@ class Uart(Peripheral):
         self.brg.written_by(self._brg_written)
         self.on_byte: Callable[[int, int], None] | None = None
         """on_byte(byte, start_cycle): a frame has left TX; its start bit began in start_cycle."""
-        self.on_edge: Callable[[int, int], None] | None = None
-        """on_edge(cycle, level): the RX pin as seen by the capture module ABAUD routes it to."""
+        self._capture: Capture | None = None
         tx_port, self._tx_pin = parse_pin(site.tx_pin)
         rx_port, self._rx_pin = parse_pin(site.rx_pin)
         self._tx_port: Final = ports[tx_port]
@@ -89,6 +89,10 @@ class Uart(Peripheral):
         self._line_free: Final = self.cell("line_free", "Q")
         """First cycle the line is free for the next frame."""
         self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
+
+    def connect_capture(self, capture: Capture) -> None:
+        """The capture channel that ABAUD connects to the receive pin."""
+        self._capture = capture
 
     # -- settings ----------------------------------------------------------------------------------------------------
 
@@ -306,7 +310,7 @@ class Uart(Peripheral):
             self._receiving.value = _SAMPLING
             self.sta["RIDLE"] = 0
             self.events.set(self._rx_event, self._done.value)
-            if self.mode["ABAUD"] and self.on_edge is not None:
+            if self.mode["ABAUD"]:
                 self._edge_bit.value = 0
                 self.events.set(self._edge_event, due)
             return
@@ -355,8 +359,8 @@ class Uart(Peripheral):
         """Autobaud: pass the edges of the RX pin to the capture module, starting with the start bit."""
         bit = self._edge_bit.value
         wave = self._rx_wave.value
-        if self.on_edge is not None:
-            self.on_edge(due, wave >> bit & 1)
+        if self._capture is not None:
+            self._capture.edge(due, bool(wave >> bit & 1))
         for index in range(bit + 1, 16):
             if wave >> index & 1 != wave >> bit & 1:
                 self._edge_bit.value = index
@@ -374,6 +378,7 @@ class Uart(Peripheral):
                 self._sender_switched(self.is_sending_enabled)
             else:
                 self._abort()
+        self.restored()
         self._plan_line()
 
     def _sta_written(self, old: int, new: int, _lanes: int) -> None:
@@ -448,6 +453,8 @@ class Uart(Peripheral):
             self.kit.pins.attach(self._tx_port.index, self._tx_pin, self)
         else:
             self.kit.pins.detach(self._tx_port.index, self)
+        if self._capture is not None:
+            self._capture.autobaud = bool(self.mode["ABAUD"])
 
     def thaw(self, cycle: int) -> None:
         """Frames that waited for the receiver may come."""

@@ -334,14 +334,15 @@ def test_wake_raises_the_interrupt_at_the_start_edge_in_sleep(rig):
     assert rig.field("U1MODE", "WAKE") == 0
 
 
-def test_autobaud_passes_the_edges_of_the_pin_on(rig):
-    """§10 ABAUD: 0x55 has ten edges, one bit apart."""
+def test_autobaud_lets_the_capture_module_time_the_bits(rig):
+    """§10 ABAUD: IC1 captures every edge of 0x55 against timer 3: 128 Tcy apart."""
     enable(rig, mode=ABAUD)
-    edges = []
-    rig.dev.uart[1].on_edge = lambda cycle, level: edges.append((cycle, level))
+    rig.write("T3CON", 0x8000)
+    rig.write("IC1CON", 1)
     rig.dev.uart[1].feed(b"\x55", cycle=1001)
-    rig.at(9000)
-    assert edges == [(1001 + 128 * bit, bit % 2) for bit in range(10)]
+    rig.at(1001 + 3 * 128 + 2)
+    times = [rig.read("IC1BUF") for _ in range(4)]
+    assert [later - times[0] for later in times] == [0, 128, 256, 384]
 
 
 def test_long_feeds_do_not_lose_bytes(rig):

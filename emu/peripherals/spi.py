@@ -1,0 +1,194 @@
+"""SPI1/2 (§12): master and slave, 8 and 16 bits, double-buffered.
+
+The outside is words: as master, `exchange(word, bits)` is asked for the answer at the end of each transfer; as slave,
+the outside calls `clock_word(word, bit_tcy)`. SCK and SDO levels are functions of the cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.chips.chip import SpiSite
+from emu.events import NEVER
+from emu.peripherals.interrupts import Interrupts
+from emu.peripherals.kit import Kit, Peripheral
+from emu.peripherals.pins import parse_pin
+from emu.peripherals.ports import Port
+
+_PRIMARY: Final = (64, 16, 4, 1)
+"""Primary prescale for PPRE = 0..3; the secondary is 8 - SPRE (§12)."""
+
+
+class Spi(Peripheral):
+    """One SPI module."""
+
+    def __init__(self, site: SpiSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__(f"spi{site.number}", kit)
+        self._line: Final = interrupts.line(site.irq)
+        prefix = f"SPI{site.number}"
+        self.stat: Final = self.register(prefix + "STAT")
+        self.con: Final = self.register(prefix + "CON")
+        self.buf: Final = self.register(prefix + "BUF")
+        self.idle_bit = (self.stat, "SPISIDL")
+        self.stat.written_by(self._stat_written)
+        self.con.written_by(lambda _old, _new, _lanes: self._take_pins())
+        self.buf.written_by(self._buf_written)
+        self.buf.read_by(self._buf_read)
+        self.buf.computed(lambda: self._received.value)
+        self.exchange: Callable[[int, int], int] | None = None
+        """exchange(word, bits) -> word: the device at the other end, when this module is master."""
+        self.on_slave_word: Callable[[int, int], None] | None = None
+        """on_slave_word(word, cycle): what an outside master has clocked out of this module."""
+        self._pins: Final = {role: parse_pin(getattr(site, f"{role}_pin")) for role in ("sck", "sdi", "sdo", "ss")}
+        self._ports: Final = ports
+        self._waiting: Final = self.cell("waiting", "H")
+        self._shift: Final = self.cell("shift", "H")
+        self._reply: Final = self.cell("reply", "H")
+        self._received: Final = self.cell("received", "H")
+        self._busy: Final = self.cell("busy", "B")
+        self._start: Final = self.moment("start", NEVER)
+        self._bit: Final = self.cell("bit", "I")
+        self._step: Final = self.slot("step", self._due)
+
+    @property
+    def word_bits(self) -> int:
+        """8 or 16 (MODE16)."""
+        return 16 if self.con["MODE16"] else 8
+
+    @property
+    def bit_time(self) -> int:
+        """Length of a bit as master in Tcy: primary x secondary prescale (§12)."""
+        return _PRIMARY[self.con["PPRE"]] * (8 - self.con["SPRE"])
+
+    # -- transfers ---------------------------------------------------------------------------------------------------
+
+    def _buf_written(self, _old: int, new: int, _lanes: int) -> None:
+        if not self.stat["SPIEN"] or self.stat["SPITBF"]:
+            return  # a word written while TXB is full is lost (§12)
+        self._waiting.value = new
+        self.stat["SPITBF"] = 1
+        if self.con["MSTEN"] and not self._busy.value:
+            self.events.set(self._step, self.now + 1)
+
+    def _due(self, due: int) -> None:
+        if self._busy.value:
+            self._finish(due)
+        if self.con["MSTEN"] and self.stat["SPITBF"] and not self._busy.value:
+            self._begin(due, self.bit_time)
+
+    def _begin(self, cycle: int, bit_time: int) -> None:
+        """TXB moves to the shift register, which is clocked from `cycle` on."""
+        if self.stat["SPITBF"]:
+            self._shift.value = self._waiting.value & (1 << self.word_bits) - 1
+            self.stat["SPITBF"] = 0
+        self._busy.value = 1
+        self._start.value = cycle
+        self._bit.value = bit_time
+        self.events.set(self._step, cycle + self.word_bits * bit_time)
+
+    def _finish(self, due: int) -> None:
+        bits = self.word_bits
+        out = self._shift.value
+        if not self.con["MSTEN"]:
+            word = self._reply.value
+            if self.on_slave_word is not None:
+                self.on_slave_word(out, due)
+        elif self.exchange is not None:
+            word = self.exchange(out, bits)
+        else:  # nobody there: the level of SDI in every bit
+            port, pin = self._pins["sdi"]
+            word = 0xFFFF if self.kit.pins.level[port] & pin else 0
+        word &= (1 << bits) - 1
+        self._shift.value = word
+        self._busy.value = 0
+        if self.stat["SPIROV"]:
+            return
+        if self.stat["SPIRBF"]:
+            self.stat["SPIROV"] = 1
+        else:
+            self._received.value = word
+            self.stat["SPIRBF"] = 1
+        self._line.request()
+
+    def _buf_read(self) -> int:
+        self.stat["SPIRBF"] = 0
+        return self._received.value
+
+    def clock_word(self, word: int, bit_tcy: int = 16) -> bool:
+        """An outside master clocks one word through this module, starting now. False if it is not listening."""
+        port, pin = self._pins["ss"]
+        selected = not self.con["SSEN"] or not self.kit.pins.level[port] & pin
+        if not self.stat["SPIEN"] or self.con["MSTEN"] or self._busy.value or self.is_frozen or not selected:
+            return False
+        self._reply.value = word
+        self._begin(self.now + 1, bit_tcy)
+        return True
+
+    # -- pins --------------------------------------------------------------------------------------------------------
+
+    def _take_pins(self) -> None:
+        """SPIEN takes SCK, SDI and (unless DISSDO) SDO (§12)."""
+        if not self.stat["SPIEN"]:
+            for port, pin in self._pins.values():
+                self._ports[port].disown(pin)
+        else:
+            roles = {"sck": bool(self.con["MSTEN"]), "sdi": False, "sdo": not self.con["DISSDO"]}
+            for role, drive in roles.items():
+                port, pin = self._pins[role]
+                if role == "sdo" and not drive:
+                    self._ports[port].disown(pin)
+                else:
+                    self._ports[port].own(pin, drive, self.con["CKP"] if role == "sck" else 0)
+        self.restored()
+
+    def bits(self, cycle: int) -> int:
+        """Levels of SCK and SDO (§12: CKP idle level, CKE 1 = data changes on the edge from active to idle)."""
+        idle = self.con["CKP"]
+        clock, data = idle, 0
+        if self._busy.value and cycle >= self._start.value:
+            index, phase = divmod(cycle - self._start.value, max(self._bit.value, 1))
+            active_first = not self.con["CKE"]
+            clock = idle ^ (2 * phase < self._bit.value) ^ (not active_first)
+            data = self._shift.value >> max(self.word_bits - 1 - index, 0) & 1
+        return (self._pins["sck"][1] if clock else 0) | (self._pins["sdo"][1] if data else 0)
+
+    def rises(self, mask: int, after: int, until: int) -> int:
+        """SCK clocks nothing else inside the chip."""
+        return 0
+
+    def nth_rise(self, mask: int, after: int, count: int) -> int:
+        """SCK clocks nothing else inside the chip."""
+        return NEVER
+
+    def restored(self) -> None:
+        """SCK (as master) and SDO carry the waveform while the module is on."""
+        port = self._pins["sck"][0]
+        self.kit.pins.detach(port, self)
+        mask = self._pins["sck"][1] if self.con["MSTEN"] else 0
+        mask |= 0 if self.con["DISSDO"] else self._pins["sdo"][1]
+        if self.stat["SPIEN"] and mask:
+            self.kit.pins.attach(port, mask, self)
+
+    # -- control -----------------------------------------------------------------------------------------------------
+
+    def _stat_written(self, old: int, new: int, _lanes: int) -> None:
+        enable = 1 << self.kit.chip.sfrs[self.stat.name].fields["SPIEN"][0]
+        if (old ^ new) & enable:
+            if not new & enable:
+                self._clear()
+            self._take_pins()
+
+    def _clear(self) -> None:
+        """SPIEN = 0 clears buffers and flags (§12)."""
+        for flag in ("SPITBF", "SPIRBF", "SPIROV"):
+            self.stat[flag] = 0
+        self._busy.value = 0
+        self._start.value = NEVER
+        self.events.cancel(self._step)
+
+    def reset(self, power_on: bool) -> None:
+        """Off and empty."""
+        self._clear()
+        self._received.value = 0
+        self.restored()
