@@ -92,7 +92,10 @@ class LlvmBuilder:
         self.pc = 0
         self.psv_cycles: int | None = 2
         self.pending = Pending()
-        self.repeating: tuple[Number, Number] | None = None
+        self.repeating: Number | None = None
+        """RCOUNT as a REPEAT target sees it."""
+        self.left_count: Number | None = None
+        """The count of a REPEAT whose state is not in the record."""
         self.dsp_region = False
         """Some instruction of the function writes accumulator flags, so SR in the record may lack them."""
         self._slow: str | None = None
@@ -101,7 +104,7 @@ class LlvmBuilder:
     def begin(self, pc: int, psv_cycles: int | None) -> None:
         """Start the instruction at `pc`; `psv_cycles` is what a PSV read adds to it (isa.md §13.3).
 
-        None: it is a REPEAT target, of which PSV reads are the interpreter's; `repeating` is (count, iterations left).
+        None: it is a REPEAT target, of which PSV reads are the interpreter's; `repeating` is to be set.
         """
         self.pc = pc
         self.psv_cycles = psv_cycles
@@ -135,8 +138,8 @@ class LlvmBuilder:
             self._slow = self.e.fresh("slow")
             current = self.e.block
             self.e.start(self._slow)
-            if self.repeating is not None:
-                self._leave_repeat(*self.repeating)
+            if self.repeating is not None and self.left_count is not None:
+                self._leave_repeat(self.left_count, self.repeating)
             self.v.leave(self.pc, INTERPRET)
             self.e.block = current
         return self._slow
@@ -284,7 +287,7 @@ class LlvmBuilder:
             return value if size == 2 else (value >> 8 if ea & 1 else value & 0xFF)
         self.pending.touches_sfr |= self.around.offset["SR"] < word_address < RAM
         if word_address == self.around.offset["RCOUNT"] and self.repeating is not None and size == 2:
-            return self.repeating[1]
+            return self.repeating
         if word_address < RAM and (self.around.reads.get(word_address) != "plain" or self.repeating is not None):
             raise NeedsInterpreter
         if ea >= DATA_BYTES:
@@ -409,7 +412,7 @@ class LlvmBuilder:
     def reg(self, name: str) -> Number:
         """A core register."""
         if name == "RCOUNT" and self.repeating is not None:
-            return self.repeating[1]
+            return self.repeating
         if name in self.pending.registers:
             return self.pending.registers[name]
         return self.e.load(pointer(self.e, self.around.offset[name]), 16)

@@ -99,7 +99,8 @@ class Compiler:
         if not self._waiting:
             return []
         while self._selector.select(0):
-            assert self._process is not None and self._process.stdout is not None
+            assert self._process is not None
+            assert self._process.stdout is not None
             data = os.read(self._process.stdout.fileno(), 1 << 20)
             if not data:
                 raise RuntimeError("the compile process ended unexpectedly")

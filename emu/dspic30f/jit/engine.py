@@ -21,8 +21,9 @@ from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, W_END, Access, S
 from emu.dspic30f.jit.compiler import Compiler
 from emu.dspic30f.jit.region import discover
 from emu.dspic30f.jit.runtime import BLOCKS, ENV_WORDS, LIMIT, STEPS, dispatch_text
+from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import Translator
-from emu.dspic30f.state import DA, NOT_REPEATING, RA
+from emu.dspic30f.state import DA, NOT_REPEATING
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM effort for blocks and for single-step code."""
@@ -91,6 +92,7 @@ class JitEngine:
         self._key: object = None
         self._dispatch: Any = None
         self._at: Final = {name: core.state.at[name] for name in ("CORCON", "MODCON", "XBREV", "INTCON1", "SR")}
+        self._offset: Final = offsets(core)
         self.counts: Final = Counts()
         core.program.changed.append(self._flash_changed)
 
@@ -99,7 +101,7 @@ class JitEngine:
         """At least one instruction, natively where possible."""
         state = self._state
         sequencer = self._core.sequencer
-        if state.repeat != NOT_REPEATING or state.sr & RA or state.edt:
+        if state.edt:
             sequencer.execute()
             return
         self._select()
@@ -125,6 +127,9 @@ class JitEngine:
         pc = self._state.pc
         code = self._code
         assert code is not None
+        if self._state.repeat != NOT_REPEATING:
+            self._core.sequencer.execute()
+            return
         for tag, address in self._compiler.poll():
             self._install(tag, address)
         heat = code.heat.get(pc, 0) + 1
@@ -160,24 +165,19 @@ class JitEngine:
 
     def _new_code(self, context: Context, loop: tuple[int, int] | None) -> Code:
         core, chip = self._core, self._core.chip
-        offset = {name: sfr.address for name, sfr in chip.sfrs.items()}
-        offset |= {name: reserved.offset for name, reserved in core.record.fields.items()}
-        for number, name in enumerate(("W0S", "W1S", "W2S", "W3S", "SRS")):
-            offset[name] = offset["cpu.shadow"] + 2 * number
-        offset["flash"] = core.program.flash_offset
         words: dict[int, int] = {}
         for source in chip.interrupts.values():
             words[chip.sfrs[source.flag[0]].address] = chip.sfrs[source.enable[0]].address
         reads, writes = access_kinds(core)
         start, end = loop if loop is not None else (-1, -1)
-        around = Surroundings(offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
+        around = Surroundings(self._offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
                               self._words, tuple(sorted(words.items())), core.traps.flags, start, end)
         table = ctypes.c_uint64 * self._words
         return Code(context, around, table(), table())
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
-        text = dispatch_text(self._core.record.fields["cpu.pc"].offset, 2 * self._words)
+        text = dispatch_text(boundary_of(self._core, self._offset), 2 * self._words)
         address = self._compiler.now(text, BLOCK_LEVEL, self._compiler.key(BLOCK_LEVEL, text.encode()))
         self._dispatch = Call(address)
 
@@ -227,6 +227,15 @@ class JitEngine:
     def close(self) -> None:
         """End the compile process."""
         self._compiler.close()
+
+
+def offsets(core: Core) -> dict[str, int]:
+    """Byte offsets in the record of every register and reserved field, by name."""
+    offset = {name: sfr.address for name, sfr in core.chip.sfrs.items()}
+    offset |= {name: reserved.offset for name, reserved in core.record.fields.items()}
+    offset |= {name: 2 * core.state.at[name] for name in ("W0S", "W1S", "W2S", "W3S", "SRS")}
+    offset["flash"] = core.program.flash_offset
+    return offset
 
 
 def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access, int]]]:

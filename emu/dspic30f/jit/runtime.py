@@ -7,16 +7,21 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT
+from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT, SERVICE
+from emu.dspic30f.jit.service import DONE, Boundary, service_text
 
-LIMIT, BLOCKS, STEPS, HOPS = range(4)
-"""Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single steps; hops."""
+LIMIT, BLOCKS, STEPS, ENTERED = range(4)
+"""Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
+steps; interrupts entered so far."""
 ENV_WORDS: Final = 8
 
 DISPATCH: Final = """
+declare i64 @llvm.cttz.i64(i64, i1)
+declare i64 @llvm.umax.i64(i64, i64)
 define i64 @entry(ptr noalias %rec, ptr %env) {{
 first:
   %pc_place = getelementptr i8, ptr %rec, i64 {pc}
+  %repeat_place = getelementptr i8, ptr %rec, i64 {repeat}
   %blocks_place = getelementptr i64, ptr %env, i64 {blocks}
   %steps_place = getelementptr i64, ptr %env, i64 {steps}
   %blocks = load ptr, ptr %blocks_place
@@ -29,6 +34,10 @@ loop:
 look:
   %half = lshr i32 %pc, 1
   %word = zext i32 %half to i64
+  %repeat = load i16, ptr %repeat_place
+  %repeating = icmp ne i16 %repeat, 0
+  br i1 %repeating, label %single, label %block
+block:
   %place = getelementptr ptr, ptr %blocks, i64 %word
   %code = load ptr, ptr %place
   %none = icmp eq ptr %code, null
@@ -36,6 +45,7 @@ look:
 call:
   %why = call i64 %code(ptr %rec, ptr %env)
   switch i64 %why, label %back [ i64 {next}, label %loop
+                                 i64 {service}, label %serve
                                  i64 {deadline}, label %again ]
 again:
   %pc2 = load i32, ptr %pc_place
@@ -43,15 +53,23 @@ again:
   %word2 = zext i32 %half2 to i64
   br label %single
 single:
-  %at = phi i64 [ %word, %look ], [ %word2, %again ]
+  %at = phi i64 [ %word, %look ], [ %word, %block ], [ %word2, %again ]
   %place2 = getelementptr ptr, ptr %steps, i64 %at
   %code2 = load ptr, ptr %place2
   %none2 = icmp eq ptr %code2, null
   br i1 %none2, label %miss, label %step
 step:
   %why2 = call i64 %code2(ptr %rec, ptr %env)
-  %on = icmp eq i64 %why2, {next}
-  br i1 %on, label %loop, label %back2
+  switch i64 %why2, label %back2 [ i64 {next}, label %loop
+                                   i64 {service}, label %serve ]
+serve:
+  %limit = load i64, ptr %env
+  %entered = getelementptr i64, ptr %env, i64 {entered}
+  %rest = call i64 @service(ptr %rec, i64 %limit, ptr %entered)
+  %served = icmp eq i64 %rest, {done}
+  br i1 %served, label %loop, label %boundary
+boundary:
+  ret i64 {service}
 back:
   ret i64 %why
 back2:
@@ -63,7 +81,9 @@ miss:
 """
 
 
-def dispatch_text(pc_offset: int, flash_end: int) -> str:
-    """The dispatch loop for records whose PC is at `pc_offset`, with flash up to `flash_end` (PC units)."""
-    return DISPATCH.format(pc=pc_offset, flash_end=flash_end, blocks=BLOCKS, steps=STEPS,
-                           next=NEXT, deadline=DEADLINE, miss=MISS)
+def dispatch_text(boundary: Boundary, flash_end: int) -> str:
+    """The dispatch loop, with what it does at boundaries; flash ends at `flash_end` (PC units)."""
+    return service_text(boundary) + DISPATCH.format(
+        pc=boundary.offset["cpu.pc"], repeat=boundary.offset["cpu.repeat"], flash_end=flash_end,
+        blocks=BLOCKS, steps=STEPS, entered=ENTERED,
+        next=NEXT, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE)

@@ -19,17 +19,14 @@ from emu.dspic30f.jit.builder import (
     SERVICE,
     LlvmBuilder,
     NeedsInterpreter,
-    Pending,
     Surroundings,
 )
 from emu.dspic30f.jit.region import Region, Step
+from emu.dspic30f.jit.repeat import Repeats
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import MemoryVariables, Variables, pointer
-from emu.dspic30f.state import IPL3, PC_MASK, RA
+from emu.dspic30f.state import FIRST, IPL3, NOT_REPEATING, PC_MASK, RA
 from emu.events import NEVER
-
-DIVIDE_COUNT: Final = 17
-"""RCOUNT of a divide: 18 iterations (isa.md §6.7)."""
 
 PROLOGUE: Final = """declare i16 @llvm.fshl.i16(i16, i16, i16)
 declare i16 @llvm.ctlz.i16(i16, i1)
@@ -48,48 +45,52 @@ class Translator:
     """
 
     def __init__(self, region: Region, around: Surroundings, context: Context, exact: bool) -> None:
-        self._region: Final = region
-        self._around: Final = around
-        self._exact: Final = exact
-        self._e: Final = Emitter()
-        self._v: Final = (MemoryVariables if exact else Variables)(self._e, around.offset)
-        self._b: Final = LlvmBuilder(self._e, self._v, around, context)
-        self._b.dsp_region = any("OA" in step.insn.row.flags for step in region.steps.values())
+        self.region: Final = region
+        self.around: Final = around
+        self.exact: Final = exact
+        self.e: Final = Emitter()
+        self.v: Final = (MemoryVariables if exact else Variables)(self.e, around.offset)
+        self.b: Final = LlvmBuilder(self.e, self.v, around, context)
+        self.b.dsp_region = any("OA" in step.insn.row.flags for step in region.steps.values())
         self._psv: Final = bool(context.psv)
+        self._repeats: Final = Repeats(self)
         self._labels: dict[int, str] = {}
         self._todo: list[int] = []
         self._exits: dict[tuple[int, int], str] = {}
 
     def text(self) -> str:
         """The module."""
-        e = self._e
-        self._v.touch("pc", "stall", "cycle")
-        steps = set(self._region.steps)
-        for pc in sorted(steps if self._exact else self._region.leaders | ({self._around.do_end} & steps)):
+        e = self.e
+        self.v.touch("pc", "stall", "cycle")
+        steps = set(self.region.steps)
+        for pc in sorted(steps if self.exact else self.region.leaders | ({self.around.do_end} & steps)):
             self._label(pc)
         while self._todo:
             self._block(self._todo.pop(0))
         entries = " ".join(f"i64 {pc}, label %{label}" for pc, label in self._labels.items())
         head = Emitter(e.last_name)
         head.start("first")
-        here = head.load(pointer(head, self._around.offset["cpu.pc"]), 32)
-        self._v.prologue(head)
-        if not self._exact:
+        here = head.load(pointer(head, self.around.offset["cpu.pc"]), 32)
+        if self.exact:  # odd: in the middle of a REPEAT
+            entries += "".join(f" i64 {pc + 1}, label %{label}" for pc, label in self._repeats.resumes.items())
+            here = here + (head.load(pointer(head, self.around.offset["cpu.repeat"]), 16) != NOT_REPEATING)
+        self.v.prologue(head)
+        if not self.exact:
             head.line("%x.reason = alloca i64")
             head.line(f"store i64 {MISS}, ptr %x.reason")
         self._deadline(head)
         head.end(f"switch i64 {here.text}, label %exit [ {entries} ]")
         tail = Emitter(head.last_name)
         tail.start("exit")
-        self._v.write_back(tail)
-        reason = str(MISS) if self._exact else tail.let("load i64, ptr %x.reason").text
+        self.v.write_back(tail)
+        reason = str(MISS) if self.exact else tail.let("load i64, ptr %x.reason").text
         tail.end(f"ret i64 {reason}")
         body = "\n".join(part.text() for part in (head, e, tail))
         return PROLOGUE + body + EPILOGUE
 
     def _deadline(self, head: Emitter) -> None:
         """%stop: no instruction may start in that cycle or later before somebody has looked (sequencer.py)."""
-        due = head.load(pointer(head, self._around.offset["events.deadline"]), 64)
+        due = head.load(pointer(head, self.around.offset["events.deadline"]), 64)
         limit = head.let("load i64, ptr %env, align 8")
         head.line(f"%before = call i64 @llvm.umin.i64(i64 {due.text}, i64 {NEVER - 2})")
         head.line("%behind = add i64 %before, 1")
@@ -103,35 +104,35 @@ class Translator:
     # -- labels and exits -------------------------------------------------------------------------------------------
     def _label(self, pc: int) -> str:
         """Label of the block at `pc`; outside the region, of an exit that goes on there."""
-        if pc not in self._region.steps:
-            return self._exit(pc, NEXT)
+        if pc not in self.region.steps:
+            return self.exit(pc, NEXT)
         if pc not in self._labels:
             self._labels[pc] = f"b{pc:x}"
             self._todo.append(pc)
         return self._labels[pc]
 
-    def _exit(self, pc: int, reason: int) -> str:
+    def exit(self, pc: int, reason: int) -> str:
         """Label of a block that leaves for `reason` with PC = `pc`."""
         if (pc, reason) not in self._exits:
             label = f"out{reason}.{pc:x}"
             self._exits[pc, reason] = label
-            current = self._e.block
-            self._e.start(label)
-            self._v.leave(pc, reason)
-            self._e.block = current
+            current = self.e.block
+            self.e.start(label)
+            self.v.leave(pc, reason)
+            self.e.block = current
         return self._exits[pc, reason]
 
-    def _jump(self, pc: int) -> None:
+    def jump(self, pc: int) -> None:
         """Go on at `pc`; exact code hands over where better code may exist."""
-        hand_over = self._exact and pc in self._region.leaders
-        self._e.end(f"br label %{self._exit(pc, NEXT) if hand_over else self._label(pc)}")
+        hand_over = self.exact and pc in self.region.leaders
+        self.e.end(f"br label %{self.exit(pc, NEXT) if hand_over else self._label(pc)}")
 
     # -- blocks -----------------------------------------------------------------------------------------------------
     def _cost(self, pc: int) -> int:
         """Upper bound of the cycles of the block at `pc`, without REPEATs (they make their own check)."""
         total = 0
         first = True
-        while (step := self._region.steps.get(pc)) is not None and (first or pc not in self._labels):
+        while (step := self.region.steps.get(pc)) is not None and (first or pc not in self._labels):
             first = False
             total += step.insn.row.cycles + (step.facts.source_pointers != 0)
             if self._psv and step.facts.loads:
@@ -142,46 +143,46 @@ class Translator:
         return total
 
     def _block(self, start: int) -> None:
-        e, v = self._e, self._v
+        e, v = self.e, self.v
         e.start(self._labels[start])
         v.new_block()
-        if self._exact:
+        if self.exact:
             fits = e.let(f"icmp ult i64 {wide(v.get('cycle'))}, %stop", bit=True)
         else:
-            fits = self._fits(self._cost(start))
+            fits = self.fits(self._cost(start))
         go = e.fresh("go")
-        late = self._exit(start, SERVICE if self._exact else DEADLINE)
+        late = self.exit(start, SERVICE if self.exact else DEADLINE)
         e.end(f"br i1 {fits.text}, label %{go}, label %{late}, !prof !0")
         e.start(go)
-        if start == self._around.do_end:
+        if start == self.around.do_end:
             again = e.fresh("again")
-            left = e.load(pointer(e, self._around.offset["DCOUNT"]), 16)
-            e.end(f"br i1 {truth(left)}, label %{again}, label %{self._exit(start, INTERPRET)}")
+            left = e.load(pointer(e, self.around.offset["DCOUNT"]), 16)
+            e.end(f"br i1 {truth(left)}, label %{again}, label %{self.exit(start, INTERPRET)}")
             e.start(again)
         written: Number = v.get("stall")
         pc = start
         while True:
-            step = self._region.steps.get(pc)
+            step = self.region.steps.get(pc)
             if step is None or (pc != start and pc in self._labels):
-                self._jump(pc)
+                self.jump(pc)
                 return
             try:
                 ended, written = self._instruction(step, written)
             except NeedsInterpreter:
-                e.end(f"br label %{self._exit(pc, INTERPRET)}")
+                e.end(f"br label %{self.exit(pc, INTERPRET)}")
                 self._label(step.next_pc)
                 return
             if ended:
                 return
             pc = step.next_pc
 
-    def _fits(self, cost: Number) -> Value:
+    def fits(self, cost: Number) -> Value:
         """Whether `cost` cycles from now on end before the cycle of the deadline."""
-        return self._e.let(f"icmp ult i64 {wide(self._v.get('cycle') + cost)}, %stop", bit=True)
+        return self.e.let(f"icmp ult i64 {wide(self.v.get('cycle') + cost)}, %stop", bit=True)
 
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
         """One instruction; returns whether the block ends and the W registers written on the destination side."""
-        b, row = self._b, step.insn.row
+        b, row = self.b, step.insn.row
         stall: Number = 0
         if step.facts.source_pointers:
             hit = written & step.facts.source_pointers
@@ -190,7 +191,7 @@ class Translator:
         b.begin(step.pc, psv_cycles)
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
         if isinstance(flow, Repeat):
-            self._repeat(step, flow, stall)
+            self._repeats.translate(step, flow, stall)
             return True, 0
         if not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip)):
             raise NeedsInterpreter
@@ -198,8 +199,8 @@ class Translator:
             self._check_retfie(flow)
         if isinstance(flow, Skip) and step.target is None:
             raise NeedsInterpreter
-        if self._exact and (b.pending.touches_sfr or isinstance(flow, Return)):  # an event within it would matter
-            b.guard(self._fits(row.cycles + 1))
+        if self.exact and (b.pending.touches_sfr or isinstance(flow, Return)):  # an event within it would matter
+            b.guard(self.fits(row.cycles + 1))
         b.commit()
         cycles: Number = row.cycles + stall
         if b.pending.psv:
@@ -209,8 +210,8 @@ class Translator:
             cycles = cycles + b.select(any_window, psv_cycles, 0)
         mask = step.facts.writes | b.pending.mapped
         if flow is None:
-            self._advance(cycles, mask)
-            if step.pc == self._around.do_end:
+            self.advance(cycles, mask)
+            if step.pc == self.around.do_end:
                 self._loop_again()
                 return True, mask
             if b.pending.stop:
@@ -222,157 +223,61 @@ class Translator:
 
     def _loop_again(self) -> None:
         """The last instruction of a DO loop whose count is not used up (isa.md §7.6)."""
-        e = self._e
-        place = pointer(e, self._around.offset["DCOUNT"])
+        e = self.e
+        place = pointer(e, self.around.offset["DCOUNT"])
         e.store(place, e.load(place, 16) - 1, 16)
-        self._jump(self._around.do_start)
+        self.jump(self.around.do_start)
 
-    def _advance(self, cycles: Number, mask: int) -> None:
-        self._v.set("cycle", self._v.get("cycle") + cycles)
-        self._v.set("stall", mask)
+    def advance(self, cycles: Number, mask: int) -> None:
+        self.v.set("cycle", self.v.get("cycle") + cycles)
+        self.v.set("stall", mask)
 
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:
-        e = self._e
+        e = self.e
         if isinstance(flow, (Branch, Skip)):
             taken, other = e.fresh("taken"), e.fresh("fall")
-            self._advance(cycles, mask)
+            self.advance(cycles, mask)
             e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{other}")
             assert step.target is not None
             e.start(taken)
-            self._v.new_block()
+            self.v.new_block()
             extra = 1 if isinstance(flow, Branch) else (step.target - step.next_pc) // 2
-            self._v.set("cycle", self._v.get("cycle") + extra)
-            self._jump(step.target)
+            self.v.set("cycle", self.v.get("cycle") + extra)
+            self.jump(step.target)
             e.start(other)
-            self._jump(step.next_pc)
+            self.jump(step.next_pc)
             return
         assert isinstance(flow, (Goto, Call, Return))
-        self._advance(cycles, mask)
+        self.advance(cycles, mask)
         if isinstance(flow.target, int):
-            self._jump(flow.target)
+            self.jump(flow.target)
             return
-        self._v.leave(flow.target & PC_MASK, NEXT)
+        if isinstance(flow, Return) and flow.kind == "retfie":
+            repeats = (flow.srl & RA) != 0
+            self.e.store(pointer(e, self.around.offset["cpu.repeat"]), self.b.select(repeats, FIRST, NOT_REPEATING), 16)
+        self.v.leave(flow.target & PC_MASK, NEXT)
 
     # -- interrupts -------------------------------------------------------------------------------------------------
     def _requests(self) -> Value:
         """Truth of "some enabled interrupt is requested"."""
-        e = self._e
+        e = self.e
         total: Number = 0
-        for flags, enables in self._around.flag_words:
+        for flags, enables in self.around.flag_words:
             total = total | (e.load(pointer(e, flags), 16) & e.load(pointer(e, enables), 16))
         assert isinstance(total, Value)
         return total != 0
 
     def _look(self, next_pc: int) -> None:
         """The instruction before may have made an interrupt acceptable: look if any is requested at all."""
-        e = self._e
-        e.end(f"br i1 {self._requests().text}, label %{self._exit(next_pc, SERVICE)}, label %{self._label(next_pc)}")
+        e = self.e
+        e.end(f"br i1 {self._requests().text}, label %{self.exit(next_pc, SERVICE)}, label %{self._label(next_pc)}")
 
     def _check_retfie(self, flow: Return) -> None:
-        """Native RETFIE: no trap level involved, no REPEAT to resume, nothing else requested (isa.md §14.3)."""
-        b, e = self._b, self._e
-        corcon = e.load(pointer(e, self._around.offset["CORCON"]), 16)
-        traps = e.load(pointer(e, self._around.offset["INTCON1"]), 16) & self._around.trap_flags
-        plain = ((flow.srl & RA) == 0) & (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
+        """Native RETFIE: no trap level involved, nothing else requested (isa.md §14.3)."""
+        b, e = self.b, self.e
+        corcon = e.load(pointer(e, self.around.offset["CORCON"]), 16)
+        traps = e.load(pointer(e, self.around.offset["INTCON1"]), 16) & self.around.trap_flags
+        plain = (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
         b.guard(plain & (self._requests() ^ 1))
         sr = b._sr_word()
         b.pending.sr = (sr & 0xFF00) | (flow.srl & 0xFF)
-
-    # -- REPEAT -----------------------------------------------------------------------------------------------------
-    def _repeat(self, step: Step, flow: Repeat, stall: Number) -> None:
-        """REPEAT and its target as one unit, which must fit before the deadline as a whole (isa.md §7.5)."""
-        e = self._e
-        target = self._region.steps.get(step.next_pc)
-        if target is None or not self._native_target(target):
-            raise NeedsInterpreter
-        count = flow.count
-        if isinstance(count, Value):
-            some, none = e.fresh("some"), e.fresh("none")
-            e.end(f"br i1 {truth(count)}, label %{some}, label %{none}")
-            e.start(none)
-            self._repeat_none(step, stall)
-            e.start(some)
-            self._v.new_block()
-        elif count == 0:
-            self._repeat_none(step, stall)
-            return
-        again = int(target.facts.writes & target.facts.source_pointers != 0)
-        cycles = target.insn.row.cycles
-        total = stall + 1 + cycles * (count + 1) + again * count
-        go, late = e.fresh("go"), self._exit(step.pc, INTERPRET if self._exact else DEADLINE)
-        e.end(f"br i1 {self._fits(total).text}, label %{go}, label %{late}, !prof !0")
-        e.start(go)
-        self._advance(stall + 1, step.facts.writes)
-        if count == DIVIDE_COUNT and target.insn.row.mnemonic.startswith("DIV"):
-            self._divide(target)
-        else:
-            self._repeat_loop(target, count, cycles, again)
-        e.store(pointer(e, self._around.offset["RCOUNT"]), 0, 16)
-        self._jump(target.next_pc)
-
-    def _native_target(self, target: Step) -> bool:
-        """Whether an instruction can be repeated natively, found by translating it for nothing."""
-        if target.facts.flow is not None or not target.insn.row.repeat_ok:
-            return False
-        scratch = Emitter()
-        scratch.start("scratch")
-        trial = LlvmBuilder(scratch, Variables(scratch, self._around.offset), self._around, self._b.context)
-        trial.begin(target.pc, None)
-        trial.repeating = (DIVIDE_COUNT, Value(scratch, "%left", False))
-        try:
-            target.insn.row.does(trial, target.insn.x)  # type: ignore[arg-type]
-        except NeedsInterpreter:
-            return False
-        return not trial.pending.stop
-
-    def _repeat_none(self, step: Step, stall: Number) -> None:
-        """REPEAT #0 is a NOP that clears RCOUNT."""
-        self._e.store(pointer(self._e, self._around.offset["RCOUNT"]), 0, 16)
-        self._advance(stall + 1, step.facts.writes)
-        self._jump(step.next_pc)
-
-    def _divide(self, target: Step) -> None:
-        """The 18 iterations of a divide: only the first (zero check) and last (result) do anything (isa.md §6.7)."""
-        b = self._b
-        b.begin(target.pc, None)
-        b.repeating = (DIVIDE_COUNT, DIVIDE_COUNT)
-        target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
-        b.pending = Pending()
-        b.repeating = (DIVIDE_COUNT, 0)
-        target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
-        b.commit()
-        b.repeating = None
-        self._advance(DIVIDE_COUNT + 1, target.facts.writes)
-
-    def _repeat_loop(self, target: Step, count: Number, cycles: int, again: int) -> None:
-        """A counted loop around the target; an iteration that cannot be native leaves with RA and RCOUNT set."""
-        e, v, b = self._e, self._v, self._b
-        before, loop, done = e.fresh("before"), e.fresh("loop"), e.fresh("done")
-        e.end(f"br label %{before}")
-        e.start(before)
-        e.end(f"br label %{loop}")
-        e.start(loop)
-        v.new_block()
-        left = Value(e, e.name(), False)
-        phi = len(e.block.lines)
-        e.line("")
-        block = e.block
-        b.begin(target.pc, None)
-        b.repeating = (count, left)
-        target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
-        b.commit()
-        extra = b.select(left == count, 0, again) if again else 0
-        b.repeating = None
-        self._advance(cycles + extra, target.facts.writes | b.pending.mapped)
-        fewer = left - 1
-        more = left != 0
-        edges = f"[ {wide_constant(count)}, %{before} ], [ {fewer.text}, %{e.block.label} ]"
-        block.lines[phi] = f"{left.text} = phi i64 {edges}"
-        e.end(f"br i1 {more.text}, label %{loop}, label %{done}")
-        e.start(done)
-        v.new_block()
-
-
-def wide_constant(count: Number) -> str:
-    """Operand text of a value that needs no conversion."""
-    return str(count) if isinstance(count, int) else count.text

@@ -1,0 +1,188 @@
+"""REPEAT and its target, natively (isa.md §7.5).
+
+In block code the two are one unit that must fit before the deadline: a bare counted loop. In exact code every
+iteration is a boundary of its own, all loop state is in the record as the sequencer keeps it, and the loop can be
+entered in the middle, after an interrupt.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from emu.dspic30f.isa.flow import Repeat
+from emu.dspic30f.jit.builder import DEADLINE, SERVICE, LlvmBuilder, NeedsInterpreter, Pending
+from emu.dspic30f.jit.region import Step
+from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.jit.variables import MemoryVariables, pointer
+from emu.dspic30f.state import FIRST, LAST, MIDDLE, NOT_REPEATING, RA
+
+if TYPE_CHECKING:
+    from emu.dspic30f.jit.translate import Translator
+
+DIVIDE_COUNT: Final = 17
+"""RCOUNT of a divide: 18 iterations (isa.md §6.7)."""
+
+
+class Repeats:
+    """Translates the REPEATs of one function."""
+
+    def __init__(self, translator: Translator) -> None:
+        self._t: Final = translator
+        self.resumes: Final[dict[int, str]] = {}
+        """Labels at which exact code goes on with a REPEAT target, by address of the target."""
+
+    def translate(self, step: Step, flow: Repeat, stall: Number) -> None:
+        """The REPEAT at `step`. Raises NeedsInterpreter before anything is emitted if its target is not native."""
+        t, e = self._t, self._t.e
+        target = t.region.steps.get(step.next_pc)
+        if target is None or not self._is_native(target):
+            raise NeedsInterpreter
+        count = flow.count
+        if isinstance(count, Value):
+            some, none = e.fresh("some"), e.fresh("none")
+            e.end(f"br i1 {truth(count)}, label %{some}, label %{none}")
+            e.start(none)
+            self._nothing(step, stall)
+            e.start(some)
+            t.v.new_block()
+        elif count == 0:
+            self._nothing(step, stall)
+            return
+        if t.exact:
+            self._begin_exact(step, target, count, stall)
+        else:
+            self._whole(step, target, count, stall)
+
+    def _is_native(self, target: Step) -> bool:
+        """Whether an instruction can be repeated natively, found by translating it for nothing."""
+        last_of_loop = target.pc == self._t.around.do_end
+        if target.facts.flow is not None or not target.insn.row.repeat_ok or last_of_loop:
+            return False
+        scratch = Emitter()
+        scratch.start("scratch")
+        t = self._t
+        trial = LlvmBuilder(scratch, MemoryVariables(scratch, t.around.offset), t.around, t.b.context)
+        trial.dsp_region = t.b.dsp_region
+        trial.begin(target.pc, None)
+        trial.repeating = Value(scratch, "%left", False)
+        try:
+            target.insn.row.does(trial, target.insn.x)  # type: ignore[arg-type]
+        except NeedsInterpreter:
+            return False
+        return not trial.pending.stop
+
+    def _nothing(self, step: Step, stall: Number) -> None:
+        """REPEAT #0 is a NOP that clears RCOUNT."""
+        t = self._t
+        t.e.store(pointer(t.e, t.around.offset["RCOUNT"]), 0, 16)
+        t.advance(stall + 1, step.facts.writes)
+        t.jump(step.next_pc)
+
+    # -- block code ---------------------------------------------------------------------------------------------------
+    def _whole(self, step: Step, target: Step, count: Number, stall: Number) -> None:
+        """All iterations at once, if they fit before the deadline."""
+        t, e = self._t, self._t.e
+        again = int(target.facts.writes & target.facts.source_pointers != 0)
+        cycles = target.insn.row.cycles
+        total = stall + 1 + cycles * (count + 1) + again * count
+        go = e.fresh("go")
+        e.end(f"br i1 {t.fits(total).text}, label %{go}, label %{t.exit(step.pc, DEADLINE)}, !prof !0")
+        e.start(go)
+        t.advance(stall + 1, step.facts.writes)
+        if count == DIVIDE_COUNT and target.insn.row.mnemonic.startswith("DIV"):
+            self._divide(target)
+        else:
+            self._loop(target, count, cycles, again)
+        e.store(pointer(e, t.around.offset["RCOUNT"]), 0, 16)
+        t.jump(target.next_pc)
+
+    def _divide(self, target: Step) -> None:
+        """The 18 iterations of a divide: only the first (zero check) and last (result) do anything (isa.md §6.7)."""
+        t, b = self._t, self._t.b
+        b.begin(target.pc, None)
+        b.left_count = b.repeating = DIVIDE_COUNT
+        target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
+        b.pending = Pending()
+        b.repeating = 0
+        target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
+        b.commit()
+        b.repeating = b.left_count = None
+        t.advance(DIVIDE_COUNT + 1, target.facts.writes)
+
+    def _loop(self, target: Step, count: Number, cycles: int, again: int) -> None:
+        """A counted loop; an iteration that cannot be native leaves with the REPEAT state as it is then."""
+        t, e, b = self._t, self._t.e, self._t.b
+        before, loop, done = e.fresh("before"), e.fresh("loop"), e.fresh("done")
+        e.end(f"br label %{before}")
+        e.start(before)
+        e.end(f"br label %{loop}")
+        e.start(loop)
+        t.v.new_block()
+        left = Value(e, e.name(), False)
+        phi, block = len(e.block.lines), e.block
+        e.line("")
+        b.begin(target.pc, None)
+        b.repeating, b.left_count = left, count
+        target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
+        b.commit()
+        extra = b.select(left == count, 0, again) if again else 0
+        b.repeating = b.left_count = None
+        t.advance(cycles + extra, target.facts.writes | b.pending.mapped)
+        fewer, more = left - 1, left != 0
+        first = str(count) if isinstance(count, int) else count.text
+        block.lines[phi] = f"{left.text} = phi i64 [ {first}, %{before} ], [ {fewer.text}, %{e.block.label} ]"
+        e.end(f"br i1 {more.text}, label %{loop}, label %{done}")
+        e.start(done)
+        t.v.new_block()
+
+    # -- exact code ---------------------------------------------------------------------------------------------------
+    def _begin_exact(self, step: Step, target: Step, count: Number, stall: Number) -> None:
+        """The REPEAT instruction alone: state to the record, then the loop of its target."""
+        t, e = self._t, self._t.e
+        offset = t.around.offset
+        e.store(pointer(e, offset["RCOUNT"]), count, 16)
+        e.store(pointer(e, offset["cpu.repeat"]), FIRST, 16)
+        status = pointer(e, offset["SR"])
+        e.store(status, e.load(status, 16) | RA, 16)
+        t.advance(stall + 1, step.facts.writes)
+        known = target.pc in self.resumes
+        label = self.resumes.setdefault(target.pc, f"r{target.pc:x}")
+        e.end(f"br label %{label}")
+        if not known:
+            self._iterations(target, label)
+
+    def _iterations(self, target: Step, label: str) -> None:
+        """One iteration after another, each a boundary; entered from REPEAT or from outside."""
+        t, e, b = self._t, self._t.e, self._t.b
+        offset = t.around.offset
+        e.start(label)
+        t.v.new_block()
+        early = e.let(f"icmp ult i64 {wide(t.v.get('cycle'))}, %stop", bit=True)
+        go, on, done = e.fresh("go"), e.fresh("on"), e.fresh("done")
+        e.end(f"br i1 {early.text}, label %{go}, label %{t.exit(target.pc, SERVICE)}")
+        e.start(go)
+        stall: Number = 0
+        if target.facts.source_pointers:
+            stall = (t.v.get("stall") & target.facts.source_pointers) != 0
+        count_place, status = pointer(e, offset["RCOUNT"]), pointer(e, offset["SR"])
+        phase = pointer(e, offset["cpu.repeat"])
+        left = e.load(count_place, 16)
+        b.begin(target.pc, None)
+        b.repeating = left
+        target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
+        b.commit()
+        b.repeating = None
+        t.advance(target.insn.row.cycles + stall, target.facts.writes | b.pending.mapped)
+        word = e.load(status, 16)
+        more = ((word & RA) != 0) & (left != 0)
+        e.end(f"br i1 {truth(more)}, label %{on}, label %{done}")
+        e.start(on)
+        fewer = left - 1
+        e.store(count_place, fewer, 16)
+        e.store(phase, b.select(fewer == 0, LAST, MIDDLE), 16)
+        e.store(status, b.select(fewer == 0, word & (0xFFFF & ~RA), word), 16)
+        e.end(f"br label %{label}")
+        e.start(done)
+        e.store(status, word & (0xFFFF & ~RA), 16)
+        e.store(phase, NOT_REPEATING, 16)
+        t.jump(target.next_pc)

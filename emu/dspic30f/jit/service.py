@@ -1,0 +1,323 @@
+"""Native work at an instruction boundary: simple periodic events, and accepting and entering interrupts.
+
+The rules are those of sequencer.py and interrupts.py; everything out of the ordinary (traps, DISI, NSTDIS, requests
+that are not visible yet, events that are not a plain timer match, a stack that does not hold) is left to them: the
+function then returns with what was due before done, and Python does the rest of the boundary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from emu.dspic30f.core import Core
+from emu.dspic30f.interrupts import ALTIVT, UNMASKABLE
+from emu.dspic30f.registers import NSTDIS
+from emu.dspic30f.state import IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA
+from emu.record import DATA_BYTES
+
+DONE, PYTHON = 0, 1
+"""Results: the boundary has no work left; Python must do it."""
+
+COLUMNS: Final = ("place", "shift", "since", "ivt", "aivt", "vector")
+"""Names of the constant tables, in the order of `Boundary.sources`."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """A timer's event slot: fields of the record that say what firing does (peripherals/README.md)."""
+
+    slot: int
+    period: int
+    """Byte offset of the period in Tcy; 0 there means "call Python"."""
+    flag: int
+    """Address of the interrupt flag register."""
+    bit: int
+    since: int
+    """Byte offset of the cycle in which that flag rose."""
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """What the generated function depends on."""
+
+    offset: Mapping[str, int]
+    slots: int
+    look: int
+    """Slot that only makes the engine look."""
+    matches: tuple[Match, ...]
+    flag_words: tuple[tuple[int, int], ...]
+    trap_flags: int
+    sources: tuple[tuple[int, int, int, int, int, int], ...]
+    """Per flag word and bit: address and shift of the priority, offset of the rise, IVT, AIVT, vector number."""
+
+
+def boundary_of(core: Core, offset: Mapping[str, int]) -> Boundary:
+    """Collect it from a wired core."""
+    chip, names = core.chip, core.events.names
+    since = core.record.fields["irq.since"].offset
+    words = sorted({(chip.sfrs[s.flag[0]].address, chip.sfrs[s.enable[0]].address) for s in chip.interrupts.values()})
+    order = {flags: number for number, (flags, _enables) in enumerate(words)}
+    vectors = {vector.irq: vector for vector in chip.vectors}
+    sources = [(0, 0, 0, 0, 0, 0)] * (16 * len(words))
+    rises: dict[int, tuple[int, int, int]] = {}
+    for irq, source in chip.interrupts.items():
+        flags, bit = chip.sfrs[source.flag[0]].address, source.flag[1]
+        rise = since + 8 * ((flags >> 1) % 4 * 16 + bit)
+        rises[irq] = (flags, bit, rise)
+        priority, shift = source.priority
+        vector = vectors[irq]
+        sources[16 * order[flags] + bit] = (
+            chip.sfrs[priority].address, shift, rise, vector.ivt >> 1, vector.aivt >> 1, vector.slot)
+    matches = []
+    for site in chip.timers:
+        name = f"t{site.number}"
+        if f"{name}.match" in names:
+            flags, bit, rise = rises[site.irq]
+            matches.append(Match(names.index(f"{name}.match"), offset[f"{name}.period"], flags, bit, rise))
+    return Boundary(offset, len(names), names.index("cpu.look"), tuple(matches), tuple(words), core.traps.flags,
+                    tuple(sources))
+
+
+def service_text(b: Boundary) -> str:
+    """IR of `i64 @service(ptr %rec, i64 %limit, ptr %entered)`."""
+    return "\n".join([_tables(b), _head(b), _events(b), _accept(b), _enter(b), "}"])
+
+
+def _tables(b: Boundary) -> str:
+    lines = []
+    for number, name in enumerate(COLUMNS):
+        values = ", ".join(f"i64 {source[number]}" for source in b.sources)
+        lines.append(f"@{name} = private unnamed_addr constant [{len(b.sources)} x i64] [{values}]")
+    return "\n".join(lines)
+
+
+def _at(name: str, offset: int) -> str:
+    return f"  %{name} = getelementptr i8, ptr %rec, i64 {offset}"
+
+
+def _head(b: Boundary) -> str:
+    o = b.offset
+    places = {"p.cycle": o["cpu.cycle"], "p.deadline": o["events.deadline"], "p.hold": o["cpu.hold"],
+              "p.due": o["events.due"], "p.intcon1": o["INTCON1"], "p.intcon2": o["INTCON2"], "p.sr": o["SR"],
+              "p.corcon": o["CORCON"], "p.pc": o["cpu.pc"], "p.disi": o["cpu.disi_end"], "p.sp": o["WREG15"],
+              "p.splim": o["SPLIM"], "p.armed": o["cpu.limit_armed"], "p.stall": o["cpu.stall"],
+              "p.inttreg": o["INTTREG"], "p.repeat": o["cpu.repeat"], "p.flash": o["flash"]}
+    return "\n".join([
+        "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {", "first:",
+        *(_at(name, offset) for name, offset in places.items()),
+        f"""  %hold = load i64, ptr %p.hold
+  %held = icmp ne i64 %hold, 0
+  br i1 %held, label %python, label %again
+python:
+  ret i64 {PYTHON}
+done:
+  ret i64 {DONE}
+again:
+  %cycle = load i64, ptr %p.cycle
+  %last = sub i64 %cycle, 1
+  %over = icmp uge i64 %cycle, %limit
+  br i1 %over, label %python, label %due
+due:
+  %deadline = load i64, ptr %p.deadline
+  %early = icmp ugt i64 %deadline, %last
+  br i1 %early, label %done, label %fire"""])
+
+
+def _events(b: Boundary) -> str:
+    lines = [f"""fire:
+  br label %scan
+scan:
+  %i = phi i64 [ 0, %fire ], [ %i1, %scan ]
+  %least = phi i64 [ -1, %fire ], [ %least1, %scan ]
+  %who = phi i64 [ 0, %fire ], [ %who1, %scan ]
+  %p.slot = getelementptr i64, ptr %p.due, i64 %i
+  %slot.due = load i64, ptr %p.slot
+  %less = icmp ult i64 %slot.due, %least
+  %least1 = select i1 %less, i64 %slot.due, i64 %least
+  %who1 = select i1 %less, i64 %i, i64 %who
+  %i1 = add i64 %i, 1
+  %more = icmp ult i64 %i1, {b.slots}
+  br i1 %more, label %scan, label %found
+found:
+  %later = icmp ugt i64 %least1, %last
+  br i1 %later, label %settled, label %choose
+settled:
+  store i64 %least1, ptr %p.deadline
+  br label %accept
+choose:
+  %p.who = getelementptr i64, ptr %p.due, i64 %who1
+  switch i64 %who1, label %python [ i64 {b.look}, label %look"""]
+    lines[0] += "".join(f" i64 {m.slot}, label %t{m.slot}" for m in b.matches) + " ]"
+    lines.append("look:\n  store i64 -1, ptr %p.who\n  br label %fire")
+    for m in b.matches:
+        n = f"t{m.slot}"
+        lines += [f"{n}:", _at(f"{n}.pp", m.period), _at(f"{n}.pf", m.flag), _at(f"{n}.ps", m.since),
+                  f"""  %{n}.period = load i64, ptr %{n}.pp
+  %{n}.odd = icmp eq i64 %{n}.period, 0
+  br i1 %{n}.odd, label %python, label %{n}.go
+{n}.go:
+  %{n}.next = add i64 %least1, %{n}.period
+  store i64 %{n}.next, ptr %p.who
+  %{n}.word = load i16, ptr %{n}.pf
+  %{n}.new = or i16 %{n}.word, {_i16(1 << m.bit)}
+  store i16 %{n}.new, ptr %{n}.pf
+  %{n}.same = icmp eq i16 %{n}.new, %{n}.word
+  br i1 %{n}.same, label %fire, label %{n}.rise
+{n}.rise:
+  store i64 %least1, ptr %{n}.ps
+  br label %fire"""]
+    return "\n".join(lines)
+
+
+def _i16(value: int) -> int:
+    return value - 0x10000 if value & 0x8000 else value
+
+
+def _accept(b: Boundary) -> str:
+    lines = [f"""accept:
+  %intcon1 = load i16, ptr %p.intcon1
+  %traps = and i16 %intcon1, {_i16(b.trap_flags)}
+  %trap = icmp ne i16 %traps, 0
+  %sr = load i16, ptr %p.sr
+  %corcon = load i16, ptr %p.corcon
+  br i1 %trap, label %python, label %ask0"""]
+    bits = 16 * len(b.flag_words)
+    for number, (flags, enables) in enumerate(b.flag_words):
+        lines += [f"ask{number}:", _at(f"pf{number}", flags), _at(f"pe{number}", enables),
+                  f"""  %f{number} = load i16, ptr %pf{number}
+  %e{number} = load i16, ptr %pe{number}
+  %r{number} = and i16 %f{number}, %e{number}
+  %w{number} = zext i16 %r{number} to i64
+  %s{number} = shl i64 %w{number}, {16 * number}
+  %o{number} = or i64 %s{number}, {f"%o{number - 1}" if number else "0"}
+  br label %{f"ask{number + 1}" if number + 1 < len(b.flag_words) else "asked"}"""]
+    shift = IPL_MASK.bit_length() - 3
+    table = f"[{bits} x i64]"
+    lines.append(f"""asked:
+  %all = or i64 %o{len(b.flag_words) - 1}, 0
+  %ipl.low = lshr i16 %sr, {shift}
+  %ipl.low7 = and i16 %ipl.low, 7
+  %ipl.high = and i16 %corcon, {IPL3}
+  %ipl16 = or i16 %ipl.low7, %ipl.high
+  %ipl = zext i16 %ipl16 to i64
+  %disi = load i64, ptr %p.disi
+  br label %pick
+pick:
+  %req = phi i64 [ %all, %asked ], [ %req1, %next ]
+  %best = phi i64 [ %ipl, %asked ], [ %best1, %next ]
+  %win = phi i64 [ -1, %asked ], [ %win1, %next ]
+  %none = icmp eq i64 %req, 0
+  br i1 %none, label %picked, label %take
+take:
+  %irq = call i64 @llvm.cttz.i64(i64 %req, i1 true)
+  %reqm = sub i64 %req, 1
+  %req1 = and i64 %req, %reqm
+  %pp = getelementptr {table}, ptr @place, i64 0, i64 %irq
+  %place.off = load i64, ptr %pp
+  %ps = getelementptr {table}, ptr @shift, i64 0, i64 %irq
+  %shift.n = load i64, ptr %ps
+  %p.ipc = getelementptr i8, ptr %rec, i64 %place.off
+  %ipc = load i16, ptr %p.ipc
+  %ipc64 = zext i16 %ipc to i64
+  %lev = lshr i64 %ipc64, %shift.n
+  %level = and i64 %lev, 7
+  %wins = icmp ugt i64 %level, %best
+  br i1 %wins, label %open, label %next
+open:
+  %maskable = icmp ult i64 %level, {UNMASKABLE}
+  %blocked = icmp ult i64 %last, %disi
+  %held.back = and i1 %maskable, %blocked
+  br i1 %held.back, label %python, label %seen
+seen:
+  %pr = getelementptr {table}, ptr @since, i64 0, i64 %irq
+  %rise.off = load i64, ptr %pr
+  %p.rise = getelementptr i8, ptr %rec, i64 %rise.off
+  %rise = load i64, ptr %p.rise
+  %visible = icmp ule i64 %rise, %last
+  br i1 %visible, label %next, label %python
+next:
+  %best1 = phi i64 [ %best, %take ], [ %level, %seen ]
+  %win1 = phi i64 [ %win, %take ], [ %irq, %seen ]
+  br label %pick
+picked:
+  %nobody = icmp eq i64 %win, -1
+  br i1 %nobody, label %done, label %enter""")
+    return "\n".join(lines)
+
+
+def _enter(b: Boundary) -> str:
+    table = f"[{len(b.sources)} x i64]"
+    return f"""enter:
+  %nstdis = and i16 %intcon1, {_i16(NSTDIS)}
+  %nest = icmp eq i16 %nstdis, 0
+  %sp = load i16, ptr %p.sp
+  %sp2 = add i16 %sp, 2
+  %armed = load i16, ptr %p.armed
+  %splim = load i16, ptr %p.splim
+  %unlimited = icmp eq i16 %armed, 0
+  %fits = icmp ule i16 %sp2, %splim
+  %below = or i1 %unlimited, %fits
+  %high = icmp uge i16 %sp, 2048
+  %ram = icmp ult i16 %sp, {DATA_BYTES - 2}
+  %a1 = and i1 %below, %high
+  %a2 = and i1 %a1, %ram
+  %a3 = and i1 %a2, %nest
+  br i1 %a3, label %push, label %python
+push:
+  %pw = getelementptr {table}, ptr @since, i64 0, i64 %win
+  %rise.w = load i64, ptr %pw
+  %p.rise.w = getelementptr i8, ptr %rec, i64 %rise.w
+  %c = load i64, ptr %p.rise.w
+  %c4 = add i64 %c, 4
+  %e3 = add i64 %last, 3
+  %start = call i64 @llvm.umax.i64(i64 %c4, i64 %e3)
+  store i64 %start, ptr %p.cycle
+  %pc = load i32, ptr %p.pc
+  %pc.low = trunc i32 %pc to i16
+  %pc.high32 = lshr i32 %pc, 16
+  %pc.high = trunc i32 %pc.high32 to i16
+  %srl = shl i16 %sr, 8
+  %ipl3 = and i16 %corcon, {IPL3}
+  %ipl3.up = shl i16 %ipl3, 4
+  %word.a = or i16 %srl, %ipl3.up
+  %word = or i16 %word.a, %pc.high
+  %spx = zext i16 %sp to i64
+  %p.push = getelementptr i8, ptr %rec, i64 %spx
+  store i16 %pc.low, ptr %p.push
+  %p.push2 = getelementptr i8, ptr %p.push, i64 2
+  store i16 %word, ptr %p.push2
+  %sp4 = add i16 %sp, 4
+  store i16 %sp4, ptr %p.sp
+  %best16 = trunc i64 %best to i16
+  %ipl.bits = shl i16 %best16, 5
+  %sr.kept = and i16 %sr, {_i16(0xFFFF & ~(IPL_MASK | RA))}
+  %sr.new = or i16 %sr.kept, %ipl.bits
+  store i16 %sr.new, ptr %p.sr
+  %corcon.new = and i16 %corcon, {_i16(0xFFFF & ~IPL3)}
+  store i16 %corcon.new, ptr %p.corcon
+  %intcon2 = load i16, ptr %p.intcon2
+  %alt = and i16 %intcon2, {_i16(ALTIVT)}
+  %ivt.on = icmp eq i16 %alt, 0
+  %pi = getelementptr {table}, ptr @ivt, i64 0, i64 %win
+  %pa = getelementptr {table}, ptr @aivt, i64 0, i64 %win
+  %p.entry = select i1 %ivt.on, ptr %pi, ptr %pa
+  %entry.word = load i64, ptr %p.entry
+  %p.vector = getelementptr i32, ptr %p.flash, i64 %entry.word
+  %vector = load i32, ptr %p.vector
+  %handler = and i32 %vector, {PC_MASK}
+  store i32 %handler, ptr %p.pc
+  store i16 0, ptr %p.stall
+  store i16 {NOT_REPEATING}, ptr %p.repeat
+  %pv = getelementptr {table}, ptr @vector, i64 0, i64 %win
+  %vec = load i64, ptr %pv
+  %lev8 = shl i64 %best, 8
+  %treg = or i64 %lev8, %vec
+  %treg16 = trunc i64 %treg to i16
+  store i16 %treg16, ptr %p.inttreg
+  store i64 0, ptr %p.deadline
+  %count = load i64, ptr %entered
+  %count1 = add i64 %count, 1
+  store i64 %count1, ptr %entered
+  br label %again"""
