@@ -28,8 +28,12 @@ __Exit:
         bset    _SR,#7                  ; IPL 7: nothing but a trap runs from here on (isa.md §2.3)
         bset    _SR,#6
         bset    _SR,#5
-2:      pwrsav  #0
+2:      btss    _U1STA,#8               ; sleeping stops the UARTs: let their last characters out (TRMT)
         bra     2b
+3:      btss    _U2STA,#8
+        bra     3b
+4:      pwrsav  #0
+        bra     4b
 
 ; Constants are read through the PSV window for the whole run (abi-elf.md §1.4).
         .global __psv_init
@@ -37,11 +41,11 @@ __psv_init:
         bclr    _CORCON,#2
         mov     #__const_length,w0
         cp0     w0
-        bra     z,3f
+        bra     z,5f
         mov     #__const_psvpage,w0
         mov     w0,_PSVPAG
         bset    _CORCON,#2
-3:      return
+5:      return
 
 ; Walk the .dinit table (abi-elf.md §3.2). W1:W0 = program address of its first word.
         .global __data_init
