@@ -25,8 +25,10 @@ class Events:
 
     def __init__(self, record: Record) -> None:
         self._u64 = record.u64
-        self._now = record.reserve("events.now", "Q").index
-        self._deadline = record.reserve("events.deadline", "Q").index
+        self.now_index: Final = record.reserve("events.now", "Q").index
+        self.deadline_index: Final = record.reserve("events.deadline", "Q").index
+        self._now: Final = self.now_index
+        self._deadline: Final = self.deadline_index
         self._first = record.reserve("events.due", "Q", SLOTS).index
         self.firing = False
         """An event is being handled, as opposed to an access of an instruction or a call from outside."""

@@ -77,7 +77,7 @@ class Machine:
         self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
         self._stopped_at: tuple[int, int] | None = None
         self._interrupt = False
-        self._engine: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
+        self.runner: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
         self.image: Image | None = None
         """What `load` was given last."""
         self.reset("POR")
@@ -85,7 +85,7 @@ class Machine:
     @property
     def engine(self) -> str:
         """Name of the engine in use."""
-        return self._engine.name
+        return self.runner.name
 
     @property
     def cycle(self) -> int:
@@ -127,7 +127,7 @@ class Machine:
 
     def run_until(self, cycle: int) -> Stop | None:
         """Run to the first instruction boundary at or after `cycle`; None if nothing stopped the run before."""
-        state, sequencer, engine, hooks = self.state, self.core.sequencer, self._engine, self._pc_hooks
+        state, sequencer, engine, hooks = self.state, self.core.sequencer, self.runner, self._pc_hooks
         stop = None
         while stop is None and state.cycle < cycle:
             try:
@@ -184,6 +184,14 @@ class Machine:
             stop = self._reset_by(reset)
         self.events.arrive(state.cycle)
         return stop
+
+    def approach(self, limit: int) -> Stop | None:
+        """Do what is due before the next instruction, as `step` does first: events, exception entry, sleep up to
+        cycle `limit`. Afterwards `pc` and `cycle` are those of the instruction `step` will run."""
+        try:
+            return None if self.core.sequencer.boundary(limit) else self.stopped("halt")
+        except DeviceReset as reset:
+            return self._reset_by(reset)
 
     def interrupt(self) -> None:
         """Make the current run end at its next boundary (signal handlers)."""
@@ -309,13 +317,13 @@ class Machine:
     def hook_pc(self, address: int, hook: PcHook) -> Callable[[], None]:
         """Call `hook` before the instruction at `address`; a true result stops the run. Returns how to remove it."""
         self._pc_hooks.setdefault(address, []).append(hook)
-        self._engine.forget()
+        self.runner.forget()
 
         def remove() -> None:
             self._pc_hooks[address].remove(hook)
             if not self._pc_hooks[address]:
                 del self._pc_hooks[address]
-            self._engine.forget()
+            self.runner.forget()
 
         return remove
 
@@ -336,4 +344,4 @@ class Machine:
             hook(True, self.record.u16[word])
 
         bus.on_read[word], bus.on_write[word] = on_read, on_write
-        self._engine.forget()
+        self.runner.forget()

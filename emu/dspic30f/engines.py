@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
+from emu.dspic30f.specialised import SpecialisedEngine
 
 NAMES: Final = ("plain", "interp", "jit", "auto")
 
@@ -43,4 +44,6 @@ def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:
     """The engine called `name`. Raises ValueError for a name that is not one of NAMES."""
     if name not in NAMES:
         raise ValueError(f"there is no engine {name!r}; expected one of {', '.join(NAMES)}")
-    return PlainEngine(core)
+    if name == "plain":
+        return PlainEngine(core)
+    return SpecialisedEngine(core, pc_hooks)

@@ -347,7 +347,12 @@ class Sequencer:
         if state.dcount and state.edt < EDT_MATURE:
             state.dcount -= 1
             state.pc = state.pair("DOSTARTL")
-            return
+        else:
+            self.end_loop()
+
+    def end_loop(self) -> None:
+        """Leave the innermost DO loop."""
+        state = self.state
         state.edt = 0
         level = state.do_level
         if level == 2:

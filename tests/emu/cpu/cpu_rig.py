@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from emu.device import Irq
 from emu.dspic30f.isa.text import parse
+from emu.dspic30f.specialised import SpecialisedEngine
 from emu.machine import Machine, Stop
 
 START = 0x200
@@ -58,6 +59,8 @@ class Rig:
 
     def __init__(self, text: str, engine: str = "plain", ipl_slip: int = 0, **w: int) -> None:
         self.machine = Machine(engine=engine, ipl_slip=ipl_slip)
+        if isinstance(self.machine.runner, SpecialisedEngine):
+            self.machine.runner.warm = 1  # write functions at once
         self.machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
         self.machine.reset("POR")
         words, self.labels = assemble(text)

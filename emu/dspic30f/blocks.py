@@ -1,0 +1,253 @@
+"""Functions in Python for stretches of a program: straight blocks, and targets of REPEAT.
+
+A block starts anywhere and follows the program through untaken branches and static jumps until something only the
+sequencer does comes up, or a hooked address, or LENGTH instructions. Its cycles are constants; the caller makes sure
+that no event and no limit falls inside before it calls. Texts are compiled once per process.
+"""
+
+from __future__ import annotations
+
+import linecache
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from types import CodeType
+from typing import Any, Final
+
+from emu.dspic30f.facts import facts_of, flow_of
+from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Repeat, Return, Skip
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.pysource import CHANGED, DONE, Source, Unsupported
+from emu.dspic30f.state import FIRST, LAST, MIDDLE, NOT_REPEATING, PC_MASK, RA
+
+LENGTH: Final = 48
+"""Longest block in instructions: compiling costs about 0.1 ms each."""
+
+Fetch = Callable[[int], Insn | None]
+"""Decoded instruction at an address; None where the sequencer must look itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A function, and the most cycles it can take."""
+
+    run: Callable[[int], int]
+    cycles: int
+
+
+def div_trunc(a: int, b: int) -> int:
+    """Quotient towards zero, 0 for b = 0."""
+    if b == 0:
+        return 0
+    quotient = abs(a) // abs(b)
+    return quotient if (a < 0) == (b < 0) else -quotient
+
+
+def rem_trunc(a: int, b: int) -> int:
+    """Remainder with the sign of a, 0 for b = 0."""
+    return 0 if b == 0 else a - div_trunc(a, b) * b
+
+
+def ctz16(v: int) -> int:
+    """Trailing zeros of a 16-bit value, 16 for 0."""
+    return (v & -v).bit_length() - 1 if v else 16
+
+
+@lru_cache(maxsize=16384)
+def compiled(text: str) -> CodeType:
+    """The code of one function's text, shared by all machines of the process."""
+    name = f"<specialised {hash(text) & 0xFFFFFFFF:08x}>"
+    linecache.cache[name] = (len(text), None, text.splitlines(True), name)
+    return compile(text, name, "exec")
+
+
+NATIVE: Final = (None, Branch, Call, Goto, Repeat, Return, Skip)
+"""Flows a block can do itself; the others end it."""
+
+
+def _restores_priority(insn: Insn, pc: int) -> bool:
+    """RETFIE, after which the sequencer must look for interrupts."""
+    flow = flow_of(insn, pc)
+    return isinstance(flow, Return) and flow.kind == "retfie"
+
+
+class _Ends(Exception):
+    """The block ends before this instruction."""
+
+
+class BlockWriter:
+    """Writes one block from `pc`; `loop` is (DOSTART, DOEND) while a DO loop is active."""
+
+    def __init__(
+        self, source: Source, fetch: Fetch, hooked: Callable[[int], bool], loop: tuple[int, int] | None
+    ) -> None:
+        self._source: Final = source
+        self._fetch: Final = fetch
+        self._hooked: Final = hooked
+        self._loop: Final = loop
+        self._visited: Final[set[int]] = set()
+        self._cycle = 0
+        """Start of the next instruction behind `c`."""
+        self._longest = 0
+
+    def write(self, pc: int) -> int | None:
+        """Write the body. Returns the most cycles it can take, None if not even the first instruction fits."""
+        source = self._source
+        first = self._fetch(pc)
+        if first is None:
+            return None
+        pointers = facts_of(first).source_pointers
+        at = source.places.at
+        source.emit(f"c = u64[{at['cpu.cycle']}]")
+        if pointers:
+            source.emit(f"if u16[{at['cpu.stall']}] & {pointers}:")
+            source.emit("    c += 1")
+        here: int | None = pc
+        while here is not None:
+            if here in self._visited or len(self._visited) >= LENGTH or (self._visited and self._hooked(here)):
+                source.leave(here, self._cycle, source.stall, DONE)
+                break
+            try:
+                after = self._instruction(here)
+            except (Unsupported, _Ends):
+                source.abandon()
+                if not self._visited:
+                    return None
+                source.leave(here, self._cycle, source.stall, DONE)
+                break
+            here = after
+        return max(self._longest, self._cycle) + 1
+
+    def _instruction(self, pc: int) -> int | None:
+        """One instruction; returns the address to go on with, None if the block has been left."""
+        source = self._source
+        source.begin(pc, self._cycle, self._cycle)
+        insn = self._fetch(pc)
+        if insn is None:
+            raise _Ends
+        facts = facts_of(insn)
+        if facts.flow not in NATIVE or _restores_priority(insn, pc):
+            raise _Ends
+        if self._loop is not None and pc == self._loop[1] and facts.flow is not None:
+            raise _Ends
+        stalled = bool(self._visited) and bool(source.stall & facts.source_pointers)
+        start = self._cycle + stalled
+        source.begin(pc, self._cycle, start + insn.row.cycles - 1)
+        flow: Flow = insn.row.does(source, insn.x)
+        source.commit()
+        source.at_entry = False
+        self._visited.add(pc)
+        after = pc + 2 * insn.words & PC_MASK
+        self._cycle = start + insn.row.cycles
+        if flow is not None:
+            return self._follow(flow, after)
+        if self._loop is not None and pc == self._loop[1]:
+            self._end_loop(after)
+            return None
+        if source.ends_here:
+            source.leave(after, self._cycle, source.stall, DONE)
+            return None
+        return after
+
+    def _follow(self, flow: Flow, after: int) -> int | None:
+        source, at = self._source, self._source.places.at
+        cycle, stall = self._cycle, source.stall
+        match flow:
+            case Branch(cond, target):
+                source.leave(target, cycle + 1, stall, DONE, under=str(cond))
+                self._longest = max(self._longest, cycle + 1)
+                return after
+            case Skip(cond):
+                skipped = self._fetch(after)
+                words = 1 if skipped is None else skipped.words
+                source.leave(after + 2 * words & PC_MASK, cycle + words, stall, DONE, under=str(cond))
+                self._longest = max(self._longest, cycle + words)
+                if source.ends_here:
+                    source.leave(after, cycle, stall, DONE)
+                    return None
+                return after
+            case Goto(target) | Call(target):
+                if isinstance(target, int):
+                    return target
+                source.leave(target, cycle, stall, DONE)
+            case Return(_kind, target):
+                source.leave(target, cycle, stall, DONE)
+            case Repeat(count):
+                source.settle()
+                source.emit(f"u16[{at['RCOUNT']}] = {count}")
+                if not isinstance(count, int) or count:
+                    if not isinstance(count, int):
+                        source.emit(f"if {count}:")
+                        source.nested(1)
+                    source.emit(f"u16[{at['SR']}] |= {RA}")
+                    source.emit(f"u16[{at['cpu.repeat']}] = {FIRST}")
+                    source.nested(0)
+                source.leave(after, cycle, stall, DONE)
+        return None
+
+    def _end_loop(self, after: int) -> None:
+        """Behind the instruction at DOEND (isa.md §7.6)."""
+        source, at = self._source, self._source.places.at
+        assert self._loop is not None
+        source.settle()
+        source.emit(f"if u16[{at['DCOUNT']}]:")
+        source.nested(1)
+        source.emit(f"u16[{at['DCOUNT']}] -= 1")
+        source.leave(self._loop[0], self._cycle, source.stall, DONE)
+        source.nested(0)
+        source.emit("end_loop()")
+        source.leave(after, self._cycle, source.stall, CHANGED)
+
+
+def write_repeat(source: Source, insn: Insn, pc: int) -> int:
+    """Write the loop of a REPEAT target: as many iterations as end by `bound`. Returns the cycles of one.
+
+    Raises Unsupported for targets the sequencer must run.
+    """
+    facts, at = facts_of(insn), source.places.at
+    if facts.flow is not None or insn.words != 1:
+        raise Unsupported("a flow change under REPEAT")
+    cycles = insn.row.cycles
+    source.emit(f"c = u64[{at['cpu.cycle']}]")
+    source.emit(f"n = u16[{at['RCOUNT']}]")
+    source.emit(f"if u16[{at['cpu.stall']}] & {facts.source_pointers}:")
+    source.emit("    c += 1")
+    source.emit("while True:")
+    source.nested(1)
+    source.emit(f"if c + {cycles} > bound:")
+    source.emit("    return 2")
+    source.begin(pc, 0, cycles - 1)
+    flow: Flow = insn.row.does(source, insn.x)
+    assert flow is None
+    source.commit()
+    if source.ends_here or source.modes_changed:
+        raise Unsupported("a device access under REPEAT")
+    source.settle()
+    stalled = int(bool(source.stall & facts.source_pointers))
+    source.emit(f"c += {cycles}")
+    source.emit(f"u64[{at['cpu.cycle']}] = c")
+    source.emit(f"u16[{at['cpu.stall']}] = {source.stall}")
+    source.emit("if not n:")
+    source.emit(f"    u16[{at['cpu.repeat']}] = {NOT_REPEATING}")
+    source.emit(f"    u32[{at['cpu.pc']}] = {pc + 2 & PC_MASK}")
+    source.emit(f"    return {DONE}")
+    source.emit("n -= 1")
+    source.emit(f"u16[{at['RCOUNT']}] = n")
+    source.emit("if n:")
+    source.emit(f"    u16[{at['cpu.repeat']}] = {MIDDLE}")
+    source.emit("else:")
+    source.emit(f"    u16[{at['SR']}] &= {~RA & 0xFFFF}")
+    source.emit(f"    u16[{at['cpu.repeat']}] = {LAST}")
+    if stalled:
+        source.emit("c += 1")
+    return cycles + 1
+
+
+def make_function(source: Source, names: dict[str, Any]) -> Callable[[int], int]:
+    """The function written in `source`, with `names` as its constants."""
+    parameters = "".join(f", {name}={name}" for name in names)
+    text = f"def run(bound{parameters}):\n" + "\n".join(source.lines) + "\n"
+    namespace = dict(names)
+    exec(compiled(text), namespace)
+    function: Callable[[int], int] = namespace["run"]
+    return function

@@ -1,0 +1,187 @@
+"""The specialised interpreter: functions generated per stretch of program, plain steps everywhere else.
+
+What is generated depends on the program words and on processor modes (`_Modes`); code for other modes is kept apart.
+A block runs only if no event is due and no limit falls before it ends, so inside it nothing but its own instructions
+can happen. Everything else goes through the sequencer, one instruction at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from emu.dspic30f.blocks import Block, BlockWriter, ctz16, div_trunc, make_function, rem_trunc, write_repeat
+from emu.dspic30f.core import Core
+from emu.dspic30f.interp import context_of
+from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.pysource import PLAIN, Places, Source, Unsupported
+from emu.dspic30f.state import DA, LAST, RA
+
+WARM: Final = 4
+"""Times an address is reached before a function is written for it."""
+
+MODE_REGISTERS: Final = (
+    "CORCON", "MODCON", "XBREV", "INTCON1", "SPLIM", "SR", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH",
+)  # fmt: skip
+
+
+@dataclass
+class _Modes:
+    """Functions for one combination of processor modes."""
+
+    blocks: dict[int, Block | None] = field(default_factory=dict)
+    repeats: dict[int, Block | None] = field(default_factory=dict)
+    loop: tuple[int, int] | None = None
+
+
+class SpecialisedEngine:
+    """`Engine` on generated Python functions."""
+
+    name = "interp"
+
+    def __init__(self, core: Core, pc_hooks: Mapping[int, Any], warm: int = WARM) -> None:
+        self._core: Final = core
+        self._hooks: Final = pc_hooks
+        self.warm = warm
+        """Times an address is reached before a function is written for it."""
+        self._state: Final = core.state
+        self._sequencer: Final = core.sequencer
+        self._places: Final = places_of(core)
+        record = core.record
+        self._names: Final = {
+            "u8": record.u8,
+            "u16": record.u16,
+            "u32": record.u32,
+            "u64": record.u64,
+            "read": core.bus.read,
+            "write": core.bus.write,
+            "end_loop": core.sequencer.end_loop,
+            "div_trunc": div_trunc,
+            "rem_trunc": rem_trunc,
+            "ctz16": ctz16,
+        }
+        self._by_modes: Final[dict[object, _Modes]] = {}
+        self._heat: Final[dict[int, int]] = {}
+        self._modes = _Modes()
+        core.program.changed.append(self._flash_changed)
+
+    def run(self, limit: int) -> None:
+        """Functions and plain steps until a boundary has work, a hooked PC or `limit` is reached."""
+        u16, u32, u64 = self._core.record.u16, self._core.record.u32, self._core.record.u64
+        at = self._state.at
+        cycle_at, pc_at, repeat_at, edt_at = at["cpu.cycle"], at["cpu.pc"], at["cpu.repeat"], at["cpu.edt"]
+        deadline_at, hooks = self._core.events.deadline_index, self._hooks
+        self._select()
+        while True:
+            cycle, pc = u64[cycle_at], u32[pc_at]
+            bound = min(limit, u64[deadline_at])
+            if u16[edt_at]:
+                block = None
+            elif u16[repeat_at]:
+                block = self._repeat(pc)
+            else:
+                block = self._modes.blocks.get(pc)
+                if block is None:
+                    block = self._block(pc)
+            status = PLAIN if block is None or cycle + block.cycles > bound else block.run(bound)
+            if status:
+                if status == PLAIN:
+                    self._sequencer.execute()
+                self._select()
+            cycle = u64[cycle_at]
+            if cycle >= limit or u64[deadline_at] < cycle or (hooks and u32[pc_at] in hooks):
+                return
+
+    def forget(self) -> None:
+        """Hooks have changed: write everything anew."""
+        self._by_modes.clear()
+        self._modes = _Modes()
+
+    def _flash_changed(self, _start: int, _end: int) -> None:
+        self.forget()
+        self._heat.clear()
+
+    def _select(self) -> None:
+        """Make the functions for the present processor modes current."""
+        u16, state = self._core.record.u16, self._state
+        at = state.at
+        loop = (state.pair("DOSTARTL"), state.pair("DOENDL")) if u16[at["SR"]] & DA else None
+        key = (
+            u16[at["CORCON"]] & 0x10F7,
+            u16[at["MODCON"]],
+            u16[at["XBREV"]] >> 15,
+            u16[at["INTCON1"]] & 0x0700,
+            u16[at["cpu.limit_armed"]],
+            u16[at["cpu.initialised"]],
+            loop,
+        )
+        modes = self._by_modes.get(key)
+        if modes is None:
+            modes = self._by_modes[key] = _Modes(loop=loop)
+        self._modes = modes
+
+    def _source(self) -> Source:
+        u16, at = self._core.record.u16, self._state.at
+        context = context_of(u16[at["CORCON"]], u16[at["MODCON"]], u16[at["XBREV"]] >> 15, u16[at["INTCON1"]] & 0x0700)
+        initialised, armed = u16[at["cpu.initialised"]], bool(u16[at["cpu.limit_armed"]])
+        return Source(self._places, context, initialised, armed)
+
+    def _fetch(self, pc: int) -> Insn | None:
+        """Decoded instruction; None where the sequencer must look itself."""
+        program = self._core.program
+        if not program.executable(pc):
+            return None
+        return decode_for_execution(program.word(pc), program.word(pc + 2))
+
+    def _block(self, pc: int) -> Block | None:
+        """The block at `pc`, written when the address has become warm."""
+        modes = self._modes
+        if pc in modes.blocks:
+            return None
+        heat = self._heat[pc] = self._heat.get(pc, 0) + 1
+        if heat < self.warm:
+            return None
+        source = self._source()
+        cycles = BlockWriter(source, self._fetch, self._hooks.__contains__, modes.loop).write(pc)
+        block = None if cycles is None else Block(make_function(source, self._names), cycles)
+        modes.blocks[pc] = block
+        return block
+
+    def _repeat(self, pc: int) -> Block | None:
+        """The loop of the REPEAT target at `pc`, if it can run as one now."""
+        state, modes = self._state, self._modes
+        counting = bool(state.sr & RA)
+        if counting != bool(state.rcount) or (not counting and state.repeat != LAST):
+            return None
+        if pc not in modes.repeats:
+            modes.repeats[pc] = self._write_repeat(pc)
+        return modes.repeats[pc]
+
+    def _write_repeat(self, pc: int) -> Block | None:
+        insn = self._fetch(pc)
+        if insn is None or (self._modes.loop is not None and pc == self._modes.loop[1]):
+            return None
+        source = self._source()
+        try:
+            cycles = write_repeat(source, insn, pc)
+        except Unsupported:
+            return None
+        return Block(make_function(source, self._names), cycles)
+
+
+def places_of(core: Core) -> Places:
+    """What generated code must know of a machine's wiring."""
+    at = core.state.at
+    effects = frozenset(word for word, hook in enumerate(core.bus.on_read) if hook is not None)
+    ram, y = core.chip.data["ram"], core.chip.data["yram"]
+    return Places(
+        at,
+        core.events.now_index,
+        (ram.start, ram.end),
+        (y.start, y.end),
+        effects,
+        frozenset((at["PCL"], at["PCH"])),
+        frozenset(at[name] for name in MODE_REGISTERS),
+    )
