@@ -35,11 +35,6 @@ class Tracer:
             if sfr.address < CORE_END and sfr.name not in SILENT
         }
         self._items: Final[dict[tuple[int, int, int], Item | None]] = {}
-        self._handlers: Final = {
-            vector.ivt if table == "ivt" else vector.aivt: vector.name
-            for vector in image.chip.vectors
-            for table in ("ivt", "aivt")
-        }
         print(HEADER, file=stream)
 
     def advance(self, until: int) -> Stop | None:
@@ -47,20 +42,29 @@ class Tracer:
         machine = self.machine
         while machine.cycle < until:
             cycle, pc, before = machine.cycle, machine.pc, self._core.tolist()
+            stop = machine.approach(until)
+            if machine.pc != pc:
+                self._write(cycle, f"{'':8}  -- exception: {self.image.symbols.text(machine.pc)}", before)
+            elif machine.cycle != cycle:
+                self._write(cycle, f"{'':8}  -- nothing executed for {machine.cycle - cycle:,} cycles", before)
+            if stop is not None or machine.cycle >= until:
+                return stop
+            cycle, pc, before = machine.cycle, machine.pc, self._core.tolist()
+            text = f"{pc:#08x}  {self._text(pc)}"
             stop = machine.step()
-            self._write(cycle, pc, before)
+            self._write(cycle, text, before)
             if stop is not None:
                 return stop
         return None
 
-    def _write(self, cycle: int, pc: int, before: list[int]) -> None:
-        after = self._core.tolist()
+    def _write(self, cycle: int, text: str, before: list[int]) -> None:
+        """A line, with the registers that differ from `before`."""
         changed = [
             f"{self._names[word]}={value:04X}"
-            for word, (old, value) in enumerate(zip(before, after, strict=True))
+            for word, (old, value) in enumerate(zip(before, self._core.tolist(), strict=True))
             if value != old and word in self._names
         ]
-        self.stream.write(f"{cycle:12} {pc:#08x}  {self._text(pc):44}  {' '.join(changed)}".rstrip() + "\n")
+        self.stream.write(f"{cycle:12} {text:54}  {' '.join(changed)}".rstrip() + "\n")
 
     def _text(self, pc: int) -> str:
         """Disassembly of what stands at `pc` in the machine, which may have programmed its own flash."""

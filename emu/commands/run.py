@@ -188,7 +188,7 @@ def _limit(options: argparse.Namespace, machine: Machine) -> int:
     if options.cycles is not None:
         return int(options.cycles)
     if options.seconds is not None:
-        return max(1, round(options.seconds * Fraction(machine.peripherals.fcy)))
+        return max(1, int(round(options.seconds * Fraction(machine.peripherals.fcy))))
     return FOREVER
 
 
@@ -203,10 +203,10 @@ def exit_status(machine: Machine, image: Image, stop: Stop, fault: Fault | None)
     if fault is not None:
         return FAULT_STATUS
     if stop.reason == "breakpoint":
-        return machine.peek("W0") & 0xFF
+        return int(machine.peek("W0")) & 0xFF
     if stop.reason == "halt":
         symbol = image.symbols.find(EXIT_SYMBOL)
-        return machine.peek(symbol.address) & 0xFF if symbol is not None else EXIT_OK
+        return int(machine.peek(symbol.address)) & 0xFF if symbol is not None else EXIT_OK
     return INTERRUPTED_STATUS if stop.reason == "interrupted" else LIMIT_STATUS
 
 
@@ -256,6 +256,6 @@ def _print_end(facts: dict[str, Any]) -> None:
         print(f"emu run: {name}: {value}", file=sys.stderr)
     print(
         f"{facts['reason']} at {_where(facts)} after {facts['cycles']:,} cycles,"
-        f" {facts['seconds']:.6f} s simulated, {facts['speed'] or 0:.2f} x real time",
+        f" {facts['seconds']:.6f} s simulated, {facts['speed'] or 0:.3g} x real time",
         file=sys.stderr,
     )

@@ -1,0 +1,80 @@
+"""The Python interface in one call: an image loaded into a machine, and variables watched by name.
+
+>>> import emu
+>>> machine = emu.load("tests/emu/cli/hello.hex")
+>>> said = bytearray()
+>>> machine.uart[1].on_byte = lambda byte, cycle: said.append(byte)
+>>> stop = machine.run(cycles=14_745_600)       # one second of an e-puck
+>>> stop.reason, bytes(said)
+('halt', b'hi!\\n')
+>>> machine.w[0], hex(machine.pc), machine.peek("U1BRG")
+(5, '0x11e', 7)
+
+A snapshot is a copy of everything, also across engines:
+
+>>> again = emu.load("tests/emu/cli/hello.hex", engine="plain")
+>>> again.run(until=0x104).reason               # or a function that says when
+'until'
+>>> state = again.snapshot()
+>>> _ = again.run()
+>>> again.restore(state)
+>>> again.run().cycle == stop.cycle
+True
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from emu.loader import load_image
+from emu.machine import Machine, Stop
+
+
+def load(path: str | os.PathLike[str], *, engine: str = "auto", ipl_slip: int = 0) -> Machine:
+    """A machine with the firmware file at `path`, ELF or Intel HEX, ready to run from reset.
+
+    Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine.
+    """
+    image = load_image(path)
+    machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip)
+    machine.load(image)
+    return machine
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A watched value has changed: by the instruction that ended before `cycle`; `pc` is the next one."""
+
+    cycle: int
+    pc: int
+    old: int
+    new: int
+
+
+def watch(machine: Machine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
+    """Run `machine` and yield every change of a variable, register or data address (`size` 1 or 2 bytes).
+
+    Looks after every instruction, so it runs at the speed of single steps. Ends with the run, after `cycles` Tcy at
+    the latest. Raises KeyError for an unknown name.
+    """
+    address = machine.address_of(place)
+    value = machine.peek(address, size)
+    changes: list[Change] = []
+
+    def changed() -> bool:
+        nonlocal value
+        now = machine.peek(address, size)
+        if now != value:
+            changes.append(Change(machine.cycle, machine.pc, value, now))
+            value = now
+        return bool(changes)
+
+    end = None if cycles is None else machine.cycle + cycles
+    while True:
+        stop: Stop = machine.run(cycles=None if end is None else end - machine.cycle, until=changed)
+        yield from changes
+        if stop.reason != "until":
+            return
+        changes.clear()
