@@ -255,7 +255,9 @@ bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
             m->queued.next = NULL;
             m->queued.event = e;
             m->queued.size = size;
-            memcpy(PAYLOAD(m), data, size);
+            if (size != 0) {
+                memcpy(PAYLOAD(m), data, size);
+            }
             enqueue(m);
         } else {
             event_lost(id);

@@ -93,27 +93,42 @@ static void *split_small(uint16 size)
     return NULL;
 }
 
-/* Moves brk down over free blocks that touch it, so that small memory can become large again. Takes each list apart
- * and pushes it back, which returns every block that ends at brk; repeats while that helps. */
+/* Takes the block that ends at brk out of the list of its size, if it is there. ISRs never give, so the list may be
+ * taken apart while they find it empty. */
+static block *unlink_last(uint16 size)
+{
+    hal_lock_state lock = hal_lock_devices();
+    block *first = small[CLASS(size)];
+    small[CLASS(size)] = NULL;
+    hal_unlock(lock);
+    block **link = &first;
+    while (*link != NULL && (uint8 *)*link + size != brk) {
+        link = &(*link)->next;
+    }
+    block *last = *link;
+    if (last != NULL) {
+        *link = last->next;
+    }
+    small[CLASS(size)] = first;
+    return last;
+}
+
+/* Slow path when memory is short: moves brk down over every free block that touches it, so that memory once used for
+ * one size serves another. At most f * f / 2 steps for f free small blocks; slice locked. */
 static void shrink_small(void)
 {
-    uint8 *before;
-    do {
-        before = brk;
-        for (uint16 size = HEAP_STEP; size <= HEAP_CLASSES * HEAP_STEP; size += HEAP_STEP) {
+    uint16 size = HEAP_STEP;
+    while (size <= HEAP_CLASSES * HEAP_STEP) {
+        block *last = unlink_last(size);
+        if (last != NULL) {
             hal_lock_state lock = hal_lock_devices();
-            block *b = small[CLASS(size)];
-            small[CLASS(size)] = NULL;
+            push_small(last, size); /* to brk, unless an ISR has moved it meanwhile */
             hal_unlock(lock);
-            while (b != NULL) {
-                block *next = b->next;
-                lock = hal_lock_devices();
-                push_small(b, size);
-                hal_unlock(lock);
-                b = next;
-            }
+            size = HEAP_STEP;
+        } else {
+            size = (uint16)(size + HEAP_STEP);
         }
-    } while (brk < before);
+    }
 }
 
 static bool lower_top(uint16 size)
@@ -186,7 +201,14 @@ void *heap_take(uint16 size)
     size = round_up(size);
     if (size <= HEAP_CLASSES * HEAP_STEP) {
         void *taken = pop_small(size);
-        return taken != NULL ? taken : split_small(size);
+        if (taken == NULL) {
+            taken = split_small(size);
+        }
+        if (taken == NULL && !hal_in_isr()) {
+            shrink_small();
+            taken = pop_small(size);
+        }
+        return taken;
     }
     if (hal_in_isr()) {
         return NULL;

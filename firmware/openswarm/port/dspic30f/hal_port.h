@@ -14,6 +14,14 @@
 typedef uint8_t hal_lock_state; /* low byte of SR */
 typedef uint16_t hal_limit;
 
+#define CPU_TEXT_(x) #x
+#define CPU_TEXT(x) CPU_TEXT_(x)
+#ifdef OS_W0 /* this toolchain spells working registers in clobber lists in its own way (dspic_compiler.h) */
+#define CPU_W0 OS_W0
+#else
+#define CPU_W0 "w0"
+#endif
+
 #define CPU_SRL (*(volatile uint8_t *)&SR)
 enum { CPU_IPL_SLICE = 0x20, CPU_IPL_DEVICE = 0x80, CPU_IPL = 0xE0 };
 
@@ -28,7 +36,7 @@ static inline hal_lock_state hal_lock_slice(void)
 {
     hal_lock_state before = CPU_SRL;
     /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. */
-    __asm__ volatile("mov [w15+%0], w0" ::"i"(HAL_CALL_DEPTH) : OS_W0);
+    __asm__ volatile("mov [w15+" CPU_TEXT(HAL_CALL_DEPTH) "], w0" ::: CPU_W0);
     if (!(before & CPU_IPL_DEVICE)) {
         cpu_raise_ipl(CPU_IPL_SLICE);
     }

@@ -1,0 +1,64 @@
+/* A host test: one function, run in a process of its own as PID 0 of a fresh kernel under virtual time.
+ *     ./kernel_tests            list        ./kernel_tests NAME   run one; exit status 0 = passed */
+#ifndef TEST_H
+#define TEST_H
+
+#include "board.h"
+#include "host.h"
+#include "io.h"
+#include "kernel.h"
+#include "openswarm.h"
+#include "openswarm_io.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct test {
+    const char *name, *says;
+    void (*run)(void);
+    struct test *next;
+} test;
+
+void test_add(test *t);
+
+/* says: the statement the test checks and where it is made. */
+#define TEST(identifier, statement)                                                  \
+    static void identifier(void);                                                    \
+    static test test_##identifier = {#identifier, statement, identifier, NULL};      \
+    static void __attribute__((constructor)) add_##identifier(void)                  \
+    {                                                                                \
+        test_add(&test_##identifier);                                                \
+    }                                                                                \
+    static void identifier(void)
+
+#define CHECK(condition)                                                             \
+    do {                                                                             \
+        if (!(condition)) {                                                          \
+            dprintf(2, "%s:%d: %s\n", __FILE__, __LINE__, #condition);               \
+            _exit(1);                                                                \
+        }                                                                            \
+    } while (0)
+
+#define CHECK_EQ(got, wanted)                                                        \
+    do {                                                                             \
+        long got_ = (long)(got), wanted_ = (long)(wanted);                           \
+        if (got_ != wanted_) {                                                       \
+            dprintf(2, "%s:%d: %s is %ld, not %ld\n", __FILE__, __LINE__, #got, got_, wanted_); \
+            _exit(1);                                                                \
+        }                                                                            \
+    } while (0)
+
+enum { E1 = SYS_FIRST_USER_EVENT, E2, E3, E4, E_NEVER };
+
+void boot(void);                 /* virtual time, Sys_Init_Kernel, Sys_Start_Kernel */
+uint16 heap_now(void);           /* bytes in use */
+bool lists_are_well_formed(void); /* ring, blocked list, states */
+
+/* What happened, in order: a short text both threads and handlers append to. */
+extern char trace[];
+void note(char c);
+
+#include <unistd.h>
+
+#endif
