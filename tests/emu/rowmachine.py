@@ -141,6 +141,7 @@ class RowMachine:
         return (v & -v).bit_length() - 1 if v else 16
 
     def let(self, v: Any) -> Any:
+        assert -(1 << 62) < v < 1 << 62, "values fit native registers"
         return v
 
     def w(self, n: int) -> int:

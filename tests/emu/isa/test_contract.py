@@ -6,6 +6,7 @@ import random
 from typing import Any
 
 import pytest
+from rowmachine import REGISTERS, RowMachine
 from samples import random_insn
 
 from emu.dspic30f.isa.builder import Context
@@ -97,6 +98,51 @@ class Watcher:
         """Not ordered."""
 
     table_write = set_reg = set_acc = trap_math = nothing
+
+
+RUNS = 120
+EDGES = (0, 1, 2, 0x7FFF, 0x8000, 0x8001, 0xFFFE, 0xFFFF, 0x1000, 0x1800, 0x27FE)
+
+
+class Anything(RowMachine):
+    """A machine in a random state, where traps may be asked for."""
+
+    def __init__(self, insn: Insn, generator: random.Random) -> None:
+        super().__init__({})
+        self.generator = generator
+        for address in range(0, 0x54, 2):
+            self.put(address, generator.choice((generator.getrandbits(16), generator.choice(EDGES))))
+        self.put(REGISTERS["TBLPAG"], generator.getrandbits(8))  # 8 bits are implemented
+        self.pc = 2 * generator.randrange(0, 0xC000)
+        self.shadow = {name: generator.getrandbits(16) for name in ("W0S", "W1S", "W2S", "W3S", "SRS")}
+
+    def prog(self, address: int) -> int:
+        assert 0 <= address < 1 << 24
+        assert address % 2 == 0
+        return self.generator.getrandbits(24)
+
+    def set_reg(self, name: str, v: int) -> None:
+        assert 0 <= v <= 0xFFFF
+        super().set_reg(name, v)
+
+    def trap_math(self, c: Any) -> None:
+        assert c in (0, 1)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.id}-{row.mnemonic}")
+def test_a_row_stays_within_its_values_in_any_state(row: Row) -> None:
+    """Addresses and pointers are 16 bits, accumulators 40, flags one, whatever the registers and modes hold."""
+    generator = random.Random(1000 + row.id)
+    for _ in range(RUNS):
+        insn = random_insn(row, generator)
+        m = Anything(insn, generator)
+        flow = insn.row.does(m, insn.x)
+        for name in ("target", "end"):
+            address = getattr(flow, name, 0)
+            assert 0 <= address < 1 << 23
+            assert address % 2 == 0
+        assert 0 <= getattr(flow, "count", 0) <= 0x3FFF
+        assert getattr(flow, "cond", 0) in (0, 1)
 
 
 def run(insn: Insn, context: Context) -> Watcher:
