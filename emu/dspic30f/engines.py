@@ -46,4 +46,9 @@ def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:
         raise ValueError(f"there is no engine {name!r}; expected one of {', '.join(NAMES)}")
     if name == "plain":
         return PlainEngine(core)
-    return SpecialisedEngine(core, pc_hooks)
+    interpreter = SpecialisedEngine(core, pc_hooks)
+    if name == "interp":
+        return interpreter
+    from emu.dspic30f.jit.engine import JitEngine  # only who runs native code pays for the translator
+
+    return JitEngine(core, pc_hooks, interpreter)

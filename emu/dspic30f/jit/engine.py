@@ -69,18 +69,18 @@ class Counts:
 
 
 class JitEngine:
-    """`Engine` that runs native code for addresses reached `threshold` times; `wait`: not before it is compiled."""
+    """`Engine` on native code, with the interpreter `cold` for what has none yet."""
 
     name = "jit"
 
-    def __init__(
-        self, core: Core, pc_hooks: Mapping[int, Any], cold: Cold, *, threshold: int = 4, wait: bool = False
-    ) -> None:
+    def __init__(self, core: Core, pc_hooks: Mapping[int, Any], cold: Cold) -> None:
         self._core: Final = core
         self._hooks: Final = pc_hooks
         self._cold: Final = cold
-        self._wait: Final = wait
-        self._threshold: Final = threshold
+        self.threshold = 4
+        """Times an address without code is reached before code is made for it."""
+        self.wait = False
+        """Let code be compiled before it is run (tests, benchmarks)."""
         self._state: Final = core.state
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2
@@ -106,6 +106,9 @@ class JitEngine:
             return
         self._select()
         if self._dispatch is None:
+            if not self.counts.regions:
+                self._miss(limit)
+                return
             self._prepare()
         self._env[LIMIT] = limit
         why = self._dispatch(self._core.record.address, self._env_address)
@@ -134,9 +137,9 @@ class JitEngine:
             self._install(tag, address)
         heat = code.heat.get(pc, 0) + 1
         code.heat[pc] = heat
-        if heat >= self._threshold and pc not in code.regions and pc >> 1 < self._words and pc not in self._hooks:
+        if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words and pc not in self._hooks:
             self._request(code, pc)
-            if self._wait:
+            if self.wait:
                 for tag, address in self._compiler.wait():
                     self._install(tag, address)
             if code.steps[pc >> 1]:

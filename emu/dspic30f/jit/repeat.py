@@ -89,7 +89,7 @@ class Repeats:
         e.end(f"br i1 {t.fits(total).text}, label %{go}, label %{t.exit(step.pc, DEADLINE)}, !prof !0")
         e.start(go)
         t.advance(stall + 1, step.facts.writes)
-        if count == DIVIDE_COUNT and target.insn.row.mnemonic.startswith("DIV"):
+        if isinstance(count, int) and count == DIVIDE_COUNT and target.insn.row.mnemonic.startswith("DIV"):
             self._divide(target)
         else:
             self._loop(target, count, cycles, again)
