@@ -7,8 +7,11 @@ from typing import Final
 from emu.bus import Bus
 from emu.chips.chip import Chip
 from emu.peripherals.adc import Adc
+from emu.peripherals.can import Can
 from emu.peripherals.capture import Capture
 from emu.peripherals.compare import Compare
+from emu.peripherals.dci import Dci
+from emu.peripherals.i2c import I2c
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import Kit, Peripheral, Wires
 from emu.peripherals.lvd import LowVoltageDetect
@@ -55,6 +58,9 @@ class Peripherals:
         self.compare: Final = {
             site.number: Compare(site, kit, self.interrupts, self.timer, self.ports) for site in chip.compares
         }
+        self.i2c: Final = I2c(chip.i2c, kit, self.interrupts, self.ports)
+        self.dci: Final = Dci(chip.dci, kit, self.interrupts, self.ports)
+        self.can: Final = {site.number: Can(site, kit, self.interrupts, self.ports) for site in chip.cans}
         for uart in self.uart.values():
             uart.connect_capture(self.capture[uart.site.autobaud_capture])
         self.pmd: Final = ModuleDisable(kit, self._modules())
@@ -73,14 +79,18 @@ class Peripherals:
             *self.spi.values(),
             *self.capture.values(),
             *self.compare.values(),
+            self.i2c,
+            self.dci,
+            *self.can.values(),
             self.pmd,
         )
 
     def _modules(self) -> dict[str, Peripheral]:
         """Peripherals by the name their PMD bit carries."""
-        modules: dict[str, Peripheral] = {"ADC": self.adc}
+        modules: dict[str, Peripheral] = {"ADC": self.adc, "DCI": self.dci, "I2C": self.i2c}
         modules |= {f"T{number}": timer for number, timer in self.timer.items()}
         modules |= {f"SPI{number}": spi for number, spi in self.spi.items()}
+        modules |= {f"C{number}": can for number, can in self.can.items()}
         modules |= {f"IC{number}": capture for number, capture in self.capture.items()}
         modules |= {f"OC{number}": compare for number, compare in self.compare.items()}
         modules |= {f"U{number}": uart for number, uart in self.uart.items()}

@@ -48,6 +48,11 @@ class Port(Peripheral):
         self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
         self._drive(self.now + 1)
 
+    def release(self, mask: int) -> None:
+        """As `disown`, by an event of the current cycle."""
+        self._owned.value &= ~mask
+        self._drive(self.now)
+
     def own_now(self, mask: int, drive: bool, level: int) -> None:
         """As `own`, by an event of the current cycle: the pins change in this cycle."""
         self._owned.value |= mask
