@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.chips.chip import Vector
-from emu.dspic30f.state import IPL3
+from emu.dspic30f.state import IPL3, STACK_POINTER
 from emu.image import Image
 
 if TYPE_CHECKING:
@@ -51,9 +51,7 @@ def fault_of(machine: Machine, image: Image, stop: Stop) -> Fault | None:
 
 def _unhandled(machine: Machine, vectors: list[Vector], stop: Stop) -> Fault | None:
     """The exception that led to the shared default handler, told by flags; None if the code was merely called."""
-    stacked = machine.w[15] - RETURN_BYTES
-    low, high = machine.peek(stacked), machine.peek(stacked + 2)
-    back = (high & 0x7F) << 16 | low & 0xFFFE
+    back = _return_address(machine) or stop.pc
     if machine.peek("CORCON") & IPL3:
         intcon1 = machine.peek("INTCON1")
         fields = machine.chip.sfrs["INTCON1"].fields
@@ -61,13 +59,22 @@ def _unhandled(machine: Machine, vectors: list[Vector], stop: Stop) -> Fault | N
             flag, words = TRAP_FLAGS.get(vector.name, ("", ""))
             if flag and intcon1 >> fields[flag][0] & 1:
                 # Only a division stacks its own address; the others stack what follows (isa.md §14.4).
-                culprit = back if flag == "MATHERR" else back - 2
+                culprit = back if flag == "MATHERR" or back == stop.pc else back - 2
                 return Fault(f"{words} without a handler", culprit, stop.cycle)
         return Fault("trap without a handler", back, stop.cycle)
     for vector in vectors:
         if vector.irq in machine.chip.interrupts and _is_pending(machine, vector.irq):
             return Fault(f"{vector.name} without a handler", back, stop.cycle)
     return None
+
+
+def _return_address(machine: Machine) -> int:
+    """What the exception pushed last, 0 if the stack pointer was not in RAM."""
+    ram = machine.chip.data["ram"]
+    place = machine.w[STACK_POINTER] - RETURN_BYTES
+    if place not in ram or place + RETURN_BYTES > ram.end:
+        return 0
+    return (machine.peek(place + 2) & 0x7F) << 16 | machine.peek(place) & 0xFFFE
 
 
 def _is_pending(machine: Machine, irq: int | None) -> bool:

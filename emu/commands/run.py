@@ -163,16 +163,13 @@ def _ports(options: argparse.Namespace, stack: ExitStack, captured: dict[int, by
         raise CommandError("only one UART can have standard output")
     ports = {}
     for number, place in places.items():
-        if options.json and place == "-":
-            captured[number] = bytearray()
-            place = "none"
         try:
             port = open_port(place, number, with_input=not options.replay)
         except ValueError as error:
             raise CommandError(str(error)) from None
         stack.callback(port.close)
-        if number in captured:
-            port.capture = captured[number]
+        if options.json and place == "-":
+            port.capture = captured[number] = bytearray()
         ports[number] = port
     return ports
 
@@ -188,7 +185,7 @@ def _limit(options: argparse.Namespace, machine: Machine) -> int:
     if options.cycles is not None:
         return int(options.cycles)
     if options.seconds is not None:
-        return max(1, int(round(options.seconds * Fraction(machine.peripherals.fcy))))
+        return max(1, int(options.seconds * Fraction(machine.peripherals.fcy)))
     return FOREVER
 
 

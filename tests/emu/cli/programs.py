@@ -21,7 +21,7 @@ def assembled(source: str, start: int = START) -> tuple[list[int], dict[str, int
     """Words and labels of `source`: one statement per line, `label:`, `.pword N`, and names of registers in braces."""
     lines = [line.split(";")[0].strip() for line in source.splitlines()]
     labels: dict[str, int] = {}
-    for final in (False, True):
+    for _pass in ("addresses", "words"):
         out: list[int] = []
         for line in filter(None, lines):
             pc = start + 2 * len(out)
@@ -31,7 +31,6 @@ def assembled(source: str, start: int = START) -> tuple[list[int], dict[str, int
                 out.append(int(line.split()[1], 0))
             else:
                 out += parse(_filled(line, labels, pc)).encode(pc)
-    assert final
     return out, labels
 
 
@@ -42,7 +41,7 @@ def _filled(line: str, labels: dict[str, int], pc: int) -> str:
 
 
 def executable(source: str, vectors: dict[str, str] | None = None) -> bytes:
-    """An ELF file that starts with `source`; `vectors` maps vector names to labels, the others go to a debugger word."""
+    """An ELF file that starts with `source`; `vectors` maps vector names to labels; the rest stop."""
     from emu.chips.dspic30f6014a import VECTORS
 
     code, labels = assembled(source)
