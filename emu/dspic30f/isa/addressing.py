@@ -61,7 +61,7 @@ def indirect(
     value = m.ptr(n, side)
     if mode == INDIRECT:
         return value, None
-    if mode == INDEXED:
+    if mode >= INDEXED:  # UNVERIFIED: code 7 acts as 6 (isa.md §3.1)
         assert index is not None
         return advance(m, n, value, signed16(m, m.ptr(index, side)), side), None
     c = m.context

@@ -15,9 +15,10 @@ from .table import BY_BYTE
 
 CACHE_WORDS = 1 << 17  # more than twice the flash of the chip
 
-# Rules whose breach is noticed when the instruction runs: a file register at an odd address in word mode (address
-# error, isa.md §3.3; UNVERIFIED), SFTAC by more than 16 (math error, §8.5). All others: illegal opcode (§4.1).
-RUNS_AND_TRAPS = frozenset(("B=0: f even", "k>=-16", "k<=16"))
+# Rules that the CPU does not enforce: a word-mode file register at an odd address makes an address error when it runs
+# (isa.md §3.3), SFTAC by more than 16 a math error (§8.5), mode 7 acts as 6 (§3.1), f of CLR WREG is ignored (§5.1).
+# A breach of any other is an illegal opcode (§4.1). UNVERIFIED but for SFTAC: isa.md §22 items 6, 7, 11, 12.
+RUNS_ANYWAY = frozenset(("B=0: f even", "k>=-16", "k<=16", "g<=6", "h<=6", "z=0"))
 
 
 class EncodeError(ValueError):
@@ -71,11 +72,11 @@ def decode_loosely(word1: int, word2: int = 0) -> Insn | None:
 
 @lru_cache(CACHE_WORDS)
 def decode_for_execution(word1: int, word2: int = 0) -> Insn | None:
-    """As ``decode``, plus instructions that run and then trap: RUNS_AND_TRAPS."""
+    """As ``decode``, plus instructions that run although no assembler writes them: RUNS_ANYWAY."""
     insn = decode(word1, word2)
     if insn is None:
         loose = decode_loosely(word1, word2)
-        if loose is not None and all(clause.text in RUNS_AND_TRAPS for clause in loose.row.broken(loose.x)):
+        if loose is not None and all(clause.text in RUNS_ANYWAY for clause in loose.row.broken(loose.x)):
             return loose
     return insn
 

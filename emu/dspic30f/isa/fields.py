@@ -1,8 +1,9 @@
 """Bit fields: how a 24-bit pattern is written, and what each letter in it stands for.
 
 A pattern is 24 characters, spaces ignored: ``0``/``1`` must match, ``-`` is ignored by the CPU, a letter is a field.
-Letters follow isa.md §4.2 with two differences, both for one meaning per letter: ``o`` is the signed offset of
-``[Wn+Slit10]``, and the f-bit forms show the 13-bit byte address ``f`` and the bit 0..7 ``b`` that the hardware uses.
+Letters follow isa.md §4.2 with three differences, for one meaning per letter: ``o`` is the signed offset of
+``[Wn+Slit10]``, ``z`` is to be 0, and the f-bit forms show the 13-bit byte address ``f`` and the bit 0..7 ``b`` that
+the hardware uses.
 A field's *value* is what the instruction means by it: signed, and scaled to a byte address or register number.
 """
 
@@ -39,13 +40,14 @@ FIELD_RULES: tuple[tuple[str, int | None, str, str], ...] = (
     ("b", 4, "B", "B=1: b<=7"),
     ("m", 3, "", "m!=3; m!=7"),
     ("a", None, "", "a<=2"),
+    ("z", None, "", "z=0"),
 )
 
 
 class Operands:
     """The decoded fields of one instruction, by letter; reading a letter the row lacks is an AttributeError."""
 
-    __slots__ = tuple("ABabdfghijkmnopqrstvwxy")
+    __slots__ = tuple("ABabdfghijkmnopqrstvwxyz")
     A: int  # 0 ACCA, 1 ACCB
     B: int  # 0 word, 1 byte
     a: int  # accumulator write-back: 0 W13, 1 [W13]+=2, 2 none
@@ -69,6 +71,7 @@ class Operands:
     w: int  # Wb register
     x: int  # X prefetch destination, W4 + x
     y: int  # Y prefetch destination, W4 + y
+    z: int  # assembled as 0, ignored by the CPU
 
     def __init__(self, **fields: int) -> None:
         for letter, value in fields.items():

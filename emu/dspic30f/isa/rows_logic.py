@@ -39,10 +39,10 @@ ROWS = (
     Row(69,  "COM{.B} f, WREG",       "1110 1110 1B0f ffff ffff ffff", "N Z", f_to_wreg(com)),
     Row(70,  "COM{.B} Ws, Wd",        "1110 1010 1Bqq qddd dppp ssss", "N Z", source_to_destination(com)),
     Row(92,  "CLR{.B} f",             "1110 1111 0B1f ffff ffff ffff", "",    f_constant(0)),
-    Row(93,  "CLR{.B} WREG",          "1110 1111 0B00 0000 0000 0000", "",    wreg_constant(0)),
+    Row(93,  "CLR{.B} WREG",          "1110 1111 0B0z zzzz zzzz zzzz", "",    wreg_constant(0)),
     Row(94,  "CLR{.B} Wd",            "1110 1011 0Bqq qddd d000 0000", "",    destination_constant(0)),
     Row(95,  "SETM{.B} f",            "1110 1111 1B1f ffff ffff ffff", "",    f_constant(-1)),
-    Row(96,  "SETM{.B} WREG",         "1110 1111 1B00 0000 0000 0000", "",    wreg_constant(-1)),
+    Row(96,  "SETM{.B} WREG",         "1110 1111 1B0z zzzz zzzz zzzz", "",    wreg_constant(-1)),
     Row(97,  "SETM{.B} Wd",           "1110 1011 1Bqq qddd d000 0000", "",    destination_constant(-1)),
 )
 # fmt: on

@@ -215,9 +215,9 @@ def test_operands_are_split_outside_brackets_and_character_literals() -> None:
     assert text.split_operands("") == []
 
 
-def test_words_that_trap_when_run_are_executable_but_not_legal() -> None:
-    """isa.md §3.3, §8.5; other broken rules are illegal opcodes (§4.1)."""
-    for word in (0xB42843, 0xC80060):  # add.w 0x843; sftac A, #-32
+def test_rules_the_cpu_does_not_enforce_leave_words_executable_but_not_legal() -> None:
+    """isa.md §3.1, §3.3, §5.1, §8.5; other broken rules are illegal opcodes (§4.1)."""
+    for word in (0xB42843, 0xC80060, 0x780070, 0xEF0001):  # add.w 0x843; sftac A, #-32; mov mode 7; clr WREG with f
         assert codec.decode(word) is None
         assert codec.decode_for_execution(word) is not None
     for word in (0xB055D1, 0xDA4000, 0xD80781):  # a byte literal above 255; no row; divisor w1
