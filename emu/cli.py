@@ -1,17 +1,18 @@
 """`python -m emu COMMAND`: finds the command, turns mistakes of the caller into one line and an exit status.
 
 What enters: arguments. What leaves: an exit status. A command is one module of `emu.commands`, named in COMMANDS and
-imported only when it is asked for, with `parser() -> ArgumentParser` and `run(options) -> int`.
+imported only when it is asked for, with `parser() -> Parser` and `run(options) -> int`.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Final, NoReturn
+from typing import Final
+
+from emu.command import BAD_INPUT_STATUS, EXIT_BAD_INPUT, EXIT_OK, CommandError, Parser
 
 COMMANDS: Final = {
     "run": "run a firmware image and show what its UART says",
@@ -19,40 +20,12 @@ COMMANDS: Final = {
     "info": "print sections, memory use, vectors and configuration words",
 }
 
-EXIT_OK: Final = 0
-EXIT_FAULT: Final = 1
-EXIT_BAD_INPUT: Final = 2
-"""Exit statuses of design §10."""
-
 _USAGE: Final = """usage: emu COMMAND [options]
 
 {commands}
 
 example: emu run firmware.elf --seconds 5
 `emu COMMAND --help` explains a command."""
-
-
-class CommandError(Exception):
-    """A mistake of the caller, told in one line."""
-
-
-class Parser(argparse.ArgumentParser):
-    """argparse that keeps descriptions as written and ends with status 126 when `--exit-code` is wanted."""
-
-    def __init__(self, command: str, description: str, example: str) -> None:
-        super().__init__(
-            prog=f"emu {command}",
-            description=description,
-            epilog=f"example: {example}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-            allow_abbrev=False,
-        )
-        self.arguments: Sequence[str] = ()
-
-    def error(self, message: str) -> NoReturn:
-        """Print what is wrong in one line and leave."""
-        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
-        sys.exit(126 if "--exit-code" in self.arguments else EXIT_BAD_INPUT)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -73,7 +46,7 @@ def _call(name: str, rest: list[str]) -> int:
     """Parse and run; refusals become one line on stderr."""
     from emu.image import LoadError
 
-    bad_input = 126 if "--exit-code" in rest else EXIT_BAD_INPUT
+    bad_input = BAD_INPUT_STATUS if "--exit-code" in rest else EXIT_BAD_INPUT
     command = import_module(f"emu.commands.{name}")
     parser: Parser = command.parser()
     parser.arguments = rest

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from emu.cli import EXIT_OK, CommandError, Parser
+from emu.command import EXIT_OK, CommandError, Parser
 from emu.disassembly import Item, items
 from emu.image import Image
 from emu.loader import load_image

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from emu.cli import EXIT_OK, Parser
+from emu.command import EXIT_OK, Parser
 from emu.image import Image
 from emu.loader import load_image
 

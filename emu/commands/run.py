@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.cli import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser
 from emu.console import SPECIFICATIONS, Port, open_port
 from emu.faults import Fault, fault_of
 from emu.image import Image

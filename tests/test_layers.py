@@ -1,0 +1,42 @@
+"""Imports point one way: the contracts in pyproject.toml hold, and would be broken by what they forbid."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LINTER = Path(sys.executable).with_name("lint-imports")
+
+pytestmark = pytest.mark.skipif(not LINTER.exists(), reason="import-linter is not installed")
+
+
+def lint(folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(LINTER), "--no-cache"], cwd=folder, capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+def test_imports_point_one_way():
+    """Design §2."""
+    done = lint(ROOT)
+    assert done.returncode == 0, done.stdout
+
+
+def test_every_package_is_under_a_contract():
+    """Design §2: `emu`, `toolchain`, `arena`."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")} & {"emu", "toolchain", "arena"}
+    assert packages <= set(settings["root_packages"])
+
+
+def test_the_instruction_table_is_a_leaf():
+    """Design §2: `emu.dspic30f.isa` imports nothing of ours but itself."""
+    for path in (ROOT / "emu" / "dspic30f" / "isa").glob("*.py"):
+        for line in path.read_text().splitlines():
+            if line.lstrip().startswith(("from emu", "import emu", "from ..")):
+                assert "emu.dspic30f.isa" in line, f"{path.name}: {line}"
