@@ -49,7 +49,12 @@ KINDS: Mapping[str, Kind] = {
     "{,AWB}": WriteBack(),
 }
 # Branch conditions and their synonyms, isa.md §7.2
-CONDITIONS = frozenset(re.findall(r"\w+", "OV C Z N LE LT LEU NOV NC NZ NN GT GE GTU OA OB SA SB GEU LTU EQ NEQ"))
+# fmt: off
+CONDITIONS = frozenset((
+    "OV", "C", "Z", "N", "LE", "LT", "LEU", "NOV", "NC", "NZ", "NN", "GT", "GE", "GTU", "OA", "OB", "SA", "SB",
+    "GEU", "LTU", "EQ", "NEQ",
+))
+# fmt: on
 
 
 @lru_cache(None)

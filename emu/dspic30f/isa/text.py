@@ -135,22 +135,22 @@ def parse(statement: str, expr: Expr = Number.read) -> Parsed:
     ``expr`` parses the expressions inside operands and may raise its own errors; what it returns needs a ``value``, an
     int or None. Raises StatementError for unknown mnemonics and operands that fit no form.
     """
-    mnemonic, _, rest = statement.strip().partition(" ")
-    mnemonic, tab, more = mnemonic.partition("\t")
+    statement = statement.strip()
+    mnemonic, *rest = statement.split(None, 1) or [""]
     choices = FORMS.get(mnemonic.lower())
     if choices is None:
         raise StatementError(f"unknown instruction {mnemonic!r}")
-    tokens = split_operands(more + " " + rest if tab else rest)
+    tokens = split_operands(rest[0] if rest else "")
     for form, byte in choices:
         site = Site(form.row, 0, byte)
         parts = _match(form, site, tokens)
         if parts is not None:
             try:
-                return _parsed(form, site, parts, expr, statement.strip())
+                return _parsed(form, site, parts, expr, statement)
             except OperandError as error:
-                raise StatementError(f"{statement.strip()}: {error}") from None
+                raise StatementError(f"{statement}: {error}") from None
     accepted = " | ".join(form.syntax for form, _ in choices)
-    raise StatementError(f"{statement.strip()}: operands fit none of {accepted}")
+    raise StatementError(f"{statement}: operands fit none of {accepted}")
 
 
 def is_mnemonic(name: str) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from rowmachine import CORCON, REGISTERS, SR, RowMachine
 
-from emu.dspic30f.isa import text
+from emu.dspic30f.isa import codec, text
 from emu.dspic30f.isa.flow import ClearWatchdog, Disi, Reset, Sleep
 from emu.dspic30f.isa.table import BY_ID
 
@@ -76,6 +76,18 @@ def test_a_register_in_two_roles_follows_the_order_of_the_reference(
     m = after(statement, w, mem)
     assert {n: m.w(n) for n in w_after} == w_after
     assert {address: m.get(address) for address in mem_after} == mem_after
+
+
+def test_mode_7_of_a_move_adds_the_index_register_as_mode_6_does() -> None:
+    """isa.md §3.1, §22 item 6."""
+    insn = codec.decode_for_execution(0x790170)  # mov [w0+w2] in mode 7, w2
+    assert insn is not None
+    m = RowMachine({})
+    m.set_w(0, 0x1000)
+    m.set_w(2, 0x10)
+    m.put(0x1010, 77)
+    insn.row.does(m, insn.x)
+    assert m.w(2) == 77
 
 
 @pytest.mark.parametrize(

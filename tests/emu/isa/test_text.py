@@ -41,6 +41,7 @@ from emu.dspic30f.isa import codec, text
         ("mov.b #-1, w0", "mov.b #0xff, w0"),
         ("add.b #-128, w0", "add.b #0x80, w0"),
         ("mov\tw1,[w2+0]", "mov.w w1, [w2+0]"),
+        ("  mov \t w1 , w2 ", "mov.w w1, w2"),
         ("mov.d w2, w4", "mov.d w2, w4"),
         ("se.w w1, w2", "se w1, w2"),
         ("daw w3", "daw.b w3"),
@@ -81,6 +82,9 @@ def test_look_alikes_keep_their_own_encodings(written: str, word: int) -> None:
     ("statement", "complaint"),
     [
         ("frob w1", "unknown instruction 'frob'"),
+        ("", "unknown instruction ''"),
+        ("nop w1", "operands fit none of NOP"),
+        ("add", "operands fit none of"),
         ("add w1", "operands fit none of"),
         ("add w1, #32, w2", "#32 is not in 0..31"),
         ("add #1024, w2", "#1024 is not in 0..1023"),
