@@ -1,0 +1,37 @@
+"""Every register has a model or is on the list of plain registers with a reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from emu.machine import Machine
+from emu.peripherals.plain import PLAIN, report
+
+LIST = Path(__file__).parents[3] / "docs" / "plain-registers.md"
+
+
+def test_every_register_is_modelled_or_listed_as_plain():
+    """A register is modelled when the CPU or a device has claimed it on the bus."""
+    machine = Machine(engine="plain")
+    unclaimed = {
+        sfr.name
+        for sfr in machine.chip.sfrs.values()
+        if sfr.size == 2 and not machine.bus.modelled[sfr.address >> 1] and not sfr.name.startswith("WREG")
+    }
+    assert unclaimed <= set(PLAIN)
+
+
+def test_plain_registers_are_reported_once_and_store_their_bits():
+    """`Bus`: an access to a register without a model behaves as a plain masked register."""
+    machine = Machine(engine="plain")
+    seen = []
+    machine.bus.report = lambda address, is_write: seen.append((machine.bus.name[address >> 1], is_write))
+    machine.write("BSRAM", 0xFFFF)
+    assert machine.read("BSRAM") == 0x0007
+    assert seen == [("BSRAM", True)]
+
+
+def test_printed_list_is_up_to_date():
+    """docs/plain-registers.md is what the code says."""
+    machine = Machine(engine="plain")
+    assert LIST.read_text() == report(machine.chip, machine.bus)
