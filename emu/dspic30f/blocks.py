@@ -215,7 +215,7 @@ def write_repeat(source: Source, insn: Insn, pc: int) -> int:
     source.emit("while True:")
     source.nested(1)
     source.emit(f"if c + {cycles} > bound:")
-    source.emit("    return 2")
+    source.emit(f"    return {DONE}")
     source.begin(pc, 0, cycles - 1)
     flow: Flow = insn.row.does(source, insn.x)
     assert flow is None

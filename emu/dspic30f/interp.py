@@ -23,6 +23,8 @@ from emu.events import Events
 from emu.program import ProgramMemory
 
 ACC_SIGN: Final = 1 << 39
+OVERFLOW_FLAGS: Final = frozenset(("OA", "OB", "SA", "SB"))
+"""Flags that OAB and SAB follow."""
 
 
 @lru_cache(maxsize=4096)
@@ -202,8 +204,10 @@ class Interpreter:
         for name, value in flags.items():
             bit = 1 << FLAGS[name]
             sr = sr | bit if value else sr & ~bit
-        sr = sr | OAB if sr & (OA | OB) else sr & ~OAB
-        self._state.sr = sr | SAB if sr & (SA | SB) else sr & ~SAB
+        if not OVERFLOW_FLAGS.isdisjoint(flags):
+            sr = sr | OAB if sr & (OA | OB) else sr & ~OAB
+            sr = sr | SAB if sr & (SA | SB) else sr & ~SAB
+        self._state.sr = sr
 
     def reg(self, name: str) -> Value:
         return self._u16[self._at[name]]

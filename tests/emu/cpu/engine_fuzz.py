@@ -1,0 +1,347 @@
+"""Random (instruction, context) pairs and random programs, run on the plain engine and on another.
+
+No difference is allowed. Contexts cover registers, SR, CORCON modes, modulo and bit-reversed addressing, stack limit,
+REPEAT and DO state, the stall mask, and memory. Programs mix all rows with loops, calls, skips, REPEAT, DO and timer
+interrupts, and are compared at random cycles. Everything follows from the seed.
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+
+from emu.dspic30f.facts import facts_of
+from emu.dspic30f.isa.codec import EncodeError, decode, encode
+from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Repeat, Reset, Return, Skip, Sleep
+from emu.dspic30f.isa.row import Insn, Row
+from emu.dspic30f.isa.table import ROWS
+from emu.dspic30f.specialised import SpecialisedEngine
+from emu.machine import Machine, Stop
+
+PC = 0x4000
+RAM_START, RAM_END = 0x0800, 0x2800
+INTERESTING = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFE, 0xFFFF)
+T1_VECTOR, T2_VECTOR = 0x1A, 0x20
+TRAP_VECTORS = range(0x04, 0x14, 2)
+HANDLER, TRAP_HANDLER, SUBROUTINE = 0x8000, 0x8100, 0x8200
+
+
+@dataclass(frozen=True)
+class Difference(Exception):
+    """Two engines disagree; the text is enough to reproduce it."""
+
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def random_insn(rng: random.Random, row: Row) -> Insn:
+    """A legal instruction of a row."""
+    while True:
+        fields = {}
+        for letter, field in row.fields.items():
+            low, high = field.limits
+            fields[letter] = rng.randrange(low, high + 1, field.scale)
+            if letter == "f" and rng.random() < 0.7:
+                fields[letter] = RAM_START + rng.randrange(0, 0x1000) // field.scale * field.scale
+        try:
+            insn = decode(*encode(row, fields))
+        except EncodeError:
+            continue
+        if insn is not None and insn.row is row:
+            return insn
+
+
+def machines(engine: str) -> tuple[Machine, Machine]:
+    """A plain machine and one to compare with it."""
+    pair = Machine(engine="plain"), Machine(engine=engine)
+    for machine in pair:
+        machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
+        machine.reset("POR")
+        if isinstance(machine.runner, SpecialisedEngine):
+            machine.runner.warm = 1
+    return pair
+
+
+def difference(plain: Machine, other: Machine) -> str:
+    """The first places where two records differ, empty if they are equal."""
+    used = plain.record.used
+    a, b = plain.record.bytes[:used], other.record.bytes[:used]
+    if a == b:
+        return ""
+    places = []
+    for start in range(0, used, 4096):
+        end = min(start + 4096, used)
+        if a[start:end] != b[start:end]:
+            places += [i for i in range(start, end) if a[i] != b[i]]
+    named = [f"{plain.record.field_at(i)}: {a[i]:02x} != {b[i]:02x}" for i in places[:8]]
+    return f"{len(places)} bytes, " + "; ".join(named)
+
+
+class Contexts:
+    """Random processor states, written straight into a record."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self._rng = rng
+        self._memory = rng.randbytes(4 * (RAM_END - RAM_START))
+
+    def modes(self, machine: Machine) -> None:
+        """CORCON, MODCON, XBREV, stack limit, traps: what translations depend on."""
+        rng = self._rng
+        machine.poke(
+            "CORCON", rng.choice((0x0020, 0x0000, rng.randrange(0x10000) & 0x10F3, rng.randrange(0x10000) & 0x10F7))
+        )
+        modulo = rng.random() < 0.4
+        machine.poke("MODCON", rng.randrange(0x10000) & 0xCFFF if modulo else 0)
+        start = RAM_START + rng.randrange(0x800) * 2
+        for name in ("XMODSRT", "YMODSRT"):
+            machine.poke(name, start)
+        for name in ("XMODEND", "YMODEND"):
+            machine.poke(name, start + rng.choice((15, 31, 63, 127)))
+        machine.poke("XBREV", rng.choice((0, 0x8008, 0x8010, 0x0008)))
+        machine.poke("INTCON1", rng.choice((0, 0, 0, 0x0700)))
+        machine.state.limit_armed = rng.random() < 0.5
+        machine.poke("SPLIM", rng.choice((0x27F0, 0x1800, RAM_START + rng.randrange(0x1FFE) & ~1)))
+        machine.state.initialised = 0xFFFF if rng.random() < 0.8 else rng.randrange(0x10000) | 0x8000
+
+    def data(self, machine: Machine) -> None:
+        """Registers, flags, memory."""
+        rng = self._rng
+        offset = rng.randrange(3 * (RAM_END - RAM_START))
+        machine.record.bytes[RAM_START:RAM_END] = self._memory[offset : offset + RAM_END - RAM_START]
+        for number in range(16):
+            machine.record.u16[number] = self.word()
+        stack = RAM_START + rng.randrange(0x1FF0) & ~1 if rng.random() < 0.9 else self.word() & ~1
+        machine.record.u16[15] = stack
+        machine.poke("SR", rng.randrange(0x10000) & 0xFDEF)
+        for accumulator in ("ACCA", "ACCB"):
+            value = rng.choice((rng.randrange(1 << 40), rng.randrange(-(1 << 32), 1 << 32) & (1 << 40) - 1))
+            for part, shift in (("L", 0), ("H", 16), ("U", 32)):
+                machine.poke(accumulator + part, value >> shift & (0xFF if part == "U" else 0xFFFF))
+        for name in ("TBLPAG", "PSVPAG"):
+            machine.poke(name, rng.choice((0, 0, 1, 0x7F)))
+        machine.state.stall = rng.choice((0, 0, rng.randrange(0x10000)))
+        machine.state.pc = PC
+
+    def word(self) -> int:
+        """A register value: an address in RAM, an edge, or anything."""
+        rng = self._rng
+        kind = rng.random()
+        if kind < 0.6:
+            return RAM_START + rng.randrange(RAM_END - RAM_START) & (~1 if rng.random() < 0.9 else ~0)
+        if kind < 0.8:
+            return rng.choice(INTERESTING)
+        return rng.randrange(0x10000)
+
+
+def check_pairs(seed: int, instructions: int, contexts: int, engine: str = "interp") -> int:
+    """Run `instructions` random instructions, each in `contexts` contexts of the same modes. Returns the pairs run.
+
+    Rows take turns, so every row is met equally often. Raises Difference.
+    """
+    rng = random.Random(seed)
+    plain, other = machines(engine)
+    used = plain.record.used
+    base = plain.record.snapshot()
+    source = Contexts(rng)
+    pairs = 0
+    for number in range(instructions):
+        row = ROWS[number % len(ROWS)]
+        insn = random_insn(rng, row)
+        repeated = row.repeat_ok and rng.random() < 0.3
+        for machine in (plain, other):
+            machine.record.bytes[:used] = base
+            for index, word in enumerate((insn.word1, insn.word2)[: insn.words]):
+                machine.program.put(PC + 2 * index, word)
+        source.modes(plain)
+        kept = plain.record.snapshot()
+        for _round in range(contexts):
+            plain.record.bytes[:used] = kept
+            source.data(plain)
+            if repeated:
+                plain.poke("RCOUNT", rng.choice((1, 2, 5, 17)))
+                plain.state.sr |= 0x10
+                plain.state.repeat = rng.choice((1, 2))
+            state = plain.record.snapshot()
+            other.record.bytes[:used] = state
+            stops = [machine.run_until(1 + (12 if repeated else 0)) for machine in (plain, other)]
+            pairs += 1
+            wrong = difference(plain, other)
+            if wrong or stops[0] != stops[1]:
+                raise Difference(
+                    f"seed {seed}, instruction {number} ({insn.word1:06x} {insn.word2:06x} {row.syntax}: {insn.x}),"
+                    f" repeated {repeated}: {wrong} {stops}"
+                )
+    return pairs
+
+
+FLOWS = (Branch, Call, Do, Goto, Repeat, Reset, Return, Skip, Sleep)
+PLAIN_ROWS = tuple(
+    row for row in ROWS if not row.word2 and facts_of(random_insn(random.Random(row.id), row)).flow not in FLOWS
+)
+BY_TEXT = {row.syntax: row for row in ROWS}
+CONDITIONS = tuple(row for row in ROWS if row.syntax.startswith("BRA ") and "," in row.syntax)
+SKIPS = tuple(row for row in ROWS if row.mnemonic in ("BTSS", "BTSC", "CPSEQ", "CPSNE", "CPSGT", "CPSLT"))
+
+
+class Program:
+    """Random code of roughly `length` instructions that ends in a loop back to its start."""
+
+    def __init__(self, rng: random.Random, length: int) -> None:
+        self._rng = rng
+        self.words: list[int] = []
+        while len(self.words) < length:
+            rng.choices(
+                (
+                    self._straight,
+                    self._branch,
+                    self._skip,
+                    self._repeat,
+                    self._do,
+                    self._call,
+                    self._disi,
+                    self._status,
+                ),
+                (60, 8, 8, 8, 4, 4, 2, 2),
+            )[0]()
+        self._add("BRA Expr", n=-len(self.words) - 1)
+
+    def _add(self, syntax: str, **fields: int) -> None:
+        self.words += encode(BY_TEXT[syntax], fields)
+
+    def _one(self, rows: tuple[Row, ...] = PLAIN_ROWS) -> None:
+        rng = self._rng
+        while True:
+            insn = random_insn(rng, rng.choice(rows))
+            x = insn.x
+            if 15 in (getattr(x, "d", 0), getattr(x, "s", 0)) and rng.random() < 0.95:
+                continue  # keep the stack where it is, mostly
+            if getattr(x, "f", RAM_START) < RAM_START and rng.random() < 0.9:
+                continue
+            self.words += (insn.word1, insn.word2)[: insn.words]
+            return
+
+    def _straight(self) -> None:
+        for _ in range(self._rng.randrange(1, 6)):
+            self._one()
+
+    def _branch(self) -> None:
+        """Forward, over a few instructions."""
+        inner = self._nested(4)
+        self.words += encode(self._rng.choice(CONDITIONS), {"n": len(inner)})
+        self.words += inner
+
+    def _skip(self) -> None:
+        self._one(SKIPS)
+        if self._rng.random() < 0.3:
+            self._add("GOTO Expr", n=PC)
+        else:
+            self._one()
+
+    def _repeat(self) -> None:
+        self._add("REPEAT #lit14", k=self._rng.choice((0, 1, 2, 7, 17)))
+        self._one(tuple(row for row in PLAIN_ROWS if row.repeat_ok))
+
+    def _do(self) -> None:
+        inner = self._nested(6)
+        while len(inner) < 3:
+            inner += encode(BY_TEXT["NOP"], {})
+        inner += encode(BY_TEXT["NOP"], {}) * 2
+        self._add("DO #lit14, Expr", k=self._rng.randrange(4), n=len(inner) - 1)
+        self.words += inner
+
+    def _nested(self, most: int) -> list[int]:
+        kept, self.words = self.words, []
+        for _ in range(self._rng.randrange(1, most)):
+            self._one()
+        inner, self.words = self.words, kept
+        return inner
+
+    def _call(self) -> None:
+        self._add("CALL Expr", n=SUBROUTINE)
+
+    def _disi(self) -> None:
+        self._add("DISI #lit14", k=self._rng.randrange(12))
+
+    def _status(self) -> None:
+        """A critical section the way kernels write it: IPL by SR, or an enable bit."""
+        if self._rng.random() < 0.5:
+            self._add("MOV{.B} WREG, f", f=0x42, B=1)
+        else:
+            self._add(self._rng.choice(("BSET{.B} f, #bit4", "BCLR{.B} f, #bit4")), f=0x8C, b=3, B=1)
+
+
+def _subroutine() -> list[int]:
+    return [
+        *encode(BY_TEXT["LNK #lit14"], {"k": 4}),
+        *encode(BY_TEXT["INC{.B} f"], {"f": 0x1000, "B": 0}),
+        *encode(BY_TEXT["ULNK"], {}),
+        *encode(BY_TEXT["RETURN"], {}),
+    ]
+
+
+def _handler(bits: tuple[tuple[int, int], ...]) -> list[int]:
+    """Clear flags (byte address, bit) and return."""
+    words = [*encode(BY_TEXT["PUSH.S"], {})]
+    for address, bit in bits:
+        words += encode(BY_TEXT["BCLR{.B} f, #bit4"], {"f": address, "b": bit})
+    return [*words, *encode(BY_TEXT["POP.S"], {}), *encode(BY_TEXT["RETFIE"], {})]
+
+
+def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) -> list[int]:
+    """Load one random program and context into both machines; returns the cycles to compare at."""
+    program = Program(rng, rng.randrange(10, 80))
+    for machine in (plain, other):
+        machine.restore(start)
+        machine.program.put_flash(0, [*encode(BY_TEXT["GOTO Expr"], {"n": PC})])
+        machine.program.put_flash(PC, program.words)
+        machine.program.put_flash(SUBROUTINE, _subroutine())
+        machine.program.put_flash(HANDLER, _handler(((0x84, 3), (0x84, 6))))
+        machine.program.put_flash(TRAP_HANDLER, _handler(((0x80, 1), (0x80, 2), (0x80, 3), (0x80, 4))))
+        for vector in (T1_VECTOR, T2_VECTOR):
+            machine.program.put(vector, HANDLER)
+        for vector in TRAP_VECTORS:
+            machine.program.put(vector, TRAP_HANDLER)
+        machine.stop_on_fault = False
+    contexts = Contexts(rng)
+    contexts.modes(plain)
+    contexts.data(plain)
+    plain.state.stall = 0
+    plain.record.u16[15] = 0x0900
+    if rng.random() < 0.7:
+        plain.state.initialised = 0xFFFF
+        plain.poke("SPLIM", 0x2700)
+    other.record.bytes[: plain.record.used] = plain.record.bytes[: plain.record.used]
+    for machine in (plain, other):
+        machine.program.announce_all()
+    periods = [rng.randrange(20, 300) for _ in range(2)]
+    for machine in (plain, other):
+        for (timer, bit), period in zip((("1", 3), ("2", 6)), periods, strict=True):
+            machine.write(f"PR{timer}", period)
+            machine.write(f"T{timer}CON", 0x8000)
+            machine.write("IEC0", machine.peek("IEC0") | 1 << bit)
+    stops, cycle = [], 0
+    for _ in range(rng.randrange(3, 10)):
+        cycle += rng.choice((1, 2, 3, rng.randrange(1, 40), rng.randrange(1, 400)))
+        stops.append(cycle)
+    return stops
+
+
+def check_programs(seed: int, count: int, engine: str = "interp") -> int:
+    """Run `count` random programs; returns the cycles simulated on each engine. Raises Difference."""
+    rng = random.Random(seed)
+    plain, other = machines(engine)
+    start = plain.snapshot()
+    total = 0
+    for number in range(count):
+        stops = prepare(rng, start, plain, other)
+        for cycle in stops:
+            ends: list[Stop | None] = [machine.run_until(cycle) for machine in (plain, other)]
+            wrong = difference(plain, other)
+            if wrong or ends[0] != ends[1]:
+                raise Difference(f"seed {seed}, program {number}, cycle {cycle}: {wrong} {ends}")
+            if ends[0] is not None and ends[0].reason == "halt":
+                break
+        total += plain.cycle
+    return total
