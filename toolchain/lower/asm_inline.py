@@ -144,7 +144,10 @@ class AsmBuilder:
         assert c.tied is not None
         at = self.reference[c.tied]
         r = self.operands[at]
-        assert isinstance(r, int)
+        if not isinstance(r, int):  # "+m": the object holds the value when the statement starts
+            self.s.emit("mov", self.s.reg(v), r, byte=v.type.bits == 8)
+            self.reference.append(at)
+            return
         self._load(v, r, self.roles[at] == "D")
         self.roles[at] = "b" if self.roles[at] == "d" else "B"
         self.reference.append(at)

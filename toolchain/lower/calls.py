@@ -101,9 +101,27 @@ def select_call(s: Selector, i: Instr) -> None:
     mi.also_defs = CALLER_SAVED
     if pushed:
         s.emit("spadd", Imm(-pushed))
-    if id(i) in s.needed:
-        for k, r in enumerate(s.value_regs(i)):
-            s.copy(k, r)
+    _take_results(s, i)
+
+
+def _take_results(s: Selector, i: Instr) -> None:
+    """Copy the result registers; the parts of an aggregate follow one another from W0."""
+    results = i.extra.get("results")
+    if not results:
+        if id(i) in s.needed:
+            for k, r in enumerate(s.value_regs(i)):
+                s.copy(k, r)
+        return
+    assert isinstance(results, list)
+    at = 0
+    users = {u.extra["index"]: u for u in s.users.get(id(i), ()) if u.op == "callresult"}
+    for k, t in enumerate(results):
+        part = i if k == 0 else users.get(k)
+        words = max(1, t.bits // 16)
+        if part is not None and id(part) in s.needed:
+            for n, r in enumerate(s.value_regs(part)):
+                s.copy(at + n, r)
+        at += words
 
 
 def _private_copy(s: Selector, a: Value, t: Type) -> int:
@@ -210,23 +228,39 @@ def _load_register_arguments(
 
 def select_ret(s: Selector, i: Instr) -> None:
     """Result in W0.. (abi-elf.md §2.3)."""
+    at = 0
     used: list[int] = []
-    if i.args and not isinstance(i.args[0], Undef):
-        v = i.args[0]
+    leaves: list[tuple[Value, int, int]] = []
+    for v in i.args:
         words = max(1, v.type.bits // 16)
-        if s.is_leaf(v):
-            for k in range(words):
-                s.load_leaf(v, k, k)
-        else:
-            for k, r in enumerate(s.regs(v)):
-                s.copy(r, k)
-        used = list(range(words))
+        if not isinstance(v, Undef):
+            used += range(at, at + words)
+            if s.is_leaf(v):
+                leaves += [(v, k, at + k) for k in range(words)]
+            else:
+                for k, r in enumerate(s.regs(v)):
+                    s.copy(r, at + k)
+        at += words
+    for leaf, word, dest in leaves:
+        s.load_leaf(leaf, word, dest)
     s.emit("ret").also_uses = tuple(used)
+
+
+def select_entryword(s: Selector, i: Instr) -> None:
+    """Return address (first word) or frame address of this function."""
+    slot = s.new_slot(2, -RETURN_ADDRESS_BYTES)
+    s.emit("lea" if i.extra["address"] else "mov", Slot(slot), s.value_regs(i)[0])
+
+
+def select_callresult(s: Selector, i: Instr) -> None:
+    """Nothing: the call copies all parts of its result."""
 
 
 SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "call": select_call,
     "ret": select_ret,
+    "callresult": select_callresult,
+    "entryword": select_entryword,
     "builtin": builtins.select_builtin,
     "asm": asm_inline.select_asm,
     "asmresult": asm_inline.select_asmresult,

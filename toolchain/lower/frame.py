@@ -130,7 +130,21 @@ class FrameBuilder:
             r = mi.args[1]
             mi.args = [Mem("idx", base, r), r]
             return [MI("mov", Imm(offset & 0xFFFF), r, line=mi.line), mi]
-        raise UnsupportedError("frame too large for a store", self.m.name)
+        return self._far_store(mi, base, offset)
+
+    def _far_store(self, mi: MI, base: int, offset: int) -> list[MI]:
+        """Borrow a register for the offset: PUSH, MOV #offset, MOV [base+Wt], POP. No flags change."""
+        source = mi.args[0]
+        t = next(r for r in range(8) if r != source)
+        if base == SP:
+            offset -= 2
+        mi.args = [source, Mem("idx", base, t)]
+        return [
+            MI("mov", t, Mem("++", SP), line=mi.line),
+            MI("mov", Imm(offset & 0xFFFF), t, line=mi.line),
+            mi,
+            MI("mov", Mem("-", SP), t, line=mi.line),
+        ]
 
     # -- entry and exit -----------------------------------------------------------------------------------------------
 

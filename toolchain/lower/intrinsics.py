@@ -258,8 +258,12 @@ def _stackrestore(lz: Legalizer, i: Instr, name: str) -> Result:
     return None
 
 
-def _frameaddress(lz: Legalizer, i: Instr, name: str) -> Result:
-    raise UnsupportedError(f"llvm.{name}: frame and return addresses are not available")
+def _entry_word(lz: Legalizer, i: Instr, name: str) -> Result:
+    """__builtin_return_address / frame_address of this function; outer levels are unknown: 0, as GCC allows."""
+    level = i.args[0]
+    if not isinstance(level, ConstInt) or level.value:
+        return const(I16, 0)
+    return lz.b.emit("entryword", I16, [], address=name.startswith("frame"))
 
 
 def _fmuladd(lz: Legalizer, i: Instr, name: str) -> Result:
@@ -379,8 +383,8 @@ FAMILIES: list[tuple[str, Callable[[Legalizer, Instr, str], Result]]] = [
     ("va_copy", _va_copy),
     ("stacksave", _stacksave),
     ("stackrestore", _stackrestore),
-    ("frameaddress", _frameaddress),
-    ("returnaddress", _frameaddress),
+    ("frameaddress", _entry_word),
+    ("returnaddress", _entry_word),
     ("fmuladd", _fmuladd),
     ("fabs", _fabs),
     ("copysign", _copysign),

@@ -36,6 +36,7 @@ from ..ir.model import (
     store_size,
     struct_offsets,
 )
+from ..target import ARGUMENT_REGISTERS
 from . import intrinsics, softfloat
 from .build import Builder, const, legal_type
 from .cfg import reverse_postorder
@@ -66,19 +67,22 @@ class Legalizer:
     def run(self) -> None:
         """Rewrite the function in place."""
         f = self.function
-        for a in f.args:
-            if a.type.kind not in ("int", "float", "ptr"):
-                raise UnsupportedError(f"parameter of type {a.type}", f.name)
-            new = Arg(legal_type(a.type), a.name, a.index, a.attrs)
-            self.values[id(a)] = new
-        old_args, f.args = f.args, [self.values[id(a)] for a in f.args]  # type: ignore[misc]
+        old_args, f.args = f.args, []
+        for a in old_args:
+            leaves = [Arg(legal_type(t), a.name, a.index, a.attrs) for t, _ in _leaves(a.type)]
+            f.args += leaves
+            if a.type.kind in ("struct", "array"):
+                self.parts[id(a)] = list(leaves)
+            else:
+                self.values[id(a)] = leaves[0]
         entry = True
         for block in reverse_postorder(f):  # definitions before uses, whatever the textual order
             self.b = Builder(self.begin(block.name))
             if entry:
                 entry = False
                 for a in old_args:
-                    self.values[id(a)] = self.argument(a)
+                    if id(a) in self.values:
+                        self.values[id(a)] = self.argument(a)
             for i in block.instrs:
                 self.b.line = i.line
                 try:
@@ -310,15 +314,19 @@ class Legalizer:
         count = self.use(i.args[0]) if i.args else const(I16, 1)
         align = i.extra.get("align", 1)
         assert isinstance(align, int)
-        if align > 2:
-            raise UnsupportedError(f"local variable aligned to {align} bytes (the stack is aligned to 2)")
+        slack = align if align > 2 else 0
         if isinstance(count, ConstInt) and (self.blocks[0] is self.b.block):
-            return self.b.emit("slot", I16, [], size=size * count.value)
+            return self.aligned(self.b.emit("slot", I16, [], size=size * count.value + slack), slack)
         if count.type.bits > 16:
             count = self.b.cast("trunc", count, I16)
         elif count.type.bits < 16:
             count = self.b.cast("zext", count, I16)
-        return self.b.emit("dynalloca", I16, [self.b.binary("mul", count, const(I16, size))])
+        total = self.b.add(self.b.binary("mul", count, const(I16, size)), slack)
+        return self.aligned(self.b.emit("dynalloca", I16, [total]), slack)
+
+    def aligned(self, p: Value, align: int) -> Value:
+        """The next multiple of `align` (0: as is); the stack itself is aligned to 2 only."""
+        return self.b.binary("and", self.b.add(p, align - 1), const(I16, -align)) if align else p
 
     def even(self, p: Value, align: int) -> bool:
         """Whether a pointer is known to be even, so that word accesses do not trap (isa.md §3)."""
@@ -495,9 +503,10 @@ class Legalizer:
         self.jump("indirectbr", [self.use(i.args[0])], i.blocks)
 
     def ret(self, i: Instr) -> None:
-        if i.args and i.args[0].type.kind in ("struct", "array"):
+        values = [self.use(a) for a in i.args if a.type.bits] or [p for a in i.args for p in self.fields(a)]
+        if sum(max(1, v.type.bits // 16) for v in values) > ARGUMENT_REGISTERS:
             raise UnsupportedError(f"returning {i.args[0].type} in registers")
-        self.jump("ret", [self.use(a) for a in i.args], [])
+        self.jump("ret", values, [])
 
     def unreachable(self, i: Instr) -> None:
         self.jump("unreachable", [], [])
@@ -516,14 +525,20 @@ class Legalizer:
                 return self.builtin(i, callee.name)
         if isinstance(callee, InlineAsm):
             return self.inline_asm(i, callee)
-        t = legal_type(i.type)
-        if t.kind not in ("int", "void"):
-            raise UnsupportedError(f"call returning {i.type} in registers")
-        for a in i.args[:-1]:
-            if a.type.kind not in ("int", "float", "ptr"):
-                raise UnsupportedError(f"call argument of type {a.type}")
-        new = self.b.emit("call", t, [self.use(a) for a in i.args])
-        new.extra = {k: i.extra[k] for k in ("attrs", "vararg", "tail", "flags")}
+        args: list[Value] = []
+        attrs: list[object] = []
+        given = i.extra["attrs"]
+        assert isinstance(given, list)
+        for a, attr in zip(i.args[:-1], given, strict=True):
+            parts = self.fields(a) if a.type.kind in ("struct", "array") else [self.use(a)]
+            args += parts
+            attrs += [attr] * len(parts)
+        leaves = [legal_type(t) for t, _ in _leaves(i.type)] if i.type.kind in ("struct", "array") else []
+        new = self.b.emit("call", leaves[0] if leaves else legal_type(i.type), [*args, self.use(callee)])
+        new.extra = {"attrs": attrs, "vararg": i.extra["vararg"], "tail": i.extra["tail"]}
+        if leaves:
+            new.extra["results"] = leaves
+            return [new, *(self.b.emit("callresult", t, [new], index=k) for k, t in enumerate(leaves) if k)]
         return self.clean_result(i.type, new)
 
     def clean_result(self, t: Type, new: Value) -> Value | None:
