@@ -111,6 +111,7 @@ def _head(b: Boundary) -> str:
   %held = icmp ne i64 %hold, 0
   br i1 %held, label %python, label %again
 python:
+  store i64 0, ptr %p.deadline
   ret i64 {PYTHON}
 done:
   ret i64 {DONE}
@@ -118,7 +119,9 @@ again:
   %cycle = load i64, ptr %p.cycle
   %last = sub i64 %cycle, 1
   %over = icmp uge i64 %cycle, %limit
-  br i1 %over, label %python, label %due
+  br i1 %over, label %stop, label %due
+stop:
+  ret i64 {PYTHON}
 due:
   %deadline = load i64, ptr %p.deadline
   %early = icmp ugt i64 %deadline, %last
