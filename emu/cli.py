@@ -18,6 +18,7 @@ COMMANDS: Final = {
     "run": "run a firmware image and show what its UART says",
     "disasm": "print a firmware image as assembly with symbols and source lines",
     "info": "print sections, memory use, vectors and configuration words",
+    "footprint": "print what a firmware image costs in ROM and RAM",
 }
 
 _USAGE: Final = """usage: emu COMMAND [options]

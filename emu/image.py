@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from emu.lines import Lines
     from emu.symbols import Symbol, Symbols
 
+BYTES_PER_WORD: Final = 3
+"""Flash bytes of one program word, as data sheets count them."""
+
 ERASED: Final = 0xFFFFFF
 """What a program word that no file defines reads (abi-elf.md §6.8 step 6)."""
 

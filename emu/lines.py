@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from elftools.dwarf.dwarfinfo import DWARFInfo
 
 _NEEDED: Final = (".debug_info", ".debug_abbrev", ".debug_line")
+DW_OP_ADDR: Final = 0x03
+"""DWARF 2 §7.7.1: a fixed address, 4 bytes here."""
 _DOUBLED_SHARE: Final = 0.9
 """Share of zero odd octets from which a section counts as doubled. Not 1: one attribute of assembler units is stored
 with its high byte in the phantom (abi-elf.md §6.7)."""
@@ -49,6 +51,8 @@ class Lines:
 
     def __init__(self, sections: Mapping[str, bytes]) -> None:
         self.broken = 0
+        self.files: Final[dict[int, str]] = {}
+        """Source file of variables by address."""
         self.rows: Final[list[Line]] = []
         if all(sections.get(name) for name in _NEEDED):
             self._read(sections)
@@ -83,6 +87,7 @@ class Lines:
                 return
             try:
                 self.rows.extend(_unit_rows(dwarf, unit))
+                self.files.update(_variables(dwarf, unit))
             except Exception:
                 self.broken += 1
 
@@ -119,6 +124,22 @@ def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[Line]:
             rows.append(Line(before.address, state.address, name, before.line))
         before = None if state.end_sequence else state
     return rows
+
+
+def _variables(dwarf: DWARFInfo, unit: Any) -> dict[int, str]:
+    """Declaring file of the variables of one unit that stand at a fixed address."""
+    program = dwarf.line_program_for_CU(unit)
+    names = _file_names(program.header) if program is not None else []
+    found = {}
+    for die in unit.iter_DIEs():
+        if die.tag != "DW_TAG_variable" or "DW_AT_location" not in die.attributes:
+            continue
+        place = die.attributes["DW_AT_location"].value
+        file = die.attributes.get("DW_AT_decl_file")
+        if isinstance(place, list) and len(place) == 5 and place[0] == DW_OP_ADDR and file is not None:
+            number = file.value
+            found[int.from_bytes(bytes(place[1:]), "little")] = names[number] if number < len(names) else "?"
+    return found
 
 
 def _file_names(header: Any) -> list[str]:

@@ -36,6 +36,11 @@ class Symbol:
         """Whether the name was made by a compiler or assembler."""
         return _COMPILER_LABEL.match(self.name) is not None
 
+    @property
+    def names_a_place(self) -> bool:
+        """Whether what follows the symbol is called by its name: functions, objects, global labels."""
+        return not self.is_compiler_label and (self.kind != "label" or self.is_global)
+
 
 class Symbols:
     """All symbols of an image."""

@@ -7,11 +7,8 @@ import json
 from typing import Any
 
 from emu.command import EXIT_OK, Parser
-from emu.image import Image
+from emu.image import BYTES_PER_WORD, Image
 from emu.loader import load_image
-
-BYTES_PER_WORD = 3
-"""Flash bytes of one 24-bit program word, as data sheets count them."""
 
 
 def parser() -> Parser:
@@ -152,18 +149,20 @@ def _memory_lines(memory: dict[str, Any]) -> list[str]:
 
 
 def _vector_lines(vectors: list[dict[str, Any]]) -> list[str]:
-    """Vectors with a handler of their own; the one most share is counted."""
+    """Vectors with a handler of their own; the one most share is counted. Equal entries of both tables are one line."""
     handlers = [vector["handler"] for vector in vectors]
     usual = max(set(handlers), key=handlers.count)
     shared = [vector for vector in vectors if vector["handler"] == usual]
-    lines = []
+    own: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for vector in vectors:
         if vector["handler"] != usual or len(shared) == 1:
-            where = f"{vector['handler']:#08x}"
-            name = f"  {vector['symbol']}" if vector["symbol"] else ""
-            lines.append(f"{vector['table']:4} {vector['address']:#08x} {vector['name']:18} -> {where}{name}")
+            own.setdefault((vector["name"], vector["handler"]), []).append(vector)
+    lines = []
+    for (name, handler), entries in own.items():
+        tables = ", ".join(f"{entry['table']} {entry['address']:#05x}" for entry in entries)
+        symbol = f"  {entries[0]['symbol']}" if entries[0]["symbol"] else ""
+        lines.append(f"{tables:23} {name:18} -> {handler:#08x}{symbol}")
     if len(shared) > 1:
-        name = f" ({shared[0]['symbol']})" if shared[0]["symbol"] else ""
-        other = "other " if lines else ""
-        lines.append(f"{len(shared)} {other}vectors -> {usual:#08x}{name}")
+        symbol = f" ({shared[0]['symbol']})" if shared[0]["symbol"] else ""
+        lines.append(f"{len(shared)} {'other ' if lines else ''}vectors -> {usual:#08x}{symbol}")
     return lines
