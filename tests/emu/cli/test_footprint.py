@@ -19,7 +19,7 @@ from emu.footprint import UNKNOWN, pieces, totals
 from emu.loader import parse_image
 
 
-@pytest.fixture()
+@pytest.fixture
 def image():
     sample = xc16_like()
     sample.parts += debug_sections()
