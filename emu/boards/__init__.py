@@ -1,1 +1,1 @@
-"""Boards as data: what a robot adds to the chip. `epuck` is the only one so far."""
+"""Boards: what a robot adds to the chip. `epuck` is the only one so far."""

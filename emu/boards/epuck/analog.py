@@ -1,0 +1,126 @@
+"""Infrared ring, accelerometer and microphones on the ADC (epuck.md §5, §6). Levels are in counts of the 12-bit ADC."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from typing import Final
+
+from emu.boards.part import Part
+from emu.peripherals import Peripherals
+
+SENSORS: Final = 8
+_FIRST_CHANNEL: Final = 8
+PULSE_PINS: Final = ("RF7", "RF8", "RG0", "RG1")
+"""Line n lights the emitters of sensors n and n + 4 (epuck.md §2)."""
+TAU_SECONDS: Final = 60e-6
+"""Time constant of the receiver behind its emitter (epuck.md §10)."""
+AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
+
+RESPONSE: Final = (  # distance in mm, reflection in counts: OpenSwarm's table (epuck.md §5)
+    (0.0, 3788.0), (10.0, 3548.0), (20.0, 857.0), (30.0, 474.0), (40.0, 296.0), (50.0, 205.0),
+    (60.0, 153.0), (70.0, 113.0), (80.0, 84.0), (90.0, 65.0), (100.0, 53.0),
+)  # fmt: skip
+
+
+def reflection_at(distance_mm: float, table: tuple[tuple[float, float], ...] = RESPONSE) -> float:
+    """Reflection in counts of a white surface at `distance_mm`, interpolated on a log scale; 0 behind the table."""
+    if distance_mm <= table[0][0]:
+        return table[0][1]
+    for (near, high), (far, low) in pairwise(table):
+        if distance_mm <= far:
+            share = (distance_mm - near) / (far - near)
+            return math.exp(math.log(high) * (1 - share) + math.log(low) * share)
+    return 0.0
+
+
+class Infrared(Part):
+    """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled."""
+
+    def __init__(self, chip: Peripherals) -> None:
+        super().__init__("ir", chip)
+        self.ambient: Final = self.array("ambient", "H", SENSORS)
+        """Raw counts with the emitter off, per sensor. Falls with light."""
+        self.reflection: Final = self.array("reflection", "H", SENSORS)
+        """Counts by which the emitter's own light lowers them when settled, per sensor."""
+        self._lit: Final = self.array("lit", "B", len(PULSE_PINS))
+        self._since: Final = self.array("since", "Q", len(PULSE_PINS))
+        self._from: Final = self.array("from", "H", len(PULSE_PINS))
+        """Settled share at the last switch, in 1/65535."""
+        for sensor in range(SENSORS):
+            self.ambient[sensor] = AMBIENT
+            chip.adc.source[_FIRST_CHANNEL + sensor] = partial(self._level, sensor)
+        for line, pin in enumerate(PULSE_PINS):
+            self.pins.watch(pin, partial(self._switched, line))
+
+    def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
+        """Put a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
+        self.chip.adc.catch_up(self.now)
+        self.reflection[sensor] = round(reflection_at(millimetres) * share)
+
+    def set_ambient(self, sensor: int, counts: int) -> None:
+        """Ambient light at a sensor as raw counts 0..4095 (dark is high)."""
+        self.chip.adc.catch_up(self.now)
+        self.ambient[sensor] = counts
+
+    def is_lit(self, sensor: int) -> bool:
+        """Whether the emitter of a sensor is on: other robots may see it."""
+        return bool(self._lit[sensor % len(PULSE_PINS)])
+
+    def _share(self, line: int, cycle: int) -> float:
+        """How far the receivers of a line have settled to full light, 0..1."""
+        tau = TAU_SECONDS * self.chip.fcy
+        target = 1.0 if self._lit[line] else 0.0
+        start = self._from[line] / 0xFFFF
+        return target + (start - target) * math.exp(-max(cycle - self._since[line], 0) / tau)
+
+    def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
+        self.chip.adc.catch_up(self.now)
+        share = self._share(line, cycle)
+        self._from[line] = round(share * 0xFFFF)
+        self._since[line] = cycle
+        self._lit[line] = bool(levels & changed)
+
+    def _level(self, sensor: int, cycle: int) -> int:
+        lowered = self.reflection[sensor] * self._share(sensor % len(PULSE_PINS), cycle)
+        return min(max(round(self.ambient[sensor] - lowered), 0), 4095) << 4
+
+
+class Accelerometer(Part):
+    """The analog part of hardware up to 1.2 on AN5..AN7: 2048 at 0 g, 800 counts per g (epuck.md §6)."""
+
+    ZERO: Final = 2048
+    PER_G: Final = 800
+    _FIRST: Final = 5
+
+    def __init__(self, chip: Peripherals) -> None:
+        super().__init__("accelerometer", chip)
+        self.set_g(0.0, 0.0, 1.0)
+
+    def set_g(self, x: float, y: float, z: float) -> None:
+        """Acceleration in g: x to the right, y backward, z up (1 at rest). UNVERIFIED signs of x and y."""
+        for axis, value in enumerate((x, y, z)):
+            code = round(self.ZERO + self.PER_G * value)
+            self.chip.adc.set_input(self._FIRST + axis, min(max(code, 0), 4095) << 4)
+
+
+class Microphones(Part):
+    """Three microphones on AN2..AN4: 2048 in silence; sound is a function of the cycle."""
+
+    _FIRST: Final = 2
+
+    def __init__(self, chip: Peripherals) -> None:
+        super().__init__("microphones", chip)
+        for microphone in range(3):
+            chip.adc.set_input(self._FIRST + microphone, 2048 << 4)
+
+    def play(self, microphone: int, sound: Callable[[int], float] | None) -> None:
+        """Let `sound(cycle)` (in counts around 0) reach microphone 0..2 (right, left, back), or None for silence."""
+        self.chip.adc.catch_up(self.now)
+        self.chip.adc.source[self._FIRST + microphone] = None if sound is None else partial(self._level, sound)
+
+    @staticmethod
+    def _level(sound: Callable[[int], float], cycle: int) -> int:
+        return min(max(round(2048 + sound(cycle)), 0), 4095) << 4

@@ -1,0 +1,68 @@
+"""The infrared remote control (epuck.md §6): RC-5 frames on RF6, idle high, low while the carrier is received."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+from emu.boards.part import Part
+from emu.peripherals import Peripherals
+
+PIN: Final = "RF6"
+HALF_BIT_SECONDS: Final = 0.889e-3
+"""Half of a Manchester bit of 1.778 ms (epuck.md §6)."""
+REPEAT_SECONDS: Final = 113.8e-3
+_BITS: Final = 14
+
+KEYS: Final = {"standby": 12, "swap": 34, "sleep": 42, "ok": 53}
+"""Command codes the demonstration programs use (openswarm-original.md §5.6)."""
+
+
+class Remote(Part):
+    """A hand-held sender. Frames wait for each other; those on their way when a snapshot is taken are part of it."""
+
+    def __init__(self, chip: Peripherals) -> None:
+        super().__init__("remote", chip)
+        self._frame: Final = self.cell("frame", "H")
+        self._start: Final = self.cell("start", "Q")
+        self._half: Final = self.cell("half", "B")
+        self._toggle: Final = self.cell("toggle", "B")
+        self._busy_until: Final = self.cell("busy_until", "Q")
+        self._edge: Final = self.slot("edge", self._next_half)
+        self._waiting: Final[deque[tuple[int, int]]] = deque()
+        self.pins.set(PIN, 1)
+
+    def press(self, command: int | str, address: int = 0, cycle: int | None = None, repeat: int = 1) -> None:
+        """Send a command (0..63, or a name of `KEYS`) to a device address (0..31), `repeat` frames of one key press.
+
+        The first frame begins at `cycle` (default: now) or when the last one is over. Raises ValueError, KeyError.
+        """
+        code = KEYS[command] if isinstance(command, str) else command
+        if not 0 <= code < 64 or not 0 <= address < 32:
+            raise ValueError(f"RC-5 has commands 0..63 and addresses 0..31, not {code} and {address}")
+        self._toggle.value ^= 1
+        frame = 3 << 12 | self._toggle.value << 11 | address << 6 | code
+        begin = max(self.now + 1 if cycle is None else cycle, self._busy_until.value)
+        for number in range(repeat):
+            self._waiting.append((begin + number * self.cycles(REPEAT_SECONDS), frame))
+        self._busy_until.value = begin + repeat * self.cycles(REPEAT_SECONDS)
+        if self._half.value == 0:
+            self._take()
+
+    def _take(self) -> None:
+        if self._waiting:
+            self._start.value, self._frame.value = self._waiting.popleft()
+            self.events.set(self._edge, self._start.value)
+
+    def _next_half(self, due: int) -> None:
+        """Level of one half bit: a 1 is high then low, a 0 low then high (carrier pulls the pin low)."""
+        half = self._half.value
+        if half == 2 * _BITS:
+            self.pins.set(PIN, 1, due)
+            self._half.value = 0
+            self._take()
+            return
+        bit = self._frame.value >> _BITS - 1 - half // 2 & 1
+        self.pins.set(PIN, bit ^ half & 1, due)
+        self._half.value = half + 1
+        self.events.set(self._edge, self._start.value + self.cycles(HALF_BIT_SECONDS * (half + 1)))

@@ -1,0 +1,182 @@
+"""LEDs, selector, battery, codec and Bluetooth (epuck.md §2, §6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Final
+
+from emu.boards.part import Part
+from emu.peripherals import Peripherals
+from emu.peripherals.pins import parse_pin
+
+_ONES: Final = (1 << 64) - 1
+
+LED_PINS: Final = {
+    **{f"led{number}": pin for number, pin in enumerate("RA6 RA7 RA9 RA12 RA10 RA13 RA14 RA15".split())},  # noqa: SIM905
+    "front": "RC1",
+    "body": "RC2",
+}
+"""LED0 is in front, the ring goes clockwise seen from above (epuck.md §2)."""
+
+
+class Leds(Part):
+    """Ten LEDs, on while their pin is driven high."""
+
+    def __init__(self, chip: Peripherals) -> None:
+        super().__init__("leds", chip)
+        self.on_change: Callable[[str, bool, int], None] | None = None
+        """on_change(name, lit, cycle)."""
+        self._places: Final = {name: parse_pin(pin) for name, pin in LED_PINS.items()}
+        for name, pin in LED_PINS.items():
+            self.pins.watch(pin, partial(self._changed, name))
+
+    def _changed(self, name: str, cycle: int, _changed: int, _levels: int) -> None:
+        if self.on_change is not None:
+            self.on_change(name, self[name], cycle)
+
+    def __getitem__(self, name: str) -> bool:
+        """Whether an LED ("led0".."led7", "front", "body") is lit. Raises KeyError for another name."""
+        port, mask = self._places[name]
+        return bool(self.pins.drive[port] & self.pins.output[port] & mask)
+
+    @property
+    def lit(self) -> tuple[str, ...]:
+        """Names of the LEDs that are on."""
+        return tuple(name for name in LED_PINS if self[name])
+
+
+class Selector(Part):
+    """The 16-position switch on RG6..RG9 (epuck.md §2)."""
+
+    def __init__(self, chip: Peripherals, position: int = 0) -> None:
+        super().__init__("selector", chip)
+        self.position = position
+
+    @property
+    def position(self) -> int:
+        """0..15. Setting it raises ValueError for another number."""
+        port, _ = parse_pin("RG6")
+        return self.pins.input[port] >> 6 & 0xF
+
+    @position.setter
+    def position(self, position: int) -> None:
+        if not 0 <= position < 16:
+            raise ValueError(f"the selector has positions 0 to 15, not {position}")
+        port, _ = parse_pin("RG6")
+        self.pins.set_port(port, 0xF << 6, position << 6)
+
+
+class Battery(Part):
+    """BATT_LOW on RF1: 1 = ok, 0 = below 3.4 V (epuck.md §2). On hardware 1.3 AN7 measures the voltage."""
+
+    LOW_VOLTS: Final = 3.4
+    _CHANNEL: Final = 7
+    _LOW_CODE: Final = 2070
+    _FULL_VOLTS: Final = 4.2
+    _FULL_CODE: Final = 2560
+
+    def __init__(self, chip: Peripherals, hardware_1_3: bool = False) -> None:
+        super().__init__("battery", chip)
+        self._measured: Final = hardware_1_3
+        self._millivolts: Final = self.cell("millivolts", "H")
+        self.volts = 4.0
+
+    @property
+    def volts(self) -> float:
+        """Battery voltage, 3.0 to 4.2 V in use."""
+        return self._millivolts.value / 1000
+
+    @volts.setter
+    def volts(self, volts: float) -> None:
+        self._millivolts.value = round(volts * 1000)
+        self.pins.set("RF1", volts >= self.LOW_VOLTS)
+        if self._measured:
+            slope = (self._FULL_CODE - self._LOW_CODE) / (self._FULL_VOLTS - self.LOW_VOLTS)
+            code = round(self._LOW_CODE + (volts - self.LOW_VOLTS) * slope)
+            self.chip.adc.set_input(self._CHANNEL, min(max(code, 0), 4095) << 4)
+
+
+class Codec(Part):
+    """The Si3000 behind the DCI: takes words, returns silence; RF0 low holds it in reset (epuck.md §6)."""
+
+    def __init__(self, chip: Peripherals) -> None:
+        super().__init__("codec", chip)
+        self._words: Final = self.cell("words", "Q")
+        self._last: Final = self.cell("last", "H")
+        self.on_word: Callable[[int, int], None] | None = None
+        """on_word(word, cycle): for players and recorders."""
+        chip.dci.on_word = self._take
+        chip.dci.source = lambda _slot, _cycle: 0
+
+    @property
+    def is_on(self) -> bool:
+        """AUDIO_ON."""
+        port, mask = parse_pin("RF0")
+        return bool(self.pins.drive[port] & self.pins.output[port] & mask)
+
+    @property
+    def words(self) -> int:
+        """Words accepted while out of reset."""
+        return self._words.value
+
+    @property
+    def last(self) -> int:
+        """The newest word."""
+        return self._last.value
+
+    def _take(self, word: int, _slot: int, cycle: int) -> None:
+        if self.is_on:
+            self._words.value += 1
+            self._last.value = word
+            if self.on_word is not None:
+                self.on_word(word, cycle)
+
+
+class Bluetooth(Part):
+    """UART1 as a byte pipe to a computer. Bytes can get lost: in given windows of cycles, or at random (seeded)."""
+
+    def __init__(self, chip: Peripherals, loss: float = 0.0, seed: int = 0) -> None:
+        super().__init__("bluetooth", chip)
+        self._uart: Final = chip.uart[1]
+        self._uart.on_byte = self._from_robot
+        self.loss = loss
+        """Probability that a byte is lost, each way, 0..1."""
+        self.dropouts: Final[list[tuple[int, int]]] = []
+        """Half-open windows of cycles in which nothing passes."""
+        self.on_byte: Callable[[int, int], None] | None = None
+        """on_byte(byte, start_cycle): what reaches the computer."""
+        self._random: Final = self.cell("random", "Q", seed * 2 + 1 & _ONES)
+        self._lost: Final = self.cell("lost")
+
+    @property
+    def lost(self) -> int:
+        """Bytes that did not get through, both directions."""
+        return self._lost.value
+
+    def send(self, data: bytes, cycle: int | None = None) -> None:
+        """The computer sends; see `Uart.feed` for `cycle`."""
+        at = self.now if cycle is None else cycle
+        self._uart.feed(self._passing(data, at), cycle)
+
+    def _passing(self, data: Iterable[int], cycle: int) -> bytes:
+        return bytes(byte for byte in data if not self._drops(cycle))
+
+    def _drops(self, cycle: int) -> bool:
+        in_window = any(start <= cycle < end for start, end in self.dropouts)
+        dropped = in_window or (self.loss > 0 and self._draw() < self.loss)
+        self._lost.value += dropped
+        return dropped
+
+    def _draw(self) -> float:
+        """Uniform in 0..1 from a xorshift generator whose state is in the record."""
+        x = self._random.value
+        x ^= x << 13 & _ONES
+        x ^= x >> 7
+        x ^= x << 17 & _ONES
+        self._random.value = x
+        return (x >> 11) / (1 << 53)
+
+    def _from_robot(self, byte: int, start: int) -> None:
+        if not self._drops(start) and self.on_byte is not None:
+            self.on_byte(byte, start)

@@ -1,0 +1,49 @@
+"""Base of the parts on a board: state in the record, event slots, and the chip's pins.
+
+Parts belong to the outside: they neither stop when the chip sleeps nor change when it is reset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.events import Events
+from emu.peripherals import Peripherals
+from emu.peripherals.kit import Cell
+from emu.peripherals.pins import Pins
+from emu.record import Record
+
+
+class Part:
+    """One part of a board."""
+
+    def __init__(self, name: str, chip: Peripherals) -> None:
+        self.name: Final = name
+        self.chip: Final = chip
+        self.record: Final[Record] = chip.kit.bus.record
+        self.events: Final[Events] = chip.kit.bus.events
+        self.pins: Final[Pins] = chip.pins
+
+    @property
+    def now(self) -> int:
+        """Cycle of the access or event being handled, in Tcy."""
+        return self.events.now
+
+    def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> Cell:
+        """Reserve a scalar of state under `<part>.<purpose>`."""
+        return Cell(self.record, f"{self.name}.{purpose}", kind, initial)
+
+    def array(self, purpose: str, kind: str, count: int) -> memoryview[int]:
+        """Reserve `count` elements of state ("B", "H", "I" or "Q") under `<part>.<purpose>`."""
+        field = self.record.reserve(f"{self.name}.{purpose}", kind, count)
+        view = {"B": self.record.u8, "H": self.record.u16, "I": self.record.u32, "Q": self.record.u64}[kind]
+        return view[field.index : field.index + count]
+
+    def slot(self, purpose: str, fire: Callable[[int], None]) -> int:
+        """Claim an event slot."""
+        return self.events.slot(f"{self.name}.{purpose}", fire)
+
+    def cycles(self, seconds: float) -> int:
+        """Tcy in `seconds` at the present clock."""
+        return round(seconds * self.chip.fcy)
