@@ -29,10 +29,11 @@ Fetch = Callable[[int], Insn | None]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A function, and the most cycles it can take."""
+    """A function; the most cycles it can take, and the latest its last instruction can start behind its beginning."""
 
     run: Callable[[int], int]
     cycles: int
+    last_start: int
 
 
 def div_trunc(a: int, b: int) -> int:
@@ -79,9 +80,15 @@ class BlockWriter:
     """Writes one block from `pc`; `loop` is (DOSTART, DOEND) while a DO loop is active."""
 
     def __init__(
-        self, source: Source, fetch: Fetch, hooked: Callable[[int], bool], loop: tuple[int, int] | None
+        self,
+        source: Source,
+        fetch: Fetch,
+        hooked: Callable[[int], bool],
+        loop: tuple[int, int] | None,
+        length: int = LENGTH,
     ) -> None:
         self._source: Final = source
+        self._length: Final = length
         self._fetch: Final = fetch
         self._hooked: Final = hooked
         self._loop: Final = loop
@@ -89,9 +96,10 @@ class BlockWriter:
         self._cycle = 0
         """Start of the next instruction behind `c`."""
         self._longest = 0
+        self._last_start = 0
 
-    def write(self, pc: int) -> int | None:
-        """Write the body. Returns the most cycles it can take, None if not even the first instruction fits."""
+    def write(self, pc: int) -> tuple[int, int] | None:
+        """Write the body. Returns `Block.cycles` and `Block.last_start`, None if not one instruction fits."""
         source = self._source
         first = self._fetch(pc)
         if first is None:
@@ -104,7 +112,7 @@ class BlockWriter:
             source.emit("    c += 1")
         here: int | None = pc
         while here is not None:
-            if here in self._visited or len(self._visited) >= LENGTH or (self._visited and self._hooked(here)):
+            if here in self._visited or len(self._visited) >= self._length or (self._visited and self._hooked(here)):
                 source.leave(here, self._cycle, source.stall, DONE)
                 break
             try:
@@ -116,7 +124,7 @@ class BlockWriter:
                 source.leave(here, self._cycle, source.stall, DONE)
                 break
             here = after
-        return max(self._longest, self._cycle) + 1
+        return max(self._longest, self._cycle) + 1, self._last_start + 1
 
     def _instruction(self, pc: int) -> int | None:
         """One instruction; returns the address to go on with, None if the block has been left."""
@@ -137,6 +145,7 @@ class BlockWriter:
         source.commit()
         source.at_entry = False
         self._visited.add(pc)
+        self._last_start = self._cycle
         after = pc + 2 * insn.words & PC_MASK
         self._cycle = start + insn.row.cycles
         if flow is not None:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from emu.dspic30f.blocks import Block, BlockWriter, ctz16, div_trunc, make_function, rem_trunc, write_repeat
+from emu.dspic30f.blocks import LENGTH, Block, BlockWriter, ctz16, div_trunc, make_function, rem_trunc, write_repeat
 from emu.dspic30f.core import Core
 from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.codec import decode_for_execution
@@ -46,6 +46,8 @@ class SpecialisedEngine:
         self._hooks: Final = pc_hooks
         self.warm = warm
         """Times an address is reached before a function is written for it."""
+        self.length = LENGTH
+        """Longest block in instructions."""
         self._state: Final = core.state
         self._sequencer: Final = core.sequencer
         self._places: Final = places_of(core)
@@ -75,8 +77,7 @@ class SpecialisedEngine:
         deadline_at, hooks = self._core.events.deadline_index, self._hooks
         self._select()
         while True:
-            cycle, pc = u64[cycle_at], u32[pc_at]
-            bound = min(limit, u64[deadline_at])
+            cycle, pc, deadline = u64[cycle_at], u32[pc_at], u64[deadline_at]
             if u16[edt_at]:
                 block = None
             elif u16[repeat_at]:
@@ -85,7 +86,10 @@ class SpecialisedEngine:
                 block = self._modes.blocks.get(pc)
                 if block is None:
                     block = self._block(pc)
-            status = PLAIN if block is None or cycle + block.cycles > bound else block.run(bound)
+            if block is None or cycle + block.cycles > deadline or cycle + block.last_start >= limit:
+                status = PLAIN
+            else:
+                status = block.run(min(limit, deadline))
             if status:
                 if status == PLAIN:
                     self._sequencer.execute()
@@ -144,8 +148,8 @@ class SpecialisedEngine:
         if heat < self.warm:
             return None
         source = self._source()
-        cycles = BlockWriter(source, self._fetch, self._hooks.__contains__, modes.loop).write(pc)
-        block = None if cycles is None else Block(make_function(source, self._names), cycles)
+        times = BlockWriter(source, self._fetch, self._hooks.__contains__, modes.loop, self.length).write(pc)
+        block = None if times is None else Block(make_function(source, self._names), *times)
         modes.blocks[pc] = block
         return block
 
@@ -168,7 +172,7 @@ class SpecialisedEngine:
             cycles = write_repeat(source, insn, pc)
         except Unsupported:
             return None
-        return Block(make_function(source, self._names), cycles)
+        return Block(make_function(source, self._names), cycles, cycles)
 
 
 def places_of(core: Core) -> Places:

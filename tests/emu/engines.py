@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from rowmachine import REGISTERS, RowMachine
 
 from emu.dspic30f.engines import NAMES
+from emu.dspic30f.specialised import SpecialisedEngine
 from emu.machine import Machine
 
 RAM_START, RAM_END = 0x0800, 0x2800
@@ -95,6 +96,8 @@ class OnMachine:
     def __init__(self, name: str) -> None:
         self.name = name
         self.machine = Machine(engine=name)
+        if isinstance(self.machine.runner, SpecialisedEngine):  # a generated function per instruction, at once
+            self.machine.runner.warm = self.machine.runner.length = 1
         for half in range(len(self.machine.program.flash)):
             self.machine.program.flash[half] = 0
         self.machine.program.announce_all()
