@@ -4,7 +4,7 @@ A value is an `int`, a `Value` (symbol ± symbol + offset under an optional oper
 `Pending` tree of such values, for what can only be known once all labels have their place.
 
 Operators and ranks are those of GNU as 2.14, on which pic30-as is based (abi-elf.md §4): `* / % << >>` bind
-tightest, then `| & ^ !` (or-not), then `+ -` and comparisons (true is -1), then `&&`, then `||`.
+tightest, then `| & ^ !` (or-not), then `+ -`, then comparisons (true is -1), then `&&`, then `||`.
 """
 
 from __future__ import annotations
@@ -105,9 +105,10 @@ _TOKEN = re.compile(
     re.VERBOSE,
 )
 _RANK = {
-    **dict.fromkeys(("*", "/", "%", "<<", ">>"), 5),
-    **dict.fromkeys(("|", "&", "^", "!"), 4),
-    **dict.fromkeys(("+", "-", "==", "!=", "<>", "<", ">", "<=", ">="), 3),
+    **dict.fromkeys(("*", "/", "%", "<<", ">>"), 6),
+    **dict.fromkeys(("|", "&", "^", "!"), 5),
+    **dict.fromkeys(("+", "-"), 4),
+    **dict.fromkeys(("==", "!=", "<>", "<", ">", "<=", ">="), 3),
     "&&": 2,
     "||": 1,
 }

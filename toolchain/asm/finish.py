@@ -185,7 +185,9 @@ class _Finisher:
         if symbol.common is not None:
             result.home, (result.size, result.value) = Home.COMMON, symbol.common
         elif symbol.place is None:
-            if symbol.bind in (None, Bind.GLOBAL):
+            if symbol.name.startswith(".L"):
+                self.asm.error(f"{_local_name(symbol.name)} is used but never defined", symbol.first_use)
+            elif symbol.bind in (None, Bind.GLOBAL):
                 result.bind = Bind.GLOBAL
             elif symbol.bind is Bind.LOCAL:
                 self.asm.error(f"local symbol {symbol.name} is used but never defined", symbol.first_use)
@@ -255,6 +257,11 @@ def _absolute_call(section: Section, offset: int, kind: RelocationType, value: i
 
 def _is_anonymous(symbol: AsmSymbol) -> bool:
     return symbol.name.startswith(".LH")
+
+
+def _local_name(name: str) -> str:
+    """How the source spells a local label."""
+    return f"local label {name[3:].partition('.')[0]}:" if name.startswith(".LN") else f"local label {name}"
 
 
 def _check_do(distance: int) -> None:

@@ -12,7 +12,6 @@ from enum import Enum
 from emu.elffacts import OCTETS_PER_UNIT, ExtendedAttribute, SectionFlag
 from toolchain.elf import constants as c
 
-
 NO_ATTRIBUTES = ExtendedAttribute(0)
 
 

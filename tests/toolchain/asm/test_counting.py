@@ -1,0 +1,99 @@
+"""Location counting and data layout in code and data sections (abi-elf.md §4.3, §4.4)."""
+
+import struct
+
+import pytest
+
+from toolchain.errors import ToolError
+
+
+@pytest.mark.parametrize(
+    ("line", "units"),
+    [
+        ("nop", 2), (".pword 1", 2), (".word 1", 2), (".pspace 3", 2), ("call 0x100", 4), (".long 1", 4),
+        (".int 1", 4),
+        (".space 4", 4), ("do #3, .+6", 4), (".pword 1, 2", 4), (".2byte 1", 2), (".4byte 1", 4), (".byte 1, 2", 2),
+        ('.ascii "abcd"', 4), ('.pascii "abcdef"', 4), (".hword 1", 2), (".short 1", 2), (".fill 3, 2, 1", 6),
+    ],
+)  # fmt: skip
+def test_code_sections_advance_in_pc_units(asm, line, units):
+    """abi-elf.md §4.4, table."""
+    assert asm(f"{line}\nend: nop\n").symbols["end"].value == units
+
+
+def test_bytes_in_code_fill_low_then_middle_and_leave_the_upper_byte(asm):
+    """abi-elf.md §4.4: .byte fills low, then middle byte of consecutive words."""
+    assert asm(".byte 0x11,0x22,0x33\n .align 2\n nop\n").words() == [0x2211, 0x33, 0]
+
+
+def test_packed_bytes_fill_all_three(asm):
+    """abi-elf.md §4.4: .pbyte low, middle, upper."""
+    assert asm(".pbyte 1,2,3,4\n .palign 2\n nop\n").words() == [0x030201, 0x000004, 0]
+
+
+def test_a_label_after_an_odd_byte_run_moves_to_the_aligned_instruction(asm):
+    """abi-elf.md §4.4: instructions and labels before them are auto-aligned to 2."""
+    out = asm(".byte 1\nodd: .byte 2\n .byte 3\nf:\ng: nop\n")
+    assert [out.symbols[n].value for n in ("odd", "f", "g")] == [1, 4, 4]
+
+
+def test_fillupper_sets_the_upper_byte_of_data_words(asm):
+    """abi-elf.md §4.3: .fillupper v."""
+    assert asm(".fillupper 0x3F\n .word 0x1234\n .fillupper\n .word 1\n").words() == [0x3F1234, 1]
+
+
+def test_data_sections_count_bytes_and_int_is_four_of_them(asm):
+    """abi-elf.md §4.3: .int is four bytes; §4.4: in data sections 1 unit = 1 byte."""
+    out = asm(
+        '.data\n .byte 1\n .word 0x0302\n .int 0x07060504\n .asciz "a\\n"\n .single 1.0\n .double -2.0\n'
+        " .fixed 0.5, -1.0\n"
+    )
+    expected = bytes(range(1, 8)) + b"a\n\0" + struct.pack("<fd", 1.0, -2.0) + struct.pack("<2h", 0x4000, -0x8000)
+    assert out.bytes(".data") == expected
+
+
+def test_objects_carry_a_phantom_octet_behind_every_data_byte(asm):
+    """abi-elf.md §6.2: RAM data and psv in objects are b0, 0, b1, 0; sizes count octets."""
+    out = asm(".section .const,psv,page\n .byte 1, 2, 3\n")
+    assert out.sections[".const"].data == bytes([1, 0, 2, 0, 3, 0])
+    assert out.sections[".const"].units == 3
+
+
+def test_align_and_org_count_from_the_section_start(asm):
+    """abi-elf.md §4.3, location directives."""
+    out = asm(".data\n .byte 1\n .align 4\nx: .byte 2\n .org 0x10, 0xEE\ny:\n")
+    assert (out.symbols["x"].value, out.symbols["y"].value) == (4, 16)
+    assert out.bytes(".data")[5:] == b"\xee" * 11
+    assert out.sections[".data"].align == 4
+
+
+def test_leb128_is_dwarfs(asm):
+    """DWARF 2 §7.6, examples of figures 22 and 23."""
+    out = asm(".section .debug_x,info\n .uleb128 2, 127, 128, 12857\n .sleb128 2, -2, 127, -127, 128, -128\n")
+    assert out.bytes(".debug_x").hex() == "027f8001b964" + "027eff00817f8001807f"
+
+
+def test_bss_only_counts(asm):
+    """abi-elf.md §6.2: bss has no content, its size is still doubled in the file."""
+    out = asm(".section .nbss,bss,near\nx: .space 10\n .bss\n .space 3\n")
+    assert (out.sections[".nbss"].units, out.sections[".bss"].units, len(out.sections[".nbss"].data)) == (10, 3, 0)
+    with pytest.raises(ToolError, match="only zero"):
+        asm(".bss\n .word 1\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (".byte 256", "outside -128..255"), (".word 65536", "outside"), (".data\n .pword 1", "code section"),
+        (".pbyte 1\nx: nop", "palign"), (".pbyte 1\n .byte 1", "palign"), (".byte 1\n .pbyte 1", ".align 2"),
+        (".space -1", "cannot advance"), (".align 3", "power of two"), (".org 4\n .org 2", "behind"),
+        (".data\n nop", "not a code section"), (".space 0x7fffffff", "grows beyond"), (".fixed 1.0", "1.15"),
+        (".uleb128 -1", "negative"), (".single x", "real number"), ('.ascii abc', "double quotes"),
+        (".data\n .space 200000", "grows beyond"), (".fill 99999999999, 8, 1", "address space"),
+    ],
+)  # fmt: skip
+def test_impossible_layouts_are_refused(asm, text, message):
+    """abi-elf.md §4.4."""
+    with pytest.raises(ToolError) as error:
+        asm(text + "\n")
+    assert message in str(error.value)

@@ -1,0 +1,80 @@
+"""Instructions through the whole assembler: vendor encodings, REPEAT and DO rules, caching."""
+
+import csv
+import re
+
+import pytest
+
+from toolchain.errors import ToolError
+
+
+def test_everything_the_vendor_assembler_takes_gives_the_same_words(asm, vectors):
+    """encodings.csv, rows marked `yes`."""
+    with open(vectors / "encodings.csv", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["assembles"] == "yes"]
+    expected = [int(row[key], 16) for row in rows for key in ("word1", "word2") if row[key]]
+    assert len(rows) > 5000
+    assert asm("\n".join(row["text"] for row in rows) + "\n").words() == expected
+
+
+def test_word_accesses_to_odd_file_addresses_are_refused(asm, vectors):
+    """encodings.csv, rows marked `no` because of an odd address; isa.md §3.3."""
+    with open(vectors / "encodings.csv", newline="") as file:
+        texts = [row["text"] for row in csv.DictReader(file) if row["assembles"] == "no"]
+    odd = [text for text in texts if re.fullmatch(r"\w+\.w 0x[0-9a-f]*[13579bdf](, WREG)?", text)]
+    assert len(odd) > 300
+    for text in odd[::5]:
+        with pytest.raises(ToolError, match="odd"):
+            asm(text + "\n")
+
+
+def test_a_word_bit_above_seven_is_a_bit_of_the_next_byte(asm):
+    """abi-elf.md §4.1: bset 0x1ffe,#15 is the byte form at 0x1FFF bit 7."""
+    assert asm("bset 0x1ffe, #15\n bset.b 0x1fff, #7\n").words() == [0xA8FFFF, 0xA8FFFF]
+
+
+@pytest.mark.parametrize("line", ["mov #-32769, w0",
+                                  "mov #65536, w0", "mov.b #256, w0", "mov.b #-129, w0", "add w0, #32, w1",
+                                  "add #1024, w0", "mov [w0+3], w1", "mov [w0+1024], w1", "mov.b [w0+512], w1",
+                                  "repeat #16384", "lnk #3", "lnk #16384"])  # fmt: skip
+def test_literals_out_of_range_are_errors_never_expanded(asm, line):
+    """abi-elf.md §4.1, literal ranges."""
+    with pytest.raises(ToolError):
+        asm(line + "\n")
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["bra x", "call x", "cpseq w0, w1", "cpsgt w0, w1", "cpslt w0, w1", "cpsne w0, w1", "disi #3", "do #3, x", "goto x",
+     "lnk #4", "mov.d w0, w2", "pwrsav #0", "rcall x", "repeat #3", "reset", "retfie", "retlw #0, w0", "return",
+     "ulnk"],
+)  # fmt: skip
+def test_what_must_not_be_repeated_is_refused(asm, line):
+    """isa.md §16: mnemonics rejected after REPEAT."""
+    with pytest.raises(ToolError, match="cannot be repeated"):
+        asm(f"repeat #4\nx: {line}\n nop\n nop\n")
+
+
+def test_what_may_be_repeated_is_accepted(asm):
+    """isa.md §7.5; data and section changes end the obligation."""
+    assert (
+        len(
+            asm(
+                "repeat #17\n div.sw w0, w2\n repeat #4\n mov [w0++], [w1++]\n repeat #3\n .data\n .text\n return\n"
+            ).words()
+        )
+        == 6
+    )
+
+
+def test_the_same_statement_means_another_thing_after_an_equate_changes(asm):
+    """Parsed statements are cached by text; values of symbols are not."""
+    out = asm("k = 1\n mov #k, w0\n bset w0, #k\nk = 2\n mov #k, w0\n bset w0, #k\n mov #late, w1\nlate = 5\n")
+    assert out.words() == [0x200010, 0xA01000, 0x200020, 0xA02000, 0x200051]
+
+
+def test_a_number_known_late_is_checked_like_one_known_early(asm):
+    """Fields filled at the end keep their ranges."""
+    with pytest.raises(ToolError, match="outside"):
+        asm("add w0, #late, w1\nlate = 32\n")
+    assert asm("call late\nlate = 0x12346\n").words() == [0x022346, 1]

@@ -1,0 +1,159 @@
+"""Reading sources: comments, labels, macros, repeats, conditionals, include files (abi-elf.md §4.1, §4.3)."""
+
+import pytest
+
+from toolchain.asm.assemble import assemble
+from toolchain.errors import ToolError
+
+
+def test_comments_labels_and_local_labels(asm):
+    """abi-elf.md §4.1: `;` anywhere, `#` first on a line, /* */ over lines, several labels on a line, 1: 1b 1f."""
+    out = asm(
+        "# whole line; bra nowhere\n"
+        "a: b: nop ; c: nop\n"
+        "/* mov #1, w0\n   still */ d: nop /* x */ ; y\n"
+        '1: nop\n 1: bra 1b\n bra 1f\n1: mov #\';\', w0\n .ascii "; /* # \\" "\n'
+    )
+    assert [out.symbols[n].value for n in "abd"] == [0, 0, 2]
+    assert [out.symbols[name].value for _, _, name in out.relocs()] == [6, 10]
+    assert out.words()[5] == 0x2003B0
+
+
+def test_mnemonics_and_registers_ignore_case_but_symbols_do_not(asm):
+    """abi-elf.md §4.1."""
+    out = asm("MOV #1, W3\n Inc.B wreg_, WREG\n BRA Nz, X\nx: X: nop\n")
+    assert out.words()[0] == 0x200013
+    assert {"x", "X"} <= out.symbols.keys()
+
+
+def test_macros_take_defaults_keywords_and_a_serial_number(asm):
+    """GNU as 2.14 macros: \\name, \\@, \\(), defaults, keyword arguments; a dot ends a name."""
+    out = asm(
+        ".macro put reg, val=7, size\n mov\\size #\\val, \\reg\nl\\@\\()_x: nop\n.endm\n"
+        " put w1\n put val=2 reg=w3\n put w0, 9, .b\n"
+    )
+    assert out.words() == [0x200071, 0, 0x200023, 0, 0xB3C090, 0]
+    assert {"l0_x", "l1_x", "l2_x"} <= out.symbols.keys()
+
+
+def test_macros_nest_end_early_and_can_be_purged(asm):
+    """.exitm leaves the innermost macro with its conditionals; .purgem forgets it."""
+    text = """
+    .macro inner n
+      .if \\n > 2
+        mov #\\n, w0
+        .exitm
+      .endif
+      nop
+    .endm
+    .macro outer
+      inner 1
+      inner 5
+    .endm
+    outer
+    .purgem inner
+    .macro inner n
+      mov #9, w0
+    .endm
+    inner 1
+    """
+    assert asm(text).words() == [0, 0x200050, 0x200090]
+
+
+def test_repeats(asm):
+    """.rept, .irp, .irpc, nested."""
+    text = ".rept 2\n .irp r, w1, w2\n clr \\r\n .endr\n .endr\n .irpc c, 34\n clr w\\c\n .endr\n"
+    assert asm(text).words() == [0xEB0080, 0xEB0100] * 2 + [0xEB0180, 0xEB0200]
+
+
+@pytest.mark.parametrize(
+    ("condition", "taken"),
+    [
+        (".if 1", True), (".if 0", False), (".ifdef known", True), (".ifdef other", False), (".ifndef other", True),
+        (".ifeq 0", True), (".ifne 0", False), (".ifgt 1", True), (".ifge 0", True), (".iflt 0", False),
+        (".ifle 0", True), (".ifc a b, a b", True), (".ifc a, b", False), (".ifnc a, b", True),
+        ('.ifeqs "x", "x"', True), (".ifdef __30F6014A", True), (".if __HAS_DSP", True),
+    ],
+)  # fmt: skip
+def test_conditions(asm, condition, taken):
+    """abi-elf.md §4.3, control group; the device symbols are always defined."""
+    out = asm(f"known = 0\n{condition}\n mov #1, w0\n .else\n mov #2, w0\n .endif\n")
+    assert out.words() == [0x200010 if taken else 0x200020]
+
+
+def test_conditionals_nest_and_skip_everything_inside(asm):
+    """Skipped text is only looked at for conditionals."""
+    text = (
+        ".if 0\n .if 1\n rubbish ! here\n .else\n more\n .endif\n .elseif 1\n nop\n .elseif 1\n"
+        " mov #3, w0\n .else\n bad\n .endif\n"
+    )
+    assert asm(text).words() == [0]
+
+
+def test_include_looks_beside_the_source_and_in_the_folders_given(tmp_path, asm):
+    """Messages name the included file and line."""
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "far.inc").write_text(' mov #2, w0\n .include "near.inc"\n')
+    (tmp_path / "lib" / "near.inc").write_text(" mov #3, w0\n frob\n")
+    main = tmp_path / "main.s"
+    main.write_text(' .include "far.inc"\n mov #1, w0\n')
+    from toolchain.asm.state import Options
+
+    with pytest.raises(ToolError) as error:
+        assemble(main.read_text(), str(main), Options(include=[str(tmp_path / "lib")]))
+    assert f"{tmp_path}/lib/near.inc:2: error: unknown instruction 'frob'" in str(error.value)
+
+
+def test_line_markers_of_the_c_preprocessor_move_the_place_of_messages(asm):
+    """`# 12 "file"` as cpp writes it."""
+    with pytest.raises(ToolError, match=r"user\.S:41: error: unknown instruction"):
+        asm('# 1 "user.S"\n nop\n# 40 "user.S" 2\n nop\n frob\n')
+
+
+def test_incbin_takes_a_part_of_a_file(tmp_path):
+    """.incbin "file", skip, count."""
+    (tmp_path / "blob").write_bytes(bytes(range(10)))
+    obj, _ = assemble(f'.data\n .incbin "{tmp_path}/blob", 2, 3\n', "x.s")
+    assert obj.sections[1].data[::2] == bytes([2, 3, 4])
+
+
+def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
+    """One run shows every mistake."""
+    with pytest.raises(ToolError) as error:
+        asm("frob\n nop\n mov #70000, w0\nx:\nx: nop\n .frob\n bra 9f\n .word 1f\n")
+    lines = str(error.value).splitlines()
+    assert [line.split(":")[1] for line in lines] == ["1", "3", "5", "6"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (".if 1\n nop\n", "never closed"), (".endif\n", "without .if"), (".else\n", "without .if"),
+        (".macro m\n nop\n", "never closed"), (".endm\n", "without .macro"), (".endr\n", "without .rept"),
+        (".rept 3\n nop\n", "never closed"), (".rept -1\n .endr\n", "outside"),
+        (".macro m\n m\n .endm\n m\n", "nested deeper"),
+        (".rept 99999999\n nop\n .endr\n", "outside"), (".exitm\n", "outside a macro"),
+        ('.include "no"\n', "cannot find"),
+        (".macro m a\n nop\n .endm\n m 1, 2\n", "takes 1 arguments"),
+        (".if undefined\n .endif\n", "must be a constant"),
+        (".error \"stop\"\n", "error: stop"), (".err\n", ".err"), (".abort\n", ".abort"), (".zero 4\n", "use .space"),
+        (".balign 4\n", "use .align"), (".quad 1\n", "two .long"), (".loc 1 2\n", "does not exist"),
+        ("1 + 2\n", "cannot read"),
+        (".if 1\n .else\n .else\n .endif\n", "second .else"), ("bra 1b\n", "not defined before"),
+        ("bra 9f\n", "label 9: is used but"), (" bra .Lx\n", "label .Lx is used but"),
+        (".frob\n", "unknown directive"),
+        (".global 1x\n", "expected a symbol"), (".section\n", "bad section name"), (".popsection\n", "without"),
+        (".section a,code\n .section a,data\n", "other attributes"),
+        (".section a,frob\n", "unknown section attribute"),
+        (".section a,code,near\n", "data sections"), (".section a,code,data\n", "both code and data"),
+        (".local q\n .word q\n", "never defined"),
+        ("a = b\n b = a\n .word a\n", "in terms of itself"), (".section a,dma\n", "other than the 30F6014A"),
+        (".macro m\n .endm\n .macro m\n .endm\n", "already defined"), (".comm a\n", "comma"),
+        (".type a, @frob\n", "unknown symbol type"),
+    ],
+)  # fmt: skip
+def test_structural_mistakes_have_a_clear_message(asm, text, message):
+    """abi-elf.md §4.3."""
+    with pytest.raises(ToolError) as error:
+        asm(text)
+    assert message in str(error.value)

@@ -1,0 +1,149 @@
+"""Symbols across objects and libraries, section collection, and what is said when names are missing."""
+
+import pytest
+
+from toolchain.asm.assemble import assemble
+from toolchain.elf.read import read_object
+from toolchain.elf.write import object_bytes
+from toolchain.errors import ToolError
+from toolchain.link.archive import Member, archive_bytes, open_archive, read_members
+from toolchain.link.link import link
+from toolchain.link.options import LinkOptions
+
+
+def member(name: str, text: str) -> Member:
+    return Member(name, object_bytes(assemble(text, name)[0]))
+
+
+def test_all_undefined_and_duplicate_symbols_are_listed_with_their_objects(image):
+    """One link shows everything that is missing, with the place of the reference."""
+    with pytest.raises(ToolError) as error:
+        image(" call one\n mov two, w0\n .global twice\ntwice: nop\n", " call one\n", ".global twice\ntwice: nop\n")
+    lines = str(error.value).splitlines()
+    assert lines == [
+        "2.o: error: duplicate symbol twice, defined in 0.o, 2.o",
+        "0.o: error: undefined symbol one, referenced at 0.o:(.text+0x0), 0.o:(.text+0x2), "
+        "1.o:(.text+0x0), 1.o:(.text+0x2)",
+        "0.o: error: undefined symbol two, referenced at 0.o:(.text+0x4)",
+    ]
+
+
+def test_a_missing_entry_is_an_undefined_symbol():
+    """Without start-up code there is no image."""
+    obj = assemble("nop\n", "x.s")[0]
+    with pytest.raises(ToolError, match="undefined symbol __reset"):
+        link([obj], [], LinkOptions())
+
+
+def test_weak_definitions_yield_and_strong_ones_win(image):
+    """ELF rules; the order of objects does not matter."""
+    weak, strong, use = ".weak f\nf: mov #1, w0\n", ".global f\nf: mov #2, w0\n", "use: call f\n"
+    for sources in ((weak, strong, use), (use, strong, weak)):
+        out = image(*sources)
+        assert out.flash[out.words("use", 1)[0] & 0xFFFF] == 0x200020
+
+
+def test_archive_members_come_in_only_when_needed_and_bring_their_own_needs():
+    """One group, searched until nothing new is wanted (abi-elf.md §2.8); weak references pull nothing."""
+    library = archive_bytes(
+        [
+            member("a.o", ".global a\na: call b\n"),
+            member("b.o", ".global b\nb: return\n"),
+            member("a_name_longer_than_fifteen.o", ".global c\nc: return\n"),
+        ]
+    )
+    main = read_object(member("m", ".global __reset\n__reset: call a\n .weak c\n call c\n").data, "m.o")
+    out = link([main], [open_archive(library, "lib.a")], LinkOptions())
+    assert [o.name for o in out.resolution.objects] == ["m.o", "lib.a(a.o)", "lib.a(b.o)", "<linker>"]
+
+
+def test_archives_round_trip_and_are_readable_by_gnu_ar():
+    """The common ar format with symbol index and long names; bytes repeat."""
+    members = [member("x.o", ".global x\nx: nop\n"), member("a_name_longer_than_fifteen.o", ".global y\ny: nop\n")]
+    data = archive_bytes(members)
+    assert data == archive_bytes(members)
+    assert [(m.name, m.data) for m in read_members(data, "l")] == [(m.name, m.data) for m in members]
+    archive = open_archive(data, "l")
+    assert {name: m.name for name, m in archive.index.items()} == {"x": "x.o", "y": "a_name_longer_than_fifteen.o"}
+
+
+def test_an_archive_without_index_is_searched_too():
+    """Members tell what they define."""
+    data = archive_bytes([member("x.o", ".global x\nx: nop\n")])
+    size = int(data[8 + 48 : 8 + 58])
+    bare = data[:8] + data[8 + 60 + size + (size & 1) :]
+    assert open_archive(bare, "l").index["x"].name == "x.o"
+
+
+@pytest.mark.parametrize("damage", [b"", b"!<arch>\n" + b"x" * 60, b"!<arch>\n" + b"y" * 10])
+def test_damaged_archives_are_refused(damage):
+    """Clear errors, no traceback."""
+    with pytest.raises(ToolError):
+        open_archive(damage, "l.a")
+
+
+def test_collection_keeps_what_the_roots_reach(image):
+    """--gc-sections: entry, vectors, fixed and EEPROM sections are roots; calls, tables and handles are edges."""
+    text = """
+    .global __reset, __T1Interrupt
+    .section .text.start,code
+ __reset: call used
+    mov #table, w0
+    .section .text.isr,code
+ __T1Interrupt: retfie
+    .section .text.used,code
+ used: return
+    .section .text.viatable,code
+ viatable: return
+    .section .ndata.table,data,near
+ table: .word handle(viatable)
+    .section .text.gone,code
+ gone: call gonetoo
+    .section .text.gonetoo,code
+ gonetoo: return
+    .section .nbss.gone,bss,near
+ gonedata: .space 100
+    .section fixed,code,address(0x1000)
+ fixed: nop
+    .section .debug_info,info
+    .4byte gone
+    """
+    out = image(text, gc_sections=True)
+    named = {"used", "viatable", "table", "gone", "gonetoo", "gonedata", "fixed", "__T1Interrupt"}
+    assert named & out.symbols.keys() == {"used", "viatable", "table", "fixed", "__T1Interrupt"}
+    info = next(s for s in out.linked.image.sections if s.name == ".debug_info")
+    assert not any(info.data)
+    assert "gone" in image(text).symbols
+
+
+def test_undefined_names_in_discarded_sections_do_not_matter(image):
+    """Only what is linked must be complete."""
+    text = ".global __reset\n__reset: nop\n .section x,code\n call missing\n"
+    image(text, gc_sections=True)
+    with pytest.raises(ToolError, match="missing"):
+        image(text)
+
+
+def test_linking_is_repeatable(image):
+    """Same inputs, same bytes."""
+    from toolchain.elf.write import executable_bytes
+
+    texts = [f".global f{n}\nf{n}: call f{(n + 1) % 5}\n .section .nbss,bss,near\nv{n}: .space {n}\n" for n in range(5)]
+    first, second = (executable_bytes(image(*texts).linked.image) for _ in range(2))
+    assert first == second
+
+
+def test_the_map_lists_symbols_with_sizes_and_what_was_left_out(image):
+    """Per-symbol sizes, memory use, discarded sections, data records."""
+    from toolchain.link.mapfile import map_text
+
+    out = image(
+        ".global __reset\n__reset: nop\n nop\nnext: nop\n .section un,code\nunused: nop\n"
+        " .section .nbss,bss,near\nv: .space 6\n",
+        gc_sections=True,
+    )
+    text = map_text(out.linked)
+    rows = {line.split()[-1]: line.split() for line in text.splitlines() if line.split()}
+    assert rows["next"][1:3] == ["0x2", "3"]
+    assert "un" in text.split("Left out by --gc-sections")[1]
+    assert "stack gets 0x800..0x27f0" in text
