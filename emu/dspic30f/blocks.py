@@ -29,7 +29,7 @@ Fetch = Callable[[int], Insn | None]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A function; the most cycles it can take, and the latest its last instruction can start behind its beginning."""
+    """A function; the most cycles it can take, and the latest boundary before its last instruction."""
 
     run: Callable[[int], int]
     cycles: int
@@ -124,7 +124,8 @@ class BlockWriter:
                 source.leave(here, self._cycle, source.stall, DONE)
                 break
             here = after
-        return max(self._longest, self._cycle) + 1, self._last_start + 1
+        stall = int(pointers != 0)
+        return max(self._longest, self._cycle) + stall, self._last_start and self._last_start + stall
 
     def _instruction(self, pc: int) -> int | None:
         """One instruction; returns the address to go on with, None if the block has been left."""

@@ -138,13 +138,14 @@ class Sequencer:
             if state.mode != RUN and not self._sleep(limit):
                 return events.next_due() != NEVER
             last = state.cycle - 1
-            if events.deadline > last:
+            if events.deadline > last >= 0:
                 return True
             events.settle(last)
             accepted = self.exceptions.acceptable(last)
-            if accepted is not None:
-                self.exceptions.enter(accepted, last)
-                events.kick()
+            if accepted is None:
+                return True
+            self.exceptions.enter(accepted, last)
+            events.kick()
 
     def _sleep(self, limit: int) -> bool:
         """Let time pass until something wakes the CPU, at most to `limit`. True if it runs again (isa.md §11).
