@@ -12,7 +12,7 @@ from typing import Protocol
 
 from .ir.model import Function, Module, UnsupportedError
 from .ir.read import read_module
-from .lower import cfg, data, emit, frame, isr, legalize, peephole, regalloc, select, switch
+from .lower import branches, cfg, combine, data, emit, frame, isr, legalize, peephole, regalloc, select, switch
 from .lower.mir import MFunction
 from .lower.names import symbol
 
@@ -81,6 +81,8 @@ FUNCTION_PASSES = [
     Pass("legalize", _legalize, ("ssa", "reachable"), ("legal",)),
     Pass("unreachable-again", lambda c: cfg.remove_unreachable(c.function), ("legal",)),
     Pass("dead-code", lambda c: cfg.dead_code(c.function), ("legal",)),
+    Pass("combine", lambda c: combine.combine(c.function), ("legal",)),
+    Pass("dead-code-again", lambda c: cfg.dead_code(c.function), ("legal",)),
     Pass("split-logical", lambda c: cfg.split_logical_branches(c.function), ("legal",), ("no-logical-branches",)),
     Pass("sink-compares", lambda c: cfg.sink_compares(c.function), ("legal",)),
     Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ("legal",), ("no-switch",)),
@@ -88,7 +90,9 @@ FUNCTION_PASSES = [
     Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
     Pass("allocate", lambda c: regalloc.allocate(c.m), ("machine",), ("real-registers",)),
     Pass("frame", lambda c: frame.build_frame(c.m, c.options.stack_check), ("real-registers",), ("framed",)),
-    Pass("peephole", lambda c: peephole.run(c.m), ("framed",), ("tidy",)),
+    Pass("peephole", lambda c: peephole.run(c.m), ("framed",)),
+    Pass("tail-calls", lambda c: branches.tail_calls(c.m), ("framed",)),
+    Pass("branches", lambda c: branches.run(c.m), ("framed",)),
 ]
 
 

@@ -381,7 +381,9 @@ def _mul_word(s: Selector, i: Instr) -> None:
         else:
             right = s.reg(b)
     kind = "su" if isinstance(right, Imm) else "ss"
-    _product(s, kind, s.reg(a), right, s.result(i), s.temp())
+    p = s.m.new_pair()
+    s.emit(f"mul.{kind}", s.reg(a), right, p)
+    s.emit("splitlo", s.result(i), p)
 
 
 def _narrow_reg(s: Selector, kind: str, v: Value) -> int:
@@ -420,8 +422,14 @@ def _mul_wide(s: Selector, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str
         for j in range(k + 1):
             if j in zero_a or k - j in zero_b:
                 continue
-            low, high = _pair(s, "uu" if k + 1 < n else "ss", a[j], b[k - j])
-            _accumulate(s, total, k, low, high if k + 1 < n else None)
+            if k + 1 < n:
+                low, high = _pair(s, "uu", a[j], b[k - j])
+                _accumulate(s, total, k, low, high)
+            else:
+                p, low = s.m.new_pair(), s.temp()
+                s.emit("mul.ss", a[j], b[k - j], p)
+                s.emit("splitlo", low, p)
+                _accumulate(s, total, k, low, None)
     for r, t in zip(d, total, strict=True):
         if t is None:
             s.emit("clr", r)
@@ -477,7 +485,18 @@ def select_divide(s: Selector, i: Instr) -> None:
     mi = s.emit("div.s" if signed else "div.u", m, n)
     mi.also_defs = (0, 1)
     mi.late = (1,)
-    s.copy(0 if i.op in ("sdiv", "udiv") else 1, s.result(i))
+    quotient = i.op in ("sdiv", "udiv")
+    other = i.extra.get("other")
+    if isinstance(other, Instr) and id(other) in s.needed:
+        s.copy(1 if quotient else 0, s.value_regs(other)[0])
+    if id(i) in s.wanted:
+        s.copy(0 if quotient else 1, s.result(i))
+
+
+def select_divother(s: Selector, i: Instr) -> None:
+    """The second result of a division: the division itself copies it out."""
+    s.value_regs(i)
+    s.needed.add(id(i.args[0]))
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -542,6 +561,7 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     **dict.fromkeys(("shl", "lshr", "ashr"), select_shift),
     "mul": select_mul,
     **dict.fromkeys(("udiv", "sdiv", "urem", "srem"), select_divide),
+    "divother": select_divother,
     "zext": select_extend,
     "sext": select_extend,
     "ff1l": select_unary,

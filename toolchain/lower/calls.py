@@ -99,6 +99,7 @@ def select_call(s: Selector, i: Instr) -> None:
         mi = s.emit("call", target)
     mi.also_uses = tuple(used)
     mi.also_defs = CALLER_SAVED
+    mi.tail = i.extra.get("tail") in ("tail", "musttail") and not pushed
     if pushed:
         s.emit("spadd", Imm(-pushed))
     _take_results(s, i)

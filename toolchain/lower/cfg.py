@@ -227,7 +227,8 @@ def dead_code(f: Function) -> None:
 
 PURE = frozenset((
     "add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr", "udiv", "sdiv", "urem", "srem", "zext", "sext", "trunc",
-    "icmp", "select", "phi", "load", "slot", "bits", "ff1l", "ff1r", "swap", "getsp", "vastart",
+    "icmp", "select", "phi", "load", "slot", "bits", "ff1l", "ff1r", "swap", "getsp", "vastart", "divother", "callresult",
+    "entryword",
 ))  # fmt: skip
 
 

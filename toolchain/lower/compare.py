@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..ir.model import I1, ConstInt, Instr, Undef, Value
 from .build import SWAPPED
-from .mir import CC_INVERSE, File, Imm
+from .mir import CC_INVERSE, MI, File, Imm
 from .rules import CONDITION
 
 if TYPE_CHECKING:
@@ -20,12 +20,32 @@ ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "
 def condition(s: Selector, c: Value, user: Instr) -> str:
     """Emit a comparison for the truth of `c` and return the branch condition."""
     if isinstance(c, Instr) and c.op == "icmp" and s.same_block(c):
+        step = _countdown(s, c) if user.op == "br" else None
+        if step is not None:
+            s.folded.add(id(step))
+            s.emit("dec", s.reg(step.args[0]), s.value_regs(step)[0], byte=step.type.bits == 8)
+            return "nc" if c.pred == "eq" else "c"  # DEC borrows exactly when the old value was 0
         return compare(s, c, user)
     if isinstance(c, Instr) and c.op == "xor" and c.type is I1 and isinstance(c.args[1], ConstInt):
         inner = condition(s, c.args[0], user)
         return CC_INVERSE[inner] if c.args[1].value else inner
     s.emit("cp0", s.reg(c), byte=True)
     return "nz"
+
+
+def _countdown(s: Selector, c: Instr) -> Instr | None:
+    """y = x - 1 of this block, wanted only after it, for a test of x against 0."""
+    x, zero = c.args
+    if c.pred not in ("eq", "ne") or not isinstance(zero, ConstInt) or zero.value or c.type is not I1:
+        return None
+    if x.type.bits not in (8, 16):
+        return None
+    for y in s.users.get(id(x), ()):
+        if y.op == "add" and isinstance(y.args[1], ConstInt) and y.args[1].signed == -1 and s.same_block(y):
+            inside = [u for u in s.users.get(id(y), ()) if u.op != "phi" and s.same_block(u)]
+            if not inside and id(y) in s.needed and id(y) not in s.folded:
+                return y
+    return None
 
 
 def compare(s: Selector, c: Instr, at: Instr) -> str:
@@ -168,19 +188,47 @@ def _or_words(s: Selector, words: tuple[int, ...]) -> None:
 
 
 def select_icmp(s: Selector, i: Instr) -> None:
-    """A truth value: 1, unless the condition fails."""
+    """A truth value: by the carry where it answers, else 1 unless the condition fails."""
     d = s.result(i)
     a, b = i.args
     if i.pred == "slt" and isinstance(b, ConstInt) and b.value == 0:
         _sign_bit(s, a, d)
         return
+    if isinstance(b, ConstInt) and b.value == 0 and i.pred in ("eq", "ne") and a.type.bits in (8, 16):
+        if not (isinstance(a, Instr) and a.op == "and" and s.single_use(a)):
+            s.emit("cp", s.reg(a), Imm(1), byte=a.type.bits == 8)  # borrows exactly for 0
+            _from_carry(s, "nc" if i.pred == "eq" else "c", d)
+            return
     cc = compare(s, i, i)
+    if cc in ("c", "nc"):
+        _from_carry(s, cc, d)
+        return
     before = len(s.out)
     s.emit("mov", Imm(1), d)
-    _move_before_compare(s, before)
+    if _skippable(s.out[before - 1], cc):
+        s.out[before - 1 :] = [s.out[before], s.out[before - 1]]
     skip = s.emit("skip", "", cc=cc)
     skip.count = 1
     s.emit("clr", d).pred = True
+
+
+def _from_carry(s: Selector, cc: str, d: int) -> None:
+    """d = C, or d = !C as the negated borrow of d - d."""
+    if cc == "c":
+        zero = s.temp()
+        s.emit("clr", zero)
+        s.emit("rlc", zero, d)
+    else:
+        t = s.temp()
+        s.emit("borrow", t)
+        s.emit("neg", t, d)
+
+
+def _skippable(mi: MI, cc: str) -> bool:
+    """Whether the comparison can become a skip instruction, which must stand next to what it guards."""
+    if mi.op in ("btst", "btstf"):
+        return True
+    return mi.op == "cp" and cc in ("z", "nz", "lt", "gt") and all(isinstance(a, int) for a in mi.args)
 
 
 def _sign_bit(s: Selector, a: Value, d: int) -> None:
@@ -191,14 +239,6 @@ def _sign_bit(s: Selector, a: Value, d: int) -> None:
         s.emit("se", top, wide)
         top = wide
     s.emit("lsr", top, Imm(15), d)
-
-
-def _move_before_compare(s: Selector, at: int) -> None:
-    """Keep the comparison next to its skip: what was emitted after it moves before its first instruction."""
-    first = at
-    while first > 0 and s.out[first - 1].op in ("cp", "cpb", "cp0", "cp0f", "btst", "btstf"):
-        first -= 1
-    s.out[first:] = s.out[at:] + s.out[first:at]
 
 
 def select_select(s: Selector, i: Instr) -> None:

@@ -203,6 +203,11 @@ class Emitter:
             if line.strip():
                 self._out(line.strip())
 
+    def _borrow(self, mi: MI) -> None:
+        """-1 after a borrow, else 0."""
+        r = operand_text(mi.args[0])
+        self._out(f"subb {r},{r},{r}")
+
     def _plain_text(self, mi: MI) -> None:
         self._out(str(mi.args[0]))
 
@@ -225,5 +230,6 @@ SPECIAL: dict[str, Callable[[Emitter, MI], None]] = {
     "repfill": Emitter._repeat,
     "shiftloop": Emitter._shiftloop,
     "asm": Emitter._asm,
+    "borrow": Emitter._borrow,
     "text": Emitter._plain_text,
 }

@@ -94,7 +94,11 @@ class FrameBuilder:
         self._prologue()
         for b in self.m.blocks:
             if b.insts and b.insts[-1].op in ("ret", "tailcall"):
-                b.insts[-1:-1] = self._epilogue(b.insts[-1])
+                epilogue = self._epilogue(b.insts[-1])
+                for mi in epilogue:
+                    mi.epilogue = True
+                b.insts[-1:-1] = epilogue
+        self.m.frame_bytes = self.locals + 2 * len(self.saved)
 
     def _instruction(self, mi: MI, pushed: int) -> list[MI]:
         if mi.op == "lea":

@@ -79,6 +79,7 @@ OPS: dict[str, OpInfo] = {
     **{n: OpInfo("sd", ARITH) for n in ("inc", "inc2", "dec", "dec2", "neg")},
     "com": OpInfo("sd", LOGIC),
     "clr": OpInfo("d"),
+    "borrow": OpInfo("d", ARITH, "cz"),
     "setm": OpInfo("d"),
     **{n: OpInfo("ssd", LOGIC) for n in ("sl", "lsr", "asr")},
     **{n: OpInfo("sd", SHIFT1) for n in ("sl1", "lsr1", "asr1")},
@@ -101,6 +102,7 @@ OPS: dict[str, OpInfo] = {
     "ff1l": OpInfo("sd", "c"),
     "ff1r": OpInfo("sd", "c"),
     "split": OpInfo("ddS", words=0),
+    "splitlo": OpInfo("dS", words=0),
     "join": OpInfo("Dss", words=0),
     "movd": OpInfo("SD"),
     # file-register forms: address, and W0 (WREG) where named
@@ -159,8 +161,8 @@ class MI:
     late    indices into args of registers that must survive past the definition (DIV divisor)
     """
 
-    __slots__ = ("also_defs", "also_uses", "args", "byte", "cc", "count", "info", "late", "line", "op", "pred", "text",
-                 "volatile")  # fmt: skip
+    __slots__ = ("also_defs", "also_uses", "args", "byte", "cc", "count", "epilogue", "info", "late", "line", "op", "pred", "tail",
+                 "text", "volatile")  # fmt: skip
 
     def __init__(self, op: str, *args: Operand, byte: bool = False, cc: str = "", line: str | None = None) -> None:
         self.op = op
@@ -175,6 +177,8 @@ class MI:
         self.late: tuple[int, ...] = ()
         self.line = line
         self.volatile = False
+        self.tail = False  # call: the callee does not look at our frame, and nothing follows but the epilogue
+        self.epilogue = False  # put before RETURN by the frame pass
         self.text = ""  # asm: template; \0n:m\0 stands for operand n with modifier m
 
     def uses(self) -> list[int]:
@@ -283,6 +287,7 @@ class MFunction:
     uses_fp: bool = False  # W14 is the frame pointer
     interrupt: str = ""  # "", "no_auto_psv", "auto_psv"; "shadow" may be appended after a comma
     tables: list[tuple[str, list[str]]] = field(default_factory=list)
+    frame_bytes: int = 0  # locals and saved registers, known after the frame pass
     temps: set[int] = field(default_factory=set)  # registers that must not be spilled again
 
     def new_register(self) -> int:

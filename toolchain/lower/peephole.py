@@ -1,51 +1,329 @@
-"""Clean-up over real registers: branches to the next block, branch chains, dead code."""
+"""Local rewrites over real registers, after frames are built.
+
+Each rewrite looks at neighbouring instructions of one block and the registers and flags live behind them; `local` runs
+them until nothing changes. Needs: real registers. Keeps behaviour; only removes or shortens.
+"""
 
 from __future__ import annotations
 
-from .mir import CC_INVERSE, MI, MFunction
+from ..target import CALLEE_SAVED
+from .liveness import bits, has_effect, live_out
+from .mir import MI, File, Imm, MBlock, Mem, MFunction
+
+AT_RETURN = bits([*CALLEE_SAVED, 15])
+ALL = 0xFFFF
+# Single-register results whose N and Z describe the word or byte written.
+SETS_NZ = {"add", "sub", "subr", "addc", "subb", "and", "ior", "xor", "addl", "subl", "andl", "iorl", "xorl", "inc", "dec",
+           "inc2", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1", "lsr1", "asr1", "se", "ze", "rlc", "rrc"}  # fmt: skip
+STICKY_Z = {"addc", "subb", "subbr", "cpb"}
+NEUTRAL_COPIES = {"mov", "clr", "setm"}
 
 
 def run(m: MFunction) -> None:
-    """Needs: frame built. Changes layout and removes redundant instructions; keeps behaviour."""
-    thread_jumps(m)
-    fall_through(m)
+    """All local rewrites, to a fixed point."""
+    at_return = ALL if m.interrupt else AT_RETURN
+    for _ in range(4):
+        changed = False
+        out = live_out(m, at_return)
+        for b in m.blocks:
+            changed |= local(b, out[b.name])
+        if not changed:
+            return
 
 
-def thread_jumps(m: MFunction) -> None:
-    """A branch to a block that only jumps goes to the final target; blocks nobody reaches go away."""
-    forward: dict[str, str] = {}
-    for b in m.blocks:
-        if len(b.insts) == 1 and b.insts[0].op == "jump" and not b.address_taken:
-            forward[b.name] = str(b.insts[0].args[0])
-
-    def final(name: str) -> str:
-        seen = set()
-        while name in forward and name not in seen:
-            seen.add(name)
-            name = forward[name]
-        return name
-
-    for b in m.blocks:
-        for mi in b.insts:
-            if mi.op in ("bra", "jump"):
-                mi.args[0] = final(str(mi.args[0]))
-        b.succs = [final(s) for s in b.succs]
-    m.tables = [(name, [final(t) for t in targets]) for name, targets in m.tables]
-    reached = {m.blocks[0].name} | {s for b in m.blocks for s in b.succs} | {b.name for b in m.blocks if b.address_taken}
-    m.blocks = [b for b in m.blocks if b.name in reached]
+def local(b: MBlock, live: int) -> bool:
+    """One round over one block. `live` is the registers live at its end."""
+    before = len(b.insts)
+    touched = propagate_copies(b)
+    touched |= drop_dead(b, live)
+    touched |= drop_compares(b)
+    touched |= auto_increment(b)
+    touched |= merge_pairs(b)
+    return touched or len(b.insts) != before
 
 
-def fall_through(m: MFunction) -> None:
-    """No branch to what follows anyway; a conditional branch over a jump is inverted."""
-    for k, b in enumerate(m.blocks):
-        following = m.blocks[k + 1].name if k + 1 < len(m.blocks) else ""
-        if len(b.insts) >= 2 and b.insts[-1].op == "jump" and b.insts[-2].op == "bra":
-            bra, jump = b.insts[-2], b.insts[-1]
-            if bra.args[0] == jump.args[0]:
-                b.insts.remove(bra)
-            elif bra.args[0] == following:
-                inverted = MI("bra", jump.args[0], cc=CC_INVERSE[bra.cc], line=bra.line)
-                b.insts[-2:] = [inverted]
+def propagate_copies(b: MBlock) -> bool:
+    """Forget moves that restate what is known; read the original of a copy where that lets the copy die.
+
+    `value` maps a register to the register or constant it equals.
+    """
+    copy_of: dict[int, int] = {}
+    constant: dict[int, tuple[str, object]] = {}
+    out: list[MI] = []
+    changed = False
+    for mi in b.insts:
+        if mi.is_copy():
+            source, dest = mi.args
+            assert isinstance(source, int) and isinstance(dest, int)
+            root = copy_of.get(source, source)
+            if copy_of.get(dest, dest) == root:
+                changed = True
                 continue
-        if b.insts and b.insts[-1].op == "jump" and b.insts[-1].args[0] == following:
-            b.insts.pop()
+            if root in constant and constant.get(dest) == constant[root]:
+                changed = True
+                continue
+        known = _constant(mi)
+        if known is not None:
+            dest = mi.args[-1]
+            assert isinstance(dest, int)
+            if constant.get(dest) == known:
+                changed = True
+                continue
+        changed |= _use_originals(mi, copy_of)
+        for d in mi.defs():
+            _forget(d, copy_of, constant)
+        if mi.is_copy():
+            source, dest = mi.args
+            assert isinstance(source, int) and isinstance(dest, int)
+            if source < 15 and dest < 15:
+                copy_of[dest] = copy_of.get(source, source)
+                if source in constant:
+                    constant[dest] = constant[source]
+        elif known is not None:
+            dest = mi.args[-1]
+            assert isinstance(dest, int)
+            if dest < 15:
+                constant[dest] = known
+        out.append(mi)
+    b.insts = out
+    return changed
+
+
+def _constant(mi: MI) -> tuple[str, object] | None:
+    """What a constant load puts into its register."""
+    if mi.pred or mi.byte or not mi.args or not isinstance(mi.args[-1], int):
+        return None
+    if mi.op == "clr":
+        return "k", 0
+    if mi.op == "setm":
+        return "k", 0xFFFF
+    if mi.op == "mov" and isinstance(mi.args[0], Imm):
+        return "k", mi.args[0].value
+    return None
+
+
+def _forget(d: int, copy_of: dict[int, int], constant: dict[int, tuple[str, object]]) -> None:
+    copy_of.pop(d, None)
+    constant.pop(d, None)
+    for k in [k for k, v in copy_of.items() if v == d]:
+        del copy_of[k]
+
+
+def _use_originals(mi: MI, copy_of: dict[int, int]) -> bool:
+    """Replace read-only register operands by what they are copies of."""
+    if not copy_of or mi.pred or mi.op in ("asm", "split", "join", "movd"):
+        return False
+    changed = False
+    for k, (role, a) in enumerate(zip(mi.info.roles, mi.args, strict=False)):
+        if role != "s":
+            continue
+        if isinstance(a, int) and a in copy_of and k not in mi.late and not mi.op.endswith("f"):
+            mi.args[k] = copy_of[a]
+            changed = True
+        elif isinstance(a, Mem) and a.mode in ("ind", "off") and a.base in copy_of:
+            mi.args[k] = Mem(a.mode, copy_of[a.base], a.off)
+            changed = True
+    return changed
+
+
+def drop_dead(b: MBlock, live: int) -> bool:
+    """Remove writes nobody reads, when their flags are not read either."""
+    kept: list[MI] = []
+    flags: set[str] = set()
+    changed = False
+    guarded = 0
+    for mi in reversed(b.insts):
+        d = bits(mi.defs())
+        writes = flag_writes(mi)
+        if d and not d & (live | 1 << 15) and not has_effect(mi) and not flags & set(writes):
+            changed = True
+            guarded += mi.pred
+            continue
+        if mi.op == "skip":
+            mi.count -= guarded
+            guarded = 0
+            if mi.count == 0:
+                changed = True
+                continue
+        if not mi.pred:
+            flags -= set(writes)
+        flags |= set(mi.flags_read())
+        live = live & ~d | bits(mi.uses())
+        kept.append(mi)
+    kept.reverse()
+    b.insts = kept
+    return changed
+
+
+def flag_writes(mi: MI) -> str:
+    """Flags an instruction changes; a byte move from a near address sets N and Z (isa.md §6.2)."""
+    if mi.op == "mov" and mi.byte and isinstance(mi.args[0], File):
+        return "zn"
+    return mi.info.writes
+
+
+def flags_read_after(b: MBlock, at: int) -> set[str] | None:
+    """Condition codes that read the flags as left by instruction `at`; None when something unknown does."""
+    found: set[str] = set()
+    for mi in b.insts[at + 1 :]:
+        if mi.op in ("bra", "skip"):
+            found.add(mi.cc)
+        elif mi.info.reads or mi.op in ("asm", "text"):
+            return None
+        if flag_writes(mi) and not mi.pred:
+            return found
+        if mi.pred and flag_writes(mi):
+            return None
+    return found
+
+
+def drop_compares(b: MBlock) -> bool:
+    """CP0 of a register whose last writer left the same Z and N."""
+    changed = False
+    k = 0
+    while k < len(b.insts):
+        mi = b.insts[k]
+        if mi.op == "cp0" and isinstance(mi.args[0], int):
+            r = mi.args[0]
+            writer = _flag_source(b, k, r, mi.byte)
+            readers = flags_read_after(b, k)
+            if writer is not None and readers is not None and readers <= {"z", "nz", "n", "nn"}:
+                if writer.op not in STICKY_Z or readers <= {"n", "nn"}:
+                    del b.insts[k]
+                    changed = True
+                    continue
+        k += 1
+    return changed
+
+
+def _flag_source(b: MBlock, at: int, r: int, byte: bool) -> MI | None:
+    """The instruction before `at` that wrote r and the flags, with only moves between."""
+    for k in range(at - 1, -1, -1):
+        mi = b.insts[k]
+        if mi.pred or mi.op == "skip":
+            return None
+        if flag_writes(mi):
+            dest = mi.args[-1] if mi.args else None
+            if mi.op in SETS_NZ and dest == r and mi.byte == byte:
+                return mi
+            return None
+        if r in mi.defs() or mi.op in ("call", "callr", "asm", "text"):
+            return None
+    return None
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# addressing
+
+
+STEPS = {"inc": 1, "inc2": 2, "dec": -1, "dec2": -2}
+
+
+def auto_increment(b: MBlock) -> bool:
+    """[Wn] and a step of Wn by the access size become [Wn++] or [Wn--]; a step before [Wn] becomes [++Wn] or [--Wn]."""
+    changed = False
+    k = 0
+    while k < len(b.insts):
+        step = b.insts[k]
+        amount = _step_amount(step)
+        if amount is not None and flags_unused(b, k):
+            r = step.args[-1]
+            assert isinstance(r, int)
+            if _fold_after(b, k, r, amount) or _fold_before(b, k, r, amount):
+                del b.insts[k]
+                changed = True
+                continue
+        k += 1
+    return changed
+
+
+def _step_amount(mi: MI) -> int | None:
+    """Signed step of `op Wn, Wn`."""
+    if mi.pred or mi.byte:
+        return None
+    if mi.op in STEPS and isinstance(mi.args[0], int) and mi.args[0] == mi.args[1]:
+        return STEPS[mi.op]
+    return None
+
+
+def flags_unused(b: MBlock, at: int) -> bool:
+    """Whether nobody reads the flags instruction `at` leaves. Flags never live across blocks."""
+    readers = flags_read_after(b, at)
+    return readers is not None and not readers
+
+
+def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
+    """Find the last access through [r] before the step."""
+    for k in range(at - 1, -1, -1):
+        mi = b.insts[k]
+        if r in mi.uses() or r in mi.defs():
+            return _modify(mi, r, amount, "++" if amount > 0 else "--")
+        if mi.op in ("skip", "call", "callr", "asm", "text") or mi.pred:
+            return False
+    return False
+
+
+def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
+    """Find the first access through [r] after the step."""
+    for k in range(at + 1, len(b.insts)):
+        mi = b.insts[k]
+        if r in mi.uses() or r in mi.defs():
+            return _modify(mi, r, amount, "+" if amount > 0 else "-")
+        if mi.op in ("skip", "call", "callr", "asm", "text", "bra", "jump", "ret", "brtable", "jumpr", "tailcall") or mi.pred:
+            return False
+    return False
+
+
+def _modify(mi: MI, r: int, amount: int, mode: str) -> bool:
+    """Turn the only [r] of an instruction into the modifying form, if r has no other part in it (isa.md §3.4)."""
+    size = 1 if mi.byte or mi.op in ("se", "ze") else 4 if mi.op == "movd" else 2
+    if abs(amount) != size or mi.pred or mi.op in ("asm", "repmov", "repclr", "repfill", "tblwtl", "tblwth"):
+        return False
+    plain = Mem("ind", r)
+    places = [k for k, a in enumerate(mi.args) if a == plain]
+    mentions = sum(1 for a in mi.args if a == r or isinstance(a, Mem) and (a.base == r or a.mode == "idx" and a.off == r))
+    if len(places) != 1 or mentions != 1 or r in mi.also_uses or r in mi.also_defs or mi.op in ("bset", "bclr", "btg"):
+        return False
+    mi.args[places[0]] = Mem(mode, r)
+    return True
+
+
+def merge_pairs(b: MBlock) -> bool:
+    """Two word moves of neighbouring words and registers become MOV.D (isa.md §5.5)."""
+    changed = False
+    k = 0
+    while k + 1 < len(b.insts):
+        merged = _merged(b.insts[k], b.insts[k + 1])
+        if merged is not None:
+            b.insts[k : k + 2] = [merged]
+            changed = True
+        k += 1
+    return changed
+
+
+def _merged(first: MI, second: MI) -> MI | None:
+    if first.op != "mov" or second.op != "mov" or first.byte or second.byte or first.pred or second.pred:
+        return None
+    a, b = first.args
+    c, d = second.args
+    if isinstance(a, int) and isinstance(b, int) and isinstance(c, int) and isinstance(d, int):
+        if a > c:
+            a, b, c, d = c, d, a, b
+        if a % 2 == 0 and b % 2 == 0 and c == a + 1 and d == b + 1 and a < 14 and b < 14:
+            return MI("movd", a, b, line=first.line)
+        return None
+    if isinstance(b, int) and isinstance(d, int) and isinstance(a, Mem) and isinstance(c, Mem):
+        low, high, x, y = (b, d, a, c) if _offset(a) == 0 else (d, b, c, a)
+        if low % 2 == 0 and high == low + 1 and low < 14 and x == Mem("ind", y.base) and y == Mem("off", x.base, 2):
+            if b != c.base:  # the first load must not change the address of the second
+                return MI("movd", x, low, line=first.line)
+        return None
+    if isinstance(a, int) and isinstance(c, int) and isinstance(b, Mem) and isinstance(d, Mem):
+        low, high, x, y = (a, c, b, d) if _offset(b) == 0 else (c, a, d, b)
+        if low % 2 == 0 and high == low + 1 and low < 14 and x == Mem("ind", y.base) and y == Mem("off", x.base, 2):
+            return MI("movd", low, x, line=first.line)
+    return None
+
+
+def _offset(a: Mem) -> int | None:
+    return 0 if a.mode == "ind" else a.off if a.mode == "off" else None

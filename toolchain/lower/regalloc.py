@@ -73,6 +73,11 @@ class Graph:
             low, high, pair = mi.args
             assert isinstance(low, int) and isinstance(high, int) and isinstance(pair, int)
             self._pair_hints(pair, low, high)
+        elif mi.op == "splitlo":
+            low, pair = mi.args
+            assert isinstance(low, int) and isinstance(pair, int)
+            self.hints.setdefault(low, []).append((pair, 0))
+            self.hints.setdefault(pair, []).append((low, 0))
         elif mi.op == "join":
             pair, low, high = mi.args
             assert isinstance(low, int) and isinstance(high, int) and isinstance(pair, int)
@@ -290,6 +295,8 @@ def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
             mi.map_registers(rename)
             if mi.op == "split":
                 out += _pair_moves(mi, ((mi.args[2], mi.args[0], 0), (mi.args[2], mi.args[1], 1)), False)
+            elif mi.op == "splitlo":
+                out += _pair_moves(mi, ((mi.args[1], mi.args[0], 0),), False)
             elif mi.op == "join":
                 out += _pair_moves(mi, ((mi.args[0], mi.args[1], 0), (mi.args[0], mi.args[2], 1)), True)
             elif mi.is_copy() and mi.args[0] == mi.args[1]:

@@ -51,7 +51,8 @@ class Selector:
         self.out: list[MI] = []
         self.line: str | None = None
         self.registers: dict[int, tuple[int, ...]] = {}
-        self.needed: set[int] = set()
+        self.needed: set[int] = set()  # instructions that must emit code
+        self.wanted: set[int] = set()  # values whose own registers somebody reads
         self.users: dict[int, list[Instr]] = {}
         self.position: dict[int, tuple[str, int]] = {}
         self.epoch: dict[int, int] = {}
@@ -93,6 +94,7 @@ class Selector:
                         home = i.blocks[k] if i.op == "phi" else block.name
                         if a.op == "phi" or self.position[id(a)][0] != home:
                             self.needed.add(id(a))
+                            self.wanted.add(id(a))
 
     def new_slot(self, size: int, fixed: int | None = None) -> int:
         """Add an object to the frame."""
@@ -140,6 +142,7 @@ class Selector:
             found = self._assign(v)
             self.registers[id(v)] = found
         self.needed.add(id(v))
+        self.wanted.add(id(v))
         if isinstance(v, Instr) and v.op in ("trunc", "bits") or self._is_bool_zext(v):
             assert isinstance(v, Instr)
             self.value_regs(v.args[0])

@@ -1,0 +1,209 @@
+"""Small rewrites of legal IR that the middle end cannot know are good here.
+
+remainders   x - x/c*c back to x % c, and quotient and remainder of one division from one DIV (isa.md §6.7)
+increments   pointer and counter steps next to the last use of the old value, so both share a register and the step can
+             become a post-increment
+countdowns   `n-- != 0`: the decrement moves to the test, whose carry answers it
+"""
+
+from __future__ import annotations
+
+from ..ir.model import Block, ConstInt, Function, Instr, Value
+from .cfg import loop_depths, predecessors, reverse_postorder
+
+REMAINDER = {"udiv": "urem", "sdiv": "srem"}
+
+
+def users_of(f: Function) -> dict[int, list[Instr]]:
+    """id(value) -> instructions that use it."""
+    out: dict[int, list[Instr]] = {}
+    for b in f.blocks:
+        for i in b.instrs:
+            for a in i.args:
+                if isinstance(a, Instr):
+                    out.setdefault(id(a), []).append(i)
+    return out
+
+
+def combine(f: Function) -> None:
+    """Needs: legal IR. Ensures: the rewrites above, where they apply."""
+    remainders(f)
+    pair_divisions(f)
+    increments(f)
+    countdowns(f)
+
+
+def remainders(f: Function) -> None:
+    """sub x, (mul (div x, c), c) -> rem x, c."""
+    for b in f.blocks:
+        for i in b.instrs:
+            if i.op == "sub" and i.type.bits == 16:
+                _recover_remainder(i)
+            elif i.op == "add" and i.type.bits == 16:
+                _recover_negative(i)
+
+
+def _division_of(x: Value, product: Value, sign: int) -> tuple[Instr, Value] | None:
+    """The division q = x / c behind product = q * (sign*c)."""
+    if not isinstance(product, Instr) or product.op != "mul":
+        return None
+    q, c = product.args
+    if not isinstance(q, Instr) or q.op not in REMAINDER or q.args[0] is not x:
+        return None
+    d = q.args[1]
+    if isinstance(d, ConstInt) and isinstance(c, ConstInt):
+        return (q, d) if (d.value * sign - c.value) % 0x10000 == 0 else None
+    return (q, d) if d is c and sign > 0 else None
+
+
+def _recover_remainder(i: Instr) -> None:
+    found = _division_of(i.args[0], i.args[1], 1)
+    if found is not None:
+        i.op = REMAINDER[found[0].op]
+        i.args = [i.args[0], found[1]]
+
+
+def _recover_negative(i: Instr) -> None:
+    """x + q * -c, the form the middle end prefers for constants."""
+    for x, product in ((i.args[0], i.args[1]), (i.args[1], i.args[0])):
+        found = _division_of(x, product, -1)
+        if found is not None:
+            i.op = REMAINDER[found[0].op]
+            i.args = [x, found[1]]
+            return
+
+
+def pair_divisions(f: Function) -> None:
+    """A quotient and a remainder of the same operands in one block share one DIV."""
+    for b in f.blocks:
+        seen: dict[tuple[str, int, object], Instr] = {}
+        for i in b.instrs:
+            if i.op not in ("udiv", "sdiv", "urem", "srem") or i.type.bits != 16:
+                continue
+            d = i.args[1]
+            key = (i.op[0], id(i.args[0]), d.value if isinstance(d, ConstInt) else id(d))
+            first = seen.get(key)
+            if first is None:
+                seen[key] = i
+            elif first.op != i.op:
+                _share(first, i)
+
+
+def _share(first: Instr, second: Instr) -> None:
+    """Make `second` the other result of `first`'s DIV."""
+    if "other" in first.extra:
+        return
+    second.op = "divother"
+    second.args = [first]
+    first.extra["other"] = second
+
+
+def increments(f: Function) -> None:
+    """Move p + constant behind the last use of the phi p, when it feeds the phi again."""
+    users = users_of(f)
+    depths = loop_depths(f)
+    dominators = immediate_dominators(f)
+    home = {id(i): b for b in f.blocks for i in b.instrs}
+    for b in f.blocks:
+        for i in [x for x in b.instrs if x.op == "add" and isinstance(x.args[1], ConstInt)]:
+            p = i.args[0]
+            if not isinstance(p, Instr) or p.op != "phi" or p.type.bits != 16:
+                continue
+            if any(u.op != "phi" for u in users.get(id(i), ())):
+                _to_last_use(b, i, p, users)
+                continue
+            others = [u for u in users[id(p)] if u is not i]
+            places = {id(home[id(u)]): home[id(u)] for u in others}
+            if any(u.op == "phi" for u in others):
+                continue
+            if len(places) == 1 and all(u.op in ("load", "store", "add") for u in others):
+                target = next(iter(places.values()))
+                if target is not b and depths[target.name] <= depths[b.name] and _dominates(dominators, target, b):
+                    b.instrs.remove(i)
+                    target.instrs.insert(len(target.instrs) - 1, i)
+                    home[id(i)] = target
+                    _to_last_use(target, i, p, users)
+                    continue
+            _to_last_use(b, i, p, users)
+
+
+def _to_last_use(b: Block, i: Instr, p: Instr, users: dict[int, list[Instr]]) -> None:
+    """Place `i` right after the last other use of p in the block, but before the first use of i."""
+    position = {id(x): k for k, x in enumerate(b.instrs)}
+    uses = [u for u in users[id(p)] if u is not i and u.op != "phi"]
+    uses += [a for u in uses if u.op == "add" for a in users.get(id(u), ()) if a.op in ("load", "store")]
+    last = max((position[id(u)] for u in uses if id(u) in position), default=-1)
+    first_use = min((position[id(u)] for u in users.get(id(i), ()) if u.op != "phi" and id(u) in position),
+                    default=len(b.instrs) - 1)  # fmt: skip
+    here = position[id(i)]
+    target = min(last + 1, first_use)
+    if target > here + 1:
+        b.instrs.remove(i)
+        b.instrs.insert(target - 1, i)
+    elif 0 < target < here and last >= 0 and all(u.op == "phi" for u in users.get(id(i), ())):
+        b.instrs.remove(i)
+        b.instrs.insert(target, i)
+
+
+def immediate_dominators(f: Function) -> dict[str, str]:
+    """Cooper, Harvey, Kennedy: A Simple, Fast Dominance Algorithm."""
+    order = [b.name for b in reverse_postorder(f)]
+    number = {n: k for k, n in enumerate(order)}
+    preds = predecessors(f)
+    idom: dict[str, str] = {order[0]: order[0]}
+    changed = True
+    while changed:
+        changed = False
+        for n in order[1:]:
+            new = ""
+            for p in preds[n]:
+                if p in idom:
+                    new = p if not new else _intersect(idom, number, p, new)
+            if idom.get(n) != new:
+                idom[n] = new
+                changed = True
+    return idom
+
+
+def _intersect(idom: dict[str, str], number: dict[str, int], a: str, b: str) -> str:
+    while a != b:
+        while number[a] > number[b]:
+            a = idom[a]
+        while number[b] > number[a]:
+            b = idom[b]
+    return a
+
+
+def _dominates(idom: dict[str, str], a: Block, b: Block) -> bool:
+    n = b.name
+    while n != a.name:
+        if idom[n] == n:
+            return False
+        n = idom[n]
+    return True
+
+
+def countdowns(f: Function) -> None:
+    """For a branch on x == 0, bring y = x - 1 of the block or of its only-reached successor to the branch."""
+    preds = predecessors(f)
+    blocks = {b.name: b for b in f.blocks}
+    users = users_of(f)
+    for b in f.blocks:
+        br = b.instrs[-1]
+        c = br.args[0] if br.op == "br" and br.args else None
+        if not isinstance(c, Instr) or c.op != "icmp" or c.pred not in ("eq", "ne") or c not in b.instrs:
+            continue
+        x, zero = c.args
+        if not isinstance(zero, ConstInt) or zero.value or x.type.bits not in (8, 16) or not isinstance(x, Instr):
+            continue
+        for source in [b, *(blocks[s] for s in br.blocks if preds[s] == [b.name])]:
+            step = next((i for i in source.instrs if _is_decrement(i, x)), None)
+            if step is None or any(u.op != "phi" for u in users.get(id(step), ()) if source is b and u in b.instrs):
+                continue
+            source.instrs.remove(step)
+            b.instrs.insert(len(b.instrs) - 1, step)
+            break
+
+
+def _is_decrement(i: Instr, x: Value) -> bool:
+    return i.op == "add" and i.args[0] is x and isinstance(i.args[1], ConstInt) and i.args[1].signed == -1
