@@ -48,14 +48,18 @@ void Sys_Assertion_Failed(const char *file, uint16 line)
     stop(file, ":", line, 10);
 }
 
+/* The thread is gone after this; a listener hears its PID, and UART1 says so once it is free. */
 sys_pcb *os_overflow(void)
 {
+    char line[40];
     uint16 pid = os_running->pid;
     board_failsafe();
     os_count(&os_statistics.overflows);
     if (pid == 0) {
         os_trap("stack overflow", 0);
     }
+    char *end = put_text(put_number(put_text(line, "stack overflow: thread "), pid, 10), " ended\r\n");
+    (void)Sys_Send_Event(SYS_SEND_UART1, line, (uint16)(end - line));
     (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
     return process_end_running();
 }

@@ -145,12 +145,15 @@ TEST(exhaustion_is_an_error_and_everything_can_be_had_again, "design.md §6: bou
     for (int round = 0; round < 3; round++) {
         for (uint16 size = HEAP_STEP; size <= 2 * HEAP_CLASSES * HEAP_STEP; size = (uint16)(size + 3 * HEAP_STEP)) {
             uint16 n = fill(size, blocks, 4096);
-            CHECK(n >= (SYS_HEAP - empty) * 9 / 10 / size); /* whatever sizes were used before */
+            CHECK(n >= (SYS_HEAP - empty) * 9 / 10 / size);
             CHECK(heap_take(size) == NULL);
             for (uint16 i = 0; i < n; i++) {
                 heap_give(blocks[i], size);
             }
             CHECK_EQ(heap_now(), empty);
+            void *all = heap_take((uint16)(SYS_HEAP - empty)); /* small memory becomes large again */
+            CHECK(all != NULL);
+            heap_give(all, (uint16)(SYS_HEAP - empty));
         }
     }
 }
