@@ -7,6 +7,7 @@ not depend on the link; everything that names a symbol is a relocation, local br
 from __future__ import annotations
 
 from emu.elffacts import RELOCATION_BY_NAME, Formula, RelocationType
+from toolchain.asm.debug import debug_sections
 from toolchain.asm.expr import ExprError, Known, Pending, Value, settle
 from toolchain.asm.relax import relax
 from toolchain.asm.sections import AsmSection, Fixup, Piece
@@ -54,10 +55,11 @@ class _Finisher:
                 except (ExprError, fields.FieldError) as error:
                     self.asm.error(str(error), fixup.place)
             self.sections[source].relocs.sort(key=lambda reloc: reloc.offset)
+        extra, symbols = debug_sections(self.asm, self.sections)
         return ObjectFile(
             self.asm.file_name or self.asm.source.place.file,
-            list(self.sections.values()),
-            self._symbol_table(),
+            list(self.sections.values()) + extra,
+            self._symbol_table() + symbols,
             self.asm.options.processor,
         )
 

@@ -13,6 +13,7 @@ from toolchain.elf.read import is_object, read_executable, read_object
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes
 
+VECTOR_TABLES = (".ivt", ".aivt")
 _FLAG_WORDS = (
     (SectionFlag.ALLOC, "ALLOC"), (SectionFlag.WRITE, "DATA"), (SectionFlag.EXECINSTR, "CODE"),
     (SectionFlag.NEAR, "NEAR"), (SectionFlag.XMEM, "XMEMORY"), (SectionFlag.YMEM, "YMEMORY"),
@@ -136,7 +137,8 @@ def _print_item(
         content = text.line(line.file, line.line)
         print(f"; {here}" + (f"  {content.strip()}" if content is not None else ""))
     words = " ".join(f"{word:06x}" for word in item.words)
-    print(f"{item.address:6x}:  {words:15} {text_of(item, names)}")
+    handler = names.operand(item.words[0], "code") if section.name in VECTOR_TABLES else None
+    print(f"{item.address:6x}:  {words:15} {f'.pword {handler}' if handler else text_of(item, names)}")
     if relocs:
         at = (item.address - section.address) * 2
         for found in _relocation_text(section, at, at + 4 * len(item.words)):
