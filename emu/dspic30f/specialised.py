@@ -32,6 +32,8 @@ class _Modes:
     """Functions for one combination of processor modes."""
 
     blocks: dict[int, Block | None] = field(default_factory=dict)
+    singles: dict[int, Block | None] = field(default_factory=dict)
+    """Blocks of one instruction, for what is left before an event or a limit."""
     repeats: dict[int, Block | None] = field(default_factory=dict)
     loop: tuple[int, int] | None = None
 
@@ -65,7 +67,7 @@ class SpecialisedEngine:
             "ctz16": ctz16,
         }
         self._by_modes: Final[dict[object, _Modes]] = {}
-        self._heat: Final[dict[int, int]] = {}
+        self._heat: Final[dict[tuple[int, int], int]] = {}
         self._modes = _Modes()
         core.program.changed.append(self._flash_changed)
 
@@ -83,9 +85,9 @@ class SpecialisedEngine:
             elif u16[repeat_at]:
                 block = self._repeat(pc)
             else:
-                block = self._modes.blocks.get(pc)
-                if block is None:
-                    block = self._block(pc)
+                block = self._modes.blocks.get(pc) or self._block(self._modes.blocks, pc, self.length)
+                if block and (cycle + block.cycles > deadline or cycle + block.last_start >= limit):
+                    block = self._modes.singles.get(pc) or self._block(self._modes.singles, pc, 1)
             if block is None or cycle + block.cycles > deadline or cycle + block.last_start >= limit:
                 status = PLAIN
             else:
@@ -139,18 +141,17 @@ class SpecialisedEngine:
             return None
         return decode_for_execution(program.word(pc), program.word(pc + 2))
 
-    def _block(self, pc: int) -> Block | None:
-        """The block at `pc`, written when the address has become warm."""
-        modes = self._modes
-        if pc in modes.blocks:
+    def _block(self, blocks: dict[int, Block | None], pc: int, length: int) -> Block | None:
+        """The block at `pc` of at most `length` instructions, written when it has been asked for often enough."""
+        if pc in blocks:
             return None
-        heat = self._heat[pc] = self._heat.get(pc, 0) + 1
+        heat = self._heat[pc, length] = self._heat.get((pc, length), 0) + 1
         if heat < self.warm:
             return None
         source = self._source()
-        times = BlockWriter(source, self._fetch, self._hooks.__contains__, modes.loop, self.length).write(pc)
+        times = BlockWriter(source, self._fetch, self._hooks.__contains__, self._modes.loop, length).write(pc)
         block = None if times is None else Block(make_function(source, self._names), *times)
-        modes.blocks[pc] = block
+        blocks[pc] = block
         return block
 
     def _repeat(self, pc: int) -> Block | None:
