@@ -187,7 +187,7 @@ class Analysis:
         entries += [Entry("thread", self.usage(address)) for address in dict.fromkeys(threads)]
         listed = {entry.usage.entry for entry in entries}
         for address in sorted(self.entries - called - listed):
-            entries.append(Entry("pointer", self.usage(address), CALL_BYTES))
+            entries.append(Entry("pointer", self.usage(address)))
         return Report([self.usage(entry) for entry in sorted(self.functions)], entries)
 
 
