@@ -38,7 +38,7 @@ def is_near(module: Module, name: str) -> bool:
     var = module.globals.get(name)
     if var is None or var.constant or var.type.kind == "opaque" or not 0 < size_of(var.type) <= NEAR_BYTES:
         return False
-    return not var.section or var.section.startswith((".nbss", ".ndata"))
+    return not var.section or var.section.startswith((".nbss", ".ndata", "sfr"))
 
 
 class DataEmitter:
