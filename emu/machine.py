@@ -29,6 +29,9 @@ REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted"
 
 RESETS_KEPT: Final = 16
 """Length of `Machine.resets`."""
+RESET_LOOP: Final = 8
+"""Equal resets in a row, each within RESET_LOOP_CYCLES of the last, that count as a fault."""
+RESET_LOOP_CYCLES: Final = 1_000_000
 
 PcHook = Callable[[], bool | None]
 SfrHook = Callable[[bool, int], None]
@@ -76,6 +79,7 @@ class Machine:
         """(cycle, cause) of the last resets."""
         self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
         self._stopped_at: tuple[int, int] | None = None
+        self._last_reset = ("", 0, 0, 0)
         self._interrupt = False
         self.runner: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
         self.image: Image | None = None
@@ -150,19 +154,32 @@ class Machine:
         return stop
 
     def run(self, cycles: int | None = None, until: Callable[[], bool] | int | None = None) -> Stop:
-        """Run until something stops the machine: at most `cycles` Tcy; `until` is a program address or a condition,
-        tested between instructions."""
+        """Run until something stops the machine: at most `cycles` Tcy. `until` is a program address, or a condition
+        tested between instructions (slow)."""
         limit = NEVER if cycles is None else self.cycle + cycles
         if until is None:
             return self.run_until(limit) or self.stopped("limit")
-        reached = until if callable(until) else lambda: self.pc == until
+        if isinstance(until, int):
+            return self._run_to(until, limit)
         while self.cycle < limit:
             stop = self.step()
             if stop is not None:
                 return stop
-            if reached():
+            if until():
                 return self.stopped("until")
         return self.stopped("limit")
+
+    def _run_to(self, address: int, limit: int) -> Stop:
+        """Run to the next arrival at a program address."""
+        start = self.cycle
+        remove = self.hook_pc(address, lambda: self.cycle > start)
+        try:
+            stop = self.run_until(limit)
+        finally:
+            remove()
+        if stop is None:
+            return self.stopped("limit")
+        return self.stopped("until") if stop.reason == "breakpoint" and stop.pc == address else stop
 
     def step(self) -> Stop | None:
         """One instruction, after whatever is to be done at the boundary before it; None if nothing stopped it.
@@ -232,12 +249,23 @@ class Machine:
         del self.resets[:-RESETS_KEPT]
 
     def _reset_by(self, reset: DeviceReset) -> Stop | None:
-        """Carry out a reset the core asked for; a fault ends the run."""
+        """Carry out a reset the core or a device asked for; a fault, or a loop of resets, ends the run."""
         culprit = self.pc
         if reset.fault:
             self.state.cycle += 1
         self.reset(reset.cause)
-        return Stop("fault", culprit, self.cycle, reset.detail) if reset.fault and self.stop_on_fault else None
+        loop = self._loops(reset.cause, culprit)
+        if not self.stop_on_fault or not (reset.fault or loop):
+            return None
+        detail = reset.detail if reset.fault else f"reset loop: {reset.detail}, {RESET_LOOP} times in a row"
+        return Stop("fault", culprit, self.cycle, detail)
+
+    def _loops(self, cause: str, culprit: int) -> bool:
+        """Whether the device was reset RESET_LOOP times for the same reason, each soon after the one before."""
+        soon = self._last_reset[:2] == (cause, culprit) and self.cycle - self._last_reset[2] < RESET_LOOP_CYCLES
+        count = self._last_reset[3] + 1 if soon else 1
+        self._last_reset = (cause, culprit, self.cycle, count % RESET_LOOP)
+        return count == RESET_LOOP
 
     # Memory
 

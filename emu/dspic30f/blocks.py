@@ -106,7 +106,7 @@ class BlockWriter:
             return None
         pointers = facts_of(first).source_pointers
         at = source.places.at
-        source.emit(f"c = u64[{at['cpu.cycle']}]")
+        source.emit(f"b = c = u64[{at['cpu.cycle']}]")
         if pointers:
             source.emit(f"if u16[{at['cpu.stall']}] & {pointers}:")
             source.emit("    c += 1")

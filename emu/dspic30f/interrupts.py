@@ -67,6 +67,8 @@ class Exceptions:
         self._inttreg: Final = state.at["INTTREG"]
         self._look: Final = events.slot("cpu.look", lambda _due: None)
         self.ipl_slip = 0
+        self.entered = ""
+        """The last exception entered and where it returns to, for messages."""
         self._slip_cycle: Final = state.record.reserve("cpu.slip_cycle", "Q").index
         self._slip_words: Final = state.record.reserve("cpu.slip_words", "H", 1 + FLAG_WORDS).index
         self._words: Final = self._tables(chip)
@@ -216,6 +218,7 @@ class Exceptions:
         alternate = state.intcon2 & ALTIVT
         vector = accepted.vector.aivt if alternate else accepted.vector.ivt
         state.pc = self._program.word(vector) & PC_MASK
+        self.entered = f"{accepted.vector.name} at {pc:06X}"
         state.mode = RUN
         state.repeat = NOT_REPEATING
         state.stall = 0

@@ -363,7 +363,14 @@ class Source:
             if self._pending.side_effect:
                 raise Unsupported("two reads with side effects")
             self._pending.side_effect = True
+            self._show_place(self.emit)
         return self.name(f"read({address})", 0, 0xFFFF)
+
+    def _show_place(self, write: Callable[[str], None]) -> None:
+        """Let hooks see what the plain interpreter shows: the instruction's first cycle, PC behind it."""
+        at = self.places.at
+        write(f"u64[{at['cpu.cycle']}] = {'b' if self.at_entry else f'c + {self.start}'}")
+        write(f"u32[{at['cpu.pc']}] = {self.pc + 2}")
 
     def _store_file(self, ea: int, value: Number, size: Size) -> None:
         if self._in_ram(ea, size):
@@ -376,8 +383,7 @@ class Source:
             raise Unsupported("EDT counts instructions")
         effects = self._pending.effects
         effects.append(f"u64[{self.places.now}] = c + {self.last}")
-        effects.append(f"u64[{at['cpu.cycle']}] = c + {self.start}")
-        effects.append(f"u32[{at['cpu.pc']}] = {self.pc + 2}")
+        self._show_place(effects.append)
         if size == 2:
             effects.append(f"write({ea}, {value})")
         else:

@@ -239,7 +239,9 @@ class Sequencer:
         state = self.state
         traps = self.exceptions.traps
         if state.ipl >= traps.address.vector.level:
-            raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}")
+            entered = self.exceptions.entered
+            origin = f", after {entered}" if entered else ""
+            raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}{origin}")
         traps.request(traps.address, max(state.cycle, 1) - 1)
 
     # Flow

@@ -52,7 +52,7 @@ class SpecialisedEngine:
         """Longest block in instructions."""
         self._state: Final = core.state
         self._sequencer: Final = core.sequencer
-        self._places: Final = places_of(core)
+        self._places = places_of(core)
         record = core.record
         self._names: Final = {
             "u8": record.u8,
@@ -102,6 +102,7 @@ class SpecialisedEngine:
 
     def forget(self) -> None:
         """Hooks have changed: write everything anew."""
+        self._places = places_of(self._core)
         self._by_modes.clear()
         self._modes = _Modes()
 
