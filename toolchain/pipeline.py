@@ -76,6 +76,10 @@ def _select(c: Context) -> None:
     c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
 
 
+def _allocate(c: Context) -> None:
+    c.machine = regalloc.allocate(c.m, c.for_size)
+
+
 FUNCTION_PASSES = [
     Pass("unreachable", lambda c: cfg.remove_unreachable(c.function), ("ssa",), ("reachable",)),
     Pass("legalize", _legalize, ("ssa", "reachable"), ("legal",)),
@@ -88,11 +92,11 @@ FUNCTION_PASSES = [
     Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ("legal",), ("no-switch",)),
     Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ("no-switch",), ("no-critical-edges",)),
     Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
-    Pass("allocate", lambda c: regalloc.allocate(c.m), ("machine",), ("real-registers",)),
+    Pass("allocate", _allocate, ("machine",), ("real-registers",)),
     Pass("frame", lambda c: frame.build_frame(c.m, c.options.stack_check), ("real-registers",), ("framed",)),
     Pass("peephole", lambda c: peephole.run(c.m), ("framed",)),
     Pass("tail-calls", lambda c: branches.tail_calls(c.m), ("framed",)),
-    Pass("branches", lambda c: branches.run(c.m), ("framed",)),
+    Pass("branches", lambda c: branches.run(c.m, c.options.level != "0"), ("framed",)),
 ]
 
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from . import layout
+from .liveness import bits, live_out
 from .mir import CC_INVERSE, MI, Imm, MBlock, Mem, MFunction
+from .peephole import ALL, AT_RETURN
 
 
-def run(m: MFunction) -> None:
-    """Needs: frame built. Changes layout and removes redundant branches; keeps behaviour."""
+def run(m: MFunction, reorder: bool) -> None:
+    """Needs: frame built. Removes redundant branches, and changes the order of blocks if allowed; keeps behaviour."""
     thread_jumps(m)
+    if reorder:
+        thread_constants(m)
+        hoist_edge_moves(m)
+        thread_jumps(m)
+        layout.run(m)
     fall_through(m)
     thread_jumps(m)
     for b in m.blocks:
@@ -49,6 +57,7 @@ def remove_unreached(m: MFunction) -> None:
 
 def fall_through(m: MFunction) -> None:
     """No branch to what follows anyway; a conditional branch over a jump is inverted."""
+    depth = {b.name: b.depth for b in m.blocks}
     for k, b in enumerate(m.blocks):
         following = m.blocks[k + 1].name if k + 1 < len(m.blocks) else ""
         if len(b.insts) >= 2 and b.insts[-1].op == "jump" and b.insts[-2].op == "bra":
@@ -58,8 +67,114 @@ def fall_through(m: MFunction) -> None:
             elif bra.args[0] == following:
                 b.insts[-2:] = [MI("bra", jump.args[0], cc=CC_INVERSE[bra.cc], line=bra.line)]
                 continue
+            elif jump.args[0] != following and depth[str(jump.args[0])] > depth[str(bra.args[0])]:
+                bra.cc = CC_INVERSE[bra.cc]
+                bra.args, jump.args = jump.args, bra.args
         if b.insts and b.insts[-1].op == "jump" and b.insts[-1].args[0] == following:
             b.insts.pop()
+
+
+NEUTRAL = {"clr", "setm", "mov"}
+
+
+def hoist_edge_moves(m: MFunction) -> None:
+    """Moves on one edge of a conditional branch go before it, when the other edge does not see them.
+
+    The edge's block then only jumps, and the branch can go straight to its target. Moves leave the flags alone.
+    """
+    blocks = m.block_map()
+    preds: dict[str, int] = {}
+    for b in m.blocks:
+        for s in b.succs:
+            preds[s] = preds.get(s, 0) + 1
+    for b in m.blocks:
+        if len(b.insts) < 2 or b.insts[-1].op != "jump" or b.insts[-2].op != "bra":
+            continue
+        bra, jump = b.insts[-2], b.insts[-1]
+        for target, other in ((str(bra.args[0]), str(jump.args[0])), (str(jump.args[0]), str(bra.args[0]))):
+            edge = blocks[target]
+            if preds[target] != 1 or edge.address_taken or target == other or len(edge.insts) < 2:
+                continue
+            moves = edge.insts[:-1]
+            if edge.insts[-1].op != "jump" or len(moves) > MAX_HOISTED or not all(_is_neutral(mi) for mi in moves):
+                continue
+            if bits([r for mi in moves for r in mi.defs()]) & live_in(m, other):
+                continue
+            b.insts[-2:-2] = moves
+            edge.insts = edge.insts[-1:]
+            break
+
+
+MAX_HOISTED = 3
+
+
+def _is_neutral(mi: MI) -> bool:
+    """A register move or constant load that touches neither flags nor memory."""
+    return mi.op in NEUTRAL and not mi.byte and not mi.pred and all(isinstance(a, int | Imm) for a in mi.args)
+
+
+def live_in(m: MFunction, name: str) -> int:
+    """Registers live at the start of a block."""
+    out = live_out(m, ALL if m.interrupt else AT_RETURN)
+    block = m.block_map()[name]
+    live = out[name]
+    for mi in reversed(block.insts):
+        live = live & ~bits(mi.defs()) | bits(mi.uses())
+    return live
+
+
+def thread_constants(m: MFunction) -> None:
+    """A jump to a block that only compares a register with a constant, from where the register is known."""
+    blocks = m.block_map()
+    for b in m.blocks:
+        if not b.insts or b.insts[-1].op != "jump":
+            continue
+        target = blocks[str(b.insts[-1].args[0])]
+        if len(target.insts) != 3 or target.insts[1].op != "bra" or target.insts[2].op != "jump":
+            continue
+        taken = _decide(b, target.insts[0], target.insts[1].cc)
+        if taken is None:
+            continue
+        goal = str(target.insts[1].args[0] if taken else target.insts[2].args[0])
+        b.insts[-1] = MI("jump", goal, line=b.insts[-1].line)
+        b.succs = [goal]
+
+
+def _decide(b: MBlock, test: MI, cc: str) -> bool | None:
+    """Outcome of `test; bra cc` with the constants the block leaves in registers, or None."""
+    if test.op not in ("cp", "cp0") or not isinstance(test.args[0], int):
+        return None
+    right = test.args[1] if test.op == "cp" else Imm(0)
+    if not isinstance(right, Imm) or not isinstance(right.value, int):
+        return None
+    value = _known_value(b, test.args[0])
+    if value is None:
+        return None
+    mask = 0xFF if test.byte else 0xFFFF
+    return _holds(cc, value & mask, right.value & mask, mask)
+
+
+def _known_value(b: MBlock, r: int) -> int | None:
+    for mi in reversed(b.insts):
+        if r in mi.defs():
+            if mi.pred or mi.byte:
+                return None
+            if mi.op == "clr":
+                return 0
+            if mi.op == "setm":
+                return 0xFFFF
+            k = mi.args[0]
+            return k.value if mi.op == "mov" and isinstance(k, Imm) and isinstance(k.value, int) else None
+    return None
+
+
+def _holds(cc: str, a: int, b: int, mask: int) -> bool | None:
+    """Condition after comparing a with b, for the conditions that follow CP."""
+    sign = (mask >> 1) + 1
+    x, y = a - 2 * (a & sign), b - 2 * (b & sign)
+    answers = {"z": a == b, "nz": a != b, "c": a >= b, "nc": a < b, "gtu": a > b, "leu": a <= b, "lt": x < y, "ge": x >= y,
+               "gt": x > y, "le": x <= y}  # fmt: skip
+    return answers.get(cc)
 
 
 # ---------------------------------------------------------------------------------------------------------------------

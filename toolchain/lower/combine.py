@@ -110,7 +110,7 @@ def increments(f: Function) -> None:
             if not isinstance(p, Instr) or p.op != "phi" or p.type.bits != 16:
                 continue
             if any(u.op != "phi" for u in users.get(id(i), ())):
-                _to_last_use(b, i, p, users)
+                _to_last_use(b, i, users)
                 continue
             others = [u for u in users[id(p)] if u is not i]
             places = {id(home[id(u)]): home[id(u)] for u in others}
@@ -122,27 +122,20 @@ def increments(f: Function) -> None:
                     b.instrs.remove(i)
                     target.instrs.insert(len(target.instrs) - 1, i)
                     home[id(i)] = target
-                    _to_last_use(target, i, p, users)
+                    _to_last_use(target, i, users)
                     continue
-            _to_last_use(b, i, p, users)
+            _to_last_use(b, i, users)
 
 
-def _to_last_use(b: Block, i: Instr, p: Instr, users: dict[int, list[Instr]]) -> None:
-    """Place `i` right after the last other use of p in the block, but before the first use of i."""
+def _to_last_use(b: Block, i: Instr, users: dict[int, list[Instr]]) -> None:
+    """Place `i` as late as its own uses allow: before the first in the block, else before the terminator."""
     position = {id(x): k for k, x in enumerate(b.instrs)}
-    uses = [u for u in users[id(p)] if u is not i and u.op != "phi"]
-    uses += [a for u in uses if u.op == "add" for a in users.get(id(u), ()) if a.op in ("load", "store")]
-    last = max((position[id(u)] for u in uses if id(u) in position), default=-1)
-    first_use = min((position[id(u)] for u in users.get(id(i), ()) if u.op != "phi" and id(u) in position),
-                    default=len(b.instrs) - 1)  # fmt: skip
+    uses = [position[id(u)] for u in users.get(id(i), ()) if u.op != "phi" and id(u) in position]
+    target = min(uses, default=len(b.instrs) - 1)
     here = position[id(i)]
-    target = min(last + 1, first_use)
     if target > here + 1:
         b.instrs.remove(i)
         b.instrs.insert(target - 1, i)
-    elif 0 < target < here and last >= 0 and all(u.op == "phi" for u in users.get(id(i), ())):
-        b.instrs.remove(i)
-        b.instrs.insert(target, i)
 
 
 def immediate_dominators(f: Function) -> dict[str, str]:

@@ -7,6 +7,7 @@ and writes and what it does to the flags; every pass asks `uses` and `defs` and 
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field
 
 FIRST_VIRTUAL = 16
@@ -224,6 +225,12 @@ class MI:
         if self.also_defs:
             self.also_defs = tuple(rename.get(r, r) for r in self.also_defs)
 
+    def clone(self) -> MI:
+        """An independent copy."""
+        new = copy.copy(self)
+        new.args = list(self.args)
+        return new
+
     def is_copy(self) -> bool:
         """A plain word move between registers."""
         return (
@@ -300,6 +307,14 @@ class MFunction:
         r = self.new_register()
         self.pairs.add(r)
         return r
+
+    def clone(self) -> MFunction:
+        """An independent copy."""
+        new = copy.copy(self)
+        new.blocks = [MBlock(b.name, [i.clone() for i in b.insts], list(b.succs), b.depth, b.address_taken) for b in self.blocks]
+        new.frame = [copy.copy(o) for o in self.frame]
+        new.pairs, new.pair_hints, new.temps = set(self.pairs), dict(self.pair_hints), set(self.temps)
+        return new
 
     def block_map(self) -> dict[str, MBlock]:
         """Blocks by name."""

@@ -22,6 +22,7 @@ PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
 REAL = (1 << FIRST_VIRTUAL) - 1
 LOOP_WEIGHT = 8
 MAX_ROUNDS = 12
+TRIAL_LIMIT = 400  # instructions; larger functions are allocated once
 
 
 class Graph:
@@ -107,8 +108,8 @@ class Graph:
 
     # -- coalescing ---------------------------------------------------------------------------------------------------
 
-    def coalesce(self) -> None:
-        """Merge copies, most frequent first, until no more can be merged safely."""
+    def coalesce(self, eager: bool) -> None:
+        """Merge copies, most frequent first, until no more can be merged safely; `eager` merges with real registers too."""
         pending = sorted(self.moves, key=lambda m: -m[0])
         changed = True
         while changed and pending:
@@ -118,7 +119,7 @@ class Graph:
                 a, b = self.find(source), self.find(dest)
                 if a == b:
                     continue
-                if self._mergeable(a, b):
+                if (eager or min(a, b) >= FIRST_VIRTUAL) and self._mergeable(a, b):
                     self._merge(a, b)
                     changed = True
                 else:
@@ -266,12 +267,32 @@ class Colouring:
         return (self._fresh(c) * (1 + (c == 14)), mismatch, order)
 
 
-def allocate(m: MFunction) -> None:
-    """Replace virtual registers by W0-W14. Ensures: pairs are even-aligned, split and join are moves or gone."""
+def allocate(m: MFunction, for_size: bool) -> MFunction:
+    """Replace virtual registers by W0-W14. Ensures: pairs are even-aligned, split and join are moves or gone.
+
+    Merging a value with an argument or result register is usually right and sometimes crowds others out, so small
+    functions are allocated both ways and the cheaper result is kept.
+    """
     remove_dead(m)
+    size = sum(len(b.insts) for b in m.blocks)
+    if size > TRIAL_LIMIT:
+        _allocate(m, True)
+        return m
+    trials = []
+    for eager in (True, False):
+        trial = m.clone()
+        _allocate(trial, eager)
+        cost = _cost(trial, for_size)
+        trials.append((cost, not eager, trial))
+        if eager and not _crowded(trial):
+            return trial
+    return min(trials, key=lambda t: t[:2])[2]
+
+
+def _allocate(m: MFunction, eager: bool) -> None:
     for _ in range(MAX_ROUNDS):
         g = Graph(m)
-        g.coalesce()
+        g.coalesce(eager)
         colouring = Colouring(g)
         colouring.run(g.simplify())
         if not colouring.spilled:
@@ -280,6 +301,23 @@ def allocate(m: MFunction) -> None:
         groups = {n: [r for r in g_members(g, n)] for n in colouring.spilled}
         rewrite_spills(m, groups)
     raise UnsupportedError("register allocation does not converge", m.name)
+
+
+def _crowded(m: MFunction) -> bool:
+    """Whether the result has moves or callee-saved registers that another choice might avoid."""
+    return any(mi.is_copy() or any(r in CALLEE_SAVED for r in mi.defs()) for b in m.blocks for mi in b.insts)
+
+
+def _cost(m: MFunction, for_size: bool) -> int:
+    """Words, or words weighted by loop depth, with the saves of callee-saved registers."""
+    saved: set[int] = set()
+    total = 0
+    for b in m.blocks:
+        weight = 1 if for_size else LOOP_WEIGHT ** min(b.depth, 3)
+        total += weight * sum(mi.info.words for mi in b.insts)
+        for mi in b.insts:
+            saved.update(r for r in mi.defs() if r in CALLEE_SAVED)
+    return total + 2 * len({r // 2 for r in saved})
 
 
 def g_members(g: Graph, n: int) -> list[int]:
