@@ -114,6 +114,8 @@ def _use_originals(mi: MI, copy_of: dict[int, int]) -> bool:
     if not copy_of or mi.pred or mi.op in ("asm", "split", "join", "movd"):
         return False
     changed = False
+    if mi.byte and any(isinstance(a, File) for a in mi.args):
+        return False  # near bytes move through W0 only (isa.md §3.3)
     for k, (role, a) in enumerate(zip(mi.info.roles, mi.args, strict=False)):
         if role != "s":
             continue
