@@ -137,7 +137,7 @@ class Machine:
             try:
                 if not sequencer.boundary(cycle):
                     stop = self.stopped("halt")
-                elif state.cycle >= cycle:
+                elif state.cycle >= cycle or self._interrupt:
                     break
                 elif state.pc in hooks and self._hit():
                     stop = self.stopped("breakpoint")
@@ -148,8 +148,10 @@ class Machine:
             except DeviceReset as reset:
                 stop = self._reset_by(reset)
             if self._interrupt:
-                self._interrupt = False
-                stop = stop or self.stopped("interrupted")
+                break
+        if self._interrupt:
+            self._interrupt = False
+            stop = stop or self.stopped("interrupted")
         self.events.arrive(state.cycle)
         return stop
 

@@ -139,7 +139,8 @@ class Contexts:
 def check_pairs(seed: int, instructions: int, contexts: int, engine: str = "interp") -> int:
     """Run `instructions` random instructions, each in `contexts` contexts of the same modes. Returns the pairs run.
 
-    Each instruction is a generated function of its own. Rows take turns, so every row is met equally often. Raises Difference.
+    Each instruction is a generated function of its own. Rows take turns, so every row is met equally often.
+    Raises Difference.
     """
     rng = random.Random(seed)
     plain, other = machines(engine, length=1)
