@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 from emu.boards import epuck
 from emu.bus import SFR_END, Bus
@@ -21,7 +21,7 @@ from emu.dspic30f.faults import Breakpoint, DeviceReset
 from emu.dspic30f.state import RUN
 from emu.events import NEVER, Events
 from emu.image import Image
-from emu.peripherals import Wires, build
+from emu.peripherals import Peripherals, Wires, build
 from emu.program import ProgramMemory
 from emu.record import Record
 
@@ -56,9 +56,17 @@ class Machine:
     """A chip with a program. See engine documentation in README.md for the choice of `engine`.
 
     `ipl_slip` = 1 lets an interrupt slip through right after a write that raises IPL or clears IEC (isa.md §14.3).
+    `board` puts the chip on a board: it is called with the peripherals before the engine is made (`emu.boards`).
     """
 
-    def __init__(self, chip: Chip = DSPIC30F6014A, *, engine: str = "auto", ipl_slip: int = 0) -> None:
+    def __init__(
+        self,
+        chip: Chip = DSPIC30F6014A,
+        *,
+        engine: str = "auto",
+        ipl_slip: int = 0,
+        board: Callable[[Peripherals], Any] | None = None,
+    ) -> None:
         self.chip: Final = chip
         self.record: Final = Record()
         self.events: Final = Events(self.record)
@@ -71,6 +79,8 @@ class Machine:
         self.core: Final = Core(self.record, self.events, self.bus, self.program, chip)
         self.core.exceptions.ipl_slip = ipl_slip
         self._connect(wires)
+        self.board: Final[Any] = board(self.peripherals) if board is not None else None
+        """What `board` made, for example an `emu.boards.epuck.board.Epuck`; its state is part of the record."""
         self.state: Final = self.core.state
         self.w: Final[_WRegisters] = self.core.w
         self.stop_on_fault = True
@@ -115,6 +125,7 @@ class Machine:
         wires.trap = self.core.traps.request_flag
         sequencer.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
         sequencer.wires.power = self._power
+        sequencer.wires.interrupted = lambda: self._interrupt
 
     def _power(self, mode: int, cycle: int) -> None:
         """The CPU stops after `cycle` - 1, or runs again from `cycle`."""
@@ -152,8 +163,7 @@ class Machine:
         if self._interrupt:
             self._interrupt = False
             stop = stop or self.stopped("interrupted")
-        self.events.arrive(state.cycle)
-        return stop
+        return self._arrive() or stop
 
     def run(self, cycles: int | None = None, until: Callable[[], bool] | int | None = None) -> Stop:
         """Run until something stops the machine: at most `cycles` Tcy. `until` is a program address, or a condition
@@ -201,8 +211,7 @@ class Machine:
             stop = Stop("breakpoint", state.pc - 2, state.cycle, str(word))
         except DeviceReset as reset:
             stop = self._reset_by(reset)
-        self.events.arrive(state.cycle)
-        return stop
+        return self._arrive() or stop
 
     def approach(self, limit: int) -> Stop | None:
         """Do what is due before the next instruction, as `step` does first: events, exception entry, sleep up to
@@ -211,6 +220,14 @@ class Machine:
             return None if self.core.sequencer.boundary(limit) else self.stopped("halt")
         except DeviceReset as reset:
             return self._reset_by(reset)
+
+    def _arrive(self) -> Stop | None:
+        """Bring the devices to the present cycle, for whoever looks at the machine between runs."""
+        try:
+            self.events.arrive(self.state.cycle)
+        except DeviceReset as reset:
+            return self._reset_by(reset)
+        return None
 
     def interrupt(self) -> None:
         """Make the current run end at its next boundary (signal handlers)."""
