@@ -99,7 +99,7 @@ _TOKEN = re.compile(
     (?P<num>0[xX][0-9a-fA-F]+|0[bB][01]+|\d+[fb](?![\w.$])|\d+)
   | (?P<limit>\.(?:startof|sizeof|endof)\.\s*\(\s*(?P<sec>[^\s()]+)\s*\))
   | (?P<name>[A-Za-z_.$][\w.$]*)
-  | (?P<char>'(?:\\[0-7]{1,3}|\\x[0-9a-fA-F]{1,2}|\\.|[^\\])'?)
+  | (?P<char>'(?P<inside>\\[0-7]{1,3}|\\x[0-9a-fA-F]{1,2}|\\.|[^\\])'?)
   | (?P<op><<|>>|<=|>=|==|!=|<>|&&|\|\||[-+*/%|&^!~<>()])
   )""",
     re.VERBOSE,
@@ -155,8 +155,11 @@ class _Parser:
             match = _TOKEN.match(text, position)
             if match is None:
                 raise ExprError(f"cannot read {text[position:].strip()!r} in expression {text.strip()!r}")
-            kind = str(match.lastgroup if match.lastgroup != "sec" else "limit")
-            self.tokens.append((kind, match.group().strip()))
+            if match["char"] is not None:
+                self.tokens.append(("char", match["inside"]))
+            else:
+                kind = "limit" if match["limit"] is not None else str(match.lastgroup)
+                self.tokens.append((kind, match.group().strip()))
             position = match.end()
         self.next = 0
         self.depth = 0
@@ -197,10 +200,9 @@ class _Parser:
 
     def _atom(self, kind: str, text: str) -> Tree:
         if kind == "num":
-            return Name(text) if text[-1] in "fb" and text[:2] not in ("0x", "0X", "0b") else _number(text)
+            return Name(text) if text[-1] in "fb" and text[:-1].isdigit() else _number(text)
         if kind == "char":
-            inside = text[1:-1] if len(text) > 2 and text.endswith("'") else text[1:]
-            return unescape(inside)[0]
+            return unescape(text)[0]
         if kind == "limit":
             return Name(re.sub(r"\s", "", text).replace("(", "").replace(")", ""))
         if kind == "name":

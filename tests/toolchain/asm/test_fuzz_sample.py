@@ -1,0 +1,15 @@
+"""A sample of the mutation campaign of `tests/fuzz/fuzz_asm.py`, which `make fuzz` runs at full length."""
+
+import importlib.util
+from pathlib import Path
+
+SCRIPT = Path(__file__).resolve().parents[2] / "fuzz" / "fuzz_asm.py"
+
+
+def test_mutated_sources_and_objects_give_images_or_clean_errors():
+    """No traceback, no hang; every finding has a place. All outcomes must occur, or the mutations are too harsh or mild."""
+    spec = importlib.util.spec_from_file_location("fuzz_asm", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    outcomes = module.campaign(400, seed=20)
+    assert set(outcomes) == {"assembly refused", "link refused", "linked", "object linked", "object refused"}
