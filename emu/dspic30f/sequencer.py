@@ -87,6 +87,8 @@ class Wires:
     clear_watchdog: Callable[[], None] = lambda: None
     power: Callable[[int, int], None] = lambda mode, cycle: None
     """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
+    interrupted: Callable[[], bool] = lambda: False
+    """Somebody wants the run to end now, even if the CPU sleeps."""
 
 
 class Sequencer:
@@ -136,7 +138,7 @@ class Sequencer:
             state.record.u64[self._hold] = 0
         while True:
             if state.mode != RUN and not self._sleep(limit):
-                return events.next_due() != NEVER
+                return self.wires.interrupted() or events.next_due() != NEVER
             last = state.cycle - 1
             if events.deadline > last >= 0:
                 return True
@@ -159,6 +161,8 @@ class Sequencer:
                 state.cycle = max(state.cycle, since + 1)
                 self.wake()
                 break
+            if self.wires.interrupted():
+                return False
             due = events.next_due()
             if due >= limit:
                 if due != NEVER:
