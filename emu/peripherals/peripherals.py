@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from emu.bus import Bus
@@ -85,6 +86,9 @@ class Peripherals:
             self.pmd,
         )
 
+        self.on_restored: Final[list[Callable[[], None]]] = []
+        """Parts of a board that keep something derived from the record."""
+
     def _modules(self) -> dict[str, Peripheral]:
         """Peripherals by the name their PMD bit carries."""
         modules: dict[str, Peripheral] = {"ADC": self.adc, "DCI": self.dci, "I2C": self.i2c}
@@ -137,6 +141,8 @@ class Peripherals:
         """Call after the record was replaced by a snapshot."""
         for device in self.all:
             device.restored()
+        for listener in self.on_restored:
+            listener()
 
     def seconds(self, cycle: int) -> float:
         """Seconds since power-on at `cycle`."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Final
 
 from emu.boards.part import Part
+from emu.events import NEVER
 from emu.peripherals import Peripherals
 
 PIN: Final = "RF6"
@@ -13,6 +13,8 @@ HALF_BIT_SECONDS: Final = 0.889e-3
 """Half of a Manchester bit of 1.778 ms (epuck.md §6)."""
 REPEAT_SECONDS: Final = 113.8e-3
 _BITS: Final = 14
+_WAITING: Final = 64
+"""Frames that can wait for their turn."""
 
 KEYS: Final = {"standby": 12, "swap": 34, "sleep": 42, "ok": 53}
 """Command codes the demonstration programs use (openswarm-original.md §5.6)."""
@@ -29,29 +31,40 @@ class Remote(Part):
         self._toggle: Final = self.cell("toggle", "B")
         self._busy_until: Final = self.cell("busy_until", "Q")
         self._edge: Final = self.slot("edge", self._next_half)
-        self._waiting: Final[deque[tuple[int, int]]] = deque()
+        self._at: Final = self.array("at", "Q", _WAITING)
+        self._frames: Final = self.array("frames", "H", _WAITING)
+        self._head: Final = self.cell("head", "H")
+        self._count: Final = self.cell("count", "H")
         self.pins.set(PIN, 1)
 
     def press(self, command: int | str, address: int = 0, cycle: int | None = None, repeat: int = 1) -> None:
         """Send a command (0..63, or a name of `KEYS`) to a device address (0..31), `repeat` frames of one key press.
 
-        The first frame begins at `cycle` (default: now) or when the last one is over. Raises ValueError, KeyError.
+        The first frame begins at `cycle` (default: now) or when the last one is over. Raises ValueError for numbers
+        out of range or more than 64 frames waiting, KeyError for an unknown name.
         """
         code = KEYS[command] if isinstance(command, str) else command
         if not 0 <= code < 64 or not 0 <= address < 32:
             raise ValueError(f"RC-5 has commands 0..63 and addresses 0..31, not {code} and {address}")
+        if self._count.value + repeat > _WAITING:
+            raise ValueError(f"more than {_WAITING} remote control frames are waiting")
         self._toggle.value ^= 1
         frame = 3 << 12 | self._toggle.value << 11 | address << 6 | code
         begin = max(self.now + 1 if cycle is None else cycle, self._busy_until.value)
         for number in range(repeat):
-            self._waiting.append((begin + number * self.cycles(REPEAT_SECONDS), frame))
+            tail = (self._head.value + self._count.value) % _WAITING
+            self._at[tail], self._frames[tail] = begin + number * self.cycles(REPEAT_SECONDS), frame
+            self._count.value += 1
         self._busy_until.value = begin + repeat * self.cycles(REPEAT_SECONDS)
-        if self._half.value == 0:
+        if self.events.due(self._edge) == NEVER:
             self._take()
 
     def _take(self) -> None:
-        if self._waiting:
-            self._start.value, self._frame.value = self._waiting.popleft()
+        if self._count.value:
+            head = self._head.value
+            self._start.value, self._frame.value = self._at[head], self._frames[head]
+            self._head.value = (head + 1) % _WAITING
+            self._count.value -= 1
             self.events.set(self._edge, self._start.value)
 
     def _next_half(self, due: int) -> None:

@@ -1,0 +1,36 @@
+"""The whole robot: every part of the e-puck joined to a chip's pins (epuck.md §1, §2, §10)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
+from emu.boards.epuck.camera import Camera
+from emu.boards.epuck.motors import Motors
+from emu.boards.epuck.remote import Remote
+from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
+from emu.peripherals import Peripherals
+
+
+class Epuck:
+    """An e-puck of hardware version 1.1 or 1.2: analog accelerometer, nothing at I2C address 0x3C.
+
+    `chip` is `machine.peripherals`. `camera` names the sensor (PO3030K, PO6030K, PO8030D), None leaves it unplugged.
+    Raises ValueError for an unknown sensor or selector position.
+    """
+
+    def __init__(self, chip: Peripherals, *, camera: str | None = "PO6030K", selector: int = 0, seed: int = 0) -> None:
+        self.chip: Final = chip
+        self.leds: Final = Leds(chip)
+        self.motors: Final = Motors(chip)
+        self.selector: Final = Selector(chip, selector)
+        self.battery: Final = Battery(chip)
+        self.ir: Final = Infrared(chip)
+        self.accelerometer: Final = Accelerometer(chip)
+        self.microphones: Final = Microphones(chip)
+        self.remote: Final = Remote(chip)
+        self.bluetooth: Final = Bluetooth(chip, seed=seed)
+        self.codec: Final = Codec(chip)
+        self.camera: Final = Camera(chip, camera) if camera is not None else None
+        if self.camera is not None:
+            chip.on_restored.append(self.camera.restored)

@@ -1,0 +1,283 @@
+"""The image sensors fitted to e-pucks: what their registers mean (epuck.md §7; openswarm-original.md §5.5).
+
+Positions are sensor columns and rows. A column lasts `column_tcy` Tcy, a row is `columns` of them, a frame `rows` rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+WIDTH, HEIGHT = 640, 480
+"""Active pixels of all three sensors."""
+RGB565, YUV, GREY = "rgb565", "yuv", "grey"
+
+ReadRegister = Callable[[int, int], int]
+"""read(bank, register) -> 0..255."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """When lines and bytes come."""
+
+    columns: int
+    rows: int
+    column_tcy: int
+    scale_x: int
+    scale_y: int
+    bytes_per_pixel: int
+    first_column: int
+    """HREF rises here."""
+    end_column: int
+    """HREF is low from here on."""
+    first_row: int
+    end_row: int
+    vsync_row: int
+    vsync_column: int
+    vsync_end_row: int
+    """VSYNC is low from this row on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """What the bytes mean."""
+
+    form: str
+    origin_x: int
+    origin_y: int
+    flip_x: bool
+    flip_y: bool
+    gains: tuple[float, float, float]
+    """Factors on red, green and blue, exposure included."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """One sensor type."""
+
+    name: str
+    identity: tuple[int, int]
+    banks: int
+    bank_register: int | None
+    defaults: Mapping[tuple[int, int], int]
+    timing: Callable[[ReadRegister], Timing]
+    picture: Callable[[ReadRegister], Picture]
+
+
+def _word(read: ReadRegister, bank: int, high: int) -> int:
+    return read(bank, high) << 8 | read(bank, high + 1)
+
+
+def _defaults(text: str) -> dict[tuple[int, int], int]:
+    """`bank:register=value value ...` groups, all hexadecimal; the values go to consecutive registers."""
+    table = {}
+    for group in text.split(";"):
+        place, values = group.split("=")
+        bank, register = (int(part, 16) for part in place.split(":"))
+        for offset, value in enumerate(values.split()):
+            table[bank, register + offset] = int(value, 16)
+    return table
+
+
+# -- PO3030K ----------------------------------------------------------------------------------------------------------
+
+_PO3030K_DIVIDER: Final = (2, 3, 4, 8, 16, 32, 64, 128)  # UNVERIFIED: code 1 is a step between 2 and 4 (§7.3)
+_PO3030K_SCALE: Final = {0x44: 1, 0x11: 2, 0x33: 4}
+_PO3030K_FORM: Final = {0x08: RGB565, 0x02: YUV, 0x0C: GREY}
+_PO3030K_DEFAULTS: Final = _defaults(  # §7.2
+    "0:04=03 53 03 53 00 D1 00 07 03 51 01 E7;0:12=02 02;0:15=10 40 40 40 40 03 E6 00 70 0A 1B 44;0:46=80;0:48=60 96 00"
+    " 7D 00;0:4E=08 0A 70;0:5C=AC 02;0:76=00 1A 2A 37 42 56 68 87 A3 BC D4 EA;0:8E=38 A5 0D 93 2D 06 83 AA 4D 25 25"
+    ";0:9C=96;0:9F=80 80 B6 9D AB 80 00 07 01 E7 00 01;0:AD=9F 22 8C 07 CC 00 70;0:B9=03 E6 07 CC 00 0C"
+    ";0:C1=10 E0 10 E0 80 80 01 A5 02 7A 00 A7 01 47;0:D4=3C 01;0:D8=80"
+)
+
+
+def _po3030k_timing(read: ReadRegister) -> Timing:
+    scale = _PO3030K_SCALE.get(read(0, 0x20), 1)
+    form = _PO3030K_FORM.get(read(0, 0x4E), YUV)
+    # UNVERIFIED: a frame is at least as long as the exposure plus two rows (§7.4)
+    rows = max(_word(read, 0, 0x06) + 1, _word(read, 0, 0x1A) + 2)
+    return Timing(
+        columns=_word(read, 0, 0x04) + 1,
+        rows=rows,
+        column_tcy=_PO3030K_DIVIDER[read(0, 0x1D) >> 4 & 7],
+        scale_x=scale,
+        scale_y=scale,
+        bytes_per_pixel=1 if form == GREY else 2,
+        first_column=_word(read, 0, 0x08),
+        end_column=_word(read, 0, 0x0C) + 1,
+        first_row=_word(read, 0, 0x0A),
+        end_row=_word(read, 0, 0x0E) + 1,
+        vsync_row=_word(read, 0, 0xA5),
+        vsync_column=_word(read, 0, 0xA9),
+        vsync_end_row=_word(read, 0, 0xA7) + 1,
+    )
+
+
+def _po3030k_picture(read: ReadRegister) -> Picture:
+    control = read(0, 0xD4)
+    exposure = 1.0 if control & 0x10 else _word(read, 0, 0xB0) / 0x07CC * read(0, 0x15) / 0x10
+    gains = (read(0, 0x16), (read(0, 0x17) + read(0, 0x19)) / 2, read(0, 0x18))
+    return Picture(
+        form=_PO3030K_FORM.get(read(0, 0x4E), YUV),
+        origin_x=210,
+        origin_y=7,
+        flip_x=bool(read(0, 0x1E) & 0x80),
+        flip_y=bool(read(0, 0x1E) & 0x40),
+        gains=_gains(gains, exposure, balanced=bool(control & 0x20)),
+    )
+
+
+def _gains(registers: tuple[float, float, float], exposure: float, balanced: bool) -> tuple[float, float, float]:
+    """Gain registers are 1.0 at 0x40; automatic white balance is taken as converged."""
+    red, green, blue = (1.0 if balanced else value / 0x40 for value in registers)
+    return red * exposure, green * exposure, blue * exposure
+
+
+# -- PO6030K and PO8030D: banks A, B, C; window and scale in output pixels ---------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Banked:
+    """Where the two banked sensors keep the same things. Pairs are (bank, register)."""
+
+    columns: int
+    rows: int
+    origin_x: int
+    origin_y: int
+    window_x: int
+    """Sensor column of window position 0."""
+    clock: tuple[int, int]
+    dividers: Mapping[int, int]
+    scale_x: tuple[int, int]
+    scale_y: tuple[int, int]
+    form: tuple[int, int]
+    forms: Mapping[int, str]
+    start_x: tuple[int, int]
+    vsync: tuple[int, int]
+    mirror: tuple[int, int]
+    control: tuple[int, int]
+    exposure: tuple[int, int]
+    gains: tuple[int, int]
+
+
+_NOMINAL_EXPOSURE: Final = 0x0008_0000
+"""Exposure registers at which the picture comes out as lit. UNVERIFIED: "8.0 units" in a public driver (§7.6)."""
+
+
+def _banked_timing(chip: _Banked, read: ReadRegister) -> Timing:
+    scale_x = max(read(*chip.scale_x) >> 5, 1)
+    scale_y = max(read(*chip.scale_y) >> 5, 1)
+    form = chip.forms.get(read(*chip.form), YUV)
+    # UNVERIFIED: the pixel behind the register's value is the first, so that drivers get the column they ask for
+    first = chip.window_x + (_word(read, *chip.start_x) + 1) * scale_x
+    return Timing(
+        columns=chip.columns,
+        rows=chip.rows,
+        column_tcy=2 * chip.dividers.get(read(*chip.clock), 1),
+        scale_x=scale_x,
+        scale_y=scale_y,
+        bytes_per_pixel=1 if form == GREY else 2,
+        first_column=min(first, chip.origin_x + WIDTH - 1),
+        end_column=chip.origin_x + WIDTH,
+        first_row=chip.origin_y,
+        end_row=chip.origin_y + HEIGHT,
+        vsync_row=_word(read, *chip.vsync),
+        vsync_column=min(first, chip.origin_x + WIDTH - 1) + 2,
+        vsync_end_row=_word(read, chip.vsync[0], chip.vsync[1] + 2) + 1,
+    )
+
+
+def _banked_picture(chip: _Banked, read: ReadRegister) -> Picture:
+    control = read(*chip.control)
+    bank, first = chip.exposure
+    manual = _word(read, bank, first) << 16 | _word(read, bank, first + 2)
+    exposure = manual / _NOMINAL_EXPOSURE if control & 1 else 1.0
+    bank, first = chip.gains
+    gains = (float(read(bank, first)), float(read(bank, first + 1)), float(read(bank, first + 2)))
+    mirror = read(*chip.mirror)
+    return Picture(
+        form=chip.forms.get(read(*chip.form), YUV),
+        origin_x=chip.origin_x,
+        origin_y=chip.origin_y,
+        flip_x=not mirror & 0x40,  # mounted upside down: the library sets both mirrors (§7.1)
+        flip_y=not mirror & 0x80,
+        gains=_gains(gains, exposure, balanced=not control & 4),
+    )
+
+
+_PO6030K: Final = _Banked(
+    columns=800,
+    rows=500,
+    origin_x=80,
+    origin_y=8,
+    window_x=64,
+    clock=(0, 0x91),
+    dividers=MappingProxyType({0x10: 1, 0x50: 2, 0x90: 4, 0xB0: 8}),
+    scale_x=(1, 0x80),
+    scale_y=(1, 0x81),
+    form=(1, 0x38),
+    forms=MappingProxyType({0x08: RGB565, 0x02: YUV, 0x0D: GREY}),
+    start_x=(1, 0x50),
+    vsync=(1, 0x60),
+    mirror=(0, 0x90),
+    control=(2, 0x04),
+    exposure=(2, 0x2C),
+    gains=(2, 0xA4),
+)
+
+_PO8030D: Final = _Banked(
+    columns=776,  # UNVERIFIED: the public driver allows columns up to 775 and rows up to 515
+    rows=516,
+    origin_x=68,
+    origin_y=4,
+    window_x=0,
+    clock=(0, 0x6A),
+    dividers=MappingProxyType({0x00: 1, 0x02: 2, 0x04: 4, 0x05: 8}),
+    scale_x=(1, 0x93),
+    scale_y=(1, 0x94),
+    form=(1, 0x4E),
+    forms=MappingProxyType({0x30: RGB565, 0x02: YUV, 0x43: GREY}),
+    start_x=(0, 0x08),
+    vsync=(0, 0x10),
+    mirror=(0, 0x6C),
+    control=(2, 0x04),
+    exposure=(2, 0x12),
+    gains=(0, 0x23),
+)
+
+SENSORS: Final[Mapping[str, Sensor]] = MappingProxyType(
+    {
+        sensor.name: sensor
+        for sensor in (
+            Sensor("PO3030K", (0x30, 0x30), 1, None, _PO3030K_DEFAULTS, _po3030k_timing, _po3030k_picture),
+            Sensor(
+                "PO6030K",
+                (0x60, 0x30),
+                4,
+                0x03,
+                _defaults(
+                    "0:90=00 10;1:38=02;1:50=00 0F;1:60=00 08 01 E7;1:68=00;1:80=20 20 01;2:04=98;2:2C=00 08 00 00"
+                    ";2:A4=40 40 40"
+                ),
+                lambda read: _banked_timing(_PO6030K, read),
+                lambda read: _banked_picture(_PO6030K, read),
+            ),
+            Sensor(
+                "PO8030D",
+                (0x80, 0x30),
+                4,
+                0x03,
+                _defaults(
+                    "0:08=00 43;0:10=00 04 01 E3;0:23=40 40 40;0:5B=C8;0:6A=00;0:6C=00;1:4E=02;1:93=20 20;1:B7=00"
+                    ";2:04=98;2:12=00 08 00 00"
+                ),
+                lambda read: _banked_timing(_PO8030D, read),
+                lambda read: _banked_picture(_PO8030D, read),
+            ),
+        )
+    }
+)
+"""By name. Defaults not in the library's tables are UNVERIFIED; drivers write all of them."""

@@ -1,0 +1,184 @@
+"""A script of what happens to the robot: one event per line, with its time.
+
+    # time  what      arguments
+    0.5s    selector  3
+    1.2s    remote    ok              or: remote 53 0 (command, address)
+    1.5s    ir        0 20            distance in mm in front of sensor 0 (inf = nothing)
+    1.5s    light     3 2500          ambient counts at sensor 3
+    2.0s    battery   3.3             volts
+    2.5s    tilt      0.1 0 0.98      acceleration x y z in g
+    3.0s    uart1     "hello\\r"       bytes for UART1 or uart2
+    4.0s    pin       RF6 0           any input pin
+    5.0s    camera    unplug          or: plug
+
+Times are seconds (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep the order of the file.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from emu.boards.epuck.board import Epuck
+from emu.boards.epuck.remote import KEYS
+from emu.boards.part import Part
+from emu.peripherals.pins import parse_pin
+
+Action = Callable[[], None]
+
+
+class StimulusError(ValueError):
+    """A stimulus file is wrong: the message names file, line and what was expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One line: what to do at `cycle`."""
+
+    cycle: int
+    line: int
+    action: Action
+
+
+def parse(board: Epuck, text: str, name: str = "stimulus") -> list[Step]:
+    """Steps in order of time. Raises StimulusError."""
+    steps = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        try:
+            words = shlex.split(line, comments=True, posix=False)
+            if words:
+                steps.append(Step(_time(board, words[0]), number, _action(board, words[1:])))
+        except (ValueError, SyntaxError, LookupError) as error:
+            raise StimulusError(f"{name}:{number}: {error}") from None
+    return sorted(steps, key=lambda step: step.cycle)
+
+
+def _time(board: Epuck, word: str) -> int:
+    seconds = word.endswith("s")
+    value = float(word[:-1]) if seconds else float(int(word))
+    if not 0 <= value < math.inf:
+        raise ValueError(f"a time is seconds like 1.5s or a number of cycles, not {word!r}")
+    return round(value * board.chip.fcy) if seconds else int(value)
+
+
+def _action(board: Epuck, words: list[str]) -> Action:
+    kinds: dict[str, Callable[[Epuck, list[str]], Action]] = {
+        "selector": _selector,
+        "remote": _remote,
+        "ir": lambda b, w: _two(w, lambda sensor, mm: b.ir.set_distance(_sensor(sensor), mm)),
+        "light": lambda b, w: _two(w, lambda sensor, counts: b.ir.set_ambient(_sensor(sensor), int(counts))),
+        "battery": _battery,
+        "tilt": _tilt,
+        "uart1": lambda b, w: _uart(b, 1, w),
+        "uart2": lambda b, w: _uart(b, 2, w),
+        "pin": _pin,
+        "camera": _camera,
+    }
+    if not words or words[0] not in kinds:
+        raise ValueError(f"expected one of {', '.join(kinds)} behind the time")
+    return kinds[words[0]](board, words[1:])
+
+
+def _count(words: list[str], *allowed: int) -> None:
+    if len(words) not in allowed:
+        raise ValueError(f"expected {' or '.join(map(str, allowed))} arguments, found {len(words)}")
+
+
+def _sensor(number: float) -> int:
+    if number not in range(8):
+        raise ValueError(f"sensors are 0 to 7, not {number:g}")
+    return int(number)
+
+
+def _two(words: list[str], action: Callable[[float, float], None]) -> Action:
+    _count(words, 2)
+    first, second = (float(word) for word in words)
+    _sensor(first)
+    return lambda: action(first, second)
+
+
+def _selector(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1)
+    position = int(words[0])
+    if not 0 <= position < 16:
+        raise ValueError(f"the selector has positions 0 to 15, not {position}")
+    return lambda: setattr(board.selector, "position", position)
+
+
+def _remote(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1, 2)
+    command = KEYS[words[0]] if words[0] in KEYS else int(words[0])
+    address = int(words[1]) if len(words) > 1 else 0
+    if not 0 <= command < 64 or not 0 <= address < 32:
+        raise ValueError("RC-5 has commands 0 to 63 and addresses 0 to 31")
+    return lambda: board.remote.press(command, address)
+
+
+def _battery(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1)
+    volts = float(words[0])
+    if not 0 <= volts <= 5:
+        raise ValueError(f"a battery has 0 to 5 V, not {volts:g}")
+    return lambda: setattr(board.battery, "volts", volts)
+
+
+def _tilt(board: Epuck, words: list[str]) -> Action:
+    _count(words, 3)
+    x, y, z = (float(word) for word in words)
+    return lambda: board.accelerometer.set_g(x, y, z)
+
+
+def _uart(board: Epuck, number: int, words: list[str]) -> Action:
+    _count(words, 1)
+    text = ast.literal_eval(words[0])
+    if not isinstance(text, str):
+        raise ValueError('expected a quoted text like "hello\\r"')
+    data = text.encode("latin-1")
+    uart = board.chip.uart[number]
+    return lambda: uart.feed(data, uart.now + 1)
+
+
+def _pin(board: Epuck, words: list[str]) -> Action:
+    _count(words, 2)
+    name, level = words
+    parse_pin(name)
+    if level not in ("0", "1"):
+        raise ValueError(f"a level is 0 or 1, not {level!r}")
+    return lambda: board.chip.pins.set(name, int(level))
+
+
+def _camera(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1)
+    camera = board.camera
+    if camera is None or words[0] not in ("plug", "unplug"):
+        raise ValueError("expected `plug` or `unplug`, on a robot with a camera")
+    return camera.plug if words[0] == "plug" else camera.unplug
+
+
+class Stimulus(Part):
+    """Plays a script on a board. The position is in the record, so snapshots continue where they were taken."""
+
+    def __init__(self, board: Epuck, steps: list[Step]) -> None:
+        super().__init__("stimulus", board.chip)
+        self._steps = steps
+        self._next = self.cell("next")
+        self._due = self.slot("next", self._play)
+        if steps:
+            self.events.set(self._due, steps[0].cycle)
+
+    @classmethod
+    def load(cls, board: Epuck, path: Path) -> Stimulus:
+        """Play the file at `path`. Raises StimulusError, OSError."""
+        return cls(board, parse(board, path.read_text(encoding="utf-8"), str(path)))
+
+    def _play(self, due: int) -> None:
+        while self._next.value < len(self._steps) and self._steps[self._next.value].cycle <= due:
+            step = self._steps[self._next.value]
+            self._next.value += 1
+            step.action()
+        if self._next.value < len(self._steps):
+            self.events.set(self._due, self._steps[self._next.value].cycle)

@@ -1,0 +1,72 @@
+"""What a person standing beside the robot would see, as lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Final
+
+from emu.boards.epuck.board import Epuck
+
+TOPICS: Final = ("leds", "motors", "uart1", "uart2", "sound")
+_MOTOR_SECONDS: Final = 0.1
+"""Motors are reported at most this often."""
+
+
+class Watch:
+    """Writes a line, with its time, when something visible changes. `write` gets lines without newline.
+
+    Raises ValueError for a topic that is not one of TOPICS.
+    """
+
+    def __init__(self, board: Epuck, topics: Iterable[str], write: Callable[[str], None]) -> None:
+        self._board: Final = board
+        self._write: Final = write
+        self._reported = [0, 0]
+        self._next_report = 0
+        self._text: Final = {1: bytearray(), 2: bytearray()}
+        for topic in topics:
+            if topic not in TOPICS:
+                raise ValueError(f"cannot watch {topic!r}; expected some of {', '.join(TOPICS)}")
+            getattr(self, f"_watch_{topic}")()
+
+    def _line(self, cycle: int, text: str) -> None:
+        self._write(f"{self._board.chip.seconds(cycle):12.6f} s  {text}")
+
+    def _watch_leds(self) -> None:
+        self._board.leds.on_change = lambda _name, _lit, cycle: self._line(
+            cycle, "leds " + (" ".join(self._board.leds.lit) or "off")
+        )
+
+    def _watch_motors(self) -> None:
+        for motor in (self._board.motors.left, self._board.motors.right):
+            motor.on_step = self._stepped
+
+    def _stepped(self, cycle: int, _direction: int) -> None:
+        """The step being reported is counted already."""
+        if cycle < self._next_report:
+            return
+        elapsed = max(cycle - self._next_report, 0) / self._board.chip.fcy + _MOTOR_SECONDS
+        steps = [self._board.motors.left.steps, self._board.motors.right.steps]
+        rates = [(now - before) / elapsed for now, before in zip(steps, self._reported, strict=True)]
+        self._reported = steps
+        self._next_report = cycle + round(_MOTOR_SECONDS * self._board.chip.fcy)
+        self._line(cycle, f"motors {steps[0]} {steps[1]} steps, about {rates[0]:.0f} {rates[1]:.0f} steps/s")
+
+    def _watch_uart1(self) -> None:
+        self._board.bluetooth.on_byte = partial(self._byte, 1)
+
+    def _watch_uart2(self) -> None:
+        self._board.chip.uart[2].on_byte = partial(self._byte, 2)
+
+    def _byte(self, number: int, byte: int, start: int) -> None:
+        """Text is reported by lines."""
+        text = self._text[number]
+        if byte not in (0x0A, 0x0D):
+            text.append(byte & 0xFF)
+        elif text:
+            self._line(start, f"uart{number} {text.decode('latin-1')!r}")
+            text.clear()
+
+    def _watch_sound(self) -> None:
+        self._board.codec.on_word = lambda word, cycle: self._line(cycle, f"sound {word:04x}")

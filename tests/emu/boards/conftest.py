@@ -1,0 +1,55 @@
+"""A robot whose registers are accessed at chosen cycles, without running a program."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu.boards.epuck.board import Epuck
+from emu.machine import Machine
+
+
+class Robot:
+    """Time only moves by `at`; everything else happens in the current cycle."""
+
+    def __init__(self, **options) -> None:
+        self.machine = Machine(engine="plain")
+        self.board = Epuck(self.machine.peripherals, **options)
+        self.events = self.machine.events
+
+    def at(self, cycle: int) -> Robot:
+        """Make `cycle` the cycle of the next access."""
+        assert cycle >= self.events.now
+        self.events.arrive(cycle)
+        self.events.settle(cycle)
+        return self
+
+    def later(self, cycles: int) -> Robot:
+        return self.at(self.events.now + cycles)
+
+    def read(self, name: str) -> int:
+        return self.machine.bus.read(self.machine.chip.sfrs[name].address)
+
+    def write(self, name: str, value: int) -> None:
+        self.machine.bus.write(self.machine.chip.sfrs[name].address, value)
+
+    def output(self, pin: str, level: int) -> None:
+        """Drive a port pin as a program does."""
+        letter, mask = pin[1], 1 << int(pin[2:])
+        tris, lat = self.read("TRIS" + letter), self.read("LAT" + letter)
+        self.write("LAT" + letter, lat | mask if level else lat & ~mask)
+        self.write("TRIS" + letter, tris & ~mask)
+
+    def configure(self, registers) -> None:
+        """Write camera registers over I2C's device side: (bank, register, value)."""
+        camera = self.board.camera
+        for bank, register, value in registers:
+            for number, byte in ((camera.sensor.bank_register, bank), (register, value)):
+                if number is not None:
+                    assert camera.start(False, self.events.now)
+                    camera.write(number, self.events.now)
+                    camera.write(byte, self.events.now)
+
+
+@pytest.fixture
+def robot() -> Robot:
+    return Robot()

@@ -1,0 +1,334 @@
+"""The camera (epuck.md §7). A driver in a few lines of Python reads the bus when the library's handler would."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from emu.boards.epuck.camera import HREF, PCLK, VSYNC
+from emu.boards.epuck.sensors import SENSORS
+
+from .conftest import Robot
+
+FCY = 14_745_600
+FIRST_READ = 17
+"""Tcy from an HREF edge to the first read of PORTD in the library's handler: 16 to 18 (§7.5)."""
+
+
+def po6030(x=240, y=160, scale=4, form="rgb565"):
+    """Register writes of the fast driver for PO6030K (openswarm-original.md §5.5)."""
+    speed = {("grey", 1): 0x90, ("grey", 2): 0x50, ("grey", 4): 0x10, 1: 0xB0, 2: 0x90, 4: 0x50}
+    start = (x + 16 - scale) // scale - 1
+    row = y + 8 - scale
+    return [
+        (1, 0x51, start & 0xFF),
+        (1, 0x50, start >> 8),
+        (1, 0x60, row >> 8),
+        (1, 0x61, row & 0xFF),
+        (1, 0x62, 488 >> 8),
+        (1, 0x63, 488 & 0xFF),
+        (0, 0x91, speed[("grey", scale) if form == "grey" else scale]),
+        (1, 0x38, {"rgb565": 0x08, "grey": 0x0D, "yuv": 0x02}[form]),
+        (1, 0x80, 0x20 * scale),
+        (1, 0x81, 0x20 * scale),
+        (1, 0x82, 1),
+        (0, 0x90, 0xC0),
+    ]
+
+
+def po3030(x=240, y=160, scale=4, form="rgb565"):
+    """Register writes of the fast driver for PO3030K (§7.5)."""
+    bytes_per_pixel = 1 if form == "grey" else 2
+    divider = {2: 0, 4: 2, 8: 3, 16: 4}[8 * bytes_per_pixel // scale]
+    x1, y1 = x + 210 - scale - 1, y + 7 - scale
+    words = {0x08: x1, 0x0A: y1, 0x0C: 851, 0x0E: 488, 0xA5: y1, 0xA7: 487, 0xA9: x1 + 2}
+    writes = [(0, reg + i, byte) for reg, word in words.items() for i, byte in enumerate(divmod(word, 256))]
+    writes.append((0, 0x4E, {"rgb565": 0x08, "grey": 0x0C, "yuv": 0x02}[form]))
+    writes.append((0, 0x1D, divider << 4))
+    writes.append((0, 0x20, {1: 0x44, 2: 0x11, 4: 0x33}[scale]))
+    return writes
+
+
+def scene():
+    """A picture in which every pixel tells its own place, as far as RGB565 can."""
+    y, x = np.mgrid[0:480, 0:640]
+    return np.stack([(x // 3) & 0xF8, (y // 2) & 0xFC, (x * 7 + y * 13) & 0xF8], axis=2).astype(np.uint8)
+
+
+def capture(robot, lines, bytes_per_line, skip_lines=0):
+    """T5 counts VSYNC, T4 counts HREF; PORTD is read every 8 Tcy from 17 Tcy behind the HREF edge."""
+    camera = robot.board.camera
+    robot.write("TMR5", 0)
+    robot.write("PR5", 1)
+    robot.write("TMR4", skip_lines)
+    robot.write("PR4", skip_lines + 1)
+    robot.write("T5CON", 0x8002)
+    robot.write("IFS1", 0)
+    while not robot.read("IFS1") & 1 << 6:
+        robot.at(robot.machine.peripherals.kit.bus.events.next_due())
+    robot.write("T5CON", 0)
+    robot.write("T4CON", 0x8002)
+    rows = []
+    for _ in range(lines):
+        robot.write("IFS1", 0)
+        while not robot.read("IFS1") & 1 << 5:
+            robot.at(robot.events.next_due())
+        robot.write("TMR4", 0)
+        edge = robot.events.now - 2  # an edge in c raises the flag in c + 2
+        assert camera.sync_levels(edge) & HREF
+        assert not camera.sync_levels(edge - 1) & HREF
+        data = []
+        for index in range(bytes_per_line):
+            robot.at(edge + FIRST_READ + 8 * index)
+            data.append(robot.read("PORTD") >> 8)
+        rows.append(data)
+    robot.write("T4CON", 0)
+    return np.array(rows, dtype=np.uint8)
+
+
+def rgb565(pixels):
+    red, green, blue = (pixels[..., channel].astype(int) for channel in range(3))
+    words = (red >> 3) << 11 | (green >> 2) << 5 | blue >> 3
+    return np.stack([words >> 8, words & 0xFF], axis=-1)
+
+
+def test_openswarm_window_is_captured_pixel_by_pixel():
+    """§7.5: 160 x 160 centred, zoom 8: QQVGA in the sensor, every second pixel and line in software."""
+    robot = Robot()
+    picture = scene()
+    robot.board.camera.show(picture)
+    robot.configure(po6030())
+    data = capture(robot, 20, 2 * 40, skip_lines=1)
+    pixels = data.reshape(20, 40, 2)[:, ::2]
+    assert np.array_equal(pixels, rgb565(picture[160:320:8, 240:400:8]))
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(1, -1), (2, -1), (4, -1)])
+def test_po3030k_rgb_window_begins_one_column_early(scale, shift):
+    """§7.5: the first stored pixel is column x - 1 in every RGB mode."""
+    robot = Robot(camera="PO3030K")
+    picture = scene()
+    robot.board.camera.show(picture)
+    robot.configure(po3030(scale=scale))
+    data = capture(robot, 3, 2 * 10).reshape(3, 10, 2)
+    columns = 240 + shift + scale * np.arange(10)
+    rows = 160 + scale * np.arange(3)
+    assert np.array_equal(data, rgb565(picture[rows][:, columns]))
+
+
+@pytest.mark.parametrize(("scale", "shift"), [(1, 0), (2, 1), (4, 3)])
+def test_po3030k_grey_window(scale, shift):
+    """§7.5: grey starts at x, x + 1, x + 3 for VGA, QVGA, QQVGA."""
+    robot = Robot(camera="PO3030K")
+    ramp = np.tile((np.arange(640) // 4).astype(np.uint8) + 40, (480, 1))
+    ramp[:, ::4] += 90
+    robot.board.camera.show(ramp)
+    robot.configure(po3030(scale=scale, form="grey"))
+    data = capture(robot, 2, 12)
+    assert np.array_equal(data[0], ramp[160, 240 + shift + scale * np.arange(12)])
+
+
+@pytest.mark.parametrize(
+    ("sensor", "writes", "frame", "fps"),
+    [
+        ("PO6030K", po6030(), 1_600_000, 9.216),
+        ("PO6030K", po6030(form="grey"), 800_000, 18.432),
+        ("PO6030K", po6030(scale=1), 6_400_000, 2.304),
+        ("PO3030K", po3030(), 3_408_000, 4.33),
+        ("PO3030K", po3030(form="grey"), 1_704_000, 8.65),
+        ("PO3030K", po3030(scale=2), 6_816_000, 2.16),
+        ("PO3030K", po3030(scale=1), 13_632_000, 1.08),
+    ],
+)
+def test_frame_rates(sensor, writes, frame, fps):
+    """§7.4, §7.1: 800 x 500 or 852 x 1000 columns of N Tcy."""
+    robot = Robot(camera=sensor)
+    robot.configure(writes)
+    assert robot.board.camera.frame_tcy == frame
+    assert robot.board.camera.frames_per_second == pytest.approx(fps, rel=2e-3)
+
+
+@pytest.mark.parametrize(("scale", "form", "line"), [(4, "rgb565", 13632), (1, "rgb565", 13632), (2, "grey", 6816)])
+def test_line_spacing_of_the_fast_driver_is_the_same_in_every_mode(scale, form, line):
+    """§7.4: 6816 grey, 13632 RGB; one byte every 8 Tcy."""
+    robot = Robot(camera="PO3030K")
+    robot.configure(po3030(scale=scale, form=form))
+    camera = robot.board.camera
+    assert camera.href_cycle(1) - camera.href_cycle(0) == line
+    assert camera.byte_tcy == 8
+
+
+def test_short_exposure_shortens_the_frame_of_the_po3030k():
+    """§7.4: rows = max(852, integration + 2)."""
+    robot = Robot(camera="PO3030K")
+    robot.configure([*po3030(), (0, 0x1A, 0x01), (0, 0x1B, 0x00)])
+    assert robot.board.camera.frame_tcy == 852 * 852 * 4
+
+
+def test_vsync_rises_two_columns_behind_href_of_its_row():
+    """§7.4: 2 N Tcy; the handler therefore takes the next line."""
+    robot = Robot(camera="PO3030K")
+    robot.configure(po3030())
+    camera = robot.board.camera
+    rise = camera.edge_cycle(VSYNC, 1)
+    assert rise - camera.href_cycle(0) == 8
+    assert camera.sync_levels(rise) & VSYNC
+    assert not camera.sync_levels(rise - 1) & VSYNC
+
+
+@pytest.mark.parametrize("sensor", sorted(SENSORS))
+@pytest.mark.parametrize("mask", [HREF, VSYNC, PCLK])
+def test_edge_arithmetic_agrees_with_the_levels(sensor, mask):
+    """Closed forms against stepping through the levels, around line and frame ends."""
+    robot = Robot(camera=sensor)
+    robot.configure({"PO3030K": [], "PO6030K": [(0, 0x91, 0x90)], "PO8030D": [(0, 0x6A, 0x04)]}[sensor])
+    camera = robot.board.camera
+    number, checked = 1, 0
+    while checked < 60:
+        cycle = camera.edge_cycle(mask, number)
+        assert camera.sync_levels(cycle) & mask
+        assert not camera.sync_levels(cycle - 1) & mask
+        assert (camera.edges(mask, cycle - 1), camera.edges(mask, cycle)) == (number - 1, number)
+        number += 1 if checked % 3 else max(camera._edges_per_frame(mask) * 3 // 10, 1)
+        checked += 1
+
+
+def test_byte_stands_on_the_bus_from_half_a_byte_before_to_half_behind():
+    """§7.5: byte k for HREF + 8 k - 4 <= t < HREF + 8 k + 4."""
+    robot = Robot()
+    robot.board.camera.show(np.full((480, 640, 3), 255, np.uint8))
+    robot.configure(po6030())
+    camera = robot.board.camera
+    edge = camera.href_cycle(30)
+    assert [camera.bits(edge + t) >> 8 for t in (-5, -4, 3)] == [0, 255, 255]
+    last = edge + 8 * camera.line_bytes - 4
+    assert [camera.bits(t) >> 8 for t in (last - 1, last)] == [255, 0]
+
+
+def test_mirrors_turn_the_picture():
+    """§7.1: PO6030K is mounted upside down; without the mirror bits the picture is turned by 180 degrees."""
+    robot = Robot()
+    picture = scene()
+    robot.board.camera.show(picture)
+    robot.configure([*po6030(), (0, 0x90, 0x00)])
+    data = capture(robot, 2, 8).reshape(2, 4, 2)
+    rows, columns = 479 - (160 + 4 * np.arange(2)), 639 - (240 + 4 * np.arange(4))
+    assert np.array_equal(data, rgb565(picture[rows][:, columns]))
+
+
+def test_yuv_and_grey_follow_bt601():
+    """§7.4: U Y V Y; grey is Y."""
+    robot = Robot()
+    robot.board.camera.show(np.full((480, 640, 3), (200, 100, 50), np.uint8))
+    robot.configure(po6030(form="yuv"))
+    luma = (77 * 200 + 150 * 100 + 29 * 50 + 128) >> 8
+    data = capture(robot, 1, 8)[0]
+    assert list(data[1::2]) == [luma] * 4
+    assert data[0] != data[2]
+    robot = Robot()
+    robot.board.camera.show(np.full((480, 640, 3), (200, 100, 50), np.uint8))
+    robot.configure(po6030(form="grey"))
+    assert set(capture(robot, 1, 8)[0]) == {luma}
+
+
+def test_gain_and_exposure_registers_scale_the_picture():
+    """§7.2, §7.6: gains 0x40 = 1.0, automatic control off."""
+    robot = Robot()
+    robot.board.camera.show(np.full((480, 640, 3), 64, np.uint8))
+    off = (2, 0x04, 0x98 | 5)
+    robot.configure([*po6030(), off, (2, 0xA4, 0x80), (2, 0xA5, 0x40), (2, 0xA6, 0x20)])
+    assert list(capture(robot, 1, 2)[0]) == list(rgb565(np.array([128, 64, 32])))
+    robot.configure([(2, 0x2D, 0x10)])  # twice the exposure
+    assert list(capture(robot, 1, 2)[0]) == list(rgb565(np.array([255, 128, 64])))
+
+
+@pytest.mark.parametrize(("sensor", "identity"), [("PO3030K", 0x3030), ("PO6030K", 0x6030), ("PO8030D", 0x8030)])
+def test_identity_over_i2c(sensor, identity):
+    """§7.1: registers 0 and 1 at 0xDC/0xDD, read with the I2C module."""
+    robot = Robot(camera=sensor)
+    robot.write("I2CBRG", 150)
+    robot.write("I2CCON", 0x9000)
+
+    def operation(name, value):
+        robot.write("IFS0", 0)
+        robot.write(name, value)
+        while not robot.read("IFS0") & 1 << 14:
+            robot.later(50)
+
+    def register(number):
+        operation("I2CCON", 0x9001)
+        operation("I2CTRN", 0xDC)
+        operation("I2CTRN", number)
+        operation("I2CCON", 0x9002)
+        operation("I2CTRN", 0xDD)
+        assert not robot.read("I2CSTAT") & 0x8000
+        operation("I2CCON", 0x9008)
+        value = robot.read("I2CRCV")
+        operation("I2CCON", 0x9030)
+        operation("I2CCON", 0x9004)
+        return value
+
+    assert register(0) << 8 | register(1) == identity
+
+
+def test_reset_line_stops_the_sensor_and_clears_its_registers(robot):
+    """§2: RC13 = 0."""
+    robot.configure([(1, 0x80, 0x80)])
+    robot.output("RC13", 0)
+    camera = robot.board.camera
+    assert not camera.start(False, 10)
+    assert camera.edge_cycle(HREF, 1) > 1 << 60
+    robot.at(1000).output("RC13", 1)
+    assert camera.register(1, 0x80) == 0x20
+    assert camera.start(False, 1010)
+    assert camera.href_cycle(0) > 1000
+
+
+def test_unplugged_camera_gives_neither_answers_nor_edges(robot):
+    """Fault input: nothing at 0x6E, no VSYNC to count."""
+    robot.write("PR5", 1)
+    robot.write("T5CON", 0x8002)
+    robot.board.camera.unplug()
+    robot.at(20_000_000)
+    assert not robot.read("IFS1") & 1 << 6
+    assert 0x6E not in robot.board.chip.i2c.wire.devices
+    robot.board.camera.plug()
+    robot.at(40_000_000)
+    assert robot.read("IFS1") & 1 << 6
+
+
+def test_lines_of_a_moving_scene_are_seen_when_they_are_read_out(robot):
+    """Rolling shutter: the source gets the cycle of each line."""
+    seen = []
+
+    def rows(y, cycle):
+        seen.append((y, cycle))
+        return np.zeros((640, 3), np.uint8)
+
+    robot.board.camera.look(rows)
+    robot.configure(po6030())
+    capture(robot, 3, 4)
+    line = 800 * 4 * 4
+    assert [y for y, _ in seen] == [160, 164, 168]
+    assert [later - seen[0][1] for _, later in seen] == [0, line, 2 * line]
+
+
+def test_snapshot_restores_registers_and_timing(robot):
+    """State is in the record; what is derived from it follows."""
+    robot.configure(po6030())
+    state = robot.machine.snapshot()
+    frame = robot.board.camera.frame_tcy
+    robot.configure([(1, 0x80, 0x20), (0, 0x91, 0xB0)])
+    assert robot.board.camera.frame_tcy != frame
+    robot.machine.restore(state)
+    assert robot.board.camera.frame_tcy == frame
+
+
+def test_pictures_of_any_size_are_scaled_and_bad_shapes_refused(robot):
+    """Grey, RGB and RGBA are pictures."""
+    robot.board.camera.show(np.zeros((3, 4), np.uint8))
+    robot.board.camera.show(np.zeros((30, 40, 4), np.uint8))
+    with pytest.raises(ValueError, match="picture is height x width"):
+        robot.board.camera.show(np.zeros((3, 4, 2), np.uint8))
+    with pytest.raises(ValueError, match="no sensor"):
+        Robot(camera="OV7670")

@@ -1,0 +1,283 @@
+"""The parts of the e-puck but for its camera (epuck.md; sections cited)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from emu.boards.epuck.analog import reflection_at
+from emu.boards.epuck.simple import LED_PINS
+
+from .conftest import Robot
+
+FCY = 14_745_600
+PHASES = [0xA, 0x6, 0x5, 0x9]
+
+
+# -- LEDs, selector, battery ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "pin"), list(LED_PINS.items()))
+def test_led_is_lit_while_its_pin_is_driven_high(robot, name, pin):
+    """§2: note that LED3 is RA12 and LED4 is RA10."""
+    robot.output(pin, 1)
+    assert robot.board.leds.lit == (name,)
+    robot.output(pin, 0)
+    assert robot.board.leds.lit == ()
+
+
+def test_selector_shows_its_position_on_port_g(robot):
+    """§2: S0 + 2 S1 + 4 S2 + 8 S3 on RG6..RG9."""
+    robot.board.selector.position = 11
+    assert robot.at(2).read("PORTG") >> 6 & 0xF == 11
+    with pytest.raises(ValueError, match="positions 0 to 15"):
+        robot.board.selector.position = 16
+
+
+def test_low_battery_pulls_its_line_down(robot):
+    """§2: RF1 = 0 below 3.4 V."""
+    assert robot.at(2).read("PORTF") & 2
+    robot.board.battery.volts = 3.39
+    assert not robot.at(4).read("PORTF") & 2
+
+
+# -- motors -----------------------------------------------------------------------------------------------------------
+
+
+def drive(robot, shift, indices, period=1000):
+    """Write phase patterns bit by bit, as BSET and BCLR do: one bit a cycle."""
+    robot.write("TRISD", 0xFF00)
+    for index in indices:
+        target = PHASES[index % 4] if index is not None else 0
+        for bit in range(4):
+            latch = robot.read("LATD")
+            mask = 1 << shift + bit
+            robot.write("LATD", latch | mask if target >> bit & 1 else latch & ~mask)
+            robot.later(1)
+        robot.later(period - 4)
+
+
+def test_right_motor_goes_forward_with_rising_and_left_with_falling_phases(robot):
+    """§3: 5000 steps each; intermediate patterns of the bit-by-bit writes do not count."""
+    drive(robot, 4, range(5001))
+    drive(robot, 0, range(5000, -1, -1))
+    motors = robot.board.motors
+    assert (motors.left.steps, motors.right.steps) == (5000, 5000)
+    assert (motors.left.lost, motors.left.illegal, motors.right.lost, motors.right.illegal) == (0, 0, 0, 0)
+
+
+def test_reversing_counts_backward(robot):
+    """§3."""
+    drive(robot, 4, [0, 1, 2, 3, 2, 1, 0, 3, 2])
+    assert robot.board.motors.right.steps == 3 - 5
+
+
+def test_jump_by_two_phases_loses_the_step(robot):
+    """§3: d = 2: no motion."""
+    drive(robot, 4, [0, 2, 3])
+    assert (robot.board.motors.right.steps, robot.board.motors.right.lost) == (1, 1)
+
+
+def test_standing_pattern_that_is_no_phase_is_counted_as_illegal(robot):
+    """§3: all four patterns have two coils on."""
+    robot.write("TRISD", 0xFF00)
+    robot.write("LATD", 0x0F)
+    assert robot.at(15).board.motors.left.illegal == 0
+    assert robot.at(16).board.motors.left.illegal == 1
+
+
+def test_coils_off_keep_the_rotor_in_place(robot):
+    """§3: power save switches the coils off between steps."""
+    drive(robot, 4, [0, None, 1, None, 2])
+    assert robot.board.motors.right.steps == 2
+
+
+def test_coil_time_is_counted_to_the_cycle(robot):
+    """§3: on from 11 to 111."""
+    robot.write("TRISD", 0xFF00)
+    robot.at(10).write("LATD", 0x5)
+    robot.at(110).write("LATD", 0)
+    assert robot.at(500).board.motors.left.coil_cycles == 100
+
+
+# -- infrared ---------------------------------------------------------------------------------------------------------
+
+
+def convert(robot, channel):
+    """One polled conversion as the library does it (chip reference §13)."""
+    robot.write("ADPCFG", 0)
+    robot.write("ADCON1", 0)
+    robot.write("ADCON3", 0x12)
+    robot.write("ADCHS", channel)
+    robot.write("ADCON1", 0x8000)
+    robot.write("ADCON1", 0x8002)
+    robot.later(20)
+    robot.write("ADCON1", 0x8000)
+    robot.later(140)
+    return robot.read("ADCBUF0")
+
+
+PULSES = ["RF7", "RF8", "RG0", "RG1"]
+
+
+@pytest.mark.parametrize("sensor", range(8))
+def test_reflection_is_seen_only_under_the_sensors_own_pulse_line(robot, sensor):
+    """§5: line n lights n and n + 4; raw falls by the reflection after 350 us."""
+    robot.board.ir.set_distance(sensor, 20)
+    assert convert(robot, 8 + sensor) == 3800
+    robot.output(PULSES[(sensor + 1) % 4], 1)
+    robot.later(6000)
+    assert convert(robot, 8 + sensor) == 3800
+    robot.output(PULSES[sensor % 4], 1)
+    robot.later(5168)
+    assert 3800 - convert(robot, 8 + sensor) == pytest.approx(857, abs=5)
+
+
+@pytest.mark.parametrize(
+    ("mm", "counts"),
+    [(0, 3788), (10, 3548), (20, 857), (30, 474), (40, 296), (50, 205), (60, 153), (80, 84), (100, 53), (150, 0)],
+)
+def test_distance_sweep_gives_the_reference_curve(robot, mm, counts):
+    """§5 table, read as the library does: ambient minus lit."""
+    robot.board.ir.set_distance(2, mm)
+    dark = convert(robot, 10)
+    robot.output("RG0", 1)
+    robot.later(5168)
+    assert dark - convert(robot, 10) == pytest.approx(counts, rel=0.005, abs=1)
+
+
+def test_curve_falls_everywhere():
+    """§5: log-linear between the points of the table."""
+    values = [reflection_at(0.5 * step) for step in range(201)]
+    assert all(near > far for near, far in pairwise(values))
+
+
+def test_receiver_settles_with_its_time_constant(robot):
+    """§5, §10: tau 60 us = 885 Tcy: 63 % after tau, more than 99 % after 300 us."""
+    ir = robot.board.ir
+    ir.set_distance(0, 10)
+    robot.at(1000).output("RF7", 1)
+    lowered = [3800 - (ir._level(0, 1001 + cycles) >> 4) for cycles in (0, 885, 4424)]
+    assert lowered[0] == 0
+    assert lowered[1] == pytest.approx(3548 * 0.632, rel=0.002)
+    assert lowered[2] > 3548 * 0.99
+
+
+def test_accelerometer_at_rest_reads_one_g_on_z(robot):
+    """§6: 2048, 2048, 2848."""
+    assert [convert(robot, channel) for channel in (5, 6, 7)] == [2048, 2048, 2848]
+
+
+def test_microphones_hear_a_function_of_the_cycle(robot):
+    """§6: AN2..AN4."""
+    assert convert(robot, 2) == 2048
+    robot.board.microphones.play(1, lambda cycle: 500.0)
+    assert convert(robot, 3) == 2548
+
+
+# -- remote control ---------------------------------------------------------------------------------------------------
+
+
+def test_remote_frame_has_its_bits_where_the_library_samples_them(robot):
+    """§6: t = 0 at the first falling edge; 2.1 ms low, 3.0 ms toggle, then every 1.8 ms: address, command."""
+    robot.board.remote.press("ok", address=5, cycle=10_000)
+    while robot.board.chip.pins.get("RF6"):
+        robot.later(100)
+    start = robot.events.now
+
+    def level(milliseconds):
+        robot.at(start + round(milliseconds * 1e-3 * FCY))
+        return robot.board.chip.pins.get("RF6")
+
+    assert level(2.1) == 0
+    assert level(3.0) == 1
+    assert [level(4.8 + 1.8 * bit) for bit in range(5)] == [0, 0, 1, 0, 1]
+    assert [level(13.8 + 1.8 * bit) for bit in range(6)] == [1, 1, 0, 1, 0, 1]
+    assert level(30.0) == 1
+
+
+def test_toggle_bit_changes_with_every_press_and_frames_wait_for_each_other(robot):
+    """§6: repeat after 113.8 ms."""
+    edges = []
+    robot.board.chip.pins.watch("RF6", lambda cycle, changed, levels: edges.append(cycle))
+    robot.board.remote.press("swap")
+    robot.board.remote.press("swap")
+    robot.at(round(0.3 * FCY))
+    starts = [edge for before, edge in zip([-(10**9), *edges], edges, strict=False) if edge - before > 0.05 * FCY]
+    assert starts[1] - starts[0] == round(0.1138 * FCY)
+
+
+def test_remote_raises_int0(robot):
+    """§6: INT0 on the falling edge."""
+    robot.write("INTCON2", 1)
+    robot.board.remote.press(12)
+    robot.at(20_000)
+    assert robot.read("IFS0") & 1
+
+
+# -- codec, Bluetooth -------------------------------------------------------------------------------------------------
+
+
+def test_codec_takes_words_only_out_of_reset(robot):
+    """§6: AUDIO_ON = RF0."""
+    robot.write("DCICON2", 0x01EF)
+    robot.write("DCICON3", 3)
+    robot.write("TSCON", 1)
+    robot.write("RSCON", 1)
+    robot.write("TXBUF0", 0x1234)
+    robot.write("DCICON1", 0x8040)
+    robot.at(1000)
+    assert robot.board.codec.words == 0
+    robot.output("RF0", 1)
+    robot.write("TXBUF0", 0x4321)
+    robot.at(5000)
+    assert robot.board.codec.words == 2
+    assert robot.read("RXBUF0") == 0
+
+
+def send(robot, data):
+    robot.write("U1BRG", 7)
+    robot.write("U1MODE", 0x8000)
+    robot.write("U1STA", 0x400)
+    for byte in data:
+        robot.write("U1TXREG", byte)
+        robot.later(1500)
+
+
+def test_bluetooth_passes_bytes_both_ways(robot):
+    """§6: a transparent pipe."""
+    heard = []
+    robot.board.bluetooth.on_byte = lambda byte, start: heard.append(byte)
+    send(robot, b"hello")
+    robot.board.bluetooth.send(b"hi")
+    robot.later(4000)
+    assert bytes(heard) == b"hello"
+    assert [robot.read("U1RXREG") for _ in range(2)] == [0x68, 0x69]
+
+
+def test_bluetooth_drop_outs_swallow_bytes(robot):
+    """Nothing passes in the given windows."""
+    heard = []
+    robot.board.bluetooth.on_byte = lambda byte, start: heard.append(byte)
+    robot.board.bluetooth.dropouts.append((1500, 4500))
+    send(robot, b"abcdef")
+    robot.later(4000)
+    assert bytes(heard) == b"adef"[: len(heard)]
+    assert robot.board.bluetooth.lost == 2
+
+
+def test_random_loss_repeats_with_its_seed():
+    """Everything random is seeded."""
+
+    def run(seed):
+        robot = Robot(seed=seed)
+        robot.board.bluetooth.loss = 0.5
+        heard = []
+        robot.board.bluetooth.on_byte = lambda byte, start: heard.append(byte)
+        send(robot, bytes(range(60)))
+        return heard
+
+    assert run(1) == run(1)
+    assert run(1) != run(2)
+    assert 10 < len(run(3)) < 50
