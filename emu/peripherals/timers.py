@@ -189,9 +189,10 @@ class Timer(Peripheral):
         if simple:  # an empty prescaler lets native code compute the count from base and tick alone
             self.base.value -= self._phase.value
             self._phase.value = 0
-        self.tick.value = self._prescale if simple else 0
-        flagged = not self.is_taken and self.limit != 0 and not self._is_gated
-        self.period.value = (self.limit + 1) * self._prescale if simple and flagged and not self._on_match else 0
+        narrow = simple and not self.is_wide  # a wide timer reads and interrupts through its partner
+        self.tick.value = self._prescale if narrow else 0
+        periodic = narrow and self.limit != 0 and not self._is_gated and not self._on_match
+        self.period.value = (self.limit + 1) * self._prescale if periodic else 0
         if not self._match_stands(rewritten):
             self._post(self.now)
         for listener in self.on_change:

@@ -346,3 +346,23 @@ def test_closed_form_of_the_count_agrees_with_counting(start, period, counts):
         expected = None if target == period == 0 else next(changes, None)
         found = counts_until(start, target, period, top)
         assert expected == (found if found is not None and found <= counts else None)
+
+
+def test_only_plain_16_bit_matches_are_offered_to_native_code(rig):
+    """README: period 0 = call Python: wide, gated, stopped, and PR = 0."""
+    period = rig.record.fields["t2.period"].index
+
+    def offered():
+        return rig.record.u64[period]
+
+    rig.write("PR2", 999)
+    assert offered() == 0
+    rig.write("T2CON", TON)
+    assert offered() == 1000
+    rig.write("T2CON", TON | T32)
+    assert offered() == 0
+    rig.write("T2CON", TON | TGATE)
+    assert offered() == 0
+    rig.write("T2CON", TON)
+    rig.write("PR2", 0)
+    assert offered() == 0
