@@ -189,32 +189,8 @@ _hal_idle:
         bset    IEC0, #T2IE
         return
 
-; ---- Device interrupts, IPL 4 -----------------------------------------------------------------------------------------
-; Moves to the kernel stack unless W15 is there already; a test of a counter instead would fail between test and move.
-; Costs 8 Tcy beside saving what a C function may change. The interrupted W15 is kept below the saved registers.
-        .macro  isr vector, handler
-        .global \vector
-\vector:
-        push.d  w0
-        mov     w15, w1
-        mov     #_os_memory+HAL_KERNEL_STACK, w0
-        cpslt   w15, w0
-        mov     #_os_memory, w15
-        push    w1
-        push    RCOUNT
-        push.d  w2
-        push.d  w4
-        push.d  w6
-        rcall   \handler
-        pop.d   w6
-        pop.d   w4
-        pop.d   w2
-        pop     RCOUNT
-        pop     w0
-        mov     w0, w15
-        pop.d   w0
-        retfie
-        .endm
+; ---- Device interrupts ---------------------------------------------------------------------------------------------
+#include "isr.inc"
 
         isr     __T1Interrupt, _cpu_clock_isr
         isr     __U1RXInterrupt, _uart1_receive_isr
