@@ -138,7 +138,7 @@ class Sequencer:
             state.record.u64[self._hold] = 0
         while True:
             if state.mode != RUN and not self._sleep(limit):
-                return self.wires.interrupted() or events.next_due() != NEVER
+                return self.wires.interrupted() or events.deadline != NEVER
             last = state.cycle - 1
             if events.deadline > last >= 0:
                 return True
@@ -155,22 +155,27 @@ class Sequencer:
         The cycle in which the waking flag is first 1 counts as that of an instruction: UNVERIFIED.
         """
         state, events = self.state, self.events
-        while state.mode != RUN:
-            since = self.exceptions.waking()
-            if since is not None:
-                state.cycle = max(state.cycle, since + 1)
-                self.wake()
-                break
+        while True:
+            if events.deadline < state.cycle:
+                events.settle(state.cycle - 1)
+                since = self.exceptions.waking()
+                if since is not None:
+                    state.cycle = max(state.cycle, since + 1)
+                    self.wake()
+                if state.mode == RUN:
+                    return True
             if self.wires.interrupted():
                 return False
-            due = events.next_due()
+            due = events.deadline
+            if due < limit:
+                due = events.next_due()
+            if due == NEVER:
+                events.settle(state.cycle - 1)
+                return False
             if due >= limit:
-                if due != NEVER:
-                    state.cycle = max(state.cycle, limit)
+                state.cycle = max(state.cycle, limit)
                 return False
             state.cycle = max(state.cycle, due + 1)
-            events.settle(due)
-        return True
 
     def wake(self) -> None:
         """Leave Idle or Sleep: execution goes on."""
