@@ -198,7 +198,8 @@ def main() -> int:
     except AssertionError as error:
         print(error)
         return 1
-    print(f"{count} sources and objects, seed {seed}: " + ", ".join(f"{n} {what}" for what, n in sorted(outcomes.items())))
+    summary = ", ".join(f"{n} {what}" for what, n in sorted(outcomes.items()))
+    print(f"{count} sources and objects, seed {seed}: {summary}")
     return 0
 
 

@@ -75,7 +75,7 @@ def _from_quoted(flags: str) -> str:
 def parse(text: str) -> Attributes:
     """Read `code, address(0x1000), near ...`; raise `ExprError` for unknown or contradictory attributes."""
     result = Attributes(0, c.SHT_PROGBITS, ExtendedAttribute(0))
-    kind = ""
+    kind, info = "", False
     for word in split_arguments(text, spaces=False):
         if len(word) >= 2 and word[0] == word[-1] == '"':
             word = _from_quoted(word[1:-1])
@@ -83,7 +83,7 @@ def parse(text: str) -> Attributes:
         if match is None:
             raise ExprError(f"cannot read section attribute {word!r}")
         name, argument = match[1].lower(), match[2]
-        if name in _TYPES or name == "info":
+        if name in _TYPES:
             if kind:
                 raise ExprError(f"a section cannot be both {kind} and {name}")
             kind = name
@@ -95,11 +95,15 @@ def parse(text: str) -> Attributes:
             result.extended |= ExtendedAttribute.PAGE
         elif name == "keep":
             result.keep = True
+        elif name == "info":
+            info = True
         elif name in _OTHER_PARTS:
             raise ExprError(f"section attribute {name} is for parts other than the 30F6014A")
         else:
             raise ExprError(f"unknown section attribute {name!r}")
     _apply_type(result, kind or "data")
+    if info:
+        _make_info(result, kind or "data")
     return result
 
 
@@ -122,11 +126,6 @@ def _with_number(result: Attributes, name: str, argument: str | None) -> None:
 
 
 def _apply_type(result: Attributes, kind: str) -> None:
-    if kind == "info":
-        if result.flags:
-            raise ExprError("an info section has no place in memory and takes no other attributes")
-        result.type = c.SHT_NOTE
-        return
     flags, result.type, extended = _TYPES[kind]
     data_only = SectionFlag.NEAR | SectionFlag.XMEM | SectionFlag.YMEM | SectionFlag.REVERSE
     if result.flags & data_only and not flags & SectionFlag.WRITE:
@@ -135,3 +134,10 @@ def _apply_type(result: Attributes, kind: str) -> None:
         raise ExprError("a section cannot be in both X and Y memory")
     result.flags |= flags
     result.extended |= extended
+
+
+def _make_info(result: Attributes, kind: str) -> None:
+    """`info` (also written `info, data`): bytes for tools, in no memory."""
+    if kind != "data" or result.flags != _DATA:
+        raise ExprError("an info section has no place in memory and takes no other attributes")
+    result.flags, result.type = 0, c.SHT_NOTE

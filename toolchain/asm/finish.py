@@ -56,6 +56,8 @@ class _Finisher:
                     self.asm.error(str(error), fixup.place)
             self.sections[source].relocs.sort(key=lambda reloc: reloc.offset)
         extra, symbols = debug_sections(self.asm, self.sections)
+        if c.SIGNATURE_SECTION not in self.asm.sections:
+            extra.append(_signature())
         return ObjectFile(
             self.asm.file_name or self.asm.source.place.file,
             list(self.sections.values()) + extra,
@@ -259,6 +261,11 @@ def _absolute_call(section: Section, offset: int, kind: RelocationType, value: i
 
 def _is_anonymous(symbol: AsmSymbol) -> bool:
     return symbol.name.startswith(".LH")
+
+
+def _signature() -> Section:
+    octets = b"".join(bytes((word & 0xFF, 0, word >> 8, 0)) for word in c.SIGNATURE_WORDS)
+    return Section(c.SIGNATURE_SECTION, 0, c.SHT_NOTE, bytearray(octets), align=1)
 
 
 def _local_name(name: str) -> str:

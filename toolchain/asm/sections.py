@@ -50,6 +50,18 @@ class Relaxable:
     is_short: bool = False
 
 
+def _spread(data: bytes, per_word: int, fill_upper: int) -> bytearray:
+    """Return `data` as program words of `per_word` bytes each, the last one zero padded (abi-elf.md §6.2)."""
+    count = -(-len(data) // per_word)
+    padded = data.ljust(count * per_word, b"\0")
+    octets = bytearray(count * OCTETS_PER_WORD)
+    for lane in range(per_word):
+        octets[lane::OCTETS_PER_WORD] = padded[lane::per_word]
+    if per_word == 2 and fill_upper:
+        octets[2::OCTETS_PER_WORD] = bytes((fill_upper,)) * count
+    return octets
+
+
 class AsmSection:
     """One section of the object being assembled."""
 
@@ -127,9 +139,7 @@ class AsmSection:
         if self._data_bytes and data:
             octets[-3] = data[0]
             position = 1
-        for start in range(position, len(data), 2):
-            pair = data[start : start + 2]
-            octets += pair + bytes(2 - len(pair)) + bytes((self.fill_upper, 0))
+        octets += _spread(data[position:], 2, self.fill_upper)
         self._data_bytes = (self._data_bytes + len(data)) & 1
         return first
 
@@ -148,8 +158,7 @@ class AsmSection:
             octets[first : first + len(head)] = head
             data = data[room:]
             self._packed_bytes = (self._packed_bytes + len(head)) % 3
-        for start in range(0, len(data), 3):
-            octets += data[start : start + 3].ljust(OCTETS_PER_WORD, b"\0")
+        octets += _spread(data, 3, 0)
         if data:
             self._packed_bytes = len(data) % 3
         return first

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 from toolchain.commands.parser import parser
@@ -37,6 +38,8 @@ def main(arguments: list[str]) -> int:
     if not names:
         raise ToolError("no input files")
     linked = link_files([(name, read_bytes(name)) for name in names], link_options(options))
+    for message in linked.messages:
+        print(message, file=sys.stderr)
     if options.report_mem:
         from toolchain.link.mapfile import memory_report
 

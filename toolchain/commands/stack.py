@@ -12,7 +12,7 @@ from toolchain.stack.analyse import Analysis, Entry, Report
 from toolchain.stack.annotations import Annotations, add_symbols, read_annotations
 
 EXIT_OVER_LIMIT = 1
-DESCRIPTION = """Worst-case stack use, in bytes, per function and per entry (reset, interrupt, thread, or reached by pointer),
+DESCRIPTION = """Worst-case stack use, in bytes, per function and per entry (reset, interrupt, thread, by pointer),
 found by following every instruction path of the image.  Recursion, calls through pointers and unknown changes of
 W15 are named; an annotation file bounds them:
 

@@ -6,6 +6,10 @@ from emu.elffacts import EM_DSPIC30F, PROCESSOR_30F6014A
 
 __all__ = ["EM_DSPIC30F", "PROCESSOR_30F6014A"]
 
+SIGNATURE_SECTION = "__c30_signature"
+"""Info section of every object: three 16-bit words 1, 0, 0 (abi-elf.md §6.7, §7 item 8)."""
+SIGNATURE_WORDS = (1, 0, 0)
+
 MAGIC = b"\x7fELF"
 ELFCLASS32, ELFDATA2LSB, EV_CURRENT = 1, 1, 1
 ET_REL, ET_EXEC = 1, 2

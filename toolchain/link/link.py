@@ -7,7 +7,16 @@ import re
 from dataclasses import dataclass
 from itertools import pairwise
 
-from emu.elffacts import OCTETS_PER_UNIT, PSV_PAGE_UNITS, ExtendedAttribute, SectionFlag
+from emu.elffacts import (
+    GENERIC_PROCESSORS,
+    OCTETS_PER_UNIT,
+    PROCESSOR_30F6014,
+    PROCESSOR_30F6014A,
+    PROCESSOR_MASK,
+    PSV_PAGE_UNITS,
+    ExtendedAttribute,
+    SectionFlag,
+)
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Section, Symbol
 from toolchain.errors import ToolError
@@ -62,9 +71,10 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
     absolute |= dict.fromkeys(_LINKER_SYMBOLS, 0)
     provided = set(absolute) | {n for n in resolution.wanted if _LIMITS.fullmatch(n)}
     check(resolution, provided, live)
-    messages = _misnamed_handlers(resolution, live)
+    _check_handlers(resolution, live)
+    messages = _foreign_processors(objects)
 
-    order = [s for obj in resolution.objects for s in obj.sections if s in live]
+    order = [s for obj in resolution.objects for s in obj.sections if s in live and s.name != c.SIGNATURE_SECTION]
     placer = Placer(resolution, order)
     placer.place_data()
     records = dinit.plan(placer.layout, options.pack_data) if options.data_init else []
@@ -201,7 +211,7 @@ def _stack(layout: Layout, order: list[Section], options: LinkOptions) -> tuple[
 _HANDLER = re.compile(r"__(?:Alt)?[A-Z]\w*(?:Interrupt|Fail|Error)")
 
 
-def _misnamed_handlers(resolution: Resolution, live: set[Section]) -> list[str]:
+def _check_handlers(resolution: Resolution, live: set[Section]) -> None:
     """Refuse a function that is spelled like an interrupt handler but that no vector of the chip takes."""
     vectors = vector_names()
     called = {r.symbol.name for s in resolution.owner if s in live for r in s.relocs}
@@ -217,7 +227,16 @@ def _misnamed_handlers(resolution: Resolution, live: set[Section]) -> list[str]:
         findings.append(f"{owner}: error: {name} looks like an interrupt handler but the chip has no such vector{hint}")
     if findings:
         raise ToolError.of(findings)
-    return []
+
+
+def _foreign_processors(objects: list[ObjectFile]) -> list[str]:
+    """Warn about objects assembled for another part: register addresses may differ (abi-elf.md §6.1)."""
+    fitting = (PROCESSOR_30F6014A, PROCESSOR_30F6014, *GENERIC_PROCESSORS)
+    return [
+        f"{obj.name}: warning: assembled for processor id {obj.processor & PROCESSOR_MASK:#x}, not the 30F6014A"
+        for obj in objects
+        if obj.processor & PROCESSOR_MASK not in fitting
+    ]
 
 
 def memory_use(linked: Linked) -> dict[str, int]:

@@ -7,7 +7,7 @@ from toolchain.elf.model import Section, Symbol
 from toolchain.elf.symbols import symbol_sizes
 from toolchain.link.link import Linked, memory_use
 from toolchain.link.memory import EEPROM, FLASH, RAM
-from toolchain.link.place import space_of
+from toolchain.link.place import memory_bytes, space_of
 
 
 def memory_report(linked: Linked) -> str:
@@ -22,11 +22,6 @@ def memory_report(linked: Linked) -> str:
     return "\n".join(f"{n:12} {u:6} of {t:6} bytes  {100 * u / t:5.1f} %  {note}".rstrip() for n, u, t, note in rows)
 
 
-def byte_size(section: Section, units: int) -> int:
-    """Bytes of memory that `units` address units take: three per instruction word in code, else one each."""
-    return units // 2 * 3 if section.is_code else units
-
-
 def map_text(linked: Linked) -> str:
     """Return the whole map as text."""
     lines = ["Memory use", memory_report(linked), "", "Sections (address, size in address units, bytes)"]
@@ -38,22 +33,22 @@ def map_text(linked: Linked) -> str:
     for output in linked.outputs:
         section = output.section
         load = f"  load {section.load:#08x}" if section.load != section.address else ""
-        bytes_used = byte_size(section, section.units)
+        bytes_used = memory_bytes(section, section.units)
         lines.append(f"\n{section.name:20} {section.address:#08x} {section.units:#7x} {bytes_used:6} bytes{load}")
         for source in output.inputs:
             placed = linked.layout.placed[source]
             owner = linked.resolution.owner[source].name
-            used = byte_size(source, placed.size)
+            used = memory_bytes(source, placed.size)
             lines.append(f"  {source.name:18} {placed.address:#08x} {placed.size:#7x} {used:6} bytes  {owner}")
             for symbol, size in sizes.get(source, []):
                 address = placed.address + symbol.value
                 lines.append(
-                    f"    {'':16} {address:#08x} {size:#7x} {byte_size(source, size):6} bytes    {symbol.name}"
+                    f"    {'':16} {address:#08x} {size:#7x} {memory_bytes(source, size):6} bytes    {symbol.name}"
                 )
     lines += ["", "Data initialisation (.dinit): address, bytes, how"]
     lines += [f"  {r.address:#06x} {r.size:6}  {r.format.name.lower()}" for r in linked.records]
     left_out = [
-        f"  {section.name:18} {byte_size(section, section.units):6} bytes  {obj.name}"
+        f"  {section.name:18} {memory_bytes(section, section.units):6} bytes  {obj.name}"
         for obj in linked.resolution.objects
         for section in obj.sections
         if section not in linked.live and section.units and space_of(section) != "info"

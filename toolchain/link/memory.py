@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import insort
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from emu.chips.dspic30f6014a import CONFIG, DSPIC30F6014A, UNIT_ID
 from emu.elffacts import UNITS_PER_WORD
@@ -17,6 +18,7 @@ HANDLE_LIMIT = 0x10000  # abi-elf.md §1.5: a function pointer is 16 bits
 UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
 
 
+@lru_cache(1)
 def config_sections() -> dict[str, int]:
     """Input section name -> program address of the configuration and unit-id words (abi-elf.md §6.6)."""
     places = {f"__{name}.sec": word.address for name, word in CONFIG.items()}

@@ -250,6 +250,11 @@ def _first_rank(section: Section) -> int:
     return next((i for i, n in names if section.name == n or section.name.startswith(n + ".")), len(_FIRST_CODE))
 
 
+def memory_bytes(section: Section, units: int) -> int:
+    """Bytes of memory that `units` address units take: three per instruction word in code, else one each."""
+    return (units + 1) // 2 * 3 if section.is_code else units
+
+
 def is_const(section: Section) -> bool:
     """Whether a psv section belongs to the constants every object shares."""
     return section.name == ".const" or section.name.startswith(".const.")
@@ -261,10 +266,12 @@ def psv_address(load: int) -> int:
 
 
 def _largest(resolution: Resolution, group: Iterable[Section]) -> str:
-    """The five largest symbols of the sections that compete for the space."""
+    """The five largest symbols, with their bytes, of the sections that compete for the space."""
     members = set(group)
     sizes: list[tuple[int, str]] = []
     for obj in resolution.objects:
-        sizes += [(size, s.name) for s, size in symbol_sizes(obj.symbols) if s.section in members]
+        for symbol, units in symbol_sizes(obj.symbols):
+            if symbol.section in members:
+                sizes.append((memory_bytes(symbol.section, units), symbol.name))
     top = sorted(sizes, key=lambda entry: (-entry[0], entry[1]))[:5]
     return "; largest symbols: " + ", ".join(f"{name} ({size})" for size, name in top) if top else ""

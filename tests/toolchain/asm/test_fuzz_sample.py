@@ -7,7 +7,7 @@ SCRIPT = Path(__file__).resolve().parents[2] / "fuzz" / "fuzz_asm.py"
 
 
 def test_mutated_sources_and_objects_give_images_or_clean_errors():
-    """No traceback, no hang; every finding has a place. All outcomes must occur, or the mutations are too harsh or mild."""
+    """No traceback, no hang, every finding placed. Each outcome must occur: mutations neither too harsh nor mild."""
     spec = importlib.util.spec_from_file_location("fuzz_asm", SCRIPT)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

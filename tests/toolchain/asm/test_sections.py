@@ -18,7 +18,7 @@ from toolchain.errors import ToolError
         ("eedata", 0x20000002, c.SHT_PROGBITS),
         ("bss,xmemory", 0x04000003, c.SHT_NOBITS), ("bss,ymemory", 0x08000003, c.SHT_NOBITS),
         ("code,address(0x1000)", 0x40000006, c.SHT_PROGBITS), ("data,noload", 0x00800003, c.SHT_PROGBITS),
-        ("bss,reverse(64)", 0x80000003, c.SHT_NOBITS), ("info", 0, c.SHT_NOTE), ('"ax"', 0x6, c.SHT_PROGBITS),
+        ("bss,reverse(64)", 0x80000003, c.SHT_NOBITS), ("info", 0, c.SHT_NOTE), ("info, data", 0, c.SHT_NOTE), ('"ax"', 0x6, c.SHT_PROGBITS),
     ],
 )  # fmt: skip
 def test_attributes_become_section_flags(asm, attributes, flags, kind):
@@ -43,7 +43,7 @@ def test_page_travels_in_an_extended_attribute_symbol():
     from toolchain.elf.write import object_bytes
 
     obj, _ = assemble(".section .const,psv,page\n .word 1\n", "x.s")
-    assert obj.sections[-1].extended is ExtendedAttribute.PAGE
+    assert next(s for s in obj.sections if s.name == ".const").extended is ExtendedAttribute.PAGE
     assert b"__ext_attr_.const\0" in object_bytes(obj)
 
 
@@ -130,3 +130,10 @@ def test_alignment_behind_a_relaxable_call_is_refused(asm):
     """Its size is not known yet."""
     with pytest.raises(ToolError, match="--relax may shorten"):
         asm("f: call f\n .align 16\n nop\n", relax=True)
+
+
+def test_every_object_carries_the_signature_microchips_linker_looks_for(asm):
+    """abi-elf.md §6.7, §7 item 8: info section of three words 1, 0, 0; an own one is kept."""
+    assert asm("").bytes("__c30_signature") == bytes([1, 0, 0, 0, 0, 0])
+    out = asm(".section __c30_signature, info, data\n .word 1, 2, 3\n")
+    assert out.bytes("__c30_signature") == bytes([1, 0, 2, 0, 3, 0])

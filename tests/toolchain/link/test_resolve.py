@@ -147,3 +147,11 @@ def test_the_map_lists_symbols_with_sizes_and_what_was_left_out(image):
     assert rows["next"][1:3] == ["0x2", "3"]
     assert "un" in text.split("Left out by --gc-sections")[1]
     assert "stack gets 0x800..0x27f0" in text
+
+
+def test_objects_for_another_part_are_mentioned():
+    """abi-elf.md §6.1: e_flags name the processor; generic ids fit."""
+    obj = assemble(".global __reset\n__reset: nop\n", "x.s")[0]
+    for processor, warned in ((0x1F, False), (0x18, False), (0, False), (90, False), (0x40, True)):
+        obj.processor = processor
+        assert bool(link([obj], [], LinkOptions()).messages) is warned
