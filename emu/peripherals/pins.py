@@ -9,6 +9,10 @@ without calls per pin:
 
 A simulation that writes `input` calls `apply(port, cycle)` once afterwards, or uses `set`. A fast input (a pixel bus)
 is not pushed edge by edge: it is attached as a `Waveform`, a function of the cycle.
+
+Watchers of pins are eager (told at once: interrupts, clocks, gates) or lazy (told in order, some time later: motors,
+LEDs). Native code may write a latch by itself as long as only lazy pins change; it leaves the new levels in `ring`, and
+`flush` tells. Whoever reports what a lazy watcher has counted calls `flush` first.
 """
 
 from __future__ import annotations
@@ -20,6 +24,8 @@ from emu.events import Events
 from emu.record import Record
 
 PORTS: Final = "ABCDEFG"
+RING: Final = 256
+"""Changes native code can leave behind before it must call Python."""
 
 Watcher = Callable[[int, int, int], None]
 """Called as watcher(cycle, changed, levels): pins in `changed` have the given levels from `cycle` on."""
@@ -67,20 +73,74 @@ class Pins:
         first = record.reserve("pins.changed", "Q", len(PORTS)).index
         self.changed: Final = record.u64[first : first + len(PORTS)]
         """First cycle of the newest output levels."""
-        self.edges: list[tuple[int, int, int]] | None = None
-        """Set to a list to log (cycle, port, levels) at every change."""
+        self.eager: Final = words("eager")
+        """Pins whose changes Python must hear of at once."""
+        self.lazy: Final = words("lazy")
+        """Pins whose changes may wait in `ring`."""
+        self._told: Final = words("told")
+        """Levels the lazy watchers know."""
+        ring = record.reserve("pins.ring", "Q", RING).index
+        self.ring: Final = record.u64[ring : ring + RING]
+        """Changes made by native code: cycle << 24 | port << 16 | levels."""
+        self._u64: Final = record.u64
+        self._count: Final = record.reserve("pins.ring_count", "Q").index
+        self._edges: list[tuple[int, int, int]] | None = None
+        self._eager_before_log: list[int] = []
         self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
+        self._lazy_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._waveforms: Final[list[list[tuple[int, Waveform]]]] = [[] for _ in PORTS]
         self._on_waveform: Final[list[tuple[Callable[[int], None], Callable[[], None]]]] = []
 
-    def watch(self, name: str, watcher: Watcher) -> None:
-        """Tell `watcher` of every edge on one pin."""
-        port, mask = parse_pin(name)
-        self.watch_port(port, mask, watcher)
+    @property
+    def edges(self) -> list[tuple[int, int, int]] | None:
+        """Set to a list to log (cycle, port, levels) at every change, to None to stop."""
+        return self._edges
 
-    def watch_port(self, port: int, mask: int, watcher: Watcher) -> None:
-        """Tell `watcher` of every edge on the pins in `mask` of a port."""
-        self._watchers[port].append((mask, watcher))
+    @edges.setter
+    def edges(self, log: list[tuple[int, int, int]] | None) -> None:
+        self.flush()
+        if log is not None and self._edges is None:  # every change must come by
+            self._eager_before_log = self.eager.tolist()
+            for port in range(len(PORTS)):
+                self.eager[port] = 0xFFFF
+        elif log is None and self._edges is not None:
+            for port, mask in enumerate(self._eager_before_log):
+                self.eager[port] = mask
+        self._edges = log
+
+    def watch(self, name: str, watcher: Watcher, *, lazy: bool = False) -> None:
+        """Tell `watcher` of every edge on one pin; `lazy`: not necessarily at once."""
+        port, mask = parse_pin(name)
+        self.watch_port(port, mask, watcher, lazy=lazy)
+
+    def watch_port(
+        self, port: int, mask: int, watcher: Watcher, *, lazy: bool = False, inputs_only: bool = False
+    ) -> None:
+        """Tell `watcher` of every edge on the pins in `mask` of a port.
+
+        `inputs_only`: it ignores edges on pins the port drives, so latch writes need not come by.
+        """
+        (self._lazy_watchers if lazy else self._watchers)[port].append((mask, watcher))
+        if lazy:
+            self._told[port] = self.level[port]
+        table = self.lazy if lazy else self.eager
+        table[port] |= 0 if inputs_only else mask
+
+    def flush(self) -> None:
+        """Tell the lazy watchers what native code has done to the pins."""
+        count = self._u64[self._count]
+        if not count:
+            return
+        self._u64[self._count] = 0
+        for entry in self.ring[:count].tolist():
+            self._tell_lazy(entry >> 24, entry >> 16 & 0xFF, entry & 0xFFFF)
+
+    def _tell_lazy(self, cycle: int, port: int, level: int) -> None:
+        changed = self._told[port] ^ level
+        self._told[port] = level
+        for mask, watcher in self._lazy_watchers[port]:
+            if changed & mask:
+                watcher(cycle, changed & mask, level)
 
     def attach(self, port: int, mask: int, waveform: Waveform) -> None:
         """Let a function of the cycle supply the levels of the pins in `mask`; edge watchers do not hear of them."""
@@ -156,8 +216,11 @@ class Pins:
         if not changed:
             return
         self.level[port] = level
-        if self.edges is not None:
-            self.edges.append((cycle, port, level))
+        if self._edges is not None:
+            self._edges.append((cycle, port, level))
+        if self._lazy_watchers[port]:
+            self.flush()
+            self._tell_lazy(cycle, port, level)
         for mask, watcher in self._watchers[port]:
             if changed & mask:
                 watcher(cycle, changed & mask, level)

@@ -96,7 +96,7 @@ class ChangeNotice(Peripheral):
         self._tris: Final = {port: kit.chip.sfrs["TRIS" + PORTS[port]].address >> 1 for port, _ in self._pins}
         for port in self._tris:
             mask = sum(bit for pin_port, bit in self._pins if pin_port == port)
-            kit.pins.watch_port(port, mask, partial(self._edge, port))
+            kit.pins.watch_port(port, mask, partial(self._edge, port), inputs_only=True)
 
     def stops_in(self, mode: int) -> bool:
         """Never: change notification wakes from Sleep."""

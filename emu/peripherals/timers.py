@@ -368,6 +368,9 @@ class Timer(Peripheral):
 
     def _fire(self, due: int) -> None:
         (self.high or self).line.request() if self.is_wide else self.line.request()
+        if self.period.value:
+            self.events.set(self._match, due + self.period.value)
+            return
         for listener in self._on_match:
             listener(due)
         if self._source.value in (TCY, WAVE):

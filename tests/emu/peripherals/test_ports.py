@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 
 from emu.peripherals.pins import parse_pin
+
+from .conftest import Rig
 
 
 def test_output_pin_follows_the_latch_in_the_next_cycle(rig):
@@ -142,3 +146,78 @@ def test_uart_owns_its_pins_while_enabled(rig):
     assert rig.at(7).dev.pins.get("RF3") == 1
     rig.write("U1MODE", 0)
     assert rig.at(9).dev.pins.get("RF3") == 0
+
+
+def native_latch_write(rig, letter, value):
+    """README: what native code does for a LATx write, from record fields alone. False: it would call Python."""
+    index = "ABCDEFG".index(letter)
+    record, fields = rig.record, rig.record.fields
+    view = {"H": record.u16, "Q": record.u64, "B": record.u8}
+
+    def field(name, offset=0):
+        return view[fields[name].kind], fields[name].index + offset
+
+    def get(name, offset=0):
+        table, place = field(name, offset)
+        return table[place]
+
+    def put(name, number, offset=0):
+        table, place = field(name, offset)
+        table[place] = number
+
+    address = rig.address("LAT" + letter) >> 1
+    mask = rig.bus.writable[address]
+    own, level, drive = get(f"port{letter}.owned"), get("pins.level", index), get("pins.drive", index)
+    out = get("pins.output", index) & own | value & ~own & mask
+    new = level & ~drive | out & drive & ~get("pins.analog", index)
+    changed, lazy = level ^ new, get("pins.lazy", index)
+    count = get("pins.ring_count")
+    if changed & get("pins.eager", index) or (changed & lazy and count == 256):
+        return False
+    record.u16[address] = value & mask
+    put("pins.output", out, index)
+    cycle = rig.events.now + 1
+    if get("pins.changed", index) != cycle:
+        put("pins.before", level, index)
+        put("pins.changed", cycle, index)
+    put("pins.level", new, index)
+    if changed & lazy:
+        put("pins.ring", cycle << 24 | index << 16 | new, count)
+        put("pins.ring_count", count + 1)
+    return True
+
+
+def test_native_latch_writes_leave_the_same_state_and_tell_the_same_edges():
+    """README: native and Python paths agree for any sequence of latch writes, TRIS in between."""
+    rigs, seen = [Rig(), Rig()], [[], []]
+    for rig, edges in zip(rigs, seen, strict=True):
+        rig.dev.pins.watch_port(3, 0x00FF, lambda *edge, edges=edges: edges.append(edge), lazy=True)
+    draw = random.Random(7)
+    for step in range(600):
+        value = draw.randrange(0x10000) if step % 50 else 0x0F0F
+        tris = draw.choice((0, 0, 0, 0x00F0, 0xFFFF))
+        for number, rig in enumerate(rigs):
+            rig.at(10 * step)
+            if step % 10 == 0:
+                rig.write("TRISD", tris)
+            rig.at(10 * step + 3)
+            if number == 0 or not native_latch_write(rig, "D", value):
+                rig.write("LATD", value)
+        reads = [[rig.at(10 * step + later).read("PORTD") for later in (4, 5)] for rig in rigs]
+        assert reads[0] == reads[1]
+    for rig in rigs:
+        rig.dev.pins.flush()
+    assert seen[0] == seen[1]
+    assert len(seen[0]) > 200
+    assert rigs[0].dev.pins.level[3] == rigs[1].dev.pins.level[3]
+
+
+def test_edge_log_sees_every_change_while_it_is_on(rig):
+    """While edges are logged every pin is eager, so native code leaves latch writes to Python."""
+    rig.write("TRISD", 0)
+    rig.dev.pins.edges = []
+    assert rig.dev.pins.eager[3] == 0xFFFF
+    rig.at(10).write("LATD", 1)
+    assert rig.dev.pins.edges == [(11, 3, 1)]
+    rig.dev.pins.edges = None
+    assert rig.dev.pins.eager[3] & 0xFF == 0
