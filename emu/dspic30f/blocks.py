@@ -14,7 +14,7 @@ from functools import lru_cache
 from types import CodeType
 from typing import Any, Final
 
-from emu.dspic30f.facts import facts_of, flow_of
+from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Repeat, Return, Skip
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.pysource import CHANGED, DONE, Source, Unsupported
@@ -29,10 +29,14 @@ Fetch = Callable[[int], Insn | None]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A function; the most cycles it can take, and the latest boundary before its last instruction."""
+    """A function, and how far behind its beginning no event may be due (`reach`) and no limit lie (`last_start`).
+
+    `last_start` is the latest boundary before its last instruction. Without accesses to devices nothing but such
+    boundaries can notice an event, and `reach` is the same; otherwise it is the most cycles the function can take.
+    """
 
     run: Callable[[int], int]
-    cycles: int
+    reach: int
     last_start: int
 
 
@@ -66,12 +70,6 @@ NATIVE: Final = (None, Branch, Call, Goto, Repeat, Return, Skip)
 """Flows a block can do itself; the others end it."""
 
 
-def _restores_priority(insn: Insn, pc: int) -> bool:
-    """RETFIE, after which the sequencer must look for interrupts."""
-    flow = flow_of(insn, pc)
-    return isinstance(flow, Return) and flow.kind == "retfie"
-
-
 class _Ends(Exception):
     """The block ends before this instruction."""
 
@@ -99,7 +97,7 @@ class BlockWriter:
         self._last_start = 0
 
     def write(self, pc: int) -> tuple[int, int] | None:
-        """Write the body. Returns `Block.cycles` and `Block.last_start`, None if not one instruction fits."""
+        """Write the body. Returns `Block.reach` and `Block.last_start`, None if not one instruction fits."""
         source = self._source
         first = self._fetch(pc)
         if first is None:
@@ -125,7 +123,8 @@ class BlockWriter:
                 break
             here = after
         stall = int(pointers != 0)
-        return max(self._longest, self._cycle) + stall, self._last_start and self._last_start + stall
+        last_start = self._last_start and self._last_start + stall
+        return max(self._longest, self._cycle) + stall if source.watches_events else last_start, last_start
 
     def _instruction(self, pc: int) -> int | None:
         """One instruction; returns the address to go on with, None if the block has been left."""
@@ -135,7 +134,7 @@ class BlockWriter:
         if insn is None:
             raise _Ends
         facts = facts_of(insn)
-        if facts.flow not in NATIVE or _restores_priority(insn, pc):
+        if facts.flow not in NATIVE:
             raise _Ends
         if self._loop is not None and pc == self._loop[1] and facts.flow is not None:
             raise _Ends
@@ -180,8 +179,15 @@ class BlockWriter:
                 if isinstance(target, int):
                     return target
                 source.leave(target, cycle, stall, DONE)
-            case Return(_kind, target):
-                source.leave(target, cycle, stall, DONE)
+            case Return(kind, target, srl, ipl3):
+                source.watches_events = True  # it looks for exceptions one cycle early
+                if kind != "retfie":
+                    source.leave(target, cycle, stall, DONE)
+                    return None
+                source.settle()
+                source.emit(f"u64[{at['cpu.cycle']}] = finish({target}, {srl}, {ipl3}, c + {cycle - 2}) + 1")
+                source.emit(f"u16[{at['cpu.stall']}] = {stall}")
+                source.emit(f"return {CHANGED}")
             case Repeat(count):
                 source.settle()
                 source.emit(f"u16[{at['RCOUNT']}] = {count}")

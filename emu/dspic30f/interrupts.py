@@ -149,6 +149,8 @@ class Exceptions:
         Requests that time alone makes acceptable later are noted: the engine will look again then.
         """
         state = self._state
+        if not self._requested():
+            return None
         slipping = bool(self.ipl_slip) and self._u64[self._slip_cycle] == last + 1
         ipl = state.ipl
         if slipping:
@@ -173,6 +175,13 @@ class Exceptions:
                     if level > (ipl if best is None else best.level) and self._open(source, level, last):
                         best = Accepted(level, source.vector, self._u64[source.since])
         return best
+
+    def _requested(self) -> bool:
+        """Whether anything is requested at all; with `ipl_slip`, enables just cleared must be looked at."""
+        u16 = self._u16
+        if self.ipl_slip or self._state.intcon1 & self.traps.flags:
+            return True
+        return any(u16[flags] & u16[enables] for flags, enables, _sources in self._words)
 
     def _open(self, source: Source, level: int, last: int) -> bool:
         """Whether neither time nor DISI holds a request back at the boundary after `last`."""

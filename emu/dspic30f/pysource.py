@@ -74,6 +74,8 @@ class Source:
         self.modes_changed = False
         self.at_entry = True
         """The record is as it was when the function, or this round of its loop, began."""
+        self.watches_events = False
+        """Something here depends on events that may be due while it runs."""
         self._limit_armed: Final = limit_armed
         self._names = 0
         self._w: dict[int, Expr] = {}
@@ -356,6 +358,7 @@ class Source:
     def _bus_read(self, address: int) -> Expr:
         if address >> 1 in self.places.refused:
             raise Unsupported("the program counter")
+        self.watches_events = True
         if not self.at_entry or self._flags:
             self.settle()
         self.emit(f"u64[{self.places.now}] = c + {self.last}")
@@ -381,6 +384,7 @@ class Source:
         at = self.places.at
         if ea >> 1 == at["CORCON"]:
             raise Unsupported("EDT counts instructions")
+        self.watches_events = True
         effects = self._pending.effects
         effects.append(f"u64[{self.places.now}] = c + {self.last}")
         self._show_place(effects.append)

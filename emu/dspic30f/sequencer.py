@@ -309,14 +309,20 @@ class Sequencer:
 
     def _return(self, flow: Return, second: int) -> int:
         """RETURN, RETLW, RETFIE, whose second cycle is `second`: ends there if an exception can be entered."""
-        state, events = self.state, self.events
-        state.pc = flow.target
         if flow.kind == "retfie":
-            state.sr = state.sr & 0xFF00 | flow.srl
-            state.corcon = state.corcon & ~IPL3 | (IPL3 if flow.ipl3 else 0)
-            if state.sr & RA:
-                state.repeat = FIRST
-            events.kick()
+            return self.finish_retfie(flow.target, flow.srl, flow.ipl3, second)
+        self.state.pc = flow.target
+        return second if self._exception_at(second) else second + 1
+
+    def finish_retfie(self, target: int, srl: int, ipl3: int, second: int) -> int:
+        """Continue at `target` with the popped SR<7:0> and IPL3; returns the last cycle."""
+        state = self.state
+        state.pc = target
+        state.sr = state.sr & 0xFF00 | srl
+        state.corcon = state.corcon & ~IPL3 | (IPL3 if ipl3 else 0)
+        if state.sr & RA:
+            state.repeat = FIRST
+        self.events.kick()
         return second if self._exception_at(second) else second + 1
 
     def _exception_at(self, last: int) -> bool:

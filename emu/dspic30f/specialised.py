@@ -62,6 +62,7 @@ class SpecialisedEngine:
             "read": core.bus.read,
             "write": core.bus.write,
             "end_loop": core.sequencer.end_loop,
+            "finish": core.sequencer.finish_retfie,
             "div_trunc": div_trunc,
             "rem_trunc": rem_trunc,
             "ctz16": ctz16,
@@ -86,9 +87,9 @@ class SpecialisedEngine:
                 block = self._repeat(pc)
             else:
                 block = self._modes.blocks.get(pc) or self._block(self._modes.blocks, pc, self.length)
-                if block and (cycle + block.cycles > deadline or cycle + block.last_start >= limit):
+                if block and (cycle + block.reach > deadline or cycle + block.last_start >= limit):
                     block = self._modes.singles.get(pc) or self._block(self._modes.singles, pc, 1)
-            if block is None or cycle + block.cycles > deadline or cycle + block.last_start >= limit:
+            if block is None or cycle + block.reach > deadline or cycle + block.last_start >= limit:
                 status = PLAIN
             else:
                 status = block.run(min(limit, deadline))
