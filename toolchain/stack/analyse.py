@@ -53,7 +53,7 @@ class Analysis:
         self.image, self.annotations = image, annotations
         self.code: dict[int, Item] = {}
         for section in image.sections:
-            if section.is_code and section.name not in NO_INSTRUCTIONS and section.address < CHIP.program["flash"].end:
+            if section.is_code and section.name not in NO_INSTRUCTIONS and section.address in CHIP.program["program"]:
                 self.code.update((item.address, item) for item in items(section))
         self.names = Names(image.symbols)
         self.vectors = self._vectors()
@@ -155,7 +155,7 @@ class Analysis:
 
     def _targets(self, call: Call) -> list[int]:
         if call.target is not None:
-            return [call.target]
+            return [call.target] if call.target else []
         owner = self.name(call.address).partition("+")[0]
         names = self.annotations.calls.get(owner) or self.annotations.calls.get(owner.removeprefix("_")) or []
         return [self._named(name) for name in names]
@@ -163,6 +163,9 @@ class Analysis:
     def _add_call(self, result: Usage, call: Call) -> None:
         base = call.depth + (0 if call.tail else CALL_BYTES)
         targets = self._targets(call)
+        if call.target == 0:  # a weak function that is not linked, as crt0's __user_init
+            result.total = max(result.total, base)
+            return
         if not targets:
             result.unknown.append(f"{result.name}: call through a pointer at {call.address:#x}")
             result.total = max(result.total, base)
