@@ -114,6 +114,8 @@ class State:
             self.at[name] = record.reserve(name, kind, count).index
         for number, name in enumerate(("W0S", "W1S", "W2S", "W3S", "SRS")):
             self.at[name] = self.at["cpu.shadow"] + number
+        self.check_pointers = True
+        """Whether a reset leaves W0..W14 uninitialised, so that using one as a pointer resets again (isa.md §2.2)."""
         self._do_registers: Final = [self.at[name] for name in ("DCOUNT", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")]
 
     @property
@@ -175,7 +177,7 @@ class State:
         self.u16[STACK_POINTER] = RESET_STACK
         self.pc = 0
         self.mode = RUN
-        self.initialised = W15_INITIALISED
+        self.initialised = W15_INITIALISED if self.check_pointers else 0xFFFF
         self.stall = 0
         self.limit_armed = 0
         self.repeat = NOT_REPEATING

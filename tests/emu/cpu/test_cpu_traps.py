@@ -230,6 +230,15 @@ def test_what_initialises_a_register(engine: str, writing: str) -> None:
     rig.cycles_to()
 
 
+def test_the_check_of_pointers_can_be_turned_off(engine: str) -> None:
+    """isa.md §2.2: a switch of the emulator."""
+    rig = Rig("mov [w1], w2\nend: nop", engine)
+    rig.machine.state.check_pointers = False
+    rig.machine.program.put_flash(0, [0x040000 | START, 0])
+    rig.machine.reset("EXTR")
+    assert rig.cycles_to() == 3
+
+
 @pytest.mark.parametrize("word", [0xDA4000, 0xDAC000])
 def test_debugger_words_stop_the_run_and_fall_through(engine: str, word: int) -> None:
     """isa.md §4.1, design §10."""
