@@ -10,9 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from .ir.model import Function, Module, UnsupportedError
+from .ir.model import BlockAddress, ConstAgg, ConstExpr, Function, Module, UnsupportedError, Value
 from .ir.read import read_module
 from .lower import branches, cfg, combine, data, emit, frame, isr, legalize, peephole, regalloc, select, switch
+from .lower.debuginfo import DebugInfo
+from .lower.dwarf import DwarfWriter, FunctionInfo
 from .lower.mir import MFunction
 from .lower.names import symbol
 
@@ -39,9 +41,11 @@ class Context:
     """One function on its way through the passes."""
 
     module: Module
+    info: DebugInfo
     function: Function
     options: CompileOptions
     interrupt: str
+    taken: set[str]  # blocks whose address somebody in the module takes
     machine: MFunction | None = None
 
     @property
@@ -67,11 +71,11 @@ class Pass:
 
 
 def _legalize(c: Context) -> None:
-    legalize.legalize(c.module, c.function, lambda line: where(c.module, c.function, line))
+    legalize.legalize(c.module, c.function, lambda line: where(c.info, c.function, line))
 
 
 def _select(c: Context) -> None:
-    c.machine = select.Selector(c.module, c.function, c.for_size).run()
+    c.machine = select.Selector(c.module, c.function, c.for_size, c.taken).run()
     c.machine.interrupt = c.interrupt
     c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
 
@@ -112,12 +116,65 @@ def check_order(passes: list[Pass]) -> None:
 check_order(FUNCTION_PASSES)
 
 
-def where(module: Module, f: Function, line: str | None) -> str:
+def where(info: DebugInfo, f: Function, line: str | None) -> str:
     """ "file:line" of a !dbg reference, or the function's name."""
-    from .lower.debuginfo import source_position
-
-    found = source_position(module, line)
+    found = info.position(line) or info.position(f.dbg)
     return f"{found[0]}:{found[1]}" if found is not None else f"in function '{f.name}'"
+
+
+def taken_blocks(module: Module) -> dict[str, set[str]]:
+    """Function name -> blocks whose address code or data takes."""
+    out: dict[str, set[str]] = {}
+    work: list[Value] = [v.init for v in module.globals.values() if v.init is not None]
+    work += [a for f in module.functions.values() for b in f.blocks for i in b.instrs for a in i.args]
+    while work:
+        v = work.pop()
+        if isinstance(v, BlockAddress):
+            out.setdefault(v.function, set()).add(v.block)
+        elif isinstance(v, ConstAgg):
+            work += v.elems
+        elif isinstance(v, ConstExpr):
+            work += v.args
+    return out
+
+
+class LineRows:
+    """Line-table rows of one function, collected while its text is written."""
+
+    def __init__(self, info: DebugInfo, f: Function, name: str) -> None:
+        self.info = info
+        self.name = name
+        self.last: tuple[str, int] | None = None
+        self.rows: list[tuple[str, str, int]] = []
+        assert f.dbg is not None
+        line = info.number(f.dbg, "scopeLine") or info.number(f.dbg, "line")
+        self.rows.append((name, f.dbg, line))
+
+    def mark(self, ref: str | None) -> str:
+        """Label line to put before an instruction that starts a new row, or ""."""
+        position = self.info.position(ref)
+        if position is None or position == self.last or ref is None:
+            return ""
+        self.last = position
+        label = f".Lrow{self.name}_{len(self.rows)}"
+        self.rows.append((label, ref, position[1]))
+        return f"{label}:"
+
+
+def no_rows(ref: str | None) -> str:
+    """Line marks without debug information."""
+    return ""
+
+
+def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
+    """(DILocalVariable, offset from W15 at entry) of variables declared to live in the frame."""
+    out = []
+    for record in f.dbg_records:
+        slot = m.slot_of.get(id(record.value))
+        if record.kind == "dbg_declare" and slot is not None:
+            o = m.frame[slot]
+            out.append((record.variable, o.fixed if o.fixed is not None else o.offset + m.locals_base))
+    return out
 
 
 class ModuleCompiler:
@@ -126,9 +183,11 @@ class ModuleCompiler:
     def __init__(self, module: Module, options: CompileOptions) -> None:
         self.module = module
         self.options = options
-        self.notes = isr.annotations(module)
+        self.notes = isr.annotations_of(module)
         self.lines: list[str] = []
         self.serial = 0
+        self.taken = taken_blocks(module)
+        self.dwarf = DwarfWriter(module)
 
     def run(self) -> str:
         """All functions, then all data, then aliases."""
@@ -141,6 +200,8 @@ class ModuleCompiler:
                 self.lines.append(f"\t.weak {symbol(self.module, f.name)}")
         self.lines += data.emit_data(self.module)
         self.aliases()
+        if self.options.debug:
+            self.lines += self.dwarf.text()
         return "\n".join(self.lines) + "\n"
 
     def function(self, f: Function) -> None:
@@ -149,15 +210,21 @@ class ModuleCompiler:
         interrupt = isr.interrupt_kind(f.name, self.notes.get(f.name, set()))
         if interrupt and (f.args or f.ret.kind != "void"):
             raise UnsupportedError("an interrupt function takes and returns nothing", f"function '{f.name}'")
-        c = Context(self.module, f, self.options, interrupt)
+        c = Context(self.module, self.dwarf.info, f, self.options, interrupt, self.taken.get(f.name, set()))
         try:
             for p in FUNCTION_PASSES:
                 p.run(c)
         except UnsupportedError as e:
-            raise UnsupportedError(e.what, e.where or where(self.module, f, f.dbg)) from e
+            raise UnsupportedError(e.what, e.where or where(self.dwarf.info, f, f.dbg)) from e
         self.header(f, interrupt)
-        self.lines += emit.Emitter(c.m, str(self.serial), False).text(lambda line: "")
-        self.lines.append(f"\t.size {symbol(self.module, f.name)},.-{symbol(self.module, f.name)}")
+        name = symbol(self.module, f.name)
+        rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
+        self.lines += emit.Emitter(c.m, str(self.serial), False).text(rows.mark if rows is not None else no_rows)
+        self.lines.append(f"\t.size {name},.-{name}")
+        if rows is not None and f.dbg is not None:
+            end = f".Lend{self.serial}"
+            self.lines.append(f"{end}:")
+            self.dwarf.add_function(FunctionInfo(name, f.dbg, end, c.m.frame_base, rows.rows, frame_variables(f, c.m)))
 
     def header(self, f: Function, interrupt: str) -> None:
         """Section, symbol and type. Each function has a section of its own for --gc-sections."""

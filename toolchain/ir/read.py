@@ -71,7 +71,9 @@ PAREN_ATTRS = {"dereferenceable", "dereferenceable_or_null", "captures", "initia
 
 def unquote(text: str) -> bytes:
     """Bytes of an LLVM string body, in which \\XX is a byte and everything else itself."""
-    return re.sub(rb"\\([0-9A-Fa-f]{2}|\\)", lambda m: b"\\" if m[1] == b"\\" else bytes([int(m[1], 16)]), text.encode())
+    return re.sub(
+        rb"\\([0-9A-Fa-f]{2}|\\)", lambda m: b"\\" if m[1] == b"\\" else bytes([int(m[1], 16)]), text.encode()
+    )
 
 
 def strip_comment(line: str) -> str:
@@ -586,8 +588,8 @@ class Reader:
         for block in f.blocks:
             for instr in block.instrs:
                 for k, a in enumerate(instr.args):
-                    if a.__class__ is Instr and a.op == "forward":  # type: ignore[attr-defined]
-                        instr.args[k] = self.locals[a.name]  # type: ignore[attr-defined]
+                    if a.__class__ is Instr and a.op == "forward":
+                        instr.args[k] = self.locals[a.name]
         for record in f.dbg_records:
             if isinstance(record.value, Instr) and record.value.op == "forward":
                 record.value = self.locals.get(record.value.name)

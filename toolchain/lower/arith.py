@@ -68,7 +68,7 @@ def _reverse_subtract(s: Selector, i: Instr, a: ConstInt, d: int, byte: bool) ->
 def apply_immediate(s: Selector, op: str, a: Value, k: int, d: int, byte: bool, user: Instr | None) -> None:
     """d = a op k by the first fitting rule; the constant goes to a register otherwise."""
     rule = immediate_rule(op, k, 8 if byte else 16)
-    if rule is not None and rule.form == "unary" and user is not None and not (rule.op == "ze"):
+    if rule is not None and rule.form == "unary" and user is not None and rule.op != "ze":
         s.emit(rule.op, s.source(a, user), d, byte=byte)
         return
     apply_rule(s, rule, op, s.reg(a), k, d, byte)
@@ -150,7 +150,7 @@ def _wide_immediate(s: Selector, op: str, a: tuple[int, ...], value: int, d: tup
         _wide_add_immediate(s, op, a, words, d)
         return
     for x, k, r in zip(a, words, d, strict=True):
-        if k == 0 and op != "and" or k == 0xFFFF and op == "and":
+        if (k == 0 and op != "and") or (k == 0xFFFF and op == "and"):
             s.copy(x, r)
         elif k == 0:
             s.emit("clr", r)
@@ -170,7 +170,7 @@ def _wide_add_immediate(s: Selector, op: str, a: tuple[int, ...], words: list[in
         words, op = other, "sub" if op == "add" else "add"
     carry = False
     for x, k, r in zip(a, words, d, strict=True):
-        name = (("addc" if op == "add" else "subb") if carry else op)
+        name = ("addc" if op == "add" else "subb") if carry else op
         if not carry and k == 0:
             s.copy(x, r)
             continue
@@ -349,7 +349,7 @@ def select_mul(s: Selector, i: Instr) -> None:
 
 
 def _fits(b: Value, kind: str) -> bool:
-    return isinstance(b, ConstInt) and (b.value <= 0xFFFF or kind == "s" and -0x8000 <= b.signed < 0)
+    return isinstance(b, ConstInt) and (b.value <= 0xFFFF or (kind == "s" and -0x8000 <= b.signed < 0))
 
 
 def _pair(s: Selector, kind: str, a: int, b: int | Imm | Mem) -> tuple[int, int]:
@@ -568,4 +568,3 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "ff1r": select_unary,
     "swap": select_swap,
 }
-

@@ -165,7 +165,7 @@ class AsmBuilder:
                 raise UnsupportedError("inline assembly memory operand without an address")
             self.reference.append(self.add(self.memory(v), "s"))
             return
-        if "r" not in c.text and c.fixed is None or ("i" in c.text or "n" in c.text) and self.s.is_leaf(v):
+        if ("r" not in c.text and c.fixed is None) or (("i" in c.text or "n" in c.text) and self.s.is_leaf(v)):
             if isinstance(v, ConstInt):
                 self.reference.append(self.add(Imm(v.signed), "n"))
                 return
@@ -220,5 +220,3 @@ def select_asm(s: Selector, i: Instr) -> None:
 
 def select_asmresult(s: Selector, i: Instr) -> None:
     """Nothing: the statement writes its results itself."""
-
-

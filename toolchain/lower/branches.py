@@ -51,7 +51,9 @@ def thread_jumps(m: MFunction) -> None:
 
 def remove_unreached(m: MFunction) -> None:
     """Drop blocks without predecessors; the first block stays."""
-    reached = {m.blocks[0].name} | {s for b in m.blocks for s in b.succs} | {b.name for b in m.blocks if b.address_taken}
+    reached = (
+        {m.blocks[0].name} | {s for b in m.blocks for s in b.succs} | {b.name for b in m.blocks if b.address_taken}
+    )
     m.blocks = [b for b in m.blocks if b.name in reached]
 
 
@@ -253,7 +255,11 @@ def tail_calls(m: MFunction) -> None:
         at = len(b.insts) - 2
         while at >= 0 and _is_epilogue(b.insts[at]):
             at -= 1
-        if at < 0 or b.insts[at].op != "call" or not (b.insts[at].tail or at == len(b.insts) - 2 and not m.frame_bytes):
+        if (
+            at < 0
+            or b.insts[at].op != "call"
+            or not (b.insts[at].tail or (at == len(b.insts) - 2 and not m.frame_bytes))
+        ):
             continue
         call = b.insts.pop(at)
         jump = MI("tailcall", call.args[0], line=call.line)

@@ -96,9 +96,7 @@ class Builder:
                 return a
             if op in ("and", "mul"):
                 return b
-        elif b.value == 1 and op in ("mul", "udiv", "sdiv"):
-            return a
-        elif b.value == ones and op == "and":
+        elif (b.value == 1 and op in ("mul", "udiv", "sdiv")) or (b.value == ones and op == "and"):
             return a
         if op == "sub":
             op, b = "add", const(b.type, -b.value)

@@ -184,4 +184,3 @@ def select_builtin(s: Selector, i: Instr) -> None:
     if handler is None:
         raise UnsupportedError(f"builtin function __builtin_{name}")
     handler(s, i)
-

@@ -75,28 +75,23 @@ def receive(s: Selector) -> None:
 
 def select_call(s: Selector, i: Instr) -> None:
     """Stack arguments last to first, then register arguments, the call, the result."""
-    callee, args = i.args[-1], i.args[:-1]
+    callee = i.args[-1]
+    args: list[Value | int] = list(i.args[:-1])
     attrs = i.extra["attrs"]
     assert isinstance(attrs, list)
     variadic = bool(i.extra.get("vararg"))
     if variadic:
-        args = [_private_copy(s, a, t) if (t := _byval(k)) is not None else a for a, k in zip(args, attrs, strict=True)]
-        fixed = i.extra.get("fixed", 0)
-        assert isinstance(fixed, int)
+        given = zip(i.args[:-1], attrs, strict=True)
+        args = [_private_copy(s, a, t) if (t := _byval(k)) is not None else a for a, k in given]
+
         places = place_arguments([scalar_shape(a.type) if isinstance(a, Value) else Shape(1, True) for a in args], True)
     else:
-        places = place_arguments([_shape(a, k) for a, k in zip(args, attrs, strict=True)], False)
+        places = place_arguments([_shape(a, k) for a, k in zip(i.args[:-1], attrs, strict=True)], False)
     target: int | str
-    if isinstance(callee, GlobalRef):
-        target = symbol(s.module, callee.name)
-    else:
-        target = s.reg(callee)
+    target = symbol(s.module, callee.name) if isinstance(callee, GlobalRef) else s.reg(callee)
     pushed = _push_stack_arguments(s, args, attrs, places, variadic)
     used = _load_register_arguments(s, args, attrs, places)
-    if isinstance(target, int):
-        mi = s.emit("callr", target)
-    else:
-        mi = s.emit("call", target)
+    mi = s.emit("callr", target) if isinstance(target, int) else s.emit("call", target)
     mi.also_uses = tuple(used)
     mi.also_defs = CALLER_SAVED
     mi.tail = i.extra.get("tail") in ("tail", "musttail") and not pushed
@@ -266,4 +261,3 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "asm": asm_inline.select_asm,
     "asmresult": asm_inline.select_asmresult,
 }
-

@@ -136,7 +136,7 @@ def _logical_parts(c: Value) -> tuple[str, Value, Value] | None:
 def _sink_compare(block: Block, rest: Block, second: Value, c: Value, counts: dict[int, int]) -> None:
     """Move the second comparison next to its branch (it has no other use), and drop the select."""
     if c in block.instrs:
-        block.instrs.remove(c)  # type: ignore[arg-type]
+        block.instrs.remove(c)
     if isinstance(second, Instr) and second.op in ("icmp", "select", "and", "or") and counts.get(id(second)) == 1:
         if second in block.instrs:
             block.instrs.remove(second)

@@ -56,7 +56,7 @@ def compare(s: Selector, c: Instr, at: Instr) -> str:
     a, b = c.args
     pred = c.pred
     bits = a.type.bits
-    if isinstance(a, ConstInt) or s.is_leaf(a) and not s.is_leaf(b):
+    if isinstance(a, ConstInt) or (s.is_leaf(a) and not s.is_leaf(b)):
         a, b, pred = b, a, SWAPPED[pred]
     if bits > 16:
         return _compare_wide(s, a, b, pred)
@@ -159,7 +159,7 @@ def _compare_wide(s: Selector, a: Value, b: Value, pred: str) -> str:
         if b.value == 0 and pred in ("eq", "ne"):
             _or_words(s, left)
             return CONDITION[pred]
-        if b.value == 0 and pred in ("slt", "sge") or b.signed == -1 and pred in ("sgt", "sle"):
+        if (b.value == 0 and pred in ("slt", "sge")) or (b.signed == -1 and pred in ("sgt", "sle")):
             s.emit("cp0", left[-1])
             return "n" if pred in ("slt", "sle") else "nn"
     op = "cp"
@@ -251,7 +251,7 @@ def select_select(s: Selector, i: Instr) -> None:
     outer, s.out = s.out, []
     cc = condition(s, c, i)
     test, s.out = s.out, outer
-    if s.is_leaf(a) and not s.is_leaf(b) or not s.is_leaf(a) and not s.is_leaf(b) and _dies_here(s, b, i, a):
+    if (s.is_leaf(a) and not s.is_leaf(b)) or (not s.is_leaf(a) and not s.is_leaf(b) and _dies_here(s, b, i, a)):
         a, b, cc = b, a, CC_INVERSE[cc]
     right = None if s.is_leaf(b) else s.value_regs(b)
     _assign(s, a, d)
@@ -288,4 +288,3 @@ def _assign(s: Selector, v: Value, d: tuple[int, ...]) -> None:
 
 
 SELECT: dict[str, Callable[[Selector, Instr], None]] = {"icmp": select_icmp, "select": select_select}
-

@@ -63,7 +63,7 @@ class DataEmitter:
     def variable(self, var: GlobalVar) -> None:
         """One definition."""
         name, size = symbol(self.module, var.name), size_of(var.type)
-        zero = isinstance(var.init, ConstZero | Undef) or isinstance(var.init, ConstInt) and var.init.value == 0
+        zero = isinstance(var.init, ConstZero | Undef) or (isinstance(var.init, ConstInt) and var.init.value == 0)
         self.lines.append(f"\t.section {self._section(var, name, zero)}")
         align = max(var.align, 2 if size > 1 else 1)
         if align > 1:

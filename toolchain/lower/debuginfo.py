@@ -1,4 +1,4 @@
-"""Source positions and DWARF from !DI metadata."""
+"""Readable view of !DI metadata: fields of nodes and source positions."""
 
 from __future__ import annotations
 
@@ -6,28 +6,66 @@ import re
 
 from ..ir.model import Module
 
-FIELD = re.compile(r"(\w+): (\"[^\"]*\"|[^,()]+)")
+FIELD = re.compile(r'(\w+): ("(?:[^"\\]|\\.)*"|!DIExpression\([^)]*\)|[^,()]+)')
+LIST = re.compile(r"!\d+|null")
+MAX_DEPTH = 64
 
 
-def fields(module: Module, ref: str) -> dict[str, str]:
-    """Fields of a metadata node given as !n."""
-    body = module.metadata.get(ref.lstrip("!"), "")
-    return {k: v.strip('"') for k, v in FIELD.findall(body)}
+class DebugInfo:
+    """Parsed metadata nodes of one module, each read once."""
 
+    def __init__(self, module: Module) -> None:
+        self.module = module
+        self._nodes: dict[str, dict[str, str]] = {}
+        self._files: dict[str, tuple[str, str]] = {}
 
-def source_position(module: Module, ref: str | None) -> tuple[str, int] | None:
-    """(file, line) of a DILocation or DISubprogram."""
-    if ref is None:
-        return None
-    node = fields(module, ref)
-    if "line" not in node:
-        return None
-    scope = node.get("scope", "")
-    file = node.get("file", "")
-    for _ in range(64):
-        if file.startswith("!") or not scope.startswith("!"):
-            break
-        up = fields(module, scope)
-        file, scope = up.get("file", ""), up.get("scope", "")
-    name = fields(module, file).get("filename", "?") if file.startswith("!") else "?"
-    return name, int(node["line"])
+    def node(self, ref: str) -> dict[str, str]:
+        """Fields of node "!n"; "kind" is the class name, such as DISubprogram."""
+        found = self._nodes.get(ref)
+        if found is None:
+            body = self.module.metadata.get(ref[1:], "")
+            found = {k: v.strip('"') for k, v in FIELD.findall(body)}
+            kind = re.match(r"(?:distinct )?!(\w+)\(", body)
+            found["kind"] = kind[1] if kind else ""
+            self._nodes[ref] = found
+        return found
+
+    def items(self, ref: str) -> list[str]:
+        """Elements of a tuple node, "null" included."""
+        return LIST.findall(self.module.metadata.get(ref[1:], "")) if ref.startswith("!") else []
+
+    def number(self, ref: str, key: str, default: int = 0) -> int:
+        """Integer field."""
+        text = self.node(ref).get(key, "").strip()
+        return int(text) if re.fullmatch(r"-?\d+", text) else default
+
+    def file(self, ref: str) -> tuple[str, str]:
+        """(directory, name) of the DIFile a node or one of its scopes names."""
+        if ref not in self._files:
+            at = ref
+            for _ in range(MAX_DEPTH):
+                node = self.node(at)
+                if node["kind"] == "DIFile":
+                    break
+                at = node.get("file") or node.get("scope") or ""
+                if not at.startswith("!"):
+                    break
+            node = self.node(at) if at.startswith("!") else {}
+            self._files[ref] = (node.get("directory", ""), node.get("filename", "?"))
+        return self._files[ref]
+
+    def position(self, ref: str | None) -> tuple[str, int] | None:
+        """(file name, line) of a DILocation or DISubprogram; None without one."""
+        if ref is None:
+            return None
+        line = self.number(ref, "line")
+        return (self.file(ref)[1], line) if line else None
+
+    def subprogram(self, ref: str) -> str:
+        """The DISubprogram a scope lies in."""
+        for _ in range(MAX_DEPTH):
+            node = self.node(ref)
+            if node["kind"] == "DISubprogram" or "scope" not in node:
+                return ref
+            ref = node["scope"]
+        return ref

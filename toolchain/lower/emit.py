@@ -9,7 +9,15 @@ from .mir import MI, File, Imm, MBlock, Mem, MFunction, Operand
 from .names import block_label
 
 MEM_TEXT = {"ind": "[w{}]", "++": "[w{}++]", "--": "[w{}--]", "+": "[++w{}]", "-": "[--w{}]"}
-RENAMED = {"sl1": "sl", "lsr1": "lsr", "asr1": "asr", "movd": "mov.d", "btst": "btst", "btstv": "btst.z", "btstc": "btst.c"}
+RENAMED = {
+    "sl1": "sl",
+    "lsr1": "lsr",
+    "asr1": "asr",
+    "movd": "mov.d",
+    "btst": "btst",
+    "btstv": "btst.z",
+    "btstc": "btst.c",
+}
 FILE_OPS = {n + "f": n for n in ("inc", "dec", "inc2", "dec2", "neg", "com", "clr", "setm", "sl", "lsr", "asr", "bset",
                                  "bclr", "btg", "btst", "cp0", "add", "sub", "and", "ior", "xor", "cp")}  # fmt: skip
 TIED_OPS = {n + "l": n for n in ("add", "sub", "addc", "subb", "and", "ior", "xor")}
@@ -126,7 +134,10 @@ class Emitter:
         if mi.byte and op in ("bset", "bclr", "btg", "btst"):
             self._out(f"{op}.b {','.join(args)}")
             return
-        self._out(f"{op}{'.b' if mi.byte else ''} {args[0]}" + (f",{args[1]}" if op in ("bset", "bclr", "btg", "btst") else ""))
+        self._out(
+            f"{op}{'.b' if mi.byte else ''} {args[0]}"
+            + (f",{args[1]}" if op in ("bset", "bclr", "btg", "btst") else "")
+        )
 
     # -- special instructions -----------------------------------------------------------------------------------------
 

@@ -98,12 +98,25 @@ class FrameBuilder:
                 for mi in epilogue:
                     mi.epilogue = True
                 b.insts[-1:-1] = epilogue
-        self.m.frame_bytes = self.locals + 2 * len(self.saved)
+        self._describe()
+
+    def _describe(self) -> None:
+        """Facts for debug information: where locals lie relative to W15 at entry."""
+        m = self.m
+        m.frame_bytes = self.locals + 2 * len(self.saved)
+        before = self.interrupt_bytes() if m.interrupt else 0
+        if m.uses_fp:
+            m.locals_base = before + 2
+            m.frame_base = (FP, -before - 2)
+        else:
+            m.locals_base = before or 2 * len(self.saved)
+            m.frame_base = (SP, -(m.locals_base + self.locals))
 
     def _instruction(self, mi: MI, pushed: int) -> list[MI]:
         if mi.op == "lea":
             slot, r = mi.args
-            assert isinstance(slot, Slot) and isinstance(r, int)
+            assert isinstance(slot, Slot)
+            assert isinstance(r, int)
             base, offset = self._place(slot, pushed)
             return _address_into(r, base, offset, mi)
         if mi.op == "setsp":
@@ -112,7 +125,8 @@ class FrameBuilder:
             return [MI("mov", source, SP, line=mi.line)]
         if mi.op == "spadd":
             amount = mi.args[0]
-            assert isinstance(amount, Imm) and isinstance(amount.value, int)
+            assert isinstance(amount, Imm)
+            assert isinstance(amount.value, int)
             return _adjust(amount.value, mi.line)
         if not any(isinstance(a, Slot) for a in mi.args):
             return [mi]
@@ -217,11 +231,13 @@ def _pushes(mi: MI) -> int:
     """Bytes an instruction adds to the stack for the rest of its block."""
     if mi.op == "spadd":
         amount = mi.args[0]
-        assert isinstance(amount, Imm) and isinstance(amount.value, int)
+        assert isinstance(amount, Imm)
+        assert isinstance(amount.value, int)
         return amount.value
     if mi.op == "repmov" and mi.args[2] == SP:
         count = mi.args[0]
-        assert isinstance(count, Imm) and isinstance(count.value, int)
+        assert isinstance(count, Imm)
+        assert isinstance(count.value, int)
         return 2 * (count.value + 1)
     return sum(2 for a in mi.args if isinstance(a, Mem) and a.mode == "++" and a.base == SP)
 

@@ -8,7 +8,7 @@ PREFIX = "os_isr:"
 WORDS = {"interrupt", "auto_psv", "no_auto_psv", "shadow"}
 
 
-def annotations(module: Module) -> dict[str, set[str]]:
+def annotations_of(module: Module) -> dict[str, set[str]]:
     """Function name -> its annotation strings."""
     table = module.globals.get("llvm.global.annotations")
     out: dict[str, set[str]] = {}
@@ -30,7 +30,7 @@ def _text(module: Module, v: Value) -> str:
 
 
 def interrupt_kind(name: str, notes: set[str]) -> str:
-    """"" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5)."""
+    """ "" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5)."""
     words = {w for n in notes for w in n.removeprefix(PREFIX).split(",")} & WORDS
     if not any(n.startswith(PREFIX) for n in notes) and "interrupt" not in words:
         return ""

@@ -145,7 +145,9 @@ class Legalizer:
         args = [self.use(a) for a in v.args]
         if v.op in ("ptrtoint", "inttoptr", "trunc", "zext", "sext", "bitcast", "addrspacecast", "ptrtoaddr"):
             t = legal_type(v.type)
-            return self.b.cast("trunc" if t.bits < args[0].type.bits else "sext" if v.op == "sext" else "zext", args[0], t)
+            return self.b.cast(
+                "trunc" if t.bits < args[0].type.bits else "sext" if v.op == "sext" else "zext", args[0], t
+            )
         return self.b.binary(v.op, args[0], args[1])
 
     def zero_extended(self, v: Value) -> Value:
@@ -262,7 +264,9 @@ class Legalizer:
                 return self.to_bool(low) if t.bits == 1 else low
         signed = i.op in ("sitofp", "fptosi")
         if i.op in ("sitofp", "uitofp"):
-            return softfloat.from_int(self.b, self.sign_extended(a) if signed else self.zero_extended(a), signed, t.bits)
+            return softfloat.from_int(
+                self.b, self.sign_extended(a) if signed else self.zero_extended(a), signed, t.bits
+            )
         if i.op in ("fptosi", "fptoui"):
             low = softfloat.to_int(self.b, self.use(a), signed, target if t.bits > 1 else I8)
             return self.to_bool(low) if t.bits == 1 else low
@@ -429,7 +433,9 @@ class Legalizer:
         if isinstance(v, ConstZero):
             return [const(legal_type(t), 0) for t, _ in leaves]
         if isinstance(v, ConstAgg):
-            return [self.use(x) if x.type.bits else y for x in v.elems for y in ([x] if x.type.bits else self.fields(x))]
+            return [
+                self.use(x) if x.type.bits else y for x in v.elems for y in ([x] if x.type.bits else self.fields(x))
+            ]
         raise UnsupportedError(f"aggregate operand of type {v.type}")
 
     def extractvalue(self, i: Instr) -> Value | list[Value]:
@@ -559,7 +565,9 @@ class Legalizer:
             self.b.emit("asm", VOID, args, asm=asm, attrs=attrs, results=[])
             return None
         types = list(i.type.elems) if i.type.kind == "struct" else [i.type]
-        new = self.b.emit("asm", legal_type(types[0]), args, asm=asm, attrs=attrs, results=[legal_type(t) for t in types])
+        new = self.b.emit(
+            "asm", legal_type(types[0]), args, asm=asm, attrs=attrs, results=[legal_type(t) for t in types]
+        )
         values: list[Value] = [new]
         for k in range(1, len(types)):
             values.append(self.b.emit("asmresult", legal_type(types[k]), [new], index=k))
@@ -676,4 +684,3 @@ HANDLERS: dict[str, Callable[[Legalizer, Instr], Value | list[Value] | None]] = 
 def legalize(module: Module, function: Function, where: Callable[[str | None], str]) -> None:
     """Rewrite one function definition in place. `where` turns a !dbg reference into "file:line"."""
     Legalizer(module, function, where).run()
-

@@ -64,13 +64,13 @@ def live_out(m: MFunction, at_return: int = 0) -> dict[str, int]:
 
 def has_effect(mi: MI) -> bool:
     """Whether an instruction does more than write registers and flags."""
-    if mi.op in SIDE_EFFECTS or mi.volatile or mi.op.endswith("f") and mi.op not in ("cpf",):
+    if mi.op in SIDE_EFFECTS or mi.volatile or (mi.op.endswith("f") and mi.op not in ("cpf",)):
         return True
     for role, a in zip(mi.info.roles, mi.args, strict=False):
         if a.__class__ is Mem:
-            if role in "db" or a.mode in ("++", "--", "+", "-"):  # type: ignore[union-attr]
+            if role in "db" or a.mode in ("++", "--", "+", "-"):
                 return True
-        elif role == "d" and a.__class__ is not int or role == "b" and a.__class__ is Slot:
+        elif (role == "d" and a.__class__ is not int) or (role == "b" and a.__class__ is Slot):
             return True
     return False
 

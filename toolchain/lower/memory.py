@@ -54,7 +54,9 @@ def _run(s: Selector, p: Value, count: int) -> list[Operand]:
     if isinstance(first, Mem):
         start = first.off if first.mode == "off" else 0
         if first.mode in ("ind", "off") and start + 2 * count <= 1024:
-            return [Mem("off", first.base, start + 2 * k) if start + 2 * k else Mem("ind", first.base) for k in range(count)]
+            return [
+                Mem("off", first.base, start + 2 * k) if start + 2 * k else Mem("ind", first.base) for k in range(count)
+            ]
         return [first, *(s.offset_operand(first.base, start + 2 * k, False) for k in range(1, count))]
     if isinstance(first, Slot):
         return [Slot(first.index, first.off + 2 * k) for k in range(count)]

@@ -188,13 +188,13 @@ class MI:
         for role, a in zip(self.info.roles, self.args, strict=False):
             if a.__class__ is int:
                 if role in "sb" or (self.pred and role == "d"):
-                    out.append(a)  # type: ignore[arg-type]
+                    out.append(a)
                 elif role in "SB":
-                    out += (a, a + 1) if a < FIRST_VIRTUAL else (a,)  # type: ignore[operator, arg-type]
+                    out += (a, a + 1) if a < FIRST_VIRTUAL else (a,)
             elif a.__class__ is Mem:
-                out.append(a.base)  # type: ignore[union-attr]
-                if a.mode == "idx":  # type: ignore[union-attr]
-                    out.append(a.off)  # type: ignore[union-attr, arg-type]
+                out.append(a.base)
+                if a.mode == "idx":
+                    out.append(a.off)
         return out
 
     def defs(self) -> list[int]:
@@ -203,23 +203,23 @@ class MI:
         for role, a in zip(self.info.roles, self.args, strict=False):
             if a.__class__ is int:
                 if role in "db":
-                    out.append(a)  # type: ignore[arg-type]
+                    out.append(a)
                 elif role in "DB":
-                    out += (a, a + 1) if a < FIRST_VIRTUAL else (a,)  # type: ignore[operator, arg-type]
-            elif a.__class__ is Mem and a.mode in ("++", "--", "+", "-"):  # type: ignore[union-attr]
-                out.append(a.base)  # type: ignore[union-attr]
+                    out += (a, a + 1) if a < FIRST_VIRTUAL else (a,)
+            elif a.__class__ is Mem and a.mode in ("++", "--", "+", "-"):
+                out.append(a.base)
         return out
 
     def map_registers(self, rename: dict[int, int]) -> None:
         """Replace registers, in place."""
         for k, a in enumerate(self.args):
             if a.__class__ is int:
-                self.args[k] = rename.get(a, a)  # type: ignore[arg-type, call-overload]
+                self.args[k] = rename.get(a, a)
             elif a.__class__ is Mem:
-                base = rename.get(a.base, a.base)  # type: ignore[union-attr]
-                off = rename.get(a.off, a.off) if a.mode == "idx" else a.off  # type: ignore[union-attr]
-                if base != a.base or off != a.off:  # type: ignore[union-attr]
-                    self.args[k] = Mem(a.mode, base, off)  # type: ignore[union-attr]
+                base = rename.get(a.base, a.base)
+                off = rename.get(a.off, a.off) if a.mode == "idx" else a.off
+                if base != a.base or off != a.off:
+                    self.args[k] = Mem(a.mode, base, off)
         if self.also_uses:
             self.also_uses = tuple(rename.get(r, r) for r in self.also_uses)
         if self.also_defs:
@@ -294,6 +294,9 @@ class MFunction:
     uses_fp: bool = False  # W14 is the frame pointer
     interrupt: str = ""  # "", "no_auto_psv", "auto_psv"; "shadow" may be appended after a comma
     tables: list[tuple[str, list[str]]] = field(default_factory=list)
+    slot_of: dict[int, int] = field(default_factory=dict)  # id(IR value) -> frame object, for debug information
+    locals_base: int = 0  # offset of the locals from W15 at entry
+    frame_base: tuple[int, int] = (15, 0)  # register, and W15 at entry relative to it, in the body
     frame_bytes: int = 0  # locals and saved registers, known after the frame pass
     temps: set[int] = field(default_factory=set)  # registers that must not be spilled again
 
@@ -311,7 +314,9 @@ class MFunction:
     def clone(self) -> MFunction:
         """An independent copy."""
         new = copy.copy(self)
-        new.blocks = [MBlock(b.name, [i.clone() for i in b.insts], list(b.succs), b.depth, b.address_taken) for b in self.blocks]
+        new.blocks = [
+            MBlock(b.name, [i.clone() for i in b.insts], list(b.succs), b.depth, b.address_taken) for b in self.blocks
+        ]
         new.frame = [copy.copy(o) for o in self.frame]
         new.pairs, new.pair_hints, new.temps = set(self.pairs), dict(self.pair_hints), set(self.temps)
         return new

@@ -54,7 +54,8 @@ def propagate_copies(b: MBlock) -> bool:
     for mi in b.insts:
         if mi.is_copy():
             source, dest = mi.args
-            assert isinstance(source, int) and isinstance(dest, int)
+            assert isinstance(source, int)
+            assert isinstance(dest, int)
             root = copy_of.get(source, source)
             if copy_of.get(dest, dest) == root:
                 changed = True
@@ -74,7 +75,8 @@ def propagate_copies(b: MBlock) -> bool:
             _forget(d, copy_of, constant)
         if mi.is_copy():
             source, dest = mi.args
-            assert isinstance(source, int) and isinstance(dest, int)
+            assert isinstance(source, int)
+            assert isinstance(dest, int)
             if source < 15 and dest < 15:
                 copy_of[dest] = copy_of.get(source, source)
                 if source in constant:
@@ -271,7 +273,10 @@ def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
             return _modify(mi, r, amount, "+" if amount > 0 else "-")
-        if mi.op in ("skip", "call", "callr", "asm", "text", "bra", "jump", "ret", "brtable", "jumpr", "tailcall") or mi.pred:
+        if (
+            mi.op in ("skip", "call", "callr", "asm", "text", "bra", "jump", "ret", "brtable", "jumpr", "tailcall")
+            or mi.pred
+        ):
             return False
     return False
 
@@ -283,7 +288,9 @@ def _modify(mi: MI, r: int, amount: int, mode: str) -> bool:
         return False
     plain = Mem("ind", r)
     places = [k for k, a in enumerate(mi.args) if a == plain]
-    mentions = sum(1 for a in mi.args if a == r or isinstance(a, Mem) and (a.base == r or a.mode == "idx" and a.off == r))
+    mentions = sum(
+        1 for a in mi.args if a == r or (isinstance(a, Mem) and (a.base == r or (a.mode == "idx" and a.off == r)))
+    )
     if len(places) != 1 or mentions != 1 or r in mi.also_uses or r in mi.also_defs or mi.op in ("bset", "bclr", "btg"):
         return False
     mi.args[places[0]] = Mem(mode, r)

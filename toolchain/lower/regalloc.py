@@ -72,16 +72,21 @@ class Graph:
             cost[r] = cost.get(r, 0) + weight
         if mi.op == "split":
             low, high, pair = mi.args
-            assert isinstance(low, int) and isinstance(high, int) and isinstance(pair, int)
+            assert isinstance(low, int)
+            assert isinstance(high, int)
+            assert isinstance(pair, int)
             self._pair_hints(pair, low, high)
         elif mi.op == "splitlo":
             low, pair = mi.args
-            assert isinstance(low, int) and isinstance(pair, int)
+            assert isinstance(low, int)
+            assert isinstance(pair, int)
             self.hints.setdefault(low, []).append((pair, 0))
             self.hints.setdefault(pair, []).append((low, 0))
         elif mi.op == "join":
             pair, low, high = mi.args
-            assert isinstance(low, int) and isinstance(high, int) and isinstance(pair, int)
+            assert isinstance(low, int)
+            assert isinstance(high, int)
+            assert isinstance(pair, int)
             self._pair_hints(pair, low, high)
         return live & ~d | bits(uses)
 
@@ -134,7 +139,7 @@ class Graph:
     def _mergeable(self, a: int, b: int) -> bool:
         if a == 15 or b == 15 or self.adjacent[a] >> b & 1:
             return False
-        if a < FIRST_VIRTUAL and b < FIRST_VIRTUAL or (a in self.m.pairs) != (b in self.m.pairs):
+        if (a < FIRST_VIRTUAL and b < FIRST_VIRTUAL) or (a in self.m.pairs) != (b in self.m.pairs):
             return False
         if b < FIRST_VIRTUAL:
             a, b = b, a
@@ -298,7 +303,7 @@ def _allocate(m: MFunction, eager: bool) -> None:
         if not colouring.spilled:
             _apply(m, g, colouring.colour)
             return
-        groups = {n: [r for r in g_members(g, n)] for n in colouring.spilled}
+        groups = {n: list(g_members(g, n)) for n in colouring.spilled}
         rewrite_spills(m, groups)
     raise UnsupportedError("register allocation does not converge", m.name)
 
@@ -349,7 +354,8 @@ def _pair_moves(mi: MI, parts: tuple[tuple[object, object, int], ...], into_pair
     """Two moves as if at once; EXCH for a swap."""
     moves = []
     for pair, word, offset in parts:
-        assert isinstance(pair, int) and isinstance(word, int)
+        assert isinstance(pair, int)
+        assert isinstance(word, int)
         source, dest = (word, pair + offset) if into_pair else (pair + offset, word)
         if source != dest:
             moves.append((source, dest))
@@ -360,5 +366,3 @@ def _pair_moves(mi: MI, parts: tuple[tuple[object, object, int], ...], into_pair
         if d0 == s1:
             moves.reverse()
     return [MI("mov", s, d, line=mi.line) for s, d in moves]
-
-

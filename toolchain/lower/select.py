@@ -28,8 +28,8 @@ from ..target import BYTE_OFFSET, WORD_OFFSET
 from . import arith, calls, compare, memory
 from .abi import Place
 from .cfg import loop_depths, predecessors
-from .mir import MI, File, FrameObject, Imm, MBlock, Mem, MFunction, Operand, Slot
 from .data import is_near
+from .mir import MI, File, FrameObject, Imm, MBlock, Mem, MFunction, Operand, Slot
 from .names import block_label, symbol
 
 FAR_FRAME_BYTES = 380  # above this, locals are reached through computed addresses (offset limits, isa.md §3.2)
@@ -43,10 +43,11 @@ def words_of(v: Value) -> int:
 class Selector:
     """State of one function's selection."""
 
-    def __init__(self, module: Module, f: Function, for_size: bool) -> None:
+    def __init__(self, module: Module, f: Function, for_size: bool, taken: set[str]) -> None:
         self.module = module
         self.f = f
         self.for_size = for_size
+        self.taken = taken
         self.m = MFunction(f.name)
         self.out: list[MI] = []
         self.line: str | None = None
@@ -131,7 +132,7 @@ class Selector:
 
     def regs(self, v: Value) -> tuple[int, ...]:
         """Registers that hold the words of a value, low word first; constants are loaded here and now."""
-        if isinstance(v, Instr) and v.op != "slot" or isinstance(v, Arg) and id(v) not in self.slots:
+        if (isinstance(v, Instr) and v.op != "slot") or (isinstance(v, Arg) and id(v) not in self.slots):
             return self.value_regs(v)
         return tuple(self.leaf_word(v, k) for k in range(words_of(v)))
 
@@ -143,7 +144,7 @@ class Selector:
             self.registers[id(v)] = found
         self.needed.add(id(v))
         self.wanted.add(id(v))
-        if isinstance(v, Instr) and v.op in ("trunc", "bits") or self._is_bool_zext(v):
+        if (isinstance(v, Instr) and v.op in ("trunc", "bits")) or self._is_bool_zext(v):
             assert isinstance(v, Instr)
             self.value_regs(v.args[0])
         return found
@@ -206,7 +207,7 @@ class Selector:
     def address_expr(self, v: Value) -> str:
         """Assembler expression for the 16-bit address of a symbol."""
         if isinstance(v, BlockAddress):
-            return f"handle({block_label(self.f.name, v.block)})"
+            return f"handle({block_label(v.function, v.block)})"
         assert isinstance(v, GlobalRef)
         name = symbol(self.module, v.name)
         if v.name in self.module.functions:
@@ -240,7 +241,12 @@ class Selector:
                 continue
             if user.op == "store" and user.args[1] is p and user.args[0] is not p:
                 continue
-            if user.op == "add" and user.args[0] is p and isinstance(user.args[1], ConstInt) and self.address_only(user):
+            if (
+                user.op == "add"
+                and user.args[0] is p
+                and isinstance(user.args[1], ConstInt)
+                and self.address_only(user)
+            ):
                 continue
             return False
         return True
@@ -254,14 +260,14 @@ class Selector:
             if base.name not in self.module.functions:
                 near = is_near(self.module, base.name)
                 constant = self._constant_global(base.name)
-                if near or not byte and not constant:
+                if near or (not byte and not constant):
                     return File(self.address_expr(ref), near)
             r = self.temp()
             self.emit("mov", Imm(self.address_expr(ref)), r)
             return Mem("ind", r)
         if isinstance(base, ConstInt):
             at = base.value + offset & 0xFFFF
-            if at < 0x2000 or not byte and not at & 1:
+            if at < 0x2000 or (not byte and not at & 1):
                 return File(f"0x{at:04X}", at < 0x2000)
             r = self.temp()
             self.load_imm(at, r)
@@ -324,7 +330,6 @@ class Selector:
         for b in f.blocks:
             if any(ends[p] == "indirectbr" for p in preds[b.name]):
                 self.two_stage.add(b.name)
-        taken = {a.block for b in f.blocks for i in b.instrs for a in i.args if isinstance(a, BlockAddress)}
         calls.incoming(self)
         bodies: dict[str, list[list[MI]]] = {}
         for block in f.blocks:
@@ -338,7 +343,7 @@ class Selector:
                     chunks.append(self.out)
             bodies[block.name] = chunks
         for block in f.blocks:
-            mb = MBlock(block.name, [], block.succs, depths[block.name], block.name in taken)
+            mb = MBlock(block.name, [], block.succs, depths[block.name], block.name in self.taken)
             if block is f.blocks[0]:
                 self.out = []
                 self.line = None
@@ -348,12 +353,13 @@ class Selector:
                 self.out = []
                 for phi in block.phis():
                     if id(phi) in self.needed:
-                        for a, b in zip(self.phi_input(phi), self.value_regs(phi), strict=True):
-                            self.copy(a, b)
+                        for source, dest in zip(self.phi_input(phi), self.value_regs(phi), strict=True):
+                            self.copy(source, dest)
                 mb.insts += self.out
             for chunk in reversed(bodies[block.name]):
                 mb.insts += chunk
             self.m.blocks.append(mb)
+        self.m.slot_of = dict(self.slots)
         return self.m
 
     def phi_input(self, phi: Instr) -> tuple[int, ...]:

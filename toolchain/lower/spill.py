@@ -101,7 +101,8 @@ def _direct_move(mi: MI, slot_of: dict[int, int]) -> MI | None:
     if not mi.is_copy():
         return None
     source, dest = mi.args
-    assert isinstance(source, int) and isinstance(dest, int)
+    assert isinstance(source, int)
+    assert isinstance(dest, int)
     if source in slot_of and dest not in slot_of:
         return MI("mov", Slot(slot_of[source]), dest, line=mi.line)
     if dest in slot_of and source not in slot_of:

@@ -171,4 +171,3 @@ def lower_switches(f: Function, for_size: bool) -> None:
         if block.instrs[-1].op == "switch":
             out += SwitchLowering(f, block, for_size).run()
     f.blocks = out
-

@@ -1,0 +1,419 @@
+"""DWARF 2 as assembler data directives (abi-elf.md §6.7): units, functions, variables, types and the line table.
+
+Code addresses are PC units, variables data addresses, both 4 bytes. Frame variables are relative to W15 at entry, which
+the frame base expresses through W15 or W14. Variables that live in registers have no location here yet: debuggers
+report them as optimised out.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from ..ir.model import Module
+from .debuginfo import DebugInfo
+from .names import symbol
+
+PRODUCER = "toolchain for dsPIC30F, clang front end"
+ADDRESS_BYTES = 4
+REFERENCE = re.compile(r"!\d+")
+# DWARF 2 §7.5.4
+TAGS = {"array_type": 0x01, "enumeration_type": 0x04, "formal_parameter": 0x05, "lexical_block": 0x0B, "member": 0x0D,
+        "pointer_type": 0x0F, "compile_unit": 0x11, "structure_type": 0x13, "subroutine_type": 0x15, "typedef": 0x16,
+        "union_type": 0x17, "subrange_type": 0x21, "base_type": 0x24, "const_type": 0x26, "enumerator": 0x28,
+        "subprogram": 0x2E, "variable": 0x34, "volatile_type": 0x35, "unspecified_parameters": 0x18}  # fmt: skip
+ATTRIBUTES = {"location": 0x02, "name": 0x03, "byte_size": 0x0B, "bit_offset": 0x0C, "bit_size": 0x0D, "stmt_list": 0x10,
+              "low_pc": 0x11, "high_pc": 0x12, "language": 0x13, "comp_dir": 0x1B, "const_value": 0x1C,
+              "upper_bound": 0x2F, "producer": 0x25, "prototyped": 0x27, "data_member_location": 0x38,
+              "decl_file": 0x3A, "decl_line": 0x3B, "declaration": 0x3C, "encoding": 0x3E, "external": 0x3F,
+              "frame_base": 0x40, "type": 0x49}  # fmt: skip
+FORMS = {"addr": 0x01, "block1": 0x0A, "data1": 0x0B, "data2": 0x05, "data4": 0x06, "string": 0x08, "flag": 0x0C,
+         "sdata": 0x0D, "ref4": 0x13}  # fmt: skip
+ENCODINGS = {"address": 1, "boolean": 2, "float": 4, "signed": 5, "signed_char": 6, "unsigned": 7, "unsigned_char": 8}
+LANGUAGE_C89 = 1
+OP_ADDR, OP_PLUS_UCONST, OP_BREG0, OP_FBREG = 0x03, 0x23, 0x70, 0x91  # DWARF 2 §7.7.1
+LINE_BASE, LINE_RANGE, OPCODE_BASE = -10, 245, 10  # abi-elf.md §6.7, C units
+STANDARD_LENGTHS = (0, 1, 1, 1, 1, 0, 0, 0, 1)
+SPECIFIERS = {"DW_TAG_const_type": "const_type", "DW_TAG_volatile_type": "volatile_type",
+              "DW_TAG_pointer_type": "pointer_type", "DW_TAG_typedef": "typedef"}  # fmt: skip
+COMPOSITES = {"DW_TAG_structure_type": "structure_type", "DW_TAG_union_type": "union_type",
+              "DW_TAG_enumeration_type": "enumeration_type", "DW_TAG_array_type": "array_type"}  # fmt: skip
+
+
+@dataclass
+class FunctionInfo:
+    """What the back end reports of one function: labels, line rows, frame variables."""
+
+    name: str  # assembler symbol
+    subprogram: str  # metadata reference
+    end_label: str
+    frame_base: tuple[int, int]  # register, offset of W15 at entry from it
+    rows: list[tuple[str, str, int]] = field(default_factory=list)  # label, position node, line
+    variables: list[tuple[str, int]] = field(default_factory=list)  # DILocalVariable, offset from W15 at entry
+
+
+@dataclass
+class Die:
+    """One entry: tag, (attribute, form, value), children. `label` marks a type that others refer to."""
+
+    tag: str
+    attributes: list[tuple[str, str, str | int | list[str]]]
+    children: list[Die] = field(default_factory=list)
+    label: str = ""
+
+
+def _uleb(value: int) -> list[str]:
+    out = []
+    while True:
+        byte, value = value & 0x7F, value >> 7
+        out.append(str(byte | (0x80 if value else 0)))
+        if not value:
+            return out
+
+
+def _sleb(value: int) -> list[str]:
+    out = []
+    while True:
+        byte, value = value & 0x7F, value >> 7
+        done = value == 0 and not byte & 0x40 or value == -1 and byte & 0x40
+        out.append(str(byte | (0 if done else 0x80)))
+        if done:
+            return out
+
+
+def _string(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'\t.asciz "{escaped}"'
+
+
+class Unit:
+    """Debug entries of one compile unit."""
+
+    def __init__(self, info: DebugInfo, module: Module, ref: str, number: int) -> None:
+        self.info = info
+        self.module = module
+        self.ref = ref
+        self.number = number
+        self.types: dict[str, Die] = {}
+        self.files: list[tuple[str, str]] = []
+        self.functions: list[FunctionInfo] = []
+        self.globals: list[tuple[str, str]] = []  # DIGlobalVariable, assembler symbol
+
+    def file_number(self, ref: str) -> int:
+        """1-based number of the file of a node."""
+        name = self.info.file(ref)
+        if name not in self.files:
+            self.files.append(name)
+        return self.files.index(name) + 1
+
+    def tree(self) -> Die:
+        """The unit's entry with everything below it."""
+        directory, name = self.info.file(self.ref)
+        top = Die("compile_unit", [
+            ("producer", "string", PRODUCER), ("language", "data1", LANGUAGE_C89), ("name", "string", name),
+            ("comp_dir", "string", directory), ("stmt_list", "data4", f".Ldbg_line{self.number}"),
+        ])  # fmt: skip
+        body = [self._variable(ref, s) for ref, s in self.globals] + [self._function(f) for f in self.functions]
+        top.children = list(self.types.values()) + body
+        return top
+
+    def _declared(self, ref: str) -> list[tuple[str, str, str | int | list[str]]]:
+        node = self.info.node(ref)
+        out: list[tuple[str, str, str | int | list[str]]] = []
+        if node.get("name"):
+            out.append(("name", "string", node["name"]))
+        if self.info.number(ref, "line"):
+            out.append(("decl_file", "data1", min(self.file_number(ref), 255)))
+            out.append(("decl_line", "data2", self.info.number(ref, "line")))
+        return out
+
+    def _type_attribute(self, ref: str | None) -> list[tuple[str, str, str | int | list[str]]]:
+        die = self.type(ref)
+        return [("type", "ref4", die.label)] if die is not None else []
+
+    def _variable(self, ref: str, name: str) -> Die:
+        node = self.info.node(ref)
+        attributes = self._declared(ref) + self._type_attribute(node.get("type"))
+        attributes.append(("external", "flag", int(node.get("isLocal") != "true")))
+        attributes.append(("location", "block1", ["addr", name]))
+        return Die("variable", attributes)
+
+    def _function(self, f: FunctionInfo) -> Die:
+        node = self.info.node(f.subprogram)
+        returns = self.info.items(self.info.node(node.get("type", "")).get("types", "")) if "type" in node else []
+        register, offset = f.frame_base
+        attributes = self._declared(f.subprogram)
+        if returns and returns[0] != "null":
+            attributes += self._type_attribute(returns[0])
+        attributes += [
+            ("external", "flag", int("LocalToUnit" not in node.get("spFlags", ""))),
+            ("prototyped", "flag", 1),
+            ("low_pc", "addr", f.name),
+            ("high_pc", "addr", f.end_label),
+            ("frame_base", "block1", [str(OP_BREG0 + register), *_sleb(offset)]),
+        ]
+        die = Die("subprogram", attributes)
+        located = dict(f.variables)
+        wanted = list(dict.fromkeys([*self._parameters(node), *located]))
+        for ref in wanted:
+            if ref in located or self.info.number(ref, "arg"):
+                die.children.append(self._local(ref, located.get(ref)))
+        return die
+
+    def _parameters(self, subprogram: dict[str, str]) -> list[str]:
+        retained = self.info.items(subprogram.get("retainedNodes", ""))
+        return [r for r in retained if self.info.number(r, "arg")]
+
+    def _local(self, ref: str, offset: int | None) -> Die:
+        attributes = self._declared(ref) + self._type_attribute(self.info.node(ref).get("type"))
+        if offset is not None:
+            attributes.append(("location", "block1", [str(OP_FBREG), *_sleb(offset)]))
+        return Die("formal_parameter" if self.info.number(ref, "arg") else "variable", attributes)
+
+    # -- types --------------------------------------------------------------------------------------------------------
+
+    def type(self, ref: str | None) -> Die | None:
+        """Entry of a type node; None for void."""
+        if ref is None or not ref.startswith("!"):
+            return None
+        found = self.types.get(ref)
+        if found is not None:
+            return found
+        node = self.info.node(ref)
+        die = Die("base_type", [], [], f".Ldbg_t{self.number}_{len(self.types)}")
+        self.types[ref] = die
+        tag = node.get("tag", "")
+        if node["kind"] == "DIBasicType":
+            self._base(die, ref, node)
+        elif tag in SPECIFIERS:
+            self._specifier(die, ref, node, SPECIFIERS[tag])
+        elif tag in COMPOSITES:
+            self._composite(die, ref, node, COMPOSITES[tag])
+        elif node["kind"] == "DISubroutineType":
+            self._subroutine(die, node)
+        else:
+            die.attributes = [("name", "string", node.get("name", "?")), ("byte_size", "data2", 0),
+                              ("encoding", "data1", ENCODINGS["unsigned"])]  # fmt: skip
+        return die
+
+    def _bytes(self, ref: str) -> int:
+        return (self.info.number(ref, "size") + 7) // 8
+
+    def _base(self, die: Die, ref: str, node: dict[str, str]) -> None:
+        encoding = ENCODINGS.get(node.get("encoding", "").removeprefix("DW_ATE_"), ENCODINGS["unsigned"])
+        die.attributes = [("name", "string", node.get("name", "?")), ("byte_size", "data2", self._bytes(ref)),
+                          ("encoding", "data1", encoding)]  # fmt: skip
+
+    def _specifier(self, die: Die, ref: str, node: dict[str, str], tag: str) -> None:
+        die.tag = tag
+        if tag == "typedef":
+            die.attributes = self._declared(ref)
+        elif tag == "pointer_type":
+            die.attributes = [("byte_size", "data2", self._bytes(ref))]
+        die.attributes = die.attributes + self._type_attribute(node.get("baseType"))
+
+    def _composite(self, die: Die, ref: str, node: dict[str, str], tag: str) -> None:
+        die.tag = tag
+        elements = self.info.items(node.get("elements", ""))
+        if tag == "array_type":
+            die.attributes = self._type_attribute(node.get("baseType"))
+            die.children = [self._subrange(e) for e in elements]
+            return
+        die.attributes = self._declared(ref)
+        if "DIFlagFwdDecl" in node.get("flags", ""):
+            die.attributes.append(("declaration", "flag", 1))
+            return
+        die.attributes.append(("byte_size", "data2", self._bytes(ref)))
+        if tag == "enumeration_type":
+            die.children = [
+                Die("enumerator", [("name", "string", self.info.node(e).get("name", "?")),
+                                   ("const_value", "sdata", self.info.number(e, "value"))])
+                for e in elements
+            ]  # fmt: skip
+        else:
+            die.children = [self._member(e, tag) for e in elements]
+
+    def _subrange(self, ref: str) -> Die:
+        count = self.info.number(ref, "count", -1)
+        return Die("subrange_type", [("upper_bound", "data2", count - 1)] if count > 0 else [])
+
+    def _member(self, ref: str, parent: str) -> Die:
+        node = self.info.node(ref)
+        attributes = self._declared(ref) + self._type_attribute(node.get("baseType"))
+        bit = self.info.number(ref, "offset")
+        size = self.info.number(ref, "size")
+        at = bit // 8
+        if "DIFlagBitField" in node.get("flags", ""):
+            storage = max(1, self._storage(node.get("baseType")))
+            at = bit // (8 * storage) * storage
+            attributes += [("byte_size", "data2", storage), ("bit_size", "data1", size),
+                           ("bit_offset", "data1", max(0, 8 * storage - size - (bit - 8 * at)))]  # fmt: skip
+        if parent == "structure_type":
+            attributes.append(("data_member_location", "block1", [str(OP_PLUS_UCONST), *_uleb(at)]))
+        return Die("member", attributes)
+
+    def _storage(self, ref: str | None) -> int:
+        """Bytes of a bit-field's declared type."""
+        for _ in range(16):
+            if ref is None or not ref.startswith("!"):
+                return 2
+            if size := self._bytes(ref):
+                return size
+            ref = self.info.node(ref).get("baseType")
+        return 2
+
+    def _subroutine(self, die: Die, node: dict[str, str]) -> None:
+        die.tag = "subroutine_type"
+        types = self.info.items(node.get("types", ""))
+        die.attributes = [("prototyped", "flag", 1)]
+        if types and types[0] != "null":
+            die.attributes += self._type_attribute(types[0])
+        for t in types[1:]:
+            if t == "null":
+                die.children.append(Die("unspecified_parameters", []))
+            else:
+                die.children.append(Die("formal_parameter", self._type_attribute(t)))
+
+
+class DwarfWriter:
+    """Text of all debug sections of one module."""
+
+    def __init__(self, module: Module) -> None:
+        self.module = module
+        self.info = DebugInfo(module)
+        self.units: dict[str, Unit] = {}
+        self.abbreviations: dict[tuple[object, ...], int] = {}
+        self.out: list[str] = []
+
+    def unit(self, ref: str) -> Unit:
+        """The unit for a DICompileUnit."""
+        if ref not in self.units:
+            self.units[ref] = Unit(self.info, self.module, ref, len(self.units))
+        return self.units[ref]
+
+    def add_function(self, f: FunctionInfo) -> None:
+        """Record one compiled function."""
+        unit = self.info.node(f.subprogram).get("unit", "")
+        if unit.startswith("!"):
+            self.unit(unit).functions.append(f)
+
+    def _collect_globals(self) -> None:
+        owners = self._owners()
+        for var in self.module.globals.values():
+            if var.dbg is None or var.init is None or var.linkage == "private":
+                continue
+            ref = self.info.node(var.dbg).get("var", "")
+            if ref in owners and self.info.node(ref).get("name"):
+                self.unit(owners[ref]).globals.append((ref, symbol(self.module, var.name)))
+
+    def _owners(self) -> dict[str, str]:
+        """DIGlobalVariable -> its compile unit."""
+        out = {}
+        for cu in REFERENCE.findall(self.module.named_metadata.get("llvm.dbg.cu", "")):
+            for expression in self.info.items(self.info.node(cu).get("globals", "")):
+                out[self.info.node(expression).get("var", "")] = cu
+        return out
+
+    def text(self) -> list[str]:
+        """All lines of .debug_info, .debug_abbrev and .debug_line."""
+        self._collect_globals()
+        self.out.append("\t.section .debug_info,info")
+        trees = [(u, u.tree()) for u in self.units.values()]
+        for unit, tree in trees:
+            self._info(unit, tree)
+        self.out += ["\t.section .debug_abbrev,info", ".Ldbg_abbrev:"]
+        self._abbreviations()
+        self.out.append("\t.section .debug_line,info")
+        for unit, _ in trees:
+            self._lines(unit)
+        return self.out
+
+    # -- .debug_info --------------------------------------------------------------------------------------------------
+
+    def _info(self, unit: Unit, tree: Die) -> None:
+        n = unit.number
+        self.out += [f".Ldbg_info{n}:", f"\t.4byte .Ldbg_info_end{n}-.Ldbg_info_start{n}", f".Ldbg_info_start{n}:",
+                     "\t.2byte 2", "\t.4byte .Ldbg_abbrev", f"\t.byte {ADDRESS_BYTES}"]  # fmt: skip
+        self._die(tree, f".Ldbg_info{n}")
+        self.out.append(f".Ldbg_info_end{n}:")
+
+    def _die(self, die: Die, base: str) -> None:
+        key = (die.tag, bool(die.children), tuple((a, f) for a, f, _ in die.attributes))
+        code = self.abbreviations.setdefault(key, len(self.abbreviations) + 1)
+        if die.label:
+            self.out.append(f"{die.label}:")
+        self.out.append(f"\t.byte {','.join(_uleb(code))}")
+        for _, form, value in die.attributes:
+            self._value(form, value, base)
+        if die.children:
+            for child in die.children:
+                self._die(child, base)
+            self.out.append("\t.byte 0")
+
+    def _value(self, form: str, value: str | int | list[str], base: str) -> None:
+        match form:
+            case "string":
+                self.out.append(_string(str(value)))
+            case "data1" | "flag":
+                self.out.append(f"\t.byte {value}")
+            case "data2":
+                self.out.append(f"\t.2byte {value}")
+            case "data4" | "addr":
+                self.out.append(f"\t.4byte {value}")
+            case "ref4":
+                self.out.append(f"\t.4byte {value}-{base}")
+            case "sdata":
+                assert isinstance(value, int)
+                self.out.append(f"\t.byte {','.join(_sleb(value))}")
+            case "block1":
+                assert isinstance(value, list)
+                if value[0] == "addr":
+                    self.out += [f"\t.byte {1 + ADDRESS_BYTES},{OP_ADDR}", f"\t.4byte {value[1]}"]
+                else:
+                    self.out.append(f"\t.byte {len(value)},{','.join(value)}")
+
+    def _abbreviations(self) -> None:
+        for (tag, children, attributes), code in self.abbreviations.items():
+            data = [*_uleb(code), *_uleb(TAGS[str(tag)]), str(int(bool(children)))]
+            assert isinstance(attributes, tuple)
+            for name, form in attributes:
+                data += [*_uleb(ATTRIBUTES[name]), *_uleb(FORMS[form])]
+            self.out.append(f"\t.byte {','.join([*data, '0', '0'])}")
+        self.out.append("\t.byte 0")
+
+    # -- .debug_line --------------------------------------------------------------------------------------------------
+
+    def _lines(self, unit: Unit) -> None:
+        n = unit.number
+        for f in unit.functions:
+            for _, node, _ in f.rows:
+                unit.file_number(node)
+        self.out += [f".Ldbg_line{n}:", f"\t.4byte .Ldbg_line_end{n}-.Ldbg_line_start{n}", f".Ldbg_line_start{n}:",
+                     "\t.2byte 2", f"\t.4byte .Ldbg_program{n}-.Ldbg_prologue{n}", f".Ldbg_prologue{n}:",
+                     f"\t.byte 1,1,{LINE_BASE & 0xFF},{LINE_RANGE},{OPCODE_BASE}",
+                     f"\t.byte {','.join(map(str, STANDARD_LENGTHS))}"]  # fmt: skip
+        directories = list(dict.fromkeys(d for d, _ in unit.files if d))
+        self.out += [_string(d) for d in directories] + ["\t.byte 0"]
+        for directory, name in unit.files:
+            index = directories.index(directory) + 1 if directory else 0
+            self.out += [_string(name), f"\t.byte {','.join(_uleb(index))},0,0"]
+        self.out += ["\t.byte 0", f".Ldbg_program{n}:"]
+        for f in unit.functions:
+            self._sequence(unit, f)
+        self.out.append(f".Ldbg_line_end{n}:")
+
+    def _sequence(self, unit: Unit, f: FunctionInfo) -> None:
+        """Rows of one function: every row sets its address, so that no distance needs to be known here."""
+        line = file = 1
+        for label, node, row_line in f.rows:
+            self.out += [f"\t.byte 0,{1 + ADDRESS_BYTES},2", f"\t.4byte {label}"]
+            number = unit.file_number(node)
+            data = []
+            if number != file:
+                data += ["4", *_uleb(number)]
+                file = number
+            if row_line != line:
+                data += ["3", *_sleb(row_line - line)]
+                line = row_line
+            self.out.append(f"\t.byte {','.join([*data, '1'])}")
+        self.out += [f"\t.byte 0,{1 + ADDRESS_BYTES},2", f"\t.4byte {f.end_label}", "\t.byte 0,1,1"]
