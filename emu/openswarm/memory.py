@@ -1,0 +1,184 @@
+"""The memory equation, measured: RAM = A + B n + C m + D s + sum over pending messages of (E + d).
+
+The `footprint` application makes a load of n threads, m events, s subscriptions and messages of d bytes; what it takes
+is seen from outside, as the heap's capacity less what its free lists and its untouched middle hold (kernel/memory.c).
+The allocator's own count must say the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+from emu.footprint import pieces
+from emu.image import Image
+from emu.openswarm.target import WORD, MeasureError, Target
+
+APPLICATION: Final = "footprint_wanted"
+"""Symbol by which the application is told."""
+
+PAPER: Final = {"A": 1142, "B": 146, "C": 6}
+"""Eq. (1) of the paper (Trenkwalder et al., IROS 2016); it has no term for subscriptions."""
+ORIGINAL: Final = {"B": 228, "C": 12, "D": 24, "E": 26}
+"""What the original's allocator really takes: 28 bytes per pending message of 2 (openswarm-original.md §4.6)."""
+
+_APPLICATION: Final = ("_footprint_wanted", "_footprint_now", "_pids")
+"""Variables of the application itself, which are no cost of the kernel."""
+_RESULT_WORDS: Final = 6
+_LONGEST_LIST: Final = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What the application is asked to build."""
+
+    threads: int = 0
+    events: int = 0
+    subscriptions: int = 0
+    messages: int = 0
+    payload: int = 0
+
+    @property
+    def payload_bytes(self) -> int:
+        """Payload of all messages as stored: memory is handed out in words."""
+        return self.messages * (self.payload + self.payload % WORD)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A load and the bytes it took, as seen from outside and as the allocator counts."""
+
+    load: Load
+    taken: int
+    counted: int
+    left: int
+    """Bytes still taken after everything was given back, less those of the empty kernel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """Coefficients in bytes, with the largest difference between equation and measurement."""
+
+    coefficients: dict[str, Fraction]
+    constant: dict[str, int]
+    """What A consists of, in bytes."""
+    heap: int
+    """Capacity of the heap, which is no part of A."""
+    residual: Fraction
+    cases: list[Case]
+
+
+class Heap:
+    """The kernel's heap read from memory."""
+
+    def __init__(self, target: Target) -> None:
+        self._target: Final = target
+        self._classes: Final = target.size("small") // WORD
+        if not self._classes:
+            raise MeasureError(f"{target.image.path}: the symbol `small` has no size")
+        self.capacity: Final = self.free() + target.words("os_statistics", 1)[0]
+        """Bytes of the whole heap: what is free plus what the kernel had taken for itself when first looked at."""
+
+    def free(self) -> int:
+        """Bytes of the untouched middle and of all free lists."""
+        target = self._target
+        free = target.word(target.address("top")) - target.word(target.address("brk"))
+        small = target.address("small")
+        for number in range(self._classes):
+            blocks = sum(1 for _ in self._list(target.word(small + WORD * number)))
+            free += blocks * WORD * (number + 1)
+        return free + sum(target.word(block + WORD) for block in self._list(target.word(target.address("large"))))
+
+    def taken(self) -> int:
+        """Bytes handed out."""
+        return self.capacity - self.free()
+
+    def _list(self, block: int) -> Iterator[int]:
+        """Addresses along a list linked by its first words."""
+        for _ in range(_LONGEST_LIST):
+            if not block:
+                return
+            yield block
+            block = self._target.word(block)
+        raise MeasureError("a free list of the kernel's heap does not end")
+
+
+def measure(image: Image, engine: str = "interp") -> Equation:
+    """Run all loads and fit the equation. Raises MeasureError if the application or the counts do not agree."""
+    target = Target(image, "footprint_begin", engine)
+    heap = Heap(target)
+    target.run_to("footprint_empty")
+    empty = heap.taken()
+    cases = [_case(target, heap, load, empty) for load in loads()]
+    for case in cases:
+        if case.taken != case.counted or case.left:
+            raise MeasureError(f"{case}: memory seen, counted by the allocator and given back do not agree")
+    return _fit(cases, _constant(target, heap, empty), heap.capacity)
+
+
+def loads() -> Iterator[Load]:
+    """n = 0..8, m = 0..16, s = 0..16, messages of several sizes, and everything together."""
+    yield from (Load(threads=n) for n in range(9))
+    yield from (Load(events=m) for m in range(1, 17))
+    yield from (Load(events=8, subscriptions=s) for s in range(1, 17))
+    for payload in (0, 1, 2, 3, 4, 8, 24, 63, 64):
+        yield from (Load(events=1, subscriptions=1, messages=count, payload=payload) for count in (1, 2, 5))
+    yield Load(8, 16, 16, 4, 24)
+    yield Load(3, 5, 7, 2, 10)
+
+
+def _case(target: Target, heap: Heap, load: Load, empty: int) -> Case:
+    target.restart()
+    request = (load.threads, load.events, load.subscriptions, load.messages, load.payload)
+    target.set_words("footprint_wanted", request)
+    target.run_to("footprint_built")
+    result = target.words("footprint_now", _RESULT_WORDS)
+    if tuple(result[:4]) != request[:4]:
+        raise MeasureError(f"asked for {request[:4]} threads, events, subscriptions, messages; got {tuple(result[:4])}")
+    taken, counted = heap.taken() - empty, result[4] - empty
+    target.run_to("footprint_undone")
+    return Case(load, taken, counted, heap.taken() - empty)
+
+
+def _constant(target: Target, heap: Heap, empty: int) -> dict[str, int]:
+    """The parts of A: RAM that is there before the first thread, heap capacity and the application's own left out."""
+    parts = {"kernel stack": target.size("os_memory") - heap.capacity, "taken from the heap by Sys_Init_Kernel": empty}
+    for piece in pieces(target.image):
+        if piece.name in ("_os_memory", *_APPLICATION) or "apps/" in piece.module:
+            continue
+        part = "UART rings and state" if piece.name == "_channels" else _part_of(piece.module)
+        parts[part] = parts.get(part, 0) + piece.ram
+    return {name: size for name, size in parts.items() if size}
+
+
+def _part_of(module: str) -> str:
+    """Whose variables those of a source file are."""
+    folders = {"/kernel/": "kernel variables", "/port/": "kernel variables", "/io/": "device variables",
+               "/board/": "device variables"}  # fmt: skip
+    return next((part for folder, part in folders.items() if folder in f"/{module}"), "library variables, padding")
+
+
+def _fit(cases: list[Case], parts: dict[str, int], capacity: int) -> Equation:
+    """Slopes from single-parameter loads; the residual is taken over all of them."""
+    by_load = {case.load: case.taken for case in cases}
+
+    def slope(many: Load, few: Load, difference: int) -> Fraction:
+        return Fraction(by_load[many] - by_load[few], difference)
+
+    b = slope(Load(threads=8), Load(), 8)
+    c = slope(Load(events=16), Load(), 16)
+    d = slope(Load(events=8, subscriptions=16), Load(events=8, subscriptions=1), 15)
+    e = slope(Load(0, 1, 1, 5, 2), Load(0, 1, 1, 1, 2), 4) - 2
+    constant = Fraction(by_load[Load()])
+    residual = max(
+        abs(
+            case.taken
+            - (constant + b * case.load.threads + c * case.load.events + d * case.load.subscriptions)
+            - (e * case.load.messages + case.load.payload_bytes)
+        )
+        for case in cases
+    )
+    coefficients = {"A": sum(parts.values()) + constant, "B": b, "C": c, "D": d, "E": e}
+    return Equation(coefficients, parts, capacity, residual, cases)
