@@ -79,6 +79,8 @@ class Interpreter:
         """The instruction has made an address error."""
         self.math = False
         """The instruction asks for a math error trap."""
+        self.stack_error = False
+        """The instruction has used a W15 address out of bounds."""
         self._window_extra = 0
         self._loads_ahead = 0
         self._stores: list[tuple[int, int, Size]] = []
@@ -92,7 +94,7 @@ class Interpreter:
         )
         self.pc = pc
         self.last = last
-        self.window = self.faulted = self.math = False
+        self.window = self.faulted = self.math = self.stack_error = False
         self._window_extra = window_extra
         self._loads_ahead = loads - 1 if loads > 1 else 0
         self._stores.clear()
@@ -111,9 +113,15 @@ class Interpreter:
                 data.write(ea, value, size)
                 cycle += 1
         if self.faulted:
-            self._exceptions.trap(self._exceptions.traps.address, self.last)
+            self._exceptions.traps.request(self._exceptions.traps.address, self.last)
+
+    def request_soft_traps(self, last: int) -> None:
+        """Request what the instruction that ended in cycle `last` asks for: visible one cycle later (isa.md §14.4)."""
+        traps = self._exceptions.traps
+        if self.stack_error:
+            traps.request(traps.stack, last + 1)
         if self.math:
-            self._exceptions.trap(self._exceptions.traps.math, self.last + 1)
+            traps.request(traps.math, last + 1)
 
     def select(self, c: Value, a: Value, b: Value) -> Value:
         return a if c else b
@@ -159,7 +167,7 @@ class Interpreter:
 
     def load(self, ea: Value, size: Size, side: Side = "src", ptr: int | None = None) -> Value:
         if ptr == STACK_POINTER:
-            self._exceptions.check_stack(ea, self.last)
+            self.stack_error |= self._exceptions.beyond_stack(ea)
         return self._read(ea, size)
 
     def xload(self, ea: Value, ptr: int) -> Value:
@@ -174,7 +182,7 @@ class Interpreter:
 
     def store(self, ea: Value, v: Value, size: Size, ptr: int | None = None) -> None:
         if ptr == STACK_POINTER:
-            self._exceptions.check_stack(ea, self.last)
+            self.stack_error |= self._exceptions.beyond_stack(ea)
         self._stores.append((ea, v, size))
 
     def _read(self, ea: int, size: int) -> int:

@@ -239,19 +239,14 @@ class Exceptions:
         state = self._state
         ea = self._u16[STACK_POINTER]
         self._events.arrive(cycle)
-        self.check_stack(ea, cycle)
+        if self.beyond_stack(ea):
+            self.traps.request(self.traps.stack, cycle + 1)
         if self._data.faulty(ea, 2):
             self.traps.request(self.traps.address, cycle)
         else:
             self._data.write(ea, value, 2)
         state.set_w(STACK_POINTER, ea + 2)
 
-    def check_stack(self, ea: int, cycle: int) -> None:
-        """Request the stack error trap if a W15 address used in `cycle` is out of bounds (isa.md §10.1, §10.2)."""
-        state = self._state
-        if ea < self._ram_start or (state.limit_armed and ea > state.splim):
-            self.traps.request(self.traps.stack, cycle + 1)
-
-    def trap(self, trap: Trap, cycle: int) -> None:
-        """Request a trap that is first visible in `cycle`. Raises TrapConflict."""
-        self.traps.request(trap, cycle)
+    def beyond_stack(self, ea: int) -> bool:
+        """Whether a W15 address is out of bounds (isa.md §10.1, §10.2)."""
+        return ea < self._ram_start or (bool(self._state.limit_armed) and ea > self._state.splim)

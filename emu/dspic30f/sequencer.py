@@ -232,6 +232,8 @@ class Sequencer:
             state.pc = pc
             raise
         last = builder.last if flow is None else self._follow(flow, pc, builder.last)
+        if builder.math or builder.stack_error:
+            builder.request_soft_traps(last)
         if state.sr & RA or repeat != NOT_REPEATING:
             last = self._after_target(step, flow, pc, last)
         if state.sr & DA and pc == state.pair("DOENDL") and state.pc == step.next_pc:

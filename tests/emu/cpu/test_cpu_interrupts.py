@@ -226,6 +226,14 @@ def test_disi_blocks_its_own_cycle_and_the_next_ones(engine: str, count: int, st
     assert rig.cycles_to("isr") == start
 
 
+def test_a_second_disi_replaces_the_count(engine: str) -> None:
+    """isa.md §12: DISI #1000 in 0, request in 1, DISI #2 in 3 blocks 3..5: NOP in 6, handler in 6 + 3."""
+    rig = Rig("disi #1000\nnop\nnop\ndisi #2\n" + "nop\n" * 12 + ISR, engine)
+    rig.vector(T1_VECTOR, "isr")
+    rig.interrupt_at(1)
+    assert rig.cycles_to("isr") == 9
+
+
 def test_priority_seven_ignores_disi(engine: str) -> None:
     """isa.md §12."""
     rig = Rig("disi #100\n" + "nop\n" * 12 + ISR, engine)

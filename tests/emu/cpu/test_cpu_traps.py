@@ -103,6 +103,14 @@ def test_stack_underflow_is_always_checked(engine: str, statement: str, w15: int
     assert rig.machine.peek("INTCON1") & STKERR
 
 
+def test_a_stack_error_of_a_return_counts_from_its_last_cycle(engine: str) -> None:
+    """isa.md §14.4: soft: RETURN in 0..2, c = 3, one NOP, handler in 7."""
+    rig = trapped(engine, "return\nback: nop", STACK_ERROR, w15=0x0802)
+    rig.machine.poke(0x07FE, rig.labels["back"])
+    rig.machine.poke(0x0800, 0)
+    assert rig.cycles_to("trap") == 7
+
+
 def test_arithmetic_on_the_stack_pointer_is_not_checked(engine: str) -> None:
     """isa.md §10.4."""
     rig = trapped(engine, "mov #0x0700, w15\nadd w15, #8, w15\nmov #0x0900, w15", STACK_ERROR)
