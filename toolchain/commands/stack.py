@@ -16,7 +16,7 @@ DESCRIPTION = """Worst-case stack use, in bytes, per function and per entry (res
 found by following every instruction path of the image.  Recursion, calls through pointers and unknown changes of
 W15 are named; an annotation file bounds them:
 
-    calls FUNCTION: TARGET, TARGET     what pointer calls inside FUNCTION reach
+    calls FUNCTION: TARGET, TARGET     what pointer calls inside FUNCTION reach, * = any with its address taken
     depth FUNCTION BYTES               FUNCTION with all it calls uses at most BYTES
     recursion FUNCTION COUNT           at most COUNT activations at once
     thread FUNCTION                    FUNCTION is the entry of a thread
@@ -32,6 +32,7 @@ def main(arguments: list[str]) -> int:
     p.add_argument("-a", "--annotations", metavar="FILE")
     p.add_argument("--thread", action="append", default=[], metavar="FUNCTION", help="as `thread` in the file")
     p.add_argument("--limit", action="append", default=[], metavar="FUNCTION=N", help="fail when FUNCTION needs more")
+    p.add_argument("--any-handle", action="store_true", help="pointer calls reach any function whose address is taken")
     p.add_argument("--functions", action="store_true", help="list every function, not only entries")
     p.add_argument("--json", action="store_true", help="machine-readable output")
     options = p.parse_args(arguments)
@@ -40,6 +41,7 @@ def main(arguments: list[str]) -> int:
     image = read_executable(read_bytes(options.image), options.image)
     add_symbols(annotations, image.symbols)
     annotations.threads += options.thread
+    annotations.any_handle = options.any_handle
     report = Analysis(image, annotations).report()
     print(json.dumps(_as_data(report), indent=1) if options.json else _as_text(report, options.functions))
     return _check(report, options.limit)

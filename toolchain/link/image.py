@@ -16,7 +16,8 @@ F = SectionFlag
 _KEPT = (
     F.WRITE | F.ALLOC | F.EXECINSTR | F.NOLOAD | F.NEAR | F.PERSIST | F.XMEM | F.YMEM | F.PSV | F.EEDATA | F.ABSOLUTE
 )
-_OWN_NAME = (".reset", ".ivt", ".aivt", ".dinit")
+_OWN_NAME = (".reset", ".ivt", ".aivt", ".handle", ".dinit")
+"""`.handle` keeps its name so that tools can tell whose address is taken; in Microchip's images it is part of .text."""
 
 
 @dataclass(slots=True)

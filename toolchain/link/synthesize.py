@@ -75,7 +75,10 @@ def handle_section(resolution: Resolution, live: set[Section]) -> tuple[Section,
             if source not in live:
                 continue
             for reloc in source.relocs:
-                if reloc.type in HANDLES and (target := resolution.lookup(reloc.symbol)) not in slots:
+                if reloc.type not in HANDLES:
+                    continue
+                target = resolution.lookup(reloc.symbol)
+                if target not in slots and target.home is not Home.UNDEFINED:
                     slots[target] = section.units
                     _goto(section, target)
     return section, slots

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from toolchain.elf import constants as c
 from toolchain.elf.disassemble import NO_INSTRUCTIONS, Item, Names, items
@@ -12,19 +12,11 @@ from toolchain.errors import ToolError
 from toolchain.link.memory import CHIP
 from toolchain.stack.annotations import Annotations
 from toolchain.stack.effects import CALL_BYTES, Flow, effect_of
+from toolchain.stack.totals import Usage, totals
 from toolchain.stack.walk import Call, Function, Walker
 
-
-@dataclass(slots=True)
-class Usage:
-    """Stack of one function: own frame, worst total in bytes, the path that reaches it, what is not known."""
-
-    name: str
-    entry: int
-    frame: int
-    total: int = 0
-    path: list[str] = field(default_factory=list)
-    unknown: list[str] = field(default_factory=list)
+TABLES = NO_INSTRUCTIONS | {".handle"}
+ANY = "*"  # annotation for "any function whose address is taken"
 
 
 @dataclass(slots=True)
@@ -53,14 +45,13 @@ class Analysis:
         self.image, self.annotations = image, annotations
         self.code: dict[int, Item] = {}
         for section in image.sections:
-            if section.is_code and section.name not in NO_INSTRUCTIONS and section.address in CHIP.program["program"]:
+            if section.is_code and section.name not in TABLES and section.address in CHIP.program["program"]:
                 self.code.update((item.address, item) for item in items(section))
         self.names = Names(image.symbols)
         self.vectors = self._vectors()
+        self.handles = self._handle_targets()
         self.entries = self._entries()
         self.functions = self._walk_all()
-        self._usages: dict[int, Usage] = {}
-        self._active: list[int] = []
 
     # -- entries -------------------------------------------------------------------------------------------------
 
@@ -80,7 +71,8 @@ class Analysis:
 
     def _entries(self) -> set[int]:
         """Function starts: FUNC symbols, call targets, vectors, the program's entry, annotated names."""
-        found = {self.image.entry, *self.vectors}
+        found = {self.image.entry, *self.vectors, *self.handles}
+        found |= {self._named(name) for name in self.annotations.threads}
         for symbol in self.image.symbols:
             if symbol.section is not None and symbol.section.is_code and is_named(symbol):
                 typed = symbol.type == c.STT_FUNC or (symbol.type == c.STT_NOTYPE and symbol.bind is not Bind.LOCAL)
@@ -110,88 +102,45 @@ class Analysis:
                 return symbol.value
         raise ToolError(f"no function is called {name}")
 
-    def _annotation(self, table: dict[str, int], entry: int) -> int | None:
+    def annotation(self, table: dict[str, int], entry: int) -> int | None:
+        """Number an annotation gives for the function at `entry`, None when it says nothing."""
         name = self.name(entry)
         return table.get(name, table.get(name.removeprefix("_")))
 
-    # -- totals --------------------------------------------------------------------------------------------------
+    # -- calls ---------------------------------------------------------------------------------------------------
 
-    def usage(self, entry: int) -> Usage:
-        """Return the worst case of the function at `entry`, callees included."""
-        known = self._usages.get(entry)
-        if known is not None:
-            return known
-        function = self.functions.get(entry) or Function(entry, notes=[f"no code at {entry:#x}"])
-        result = Usage(self.name(entry), entry, function.frame, function.frame, [self.name(entry)])
-        bound = self._annotation(self.annotations.depth, entry)
-        if bound is not None:
-            result.total = bound
-            self._usages[entry] = result
-            return result
-        result.unknown = [f"{result.name}: {note}" for note in function.notes]
-        self._active.append(entry)
-        for call in function.calls:
-            self._add_call(result, call)
-        self._active.pop()
-        repeats = self._annotation(self.annotations.recursion, entry)
-        if repeats is not None and repeats > 1:
-            result.total += (repeats - 1) * (result.total + CALL_BYTES)
-        if not self._active or not self._in_cycle(entry):
-            self._usages[entry] = result
-        return result
-
-    def _in_cycle(self, entry: int) -> bool:
-        """Whether `entry` can reach a function whose walk is still open: its total is then not final yet."""
-        seen, work = {entry}, [entry]
-        while work:
-            for call in self.functions[work.pop()].calls:
-                for target in self._targets(call):
-                    if target in self._active:
-                        return True
-                    if target in self.functions and target not in seen:
-                        seen.add(target)
-                        work.append(target)
-        return False
-
-    def _targets(self, call: Call) -> list[int]:
+    def targets(self, call: Call) -> list[int]:
+        """Functions a call site may reach: its own target, or what annotations say about a pointer call."""
         if call.target is not None:
-            return [call.target] if call.target else []
+            return [call.target] if call.target else []  # 0: a weak function that is not linked
         owner = self.name(call.address).partition("+")[0]
         names = self.annotations.calls.get(owner) or self.annotations.calls.get(owner.removeprefix("_")) or []
-        return [self._named(name) for name in names]
+        if not names and self.annotations.any_handle:
+            names = [ANY]
+        return [a for name in names for a in (self._handles() if name == ANY else [self._named(name)])]
 
-    def _add_call(self, result: Usage, call: Call) -> None:
-        base = call.depth + (0 if call.tail else CALL_BYTES)
-        targets = self._targets(call)
-        if call.target == 0:  # a weak function that is not linked, as crt0's __user_init
-            result.total = max(result.total, base)
-            return
-        if not targets:
-            result.unknown.append(f"{result.name}: call through a pointer at {call.address:#x}")
-            result.total = max(result.total, base)
-        for target in targets:
-            if target in self._active:
-                if self._annotation(self.annotations.recursion, target) is None:
-                    result.unknown.append(f"{result.name}: recursion to {self.name(target)} at {call.address:#x}")
-                continue
-            callee = self.usage(target)
-            result.unknown += [note for note in callee.unknown if note not in result.unknown]
-            if base + callee.total > result.total:
-                result.total = base + callee.total
-                result.path = [self.name(result.entry), *callee.path]
+    def _handles(self) -> list[int]:
+        """Functions whose address is taken: the targets of `.handle` (abi-elf.md §1.5); raises `ToolError`."""
+        if not any(s.name == ".handle" for s in self.image.sections):
+            raise ToolError("the image has no .handle section that tells whose address is taken")
+        return sorted(self.handles & self.entries)
+
+    def _handle_targets(self) -> set[int]:
+        slots = [i for s in self.image.sections if s.name == ".handle" for i in items(s)]
+        jumps = [effect_of(i.insn, i.address) for i in slots if i.insn is not None]
+        return {jump.target for jump in jumps if jump.flow is Flow.JUMP}
 
     def report(self) -> Report:
         """Return all functions, and the entries: reset, interrupts, threads, and what is only reached by pointer."""
-        called = {t for f in self.functions.values() for call in f.calls for t in self._targets(call)}
+        usages = totals(self)
+        called = {t for f in self.functions.values() for call in f.calls for t in self.targets(call)}
         threads = [self._named(name) for name in self.annotations.threads]
-        entries = [Entry("reset", self.usage(self.image.entry))]
-        for handler in sorted(self.vectors):
-            entries.append(Entry("interrupt", self.usage(handler), CALL_BYTES))
-        entries += [Entry("thread", self.usage(address)) for address in dict.fromkeys(threads)]
+        entries = [Entry("reset", usages[self.image.entry])]
+        entries += [Entry("interrupt", usages[handler], CALL_BYTES) for handler in sorted(self.vectors)]
+        entries += [Entry("thread", usages[address]) for address in dict.fromkeys(threads)]
         listed = {entry.usage.entry for entry in entries}
-        for address in sorted(self.entries - called - listed):
-            entries.append(Entry("pointer", self.usage(address)))
-        return Report([self.usage(entry) for entry in sorted(self.functions)], entries)
+        entries += [Entry("pointer", usages[address]) for address in sorted(self.entries - called - listed)]
+        return Report([usages[entry] for entry in sorted(self.functions)], entries)
 
 
 __all__ = ["Analysis", "Entry", "Report", "Usage"]

@@ -2,7 +2,8 @@
 
 A text file, one statement per line, `#` starts a comment:
 
-    calls FUNCTION: TARGET, TARGET ...   pointer calls inside FUNCTION reach one of these
+    calls FUNCTION: TARGET, TARGET ...   pointer calls inside FUNCTION reach one of these; * stands for every
+                                         function whose address the program takes
     depth FUNCTION BYTES                 FUNCTION and all it calls use at most BYTES
     recursion FUNCTION COUNT             at most COUNT activations of FUNCTION exist at once
     thread FUNCTION                      FUNCTION is the entry of a thread
@@ -33,6 +34,7 @@ class Annotations:
     depth: dict[str, int] = field(default_factory=dict)
     recursion: dict[str, int] = field(default_factory=dict)
     threads: list[str] = field(default_factory=list)
+    any_handle: bool = False  # every pointer call without targets of its own reaches *
 
 
 def read_annotations(text: str, file: str) -> Annotations:

@@ -136,6 +136,8 @@ def test_pointer_calls_are_named_and_can_be_told_their_targets(image):
     told = analyse(image, POINTER, "# comment\ncalls main: big, _small\n")
     assert (told["_main"].total, told["_main"].unknown) == (4 + 42, [])
     assert analyse(image, POINTER, "depth main 100")["_main"].total == 100
+    anything = analyse(image, POINTER, "calls main: *\n")
+    assert (anything["_main"].total, anything["_main"].unknown) == (4 + 42, [])
 
 
 def test_unknown_stack_pointers_and_unbalanced_returns_are_named(image):
