@@ -45,9 +45,11 @@ class Session:
         record: TextIO | None = None,
         realtime: bool = False,
         advance: Callable[[int], Stop | None] | None = None,
+        links: dict[int, Any] | None = None,
     ) -> None:
         """`limit`: last cycle. `realtime`: no faster than the wall clock. `advance(cycle)` replaces the machine's
-        `run_until`, for traces."""
+        `run_until`, for traces. `links`: what lies between a UART's pins and its port, by UART number: `on_byte` and
+        `feed` like the UART's own."""
         self.machine: Final = machine
         self.ports: Final = ports
         self.limit: Final = limit
@@ -57,11 +59,12 @@ class Session:
         self._realtime: Final = realtime
         self._hz: Final = machine.peripherals.fcy
         self._advance: Final = advance or machine.run_until
+        self._links: Final = {number: (links or {}).get(number, machine.uart[number]) for number in ports}
         self._sent: Final = {number: bytearray() for number in ports}
         self._start = 0.0
         self._first_cycle: Final = machine.cycle
         for number in ports:
-            machine.uart[number].on_byte = self._collector(number)
+            self._links[number].on_byte = self._collector(number)
 
     def run(self) -> tuple[Stop, float]:
         """Run to the end; returns how it ended and the seconds of host time it took."""
@@ -137,7 +140,7 @@ class Session:
     def _hand_over(self, stamp: Stamp) -> None:
         """Bytes for a running machine wait until its receiver is on; for a sleeping one they come at their date."""
         late = stamp.cycle > self.machine.cycle
-        self.machine.uart[stamp.uart].feed(stamp.data, stamp.cycle if late else None)
+        self._links[stamp.uart].feed(stamp.data, stamp.cycle if late else None)
         if self._record is not None:
             stamp.write(self._record)
 

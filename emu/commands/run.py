@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.console import SPECIFICATIONS, Port, open_port
 from emu.faults import Fault, fault_of
 from emu.image import Image
@@ -61,6 +62,8 @@ def parser() -> Parser:
     made.add_argument("--replay", metavar="FILE", help="take input from a recorded file instead")
     made.add_argument("--pace", choices=("realtime",), help="run no faster than the robot would")
     made.add_argument("--stats", action="store_true", help="print what the engine did")
+    add_board_options(made)
+    add_watch_option(made)
     return made
 
 
@@ -98,8 +101,11 @@ def run(options: argparse.Namespace) -> int:
             record=record,
             realtime=options.pace == "realtime",
             advance=_tracer(machine, image, trace) if trace is not None else None,
+            links=links_of(machine),
         )
+        end_watch = start_watch(machine, options)
         stop, host_seconds = session.run()
+        end_watch()
         lost = {number: port.lost for number, port in ports.items() if port.lost}
     fault = fault_of(machine, image, stop) if stop.pc not in _addresses(image, options.breaks) else None
     status = exit_status(machine, image, stop, fault) if options.exit_code else EXIT_FAULT if fault else EXIT_OK
@@ -121,10 +127,11 @@ def _machine(options: argparse.Namespace, image: Image) -> Machine:
     from emu.machine import Machine
 
     try:
-        machine = Machine(image.chip, engine=options.engine, ipl_slip=options.ipl_slip)
+        machine = Machine(image.chip, engine=options.engine, ipl_slip=options.ipl_slip, board=board_of(options))
     except ValueError as error:
         raise CommandError(str(error)) from None
     machine.load(image)
+    set_up(machine, options)
     for address in _addresses(image, options.breaks):
         machine.hook_pc(address, lambda: True)
 

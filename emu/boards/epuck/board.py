@@ -9,6 +9,7 @@ from emu.boards.epuck.camera import Camera
 from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote
 from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
+from emu.boards.epuck.stimulus import Stimulus
 from emu.peripherals import Peripherals
 
 
@@ -34,3 +35,4 @@ class Epuck:
         self.camera: Final = Camera(chip, camera) if camera is not None else None
         if self.camera is not None:
             chip.on_restored.append(self.camera.restored)
+        self.stimulus: Final = Stimulus(self)

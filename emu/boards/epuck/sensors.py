@@ -50,7 +50,9 @@ class Picture:
     flip_x: bool
     flip_y: bool
     gains: tuple[float, float, float]
-    """Factors on red, green and blue, exposure included."""
+    """Factors on red, green and blue."""
+    exposure: float | None
+    """Factor of the exposure registers, 1 = as lit; None while the sensor chooses by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,7 @@ def _po3030k_timing(read: ReadRegister) -> Timing:
 
 def _po3030k_picture(read: ReadRegister) -> Picture:
     control = read(0, 0xD4)
-    exposure = 1.0 if control & 0x10 else _word(read, 0, 0xB0) / 0x07CC * read(0, 0x15) / 0x10
+    exposure = None if control & 0x10 else _word(read, 0, 0xB0) / 0x07CC * read(0, 0x15) / 0x10
     gains = (read(0, 0x16), (read(0, 0x17) + read(0, 0x19)) / 2, read(0, 0x18))
     return Picture(
         form=_PO3030K_FORM.get(read(0, 0x4E), YUV),
@@ -126,14 +128,15 @@ def _po3030k_picture(read: ReadRegister) -> Picture:
         origin_y=7,
         flip_x=bool(read(0, 0x1E) & 0x80),
         flip_y=bool(read(0, 0x1E) & 0x40),
-        gains=_gains(gains, exposure, balanced=bool(control & 0x20)),
+        gains=_gains(gains, balanced=bool(control & 0x20)),
+        exposure=exposure,
     )
 
 
-def _gains(registers: tuple[float, float, float], exposure: float, balanced: bool) -> tuple[float, float, float]:
+def _gains(registers: tuple[float, float, float], balanced: bool) -> tuple[float, float, float]:
     """Gain registers are 1.0 at 0x40; automatic white balance is taken as converged."""
     red, green, blue = (1.0 if balanced else value / 0x40 for value in registers)
-    return red * exposure, green * exposure, blue * exposure
+    return red, green, blue
 
 
 # -- PO6030K and PO8030D: banks A, B, C; window and scale in output pixels ---------------------------------------------
@@ -194,7 +197,6 @@ def _banked_picture(chip: _Banked, read: ReadRegister) -> Picture:
     control = read(*chip.control)
     bank, first = chip.exposure
     manual = _word(read, bank, first) << 16 | _word(read, bank, first + 2)
-    exposure = manual / _NOMINAL_EXPOSURE if control & 1 else 1.0
     bank, first = chip.gains
     gains = (float(read(bank, first)), float(read(bank, first + 1)), float(read(bank, first + 2)))
     mirror = read(*chip.mirror)
@@ -204,7 +206,8 @@ def _banked_picture(chip: _Banked, read: ReadRegister) -> Picture:
         origin_y=chip.origin_y,
         flip_x=not mirror & 0x40,  # mounted upside down: the library sets both mirrors (§7.1)
         flip_y=not mirror & 0x80,
-        gains=_gains(gains, exposure, balanced=not control & 4),
+        gains=_gains(gains, balanced=not control & 4),
+        exposure=manual / _NOMINAL_EXPOSURE if control & 1 else None,
     )
 
 
@@ -233,7 +236,7 @@ _PO8030D: Final = _Banked(
     rows=516,
     origin_x=68,
     origin_y=4,
-    window_x=0,
+    window_x=64,
     clock=(0, 0x6A),
     dividers=MappingProxyType({0x00: 1, 0x02: 2, 0x04: 4, 0x05: 8}),
     scale_x=(1, 0x93),
@@ -271,7 +274,7 @@ SENSORS: Final[Mapping[str, Sensor]] = MappingProxyType(
                 4,
                 0x03,
                 _defaults(
-                    "0:08=00 43;0:10=00 04 01 E3;0:23=40 40 40;0:5B=C8;0:6A=00;0:6C=00;1:4E=02;1:93=20 20;1:B7=00"
+                    "0:08=00 03;0:10=00 04 01 E3;0:23=40 40 40;0:5B=C8;0:6A=00;0:6C=00;1:4E=02;1:93=20 20;1:B7=00"
                     ";2:04=98;2:12=00 08 00 00"
                 ),
                 lambda read: _banked_timing(_PO8030D, read),

@@ -134,7 +134,10 @@ class Codec(Part):
 
 
 class Bluetooth(Part):
-    """UART1 as a byte pipe to a computer. Bytes can get lost: in given windows of cycles, or at random (seeded)."""
+    """UART1 as a byte pipe to a computer. Bytes can get lost: while the link is down, or at random (seeded).
+
+    It has the interface of a `Uart` seen from outside: `on_byte` and `feed`.
+    """
 
     def __init__(self, chip: Peripherals, loss: float = 0.0, seed: int = 0) -> None:
         super().__init__("bluetooth", chip)
@@ -146,25 +149,32 @@ class Bluetooth(Part):
         """Half-open windows of cycles in which nothing passes."""
         self.on_byte: Callable[[int, int], None] | None = None
         """on_byte(byte, start_cycle): what reaches the computer."""
+        self._down: Final = self.cell("down", "B")
         self._random: Final = self.cell("random", "Q", seed * 2 + 1 & _ONES)
         self._lost: Final = self.cell("lost")
+
+    @property
+    def connected(self) -> bool:
+        """Whether the radio link is up. Set it to lose and regain the computer."""
+        return not self._down.value
+
+    @connected.setter
+    def connected(self, up: bool) -> None:
+        self._down.value = not up
 
     @property
     def lost(self) -> int:
         """Bytes that did not get through, both directions."""
         return self._lost.value
 
-    def send(self, data: bytes, cycle: int | None = None) -> None:
-        """The computer sends; see `Uart.feed` for `cycle`."""
+    def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0) -> None:
+        """The computer sends; see `Uart.feed` for `cycle` and `errors`."""
         at = self.now if cycle is None else cycle
-        self._uart.feed(self._passing(data, at), cycle)
-
-    def _passing(self, data: Iterable[int], cycle: int) -> bytes:
-        return bytes(byte for byte in data if not self._drops(cycle))
+        self._uart.feed([byte for byte in data if not self._drops(at)], cycle, errors=errors)
 
     def _drops(self, cycle: int) -> bool:
         in_window = any(start <= cycle < end for start, end in self.dropouts)
-        dropped = in_window or (self.loss > 0 and self._draw() < self.loss)
+        dropped = not self.connected or in_window or (self.loss > 0 and self._draw() < self.loss)
         self._lost.value += dropped
         return dropped
 

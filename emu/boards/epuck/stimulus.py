@@ -9,7 +9,12 @@
     2.5s    tilt      0.1 0 0.98      acceleration x y z in g
     3.0s    uart1     "hello\\r"       bytes for UART1 or uart2
     4.0s    pin       RF6 0           any input pin
+    3.5s    uart1     "x" framing     the same with a broken stop bit; also parity, break
     5.0s    camera    unplug          or: plug
+    5.0s    picture   room.png        what the camera sees; paths are relative to the working folder
+    6.0s    lamp      0.5             brightness of the scene, 1 = as in the picture
+    7.0s    bluetooth down            or: up
+    8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
 
 Times are seconds (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep the order of the file.
 """
@@ -22,13 +27,21 @@ import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
-from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.remote import KEYS
 from emu.boards.part import Part
+from emu.boards.picture import read_picture
 from emu.peripherals.pins import parse_pin
+from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR
+
+if TYPE_CHECKING:
+    from emu.boards.epuck.board import Epuck
 
 Action = Callable[[], None]
+
+_ERRORS: Final = {"framing": FRAMING_ERROR, "parity": PARITY_ERROR, "break": BREAK}
+"""What can be wrong with a character on a serial line."""
 
 
 class StimulusError(ValueError):
@@ -77,6 +90,10 @@ def _action(board: Epuck, words: list[str]) -> Action:
         "uart2": lambda b, w: _uart(b, 2, w),
         "pin": _pin,
         "camera": _camera,
+        "picture": _picture,
+        "lamp": _lamp,
+        "bluetooth": _bluetooth,
+        "i2c": _i2c,
     }
     if not words or words[0] not in kinds:
         raise ValueError(f"expected one of {', '.join(kinds)} behind the time")
@@ -133,13 +150,16 @@ def _tilt(board: Epuck, words: list[str]) -> Action:
 
 
 def _uart(board: Epuck, number: int, words: list[str]) -> Action:
-    _count(words, 1)
+    _count(words, 1, 2)
     text = ast.literal_eval(words[0])
     if not isinstance(text, str):
         raise ValueError('expected a quoted text like "hello\\r"')
+    if len(words) > 1 and words[1] not in _ERRORS:
+        raise ValueError(f"expected one of {', '.join(_ERRORS)} behind the text")
     data = text.encode("latin-1")
-    uart = board.chip.uart[number]
-    return lambda: uart.feed(data, uart.now + 1)
+    errors = _ERRORS[words[1]] if len(words) > 1 else 0
+    line = board.bluetooth if number == 1 else board.chip.uart[number]
+    return lambda: line.feed(data, line.now + 1, errors=errors)
 
 
 def _pin(board: Epuck, words: list[str]) -> Action:
@@ -159,21 +179,66 @@ def _camera(board: Epuck, words: list[str]) -> Action:
     return camera.plug if words[0] == "plug" else camera.unplug
 
 
+def _picture(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1)
+    camera = board.camera
+    if camera is None:
+        raise ValueError("this robot has no camera")
+    picture = read_picture(words[0].strip("\"'"))
+    return lambda: camera.show(picture)
+
+
+def _lamp(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1)
+    brightness = float(words[0])
+    camera = board.camera
+    if camera is None or not 0 <= brightness <= 1000:
+        raise ValueError("brightness is 0 to 1000, on a robot with a camera")
+    return lambda: setattr(camera, "lamp", brightness)
+
+
+def _bluetooth(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1)
+    if words[0] not in ("up", "down"):
+        raise ValueError(f"the link is `up` or `down`, not {words[0]!r}")
+    return lambda: setattr(board.bluetooth, "connected", words[0] == "up")
+
+
+def _i2c(board: Epuck, words: list[str]) -> Action:
+    wire = board.chip.i2c.wire
+    if words == ["free"]:
+        return wire.release
+    if words == ["scl"]:
+        return lambda: wire.hold(scl=True)
+    if len(words) == 2 and words[0] == "sda":
+        clocks = int(words[1])
+        return lambda: wire.hold(sda=True, clocks=clocks)
+    raise ValueError("expected `sda CLOCKS`, `scl` or `free`")
+
+
 class Stimulus(Part):
     """Plays a script on a board. The position is in the record, so snapshots continue where they were taken."""
 
-    def __init__(self, board: Epuck, steps: list[Step]) -> None:
+    def __init__(self, board: Epuck) -> None:
         super().__init__("stimulus", board.chip)
-        self._steps = steps
-        self._next = self.cell("next")
-        self._due = self.slot("next", self._play)
-        if steps:
-            self.events.set(self._due, steps[0].cycle)
+        self._board: Final = board
+        self._steps: list[Step] = []
+        self._next: Final = self.cell("next")
+        self._due: Final = self.slot("next", self._play)
 
-    @classmethod
-    def load(cls, board: Epuck, path: Path) -> Stimulus:
-        """Play the file at `path`. Raises StimulusError, OSError."""
-        return cls(board, parse(board, path.read_text(encoding="utf-8"), str(path)))
+    def load(self, path: Path) -> None:
+        """Play the file at `path`. Call it when the machine has its image, whose clock setting turns seconds into
+        cycles. Raises StimulusError, OSError, UnicodeDecodeError."""
+        self.play(parse(self._board, path.read_text(encoding="utf-8"), str(path)))
+
+    def play(self, steps: list[Step]) -> None:
+        """Do `steps`, in order of time, from now on; steps of the past happen at once. Replaces an earlier script."""
+        self._steps = steps
+        self._next.value = 0
+        if steps:
+            self.events.set(self._due, max(steps[0].cycle, self.now + 1))
+        else:
+            self.events.cancel(self._due)
 
     def _play(self, due: int) -> None:
         while self._next.value < len(self._steps) and self._steps[self._next.value].cycle <= due:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import partial
 from typing import Final
 
 from emu.boards.epuck.board import Epuck
+from emu.boards.epuck.simple import Bluetooth
+from emu.peripherals.uart import Uart
 
 TOPICS: Final = ("leds", "motors", "uart1", "uart2", "sound")
 _MOTOR_SECONDS: Final = 0.1
@@ -24,6 +25,7 @@ class Watch:
         self._write: Final = write
         self._reported = [0, 0]
         self._next_report = 0
+        self._watches_motors = False
         self._text: Final = {1: bytearray(), 2: bytearray()}
         for topic in topics:
             if topic not in TOPICS:
@@ -39,6 +41,7 @@ class Watch:
         )
 
     def _watch_motors(self) -> None:
+        self._watches_motors = True
         for motor in (self._board.motors.left, self._board.motors.right):
             motor.on_step = self._stepped
 
@@ -54,10 +57,21 @@ class Watch:
         self._line(cycle, f"motors {steps[0]} {steps[1]} steps, about {rates[0]:.0f} {rates[1]:.0f} steps/s")
 
     def _watch_uart1(self) -> None:
-        self._board.bluetooth.on_byte = partial(self._byte, 1)
+        self._listen(1, self._board.bluetooth)
 
     def _watch_uart2(self) -> None:
-        self._board.chip.uart[2].on_byte = partial(self._byte, 2)
+        self._listen(2, self._board.chip.uart[2])
+
+    def _listen(self, number: int, line: Bluetooth | Uart) -> None:
+        """Whoever listened before goes on hearing everything."""
+        earlier = line.on_byte
+
+        def heard(byte: int, start: int) -> None:
+            self._byte(number, byte, start)
+            if earlier is not None:
+                earlier(byte, start)
+
+        line.on_byte = heard
 
     def _byte(self, number: int, byte: int, start: int) -> None:
         """Text is reported by lines."""
@@ -67,6 +81,19 @@ class Watch:
         elif text:
             self._line(start, f"uart{number} {text.decode('latin-1')!r}")
             text.clear()
+
+    def finish(self) -> None:
+        """The run is over: print what is still open."""
+        now = self._board.chip.kit.bus.events.now
+        for number, text in self._text.items():
+            if text:
+                self._line(now, f"uart{number} {text.decode('latin-1')!r}")
+        if self._watches_motors:
+            left, right = self._board.motors.left, self._board.motors.right
+            self._line(now, f"motors {left.steps} {right.steps} steps in all")
+            for side, motor in (("left", left), ("right", right)):
+                if motor.lost or motor.illegal:
+                    self._line(now, f"{side} motor: {motor.lost} steps lost, {motor.illegal} illegal patterns")
 
     def _watch_sound(self) -> None:
         self._board.codec.on_word = lambda word, cycle: self._line(cycle, f"sound {word:04x}")

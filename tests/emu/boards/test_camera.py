@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from emu.boards.epuck.camera import HREF, PCLK, VSYNC
+from emu.boards.epuck.scan import HREF, PCLK, VSYNC
 from emu.boards.epuck.sensors import SENSORS
 
 from .conftest import Robot
@@ -75,8 +75,8 @@ def capture(robot, lines, bytes_per_line, skip_lines=0):
             robot.at(robot.events.next_due())
         robot.write("TMR4", 0)
         edge = robot.events.now - 2  # an edge in c raises the flag in c + 2
-        assert camera.sync_levels(edge) & HREF
-        assert not camera.sync_levels(edge - 1) & HREF
+        assert camera.scan.bits(edge) & HREF
+        assert not camera.scan.bits(edge - 1) & HREF
         data = []
         for index in range(bytes_per_line):
             robot.at(edge + FIRST_READ + 8 * index)
@@ -144,7 +144,7 @@ def test_frame_rates(sensor, writes, frame, fps):
     """§7.4, §7.1: 800 x 500 or 852 x 1000 columns of N Tcy."""
     robot = Robot(camera=sensor)
     robot.configure(writes)
-    assert robot.board.camera.frame_tcy == frame
+    assert robot.board.camera.scan.course.frame_tcy == frame
     assert robot.board.camera.frames_per_second == pytest.approx(fps, rel=2e-3)
 
 
@@ -154,15 +154,15 @@ def test_line_spacing_of_the_fast_driver_is_the_same_in_every_mode(scale, form, 
     robot = Robot(camera="PO3030K")
     robot.configure(po3030(scale=scale, form=form))
     camera = robot.board.camera
-    assert camera.href_cycle(1) - camera.href_cycle(0) == line
-    assert camera.byte_tcy == 8
+    assert camera.scan.href(1) - camera.scan.href(0) == line
+    assert camera.scan.course.byte_tcy == 8
 
 
 def test_short_exposure_shortens_the_frame_of_the_po3030k():
     """§7.4: rows = max(852, integration + 2)."""
     robot = Robot(camera="PO3030K")
     robot.configure([*po3030(), (0, 0x1A, 0x01), (0, 0x1B, 0x00)])
-    assert robot.board.camera.frame_tcy == 852 * 852 * 4
+    assert robot.board.camera.scan.course.frame_tcy == 852 * 852 * 4
 
 
 def test_vsync_rises_two_columns_behind_href_of_its_row():
@@ -170,10 +170,10 @@ def test_vsync_rises_two_columns_behind_href_of_its_row():
     robot = Robot(camera="PO3030K")
     robot.configure(po3030())
     camera = robot.board.camera
-    rise = camera.edge_cycle(VSYNC, 1)
-    assert rise - camera.href_cycle(0) == 8
-    assert camera.sync_levels(rise) & VSYNC
-    assert not camera.sync_levels(rise - 1) & VSYNC
+    rise = camera.scan.edge_cycle(VSYNC, 1)
+    assert rise - camera.scan.href(0) == 8
+    assert camera.scan.bits(rise) & VSYNC
+    assert not camera.scan.bits(rise - 1) & VSYNC
 
 
 @pytest.mark.parametrize("sensor", sorted(SENSORS))
@@ -185,11 +185,11 @@ def test_edge_arithmetic_agrees_with_the_levels(sensor, mask):
     camera = robot.board.camera
     number, checked = 1, 0
     while checked < 60:
-        cycle = camera.edge_cycle(mask, number)
-        assert camera.sync_levels(cycle) & mask
-        assert not camera.sync_levels(cycle - 1) & mask
-        assert (camera.edges(mask, cycle - 1), camera.edges(mask, cycle)) == (number - 1, number)
-        number += 1 if checked % 3 else max(camera._edges_per_frame(mask) * 3 // 10, 1)
+        cycle = camera.scan.edge_cycle(mask, number)
+        assert camera.scan.bits(cycle) & mask
+        assert not camera.scan.bits(cycle - 1) & mask
+        assert (camera.scan.edges(mask, cycle - 1), camera.scan.edges(mask, cycle)) == (number - 1, number)
+        number += 1 if checked % 3 else max(camera.scan.edges_per_frame(mask) * 3 // 10, 1)
         checked += 1
 
 
@@ -199,9 +199,9 @@ def test_byte_stands_on_the_bus_from_half_a_byte_before_to_half_behind():
     robot.board.camera.show(np.full((480, 640, 3), 255, np.uint8))
     robot.configure(po6030())
     camera = robot.board.camera
-    edge = camera.href_cycle(30)
+    edge = camera.scan.href(30)
     assert [camera.bits(edge + t) >> 8 for t in (-5, -4, 3)] == [0, 255, 255]
-    last = edge + 8 * camera.line_bytes - 4
+    last = edge + 8 * camera.scan.course.line_bytes - 4
     assert [camera.bits(t) >> 8 for t in (last - 1, last)] == [255, 0]
 
 
@@ -277,11 +277,11 @@ def test_reset_line_stops_the_sensor_and_clears_its_registers(robot):
     robot.output("RC13", 0)
     camera = robot.board.camera
     assert not camera.start(False, 10)
-    assert camera.edge_cycle(HREF, 1) > 1 << 60
+    assert camera.scan.edge_cycle(HREF, 1) > 1 << 60
     robot.at(1000).output("RC13", 1)
     assert camera.register(1, 0x80) == 0x20
     assert camera.start(False, 1010)
-    assert camera.href_cycle(0) > 1000
+    assert camera.scan.href(0) > 1000
 
 
 def test_unplugged_camera_gives_neither_answers_nor_edges(robot):
@@ -317,11 +317,11 @@ def test_snapshot_restores_registers_and_timing(robot):
     """State is in the record; what is derived from it follows."""
     robot.configure(po6030())
     state = robot.machine.snapshot()
-    frame = robot.board.camera.frame_tcy
+    frame = robot.board.camera.scan.course.frame_tcy
     robot.configure([(1, 0x80, 0x20), (0, 0x91, 0xB0)])
-    assert robot.board.camera.frame_tcy != frame
+    assert robot.board.camera.scan.course.frame_tcy != frame
     robot.machine.restore(state)
-    assert robot.board.camera.frame_tcy == frame
+    assert robot.board.camera.scan.course.frame_tcy == frame
 
 
 def test_pictures_of_any_size_are_scaled_and_bad_shapes_refused(robot):

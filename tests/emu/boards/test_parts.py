@@ -250,7 +250,7 @@ def test_bluetooth_passes_bytes_both_ways(robot):
     heard = []
     robot.board.bluetooth.on_byte = lambda byte, start: heard.append(byte)
     send(robot, b"hello")
-    robot.board.bluetooth.send(b"hi")
+    robot.board.bluetooth.feed(b"hi")
     robot.later(4000)
     assert bytes(heard) == b"hello"
     assert [robot.read("U1RXREG") for _ in range(2)] == [0x68, 0x69]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emu.boards.epuck.stimulus import Stimulus, StimulusError, parse
+from emu.boards.epuck.stimulus import StimulusError, parse
 from emu.boards.epuck.watch import Watch
 
 FCY = 14_745_600
@@ -27,7 +27,7 @@ def test_steps_happen_at_their_times(robot):
     """Seconds or cycles, in any order."""
     robot.write("U2BRG", 7)
     robot.write("U2MODE", 0x8000)
-    Stimulus(robot.board, parse(robot.board, SCRIPT))
+    robot.board.stimulus.play(parse(robot.board, SCRIPT))
     robot.at(round(0.001 * FCY) - 1)
     assert robot.board.selector.position == 0
     robot.at(round(0.001 * FCY))
@@ -70,7 +70,7 @@ def test_mistakes_are_reported_with_file_and_line(robot, line, message):
 
 def test_script_position_is_part_of_a_snapshot(robot):
     """After a restore the same steps come again."""
-    Stimulus(robot.board, parse(robot.board, "1000 selector 1\n3000 selector 2"))
+    robot.board.stimulus.play(parse(robot.board, "1000 selector 1\n3000 selector 2"))
     robot.at(2000)
     state = robot.machine.snapshot()
     robot.at(4000)

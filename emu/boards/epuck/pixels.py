@@ -1,0 +1,112 @@
+"""From the scene to the bytes of a line: mirrors, gains and colour formats (epuck.md §7.2, §7.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emu.boards.epuck.sensors import GREY, HEIGHT, RGB565, WIDTH, YUV, Picture, Timing
+
+Pixels = NDArray[np.uint8]
+"""n x 3 values, red, green, blue."""
+
+
+def scene_columns(timing: Timing, picture: Picture) -> NDArray[np.intp]:
+    """Scene column (0 = left, 0..639) of every pixel of a line. Beside the array its edge is seen."""
+    columns = np.arange(timing.first_column, timing.end_column, timing.scale_x) - picture.origin_x
+    return np.clip(WIDTH - 1 - columns if picture.flip_x else columns, 0, WIDTH - 1)
+
+
+def scene_row(timing: Timing, picture: Picture, line: int) -> int:
+    """Scene row (0 = top, 0..479) of a line of the frame."""
+    row = timing.first_row + line * timing.scale_y - picture.origin_y
+    return min(max(HEIGHT - 1 - row if picture.flip_y else row, 0), HEIGHT - 1)
+
+
+def encode(pixels: Pixels, form: str, gains: tuple[float, float, float]) -> bytes:
+    """The bytes a sensor sends for a line of `pixels` after its gains."""
+    values = pixels.astype(np.int32)
+    if gains != (1.0, 1.0, 1.0):
+        values = np.minimum(values * np.array(gains), 255.0).astype(np.int32)
+    return _ENCODERS[form](values)
+
+
+def decode(data: bytes, form: str) -> Pixels:
+    """The pixels in a buffer that a driver filled: the inverse of `encode` as far as the format keeps them.
+
+    Raises ValueError for an unknown format or a buffer that ends in the middle of a pixel.
+    """
+    if form not in _DECODERS:
+        raise ValueError(f"unknown pixel format {form!r}; expected one of {', '.join(_DECODERS)}")
+    size = 1 if form == GREY else 4 if form == YUV else 2
+    if len(data) % size:
+        raise ValueError(f"{len(data)} bytes are no whole number of {form} pixels")
+    return _DECODERS[form](np.frombuffer(data, dtype=np.uint8))
+
+
+def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
+    """Any grey, RGB or RGBA picture as 480 x 640 x 3 by nearest pixel, `turned` by 0, 90, 180 or 270 degrees counter-
+    clockwise first (sensors mounted turned, epuck.md §7.1). Raises ValueError for other shapes and angles."""
+    if image.ndim == 2:
+        image = np.repeat(image[:, :, None], 3, axis=2)
+    if image.ndim != 3 or image.shape[2] not in (3, 4) or not image.size:
+        raise ValueError(f"a picture is height x width, grey or with 3 or 4 channels, not of shape {image.shape}")
+    if turned not in (0, 90, 180, 270):
+        raise ValueError(f"a picture can be turned by 0, 90, 180 or 270 degrees, not {turned}")
+    image = np.rot90(image, turned // 90)
+    rows = np.arange(HEIGHT) * image.shape[0] // HEIGHT
+    columns = np.arange(WIDTH) * image.shape[1] // WIDTH
+    return np.ascontiguousarray(image[rows][:, columns, :3], dtype=np.uint8)
+
+
+def _rgb565(pixels: NDArray[np.int32]) -> bytes:
+    """High byte first: R4..R0 G5..G3, G2..G0 B4..B0 (§7.4)."""
+    red, green, blue = pixels[:, 0], pixels[:, 1], pixels[:, 2]
+    return ((red >> 3) << 11 | (green >> 2) << 5 | blue >> 3).astype(">u2").tobytes()
+
+
+def _from_rgb565(data: NDArray[np.uint8]) -> Pixels:
+    words = data[0::2].astype(np.uint16) << 8 | data[1::2]
+    return np.stack([words >> 8 & 0xF8, words >> 3 & 0xFC, words << 3 & 0xF8], axis=1).astype(np.uint8)
+
+
+def _luma(pixels: NDArray[np.int32]) -> NDArray[np.int32]:
+    weighted = 77 * pixels[:, 0] + 150 * pixels[:, 1] + 29 * pixels[:, 2]  # ITU-R BT.601 in 1/256
+    return (weighted + 128) >> 8
+
+
+def _grey(pixels: NDArray[np.int32]) -> bytes:
+    return _luma(pixels).astype(np.uint8).tobytes()
+
+
+def _from_grey(data: NDArray[np.uint8]) -> Pixels:
+    return np.repeat(data[:, None], 3, axis=1)
+
+
+def _yuv(pixels: NDArray[np.int32]) -> bytes:
+    """U Y V Y, chroma of the first pixel of each pair. UNVERIFIED order (§7.4)."""
+    luma = _luma(pixels)
+    chroma = np.clip(128 + ((pixels[:, 2] - luma) * 145 >> 8), 0, 255)
+    red_difference = np.clip(128 + ((pixels[:, 0] - luma) * 183 >> 8), 0, 255)
+    chroma[1::2] = red_difference[: len(chroma) - len(chroma) % 2 : 2]
+    return np.stack([chroma, luma], axis=1).astype(np.uint8).tobytes()
+
+
+def _from_yuv(data: NDArray[np.uint8]) -> Pixels:
+    blue_difference, luma1, red_difference, luma2 = (data[index::4].astype(np.int32) for index in range(4))
+    luma = np.stack([luma1, luma2], axis=1).reshape(-1)
+    blue = luma + np.repeat((blue_difference - 128) * 256 // 145, 2)
+    red = luma + np.repeat((red_difference - 128) * 256 // 183, 2)
+    green = (256 * luma - 77 * red - 29 * blue) // 150
+    return np.clip(np.stack([red, green, blue], axis=1), 0, 255).astype(np.uint8)
+
+
+_ENCODERS: Final[dict[str, Callable[[NDArray[np.int32]], bytes]]] = {RGB565: _rgb565, GREY: _grey, YUV: _yuv}
+_DECODERS: Final[dict[str, Callable[[NDArray[np.uint8]], Pixels]]] = {
+    RGB565: _from_rgb565,
+    GREY: _from_grey,
+    YUV: _from_yuv,
+}

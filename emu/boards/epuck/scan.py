@@ -1,0 +1,157 @@
+"""When the sensor's lines and bytes come: HREF, VSYNC, PCLK and byte numbers in closed form (epuck.md §7.4).
+
+Every number is a record cell `camera.<name>`, so that native code can do the same arithmetic (README.md). Sensors
+know columns and rows; here everything is Tcy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, fields
+from typing import Final
+
+from emu.boards.epuck.sensors import Timing
+from emu.events import NEVER
+from emu.peripherals.kit import Cell
+from emu.record import Record
+
+HREF, VSYNC, PCLK = 1 << 3, 1 << 4, 1 << 14
+"""RC3, RC4, RC14 (epuck.md §2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One frame in Tcy; it repeats for ever. A line's bytes and its HREF begin together."""
+
+    frame_tcy: int
+    first_href: int
+    """From the start of the frame to the rise of its first HREF."""
+    line_tcy: int
+    """From one HREF to the next: skipped rows have none (§7.4)."""
+    lines: int
+    line_bytes: int
+    byte_tcy: int
+    """8 in every mode of the library's fast driver (§7.3)."""
+    vsync_rise: int
+    vsync_fall: int
+
+
+def course_of(timing: Timing) -> Course:
+    """Columns and rows to Tcy."""
+    row = timing.columns * timing.column_tcy
+    visible = min(timing.end_row, timing.rows) - timing.first_row
+    pixels = max(-(-(timing.end_column - timing.first_column) // timing.scale_x), 0)
+    fall = min(timing.vsync_end_row, timing.rows) * row
+    return Course(
+        frame_tcy=row * timing.rows,
+        first_href=timing.first_row * row + timing.first_column * timing.column_tcy,
+        line_tcy=row * timing.scale_y,
+        lines=max(-(-visible // timing.scale_y), 0),
+        line_bytes=pixels * timing.bytes_per_pixel,
+        byte_tcy=max(timing.column_tcy * timing.scale_x // timing.bytes_per_pixel, 1),
+        vsync_rise=min(timing.vsync_row * row + timing.vsync_column * timing.column_tcy, fall),
+        vsync_fall=fall,
+    )
+
+
+class Scan:
+    """The course in force and the cycle its first frame began. `running` is 0 in reset."""
+
+    def __init__(self, record: Record) -> None:
+        self._cells: Final = {part.name: Cell(record, f"camera.{part.name}", "Q", 1) for part in fields(Course)}
+        self._start: Final = Cell(record, "camera.frame_start", "Q")
+        self._running: Final = Cell(record, "camera.running", "B")
+        self.course = Course(*(1 for _ in self._cells))
+        self.start = 0
+        self.running = False
+
+    def begin(self, course: Course, cycle: int, running: bool) -> None:
+        """The first frame of `course` starts in `cycle`."""
+        for cell, number in zip(self._cells.values(), astuple(course), strict=True):
+            cell.value = number
+        self._start.value = cycle
+        self._running.value = running
+        self.restored()
+
+    def restored(self) -> None:
+        """Take over what the record says."""
+        self.course = Course(*(cell.value for cell in self._cells.values()))
+        self.start = self._start.value
+        self.running = bool(self._running.value)
+
+    def place(self, cycle: int) -> tuple[int, int]:
+        """(frame, Tcy since its start); the frame is negative before the sensor started."""
+        return divmod(cycle - self.start, self.course.frame_tcy)
+
+    def line_at(self, cycle: int) -> tuple[int, int] | None:
+        """(line, cycle of its HREF) whose byte is on the bus in `cycle`, None between lines.
+
+        Byte k is there from HREF + (k - 1/2) to HREF + (k + 1/2) byte times (§7.5).
+        """
+        course = self.course
+        frame, offset = self.place(cycle + course.byte_tcy // 2)
+        line, behind = divmod(offset - course.first_href, course.line_tcy)
+        if not self.running or frame < 0 or not 0 <= line < course.lines:
+            return None
+        return (line, self.href(line, frame)) if behind < course.line_bytes * course.byte_tcy else None
+
+    def href(self, line: int, frame: int = 0) -> int:
+        """Cycle in which HREF rises for a line (0 = first of the frame) of a frame since the last restart."""
+        course = self.course
+        return self.start + frame * course.frame_tcy + course.first_href + line * course.line_tcy
+
+    def bits(self, cycle: int) -> int:
+        """Levels of HREF, VSYNC and PCLK in `cycle`."""
+        course = self.course
+        frame, offset = self.place(cycle)
+        if not self.running or frame < 0:
+            return 0
+        line, behind = divmod(offset - course.first_href, course.line_tcy)
+        levels = VSYNC if course.vsync_rise <= offset < course.vsync_fall else 0
+        if 0 <= line < course.lines and behind < course.line_bytes * course.byte_tcy:
+            levels |= HREF
+            if 2 * (behind % course.byte_tcy) < course.byte_tcy:
+                levels |= PCLK
+        return levels
+
+    def rises(self, mask: int, after: int, until: int) -> int:
+        """Rising edges of one line in after < c <= until."""
+        return self.edges(mask, until) - self.edges(mask, after)
+
+    def nth_rise(self, mask: int, after: int, count: int) -> int:
+        """Cycle of the `count`-th rising edge behind `after`, or NEVER."""
+        return self.edge_cycle(mask, self.edges(mask, after) + count)
+
+    def edges(self, mask: int, cycle: int) -> int:
+        """Rising edges of one sync line since the start, up to and with `cycle`."""
+        course = self.course
+        frame, offset = self.place(cycle)
+        if not self.running or frame < 0:
+            return 0
+        earlier = frame * self.edges_per_frame(mask)
+        if mask == VSYNC:
+            return earlier + (course.vsync_rise <= offset and course.vsync_rise < course.vsync_fall)
+        behind = offset - course.first_href
+        lines = min(max(behind // course.line_tcy + 1, 0), course.lines)
+        if mask == HREF or lines == 0:
+            return earlier + lines
+        inside = (behind - (lines - 1) * course.line_tcy) // course.byte_tcy + 1
+        return earlier + (lines - 1) * course.line_bytes + min(inside, course.line_bytes)
+
+    def edges_per_frame(self, mask: int) -> int:
+        """Rising edges of one sync line in a frame."""
+        course = self.course
+        if mask == VSYNC:
+            return int(course.vsync_rise < course.vsync_fall)
+        return course.lines * (course.line_bytes if mask == PCLK else 1)
+
+    def edge_cycle(self, mask: int, number: int) -> int:
+        """Cycle of the `number`-th (1 = first) rising edge since the start, or NEVER."""
+        course = self.course
+        per_frame = self.edges_per_frame(mask)
+        if not self.running or not per_frame:
+            return NEVER
+        frame, index = divmod(number - 1, per_frame)
+        if mask == VSYNC:
+            return self.start + frame * course.frame_tcy + course.vsync_rise
+        line, byte = divmod(index, course.line_bytes) if mask == PCLK else (index, 0)
+        return self.href(line, frame) + byte * course.byte_tcy

@@ -1,0 +1,48 @@
+"""Picture files: what a camera is shown, and what it delivered."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+def read_picture(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
+    """The picture in a PNG, JPEG or similar file: height x width x 3, red, green, blue.
+
+    Raises OSError if the file cannot be read, ValueError if it holds no picture.
+    """
+    import numpy as np
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image.convert("RGB"), dtype=np.uint8)
+    except (UnidentifiedImageError, Image.DecompressionBombError, SyntaxError, EOFError) as error:
+        raise ValueError(f"{path}: not a picture: {error}") from None
+    except OSError as error:
+        if error.errno is not None:
+            raise
+        raise ValueError(f"{path}: not a picture: {error}") from None
+
+
+def write_picture(path: str | os.PathLike[str], pixels: NDArray[np.uint8], enlarge: int = 1) -> None:
+    """Write height x width x 3 pixels as PNG, every pixel `enlarge` x `enlarge` large, whole or not at all.
+
+    Raises OSError.
+    """
+    import numpy as np
+    from PIL import Image
+
+    target = Path(path)
+    part = target.with_name(target.name + ".part")
+    large = np.repeat(np.repeat(pixels, enlarge, axis=0), enlarge, axis=1)
+    try:
+        Image.fromarray(np.ascontiguousarray(large)).save(part, format="PNG")
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)

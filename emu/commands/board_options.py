@@ -1,0 +1,109 @@
+"""The options that put a robot around the chip: for `emu run` and `emu screenshot`.
+
+What enters: parsed options. What leaves: what `Machine(board=...)` wants, a board set up as asked, lines for a watcher.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from emu.command import CommandError
+
+if TYPE_CHECKING:
+    from emu.boards.epuck.board import Epuck
+    from emu.machine import Machine
+    from emu.peripherals import Peripherals
+
+BOARDS: Final = ("epuck", "none")
+SENSORS: Final = ("PO6030K", "PO3030K", "PO8030D", "none")
+SELECTOR_POSITIONS: Final = 16
+
+
+def add_board_options(parser: argparse.ArgumentParser) -> None:
+    """Add --board, --selector, --camera, --sensor and --stimulus."""
+    board = parser.add_argument_group("robot")
+    board.add_argument(
+        "--board", choices=BOARDS, default="epuck", help="what is around the chip (default epuck; none: bare pins)"
+    )
+    board.add_argument("--selector", metavar="N", type=_selector, default=0, help="position of the selector, 0 to 15")
+    board.add_argument("--camera", metavar="FILE.png", help="picture in front of the camera (default: darkness)")
+    board.add_argument(
+        "--sensor", choices=SENSORS, default=SENSORS[0], help=f"camera type (default {SENSORS[0]}; none: unplugged)"
+    )
+    board.add_argument("--stimulus", metavar="FILE", help="events for the robot, one per line: TIME WHAT ARGUMENTS")
+
+
+def add_watch_option(parser: argparse.ArgumentParser) -> None:
+    """Add --watch."""
+    parser.add_argument(
+        "--watch", metavar="LIST", type=_topics, default=[], help="tell what one sees: leds,motors,uart1,uart2,sound"
+    )
+
+
+def _selector(text: str) -> int:
+    number = int(text, 0)
+    if not 0 <= number < SELECTOR_POSITIONS:
+        raise ValueError
+    return number
+
+
+def _topics(text: str) -> list[str]:
+    return [topic.strip() for topic in text.split(",") if topic.strip()]
+
+
+def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Epuck] | None:
+    """What to hand to `Machine(board=...)`."""
+    if options.board == "none":
+        wanted = [name for name in ("selector", "camera", "stimulus", "watch") if getattr(options, name, None)]
+        if wanted:
+            raise CommandError(f"--{wanted[0]} needs a robot; leave out --board none")
+        return None
+    from emu.boards.epuck.board import Epuck
+
+    sensor = None if options.sensor == "none" else options.sensor
+    return partial(Epuck, camera=sensor, selector=options.selector)
+
+
+def set_up(machine: Machine, options: argparse.Namespace) -> None:
+    """Put the picture before the camera and start the stimulus file of a machine that has its image."""
+    board: Epuck | None = machine.board
+    if board is None:
+        return
+    if options.camera:
+        if board.camera is None:
+            raise CommandError("--camera needs a sensor; leave out --sensor none")
+        from emu.boards.picture import read_picture
+
+        try:
+            board.camera.show(read_picture(options.camera))
+        except ValueError as error:
+            raise CommandError(str(error)) from None
+    if options.stimulus:
+        from emu.boards.epuck.stimulus import StimulusError
+
+        try:
+            board.stimulus.load(Path(options.stimulus))
+        except (StimulusError, UnicodeDecodeError) as error:
+            raise CommandError(str(error)) from None
+
+
+def links_of(machine: Machine) -> dict[int, Any]:
+    """What lies between UARTs and the host: Bluetooth on UART1 of a robot."""
+    return {1: machine.board.bluetooth} if machine.board is not None else {}
+
+
+def start_watch(machine: Machine, options: argparse.Namespace) -> Callable[[], None]:
+    """Print what is watched on standard error. Returns what to call at the end of the run."""
+    if not options.watch:
+        return lambda: None
+    from emu.boards.epuck.watch import Watch
+
+    try:
+        return Watch(machine.board, options.watch, partial(print, file=sys.stderr)).finish
+    except ValueError as error:
+        raise CommandError(str(error)) from None
