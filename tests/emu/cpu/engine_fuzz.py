@@ -68,14 +68,10 @@ def machines(engine: str, length: int = 48) -> tuple[Machine, Machine]:
 def difference(plain: Machine, other: Machine) -> str:
     """The first places where two records differ, empty if they are equal."""
     used = plain.record.used
-    a, b = plain.record.bytes[:used], other.record.bytes[:used]
+    a, b = plain.record.bytes[:used].tobytes(), other.record.bytes[:used].tobytes()
     if a == b:
         return ""
-    places = []
-    for start in range(0, used, 4096):
-        end = min(start + 4096, used)
-        if a[start:end] != b[start:end]:
-            places += [i for i in range(start, end) if a[i] != b[i]]
+    places = [i for i in range(used) if a[i] != b[i]]
     named = [f"{plain.record.field_at(i)}: {a[i]:02x} != {b[i]:02x}" for i in places[:8]]
     return f"{len(places)} bytes, " + "; ".join(named)
 
