@@ -80,6 +80,7 @@ def front_end_flags(options: CcOptions) -> list[str]:
     if options.xc16_attributes:
         flags += [_attribute_macro(word, word) for word in ATTRIBUTE_WORDS]
     flags += [f"-fno-builtin-{name}" for name in ABSENT_FUNCTIONS]
+    flags += ["-include", str(INCLUDE_DIR / "dspic_builtins.h")]
     if options.single_constants:
         flags += ["-Xclang", "-cl-single-precision-constant"]
     if options.debug:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 EXIT_DONE, EXIT_C_ERRORS, EXIT_BAD_INPUT = 0, 1, 2
 IR_SOURCES = {"c", "cpp-output"}
+STANDARD_OUTPUT = Path("-")
 
 
 def main(argv: list[str]) -> int:
@@ -65,7 +66,11 @@ def _run(options: CcOptions, scratch: Path) -> None:
         link_program(options, _compile_program(options, scratch))
     else:
         modules = _front_end(options, scratch)
-        write_outputs([_translate(options, item, modules, scratch) for item in options.inputs])
+        outputs = [_translate(options, item, modules, scratch) for item in options.inputs]
+        if options.output == STANDARD_OUTPUT:
+            sys.stdout.buffer.write(outputs[0][1])
+        else:
+            write_outputs(outputs)
 
 
 def _preprocess(options: CcOptions) -> None:
@@ -110,10 +115,14 @@ def _optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
 
 def _to_assembly(options: CcOptions, ir_text: str) -> str:
     from toolchain import pipeline
+    from toolchain.ir.model import UnsupportedError
     from toolchain.isr_names import check
 
     check(ir_text)
-    return pipeline.compile_module(ir_text, options)
+    try:
+        return pipeline.compile_module(ir_text, options)
+    except UnsupportedError as error:
+        raise ToolError(f"not supported: {error}") from error
 
 
 def _assemble(options: CcOptions, text: str, name: str, relax: bool) -> bytes:

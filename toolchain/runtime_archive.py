@@ -77,7 +77,20 @@ def _member(source: Path) -> bytes:
     item = Input(source, "c" if source.suffix == ".c" else "assembler")
     options = CcOptions(inputs=[item], stage="assemble", level=LEVEL, clang=["-std=c11", "-ffreestanding", "-Wall"])
     with tempfile.TemporaryDirectory(prefix="dspic-rt-") as scratch:
-        return driver.object_of(options, item, Path(scratch))
+        return _weakened(driver.object_of(options, item, Path(scratch)), source.name)
+
+
+def _weakened(content: bytes, name: str) -> bytes:
+    """The object with every global definition made weak: a program may replace any library function by its own."""
+    from toolchain.elf.model import Bind, Home
+    from toolchain.elf.read import read_object
+    from toolchain.elf.write import object_bytes
+
+    obj = read_object(content, name)
+    for symbol in obj.symbols:
+        if symbol.bind is Bind.GLOBAL and symbol.home is not Home.UNDEFINED:
+            symbol.bind = Bind.WEAK
+    return object_bytes(obj)
 
 
 def _store(path: Path, content: bytes) -> None:

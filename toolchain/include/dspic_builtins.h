@@ -9,6 +9,9 @@
 #define __builtin_disi(cycles) __asm__ volatile("disi #%0" ::"i"(cycles) : "memory")
 #define __builtin_software_breakpoint() __asm__ volatile(".pword 0xDA4000" ::: "memory")
 
+/* There is no cache; the front end's own version of this builtin does not fit a 16-bit int. */
+#define __builtin_prefetch(address, ...) ((void)(address))
+
 /* One unlocked byte write: two keys and the value in consecutive byte moves (dspic30f6014a.md §3). */
 #define __dspic_unlocked_write(address, key1, key2, value)                          \
   __asm__ volatile("mov.b %0,[%3]\n\tmov.b %1,[%3]\n\tmov.b %2,[%3]" ::"r"(key1),   \

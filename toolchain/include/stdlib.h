@@ -1,4 +1,5 @@
-/* C11 7.22: conversions, division, random numbers, sorting, end of program. There is no heap and no environment. */
+/* C11 7.22: conversions, division, random numbers, sorting, end of program. The heap is as large
+ * as the linker is told (-Wl,--heap=BYTES); there is no environment. */
 #ifndef STDLIB_H
 #define STDLIB_H
 
@@ -32,6 +33,11 @@ double atof(const char *text);
 long strtol(const char *restrict text, char **restrict end, int base);
 unsigned long strtoul(const char *restrict text, char **restrict end, int base);
 double strtod(const char *restrict text, char **restrict end);
+
+void *malloc(size_t size);
+void *calloc(size_t count, size_t size);
+void *realloc(void *memory, size_t size);
+void free(void *memory);
 
 int rand(void);
 void srand(unsigned int seed);

@@ -235,7 +235,10 @@ double pow(double x, double y)
     double y_high = upper(y), log_high = upper(high);
     double error = ((y_high * log_high - product) + y_high * (high - log_high) + (y - y_high) * log_high) +
                    (y - y_high) * (high - log_high);
-    return copysign(exponential_of(product, error + y * tail), sign);
+    double power = exponential_of(product, error + y * tail);
+    if (y > 0 && power < 9007199254740992.0 && trunc(x) == x && trunc(y) == y)
+        power = round(power); /* an integer to an integer's power is one, and it is representable */
+    return copysign(power, sign);
 }
 
 double hypot(double x, double y)

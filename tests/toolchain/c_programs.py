@@ -1,0 +1,65 @@
+"""Compile C programs with our driver and run them on the emulator, all in this process.
+
+A program's verdict is the status it leaves when it sleeps after `main` or `exit`: anything else is a fault with a reason.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import emu
+from toolchain import driver
+
+INTCON1_TRAPS = {1: "oscillator", 2: "stack error", 3: "address error", 4: "math error"}
+"""Trap flags of INTCON1 by bit (isa.md §14.4)."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """Exit status of the driver and what it said on stderr."""
+
+    status: int
+    messages: str
+
+    @property
+    def first_error(self) -> str:
+        """The first line that is an error, for reports."""
+        lines = [line for line in self.messages.splitlines() if "error" in line]
+        return lines[0] if lines else self.messages.strip().splitlines()[0] if self.messages.strip() else "no message"
+
+
+@dataclass(frozen=True)
+class Ran:
+    """How a run ended: `status` is W0 after a normal end, None otherwise; `why` says what happened then."""
+
+    status: int | None
+    why: str
+    uart: bytes
+    cycles: int
+
+
+def build(sources: list[Path], output: Path, *options: str) -> Built:
+    """`python -m toolchain cc options sources -o output` without starting a process."""
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+        status = driver.main([*options, *map(str, sources), "-o", str(output)])
+    return Built(status, said.getvalue())
+
+
+def run(image: Path, cycles: int = 30_000_000, engine: str = "auto") -> Ran:
+    """Run an image for at most `cycles` Tcy."""
+    machine = emu.load(image, engine=engine)
+    said = bytearray()
+    machine.uart[1].on_byte = lambda byte, cycle: said.append(byte)
+    stop = machine.run(cycles=cycles)
+    if stop.reason == "halt":
+        return Ran(machine.w[0], "", bytes(said), stop.cycle)
+    why = f"{stop.reason} at {stop.pc:#x} {stop.detail}".strip()
+    if stop.reason == "breakpoint":
+        flags = machine.peek("INTCON1")
+        traps = [name for bit, name in INTCON1_TRAPS.items() if flags >> bit & 1]
+        why = f"trap: {', '.join(traps) or 'unexpected interrupt'}"
+    return Ran(None, why, bytes(said), stop.cycle)

@@ -1,0 +1,237 @@
+"""Compile and run a folder of C tests, each of which must exit 0: `python tests/toolchain/run_c_tests.py DIR`.
+
+Made for GCC's c-torture `execute` directory, but takes any folder. Prints every failure and skip with its reason, then
+the counts. Skips follow rules, never names: see SKIP_RULES and the dg- directives GCC's own harness obeys.
+Exit status 0 when nothing failed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import signal
+import sys
+import tempfile
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.toolchain.c_programs import build, run
+
+STACK_SIZE = 3000
+"""Bytes of stack a test may count on; GCC's tests read it as a macro and shrink their arrays."""
+
+HEAP_SIZE = 3200
+WALL_SECONDS = 100
+SHORT = 3_000_000
+"""Cycles after which the compiling engine takes over: short runs start faster in the interpreter."""
+
+FLAGS = ["-std=gnu17", "-w", f"-DSTACK_SIZE={STACK_SIZE}", "-DNO_TRAMPOLINES", "-DSIGNAL_SUPPRESS",
+
+         *[f"-Wno-error={name}" for name in ("implicit-function-declaration", "implicit-int", "int-conversion",
+           "incompatible-pointer-types", "return-mismatch", "incompatible-function-pointer-types", "parentheses")],
+         *[f"-Wno-{name}" for name in ("implicit-function-declaration", "implicit-int", "int-conversion",
+           "incompatible-pointer-types", "return-mismatch", "incompatible-function-pointer-types")]]  # fmt: skip
+
+# dg-require-effective-target names that this target does not fulfil, with the reason.
+ABSENT_TARGETS = {
+    "int32plus": "needs 32-bit int", "int32": "needs 32-bit int", "size32plus": "needs objects above 64 kB",
+    "ptr32plus": "needs 32-bit pointers", "size20plus": "needs objects above 64 kB", "trampolines": "nested functions",
+    "int128": "needs __int128", "ptr_eq_long": "needs pointers as wide as long", "lp64": "needs 64-bit long",
+    "mmap": "needs an operating system", "signal": "needs signals", "fopen": "needs files", "float128": "_Float128",
+    "freorder": "GCC option", "vma_equals_lma": "needs VMA equal to LMA", "indirect_jumps": None, "label_values": None,
+}  # fmt: skip
+SIXTEEN_BIT_TARGETS = re.compile(r"\b(avr|msp430|xstormy16|pdp11|rl78|h8300)[-*]")
+
+# Messages of the C front end that mean: this program uses what the target or clang does not have.
+SKIP_RULES = [
+    (r"function definition is not allowed here|nested function|'auto' storage class", "GNU nested functions"),
+    (r"variable.* has incomplete type|size of array|array is too large|array size", "object larger than 64 kB or RAM"),
+    (r"__int128|_Decimal|_Float128|__float128|_Float16|_Float64x", "type this target does not have"),
+    (r"bit-field.*exceeds|width of bit-field|exceeds the width of its type", "bit-field wider than 16-bit int"),
+    (r"__builtin_(apply|return|setjmp|longjmp|shuffle|va_arg_pack|mul_overflow_p|add_overflow_p|sub_overflow_p|"
+     r"aggregate_incoming|isinff|dwarf|init_|eh_|speculation|convertvector|extend|unwind|complex|call_with|has_attr)"
+     r"|use of unknown builtin|undeclared.*__builtin", "GCC builtin that clang does not have"),
+    (r"variable length array|fields must have a constant size|VLA in struct", "GNU variable-length struct fields"),
+    (r"unknown register name|invalid output constraint|invalid input constraint|invalid .*constraint|inline asm",
+     "inline assembly for other machines"),
+    (r"error: (unknown|unsupported) (argument|option)|unknown argument", "GCC option"),
+    (r"file not found|No such file", "needs a header of an operating system"),
+    (r"static assertion|is not a compile-time constant|initializer element is not", "not a constant for clang"),
+    (r"error: unknown type name|undeclared identifier|undeclared function", "needs declarations this target lacks"),
+    (r"scalar_storage_order|'vector_size'|vector_size|ext_vector|vector type", "GNU vector types"),
+    (r"redefinition of|conflicting types|cannot redeclare|has different definitions", "code clang rejects"),
+    (r"_Complex", "complex integers"),
+    (r"decimal type", "decimal floating point"),
+    (r"asm label|register.*asm", "register variables of other machines"),
+    (r"indirect goto|address of label|computed goto", "computed goto in a form clang rejects"),
+    (r"invalid LLVM IR input: Intrinsic called", "builtin whose form clang gets wrong where int has 16 bits"),
+    (r"called object type|invalid operands|assigning to|passing|incompatible|returning|conversion|cast|too (many|few)"
+     r"|must return a value|not assignable|expected|requires|cannot|duplicate case|flexible array|invalid|typeof|enum",
+     "code clang rejects"),
+]  # fmt: skip
+# Refusals of the back end that are GNU extensions and not C.
+UNSUPPORTED_RULES = [
+    (r"vector type|(extract|insert)element|shufflevector", "GNU vector types"),
+    (r"builtin function __builtin_", "GCC builtin that clang does not have"),
+]
+
+# Properties of the source that make a test invalid here: undefined or unspecified where int has 16 bits, or a check of
+# what GCC's optimiser does rather than of what the program means.
+SOURCE_RULES = [
+    (
+        re.compile(r"\b1\s*<<\s*(1[6-9]|2\d|3[01])\b|1 << sizeof \(short\) \* 8"),
+        "needs 32-bit int: shifts 1 by 16 or more",
+    ),
+    (re.compile(r"long long( int)?\s+\w+\s*:\s*(1[7-9]|[2-6]\d)"), "expects GCC's type for bit-fields wider than int"),
+    (re.compile(r"should_optimize|inside_main|link_error"), "checks which library calls GCC folds"),
+    (re.compile(r"\(\(aligned\)\).*alloca", re.DOTALL), "clang's __attribute__((aligned)) is 16, XC16's is 2"),
+    (re.compile(r"-finstrument-functions"), "needs -finstrument-functions"),
+    (re.compile(r"&&\w+;.*__OPTIMIZE__|__OPTIMIZE__.*&&\w+;", re.DOTALL), "checks GCC's inlining of labels"),
+]
+
+MEMORY = re.compile(r"does not fit|no room for the stack|overflow|largest symbols|must be less than 8192|bytes too")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one test at one level: `kind` is passed, failed or skipped."""
+
+    test: str
+    level: str
+    kind: str
+    reason: str = ""
+
+
+def directive_skip(source: str) -> str | None:
+    """Reason not to run this test on a 16-bit machine that its text or a dg- directive gives, or None."""
+    for pattern, why in SOURCE_RULES:
+        if pattern.search(source):
+            return why
+    for name in re.findall(r"dg-require-effective-target\s+([\w-]+)", source):
+        reason = ABSENT_TARGETS.get(name)
+        if reason:
+            return f"{reason} (dg-require-effective-target {name})"
+    for need in re.findall(r'dg-require-stack-size\s+"(\d+)', source):
+        if int(need) > STACK_SIZE:
+            return f"needs {need} bytes of stack"
+    for line in re.findall(r"dg-(?:skip-if|xfail-run-if|xfail-if)[^\n]*", source):
+        if SIXTEEN_BIT_TARGETS.search(line):
+            return f"GCC skips it on 16-bit machines: {line.strip(' {}*/')}"
+        if re.search(r'"(-O0|-Os|-O2)', line) is None and re.search(r"\{ \*-\*-\* \}", line) and "xfail" in line:
+            return f"fails everywhere in GCC: {line.strip(' {}*/')}"
+    return None
+
+
+def options_of(source: str) -> list[str]:
+    """Options from dg-options and dg-additional-options that mean something to us; optimiser switches of GCC do not."""
+    words: list[str] = []
+    for text in re.findall(r'dg-(?:additional-)?options\s+["{]\s*"?([^"}]*)"?\s*["}](?![^\n]*target)', source):
+        words += ["-fno-lto"] if "externally_visible" in source else []
+        words += [w for w in text.split() if re.fullmatch(r"-(fwrapv|fno-builtin.*|fgnu89-inline|std=.*|D.*|funsigned-char"
+                                                           r"|fsigned-char|fno-strict-aliasing|fms-extensions)", w)]  # fmt: skip
+    return words
+
+
+def sources_of(path: Path) -> list[Path]:
+    """The files of one test. In GCC's `builtins` folder a test is X.c, X-lib.c and lib/main.c."""
+    companion = path.with_name(path.stem + "-lib.c")
+    driver = path.parent / "lib" / "main.c"
+    return [path, companion, driver] if companion.exists() and driver.exists() else [path]
+
+
+def is_test(path: Path) -> bool:
+    """False for files that are only parts of another test."""
+    return not path.stem.endswith("-lib") and path.parent.name != "lib"
+
+
+def heap_of(source: str) -> list[str]:
+    """Linker option that gives a heap to programs that allocate."""
+    return [f"-Wl,--heap={HEAP_SIZE}"] if re.search(r"\b(malloc|calloc|realloc)\b", source) else []
+
+
+def judge(path: Path, level: str, cycles: int) -> Verdict:
+    """Compile and run one test."""
+    source = path.read_text(encoding="latin-1")
+    reason = directive_skip(source)
+    if reason:
+        return Verdict(path.name, level, "skipped", reason)
+    with tempfile.TemporaryDirectory(prefix="ctest-") as folder:
+        image = Path(folder) / "test.elf"
+        built = build(sources_of(path), image, level, *FLAGS, *options_of(source), *heap_of(source))
+        if built.status == 1:
+            for pattern, why in SKIP_RULES:
+                if re.search(pattern, built.first_error):
+                    return Verdict(
+                        path.name, level, "skipped", f"{why}: {built.first_error.split('error:')[-1].strip()}"
+                    )
+            return Verdict(path.name, level, "failed", built.first_error)
+        if built.status != 0:
+            for pattern, why in UNSUPPORTED_RULES:
+                if re.search(pattern, built.messages):
+                    return Verdict(path.name, level, "skipped", f"{why}: {built.first_error}")
+            kind = "skipped" if MEMORY.search(built.messages) else "failed"
+            return Verdict(path.name, level, kind, built.first_error)
+        result = run(image, SHORT, engine="interp")
+        if result.why.startswith("limit"):
+            result = run(image, cycles)
+    if result.status == 0:
+        return Verdict(path.name, level, "passed")
+    if result.status is not None:
+        return Verdict(path.name, level, "failed", f"exit status {result.status}")
+    if result.why == "trap: stack error":
+        return Verdict(path.name, level, "skipped", "needs more stack than there is RAM (stack error trap)")
+    return Verdict(path.name, level, "failed", result.why)
+
+
+def _judge(work: tuple[Path, str, int]) -> Verdict:
+    def late(signum: int, frame: object) -> None:
+        raise TimeoutError(f"took longer than {WALL_SECONDS} s")
+
+    signal.signal(signal.SIGALRM, late)
+    signal.alarm(WALL_SECONDS)
+    try:
+        return judge(*work)
+    except TimeoutError as error:
+        return Verdict(work[0].name, work[1], "failed", str(error))
+    except Exception as error:
+        return Verdict(work[0].name, work[1], "failed", f"internal error: {type(error).__name__}: {error}")
+    finally:
+        signal.alarm(0)
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog="example: run_c_tests.py gcc.c-torture/execute --jobs 2 -Os"
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("-O", dest="levels", action="append", help="level, repeatable: -O 0 -O s (default s)")
+    parser.add_argument("--cycles", type=int, default=1_500_000_000, help="limit per run, in Tcy")
+    parser.add_argument("--match", default="*.c", help="file name pattern")
+    parser.add_argument("--json", action="store_true", help="print one JSON list of verdicts")
+    options = parser.parse_args()
+    if not options.folder.is_dir():
+        parser.error(f"{options.folder} is not a folder")
+    files = sorted(path for path in options.folder.rglob(options.match) if is_test(path))
+    work = [(path, f"-O{level}", options.cycles) for path in files for level in options.levels or ["s"]]
+    with ProcessPoolExecutor(options.jobs) as pool:
+        verdicts = list(pool.map(_judge, work, chunksize=4))
+    if options.json:
+        print(json.dumps([asdict(v) for v in verdicts], indent=1))
+    else:
+        for v in verdicts:
+            if v.kind != "passed":
+                print(f"{v.kind} {v.test} {v.level}: {v.reason}")
+    counts = Counter(v.kind for v in verdicts)
+    print(f"{counts['passed']} passed, {counts['failed']} failed, {counts['skipped']} skipped", file=sys.stderr)
+    return 1 if counts["failed"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+"""Every case of `exec/*.c` on the emulator at four optimisation levels.
+
+One image per file and level: a generated main calls the cases in order and reports each over UART1 as `name line`, with
+line 0 for a pass. A case that traps or hangs shows as such, and those after it as not run.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from tests.toolchain.c_programs import build, run
+
+FOLDER = Path(__file__).parent / "exec"
+LEVELS = ("-O0", "-O1", "-Os", "-O2")
+CASE = re.compile(r'^TEST\((\w+),\s*"([^"]+)"\)', re.MULTILINE)
+CYCLES = 40_000_000
+
+MAIN = """
+#include <stdio.h>
+int exec_failed_line;
+{declarations}
+static const struct {{ const char *name; void (*run)(void); }} cases[] = {{ {table} }};
+int main(void)
+{{
+    for (unsigned i = 0; i < sizeof cases / sizeof *cases; i++) {{
+        exec_failed_line = 0;
+        printf("%s ", cases[i].name);
+        cases[i].run();
+        printf("%d\\n", exec_failed_line);
+    }}
+    return 0;
+}}
+"""
+
+
+def cases_of(path: Path) -> list[str]:
+    """Names of the cases of one file, in order."""
+    return [name for name, _ in CASE.findall(path.read_text())]
+
+
+@cache
+def results(path: Path, level: str, folder: Path) -> dict[str, str]:
+    """What became of each case: "ok", or what went wrong."""
+    names = cases_of(path)
+    main = folder / f"{path.stem}_main.c"
+    main.write_text(
+        MAIN.format(
+            declarations="\n".join(f"void test_{name}(void);" for name in names),
+            table=", ".join(f'{{"{name}", test_{name}}}' for name in names),
+        )
+    )
+    image = folder / f"{path.stem}{level}.elf"
+    built = build([path, main], image, level, "-std=gnu11", "-Wall", "-Wno-unused", "-Wno-parentheses", f"-I{FOLDER}")
+    if built.status != 0:
+        return dict.fromkeys(names, f"does not build: {built.first_error}")
+    ran = run(image, CYCLES, engine="interp")
+    outcome = dict.fromkeys(names, f"not run: the program ended before ({ran.why or 'exit ' + str(ran.status)})")
+    for line in ran.uart.decode("latin-1").splitlines():
+        name, _, failed = line.partition(" ")
+        if failed:
+            outcome[name] = "ok" if failed == "0" else f"{path.name}:{failed}: check failed"
+        else:
+            outcome[name] = f"{ran.why or 'the program ended'} while it ran"
+    return outcome
+
+
+@pytest.fixture(scope="session")
+def image_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("exec")
+
+
+PARAMETERS = [
+    pytest.param(path, level, name, id=f"{path.stem}-{name}{level}")
+    for path in sorted(FOLDER.glob("*.c"))
+    for level in LEVELS
+    for name in cases_of(path)
+]
+
+
+@pytest.mark.parametrize(("path", "level", "name"), PARAMETERS)
+def test_c_program_does_what_the_standard_says(path: Path, level: str, name: str, image_folder: Path) -> None:
+    """Paragraphs of C11 and of abi-elf.md are cited at each case."""
+    assert results(path, level, image_folder)[name] == "ok"
+
+
+def test_there_are_at_least_300_cases() -> None:
+    """Execution cases per level; the goal counts small C tests, not levels."""
+    assert sum(len(cases_of(path)) for path in FOLDER.glob("*.c")) >= 300
+
+
+def test_a_failing_case_is_reported_as_failing(tmp_path: Path) -> None:
+    """The frame itself: a wrong check, a trap and the case after it must not pass."""
+    source = tmp_path / "broken.c"
+    source.write_text(
+        '#include "exec.h"\n'
+        'TEST(good, "frame") { CHECK(I(1) == 1); }\n'
+        'TEST(wrong, "frame") { CHECK(I(1) == 2); }\n'
+        'TEST(trapping, "frame") { volatile int zero = 0; volatile int x = 7 / zero; (void)x; }\n'
+        'TEST(after, "frame") { CHECK(1); }\n'
+    )
+    outcome = results(source, "-Os", tmp_path)
+    assert outcome["good"] == "ok"
+    assert "broken.c:3" in outcome["wrong"]
+    assert "math error" in outcome["trapping"]
+    assert "not run" in outcome["after"]
