@@ -12,7 +12,7 @@ from typing import Protocol
 
 from .ir.model import BlockAddress, ConstAgg, ConstExpr, Function, Module, UnsupportedError, Value
 from .ir.read import read_module
-from .lower import branches, cfg, combine, data, emit, frame, isr, legalize, peephole, regalloc, select, switch
+from .lower import branches, cfg, combine, constants, data, emit, frame, isr, legalize, peephole, regalloc, schedule, select, switch
 from .lower.debuginfo import DebugInfo
 from .lower.dwarf import DwarfWriter, FunctionInfo
 from .lower.mir import MFunction
@@ -80,6 +80,16 @@ def _select(c: Context) -> None:
     c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
 
 
+def _constants(c: Context) -> None:
+    if c.options.level != "0":
+        constants.run(c.m)
+
+
+def _schedule(c: Context) -> None:
+    if c.options.level != "0":
+        schedule.run(c.m)
+
+
 def _allocate(c: Context) -> None:
     c.machine = regalloc.allocate(c.m, c.for_size)
 
@@ -96,9 +106,11 @@ FUNCTION_PASSES = [
     Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ("legal",), ("no-switch",)),
     Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ("no-switch",), ("no-critical-edges",)),
     Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
+    Pass("constants", _constants, ("machine",)),
     Pass("allocate", _allocate, ("machine",), ("real-registers",)),
     Pass("frame", lambda c: frame.build_frame(c.m, c.options.stack_check), ("real-registers",), ("framed",)),
     Pass("peephole", lambda c: peephole.run(c.m), ("framed",)),
+    Pass("schedule", _schedule, ("framed",)),
     Pass("tail-calls", lambda c: branches.tail_calls(c.m), ("framed",)),
     Pass("branches", lambda c: branches.run(c.m, c.options.level != "0"), ("framed",)),
 ]

@@ -33,6 +33,8 @@ def select_binary(s: Selector, i: Instr) -> None:
         _reverse_subtract(s, i, a, d, byte)
         return
     if isinstance(b, ConstInt):
+        if _file_logic(s, i, a, b, d, byte):
+            return
         if i.op == "sub":
             apply_immediate(s, "add", a, -b.value & ((1 << i.type.bits) - 1), d, byte, i)
         else:
@@ -50,6 +52,19 @@ def select_binary(s: Selector, i: Instr) -> None:
         s.emit(op, left, right, d, byte=byte)
         return
     s.emit(op, s.reg(a), right, d, byte=byte)
+
+
+def _file_logic(s: Selector, i: Instr, a: Value, b: ConstInt, d: int, byte: bool) -> bool:
+    """near object op constant, through W0: one word less than loading both (abi-elf.md §8.1, bit-field writes)."""
+    if i.op not in ("and", "or", "xor") or immediate_rule(i.op, b.value, i.type.bits) is not None:
+        return False
+    near = s.near_operand(a, i)
+    if near is None:
+        return False
+    s.load_imm(b.value, 0)
+    s.emit(REGISTER_OP[i.op] + "w", near, 0, byte=byte)
+    s.copy(0, d)
+    return True
 
 
 def _reverse_subtract(s: Selector, i: Instr, a: ConstInt, d: int, byte: bool) -> None:

@@ -175,25 +175,35 @@ def split_critical_edges(f: Function) -> None:
 
 
 def loop_depths(f: Function) -> dict[str, int]:
-    """Nesting depth of every block: natural loops of back edges found by depth-first search."""
-    blocks = {b.name: b for b in f.blocks}
-    state: dict[str, int] = {}
+    """Nesting depth of every block."""
+    depth = {b.name: 0 for b in f.blocks}
+    for body in natural_loops({b.name: b.succs for b in f.blocks}, f.blocks[0].name).values():
+        for n in body:
+            depth[n] += 1
+    return depth
+
+
+def natural_loops(succs: dict[str, list[str]], entry: str) -> dict[str, set[str]]:
+    """Header -> blocks of its loop, from the back edges of a depth-first search."""
+    state = {entry: 1}
     back: list[tuple[str, str]] = []
-    stack: list[tuple[str, list[str]]] = [(f.blocks[0].name, list(f.blocks[0].succs))]
-    state[f.blocks[0].name] = 1
+    stack = [(entry, list(succs[entry]))]
     while stack:
-        name, succs = stack[-1]
-        if not succs:
+        name, rest = stack[-1]
+        if not rest:
             state[name] = 2
             stack.pop()
             continue
-        s = succs.pop()
+        s = rest.pop()
         if state.get(s, 0) == 1:
             back.append((name, s))
         elif s not in state:
             state[s] = 1
-            stack.append((s, list(blocks[s].succs)))
-    preds = predecessors(f)
+            stack.append((s, list(succs[s])))
+    preds: dict[str, list[str]] = {n: [] for n in succs}
+    for n, targets in succs.items():
+        for s in targets:
+            preds[s].append(n)
     bodies: dict[str, set[str]] = {}
     for tail, head in back:
         body = bodies.setdefault(head, {head})
@@ -203,11 +213,7 @@ def loop_depths(f: Function) -> dict[str, int]:
             if n not in body:
                 body.add(n)
                 work += preds[n]
-    depth = {b.name: 0 for b in f.blocks}
-    for body in bodies.values():
-        for n in body:
-            depth[n] += 1
-    return depth
+    return bodies
 
 
 def dead_code(f: Function) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..ir.model import I1, ConstInt, Instr, Undef, Value
 from .build import SWAPPED
 from .mir import CC_INVERSE, MI, File, Imm
-from .rules import CONDITION
+from .rules import CONDITION, immediate_rule
 
 if TYPE_CHECKING:
     from .select import Selector
@@ -112,29 +112,12 @@ def _compare_zero(s: Selector, a: Value, pred: str, byte: bool, fold: Instr | No
     if pred in ("eq", "ne") and isinstance(a, Instr) and a.op == "and" and s.single_use(a) and s.same_block(a):
         if isinstance(a.args[1], ConstInt) and _test_bits(s, a, fold):
             return CONDITION[pred]
-    operand = _near_operand(s, a, fold)
+    operand = s.near_operand(a, fold)
     if operand is not None:
         s.emit("cp0f", operand, byte=byte)
     else:
         s.emit("cp0", s.source(a, fold), byte=byte)
     return ZERO_CONDITION[pred]
-
-
-def _near_operand(s: Selector, v: Value, user: Instr) -> File | None:
-    """Near address of a load that may fold into `user`."""
-    load = s.foldable_load(v, user)
-    if load is None or load.type.bits not in (8, 16):
-        return None
-    base, _ = s.decompose(load.args[0])
-    if not s.is_leaf(base) or id(base) in s.slots:
-        return None
-    mark = len(s.out)
-    operand = s.address(load.args[0], load.type.bits == 8)
-    if isinstance(operand, File) and operand.near:
-        s.folded.add(id(load))
-        return operand
-    del s.out[mark:]
-    return None
 
 
 def _test_bits(s: Selector, a: Instr, at: Instr) -> bool:
@@ -143,7 +126,7 @@ def _test_bits(s: Selector, a: Instr, at: Instr) -> bool:
     assert isinstance(mask, ConstInt)
     if mask.value and mask.value & (mask.value - 1) == 0:
         bit = mask.value.bit_length() - 1
-        near = _near_operand(s, a.args[0], at)
+        near = s.near_operand(a.args[0], at)
         if near is not None:
             s.emit("btstf", near, Imm(bit), byte=a.type.bits == 8)
         else:
@@ -251,6 +234,8 @@ def select_select(s: Selector, i: Instr) -> None:
     outer, s.out = s.out, []
     cc = condition(s, c, i)
     test, s.out = s.out, outer
+    if _select_operation(s, i, a, b, cc, test) or _select_operation(s, i, b, a, CC_INVERSE[cc], test):
+        return
     if (s.is_leaf(a) and not s.is_leaf(b)) or (not s.is_leaf(a) and not s.is_leaf(b) and _dies_here(s, b, i, a)):
         a, b, cc = b, a, CC_INVERSE[cc]
     right = None if s.is_leaf(b) else s.value_regs(b)
@@ -270,6 +255,44 @@ def select_select(s: Selector, i: Instr) -> None:
         mi.pred = True
     if skip.count == 0:
         s.out.remove(skip)
+
+
+CONDITIONAL = {"add": "add", "sub": "sub", "and": "and", "or": "ior", "xor": "xor"}
+
+
+def _select_operation(s: Selector, i: Instr, a: Value, b: Value, cc: str, test: list[MI]) -> bool:
+    """cond ? a : (a op x): start with a, do the operation under the skip. One word, no second value."""
+    if not isinstance(b, Instr) or b.op not in CONDITIONAL or not s.single_use(b) or not s.same_block(b):
+        return False
+    if b.args[0] is not a or s.is_leaf(a) or id(b) in s.needed or i.type.bits not in (8, 16):
+        return False
+    d, x = s.result(i), b.args[1]
+    byte = i.type.bits == 8
+    rule = None
+    if isinstance(x, ConstInt):
+        k = -x.value & ((1 << x.type.bits) - 1) if b.op == "sub" else x.value
+        rule = immediate_rule("add" if b.op == "sub" else b.op, k, i.type.bits)
+    operand: int | Imm
+    if rule is None:
+        operand = s.reg(x)
+    s.copy(s.reg(a), d)
+    s.out += test
+    s.emit("skip", "", cc=cc).count = 1
+    if rule is None:
+        mi = s.emit(CONDITIONAL[b.op], d, operand, d, byte=byte)
+    else:
+        literal = Imm(rule.literal(k, i.type.bits))
+        if rule.form == "unary":
+            mi = s.emit(rule.op, d, d, byte=byte and rule.op != "ze")
+        elif rule.form == "lit5":
+            mi = s.emit(rule.op, d, literal, d, byte=byte)
+        elif rule.form == "tied":
+            mi = s.emit(rule.op, literal, d, byte=byte)
+        else:
+            mi = s.emit(rule.op, d, literal, byte=byte)
+    mi.pred = True
+    s.folded.add(id(b))
+    return True
 
 
 def _dies_here(s: Selector, b: Value, i: Instr, a: Value) -> bool:

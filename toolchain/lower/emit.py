@@ -19,8 +19,10 @@ RENAMED = {
     "btstc": "btst.c",
 }
 FILE_OPS = {n + "f": n for n in ("inc", "dec", "inc2", "dec2", "neg", "com", "clr", "setm", "sl", "lsr", "asr", "bset",
-                                 "bclr", "btg", "btst", "cp0", "add", "sub", "and", "ior", "xor", "cp")}  # fmt: skip
+                                 "bclr", "btg", "btst", "cp0", "add", "sub", "addc", "subb", "and", "ior", "xor",
+                                 "cp")}  # fmt: skip
 TIED_OPS = {n + "l": n for n in ("add", "sub", "addc", "subb", "and", "ior", "xor")}
+WREG_OPS = {n + "w": n for n in ("and", "ior", "xor")}
 CONDITION_TEXT = {"c": "geu", "nc": "ltu"}
 ASM_OPERAND = re.compile("\x00(\\d+):(\\w?)\x00|\x00uid\x00")
 SHIFT_FIRST = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
@@ -112,6 +114,9 @@ class Emitter:
             handler(self, mi)
             return
         op, args = mi.op, [operand_text(a) for a in mi.args]
+        if op in WREG_OPS:
+            self._out(f"{WREG_OPS[op]}{'.b' if mi.byte else ''} {args[0]},WREG")
+            return
         if op in FILE_OPS:
             self._file(mi, FILE_OPS[op], args)
             return

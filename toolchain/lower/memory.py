@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..ir.model import ConstInt, Instr, Value
 from .mir import File, Imm, Mem, Operand, Slot
-from .rules import COMMUTES, FILE_BINARY, FILE_UNARY, REGISTER_OP, immediate_rule
+from .rules import COMMUTES, FILE_BINARY, FILE_CARRY, FILE_UNARY, REGISTER_OP, immediate_rule
 
 if TYPE_CHECKING:
     from .select import Selector
@@ -112,6 +112,8 @@ def _store_constant(s: Selector, k: int, operand: Operand, byte: bool) -> None:
 def _store_modified(s: Selector, i: Instr) -> bool:
     """store (load p op x), p as one instruction on memory, when nothing else needs the values."""
     op, p = i.args
+    if isinstance(op, Instr) and op.type.bits > 16:
+        return _modify_wide(s, i, op, p)
     if not isinstance(op, Instr) or op.type.bits not in (8, 16) or not s.single_use(op) or not s.same_block(op):
         return False
     if id(op) in s.needed or op.op not in ("add", "sub", "and", "or", "xor", "shl", "lshr", "ashr"):
@@ -226,6 +228,41 @@ def _modify_register(s: Selector, op: Instr, b: Value, load: Instr, p: Value, by
     else:
         name = "subr" if op.op == "sub" else REGISTER_OP[op.op]
         s.emit(name, value, target, target, byte=byte)
+    return True
+
+
+def _modify_wide(s: Selector, store: Instr, op: Instr, p: Value) -> bool:
+    """Several words in near memory: word by word through W0, the carry running along. CLR and MOV keep the carry."""
+    if not s.single_use(op) or not s.same_block(op) or id(op) in s.needed or op.op not in FILE_BINARY:
+        return False
+    a, b = op.args
+    load = _load_of(s, a, p, store)
+    if load is None and op.op in COMMUTES:
+        a, b = b, a
+        load = _load_of(s, a, p, store)
+    if load is None or not s.is_leaf(s.decompose(p)[0]) or id(s.decompose(p)[0]) in s.slots:
+        return False
+    targets = [s.address(p, False, 2 * k, _words(op)) for k in range(_words(op))]
+    if not all(isinstance(t, File) and t.near for t in targets) or s.is_leaf(b) and not isinstance(b, ConstInt):
+        return False
+    s.folded.add(id(load))
+    registers = None if isinstance(b, ConstInt) else s.regs(b)
+    carry = False
+    for k, target in enumerate(targets):
+        if registers is not None:
+            s.copy(registers[k], 0)
+        else:
+            assert isinstance(b, ConstInt)
+            word = b.value >> 16 * k & 0xFFFF
+            if not carry and word == (0xFFFF if op.op == "and" else 0):
+                continue
+            if not carry and op.op == "add" and word == 1:
+                s.emit("incf", target)
+                carry = True
+                continue
+            s.load_imm(word, 0)
+        s.emit(FILE_CARRY[op.op] if carry else FILE_BINARY[op.op], target, 0)
+        carry = op.op in ("add", "sub")
     return True
 
 

@@ -112,7 +112,9 @@ OPS: dict[str, OpInfo] = {
     **{n: OpInfo("n") for n in ("clrf", "setmf", "bsetf", "bclrf", "btgf")},
     **{n: OpInfo("n", SHIFT1) for n in ("slf", "lsrf", "asrf")},
     **{n: OpInfo("ns", ARITH) for n in ("addf", "subf", "cpf")},
+    **{n: OpInfo("ns", ARITH, "cz") for n in ("addcf", "subbf")},
     **{n: OpInfo("ns", LOGIC) for n in ("andf", "iorf", "xorf")},
+    **{n: OpInfo("nb", LOGIC) for n in ("andw", "iorw", "xorw")},
     "btstf": OpInfo("nn", "z"),
     # blocks, control
     "repmov": OpInfo("nbb", words=2),

@@ -6,7 +6,7 @@ them until nothing changes. Needs: real registers. Keeps behaviour; only removes
 
 from __future__ import annotations
 
-from ..target import CALLEE_SAVED
+from ..target import CALLEE_SAVED, LIT10_BYTE_MAX, LIT10_MAX
 from .liveness import bits, has_effect, live_out
 from .mir import MI, File, Imm, MBlock, Mem, MFunction
 
@@ -37,6 +37,7 @@ def local(b: MBlock, live: int) -> bool:
     touched = propagate_copies(b)
     touched |= drop_dead(b, live)
     touched |= drop_compares(b)
+    touched |= compare_in_place(b, live)
     touched |= auto_increment(b)
     touched |= merge_pairs(b)
     return touched or len(b.insts) != before
@@ -187,6 +188,10 @@ def drop_compares(b: MBlock) -> bool:
     k = 0
     while k < len(b.insts):
         mi = b.insts[k]
+        if mi.op == "cp" and _repeated(b, k):
+            del b.insts[k]
+            changed = True
+            continue
         if mi.op == "cp0" and isinstance(mi.args[0], int):
             r = mi.args[0]
             writer = _flag_source(b, k, r, mi.byte)
@@ -197,6 +202,41 @@ def drop_compares(b: MBlock) -> bool:
                     changed = True
                     continue
         k += 1
+    return changed
+
+
+def _repeated(b: MBlock, at: int) -> bool:
+    """Whether the same registers were compared before and neither they nor the flags changed since."""
+    mi = b.insts[at]
+    if not all(isinstance(a, int | Imm) for a in mi.args):
+        return False
+    operands = {a for a in mi.args if isinstance(a, int)}
+    for k in range(at - 1, -1, -1):
+        before = b.insts[k]
+        if before.op == "cp" and before.args == mi.args and before.byte == mi.byte and not before.pred:
+            return True
+        if flag_writes(before) or operands & set(before.defs()) or before.op in ("call", "callr", "asm", "text"):
+            return False
+    return False
+
+
+def compare_in_place(b: MBlock, live: int) -> bool:
+    """MOV #k,Wt; CP Wn,Wt with both dead afterwards is SUB #k,Wn (same flags)."""
+    changed = False
+    for k in range(len(b.insts) - 1, 0, -1):
+        mi, load = b.insts[k], b.insts[k - 1]
+        if mi.op == "cp" and load.op == "mov" and isinstance(load.args[0], Imm) and not mi.pred and not load.pred:
+            n, t = mi.args
+            value = load.args[0].value
+            fits = isinstance(value, int) and value <= (LIT10_BYTE_MAX if mi.byte else LIT10_MAX)
+            if isinstance(n, int) and load.args[1] == t and n != t and fits and not live >> n & 1:
+                assert isinstance(t, int)
+                if not live >> t & 1:
+                    new = MI("subl", Imm(value), n, byte=mi.byte, line=mi.line)
+                    b.insts[k - 1 : k + 1] = [new]
+                    changed = True
+                    return changed
+        live = live & ~bits(mi.defs()) | bits(mi.uses())
     return changed
 
 

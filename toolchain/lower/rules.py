@@ -116,6 +116,7 @@ CONDITION = {
 FILE_UNARY = {("add", 1): "incf", ("add", -1): "decf", ("add", 2): "inc2f", ("add", -2): "dec2f", ("xor", -1): "comf",
               ("shl", 1): "slf", ("lshr", 1): "lsrf", ("ashr", 1): "asrf"}  # fmt: skip
 FILE_BINARY = {"add": "addf", "sub": "subf", "and": "andf", "or": "iorf", "xor": "xorf"}
+FILE_CARRY = FILE_BINARY | {"add": "addcf", "sub": "subbf"}
 
 
 def immediate_rule(op: str, k: int, bits: int) -> ImmRule | None:

@@ -319,6 +319,22 @@ class Selector:
                 return Mem("ind", self.reg(base))
         return self.reg(v)
 
+    def near_operand(self, v: Value, user: Instr) -> File | None:
+        """Near address of a load that may fold into `user` as a file-register operand."""
+        load = self.foldable_load(v, user)
+        if load is None or load.type.bits not in (8, 16):
+            return None
+        base, _ = self.decompose(load.args[0])
+        if not self.is_leaf(base) or id(base) in self.slots:
+            return None
+        mark = len(self.out)
+        operand = self.address(load.args[0], load.type.bits == 8)
+        if isinstance(operand, File) and operand.near:
+            self.folded.add(id(load))
+            return operand
+        del self.out[mark:]
+        return None
+
     # -- function -----------------------------------------------------------------------------------------------------
 
     def run(self) -> MFunction:

@@ -1,0 +1,102 @@
+"""Fill RAW stalls: an instruction that uses Wn as a source address right after one that writes Wn waits a cycle
+(isa.md §13.2). Another instruction is moved between the two when nothing else changes by it.
+
+Needs: final instructions of each block, before branches are laid out. Keeps behaviour and size.
+"""
+
+from __future__ import annotations
+
+from .liveness import bits, has_effect
+from .mir import MI, Mem, MFunction
+from .peephole import flag_writes
+
+WINDOW = 4
+
+
+def run(m: MFunction) -> None:
+    """One pass over every block."""
+    for b in m.blocks:
+        k = 0
+        while k + 1 < len(b.insts):
+            if stalls(b.insts[k], b.insts[k + 1]) and not _fill_from_below(b.insts, k):
+                _fill_from_above(b.insts, k)
+            k += 1
+
+
+def stalls(first: MI, second: MI) -> bool:
+    """Whether `second` waits for a register `first` writes."""
+    written = bits(_destination_writes(first))
+    return bool(written & bits(_source_addresses(second)))
+
+
+def _destination_writes(mi: MI) -> list[int]:
+    """Registers written directly or by modification of the destination pointer; source pointers are early."""
+    out = list(mi.also_defs) if mi.op not in ("call", "callr") else []
+    for role, a in zip(mi.info.roles, mi.args, strict=False):
+        if isinstance(a, int):
+            if role in "dbD":
+                out += [a, a + 1] if role == "D" else [a]
+        elif isinstance(a, Mem) and role == "d" and a.mode in ("++", "--", "+", "-"):
+            out.append(a.base)
+    return out
+
+
+def _source_addresses(mi: MI) -> list[int]:
+    out = []
+    for role, a in zip(mi.info.roles, mi.args, strict=False):
+        if isinstance(a, Mem) and role in "sbS":
+            out.append(a.base)
+            if a.mode == "idx":
+                out.append(a.off)
+    return out
+
+
+def _movable(mi: MI) -> bool:
+    """Plain register work: no memory, no control, not part of a skip."""
+    if mi.pred or mi.volatile or mi.op in ("skip", "bra", "jump") or has_effect(mi) or mi.also_defs or mi.also_uses:
+        return False
+    return all(not isinstance(a, Mem) and a != 15 for a in mi.args)
+
+
+def _independent(a: MI, b: MI) -> bool:
+    """Whether two neighbours may change places."""
+    da, db = bits(a.defs()), bits(b.defs())
+    if da & db or da & bits(b.uses()) or db & bits(a.uses()):
+        return False
+    wa, wb = set(flag_writes(a)), set(flag_writes(b))
+    return not (wa & wb or wa & set(b.flags_read()) or wb & set(a.flags_read()))
+
+
+def _fill_from_below(insts: list[MI], k: int) -> bool:
+    """Bring a later instruction up between insts[k] and insts[k+1]."""
+    for j in range(k + 2, min(k + 2 + WINDOW, len(insts))):
+        mover = insts[j]
+        if insts[j - 1].op == "skip" or insts[j - 1].pred or mover.op in ("bra", "jump"):
+            return False
+        if _movable(mover) and all(_independent(mover, x) for x in insts[k + 1 : j]):
+            if not stalls(insts[k], mover) and not _flags_reach_end(insts, j, mover):
+                insts.insert(k + 1, insts.pop(j))
+                return True
+    return False
+
+
+def _flags_reach_end(insts: list[MI], j: int, mover: MI) -> bool:
+    """Whether somebody after position j reads flags the mover writes: then it stays in place."""
+    live = set(flag_writes(mover))
+    for mi in insts[j + 1 :]:
+        if live & set(mi.flags_read()) or mi.op in ("asm", "text"):
+            return True
+        if not mi.pred:
+            live -= set(flag_writes(mi))
+    return False
+
+
+def _fill_from_above(insts: list[MI], k: int) -> None:
+    """Move insts[k-1] down behind insts[k]."""
+    if k == 0 or insts[k - 1].op == "skip" or insts[k].pred or insts[k + 1].pred:
+        return
+    mover = insts[k - 1]
+    if k >= 2 and (insts[k - 2].op == "skip" or insts[k - 2].pred or stalls(insts[k - 2], insts[k])):
+        return
+    if _movable(mover) and not mover.info.writes and _independent(mover, insts[k]) and not stalls(mover, insts[k + 1]):
+        insts[k - 1], insts[k] = insts[k], insts[k - 1]
