@@ -6,6 +6,7 @@ from typing import Final
 
 from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
 from emu.boards.epuck.camera import Camera
+from emu.boards.epuck.exchange import Inputs, Outputs
 from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote
 from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
@@ -36,3 +37,5 @@ class Epuck:
         if self.camera is not None:
             chip.on_restored.append(self.camera.restored)
         self.stimulus: Final = Stimulus(self)
+        self.outputs: Final = Outputs(self)
+        self.inputs: Final = Inputs(self)

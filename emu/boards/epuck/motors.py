@@ -41,33 +41,43 @@ class Stepper(Part):
         self._since: Final = self.cell("since", "Q")
         self._settled: Final = self.cell("settled", "B", 1)
         self._on_time: Final = self.cell("on_time", "Q")
-        self.on_step: Callable[[int, int], None] | None = None
-        """on_step(cycle, direction): a step was made; `cycle` is when its pattern appeared."""
-        self.pins.watch_port(PORT, 0xF << shift, self._changed)
+        self._on_step: Callable[[int, int], None] | None = None
+        self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True)
 
     @property
     def steps(self) -> int:
         """Steps made so far; negative = backward."""
-        self._settle(self.now)
+        self._catch_up()
         return self._steps.value
 
     @property
     def lost(self) -> int:
         """Jumps by two phases: the rotor does not follow."""
-        self._settle(self.now)
+        self._catch_up()
         return self._lost.value
 
     @property
     def illegal(self) -> int:
         """Patterns that are no phase and stood for 1 us or more."""
-        self._settle(self.now)
+        self._catch_up()
         return self._illegal.value
 
     @property
     def coil_cycles(self) -> int:
         """Tcy during which at least one coil was on: what the battery pays for."""
-        running = self.now - self._since.value if self._nibble.value else 0
+        self._catch_up()
+        running = max(self.now - self._since.value, 0) if self._nibble.value else 0
         return self._on_time.value + running
+
+    def listen(self, on_step: Callable[[int, int], None]) -> None:
+        """Call on_step(cycle, direction) at each step, when the next pattern shows that it was one; `cycle` is when
+        the step's pattern appeared."""
+        self._on_step = on_step
+        self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)  # so that edges come by as they happen
+
+    def _catch_up(self) -> None:
+        self.pins.flush()
+        self._settle(self.now)
 
     def _changed(self, cycle: int, _changed: int, levels: int) -> None:
         nibble = levels >> self._shift & 0xF
@@ -98,8 +108,8 @@ class Stepper(Part):
         elif moved:
             direction = self._forward if moved == 1 else -self._forward
             self._steps.value += direction
-            if self.on_step is not None:
-                self.on_step(self._since.value, direction)
+            if self._on_step is not None:
+                self._on_step(self._since.value, direction)
 
 
 class Motors:

@@ -25,20 +25,23 @@ class Leds(Part):
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("leds", chip)
-        self.on_change: Callable[[str, bool, int], None] | None = None
-        """on_change(name, lit, cycle)."""
         self._places: Final = {name: parse_pin(pin) for name, pin in LED_PINS.items()}
-        for name, pin in LED_PINS.items():
-            self.pins.watch(pin, partial(self._changed, name))
 
-    def _changed(self, name: str, cycle: int, _changed: int, _levels: int) -> None:
-        if self.on_change is not None:
-            self.on_change(name, self[name], cycle)
+    def listen(self, on_change: Callable[[str, bool, int], None]) -> None:
+        """Call on_change(name, lit, cycle) whenever an LED goes on or off."""
+        for name, pin in LED_PINS.items():
+            self.pins.watch(pin, partial(self._changed, on_change, name))
+
+    @staticmethod
+    def _changed(
+        on_change: Callable[[str, bool, int], None], name: str, cycle: int, changed: int, levels: int
+    ) -> None:
+        on_change(name, bool(changed & levels), cycle)
 
     def __getitem__(self, name: str) -> bool:
         """Whether an LED ("led0".."led7", "front", "body") is lit. Raises KeyError for another name."""
         port, mask = self._places[name]
-        return bool(self.pins.drive[port] & self.pins.output[port] & mask)
+        return bool(self.pins.level[port] & mask)
 
     @property
     def lit(self) -> tuple[str, ...]:

@@ -36,14 +36,14 @@ class Watch:
         self._write(f"{self._board.chip.seconds(cycle):12.6f} s  {text}")
 
     def _watch_leds(self) -> None:
-        self._board.leds.on_change = lambda _name, _lit, cycle: self._line(
-            cycle, "leds " + (" ".join(self._board.leds.lit) or "off")
+        self._board.leds.listen(
+            lambda _name, _lit, cycle: self._line(cycle, "leds " + (" ".join(self._board.leds.lit) or "off"))
         )
 
     def _watch_motors(self) -> None:
         self._watches_motors = True
         for motor in (self._board.motors.left, self._board.motors.right):
-            motor.on_step = self._stepped
+            motor.listen(self._stepped)
 
     def _stepped(self, cycle: int, _direction: int) -> None:
         """The step being reported is counted already."""

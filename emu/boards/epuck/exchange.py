@@ -1,0 +1,101 @@
+"""What a simulated world and a robot tell each other, as arrays: read `Outputs`, move the world, write `Inputs`.
+
+    machine.run_until(cycle)
+    robot.outputs.update()          # steps, LEDs, emitters ... as of now
+    ...                             # the world moves
+    robot.inputs.distance[:] = ...
+    robot.inputs.apply()            # holds from now on
+
+The camera asks by itself when a line is read out (`Camera.sample`); the remote control is `Remote.press`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emu.boards.epuck.analog import PULSE_PINS, SENSORS
+from emu.boards.epuck.simple import LED_PINS
+
+if TYPE_CHECKING:
+    from emu.boards.epuck.board import Epuck
+
+LEFT, RIGHT = 0, 1
+"""Index of the wheels."""
+
+
+class Outputs:
+    """What the robot does. Arrays keep their identity; `update` fills them."""
+
+    def __init__(self, board: Epuck) -> None:
+        self._board: Final = board
+        self.steps: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
+        """Motor steps since power-on, left and right, forward positive; 1000 make one turn (epuck.md §3)."""
+        self.lost: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
+        """Steps lost by jumps of two phases."""
+        self.illegal: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
+        """Patterns that are no phase."""
+        self.coil_cycles: Final[NDArray[np.int64]] = np.zeros(2, np.int64)
+        """Tcy during which coils were on."""
+        self.leds: Final[NDArray[np.bool_]] = np.zeros(len(LED_PINS), np.bool_)
+        """Ring LEDs 0-7, front, body."""
+        self.emitters: Final[NDArray[np.bool_]] = np.zeros(len(PULSE_PINS), np.bool_)
+        """Infrared pulse lines; line n lights the emitters of sensors n and n + 4."""
+        self.camera_running = False
+        """The camera is plugged in and out of reset."""
+        self.speaker_on = False
+
+    def update(self) -> None:
+        """Take over the present state, and make the past final: what the ADC sampled up to now is done."""
+        board = self._board
+        board.chip.adc.catch_up(board.chip.adc.now)
+        for side, motor in ((LEFT, board.motors.left), (RIGHT, board.motors.right)):
+            self.steps[side] = motor.steps
+            self.lost[side] = motor.lost
+            self.illegal[side] = motor.illegal
+            self.coil_cycles[side] = motor.coil_cycles
+        for index, name in enumerate(LED_PINS):
+            self.leds[index] = board.leds[name]
+        for line in range(len(PULSE_PINS)):
+            self.emitters[line] = board.ir.is_lit(line)
+        self.camera_running = board.camera is not None and board.camera.is_plugged and board.camera.scan.running
+        self.speaker_on = board.codec.is_on
+
+
+class Inputs:
+    """What the robot feels. Write the arrays and attributes, then call `apply`."""
+
+    def __init__(self, board: Epuck) -> None:
+        self._board: Final = board
+        self.distance: Final[NDArray[np.float64]] = np.full(SENSORS, np.inf)
+        """mm from each infrared sensor's front to the nearest surface; inf = nothing."""
+        self.share: Final[NDArray[np.float64]] = np.ones(SENSORS)
+        """Reflection as a share of that of a white perpendicular surface, 0..1."""
+        self.ambient: Final[NDArray[np.int64]] = np.array(board.ir.ambient, np.int64)
+        """Raw counts 0..4095 with the emitter off; dark is high."""
+        self.acceleration: Final[NDArray[np.float64]] = np.array([0.0, 0.0, 1.0])
+        """g, as `Accelerometer.set_g`."""
+        self.selector = board.selector.position
+        """0..15."""
+        self.battery = board.battery.volts
+        """V."""
+        self._done: Final = (self.distance.copy(), self.share.copy(), self.ambient.copy(), self.acceleration.copy())
+
+    def apply(self) -> None:
+        """Let what has changed since the last time hold from the present cycle on. Raises ValueError out of range."""
+        board = self._board
+        distance, share, ambient, acceleration = self._done
+        for sensor in np.flatnonzero((self.distance != distance) | (self.share != share)).tolist():
+            board.ir.set_distance(sensor, float(self.distance[sensor]), float(self.share[sensor]))
+        for sensor in np.flatnonzero(self.ambient != ambient).tolist():
+            board.ir.set_ambient(sensor, int(self.ambient[sensor]))
+        if not np.array_equal(self.acceleration, acceleration):
+            board.accelerometer.set_g(*self.acceleration.tolist())
+        if self.selector != board.selector.position:
+            board.selector.position = self.selector
+        if self.battery != board.battery.volts:
+            board.battery.volts = self.battery
+        for done, given in zip(self._done, (self.distance, self.share, self.ambient, self.acceleration), strict=True):
+            done[:] = given
