@@ -169,7 +169,11 @@ class Dci(Peripheral):
         self._post(self.now + 1, 0)
 
     def _finish_frame(self) -> None:
-        """DCIEN = 0: the frame on the wire is the last (§14)."""
+        """DCIEN = 0: the frame on the wire is the last (§14); without a clock it ends at once."""
+        if not self.frame_time:
+            self._frame.value = NEVER
+            self._release()
+            return
         behind = max(self.now + 1 - self._frame.value, 0)
         self._stop.value = self._frame.value + -(-behind // self.frame_time) * self.frame_time
         if self._frame.value >= self.now + 1:  # the posted word belongs to a frame that will not come

@@ -19,6 +19,7 @@ class Port(Peripheral):
         super().__init__("port" + letter, kit)
         self.index: Final = PORTS.index(letter)
         self.mask: Final = kit.chip.sfrs["TRIS" + letter].mask
+        kit.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins the package does not have read 0
         self.tris: Final = self.register("TRIS" + letter)
         self.port: Final = self.register("PORT" + letter)
         self.lat: Final = self.register("LAT" + letter)

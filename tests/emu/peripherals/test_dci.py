@@ -115,3 +115,13 @@ def test_generator_stands_with_bcg_0(rig):
     rig.write("DCICON3", 0)
     rig.write("DCICON1", DCIEN)
     assert not rig.at(100000).flag("DCIIF")
+
+
+def test_switching_off_without_a_clock_ends_at_once(rig):
+    """§14: BCG = 0 while a frame was under way."""
+    epuck(rig)
+    rig.at(10).write("DCICON1", DCIEN)
+    rig.at(100).write("DCICON3", 0)
+    rig.at(200).write("DCICON1", 0)
+    assert not rig.at(100000).flag("DCIIF")
+    assert rig.field("DCISTAT", "SLOT") == 0
