@@ -102,9 +102,7 @@ def facts_of(insn: Insn) -> Facts:
     """The facts of a decoded instruction; they do not depend on where it stands."""
     notes: Any = _Notes(0)
     flow: Flow = insn.row.does(notes, insn.x)
-    return Facts(
-        notes.source_pointers, notes.writes, notes.loads, notes.stores, None if flow is None else type(flow)
-    )
+    return Facts(notes.source_pointers, notes.writes, notes.loads, notes.stores, None if flow is None else type(flow))
 
 
 def flow_of(insn: Insn, pc: int) -> Flow:

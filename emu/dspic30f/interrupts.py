@@ -21,7 +21,7 @@ from emu.device import FLAG_WORDS, flag_since
 from emu.dspic30f.data import DataSpace
 from emu.dspic30f.registers import NSTDIS
 from emu.dspic30f.state import IPL3, NOT_REPEATING, PC_MASK, RA, RUN, STACK_POINTER, State
-from emu.dspic30f.traps import Trap, Traps
+from emu.dspic30f.traps import Traps
 from emu.events import Events
 from emu.program import ProgramMemory
 

@@ -17,6 +17,7 @@ from emu.bus import SFR_END
 from emu.dspic30f.data import W_END
 from emu.dspic30f.expressions import Expr, Number, choose, interval
 from emu.dspic30f.isa.builder import Context, Side, Size
+from emu.dspic30f.places import Places
 from emu.dspic30f.state import FLAGS, OA, OAB, OB, SA, SAB, SB, STACK_POINTER
 
 DONE, CHANGED, PLAIN = range(3)
@@ -25,22 +26,6 @@ DONE, CHANGED, PLAIN = range(3)
 
 class Unsupported(Exception):
     """The instruction is left to the sequencer."""
-
-
-@dataclass(frozen=True, slots=True)
-class Places:
-    """Where things are in the record: indices into the views of 16, 32 and 64 bits, and the edges of RAM."""
-
-    at: dict[str, int]
-    now: int
-    ram: tuple[int, int]
-    y: tuple[int, int]
-    read_effects: frozenset[int]
-    """Word indices of SFRs whose read changes something."""
-    refused: frozenset[int]
-    """Word indices of SFRs whose read depends on what only the sequencer keeps current."""
-    modes: frozenset[int]
-    """Word indices of SFRs that change how instructions are translated."""
 
 
 @dataclass(slots=True)

@@ -16,15 +16,12 @@ from emu.dspic30f.core import Core
 from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.pysource import PLAIN, Places, Source, Unsupported
+from emu.dspic30f.places import places_of
+from emu.dspic30f.pysource import PLAIN, Source, Unsupported
 from emu.dspic30f.state import DA, LAST, RA
 
 WARM: Final = 4
 """Times an address is reached before a function is written for it."""
-
-MODE_REGISTERS: Final = (
-    "CORCON", "MODCON", "XBREV", "INTCON1", "SPLIM", "SR", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH",
-)  # fmt: skip
 
 
 @dataclass
@@ -176,19 +173,3 @@ class SpecialisedEngine:
         except Unsupported:
             return None
         return Block(make_function(source, self._names), cycles, cycles)
-
-
-def places_of(core: Core) -> Places:
-    """What generated code must know of a machine's wiring."""
-    at = core.state.at
-    effects = frozenset(word for word, hook in enumerate(core.bus.on_read) if hook is not None)
-    ram, y = core.chip.data["ram"], core.chip.data["yram"]
-    return Places(
-        at,
-        core.events.now_index,
-        (ram.start, ram.end),
-        (y.start, y.end),
-        effects,
-        frozenset((at["PCL"], at["PCH"])),
-        frozenset(at[name] for name in MODE_REGISTERS),
-    )

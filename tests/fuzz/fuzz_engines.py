@@ -24,9 +24,7 @@ BATCH = 500
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--pairs", type=int, default=1_000_000, help="instructions x contexts (default %(default)s)"
-    )
+    parser.add_argument("--pairs", type=int, default=1_000_000, help="instructions x contexts (default %(default)s)")
     parser.add_argument("--programs", type=int, default=5_000, help="random programs (default %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="first seed (default %(default)s)")
     parser.add_argument("--engine", default="interp", help="engine to compare with the plain one (default %(default)s)")
