@@ -1,4 +1,4 @@
-"""What generated code must know of a machine's wiring: where things are in the record, and which registers are special."""
+"""What generated code must know of a machine: where things are in the record, and which registers are special."""
 
 from __future__ import annotations
 
