@@ -65,7 +65,7 @@ class Exceptions:
         self._u64: Final = state.record.u64
         self._ram_start: Final = chip.data["ram"].start
         self._inttreg: Final = state.at["INTTREG"]
-        self._look: Final = events.slot("cpu.look", lambda _due: None)
+        self._look: Final = events.slot("cpu.look", lambda _due: events.kick())
         self.ipl_slip = 0
         self.entered = ""
         """The last exception entered and where it returns to, for messages."""
