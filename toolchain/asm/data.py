@@ -204,7 +204,9 @@ def _align(asm: Assembler, text: str) -> None:
 
 def _org(asm: Assembler, text: str) -> None:
     numbers = _numbers(asm, text, ".org", 1, 2)
-    asm.section.align_word() if asm.section.is_code else None
+    if asm.section.relaxables:
+        raise ExprError(".org after a call that --relax may shorten: use a section of its own")
+    asm.section.align_word()
     gap = numbers[0] - asm.section.location()
     if gap < 0:
         raise ExprError(f".org {numbers[0]:#x} is behind the current location {asm.section.location():#x}")

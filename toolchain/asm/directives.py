@@ -7,37 +7,16 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from toolchain.asm import attributes
+from toolchain.asm.blocks import BLOCK_DIRECTIVES, symbol_names
 from toolchain.asm.data import DATA_DIRECTIVES, string_argument
 from toolchain.asm.expr import ExprError
-from toolchain.asm.macro import (
-    CLOSE_MACRO,
-    CLOSE_REPEAT,
-    OPEN_MACRO,
-    OPEN_REPEAT,
-    Macro,
-    parse_head,
-    split_arguments,
-    substitute,
-)
 from toolchain.asm.sections import AsmSection
-from toolchain.asm.source import SourceError
 from toolchain.asm.state import Assembler
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind
-from toolchain.errors import ToolError
-from toolchain.files import read_text
 
 Handler = Callable[[Assembler, str], None]
 _NAME = re.compile(r"[A-Za-z_.$][\w.$]*")
-MAX_REPEAT = 1_000_000
-
-
-def _names(text: str) -> list[str]:
-    names = [n.strip() for n in text.split(",")]
-    for name in names:
-        if not _NAME.fullmatch(name):
-            raise ExprError(f"expected a symbol, got {name!r}")
-    return names
 
 
 def _name_and_rest(text: str, directive: str) -> tuple[str, str]:
@@ -119,7 +98,7 @@ def _previous(asm: Assembler, text: str) -> None:
 
 def _binder(bind: Bind) -> Handler:
     def set_bind(asm: Assembler, text: str) -> None:
-        for name in _names(text):
+        for name in symbol_names(text):
             symbol = asm.symbol(name)
             if bind is Bind.LOCAL and symbol.bind not in (None, Bind.LOCAL):
                 raise ExprError(f"symbol {name} is already global")
@@ -131,7 +110,7 @@ def _binder(bind: Bind) -> Handler:
 
 def _visibility(value: int) -> Handler:
     def set_visibility(asm: Assembler, text: str) -> None:
-        for name in _names(text):
+        for name in symbol_names(text):
             asm.symbol(name).visibility = value
 
     return set_visibility
@@ -191,76 +170,6 @@ def _type(asm: Assembler, text: str) -> None:
 def _size(asm: Assembler, text: str) -> None:
     name, value = _name_and_rest(text, ".size")
     asm.symbol(name).size = asm.evaluate(value)
-
-
-# -- blocks and files --------------------------------------------------------------------------------------------
-
-
-def _macro(asm: Assembler, text: str) -> None:
-    name, parameters = parse_head(text)
-    if name.lower() in asm.macros:
-        asm.source.block(OPEN_MACRO, CLOSE_MACRO, f".macro {name}")
-        raise ExprError(f"macro {name} is already defined (use .purgem first)")
-    asm.macros[name.lower()] = Macro(name, parameters, asm.source.block(OPEN_MACRO, CLOSE_MACRO, f".macro {name}"))
-
-
-def _purge_macro(asm: Assembler, text: str) -> None:
-    for name in _names(text):
-        if asm.macros.pop(name.lower(), None) is None:
-            raise ExprError(f"no macro is called {name}")
-
-
-def _exit_macro(asm: Assembler, text: str) -> None:
-    frame = asm.source.leave_macro()
-    if frame is None:
-        raise ExprError(".exitm outside a macro")
-    asm.conditionals.cut(frame.conditionals)
-
-
-def _repeat(asm: Assembler, text: str) -> None:
-    body = asm.source.block(OPEN_REPEAT, CLOSE_REPEAT, ".rept")
-    count = asm.constant(text, ".rept count")
-    if not 0 <= count <= MAX_REPEAT:
-        raise ExprError(f".rept count {count} is outside 0..{MAX_REPEAT}")
-    if count * max(len(body), 1) > MAX_REPEAT:
-        raise ExprError(f".rept expands to more than {MAX_REPEAT} lines")
-    asm.source.expand(body * count, asm.conditionals.depth)
-
-
-def _iterate(characters: bool) -> Handler:
-    directive = ".irpc" if characters else ".irp"
-
-    def expand(asm: Assembler, text: str) -> None:
-        body = asm.source.block(OPEN_REPEAT, CLOSE_REPEAT, directive)
-        match = re.match(r"\s*([A-Za-z_$][\w$]*)\s*,?\s*(.*)", text, re.DOTALL)
-        if match is None:
-            raise ExprError(f"{directive} expects a symbol and values")
-        values = list(match[2].strip().strip('"')) if characters else split_arguments(match[2])
-        if len(values) * max(len(body), 1) > MAX_REPEAT:
-            raise ExprError(f"{directive} expands to more than {MAX_REPEAT} lines")
-        lines: list[str] = []
-        for value in values or [""]:
-            lines += substitute(body, {match[1]: value}, asm.serial)
-        asm.source.expand(lines, asm.conditionals.depth)
-
-    return expand
-
-
-def _stray(directive: str, opener: str) -> Handler:
-    def refuse(asm: Assembler, text: str) -> None:
-        raise ExprError(f"{directive} without {opener}")
-
-    return refuse
-
-
-def _include(asm: Assembler, text: str) -> None:
-    name = string_argument(text, ".include")
-    path = asm.find_file(name)
-    try:
-        content = read_text(path)
-    except ToolError as error:
-        raise SourceError(str(error).removeprefix("error: ")) from None
-    asm.source.include(content, path, asm.conditionals.depth)
 
 
 # -- control and messages ----------------------------------------------------------------------------------------
@@ -356,15 +265,6 @@ DIRECTIVES: dict[str, Handler] = {
     ".lcomm": _local_common,
     ".type": _type,
     ".size": _size,
-    ".macro": _macro,
-    ".endm": _stray(".endm", ".macro"),
-    ".exitm": _exit_macro,
-    ".purgem": _purge_macro,
-    ".rept": _repeat,
-    ".irp": _iterate(characters=False),
-    ".irpc": _iterate(characters=True),
-    ".endr": _stray(".endr", ".rept, .irp or .irpc"),
-    ".include": _include,
     ".end": _end,
     ".abort": _abort,
     ".err": _error,
@@ -376,6 +276,7 @@ DIRECTIVES: dict[str, Handler] = {
     ".fillvalue": _fill_value,
     ".pfillvalue": _packed_fill_value,
     **dict.fromkeys((".list", ".nolist", ".eject", ".psize", ".title", ".sbttl", ".ident", ".version"), _ignore),
+    **BLOCK_DIRECTIVES,
     **DATA_DIRECTIVES,
 }
 

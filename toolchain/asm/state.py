@@ -58,7 +58,7 @@ class Assembler:
         self.macros: dict[str, Macro] = {}
         self.serial = 0  # number of macro expansions so far, `\@`
         self.findings: list[str] = []
-        self.messages: list[str] = []  # .print, .ident and warnings, for the caller to show
+        self.messages: list[str] = []  # of .print, for the caller to show
         self.sections: dict[str, AsmSection] = {}
         self.section_stack: list[tuple[AsmSection, AsmSection]] = []
         self.numeric: dict[str, int] = {}
@@ -92,10 +92,6 @@ class Assembler:
         if len(self.findings) >= MAX_ERRORS:
             self.findings.append(f"{self.source.place.file}: error: more than {MAX_ERRORS} errors, giving up")
             raise ToolError.of(self.findings)
-
-    def warn(self, message: str, place: Place | None = None) -> None:
-        """Record a warning for the caller to print."""
-        self.messages.append(f"{place or self.source.place}: warning: {message}")
 
     # -- symbols and expressions ---------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -27,6 +28,7 @@ def main(arguments: list[str]) -> int:
     p.add_argument("--relax", action="store_true", help="shorten CALL and GOTO within a section")
     p.add_argument("-g", dest="debug", action="store_true", help="write a DWARF line table for this source")
     p.add_argument("-p", dest="part", default=PART, help=f"processor; only {PART} is supported")
+    p.add_argument("-omf", default="elf", choices=("elf",), help=argparse.SUPPRESS)
     options = p.parse_args(arguments)
     if options.part.upper().removeprefix("DSPIC") != PART:
         raise ToolError(f"-p{options.part}: the only processor supported is {PART}")

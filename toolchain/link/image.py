@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from emu.elffacts import OCTETS_PER_WORD, SectionFlag
+from emu.elffacts import OCTETS_PER_WORD, Content, SectionFlag, content_kind
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Executable, Home, Section, Symbol
 from toolchain.elf.symbols import is_named
@@ -62,7 +62,7 @@ def _content(section: Section, octets: bytearray, size: int, fill_upper: int) ->
     if section.type == c.SHT_NOBITS:
         return bytearray()
     padded = octets + bytes(size * 2 - len(octets))
-    if not (section.is_psv or section.is_eedata):
+    if content_kind(section.flags, executable=True) is not Content.PAIRS:
         return padded
     result = bytearray(len(padded))
     result[0::OCTETS_PER_WORD] = padded[0::OCTETS_PER_WORD]

@@ -26,7 +26,7 @@ from toolchain.link.gc import live_sections, vector_names
 from toolchain.link.image import Output, build_executable, build_outputs
 from toolchain.link.memory import script_symbols
 from toolchain.link.options import LinkOptions
-from toolchain.link.place import Layout, Placer, even, is_const, space_of
+from toolchain.link.place import Layout, Placer, even, is_const, largest_symbols, space_of
 from toolchain.link.relocate import Relocator
 from toolchain.link.resolve import Resolution, check, resolve
 
@@ -89,7 +89,7 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
     placer.place_info()
     layout = placer.layout
 
-    stack = _stack(layout, order, options)
+    stack = _stack(resolution, layout, order, options)
     absolute |= _linker_symbols(resolution, layout, table if options.data_init else None, stack, options)
     absolute |= _section_limits(resolution, layout)
     relocator = Relocator(resolution, layout, absolute, slots, handle)
@@ -191,7 +191,7 @@ def _section_limits(resolution: Resolution, layout: Layout) -> dict[str, int]:
     return result
 
 
-def _stack(layout: Layout, order: list[Section], options: LinkOptions) -> tuple[int, int]:
+def _stack(resolution: Resolution, layout: Layout, order: list[Section], options: LinkOptions) -> tuple[int, int]:
     """Return (first address, limit): a stack section of the program, else the largest free block (abi-elf.md §3.3)."""
     given = [s for s in order if s.extended & ExtendedAttribute.STACK and s.units]
     if given:
@@ -204,7 +204,10 @@ def _stack(layout: Layout, order: list[Section], options: LinkOptions) -> tuple[
     low = even(low)
     if high - low < options.stack + options.stack_guard:
         needed = options.stack + options.stack_guard
-        raise ToolError(f"no room for the stack: {high - low} bytes of data memory are free, {needed} needed (--stack)")
+        largest = largest_symbols(resolution, (s for s in order if s.is_ram))
+        raise ToolError(
+            f"no room for the stack: {high - low} bytes of data memory are free, {needed} needed (--stack){largest}"
+        )
     return low, high - options.stack_guard
 
 

@@ -104,7 +104,8 @@ class Placer:
                 take = self._take_top if top else self._take
                 at = take(section, low, high)
                 if at is None:
-                    raise self._overflow(members, self.layout.data, low, high, section)
+                    rivals = sections if high == RAM.end else members
+                    raise self._overflow(members, self.layout.data, low, high, section, rivals)
                 self._record(section, at)
 
     def _take(self, section: Section, low: int, high: int) -> int | None:
@@ -182,7 +183,7 @@ class Placer:
             offsets.append(size)
             size += even(section.units)
         if size > PSV_PAGE_UNITS:
-            largest = _largest(self.resolution, const)
+            largest = largest_symbols(self.resolution, const)
             raise ToolError(
                 f"constants (.const) are {size - PSV_PAGE_UNITS} bytes too large for one PSV window of 32 KB{largest}"
             )
@@ -215,7 +216,16 @@ class Placer:
 
     # -- errors --------------------------------------------------------------------------------------------------
 
-    def _overflow(self, group: list[Section], pool: Pool, low: int, high: int, failed: Section) -> ToolError:
+    def _overflow(
+        self,
+        group: list[Section],
+        pool: Pool,
+        low: int,
+        high: int,
+        failed: Section,
+        rivals: list[Section] | None = None,
+    ) -> ToolError:
+        """Say by how much `group` exceeds what `pool` has left; `rivals` are all who took from it."""
         waiting = sum(even(s.units) for s in group if s not in self.layout.placed)
         missing = waiting - pool.room(low, high)
         program = space_of(failed) == "program"
@@ -229,7 +239,9 @@ class Placer:
                 "EEPROM" if space_of(failed) == "eeprom" else "near data memory" if high == NEAR.end else "data memory"
             )
             reason = f"{kind} {what} overflows by {missing} bytes"
-        return ToolError(f"{self._name(failed)} does not fit: {reason}{_largest(self.resolution, group)}")
+        return ToolError(
+            f"{self._name(failed)} does not fit: {reason}{largest_symbols(self.resolution, rivals or group)}"
+        )
 
 
 _XY = SectionFlag.XMEM | SectionFlag.YMEM
@@ -265,7 +277,7 @@ def psv_address(load: int) -> int:
     return PSV_WINDOW | load & (PSV_PAGE_UNITS - 1)
 
 
-def _largest(resolution: Resolution, group: Iterable[Section]) -> str:
+def largest_symbols(resolution: Resolution, group: Iterable[Section]) -> str:
     """The five largest symbols, with their bytes, of the sections that compete for the space."""
     members = set(group)
     sizes: list[tuple[int, str]] = []

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from toolchain.elf.model import Bind, Home, ObjectFile, Section, Symbol
 from toolchain.elf.read import read_object
+from toolchain.elf.symbols import is_named
 from toolchain.errors import ToolError
 from toolchain.link.archive import Archive
 
@@ -92,6 +93,13 @@ def resolve(objects: list[ObjectFile], archives: list[Archive], roots: list[str]
     return result
 
 
+def _place(obj: ObjectFile, section: Section, offset: int) -> str:
+    """Where a reference stands: object, section and the function or object around it."""
+    around = [s for s in obj.symbols if s.section is section and s.value <= offset and is_named(s)]
+    name = max(around, key=lambda s: s.value).name if around else ""
+    return f"{obj.name}:({section.name}+{offset:#x}{f' in {name}' if name else ''})"
+
+
 def check(result: Resolution, provided: set[str], live: set[Section]) -> None:
     """Raise `ToolError` listing every duplicate and every undefined symbol that live sections refer to."""
     findings = [
@@ -108,7 +116,7 @@ def check(result: Resolution, provided: set[str], live: set[Section]) -> None:
                 if symbol.home is not Home.UNDEFINED or symbol.bind is Bind.WEAK or not symbol.name:
                     continue
                 if symbol.name not in result.globals and symbol.name not in provided:
-                    missing.setdefault(symbol.name, []).append(f"{obj.name}:({section.name}+{reloc.offset // 2:#x})")
+                    missing.setdefault(symbol.name, []).append(_place(obj, section, reloc.offset // 2))
     for name, places in missing.items():
         shown = ", ".join(places[:MAX_REFERENCES])
         more = f" and {len(places) - MAX_REFERENCES} more" if len(places) > MAX_REFERENCES else ""

@@ -18,13 +18,13 @@ def member(name: str, text: str) -> Member:
 def test_all_undefined_and_duplicate_symbols_are_listed_with_their_objects(image):
     """One link shows everything that is missing, with the place of the reference."""
     with pytest.raises(ToolError) as error:
-        image(" call one\n mov two, w0\n .global twice\ntwice: nop\n", " call one\n", ".global twice\ntwice: nop\n")
+        image("f: call one\n mov two, w0\n .global twice\ntwice: nop\n", " call one\n", ".global twice\ntwice: nop\n")
     lines = str(error.value).splitlines()
     assert lines == [
         "2.o: error: duplicate symbol twice, defined in 0.o, 2.o",
-        "0.o: error: undefined symbol one, referenced at 0.o:(.text+0x0), 0.o:(.text+0x2), "
+        "0.o: error: undefined symbol one, referenced at 0.o:(.text+0x0 in f), 0.o:(.text+0x2 in f), "
         "1.o:(.text+0x0), 1.o:(.text+0x2)",
-        "0.o: error: undefined symbol two, referenced at 0.o:(.text+0x4)",
+        "0.o: error: undefined symbol two, referenced at 0.o:(.text+0x4 in f)",
     ]
 
 
