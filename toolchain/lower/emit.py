@@ -211,8 +211,8 @@ class Emitter:
             modifier = m[2]
             if isinstance(a, int) and modifier == "d":
                 return f"w{a + 1}"
-            if isinstance(a, Imm) and modifier in ("c", "n"):
-                return str(a.value) if modifier == "c" else str(-int(a.value))
+            if isinstance(a, Imm):  # bare: XC16 sources write the sign themselves, "disi #%0"
+                return str(-int(a.value)) if modifier == "n" else str(a.value)
             return operand_text(a)
 
         for line in ASM_OPERAND.sub(replace, mi.text).split("\n"):
