@@ -16,6 +16,7 @@ from emu.command import BAD_INPUT_STATUS, EXIT_BAD_INPUT, EXIT_OK, CommandError,
 
 COMMANDS: Final = {
     "run": "run a firmware image and show what its UART says",
+    "screenshot": "run a firmware image and write the picture its camera captured",
     "disasm": "print a firmware image as assembly with symbols and source lines",
     "info": "print sections, memory use, vectors and configuration words",
     "footprint": "print what a firmware image costs in ROM and RAM",

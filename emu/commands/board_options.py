@@ -46,10 +46,9 @@ def add_watch_option(parser: argparse.ArgumentParser) -> None:
 
 
 def _selector(text: str) -> int:
-    number = int(text, 0)
-    if not 0 <= number < SELECTOR_POSITIONS:
-        raise ValueError
-    return number
+    if not text.isdecimal() or int(text) >= SELECTOR_POSITIONS:
+        raise argparse.ArgumentTypeError(f"the selector has positions 0 to 15, not {text!r}")
+    return int(text)
 
 
 def _topics(text: str) -> list[str]:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Final
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
 from emu.boards.epuck.camera import Camera
-from emu.boards.epuck.exchange import Inputs, Outputs
 from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote
 from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
 from emu.boards.epuck.stimulus import Stimulus
 from emu.peripherals import Peripherals
+
+if TYPE_CHECKING:  # arrays are loaded when somebody asks for them
+    from emu.boards.epuck.exchange import Inputs, Outputs
 
 
 class Epuck:
@@ -37,5 +40,17 @@ class Epuck:
         if self.camera is not None:
             chip.on_restored.append(self.camera.restored)
         self.stimulus: Final = Stimulus(self)
-        self.outputs: Final = Outputs(self)
-        self.inputs: Final = Inputs(self)
+
+    @cached_property
+    def outputs(self) -> Outputs:
+        """What the robot does, as arrays."""
+        from emu.boards.epuck.exchange import Outputs
+
+        return Outputs(self)
+
+    @cached_property
+    def inputs(self) -> Inputs:
+        """What the robot feels, as arrays."""
+        from emu.boards.epuck.exchange import Inputs
+
+        return Inputs(self)

@@ -9,19 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.exposure import Exposure
-from emu.boards.epuck.pixels import Pixels, as_vga, encode, scene_columns, scene_row
 from emu.boards.epuck.scan import HREF, PCLK, VSYNC, Scan, course_of
 from emu.boards.epuck.sensors import SENSORS, Picture, Timing
 from emu.boards.part import Part
 from emu.events import NEVER
 from emu.peripherals import Peripherals
 from emu.peripherals.i2cbus import I2cDevice
+
+if TYPE_CHECKING:  # loaded when the first picture is: most runs start faster without
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from emu.boards.epuck.pixels import Pixels
 
 ADDRESS: Final = 0x6E
 """7-bit I2C address: 0xDC to write, 0xDD to read (epuck.md §7.1)."""
@@ -31,9 +33,9 @@ SYNC_PORT: Final = 2
 RESET_PIN: Final = "RC13"
 _LINE_BYTES: Final = 2 * 1024
 
-RowSource = Callable[[int, int], Pixels]
+RowSource = Callable[[int, int], "Pixels"]
 """rows(y, cycle): line y (0 = top) of the upright scene, 640 x 3 values, as seen in `cycle`."""
-PixelSource = Callable[[int, NDArray[np.intp], int], Pixels]
+PixelSource = Callable[[int, "NDArray[np.intp]", int], "Pixels"]
 """pixels(y, columns, cycle): only these columns (0..639) of line y, len(columns) x 3 values."""
 
 
@@ -56,10 +58,10 @@ class Camera(Part, I2cDevice):
         self._line_from: Final = self.cell("line_from", "Q")
         self._line_to: Final = self.cell("line_to", "Q")
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
-        self._pixels: PixelSource = _darkness
+        self._pixels: PixelSource | None = None
         self._timing: Timing
         self._picture: Picture
-        self._columns: NDArray[np.intp]
+        self._columns: NDArray[np.intp] | None
         self._load_defaults()
         self._interpret()
         self.scan.begin(course_of(self._timing), self.now, running=True)
@@ -76,6 +78,8 @@ class Camera(Part, I2cDevice):
         `turned` = 90, 180 or 270 turns it counter-clockwise before a sensor that is mounted turned (§7.1).
         Raises ValueError for something that is no picture.
         """
+        from emu.boards.epuck.pixels import as_vga
+
         scene = as_vga(image, turned)
         self.sample(lambda y, columns, _cycle: scene[y, columns])
 
@@ -102,11 +106,33 @@ class Camera(Part, I2cDevice):
         self._line_to.value = 0
 
     def frame(self, cycle: int | None = None) -> Pixels:
-        """What the sensor sees through its present window, lines x pixels x 3, at `cycle` (default: now)."""
+        """The picture the sensor would send of the scene in `cycle` (default: now): lines x pixels x 3, through its
+        present window, format and exposure."""
+        import numpy as np
+
+        from emu.boards.epuck.pixels import decode
+
         at = self.now if cycle is None else cycle
-        lines = range(self.scan.course.lines)
-        rows = (scene_row(self._timing, self._picture, line) for line in lines)
-        return np.stack([self._pixels(row, self._columns, at) for row in rows])
+        lines = [decode(self._sent(line, at), self._picture.form) for line in range(self.scan.course.lines)]
+        return np.stack(lines) if lines else np.zeros((0, 0, 3), np.uint8)
+
+    def _sent(self, line: int, cycle: int) -> bytes:
+        """The bytes of a line read out in `cycle`."""
+        from emu.boards.epuck.pixels import encode
+
+        picture = self._picture
+        brightness = self._exposure.brightness(picture.exposure, cycle, self.scan.course.frame_tcy)
+        red, green, blue = (gain * brightness for gain in picture.gains)
+        return encode(self._seen(line, cycle), picture.form, (red, green, blue))
+
+    def _seen(self, line: int, cycle: int) -> Pixels:
+        """Scene pixels of a line of the frame."""
+        from emu.boards.epuck import pixels
+
+        if self._columns is None:
+            self._columns = pixels.scene_columns(self._timing, self._picture)
+        source = self._pixels or pixels.darkness
+        return source(pixels.scene_row(self._timing, self._picture, line), self._columns, cycle)
 
     # -- connector ---------------------------------------------------------------------------------------------------
 
@@ -163,11 +189,7 @@ class Camera(Part, I2cDevice):
         if found is None:
             return False
         line, href = found
-        course, picture = self.scan.course, self._picture
-        brightness = self._exposure.brightness(picture.exposure, href, course.frame_tcy)
-        red, green, blue = (gain * brightness for gain in picture.gains)
-        pixels = self._pixels(scene_row(self._timing, picture, line), self._columns, href)
-        data = encode(pixels, picture.form, (red, green, blue))
+        course, data = self.scan.course, self._sent(line, href)
         self._line[: len(data)] = memoryview(data)
         self._line_from.value = href - course.byte_tcy // 2
         self._line_to.value = self._line_from.value + len(data) * course.byte_tcy
@@ -221,7 +243,7 @@ class Camera(Part, I2cDevice):
         """What the registers mean; a line already rendered is out of date."""
         self._timing = self.sensor.timing(self.register)
         self._picture = self.sensor.picture(self.register)
-        self._columns = scene_columns(self._timing, self._picture)
+        self._columns = None
         self._line_to.value = 0
 
     # -- reset -------------------------------------------------------------------------------------------------------
@@ -250,9 +272,3 @@ class Camera(Part, I2cDevice):
         self._line_to.value = line_to
         self.scan.restored()
         self._connect()
-
-
-def _darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
-    return np.zeros((len(columns), 3), dtype=np.uint8)
-
-

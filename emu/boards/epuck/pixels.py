@@ -26,6 +26,11 @@ def scene_row(timing: Timing, picture: Picture, line: int) -> int:
     return min(max(HEIGHT - 1 - row if picture.flip_y else row, 0), HEIGHT - 1)
 
 
+def darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
+    """A scene without light."""
+    return np.zeros((len(columns), 3), dtype=np.uint8)
+
+
 def encode(pixels: Pixels, form: str, gains: tuple[float, float, float]) -> bytes:
     """The bytes a sensor sends for a line of `pixels` after its gains."""
     values = pixels.astype(np.int32)

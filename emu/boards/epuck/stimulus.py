@@ -22,10 +22,10 @@ Times are seconds (`1.5s`) or cycles (`22118400`). Lines may be in any order; eq
 from __future__ import annotations
 
 import ast
-import math
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -71,11 +71,15 @@ def parse(board: Epuck, text: str, name: str = "stimulus") -> list[Step]:
 
 
 def _time(board: Epuck, word: str) -> int:
-    seconds = word.endswith("s")
-    value = float(word[:-1]) if seconds else float(int(word))
-    if not 0 <= value < math.inf:
-        raise ValueError(f"a time is seconds like 1.5s or a number of cycles, not {word!r}")
-    return round(value * board.chip.fcy) if seconds else int(value)
+    """Cycle of a time. Fractions are exact, so 0.1s is the same cycle on every host."""
+    try:
+        value = Fraction(word.removesuffix("s"))
+    except (ValueError, ZeroDivisionError):
+        value = Fraction(-1)
+    cycles = value * Fraction(board.chip.fcy) if word.endswith("s") else value
+    if cycles < 0 or not word.endswith("s") and cycles.denominator != 1:
+        raise ValueError(f"a line begins with its time, seconds like 1.5s or a number of cycles, not {word!r}")
+    return round(cycles)
 
 
 def _action(board: Epuck, words: list[str]) -> Action:

@@ -47,8 +47,9 @@ def test_steps_happen_at_their_times(robot):
     [
         ("1s", "expected one of selector"),
         ("1s dance", "expected one of selector"),
-        ("soon selector 1", "could not convert|invalid literal"),
-        ("-1s selector 1", "a time is"),
+        ("soon selector 1", "begins with its time"),
+        ("-1s selector 1", "begins with its time"),
+        ("1.5 selector 1", "begins with its time"),
         ("1s selector 16", "positions 0 to 15"),
         ("1s selector", "expected 1 arguments"),
         ("1s ir 8 20", "sensors are 0 to 7"),

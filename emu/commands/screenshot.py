@@ -1,0 +1,139 @@
+"""`emu screenshot`: run a firmware image and write the picture its camera driver captured, or what its sensor sees."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Final
+
+from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.commands.board_options import add_board_options, board_of, set_up
+from emu.faults import fault_of
+from emu.loader import load_image
+
+if TYPE_CHECKING:
+    from emu.machine import Machine
+
+FORMATS: Final = {"rgb565": 2, "yuv": 2, "grey": 1}
+"""Bytes per pixel."""
+
+DESCRIPTION: Final = """\
+Run a firmware image for a while and write a picture as PNG.
+
+With --buffer: the frame its camera driver has put there, --size pixels wide and high, lines from top to bottom.
+Without: what the sensor sees through the window the firmware has programmed.
+
+Exit status: 0 done, 1 firmware fault (the picture is written all the same), 2 bad input."""
+
+
+def parser() -> Parser:
+    example = "emu screenshot firmware.elf --camera room.png --seconds 2 --buffer frame --size 20x20 -o frame.png"
+    made = Parser("screenshot", DESCRIPTION, example)
+    made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    made.add_argument("-o", "--output", metavar="FILE.png", default="frame.png", help="default frame.png")
+    made.add_argument("--seconds", metavar="S", type=_positive, default=Fraction(2), help="simulated time (default 2)")
+    made.add_argument("--buffer", metavar="SYM|ADDR", help="variable or data address of the frame")
+    made.add_argument("--size", metavar="WxH", type=_size, help="pixels of the frame, for example 20x20")
+    made.add_argument("--format", choices=FORMATS, default="rgb565", help="of the frame (default rgb565)")
+    made.add_argument("--enlarge", metavar="N", type=_enlargement, default=1, help="make every pixel N x N large")
+    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit, interp or plain (default auto)")
+    made.add_argument("--json", action="store_true", help="print one JSON object")
+    add_board_options(made)
+    return made
+
+
+def _positive(text: str) -> Fraction:
+    try:
+        number = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        number = Fraction(0)
+    if number <= 0:
+        raise argparse.ArgumentTypeError(f"expected a positive number, not {text!r}")
+    return number
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT like 20x20, not {text!r}")
+    return int(width), int(height)
+
+
+def _enlargement(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 100:
+        raise argparse.ArgumentTypeError(f"expected 1 to 100, not {text!r}")
+    return int(text)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says."""
+    from emu.boards.picture import write_picture
+    from emu.machine import Machine
+
+    if (options.buffer is None) != (options.size is None):
+        raise CommandError("--buffer and --size belong together")
+    if options.board == "none" and options.buffer is None:
+        raise CommandError("a bare chip has no sensor; leave out --board none or give --buffer")
+    image = load_image(options.image)
+    try:
+        machine = Machine(image.chip, engine=options.engine, board=board_of(options))
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+    machine.load(image)
+    set_up(machine, options)
+    limit = max(1, int(options.seconds * Fraction(machine.peripherals.fcy)))
+    place = _place(machine, options) if options.buffer else None
+    stop = machine.run_until(limit) or machine.stopped("limit")
+    pixels = _sensor(machine) if place is None else _captured(machine, place, options)
+    write_picture(options.output, pixels, options.enlarge)
+    fault = fault_of(machine, image, stop)
+    height, width, _ = pixels.shape
+    if options.json:
+        facts = {"output": options.output, "width": width, "height": height, "cycles": machine.cycle}
+        print(json.dumps(facts | {"reason": "fault" if fault else stop.reason}))
+    else:
+        print(f"{options.output}: {width} x {height} pixels after {machine.cycle:,} cycles", file=sys.stderr)
+    if fault is not None:
+        print(f"emu screenshot: firmware fault: {fault.cause} at {fault.pc:#08x}", file=sys.stderr)
+        return EXIT_FAULT
+    return EXIT_OK
+
+
+def _place(machine: Machine, options: argparse.Namespace) -> int:
+    """Data address of the buffer, which must lie in data memory as a whole."""
+    try:
+        address = int(options.buffer, 0)
+    except ValueError:
+        try:
+            address = machine.address_of(options.buffer)
+        except KeyError as error:
+            raise CommandError(str(error.args[0])) from None
+    width, height = options.size
+    end = address + width * height * FORMATS[options.format]
+    ram = machine.chip.data["ram"]
+    if not ram.start <= address < end <= ram.end:
+        raise CommandError(f"{address:#x}..{end - 1:#x} does not lie in RAM, {ram.start:#x}..{ram.end - 1:#x}")
+    return address
+
+
+def _captured(machine: Machine, address: int, options: argparse.Namespace) -> Any:
+    from emu.boards.epuck.pixels import decode
+
+    width, height = options.size
+    data = bytes(machine.record.bytes[address : address + width * height * FORMATS[options.format]])
+    try:
+        return decode(data, options.format).reshape(height, width, 3)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+
+
+def _sensor(machine: Machine) -> Any:
+    camera = machine.board.camera
+    if camera is None:
+        raise CommandError("this robot has no camera; leave out --sensor none or give --buffer")
+    pixels = camera.frame()
+    if not pixels.size:
+        raise CommandError("the window the firmware has programmed holds no pixel")
+    return pixels
