@@ -10,6 +10,7 @@ SIGNATURE_SECTION = "__c30_signature"
 """Info section of every object: three 16-bit words 1, 0, 0 (abi-elf.md §6.7, §7 item 8)."""
 SIGNATURE_WORDS = (1, 0, 0)
 
+COFF_MAGIC = (0x1236).to_bytes(2, "little")  # abi-elf.md §6.8
 MAGIC = b"\x7fELF"
 ELFCLASS32, ELFDATA2LSB, EV_CURRENT = 1, 1, 1
 ET_REL, ET_EXEC = 1, 2

@@ -33,6 +33,8 @@ class _Reader:
 
     def __init__(self, data: bytes, name: str) -> None:
         self.data, self.name = data, name
+        if data[:2] == c.COFF_MAGIC:
+            raise self.error("a COFF file of an old C30: build it with -omf=elf")
         if data[:4] != c.MAGIC:
             raise self.error("not an ELF file (bad magic at offset 0)")
         if len(data) < c.EHDR_SIZE:

@@ -147,7 +147,7 @@ def test_damage_anywhere_in_an_object_is_an_error_or_harmless():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ((0, b"MZ"), "not an ELF file"), ((4, b"\2"), "32-bit little-endian"),
+        ((0, b"MZ"), "not an ELF file"), ((0, b"\x36\x12"), "-omf=elf"), ((4, b"\2"), "32-bit little-endian"),
         ((18, b"\x3e\0"), "machine 62 at offset 18"),
         ((16, b"\2\0"), "executable cannot be linked"), ((32, b"\xff\xff\xff\x7f"), "truncated"),
     ],
