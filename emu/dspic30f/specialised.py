@@ -20,7 +20,7 @@ from emu.dspic30f.places import places_of
 from emu.dspic30f.pysource import PLAIN, Source, Unsupported
 from emu.dspic30f.state import DA, LAST, RA
 
-WARM: Final = 4
+WARM: Final = 16
 """Times an address is reached before a function is written for it."""
 
 

@@ -1,0 +1,22 @@
+"""`python -m bench`: every measurement of this folder, one after the other. Arguments go to each script."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+
+def main() -> int:
+    for script in sorted(HERE.glob("[a-z]*.py")):
+        print(f"{script.name}:", flush=True)
+        status = subprocess.run([sys.executable, str(script), *sys.argv[1:]], check=False).returncode
+        if status:
+            return status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
