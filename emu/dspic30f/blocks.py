@@ -40,24 +40,6 @@ class Block:
     last_start: int
 
 
-def div_trunc(a: int, b: int) -> int:
-    """Quotient towards zero, 0 for b = 0."""
-    if b == 0:
-        return 0
-    quotient = abs(a) // abs(b)
-    return quotient if (a < 0) == (b < 0) else -quotient
-
-
-def rem_trunc(a: int, b: int) -> int:
-    """Remainder with the sign of a, 0 for b = 0."""
-    return 0 if b == 0 else a - div_trunc(a, b) * b
-
-
-def ctz16(v: int) -> int:
-    """Trailing zeros of a 16-bit value, 16 for 0."""
-    return (v & -v).bit_length() - 1 if v else 16
-
-
 @lru_cache(maxsize=16384)
 def compiled(text: str) -> CodeType:
     """The code of one function's text, shared by all machines of the process."""

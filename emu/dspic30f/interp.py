@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Final
 
 from emu.bus import SFR_END
+from emu.dspic30f import arithmetic
 from emu.dspic30f.data import W_END, DataSpace
 from emu.dspic30f.faults import UninitialisedPointer
 from emu.dspic30f.interrupts import Exceptions
@@ -126,20 +127,10 @@ class Interpreter:
     def select(self, c: Value, a: Value, b: Value) -> Value:
         return a if c else b
 
-    def div_trunc(self, a: Value, b: Value) -> Value:
-        if b == 0:
-            return 0
-        quotient = abs(a) // abs(b)
-        return quotient if (a < 0) == (b < 0) else -quotient
-
-    def rem_trunc(self, a: Value, b: Value) -> Value:
-        return 0 if b == 0 else a - self.div_trunc(a, b) * b
-
-    def clz16(self, v: Value) -> Value:
-        return 16 - int(v).bit_length()
-
-    def ctz16(self, v: Value) -> Value:
-        return (v & -v).bit_length() - 1 if v else 16
+    div_trunc = staticmethod(arithmetic.div_trunc)
+    rem_trunc = staticmethod(arithmetic.rem_trunc)
+    clz16 = staticmethod(arithmetic.clz16)
+    ctz16 = staticmethod(arithmetic.ctz16)
 
     def let(self, v: Value) -> Value:
         return v

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from emu.dspic30f.blocks import LENGTH, Block, BlockWriter, ctz16, div_trunc, make_function, rem_trunc, write_repeat
+from emu.dspic30f.arithmetic import ctz16, div_trunc, rem_trunc
+from emu.dspic30f.blocks import LENGTH, Block, BlockWriter, make_function, write_repeat
 from emu.dspic30f.core import Core
 from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.codec import decode_for_execution
