@@ -19,7 +19,8 @@ COMMANDS: Final = {
     "screenshot": "run a firmware image and write the picture its camera captured",
     "disasm": "print a firmware image as assembly with symbols and source lines",
     "info": "print sections, memory use, vectors and configuration words",
-    "footprint": "print what a firmware image costs in ROM and RAM",
+    "footprint": "print what a firmware image costs in ROM and RAM; fit the kernel's memory equation",
+    "cycles": "measure the kernel's operations in exact cycles; check them against a baseline",
 }
 
 _USAGE: Final = """usage: emu COMMAND [options]

@@ -28,8 +28,6 @@ POLL_SECONDS: Final = 0.1
 """Longest wait without looking for Ctrl-C."""
 FOREVER: Final = 1 << 62
 """Limit in Tcy when there is none: 10,000 years."""
-RESET_LOOP: Final = 16
-"""So many resets without a second of simulated time between first and last are a loop."""
 
 
 class Session:
@@ -91,7 +89,6 @@ class Session:
             self._show_output()
             if stop is not None and stop.reason == "halt":
                 stop = self._outlive(stop)
-            stop = stop or self._reset_loop()
             if stop is not None:
                 return stop
             if machine.cycle >= self.limit:
@@ -174,18 +171,6 @@ class Session:
         enabled = machine.peek(source.enable[0]) >> source.enable[1] & 1
         priority = machine.peek(source.priority[0]) >> source.priority[1] & 7
         return bool(uart.is_enabled and enabled and priority)
-
-    # Health
-
-    def _reset_loop(self) -> Stop | None:
-        """A fault if the firmware does nothing but reset."""
-        resets = self.machine.resets
-        if len(resets) < RESET_LOOP or any(cause in ("POR", "EXTR") for _, cause in resets[-RESET_LOOP:]):
-            return None
-        (first, _), (last, cause) = resets[-RESET_LOOP], resets[-1]
-        if last - first >= self._hz:
-            return None
-        return self.machine.stopped("fault", f"reset loop: {RESET_LOOP} resets ({cause}) in {last - first:,} cycles")
 
 
 def _adapted(cycles: int, seconds: float) -> int:

@@ -4,33 +4,119 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from dataclasses import asdict
+from math import ceil
 from typing import Any
 
 from emu.command import EXIT_OK, CommandError, Parser
+from emu.commands.cycles import add_baseline_arguments, settle
 from emu.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image import Image
 from emu.loader import load_image
+from emu.openswarm.baseline import Number, short
+
+DESCRIPTION = """\
+Print what an image costs in ROM and RAM (bytes; 3 per program word), by part, source file and symbol.
+
+Of the application `footprint` also what threads, events, subscriptions and messages take: it is run with 60 loads, the
+heap is read from the running image, and the memory equation RAM = A + B n + C m + D s + sum (E + d) is fitted."""
 
 
 def parser() -> Parser:
     made = Parser(
         "footprint",
-        "Print what an image costs in ROM and RAM (bytes; 3 per program word), by part, source file and symbol.",
+        DESCRIPTION,
         "emu footprint firmware.elf --symbols 20",
     )
     made.add_argument("image", metavar="IMAGE", help="ELF executable")
     made.add_argument("--symbols", metavar="N", type=int, default=15, help="how many symbols to list (default 15)")
     made.add_argument("--json", action="store_true", help="print one JSON object with every symbol")
+    add_baseline_arguments(made)
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status: 0 printed, 2 bad input."""
+    """Exit status: 0 printed or nothing grew, 1 something grew, 2 bad input."""
     image = load_image(options.image)
     facts = static(image)
-    print(json.dumps(facts, indent=2) if options.json else static_text(facts, options.symbols))
-    return EXIT_OK
+    numbers = {name: Number(facts[key][size]) for name, key, size in _KEPT} | {
+        "ROM": Number(facts["rom"], _places(facts, "rom")),
+        "RAM": Number(facts["ram"], _places(facts, "ram")),
+    }
+    equation = _equation(image)
+    if equation is not None:
+        facts["equation"] = equation
+        numbers |= {f"{name} of the memory equation": Number(ceil(equation[name])) for name in "ABCDE"}
+    if options.json:
+        print(json.dumps(facts, indent=2))
+    elif not options.check:
+        print(static_text(facts, options.symbols))
+        if equation is not None:
+            print("\n" + equation_text(equation))
+    return settle(options, numbers, "bytes") if options.check or options.update else EXIT_OK
+
+
+def _places(facts: dict[str, Any], size: str) -> dict[str, int]:
+    """Bytes by source file, by names that do not depend on where the checkout lies."""
+    return {short(name): sizes[size] for name, sizes in sorted(facts["modules"].items()) if sizes[size]}
+
+
+_KEPT = (
+    ("ROM without vectors, start-up code and printf", "without_start_up_and_printf", "rom"),
+    ("RAM without start-up code and printf", "without_start_up_and_printf", "ram"),
+)
+
+
+def _equation(image: Image) -> dict[str, Any] | None:
+    """The memory equation as plain data, None for an image that is not the measuring application."""
+    from emu.openswarm.memory import APPLICATION, measure
+    from emu.openswarm.target import MeasureError
+
+    if image.symbols.find(APPLICATION) is None:
+        return None
+    try:
+        equation = measure(image)
+    except MeasureError as error:
+        raise CommandError(str(error)) from None
+    return {
+        **{name: float(value) for name, value in equation.coefficients.items()},
+        "constant": equation.constant,
+        "heap_capacity": equation.heap,
+        "largest_residual": float(equation.residual),
+        "cases": [asdict(case) for case in equation.cases],
+    }
+
+
+def equation_text(equation: dict[str, Any]) -> str:
+    """The equation beside the paper's and the original's."""
+    from emu.openswarm.memory import ORIGINAL, PAPER
+
+    ours = {name: equation[name] for name in "ABCDE"}
+    lines = [
+        "RAM = A + B n + C m + D s + sum over pending messages of (E + d), in bytes;"
+        f" exact for all {len(equation['cases'])} loads"
+        if not equation["largest_residual"]
+        else f"RAM = A + B n + ..., largest difference to a measurement {equation['largest_residual']:g} bytes",
+        "n threads (128 bytes of stack), m events, s subscriptions, d bytes of payload, rounded up to words",
+        "",
+        f"{'':24} {'A':>7} {'B':>6} {'C':>6} {'D':>6} {'E':>6}",
+    ]
+    for name, row in (("this kernel", ours), ("paper, Eq. (1)", PAPER), ("original, as measured", ORIGINAL)):
+        cells = " ".join(
+            f"{row[key]:{7 if key == 'A' else 6}g}" if key in row else f"{'-':>{7 if key == 'A' else 6}}"
+            for key in "ABCDE"
+        )
+        lines.append(f"{name:24} {cells}")
+    one_message = ours["C"] + ours["E"]
+    lines += [
+        "",
+        f"with one pending message per event and s = 0: {ours['A']:g} + {ours['B']:g} n + {one_message:g} m + sum d",
+        "A consists of",
+        *(f"  {size:6,} {name}" for name, size in equation["constant"].items()),
+        f"not in A: heap of {equation['heap_capacity']:,} bytes, from which all the rest is taken",
+    ]
+    return "\n".join(lines)
 
 
 def static(image: Image) -> dict[str, Any]:
@@ -76,6 +162,12 @@ def _by_name(found: list[Piece]) -> list[Piece]:
     return sorted(whole, key=lambda piece: (-piece.rom - piece.ram, piece.name))
 
 
+def _near(path: str) -> str:
+    """A path as seen from the current folder, if it lies below it."""
+    near = os.path.relpath(path)
+    return path if near.startswith("..") or not path.startswith("/") else near
+
+
 def static_text(facts: dict[str, Any], symbols: int) -> str:
     """The sizes as lines for people."""
     lines = [f"{facts['path']}: ROM {facts['rom']:,} bytes, RAM {facts['ram']:,} bytes"]
@@ -90,7 +182,7 @@ def static_text(facts: dict[str, Any], symbols: int) -> str:
         lines.append("(no debug information: build with -g for sizes by source file)")
     for title, key in tables:
         lines += ["", f"{title:48} {'ROM':>7} {'RAM':>7}"]
-        lines += [f"{name[-48:]:48} {size['rom']:7,} {size['ram']:7,}" for name, size in facts[key].items()]
+        lines += [f"{_near(name)[-48:]:48} {size['rom']:7,} {size['ram']:7,}" for name, size in facts[key].items()]
     if symbols > 0:
         lines += ["", f"{'symbol':48} {'ROM':>7} {'RAM':>7}"]
         lines += [f"{item['name'][-48:]:48} {item['rom']:7,} {item['ram']:7,}" for item in facts["symbols"][:symbols]]

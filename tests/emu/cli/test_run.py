@@ -83,7 +83,7 @@ def test_a_debugger_word_ends_the_run_with_w0_as_status(build):
         ("main:\nmov [w1], w2\n", "W1 is used as an address pointer before it was written"),
         ("main:\n.pword 0xDB0000\n", "illegal opcode DB0000"),
         ("main:\nbset {IEC0}, #3\nbset {IFS0}, #3\nnop\nnop\nnop\n", "T1Interrupt without a handler"),
-        ("main:\nreset\n", "reset loop: 16 resets (SWR)"),
+        ("main:\nreset\n", "reset loop: RESET instruction"),
     ],
 )
 def test_faults_end_with_status_1_and_name_cause_and_place(build, capfd, source, cause):

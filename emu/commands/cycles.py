@@ -1,0 +1,71 @@
+"""`emu cycles`: exact cycles of the kernel's operations, printed, checked against a baseline, or made one."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.loader import load_image
+from emu.openswarm import baseline
+from emu.openswarm.latency import APPLICATION, run_measures
+from emu.openswarm.target import MeasureError
+
+DESCRIPTION = """\
+Run the scenarios of the `latency` application and print how many cycles the kernel's operations take.
+
+The numbers are exact and repeat exactly, so --check has no tolerance: any increase over the baseline is printed with
+the source lines that grew, and ends with status 1."""
+
+
+def parser() -> Parser:
+    made = Parser("cycles", DESCRIPTION, "emu cycles firmware/build/latency/firmware.elf --check firmware/cycles.json")
+    made.add_argument("image", metavar="IMAGE", help="ELF executable of the application `latency`")
+    made.add_argument("--engine", metavar="NAME", default="interp", help="auto, jit, interp or plain (default interp)")
+    made.add_argument("--json", action="store_true", help="print one JSON object")
+    add_baseline_arguments(made)
+    return made
+
+
+def add_baseline_arguments(parser: Parser) -> None:
+    """--check FILE and --update FILE, as every command with exact numbers has them."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("--check", metavar="FILE", help="compare with a baseline; status 1 if anything grew")
+    group.add_argument("--update", metavar="FILE", help="write the baseline")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status: 0 printed or nothing grew, 1 something grew, 2 bad input."""
+    image = load_image(options.image)
+    if image.symbols.find(APPLICATION) is None:
+        raise CommandError(f"{image.path} is not the application `latency`: it has no symbol {APPLICATION!r}")
+    try:
+        windows = run_measures(image, options.engine)
+    except (MeasureError, ValueError) as error:
+        raise CommandError(str(error)) from None
+    sources = baseline.Sources(image.path)
+    numbers = {name: baseline.Number(w.cycles, sources.names(w.where)) for name, w in windows.items()}
+    if options.json:
+        print(json.dumps({name: number.value for name, number in numbers.items()}, indent=2))
+    return settle(options, numbers, "cycles")
+
+
+def settle(options: argparse.Namespace, numbers: dict[str, baseline.Number], unit: str) -> int:
+    """Check, update or just print, as the options say."""
+    if options.update:
+        baseline.save(options.update, numbers)
+    if options.check:
+        try:
+            rows = baseline.compare(baseline.load(options.check), numbers)
+        except ValueError as error:
+            raise CommandError(str(error)) from None
+        worse = [row for row in rows if row.is_worse]
+        if not options.json:
+            print(baseline.table(rows, unit))
+        if any(row.new is not None and row.old is not None and row.new < row.old for row in rows) and not worse:
+            print(f"some numbers fell: keep them with --update {options.check}")
+        return EXIT_FAULT if worse else EXIT_OK
+    if not options.json:
+        width = max(len(name) for name in numbers)
+        print("\n".join(f"{name:{width}} {number.value:8,} {unit}" for name, number in numbers.items()))
+    return EXIT_OK
