@@ -22,7 +22,8 @@ W15 are named; an annotation file bounds them:
     thread FUNCTION                    FUNCTION is the entry of a thread
 
 or absolute symbols __stack_depth_of_F, __stack_recursion_of_F, __stack_thread_F in the firmware.
-A + behind a number marks a lower bound: something on that path is not known."""
+A + behind a number marks a lower bound: something on that path is not known.  A handler that moves W15 to a stack
+of its own shows how much it leaves on the interrupted one."""
 
 
 def main(arguments: list[str]) -> int:
@@ -61,7 +62,14 @@ def _as_data(report: Report) -> dict[str, list[dict[str, object]]]:
             for u in report.functions
         ],
         "entries": [
-            {"kind": e.kind, "name": e.usage.name, "total": e.total, "path": e.usage.path, "unknown": e.usage.unknown}
+            {
+                "kind": e.kind,
+                "name": e.usage.name,
+                "total": e.total,
+                "before_switch": e.before_switch,
+                "path": e.usage.path,
+                "unknown": e.usage.unknown,
+            }
             for e in report.entries
         ],
     }
@@ -70,9 +78,10 @@ def _as_data(report: Report) -> dict[str, list[dict[str, object]]]:
 def _as_text(report: Report, functions: bool) -> str:
     lines = [f"{'entry':10} {'bytes':>6}  deepest path"]
     for entry in report.entries:
-        lines.append(
-            f"{entry.kind:10} {entry.total:6}{'+' if entry.usage.unknown else ' '} {' > '.join(entry.usage.path)}"
-        )
+        left = entry.before_switch
+        note = f"  [{left} on the interrupted stack, the rest on its own]" if left is not None else ""
+        mark = "+" if entry.usage.unknown else " "
+        lines.append(f"{entry.kind:10} {entry.total:6}{mark} {' > '.join(entry.usage.path)}{note}")
     interrupts = [e for e in report.entries if e.kind == "interrupt"]
     lines.append(f"all interrupts nested once: {sum(map(_total, interrupts))} bytes")
     if functions:

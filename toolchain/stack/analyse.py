@@ -31,6 +31,11 @@ class Entry:
     def total(self) -> int:
         return self.usage.total + self.extra
 
+    @property
+    def before_switch(self) -> int | None:
+        """Bytes on the interrupted stack when the handler moves to a stack of its own, None when it does not."""
+        return None if self.usage.switch is None else self.usage.switch + self.extra
+
 
 @dataclass(slots=True)
 class Report:

@@ -41,6 +41,8 @@ class Pointer(Enum):
     UNLINK = "ULNK: back to the frame"
     FROM_FRAME = "copied from W14"
     FRESH = "loaded with a constant: the start of another stack"
+    SAVED = "copied to another register"
+    RESTORED = "copied from another register"
     UNKNOWN = "set to a value not known here"
 
 
@@ -105,9 +107,10 @@ def _register_effect(insn: Insn) -> tuple[Pointer, int]:
         mode = next((getattr(x, m) for m in modes if m in fields), 0)
         if register in fields and getattr(x, register) == SP and mode:
             delta += _STEP.get(mode, 0) * size
-    if not _writes_sp(insn):
-        return Pointer.MOVED, delta
-    return _arithmetic(insn)
+    if _writes_sp(insn):
+        return _arithmetic(insn)
+    copied = insn.row.mnemonic == "MOV" and "g" in fields and (x.s, x.g, x.h) == (SP, 0, 0)
+    return (Pointer.SAVED if copied else Pointer.MOVED), delta
 
 
 def _writes_sp(insn: Insn) -> bool:
@@ -129,7 +132,7 @@ def _arithmetic(insn: Insn) -> tuple[Pointer, int]:
     step = {"INC": 1, "INC2": 2, "DEC": -1, "DEC2": -2}.get(name)
     if step and x.s == SP and x.p == 0:
         return Pointer.MOVED, step
-    if name == "MOV" and "g" in fields and x.s == FRAME and x.g == 0:
-        return Pointer.FROM_FRAME, 0
+    if name == "MOV" and "g" in fields and x.g == 0 and not x.B:
+        return (Pointer.FROM_FRAME if x.s == FRAME else Pointer.RESTORED), 0
     constant = name == "MOV" and "k" in fields
     return (Pointer.FRESH if constant else Pointer.UNKNOWN), 0

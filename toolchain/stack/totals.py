@@ -23,6 +23,7 @@ class Usage:
     entry: int
     frame: int
     total: int = 0
+    switch: int | None = None  # bytes on the interrupted stack when the function moves to one of its own
     path: list[str] = field(default_factory=list)
     unknown: list[str] = field(default_factory=list)
 
@@ -60,7 +61,7 @@ def totals(program: Program) -> dict[int, Usage]:
 def _outside(program: Program, entry: int, members: set[int], done: dict[int, Usage]) -> Usage:
     """Worst case of one function over calls that leave its component."""
     function, name = program.functions[entry], program.name(entry)
-    result = Usage(name, entry, function.frame, function.frame, [name])
+    result = Usage(name, entry, function.frame, function.frame, function.switch, [name])
     bound = program.annotation(program.annotations.depth, entry)
     if bound is not None:
         result.total = bound

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from toolchain.elf.disassemble import Item
 from toolchain.stack.effects import SP, Effect, Flow, Pointer, effect_of
@@ -23,13 +23,30 @@ class Call:
 
 @dataclass(slots=True)
 class Function:
-    """What a walk found; `frame` is the deepest own use in bytes, without return address and callees."""
+    """What a walk found; `frame` is the deepest own use in bytes, without return address and callees.
+
+    `switch` is the depth at which the function moves to a stack of its own, None when it never does; a path that
+    stays, because the stack pointer is on that stack already, counts in `frame` like any other.
+    """
 
     entry: int
     frame: int = 0
+    switch: int | None = None
     calls: list[Call] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    returns: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """One point of a path: `depth` of the stack in use, `frame` where W14 points, `outer` the depth left behind on the
+    stack that was in use before, `saved` what a copy of W15 in a register is worth: (depth, outer)."""
+
+    pc: int
+    depth: int = 0
+    frame: int | None = None
+    outer: int | None = None
+    saved: tuple[int, int | None] | None = None
+    lost: bool = False  # W15 was replaced by an unknown value: what follows cannot be balanced
 
 
 class Walker:
@@ -41,102 +58,103 @@ class Walker:
     def walk(self, entry: int) -> Function:
         """Return the facts of the function that starts at `entry`."""
         result = Function(entry)
-        seen: dict[int, tuple[int, int | None, int]] = {}
-        work: list[tuple[int, int, int | None]] = [(entry, 0, None)]
+        seen: dict[tuple[int, bool], tuple[int, int]] = {}  # place, switched or not -> deepest yet, visits
+        work = [_State(entry)]
         calls: dict[int, Call] = {}
         while work:
-            pc, depth, frame = work.pop()
-            before = seen.get(pc)
-            if before is not None and before[0] >= depth:
+            state = work.pop()
+            key = (state.pc, state.outer is None)
+            deepest, visits = seen.get(key, (-1 << 16, 0))
+            if deepest >= state.depth:
                 continue
-            visits = before[2] + 1 if before else 1
-            if visits > MAX_VISITS:
-                self._note(result, f"stack grows in a loop at {pc:#x}")
+            if visits >= MAX_VISITS:
+                self._note(result, f"stack grows in a loop at {state.pc:#x}")
                 continue
-            seen[pc] = (depth, frame, visits)
-            item = self.code.get(pc)
-            if item is None or item.insn is None:
-                if item is None:
-                    self._note(result, f"runs out of known code at {pc:#x}")
-                continue
-            work += self._step(result, calls, item, depth, frame)
+            seen[key] = (state.depth, visits + 1)
+            item = self.code.get(state.pc)
+            if item is None:
+                self._note(result, f"runs out of known code at {state.pc:#x}")
+            elif item.insn is not None:
+                work += self._step(result, calls, item, state)
         result.calls = [calls[a] for a in sorted(calls)]
         return result
 
-    def _step(
-        self, result: Function, calls: dict[int, Call], item: Item, depth: int, frame: int | None
-    ) -> list[tuple[int, int, int | None]]:
+    def _step(self, result: Function, calls: dict[int, Call], item: Item, state: _State) -> list[_State]:
         """Apply one instruction; return the states that follow."""
         assert item.insn is not None
         effect = effect_of(item.insn, item.address)
-        after, frame = self._depth(result, item, effect, depth, frame)
-        result.frame = max(result.frame, after)
         following = item.address + 2 * len(item.words)
+        after = replace(self._stack(result, item, effect, state), pc=following)
+        result.frame = max(result.frame, after.depth)
         if item.insn.row.mnemonic == "REPEAT":
-            return [self._repeated(result, item, following, after, frame)]
+            return [self._repeated(result, item, after)]
         match effect.flow:
             case Flow.NEXT:
-                return [(following, after, frame)]
+                return [after]
             case Flow.BRANCH:
-                return [(following, after, frame), (effect.target, after, frame)]
+                return [after, replace(after, pc=effect.target)]
             case Flow.JUMP if effect.target in self.entries and effect.target != result.entry:
-                self._call(calls, item.address, after, effect.target, tail=True)
-                result.returns = True
+                self._call(calls, item.address, after.depth, effect.target, tail=True)
                 return []
             case Flow.JUMP:
-                return [(effect.target, after, frame)]
+                return [replace(after, pc=effect.target)]
             case Flow.CALL | Flow.CALL_POINTER:
-                self._call(calls, item.address, after, effect.target if effect.flow is Flow.CALL else None)
-                return [(following, after, frame)]
+                self._call(calls, item.address, after.depth, effect.target if effect.flow is Flow.CALL else None)
+                return [after]
             case Flow.JUMP_POINTER:
-                self._call(calls, item.address, after, None, tail=True)
+                self._call(calls, item.address, after.depth, None, tail=True)
                 return []
             case Flow.SKIP:
                 skipped = self.code.get(following)
-                behind = following + 2 * len(skipped.words) if skipped else following + 2
-                return [(following, after, frame), (behind, after, frame)]
+                return [after, replace(after, pc=following + 2 * (len(skipped.words) if skipped else 1))]
             case Flow.TABLE:
-                return [(target, after, frame) for target in self._table(result, following)]
-        result.returns = True
-        if after and item.insn.row.mnemonic != "RESET":
-            self._note(result, f"returns at {item.address:#x} with {after} bytes still on the stack")
+                return [replace(after, pc=target) for target in self._table(result, following)]
+        if after.depth and not after.lost and item.insn.row.mnemonic != "RESET":
+            where = f"returns at {item.address:#x} "
+            if not any(note.startswith(where) for note in result.notes):
+                self._note(result, f"{where}with {after.depth} bytes still on the stack")
         return []
 
-    def _depth(
-        self, result: Function, item: Item, effect: Effect, depth: int, frame: int | None
-    ) -> tuple[int, int | None]:
+    def _stack(self, result: Function, item: Item, effect: Effect, state: _State) -> _State:
+        """Return the state with depth, frame and stack after the instruction."""
         match effect.pointer:
             case Pointer.LINK:
-                result.frame = max(result.frame, depth + 2 + effect.delta)
-                return depth + 2 + effect.delta, depth + 2
+                base = state.depth + 2
+                return replace(state, depth=base + effect.delta, frame=base)
+            case Pointer.UNLINK | Pointer.FROM_FRAME if state.frame is not None:
+                if effect.pointer is Pointer.UNLINK:
+                    return replace(state, depth=state.frame - 2, frame=None)
+                return replace(state, depth=state.frame)
             case Pointer.UNLINK | Pointer.FROM_FRAME:
-                if frame is None:
-                    self._note(result, f"W15 restored from an unknown W14 at {item.address:#x}")
-                    return depth, frame
-                return (frame - 2, None) if effect.pointer is Pointer.UNLINK else (frame, frame)
-            case Pointer.FRESH if depth == 0:
-                return 0, frame
-            case Pointer.UNKNOWN | Pointer.FRESH:
+                self._note(result, f"W15 restored from an unknown W14 at {item.address:#x}")
+            case Pointer.SAVED:
+                return replace(state, saved=(state.depth, state.outer))
+            case Pointer.RESTORED if state.saved is not None:
+                return replace(state, depth=state.saved[0], outer=state.saved[1])
+            case Pointer.FRESH if state.outer is None:
+                if state.depth:
+                    result.switch = max(result.switch or 0, state.depth)
+                return replace(state, depth=0, outer=state.depth)
+            case Pointer.UNKNOWN | Pointer.RESTORED | Pointer.FRESH:
                 self._note(result, f"W{SP} is set to an unknown value at {item.address:#x}")
-                return depth, frame
-        return depth + effect.delta, frame
+                return replace(state, lost=True)
+            case Pointer.MOVED:
+                return replace(state, depth=state.depth + effect.delta)
+        return state
 
-    def _repeated(
-        self, result: Function, item: Item, following: int, depth: int, frame: int | None
-    ) -> tuple[int, int, int | None]:
-        """Go on behind a repeated instruction, its effect on the stack counted once per iteration."""
-        target = self.code.get(following)
-        if target is None or target.insn is None or item.insn is None:
-            return following, depth, frame
-        delta = effect_of(target.insn, following).delta
+    def _repeated(self, result: Function, item: Item, state: _State) -> _State:
+        """Go on behind a repeated instruction that moves W15: its effect counts once per iteration."""
+        target = self.code.get(state.pc)
+        assert item.insn is not None
+        delta = effect_of(target.insn, state.pc).delta if target is not None and target.insn is not None else 0
         if not delta:
-            return following, depth, frame
+            return state
         if "k" not in item.insn.row.fields:
             self._note(result, f"repeated push or pop with a count not known at {item.address:#x}")
-            return following, depth, frame
-        total = depth + delta * (item.insn.x.k + 1)
-        result.frame = max(result.frame, total)
-        return following + 2, total, frame
+            return state
+        depth = state.depth + delta * (item.insn.x.k + 1)
+        result.frame = max(result.frame, depth)
+        return replace(state, pc=state.pc + 2, depth=depth)
 
     def _table(self, result: Function, address: int) -> list[int]:
         """Entries of a jump table behind BRA Wn: a run of BRA and RETLW (abi-elf.md §8.1)."""

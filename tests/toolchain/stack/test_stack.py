@@ -153,6 +153,27 @@ def test_unknown_stack_pointers_and_unbalanced_returns_are_named(image):
     assert "grows in a loop" in found["_loop"].unknown[0]
 
 
+def test_a_handler_that_moves_to_its_own_stack_tells_what_it_leaves_behind(image):
+    """Conditional move as in a nestable handler: 4 bytes by hardware, 4 pushed, the rest on the handler's own stack."""
+    text = func(
+        "__T1Interrupt",
+        *["push.d w0", "mov w15, w1", "mov #0x1000, w0", "cpslt w15, w0", "mov #0x900, w15", "push w1", "push.d w2"],
+        *["rcall _deep", "pop.d w2", "pop w0", "mov w0, w15", "pop.d w0", "retfie"],
+    ) + func("_deep", "lnk #50", "ulnk", "return")
+    out = image(".global __reset\n__reset: reset\n" + text)
+    report = Analysis(out.linked.image, Annotations()).report()
+    entry = next(e for e in report.entries if e.usage.name == "__T1Interrupt")
+    assert (entry.before_switch, entry.usage.unknown) == (8, [])
+    assert entry.total == 4 + 4 + 2 + 4 + 4 + 52
+
+
+def test_a_saved_stack_pointer_brings_the_depth_back(image):
+    """Variable length arrays keep the base in a register (abi-elf.md §2.4); what they add is not known."""
+    lines = ["mov w15, w8", "push.d w0", "push.d w2", "mov w8, w15", "return"]
+    found = analyse(image, func("_main", *lines))["_main"]
+    assert (found.frame, found.unknown) == (8, [])
+
+
 @pytest.mark.parametrize(
     ("text", "message"), [("frob x 1\n", "notes:1"), ("\ndepth f x\n", "notes:2"), ("calls\n", "expected")]
 )
