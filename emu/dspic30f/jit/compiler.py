@@ -11,6 +11,7 @@ import selectors
 import struct
 import subprocess
 import sys
+from collections import deque
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -42,6 +43,8 @@ class Compiler:
         self._selector = selectors.DefaultSelector()
         self._received = bytearray()
         self._waiting: dict[int, tuple[str, object]] = {}
+        self._outbox: deque[tuple[int, int, bytes]] = deque()
+        self._in_flight = False
         self._tickets = 0
         self._loader: Any = None
         self._modules = 0
@@ -86,13 +89,21 @@ class Compiler:
     def request(self, text: str, level: int, key: str, tag: object) -> None:
         """Have `text` compiled in the background; `poll` will yield (tag, address)."""
         self.statistics.requested += 1
-        process = self._start()
         self._tickets += 1
         self._waiting[self._tickets] = (key, tag)
-        data = text.encode()
+        self._outbox.append((self._tickets, level, text.encode()))
+        self._send()
+
+    def _send(self) -> None:
+        """Give the idle process its next piece. One at a time: two full pipes would wait for each other."""
+        if self._in_flight or not self._outbox:
+            return
+        process = self._start()
+        ticket, level, data = self._outbox.popleft()
         assert process.stdin is not None
-        process.stdin.write(REQUEST.pack(self._tickets, level, len(data)) + data)
+        process.stdin.write(REQUEST.pack(ticket, level, len(data)) + data)
         process.stdin.flush()
+        self._in_flight = True
 
     def poll(self) -> list[tuple[object, int]]:
         """Code that has arrived since the last call, loaded. Raises Refused on a translator defect."""
@@ -179,6 +190,8 @@ class Compiler:
             return False
         code = bytes(received[REPLY.size : end])
         del received[:end]
+        self._in_flight = False
+        self._send()
         key, tag = self._waiting.pop(ticket)
         self.statistics.compiled += 1
         self.cache.put(key, code)
