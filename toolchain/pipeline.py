@@ -12,7 +12,7 @@ from typing import Protocol
 
 from .ir.model import BlockAddress, ConstAgg, ConstExpr, Function, Module, UnsupportedError, Value
 from .ir.read import read_module
-from .lower import branches, cfg, combine, constants, data, emit, frame, isr, legalize, peephole, regalloc, schedule, select, switch
+from .lower import branches, cfg, combine, constants, data, emit, frame, isr, legalize, peephole, regalloc, schedule, select, switch, tails
 from .lower.debuginfo import DebugInfo
 from .lower.dwarf import DwarfWriter, FunctionInfo
 from .lower.mir import MFunction
@@ -90,6 +90,11 @@ def _schedule(c: Context) -> None:
         schedule.run(c.m)
 
 
+def _tails(c: Context) -> None:
+    if c.options.level == "s":
+        tails.run(c.m)
+
+
 def _allocate(c: Context) -> None:
     c.machine = regalloc.allocate(c.m, c.for_size)
 
@@ -112,6 +117,7 @@ FUNCTION_PASSES = [
     Pass("peephole", lambda c: peephole.run(c.m), ("framed",)),
     Pass("schedule", _schedule, ("framed",)),
     Pass("tail-calls", lambda c: branches.tail_calls(c.m), ("framed",)),
+    Pass("tails", _tails, ("framed",)),
     Pass("branches", lambda c: branches.run(c.m, c.options.level != "0"), ("framed",)),
 ]
 
@@ -227,7 +233,7 @@ class ModuleCompiler:
             for p in FUNCTION_PASSES:
                 p.run(c)
         except UnsupportedError as e:
-            raise UnsupportedError(e.what, e.where or where(self.dwarf.info, f, f.dbg)) from e
+            raise UnsupportedError(e.what, e.where or where(self.dwarf.info, f, e.line)) from e
         self.header(f, interrupt)
         name = symbol(self.module, f.name)
         rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None

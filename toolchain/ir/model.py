@@ -17,6 +17,7 @@ class UnsupportedError(Exception):
         super().__init__(f"{where}: {what}" if where else what)
         self.what = what
         self.where = where
+        self.line: str | None = None  # !dbg reference of the construct, where the raiser knows it
 
 
 # ---------------------------------------------------------------------------------------------------------------------

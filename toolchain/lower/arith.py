@@ -62,7 +62,7 @@ def _file_logic(s: Selector, i: Instr, a: Value, b: ConstInt, d: int, byte: bool
     if near is None:
         return False
     s.load_imm(b.value, 0)
-    s.emit(REGISTER_OP[i.op] + "w", near, 0, byte=byte)
+    s.emit(REGISTER_OP[i.op] + "w", near, 0, byte=byte).volatile = True
     s.copy(0, d)
     return True
 

@@ -19,13 +19,13 @@ def _words(v: Value) -> int:
     return max(1, v.type.bits // 16)
 
 
-def move_in(s: Selector, source: Operand, d: int, byte: bool) -> None:
+def move_in(s: Selector, source: Operand, d: int, byte: bool, volatile: bool = False) -> None:
     """d = memory operand. Near bytes pass through W0 (isa.md §3.3)."""
     if byte and isinstance(source, File):
-        s.emit("mov", source, 0, byte=True)
+        s.emit("mov", source, 0, byte=True).volatile = volatile
         s.emit("mov", 0, d)
     else:
-        s.emit("mov", source, d, byte=byte)
+        s.emit("mov", source, d, byte=byte).volatile = volatile
 
 
 def move_out(s: Selector, r: int, dest: Operand, byte: bool) -> None:
@@ -42,10 +42,10 @@ def select_load(s: Selector, i: Instr) -> None:
     d = s.value_regs(i)
     p, byte = i.args[0], i.type.bits == 8
     if len(d) == 1:
-        move_in(s, s.address(p, byte), d[0], byte)
+        move_in(s, s.address(p, byte), d[0], byte, i.volatile)
         return
     for operand, r in zip(_run(s, p, len(d)), d, strict=True):
-        s.emit("mov", operand, r)
+        s.emit("mov", operand, r).volatile = i.volatile
 
 
 def _run(s: Selector, p: Value, count: int) -> list[Operand]:

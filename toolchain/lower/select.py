@@ -311,7 +311,7 @@ class Selector:
     def source(self, v: Value, user: Instr) -> Operand:
         """Operand for the Ws position of an ALU instruction: a register, or [Wn] when a load folds."""
         load = self.foldable_load(v, user)
-        if load is not None and load.type.bits in (8, 16):
+        if load is not None and load.type.bits in (8, 16) and not load.volatile:
             base, offset = self.decompose(load.args[0])
             plain = not self.is_leaf(base) and offset == 0
             if plain and not (isinstance(base, Instr) and base.op == "add" and self.address_only(base)):
@@ -354,7 +354,11 @@ class Selector:
             for i in reversed(block.instrs):
                 self.out = []
                 self.line = i.line
-                self.instruction(i)
+                try:
+                    self.instruction(i)
+                except UnsupportedError as e:
+                    e.line = i.line
+                    raise
                 if self.out:
                     chunks.append(self.out)
             bodies[block.name] = chunks

@@ -1,0 +1,128 @@
+"""What code comes out: size gates and the idioms the chip is good at."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.toolchain.lower.compiled import assembly, body, words
+
+SAMPLES = """
+int sat(int a,int lo,int hi){ return a<lo?lo:a>hi?hi:a; }
+unsigned crc16(const unsigned char*p,int n){ unsigned c=0xFFFF;int k; while(n--){ c^=*p++;
+  for(k=0;k<8;k++) c=(c&1)?(c>>1)^0xA001:c>>1; } return c; }
+long dot(const int*a,const int*b,int n){ long s=0; while(n--) s+=(long)*a++ * *b++; return s; }
+struct node{struct node*next;int key;char tag;};
+struct node*find(struct node*l,int key){ for(;l;l=l->next) if(l->key==key&&l->tag=='x') return l; return 0; }
+int itoa10(unsigned v,char*out){ char t[6];int n=0,m=0; do{ t[n++]='0'+v%10; v/=10; }while(v);
+  while(n) out[m++]=t[--n]; out[m]=0; return m; }
+"""
+XC16_WORDS = {"sat": 8, "crc16": 19, "dot": 12, "find": 12, "itoa10": 25}  # abi-elf.md §8.2, -Os
+PRIMITIVES = """
+long add32(long a,long b){return a+b;} long neg32(long a){return -a;} long shl1(long a){return a<<1;}
+int lt32(long a,long b){return a<b;} int eq32(long a,long b){return a==b;} long shlv(long a,int n){return a<<n;}
+int mul16(int a,int b){return a*b;} long muls(int a,int b){return (long)a*b;} int div16(int a,int b){return a/b;}
+int mod16(int a,int b){return a%b;} unsigned divu10(unsigned a){return a/10;} long div32(long a,long b){return a/b;}
+long shl4(long a){return a<<4;} long shr8(long a){return a>>8;}
+"""
+XC16_PRIMITIVES = {"add32": 3, "neg32": 3, "shl1": 3, "lt32": 8, "eq32": 8, "shlv": 6, "mul16": 2, "muls": 2, "div16": 4,
+                   "mod16": 5, "divu10": 4, "div32": 2, "shl4": 6, "shr8": 5}  # fmt: skip
+
+
+def test_the_five_sample_functions_are_no_larger_than_xc16s() -> None:
+    """abi-elf.md §8.2: total at most 1.0 x, none above 1.25 x XC16 -Os."""
+    text = assembly(SAMPLES)
+    ours = {name: words(text, name) for name in XC16_WORDS}
+    assert sum(ours.values()) <= sum(XC16_WORDS.values()), ours
+    assert all(ours[n] <= 1.25 * XC16_WORDS[n] for n in ours), ours
+
+
+def test_primitive_functions_are_no_larger_than_xc16s() -> None:
+    """abi-elf.md §8.2, second table."""
+    text = assembly(PRIMITIVES)
+    ours = {name: words(text, name) for name in XC16_PRIMITIVES}
+    assert {n: w for n, w in ours.items() if w > XC16_PRIMITIVES[n]} == {}
+
+
+IDIOMS = [
+    ("one SFR bit is set atomically", "void f(void){ P |= 4; }", ["bset _P,#2", "return"]),
+    ("one SFR bit is cleared atomically", "void f(void){ P &= ~0x8000; }", ["bclr _P,#15", "return"]),
+    ("a near counter is incremented in place", "void f(void){ N++; }", ["inc _N", "return"]),
+    ("a wide near counter carries through memory", "void f(void){ T++; }", ["inc _T", "clr w0", "addc _T+2", "return"]),
+    ("a widening product is one MUL", "long f(int a,int b){ return (long)a*b; }", ["mul.ss w1,w0,w0", "return"]),
+    ("a tail call is a branch", "int g(int); int f(int a){ return g(a+1); }", ["inc w0,w0", "bra _g"]),
+    ("a zero store is CLR", "void f(int *p){ *p = 0; }", ["clr [w0]", "return"]),
+]
+
+
+@pytest.mark.parametrize(("name", "source", "expected"), IDIOMS, ids=[i[0] for i in IDIOMS])
+def test_idiom(name: str, source: str, expected: list[str]) -> None:
+    """abi-elf.md §8.1."""
+    text = assembly("extern volatile unsigned P; unsigned N; unsigned long T; " + source)
+    assert body(text, "f") == expected
+
+
+def test_quotient_and_remainder_share_one_division() -> None:
+    """isa.md §6.7: DIV leaves the quotient in W0 and the remainder in W1."""
+    text = assembly("unsigned f(unsigned a,unsigned b,unsigned*r){ *r=a%b; return a/b; }")
+    assert sum(line.startswith("div.u") for line in body(text, "f")) == 1
+
+
+def test_dense_switches_use_a_branch_table() -> None:
+    """abi-elf.md §8.1: BRA Wn, one word per value."""
+    cases = "".join(f"case {k}: g({k * k}, {k} + h()); break;" for k in range(12))
+    lines = body(assembly(f"void g(int,int); int h(void); void f(int x){{ switch(x){{ {cases} }} }}"), "f")
+    at = lines.index("bra w0")
+    assert all(line.startswith("bra .L") for line in lines[at + 1 : at + 13])
+
+
+def test_block_copies_repeat_a_move() -> None:
+    """isa.md §15: REPEAT #n-1; MOV [Ws++],[Wd++]."""
+    lines = body(assembly("struct s{int a[9];}; void f(struct s*a,struct s*b){ *a=*b; }"), "f")
+    assert lines == ["repeat #8", "mov [w1++],[w0++]", "return"]
+
+
+def test_the_compiler_never_emits_do() -> None:
+    """abi-elf.md §2.1: the kernel need not save the DO registers."""
+    assert not any(line.startswith("do ") for line in assembly(SAMPLES, "2").replace("\t", "").split("\n"))
+
+
+def test_volatile_accesses_are_neither_merged_nor_dropped() -> None:
+    """C11 5.1.2.3p6."""
+    lines = body(assembly("extern volatile unsigned P; void f(void){ P; P; P=1; P=1; }"), "f")
+    assert sum("_P" in line for line in lines) == 4
+
+
+def test_a_minimal_interrupt_function_saves_nothing() -> None:
+    """abi-elf.md §2.5: a minimal handler is 2 words."""
+    source = '#include <dspic30f6014a.h>\nunsigned N; OS_ISR(_T1Interrupt) { N++; }'
+    assert body(assembly(source), "_T1Interrupt") == ["inc _N", "retfie"]
+
+
+def test_an_interrupt_function_with_a_call_saves_all_scratch_registers() -> None:
+    """abi-elf.md §2.5, rules 2 and 3."""
+    source = '#include <dspic30f6014a.h>\nvoid g(void); OS_ISR(_T1Interrupt) { g(); }'
+    lines = body(assembly(source), "_T1Interrupt")
+    assert lines[:5] == ["push _RCOUNT", *(f"mov.d w{r},[w15++]" for r in (0, 2, 4, 6))]
+    assert lines[-6:] == [*(f"mov.d [--w15],w{r}" for r in (6, 4, 2, 0)), "pop _RCOUNT", "retfie"]
+
+
+def test_stack_check_probes_only_frames_above_eight_bytes() -> None:
+    """kernel.md §4: a read through W15 above SPLIM traps at entry."""
+    small = assembly("void g(char*); void f(void){ char b[4]; g(b); }", stack_check=True)
+    large = assembly("void g(char*); void f(void){ char b[20]; g(b); }", stack_check=True)
+    assert "cp0 [w15]" not in body(small, "f")
+    assert body(large, "f")[1] == "cp0 [w15]"
+
+
+def test_every_function_and_object_has_a_section_of_its_own() -> None:
+    """The linker's --gc-sections works on sections."""
+    text = assembly("int a; int b=1; const int c=2; int f(void){return a+b;} int g(void){return c;}")
+    for section in (".text._f,code", ".text._g,code", ".nbss._a,bss,near", ".ndata._b,data,near", ".const._c,psv,page"):
+        assert f"\t.section {section}\n" in text
+
+
+def test_function_pointers_are_handles() -> None:
+    """abi-elf.md §1.5."""
+    text = assembly("int g(void); int (*p)(void)=g; int (*f(void))(void){ return g; }")
+    assert ".word handle(_g)" in text
+    assert body(text, "f") == ["mov #handle(_g),w0", "return"]

@@ -1,0 +1,70 @@
+"""Passes keep the IR well formed, and their order is checked."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.toolchain.lower.compiled import llvm
+from toolchain.ir.read import read_module
+from toolchain.ir.spec import check
+from toolchain.lower import cfg, combine, legalize, switch
+from toolchain.pipeline import FUNCTION_PASSES, Options, Pass, check_order, compile_module
+
+SOURCE = """
+struct bits { unsigned a:3; int b:5; long long q:40; } s;
+double scale(double x, int n) { while (n--) x *= 2.5; return x < 3.0 || x != x ? x : (float)n; }
+int classify(long k, int *p) {
+  switch (k) { case 1: return 5; case 2: return 7; case 3: return 9; case 100000: return *p; }
+  for (int i = 0; i < 10 && p[i] != 3; i++) if (p[i] > 4 || p[i] % 3 == 1) s.q += i;
+  return s.b;
+}
+int wide(unsigned long long a, long b) { return __builtin_clzll(a) + (a >> (b & 63)) + __builtin_popcountl(b); }
+int vla(int n) { char buf[n]; for (int i = 0; i < n; i++) buf[i] = i; return buf[n / 2]; }
+"""
+
+
+@pytest.mark.parametrize("level", ["0", "1", "s", "2"])
+def test_every_ir_pass_leaves_well_formed_legal_functions(level: str) -> None:
+    """style.md §2: a function is checked between passes."""
+    module = read_module(llvm(SOURCE, level))
+    for f in module.functions.values():
+        if not f.blocks:
+            continue
+        assert check(f) == []
+        cfg.remove_unreachable(f)
+        legalize.legalize(module, f, str)
+        for step in (
+            cfg.remove_unreachable,
+            cfg.dead_code,
+            combine.combine,
+            cfg.split_logical_branches,
+            cfg.sink_compares,
+            lambda g: switch.lower_switches(g, True),
+            cfg.split_critical_edges,
+        ):
+            step(f)
+            assert check(f, legal=True) == []
+
+
+@pytest.mark.parametrize("level", ["0", "1", "s", "2"])
+def test_output_is_the_same_every_time(level: str) -> None:
+    """Same input, same bytes."""
+    text = llvm(SOURCE, level)
+    assert compile_module(text, Options(level)) == compile_module(text, Options(level))
+
+
+def test_no_virtual_register_reaches_the_assembly() -> None:
+    """Every register in the text is W0-W15."""
+    import re
+
+    text = compile_module(llvm(SOURCE), Options())
+    assert all(int(n) <= 15 for n in re.findall(r"\bw(\d+)\b", text))
+
+
+def test_a_pass_before_what_it_needs_is_refused() -> None:
+    """The pass list states its constraints and they are verified at start-up."""
+    check_order(FUNCTION_PASSES)
+    with pytest.raises(AssertionError, match="select"):
+        check_order([p for p in FUNCTION_PASSES if p.name != "critical-edges"])
+    with pytest.raises(AssertionError, match="odd"):
+        check_order([Pass("odd", lambda c: None, ("nothing gives this",))])

@@ -1,0 +1,29 @@
+"""What the back end cannot do is an error that names the construct and its place, never wrong code."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.toolchain.lower.compiled import assembly
+from toolchain.ir.model import UnsupportedError
+
+CASES = [
+    ("int f(int a){\n int r; __asm__(\"mov %1,%0\" : \"=a\"(r) : \"r\"(a)); return r; }", "constraint", 2),
+    ("void (__builtin_disi)(unsigned); void f(unsigned n){\n (__builtin_disi)(n); }", "__builtin_disi", 2),
+    ("void __builtin_frobnicate(void); void f(void){\n __builtin_frobnicate(); }", "__builtin_frobnicate", 2),
+]
+
+
+@pytest.mark.parametrize(("source", "what", "line"), CASES)
+def test_unsupported_constructs_name_themselves_and_their_line(source: str, what: str, line: int) -> None:
+    """design §5."""
+    with pytest.raises(UnsupportedError) as caught:
+        assembly(source, debug=True)
+    assert what in str(caught.value)
+    assert str(caught.value).split(": ")[0].endswith(f"unit.c:{line}")
+
+
+def test_without_debug_information_the_function_is_named() -> None:
+    """A place is better than none."""
+    with pytest.raises(UnsupportedError, match="in function 'f'"):
+        assembly(CASES[0][0])

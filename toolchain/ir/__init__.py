@@ -1,0 +1,1 @@
+"""LLVM IR as Python objects: reader, model, dump, rules of well-formedness."""

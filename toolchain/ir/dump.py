@@ -1,0 +1,195 @@
+"""Function -> text. Raw IR comes out as LLVM IR that `read` accepts again; legal IR as the same with its own operations."""
+
+from __future__ import annotations
+
+import struct
+
+from .model import (
+    Arg,
+    BlockAddress,
+    ConstAgg,
+    ConstBytes,
+    ConstExpr,
+    ConstInt,
+    ConstZero,
+    Function,
+    GlobalRef,
+    InlineAsm,
+    Instr,
+    MetaRef,
+    Undef,
+    Value,
+)
+
+
+def quoted(name: str) -> str:
+    """Identifier after % or @, in quotes where it needs them."""
+    plain = all(ch.isalnum() or ch in "-._$" for ch in name)
+    return name if plain and name else '"' + name.replace("\\", "\\5C").replace('"', "\\22") + '"'
+
+
+class Dumper:
+    """Text of one function; unnamed values get numbers of their own."""
+
+    def __init__(self, f: Function) -> None:
+        self.f = f
+        self.names: dict[int, str] = {id(a): f"%{quoted(a.name)}" for a in f.args}
+        serial = 0
+        for b in f.blocks:
+            for i in b.instrs:
+                if i.name:
+                    self.names[id(i)] = f"%{quoted(i.name)}"
+                elif i.type.kind != "void":
+                    self.names[id(i)] = f"%t.{serial}"
+                    serial += 1
+
+    def text(self) -> str:
+        """The whole definition."""
+        f = self.f
+        params = ", ".join(f"{a.type} {self.names[id(a)]}" for a in f.args)
+        dots = ", ..." if f.vararg and f.args else "..." if f.vararg else ""
+        lines = [f"define {f.ret} @{quoted(f.name)}({params}{dots}) {{"]
+        for b in f.blocks:
+            lines.append(f"{quoted(b.name)}:")
+            lines += ["  " + self.instruction(i) for i in b.instrs]
+        return "\n".join([*lines, "}"])
+
+    def value(self, v: Value) -> str:
+        """Operand without its type."""
+        match v:
+            case Instr() | Arg():
+                return self.names.get(id(v), "%?")
+            case ConstInt():
+                return self._number(v)
+            case Undef():
+                return "undef"
+            case ConstZero():
+                return "zeroinitializer"
+            case GlobalRef(offset=0):
+                return f"@{quoted(v.name)}"
+            case GlobalRef():
+                return f"getelementptr (i8, ptr @{quoted(v.name)}, i16 {v.offset})"
+            case BlockAddress():
+                return f"blockaddress(@{quoted(v.function)}, %{quoted(v.block)})"
+            case ConstAgg():
+                inner = ", ".join(self.typed(e) for e in v.elems)
+                return f"[{inner}]" if v.type.kind == "array" else f"{{ {inner} }}"
+            case ConstBytes():
+                return 'c"' + "".join(f"\\{byte:02X}" for byte in v.data) + '"'
+            case InlineAsm():
+                effect = "sideeffect " if v.sideeffect else ""
+                return f'asm {effect}"{_escaped(v.text)}", "{_escaped(v.constraints)}"'
+            case MetaRef():
+                return v.ref
+            case ConstExpr(args=[a]):
+                return f"{v.op} ({self.typed(a)} to {v.type})"
+            case ConstExpr():
+                return f"{v.op} ({', '.join(self.typed(a) for a in v.args)})"
+        return "?"
+
+    def _number(self, v: ConstInt) -> str:
+        if v.type.kind == "ptr":
+            return "null" if v.value == 0 else f"inttoptr (i16 {v.value} to ptr)"
+        if v.type.kind == "float":
+            return f"0x{_as_double(v):016X}"
+        return ("true" if v.value else "false") if v.type.bits == 1 else str(v.signed)
+
+    def typed(self, v: Value) -> str:
+        """Operand with its type."""
+        return f"{v.type} {self.value(v)}"
+
+    def instruction(self, i: Instr) -> str:
+        """One line."""
+        left = f"{self.names[id(i)]} = " if id(i) in self.names else ""
+        return left + self._body(i)
+
+    def _body(self, i: Instr) -> str:
+        volatile = "volatile " if i.volatile else ""
+        align = f", align {i.extra['align']}" if "align" in i.extra else ""
+        args = i.args
+        match i.op:
+            case "ret":
+                return f"ret {self.typed(args[0])}" if args else "ret void"
+            case "br" if not args:
+                return f"br label %{quoted(i.blocks[0])}"
+            case "br":
+                return f"br {self.typed(args[0])}, label %{quoted(i.blocks[0])}, label %{quoted(i.blocks[1])}"
+            case "switch":
+                return self._switch(i)
+            case "indirectbr":
+                return f"indirectbr {self.typed(args[0])}, [{', '.join(f'label %{quoted(b)}' for b in i.blocks)}]"
+            case "phi":
+                pairs = zip(args, i.blocks, strict=True)
+                return f"phi {i.type} " + ", ".join(f"[ {self.value(a)}, %{quoted(b)} ]" for a, b in pairs)
+            case "icmp" | "fcmp":
+                return f"{i.op} {i.pred} {self.typed(args[0])}, {self.value(args[1])}"
+            case "load":
+                return f"load {volatile}{i.type}, {self.typed(args[0])}{align}"
+            case "store":
+                return f"store {volatile}{self.typed(args[0])}, {self.typed(args[1])}{align}"
+            case "alloca":
+                count = f", {self.typed(args[0])}" if args else ""
+                return f"alloca {i.extra['type']}{count}{align}"
+            case "getelementptr":
+                return f"getelementptr {i.extra['type']}, " + ", ".join(self.typed(a) for a in args)
+            case "call":
+                return self._call(i)
+            case "extractvalue" | "insertvalue":
+                indices = i.extra["indices"]
+                assert isinstance(indices, list)
+                return f"{i.op} " + ", ".join([*(self.typed(a) for a in args), *map(str, indices)])
+            case "zext" | "sext" | "trunc" | "bitcast" | "ptrtoint" | "inttoptr" | "fptosi" | "fptoui" | "sitofp" | "uitofp":
+                return f"{i.op} {self.typed(args[0])} to {i.type}"
+            case "fpext" | "fptrunc":
+                return f"{i.op} {self.typed(args[0])} to {i.type}"
+            case "freeze" | "fneg":
+                return f"{i.op} {self.typed(args[0])}"
+            case "select":
+                return "select " + ", ".join(self.typed(a) for a in args)
+            case "va_arg":
+                return f"va_arg {self.typed(args[0])}, {i.type}"
+            case "atomicrmw":
+                return f"atomicrmw {volatile}{i.extra['kind']} {self.typed(args[0])}, {self.typed(args[1])} seq_cst"
+            case "cmpxchg":
+                return f"cmpxchg {volatile}" + ", ".join(self.typed(a) for a in args) + " seq_cst seq_cst"
+            case "unreachable" | "fence":
+                return i.op + (f" {i.extra['ordering']}" if "ordering" in i.extra else "")
+        if len(args) == 2 and args[0].type == i.type:
+            return f"{i.op} {self.typed(args[0])}, {self.value(args[1])}"
+        extras = ", ".join(f"{k}={v}" for k, v in i.extra.items())
+        return f"{i.op} {i.type} " + ", ".join(self.typed(a) for a in args) + (f" ; {extras}" if extras else "")
+
+    def _switch(self, i: Instr) -> str:
+        cases = i.extra["cases"]
+        assert isinstance(cases, list)
+        t = i.args[0].type
+        rows = " ".join(f"{t} {k}, label %{quoted(b)}" for k, b in zip(cases, i.blocks[1:], strict=True))
+        return f"switch {self.typed(i.args[0])}, label %{quoted(i.blocks[0])} [ {rows} ]"
+
+    def _call(self, i: Instr) -> str:
+        attrs = i.extra.get("attrs")
+        words = []
+        for k, a in enumerate(i.args[:-1]):
+            given = attrs[k] if isinstance(attrs, list) else {}
+            text = "".join(f" {n}({v})" for n, v in given.items() if n in ("byval", "sret"))
+            text += f" align {given['align']}" if "align" in given else ""
+            words.append(f"{a.type}{text} {self.value(a)}")
+        dots = f" ({', '.join(str(a.type) for a in i.args[:-1])}, ...)" if i.extra.get("vararg") else ""
+        return f"call {i.type}{dots} {self.value(i.args[-1])}({', '.join(words)})"
+
+
+def _escaped(text: str) -> str:
+    return "".join(ch if ch.isprintable() and ch not in '"\\' else f"\\{ord(ch):02X}" for ch in text)
+
+
+def _as_double(v: ConstInt) -> int:
+    """LLVM prints every float as the double of equal value."""
+    if v.type.bits == 64:
+        return v.value
+    number = struct.unpack("<f", v.value.to_bytes(4, "little"))[0]
+    return int.from_bytes(struct.pack("<d", number), "little")
+
+
+def dump(f: Function) -> str:
+    """Text of one function."""
+    return Dumper(f).text()

@@ -1,0 +1,1 @@
+"""Back end: legal IR, selection, register allocation, frames, text. The order of passes is in `toolchain.pipeline`."""
