@@ -1,0 +1,60 @@
+"""Builds firmware for the tests, each image once per run, in a temporary folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = ROOT / "firmware"
+TARGET_APPS = Path(__file__).parent / "target"
+
+Build = Callable[..., Path]
+
+
+def run_make(folder: Path, *words: str) -> None:
+    """One `make`; fails the test with the compiler's words."""
+    command = ["make", "-s", "-C", str(folder), *words]
+    environment = {**os.environ, "MAKEFLAGS": ""}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="session")
+def image(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """`image("listing1")` builds an application for the e-puck; `apps=` names another folder of applications."""
+    built: dict[tuple[str, ...], Path] = {}
+
+    def build(app: str, apps: Path | None = None, *words: str) -> Path:
+        key = (app, *words)
+        if key not in built:
+            out = tmp_path_factory.mktemp(app)
+            folder = [f"APPS={os.path.relpath(apps, FIRMWARE)}"] if apps else []
+            run_make(FIRMWARE, f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *folder, *words)
+            built[key] = out / "firmware.elf"
+        return built[key]
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def host_program(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The host test program of a port: kernel_tests for posix, conformance for others."""
+    built: dict[str, Path] = {}
+
+    def build(port: str) -> Path:
+        if shutil.which("gcc") is None:
+            pytest.skip("the host tests of the kernel are built with gcc, which is not installed")
+        if port not in built:
+            out = tmp_path_factory.mktemp(port)
+            run_make(Path(__file__).parent / "host", "-j2", f"PORT={port}", f"OUT={out}")
+            built[port] = out / ("kernel_tests" if port == "posix" else "conformance")
+        return built[port]
+
+    return build

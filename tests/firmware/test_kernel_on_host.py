@@ -1,0 +1,26 @@
+"""The portable kernel on the POSIX port, under address and undefined-behaviour sanitizers: every TEST of host/*.c."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+HOST = Path(__file__).parent / "host"
+TESTS = [name for file in sorted(HOST.glob("*.c")) for name in re.findall(r"^TEST\((\w+),", file.read_text(), re.M)]
+
+
+@pytest.mark.parametrize("name", TESTS)
+def test_the_kernel_on_posix(host_program: Callable[[str], Path], name: str) -> None:
+    """kernel.md §2; openswarm-original.md §7; the statement beside each TEST."""
+    done = subprocess.run([host_program("posix"), name], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_template_port_conforms(host_program: Callable[[str], Path]) -> None:
+    """docs/porting.md: the template compiles as it stands and passes the conformance suite."""
+    done = subprocess.run([host_program("template")], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (0, "conforms\n"), done.stdout + done.stderr

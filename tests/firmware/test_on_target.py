@@ -1,0 +1,252 @@
+"""The kernel on the emulated dsPIC30F6014A: time, preemption at every instruction, registers, stack limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import emu
+from emu import Machine
+from tests.firmware.conftest import TARGET_APPS, Build
+
+FCY = 14_745_600
+ENGINE = "interp"
+
+
+def load(path: Path, ipl_slip: int = 0) -> Machine:
+    return emu.load(path, engine=ENGINE, ipl_slip=ipl_slip)
+
+
+def place(machine: Machine, symbol: str) -> int:
+    """Program address of a C function or assembly label."""
+    assert machine.image is not None
+    found = machine.image.symbols.find("_" + symbol) or machine.image.symbols.find(symbol)
+    assert found is not None, symbol
+    return found.address
+
+
+def run_to(machine: Machine, symbol: str, cycles: int = 10 * FCY) -> None:
+    stop = machine.run(cycles=cycles, until=place(machine, symbol))
+    assert stop.reason == "until", stop
+
+
+def words(machine: Machine, name: str, count: int) -> list[int]:
+    at = machine.address_of(name)
+    return [machine.peek(at + 2 * i) for i in range(count)]
+
+
+# ---- Listing 1 ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def listing1(image: Build) -> tuple[bytes, list[int], list[int]]:
+    """What UART1 said in 2.1 s, the cycles of the log thread's wake-ups, and of the first bit of each line."""
+    machine = load(image("listing1"))
+    said = bytearray()
+    wakes: list[int] = []
+    starts: list[int] = []
+
+    def on_byte(byte: int, cycle: int) -> None:
+        if not said or said[-1] == 0x0A:
+            starts.append(cycle)
+        said.append(byte)
+
+    machine.uart[1].on_byte = on_byte
+    machine.hook_pc(place(machine, "snprintf"), lambda *_: wakes.append(machine.cycle))
+    machine.run(cycles=21 * FCY // 10)
+    return bytes(said), wakes, starts
+
+
+def test_listing1_logs_every_250_ms(listing1: tuple[bytes, list[int], list[int]]) -> None:
+    """Paper, Listing 1: time:(left,right)."""
+    said, _, _ = listing1
+    assert said.decode() == "".join(f"{250 * i}:(0,0)\r\n" for i in range(1, 9))
+
+
+def test_wake_ups_are_exactly_3686400_cycles_apart(listing1: tuple[bytes, list[int], list[int]]) -> None:
+    """Issue 4, Must show 1: 250 ms are 3,686,400 Tcy, and start bits differ by no more than the formatting does."""
+    _, wakes, starts = listing1
+    assert [b - a for a, b in zip(wakes, wakes[1:], strict=False)] == [3_686_400] * (len(wakes) - 1)
+    bit = 128  # Tcy at 115,200 baud: a byte leaves at the next edge of the free-running baud clock
+    assert all(abs(b - a - 3_686_400) <= 1000 + bit for a, b in zip(starts, starts[1:], strict=False))
+
+
+def test_the_clock_does_not_drift(image: Build) -> None:
+    """kernel.md §3: every five 1 ms events are exactly 73,728 Tcy, so 3,600,000 are 53,084,160,000."""
+    machine = load(image("listing1"))
+    ticks: list[int] = []
+    machine.hook_pc(place(machine, "_T1Interrupt"), lambda *_: ticks.append(machine.cycle))
+    machine.run(cycles=FCY // 4)
+    assert len(ticks) > 200
+    fives = [b - a for a, b in zip(ticks[::5], ticks[5::5], strict=False)]
+    jitter = max(fives) - min(fives)
+    assert jitter <= 8, "interrupt latency varies by a few cycles, the period does not"
+    assert abs(sum(fives) - 73_728 * len(fives)) <= 8
+
+
+# ---- Registers ----------------------------------------------------------------------------------------------------
+
+
+def test_registers_survive_preemption_under_a_storm(image: Build) -> None:
+    """kernel.md §4: all W, flags, RCOUNT, TBLPAG; with SYS_DSP accumulators, CORCON and nested DO loops. Bug 7 of
+    openswarm-original.md §7: saved registers were overwritten by an interrupt; bug 23: half-saved accumulators."""
+    machine = load(image("registers", TARGET_APPS))
+    machine.run(cycles=200_000)
+    machine.write("PR2", 60)  # slices of 488 Tcy instead of 147,456
+    switches = 0
+
+    def count(*_: object) -> None:
+        nonlocal switches
+        switches += 1
+
+    machine.hook_pc(place(machine, "_T2Interrupt"), count)
+    machine.run(cycles=6_000_000)
+    assert machine.peek("broken") == 0
+    assert switches > 5_000
+    assert all(words(machine, "checked", 4))
+    assert machine.peek("stormed") > 3_000
+    assert machine.peek("stormed") - machine.peek("handled") <= 1
+
+
+# ---- Stack limits -------------------------------------------------------------------------------------------------
+
+KINDS = ["push", "call chain", "large frame", "variadic call", "kernel call without room", "interrupt frame"]
+
+
+@pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
+def test_a_stack_overflow_ends_only_the_offender(image: Build, kind: int) -> None:
+    """Issue 4, Must show 6; kernel.md §4; bug 21 of openswarm-original.md §7."""
+    machine = load(image("overflow", TARGET_APPS))
+    run_to(machine, "begin")
+    machine.poke("kind", kind)
+    said = bytearray()
+    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    stop = machine.run(cycles=FCY // 20)
+    assert stop.reason == "limit", stop
+    culprit = machine.peek("culprit_pid")
+    assert machine.peek("ended") == culprit
+    assert said.decode() == f"stack overflow: thread {culprit} ended\r\n"
+    rounds = words(machine, "rounds", 2)
+    machine.run(cycles=FCY // 50)
+    assert all(now > before for now, before in zip(words(machine, "rounds", 2), rounds, strict=True))
+    assert machine.peek("LATD") & 0xFF == 0, "the motors stop"
+
+
+def test_a_trap_stops_the_motors_and_reports(image: Build) -> None:
+    """Issue 4: traps stop the motors, then report cause, PC and thread over UART1."""
+    machine = load(image("overflow", TARGET_APPS))
+    run_to(machine, "begin")
+    machine.poke("kind", len(KINDS))
+    machine.run(cycles=FCY // 50)
+    assert machine.peek("LATD") & 0xFF != 0
+    said = bytearray()
+    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    machine.pc = 0x018000  # unimplemented program memory (isa.md §14.4)
+    machine.run(cycles=FCY // 10)
+    assert machine.peek("LATD") & 0xFF == 0
+    assert b"stopped: address error at 0x" in said and b" in thread " in said
+
+
+# ---- Every instruction ----------------------------------------------------------------------------------------------
+
+T2IF, T3IF, INT1IF = 1 << 6, 1 << 7, 1 << 0
+
+
+def start_of_scenario(path: Path, ipl_slip: int) -> Machine:
+    """The points firmware when its second round begins."""
+    machine = load(path, ipl_slip)
+    run_to(machine, "scenario_begin")
+    machine.step()
+    run_to(machine, "scenario_begin")
+    for counter in ("heard", "sent", "woken", "isr_sent", "failures", "checked"):
+        machine.poke(counter, 0)
+    return machine
+
+
+def thread_list(machine: Machine) -> list[int]:
+    """PCBs on the ring and the blocked list; fails when either is malformed."""
+    ring, seen = machine.peek("os_ring"), []
+    at = ring
+    while at and (not seen or at != ring):
+        seen.append(at)
+        at = machine.peek(at + 14)
+        assert len(seen) < 20
+    at = machine.peek("os_blocked")
+    while at:
+        seen.append(at)
+        at = machine.peek(at + 14)
+        assert len(seen) < 20
+    assert len(seen) == len(set(seen))
+    return seen
+
+
+def check_round(machine: Machine, sends: int) -> None:
+    """After scenario_end: nothing lost, nothing doubled, nothing leaked."""
+    assert machine.peek("broken") == 0
+    assert machine.peek("failures") == 0
+    assert machine.peek("woken") == 1
+    assert machine.peek("sent") == 2
+    assert machine.peek("isr_sent") == sends
+    assert machine.peek("heard") == 2 + sends
+    assert machine.peek("heap_after") == machine.peek("heap_before")
+    assert len(thread_list(machine)) == 3  # system, checker, driver
+
+
+def interrupt_every_boundary(machine: Machine, stride: int, phase: int) -> int:
+    """From scenario_begin: at every stride-th instruction boundary, tick, stepper and a device that sends arrive
+    together; the round must end as if they had not. Returns the number of boundaries tried."""
+    end = place(machine, "scenario_end")
+    boundary = tried = 0
+    while machine.pc != end:
+        if boundary % stride == phase:
+            here = machine.snapshot()
+            machine.poke("IFS0", machine.peek("IFS0") | T2IF | T3IF)
+            machine.write("IFS1", machine.peek("IFS1") | INT1IF)
+            run_to(machine, "scenario_end")
+            check_round(machine, 1)
+            machine.restore(here)
+            tried += 1
+        machine.step()
+        boundary += 1
+    check_round(machine, 0)
+    return tried
+
+
+@pytest.mark.parametrize("ipl_slip", [0, 1])
+def test_interrupts_at_every_instruction_change_nothing(image: Build, ipl_slip: int) -> None:
+    """Issue 4, Must show 3: tick, a device that sends, and the stepper, together at instruction boundaries of a round
+    of kernel calls (here every 17th; tests/fuzz/fuzz_kernel.py tries all); kernel.md §4 `--ipl-slip`. Bugs 7, 12, 13
+    of openswarm-original.md §7."""
+    machine = start_of_scenario(image("points", TARGET_APPS), ipl_slip)
+    assert interrupt_every_boundary(machine, 17, 8 * ipl_slip) > 100
+
+
+def test_a_thread_keeps_64_of_its_128_bytes(image: Build) -> None:
+    """Issue 4, Must show 3: what interrupts and the kernel may take, found by painting under nested interrupts."""
+    machine = load(image("points", TARGET_APPS))
+    run_to(machine, "scenario_begin")
+    begin = machine.cycle
+    nested = 0
+    spot = place(machine, "pattern_checker")
+
+    def storm(*_: object) -> None:
+        nonlocal nested
+        nested += 1
+        machine.poke("IFS0", machine.peek("IFS0") | T2IF | T3IF)
+        machine.write("IFS1", machine.peek("IFS1") | INT1IF)
+
+    for offset in range(0, 60, 6):
+        machine.hook_pc(spot + offset, storm)
+    machine.run(cycles=400_000)
+    assert nested > 100 and machine.cycle > begin
+    pid = machine.peek("checker_pid")
+    pcb = next(p for p in thread_list(machine) if machine.peek(p + 16) == pid)
+    block = machine.peek(pcb + 10)
+    stack = [machine.peek(a) for a in range(block, pcb - 12, 2)]
+    unused = 0
+    while stack and stack[-1] == 0xA5A5:
+        stack.pop()
+        unused += 2
+    assert unused >= 64, "the checker itself uses four bytes and a call"
