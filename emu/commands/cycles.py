@@ -45,27 +45,25 @@ def run(options: argparse.Namespace) -> int:
         raise CommandError(str(error)) from None
     sources = baseline.Sources(image.path)
     numbers = {name: baseline.Number(w.cycles, sources.names(w.where)) for name, w in windows.items()}
-    if options.json:
-        print(json.dumps({name: number.value for name, number in numbers.items()}, indent=2))
-    return settle(options, numbers, "cycles")
-
-
-def settle(options: argparse.Namespace, numbers: dict[str, baseline.Number], unit: str) -> int:
-    """Check, update or just print, as the options say."""
     if options.update:
         baseline.save(options.update, numbers)
-    if options.check:
-        try:
-            rows = baseline.compare(baseline.load(options.check), numbers)
-        except ValueError as error:
-            raise CommandError(str(error)) from None
-        worse = [row for row in rows if row.is_worse]
-        if not options.json:
-            print(baseline.table(rows, unit))
-        if any(row.new is not None and row.old is not None and row.new < row.old for row in rows) and not worse:
-            print(f"some numbers fell: keep them with --update {options.check}")
-        return EXIT_FAULT if worse else EXIT_OK
-    if not options.json:
+    if options.json:
+        print(json.dumps({name: number.value for name, number in numbers.items()}, indent=2))
+    elif not options.check:
         width = max(len(name) for name in numbers)
-        print("\n".join(f"{name:{width}} {number.value:8,} {unit}" for name, number in numbers.items()))
-    return EXIT_OK
+        print("\n".join(f"{name:{width}} {number.value:8,} cycles" for name, number in numbers.items()))
+    return verdict(options, numbers, "cycles") if options.check else EXIT_OK
+
+
+def verdict(options: argparse.Namespace, numbers: dict[str, baseline.Number], unit: str) -> int:
+    """Print the comparison --check asks for; status 1 if something grew."""
+    try:
+        rows = baseline.compare(baseline.load(options.check), numbers)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+    worse = any(row.is_worse for row in rows)
+    if not options.json:
+        print(baseline.table(rows, unit))
+        if not worse and any(row.old is None or row.new != row.old for row in rows):
+            print(f"nothing grew; keep the new numbers with --update {options.check}")
+    return EXIT_FAULT if worse else EXIT_OK

@@ -10,11 +10,11 @@ from math import ceil
 from typing import Any
 
 from emu.command import EXIT_OK, CommandError, Parser
-from emu.commands.cycles import add_baseline_arguments, settle
+from emu.commands.cycles import add_baseline_arguments, verdict
 from emu.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image import Image
 from emu.loader import load_image
-from emu.openswarm.baseline import Number, short
+from emu.openswarm.baseline import Number, save, short
 
 DESCRIPTION = """\
 Print what an image costs in ROM and RAM (bytes; 3 per program word), by part, source file and symbol.
@@ -48,13 +48,15 @@ def run(options: argparse.Namespace) -> int:
     if equation is not None:
         facts["equation"] = equation
         numbers |= {f"{name} of the memory equation": Number(ceil(equation[name])) for name in "ABCDE"}
+    if options.update:
+        save(options.update, numbers)
     if options.json:
         print(json.dumps(facts, indent=2))
     elif not options.check:
         print(static_text(facts, options.symbols))
         if equation is not None:
             print("\n" + equation_text(equation))
-    return settle(options, numbers, "bytes") if options.check or options.update else EXIT_OK
+    return verdict(options, numbers, "bytes") if options.check else EXIT_OK
 
 
 def _places(facts: dict[str, Any], size: str) -> dict[str, int]:
