@@ -123,14 +123,6 @@ class Compiler:
         ready, self._ready = self._ready, []
         return ready
 
-    def wait(self) -> list[tuple[object, int]]:
-        """Block until nothing is being compiled any more (benchmarks and tests)."""
-        ready: list[tuple[object, int]] = []
-        while self._waiting:
-            self._selector.select(1.0)
-            ready += self.poll()
-        return ready
-
     @property
     def busy(self) -> int:
         """Number of pieces under way in the compile process."""

@@ -20,7 +20,7 @@ from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, W_END, Access, Surroundings
 from emu.dspic30f.jit.compiler import Compiler
 from emu.dspic30f.jit.region import discover
-from emu.dspic30f.jit.runtime import BLOCKS, ENV_WORDS, LIMIT, STEPS, dispatch_text
+from emu.dspic30f.jit.runtime import BLOCKS, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import Translator
 from emu.dspic30f.state import DA, NOT_REPEATING
@@ -111,9 +111,13 @@ class JitEngine:
                 return
             self._prepare()
         self._env[LIMIT] = limit
+        start = state.cycle
         why = self._dispatch(self._core.record.address, self._env_address)
         self.counts.runs += 1
-        if why == INTERPRET:
+        if self._hooks and state.pc in self._hooks:  # the machine calls hooks, once per arrival
+            if state.cycle == start:
+                sequencer.execute()
+        elif why == INTERPRET:
             self.counts.interpreted += 1
             sequencer.execute()
         elif why in (MISS, DEADLINE):
@@ -124,6 +128,11 @@ class JitEngine:
         self._codes.clear()
         self._key = None
         self._cold.forget()
+
+    @property
+    def interrupts(self) -> int:
+        """Interrupts entered natively so far."""
+        return int(self._env[ENTERED])
 
     def _miss(self, limit: int) -> None:
         """No code at PC: ask for some, meanwhile run cold."""
@@ -139,9 +148,6 @@ class JitEngine:
         code.heat[pc] = heat
         if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words and pc not in self._hooks:
             self._request(code, pc)
-            if self.wait:
-                for tag, address in self._compiler.wait():
-                    self._install(tag, address)
             if code.steps[pc >> 1]:
                 return
         self.counts.cold += 1
@@ -209,7 +215,7 @@ class JitEngine:
             key = self._compiler.key(level, b"exact" if exact else b"block", name)
             text = translator.text()
             tag = (code, translator.entries, exact)
-            address = self._compiler.from_disk(key)
+            address = self._compiler.now(text, level, key) if self.wait else self._compiler.from_disk(key)
             if address is not None:
                 self._install(tag, address)
             else:

@@ -1,0 +1,155 @@
+"""Random firmware: legal instructions of every row in a loop, with interrupts at odd moments, traps and all modes.
+
+Two machines with different engines run it side by side; their whole records are compared at random stops.
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, field
+
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.isa import codec, table
+from emu.dspic30f.isa.fields import Operands
+from emu.dspic30f.isa.row import Row
+from emu.machine import Machine
+
+CODE, ISR, HANDLER, LEAF = 0x200, 0x1000, 0x1100, 0x1180
+"""Program addresses of the body, the interrupt handlers, the trap handler and a callee."""
+BODY_WORDS = 60
+STACK = 0x2000
+
+FLOWS = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RETLW")
+LEFT_OUT = ("RESET", "PWRSAV")
+"""They end the run or only wait; their own tests check them."""
+
+ROWS = [row for row in table.ROWS if row.mnemonic not in LEFT_OUT]
+BY_SYNTAX = {row.syntax: row for row in table.ROWS}
+
+
+def words_of(syntax: str, **fields: int) -> list[int]:
+    """Encoding of one instruction by the syntax of its row."""
+    return list(codec.encode(BY_SYNTAX[syntax], Operands(**fields)))
+
+
+def literal(value: int, register: int) -> list[int]:
+    """MOV #value,Wn."""
+    return words_of("MOV{.W} #lit16, Wnd", k=value, d=register)
+
+
+def to_sfr(name: str, value: int) -> list[int]:
+    """Write a register through W0."""
+    return literal(value, 0) + words_of("MOV{.W} Wns, f", s=0, f=DSPIC30F6014A.sfrs[name].address)
+
+
+@dataclass
+class Firmware:
+    """Program words by address, and what was used to make them."""
+
+    seed: int
+    flash: dict[int, int] = field(default_factory=dict)
+
+    def put(self, address: int, words: list[int]) -> int:
+        """Place words; returns the address behind them."""
+        for word in words:
+            self.flash[address] = word
+            address += 2
+        return address
+
+
+def random_words(row: Row, generator: random.Random, at: int, end: int) -> list[int] | None:
+    """A legal instruction of `row` at address `at`, whose static targets lie in the body; None if it fits badly."""
+    mask, value = row.pattern.mask, row.pattern.value
+    words = [v | generator.getrandbits(24) & ~m & 0xFFFFFF for m, v in zip(mask, value, strict=True)]
+    x = Operands(**{f.letter: f.get(*words) for f in row.pattern.fields})
+    if "t" in row.fields and "v" in row.fields:
+        x.v = generator.randrange(0, 14, 2)
+        x.t = x.v + 1
+    if "f" in row.fields and generator.random() < 0.8:
+        x.f = generator.choice((generator.randrange(0, 0x20), generator.randrange(0x800, 0x1FFE))) & ~1
+    if "n" in row.fields:
+        if row.mnemonic in ("CALL", "GOTO"):
+            x.n = LEAF if row.mnemonic == "CALL" else generator.randrange(CODE, end, 2)
+        elif row.mnemonic == "RCALL":
+            x.n = (LEAF - at - 2) // 2
+        elif row.mnemonic == "DO":
+            x.n = generator.randrange(2, 7)
+        else:
+            x.n = generator.randrange(-6, 10)
+    if row.mnemonic == "REPEAT" and "k" in row.fields:
+        x.k = generator.choice((0, 1, 2, 5, 17, 17, 40))
+    if row.mnemonic in ("DO", "DISI") and "k" in row.fields:
+        x.k = generator.randrange(0, 6)
+    if row.broken(x):
+        return None
+    return list(codec.encode(row, x))
+
+
+def random_firmware(seed: int) -> Firmware:
+    """A program that never ends by itself, except through a reset for a fault."""
+    generator = random.Random(seed)
+    firmware = Firmware(seed)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    for vector in DSPIC30F6014A.vectors:
+        target = HANDLER if vector.level or vector.irq is None else ISR + 0x20 * (vector.irq % 4)
+        firmware.put(vector.ivt, [target])
+        firmware.put(vector.aivt, [target])
+    at = 0x100
+    for sfr, value in (
+        ("PR1", generator.randrange(20, 900)), ("PR2", generator.randrange(30, 400)), ("PR3", generator.randrange(300)),
+        ("IPC0", generator.getrandbits(16)), ("IPC1", generator.getrandbits(16)), ("IEC0", 0x00C8),
+        ("T1CON", 0x8000), ("T2CON", 0x8000 | generator.choice((0, 0x10))), ("T3CON", 0x8000),
+        ("CORCON", generator.getrandbits(16) & 0x10F7), ("PSVPAG", 0), ("TBLPAG", 0),
+    ):
+        at = firmware.put(at, to_sfr(sfr, value))
+    if generator.random() < 0.2:
+        for sfr, value in (("XMODSRT", 0x1000), ("XMODEND", 0x103F), ("YMODSRT", 0x1800), ("YMODEND", 0x181F),
+                           ("XBREV", generator.choice((0x8008, 0))), ("MODCON", generator.getrandbits(16))):
+            at = firmware.put(at, to_sfr(sfr, value))
+    if generator.random() < 0.5:
+        at = firmware.put(at, to_sfr("SPLIM", 0x2600))
+    firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40))
+    at = CODE - 0x40
+    for n in range(15):
+        value = generator.randrange(0x1000, 0x2600) & ~1 if generator.random() < 0.7 else generator.getrandbits(16)
+        at = firmware.put(at, literal(value, n))
+    firmware.put(at, literal(STACK, 15))
+    at = CODE
+    end = CODE + 2 * BODY_WORDS
+    while at < end:
+        row = generator.choice(ROWS)
+        words = random_words(row, generator, at, end)
+        if words is not None:
+            at = firmware.put(at, words)
+    firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40 if generator.random() < 0.8 else CODE - 2))
+    for number in range(4):
+        at = ISR + 0x20 * number
+        for _ in range(generator.randrange(3)):
+            at = firmware.put(at, random_words(BY_SYNTAX["INC{.B} f"], generator, at, end) or [0])
+        for flag in (3, 6, 7):
+            at = firmware.put(at, words_of("BCLR{.B} f, #bit4", f=DSPIC30F6014A.sfrs["IFS0"].address, b=flag))
+        firmware.put(at, words_of("RETFIE"))
+    at = firmware.put(HANDLER, words_of("CLR{.B} f", B=0, f=DSPIC30F6014A.sfrs["INTCON1"].address))
+    at = firmware.put(at, literal(STACK, 15))
+    firmware.put(at, words_of("GOTO Expr", n=0x100))
+    firmware.put(LEAF, words_of("RETURN"))
+    return firmware
+
+
+def load(machine: Machine, firmware: Firmware) -> None:
+    """Put the program and random data into a machine and reset it."""
+    for address, word in firmware.flash.items():
+        machine.program.put_flash(address, [word])
+    machine.reset("POR")
+    generator = random.Random(firmware.seed + 1)
+    for address in range(0x800, 0x2800, 2):
+        machine.poke(address, generator.getrandbits(16))
+
+
+def difference(one: Machine, other: Machine) -> str:
+    """What differs between the states of two machines; empty if nothing."""
+    a, b = one.snapshot(), other.snapshot()
+    if a == b:
+        return ""
+    places = dict.fromkeys(one.record.field_at(i) for i in range(len(a)) if a[i] != b[i])
+    return f"pc {one.pc:06X} {other.pc:06X} cycle {one.cycle} {other.cycle}: " + ", ".join(list(places)[:12])

@@ -1,0 +1,142 @@
+"""Native code against the plain interpreter: the whole record, at random stops, on random firmware."""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from random_firmware import Firmware, difference, literal, load, random_firmware, to_sfr, words_of
+
+from emu.dspic30f.jit.cache import ObjectCache
+from emu.dspic30f.jit.engine import JitEngine
+from emu.machine import Machine
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests neither trust nor fill the user's cache."""
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path_factory.getbasetemp() / "objects"))
+
+
+def eager(engine: str = "jit", ipl_slip: int = 0) -> Machine:
+    """A machine that compiles every address it reaches before it runs it."""
+    machine = Machine(engine=engine, ipl_slip=ipl_slip)
+    if isinstance(machine.runner, JitEngine):
+        machine.runner.threshold = 1
+        machine.runner.wait = True
+    return machine
+
+
+def pair(firmware: Firmware, ipl_slip: int = 0) -> Iterator[Machine]:
+    """The same firmware under both engines."""
+    for engine in ("plain", "jit"):
+        machine = eager(engine, ipl_slip)
+        load(machine, firmware)
+        yield machine
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_firmware_gives_equal_records_at_random_stops(seed: int) -> None:
+    """Design §4.3: same seed, same bytes, same cycle in both engines."""
+    plain, native = pair(random_firmware(seed), ipl_slip=seed % 2)
+    generator = random.Random(seed)
+    for _ in range(10):
+        cycles = generator.randrange(1, 500)
+        one, other = plain.run(cycles), native.run(cycles)
+        assert one == other
+        assert not difference(plain, native)
+        if one.reason != "limit":
+            break
+
+
+def test_a_snapshot_of_one_engine_goes_on_in_the_other() -> None:
+    """Engines share the record; nothing of it is private to one."""
+    plain, native = pair(random_firmware(3))
+    native.run(700)
+    plain.restore(native.snapshot())
+    assert plain.run(500) == native.run(500)
+    assert not difference(plain, native)
+    native.restore(plain.snapshot())
+    assert plain.run(500) == native.run(500)
+    assert not difference(plain, native)
+
+
+def counting_firmware() -> Firmware:
+    """An endless loop that counts in W1, with a T1 interrupt every 100 Tcy that counts in W2."""
+    firmware = Firmware(0)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    firmware.put(0x1A, [0x1000])
+    at = 0x100
+    for register in range(16):
+        at = firmware.put(at, literal(0x900 if register == 15 else 0, register))
+    for sfr, value in (("PR1", 99), ("IEC0", 8), ("T1CON", 0x8000)):
+        at = firmware.put(at, to_sfr(sfr, value))
+    firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=1, p=0, d=1, q=0) + words_of("BRA Expr", n=-2))
+    handler = words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0)
+    handler += words_of("BCLR{.B} f, #bit4", f=0x84, b=3) + words_of("RETFIE")
+    firmware.put(0x1000, handler)
+    return firmware
+
+
+def test_interrupts_are_entered_and_left_without_python() -> None:
+    """Design §4.3: exception entry, RETFIE and acceptance are native."""
+    plain, native = pair(counting_firmware())
+    for machine in (plain, native):
+        machine.run(50_000)
+    assert not difference(plain, native)
+    assert isinstance(native.runner, JitEngine)
+    assert native.runner.interrupts > 450
+    assert native.runner.counts.interpreted < 40
+
+
+def test_a_hook_is_called_at_each_arrival_although_the_code_around_it_is_native() -> None:
+    """Hooked addresses are left out of regions."""
+    seen: list[list[int]] = []
+    for machine in pair(counting_firmware()):
+        calls: list[int] = []
+        machine.hook_pc(0x1002, lambda m=machine, c=calls: c.append(m.cycle))
+        machine.run(2_000)
+        seen.append(calls)
+    assert seen[0] == seen[1]
+    assert len(seen[0]) > 10
+
+
+def test_reprogrammed_flash_is_translated_anew() -> None:
+    """RTSP invalidates native code."""
+    plain, native = pair(counting_firmware())
+    for machine in (plain, native):
+        machine.run(3_000)
+        machine.program.put_flash(0x1000, words_of("DEC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0))
+        machine.run(3_000)
+    assert not difference(plain, native)
+    assert native.w[2] == 0xFFFF  # 29 up, 30 down
+
+
+def test_a_damaged_object_on_disk_counts_as_absent(tmp_path: Path) -> None:
+    """The checksum guards what is loaded."""
+    cache = ObjectCache(tmp_path)
+    key = cache.key(b"one")
+    cache.put(key, b"some code")
+    assert cache.get(key) == b"some code"
+    file = tmp_path / key[:2] / key
+    file.write_bytes(file.read_bytes()[:-1] + b"X")
+    assert cache.get(key) is None
+    file.write_bytes(b"short")
+    assert cache.get(key) is None
+    assert cache.key(b"on", b"e") != key
+
+
+def test_a_folder_that_cannot_be_written_only_costs_the_cache(tmp_path: Path) -> None:
+    """Nothing fails, nothing is kept."""
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    cache = ObjectCache(blocked)
+    cache.put(cache.key(b"one"), b"code")
+    assert cache.get(cache.key(b"one")) is None
+    assert cache.stores == 0
