@@ -72,8 +72,11 @@ def _from_quoted(flags: str) -> str:
     return "data"
 
 
-def parse(text: str) -> Attributes:
-    """Read `code, address(0x1000), near ...`; raise `ExprError` for unknown or contradictory attributes."""
+def parse(text: str, name: str = "") -> Attributes:
+    """Read `code, address(0x1000), near ...`; raise `ExprError` for unknown or contradictory attributes.
+
+    Without a type among them it is the one that the section's `name` implies: `.section .bss, near`.
+    """
     result = Attributes(0, c.SHT_PROGBITS, ExtendedAttribute(0))
     kind, info = "", False
     for word in split_arguments(text, spaces=False):
@@ -82,28 +85,29 @@ def parse(text: str) -> Attributes:
         match = re.fullmatch(r"(\w+)\s*(?:\(\s*([^()]*?)\s*\))?", word)
         if match is None:
             raise ExprError(f"cannot read section attribute {word!r}")
-        name, argument = match[1].lower(), match[2]
-        if name in _TYPES:
+        attribute, argument = match[1].lower(), match[2]
+        if attribute in _TYPES:
             if kind:
-                raise ExprError(f"a section cannot be both {kind} and {name}")
-            kind = name
-        elif name in _MODIFIERS:
-            result.flags |= _MODIFIERS[name]
-        elif name in ("address", "reverse", "align", "merge"):
-            _with_number(result, name, argument)
-        elif name == "page":
+                raise ExprError(f"a section cannot be both {kind} and {attribute}")
+            kind = attribute
+        elif attribute in _MODIFIERS:
+            result.flags |= _MODIFIERS[attribute]
+        elif attribute in ("address", "reverse", "align", "merge"):
+            _with_number(result, attribute, argument)
+        elif attribute == "page":
             result.extended |= ExtendedAttribute.PAGE
-        elif name == "keep":
+        elif attribute == "keep":
             result.keep = True
-        elif name == "info":
+        elif attribute == "info":
             info = True
-        elif name in _OTHER_PARTS:
-            raise ExprError(f"section attribute {name} is for parts other than the 30F6014A")
+        elif attribute in _OTHER_PARTS:
+            raise ExprError(f"section attribute {attribute} is for parts other than the 30F6014A")
         else:
-            raise ExprError(f"unknown section attribute {name!r}")
-    _apply_type(result, kind or "data")
+            raise ExprError(f"unknown section attribute {attribute!r}")
+    kind = kind or implied(name).partition(",")[0].replace("info", "data")
+    _apply_type(result, kind)
     if info:
-        _make_info(result, kind or "data")
+        _make_info(result, kind)
     return result
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 
 from toolchain.asm.data import string_argument
+from toolchain.asm.device import FILE_NAMES, include_text
 from toolchain.asm.expr import ExprError
 from toolchain.asm.macro import (
     CLOSE_MACRO,
@@ -97,7 +99,13 @@ def _stray(directive: str, opener: str) -> Handler:
 
 def _include(asm: Assembler, text: str) -> None:
     name = string_argument(text, ".include")
-    path = asm.find_file(name)
+    try:
+        path = asm.find_file(name)
+    except ExprError:
+        if os.path.basename(name).lower() not in FILE_NAMES:
+            raise
+        asm.source.include(include_text(), name, asm.conditionals.depth)
+        return
     try:
         content = read_text(path)
     except ToolError as error:

@@ -45,27 +45,24 @@ def _section(asm: Assembler, text: str) -> None:
         name = f"*_{len(asm.sections):08x}"
     existing = asm.sections.get(name)
     if existing is None:
-        _enter(asm, _create(asm, name, rest if comma else attributes.implied(name)))
-        return
-    if comma:
-        wanted = attributes.parse(rest)
-        if (
-            wanted.flags != existing.flags
-            or wanted.type != existing.type
-            or wanted.address not in (None, existing.load)
-        ):
+        existing = asm.sections[name] = AsmSection(name, 0, c.SHT_NOTE, asm.source.place)
+        _configure(existing, rest if comma else attributes.implied(name))
+    elif comma and existing.is_untouched():
+        _configure(existing, rest)
+    elif comma:
+        wanted = attributes.parse(rest, name)
+        same = (wanted.flags, wanted.type) == (existing.flags, existing.type)
+        if not same or wanted.address not in (None, existing.load):
             raise ExprError(f"section {name} already exists with other attributes (first used at {existing.place})")
     _enter(asm, existing)
 
 
-def _create(asm: Assembler, name: str, text: str) -> AsmSection:
-    wanted = attributes.parse(text)
-    section = AsmSection(name, wanted.flags, wanted.type, asm.source.place)
+def _configure(section: AsmSection, text: str) -> None:
+    wanted = attributes.parse(text, section.name)
+    section.configure(wanted.flags, wanted.type)
     section.extended, section.load, section.keep = wanted.extended, wanted.address, wanted.keep
     if wanted.align is not None:
         section.align = max(section.align, wanted.align)
-    asm.sections[name] = section
-    return section
 
 
 def _fixed_section(name: str) -> Handler:

@@ -320,10 +320,12 @@ def combine(op: str, a: Known, b: Known, final: bool = False) -> Known:
     if isinstance(a, int) and isinstance(b, int):
         return wrap(_BINARY[op](a, b))
     if op in "+-":
-        if isinstance(b, int) and isinstance(a, Value) and not a.op:
-            return Value(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b))
-        if op == "+" and isinstance(a, int) and isinstance(b, Value) and not b.op:
-            return Value(b.add, b.sub, wrap(a + b.offset))
+        if isinstance(b, int) and isinstance(
+            a, Value
+        ):  # also op(x)+n: a relocation has one addend, inside the operator
+            return Value(a.add, a.sub, wrap(a.offset + b if op == "+" else a.offset - b), a.op)
+        if op == "+" and isinstance(a, int) and isinstance(b, Value):
+            return Value(b.add, b.sub, wrap(a + b.offset), b.op)
     if isinstance(a, Value) and isinstance(b, Value) and op in _COMPARABLE and not (a.op or b.op or a.sub or b.sub):
         if a.add is b.add:
             return wrap(_BINARY[op](a.offset, b.offset))

@@ -66,26 +66,37 @@ class AsmSection:
     """One section of the object being assembled."""
 
     def __init__(self, name: str, flags: int, kind: int, place: Place) -> None:
-        self.name, self.flags, self.type, self.place = name, flags, kind, place
+        self.name, self.place = name, place
         self.extended = ExtendedAttribute(0)
-        self.align = 2 if flags & SectionFlag.ALLOC else 1
         self.load: int | None = None
         self.keep = False
-        self.is_code = bool(flags & SectionFlag.EXECINSTR)
+        self.labelled = False
         self.pieces: list[Piece] = [Piece(self)]
         self.piece = self.pieces[0]
+        self.closed_units = 0  # length of all pieces but the current one, as long as nothing is relaxed
         self.fixups: list[Fixup] = []
         self.relaxables: list[Relaxable] = []
         self.fill_upper = 0
         self._data_bytes = 0  # data bytes in the last word, 0 or 1
         self._packed_bytes = 0  # .p bytes in the last word, 0..2
         self._waiting: list[Label] = []  # labels since the last content, to move when an instruction aligns
-        if kind == c.SHT_NOBITS or not flags & SectionFlag.ALLOC:
-            limit = INFO_LIMIT
+        self.configure(flags, kind)
+
+    def configure(self, flags: int, kind: int) -> None:
+        """Set what the attributes say: flags, ELF type, and how locations count.  Only while nothing is in it."""
+        self.flags, self.type = flags, kind
+        self.align = 2 if flags & SectionFlag.ALLOC else 1
+        self.is_code = bool(flags & SectionFlag.EXECINSTR)
+        if kind == c.SHT_NOBITS:
+            self.limit = DATA_LIMIT
+        elif not flags & SectionFlag.ALLOC:
+            self.limit = INFO_LIMIT
         else:
-            limit = CODE_LIMIT if self.is_code else DATA_LIMIT
-        self.limit = DATA_LIMIT if kind == c.SHT_NOBITS else limit
-        self.closed_units = 0  # length of all pieces but the current one, as long as nothing is relaxed
+            self.limit = CODE_LIMIT if self.is_code else DATA_LIMIT
+
+    def is_untouched(self) -> bool:
+        """Whether nothing stands in the section and no label points into it: its attributes may still change."""
+        return not (self.closed_units or self.piece.data or self.labelled)
 
     def here(self) -> int:
         """Location within the current piece, in address units."""
@@ -103,6 +114,7 @@ class AsmSection:
         if self._packed_bytes:
             raise ExprError("a label inside a run of .p bytes needs .palign 2 before it")
         label = Label(self.piece, self.here())
+        self.labelled = True
         if self._data_bytes:
             self._waiting.append(label)
         return label

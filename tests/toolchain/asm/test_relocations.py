@@ -50,6 +50,7 @@ def test_offsets_count_file_octets(asm):
     [
         ("bra sym+4", 0x370004), ("bra sym-2", 0x37FFFE), ("mov sym+6, w1", 0x800031), ("mov #sym-1, w0", 0x2FFFF0),
         ("inc sym+2", 0xEC2002), ("bset sym+4, #9", 0xA82005), ("add #sym+5, w2", 0xB00052),
+        ("mov #psvoffset(sym)+3, w0", 0x200030), ("mov #psvoffset(sym+3), w0", 0x200030),
     ],
 )  # fmt: skip
 def test_the_addend_stands_in_the_field(asm, line, word):

@@ -18,7 +18,8 @@ from toolchain.errors import ToolError
         ("eedata", 0x20000002, c.SHT_PROGBITS),
         ("bss,xmemory", 0x04000003, c.SHT_NOBITS), ("bss,ymemory", 0x08000003, c.SHT_NOBITS),
         ("code,address(0x1000)", 0x40000006, c.SHT_PROGBITS), ("data,noload", 0x00800003, c.SHT_PROGBITS),
-        ("bss,reverse(64)", 0x80000003, c.SHT_NOBITS), ("info", 0, c.SHT_NOTE), ("info, data", 0, c.SHT_NOTE), ('"ax"', 0x6, c.SHT_PROGBITS),
+        ("bss,reverse(64)", 0x80000003, c.SHT_NOBITS), ("info", 0, c.SHT_NOTE), ("info, data", 0, c.SHT_NOTE),
+        ('"ax"', 0x6, c.SHT_PROGBITS),
     ],
 )  # fmt: skip
 def test_attributes_become_section_flags(asm, attributes, flags, kind):
@@ -137,3 +138,12 @@ def test_every_object_carries_the_signature_microchips_linker_looks_for(asm):
     assert asm("").bytes("__c30_signature") == bytes([1, 0, 0, 0, 0, 0])
     out = asm(".section __c30_signature, info, data\n .word 1, 2, 3\n")
     assert out.bytes("__c30_signature") == bytes([1, 0, 2, 0, 3, 0])
+
+
+def test_modifiers_alone_keep_the_type_the_name_implies(asm):
+    """As in e-puck library sources: `.section .data, near`; an untouched section may still change its attributes."""
+    out = asm(
+        " .section .data, near\n .word 1\n .section .bss, near\n .space 2\n .section .text, address(0x200)\n nop\n"
+    )
+    assert [out.sections[n].flags for n in (".data", ".bss", ".text")] == [0x01000003, 0x01000003, 0x40000006]
+    assert out.sections[".bss"].type == c.SHT_NOBITS

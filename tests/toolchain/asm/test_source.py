@@ -143,7 +143,7 @@ def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
         ("bra 9f\n", "label 9: is used but"), (" bra .Lx\n", "label .Lx is used but"),
         (".frob\n", "unknown directive"),
         (".global 1x\n", "expected a symbol"), (".section\n", "bad section name"), (".popsection\n", "without"),
-        (".section a,code\n .section a,data\n", "other attributes"),
+        (".section a,code\n nop\n .section a,data\n", "other attributes"),
         (".section a,frob\n", "unknown section attribute"),
         (".section a,code,near\n", "data sections"), (".section a,code,data\n", "both code and data"),
         (".local q\n .word q\n", "never defined"),
@@ -157,3 +157,22 @@ def test_structural_mistakes_have_a_clear_message(asm, text, message):
     with pytest.raises(ToolError) as error:
         asm(text)
     assert message in str(error.value)
+
+
+def test_the_device_include_is_there_without_a_file(asm):
+    """Bits by name, numbered where a field is wide, settings, and `config`; the registers are the linker's."""
+    out = asm(
+        ' .equ __30F6014A, 1\n .include "p30f6014A.INC"\n config __FOSC, CSW_FSCM_OFF & XT_PLL8\n'
+        " bclr IFS0, #U1RXIF\n bset IPC10, #DCIIP2\n bra N, 1f\n1: pwrsav #IDLE_MODE\n"
+    )
+    assert out.words("__FOSC.sec") == [0xFFE6]
+    assert out.symbols["__FOSC"].section.name == "__FOSC.sec"
+    assert out.words() == [0xA92001, 0xA8C000, 0x330000, 0xFE4001]
+    assert out.relocs()[0][2] == "IFS0"
+
+
+def test_a_device_include_of_the_users_own_comes_first(tmp_path):
+    """Microchip's file is used where a user has it."""
+    (tmp_path / "p30f6014A.inc").write_text(" .equ MINE, 7\n")
+    obj, _ = assemble(' .include "p30f6014A.inc"\n mov #MINE, w0\n', str(tmp_path / "x.s"))
+    assert bytes(obj.sections[0].data) == bytes([0x70, 0, 0x20, 0])

@@ -1,0 +1,47 @@
+"""`.include "p30F6014A.inc"`: Microchip's device include, made from the chip's tables when no such file is found.
+
+It names register bits and configuration settings and defines the macro `config`; registers themselves stay undefined,
+for the linker to resolve (abi-elf.md §2.6, §3.3).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from emu.chips.dspic30f6014a import SFRS
+
+FILE_NAMES = frozenset(("p30f6014a.inc", "p30fxxxx.inc"))
+_SETTINGS = Path(__file__).resolve().parents[1] / "include" / "dspic_compiler.h"
+"""The C header that lists the configuration settings by name; C and assembly share the numbers."""
+_SETTING = re.compile(r"#define ([A-Z][A-Z0-9_]*) (0x[0-9A-F]{4})$", re.MULTILINE)
+_CONFIG_MACRO = """
+        .macro  config REG, VALUE
+        .pushsection \\REG\\().sec, code
+        .global \\REG
+\\REG:  .pword  \\VALUE
+        .popsection
+        .endm
+"""
+
+
+def _bits() -> Iterator[tuple[str, int]]:
+    """Bit names and positions; bits of a wide field are numbered: OC1IP0, OC1IP1, OC1IP2."""
+    for sfr in SFRS.values():
+        for name, (lsb, width) in sfr.fields.items():
+            if width == 1:
+                yield name, lsb
+            else:
+                yield from ((f"{name}{bit}", lsb + bit) for bit in range(width))
+
+
+def include_text() -> str:
+    """Return the include file.  A bit name that means different positions in two registers is left out."""
+    positions: dict[str, set[int]] = {}
+    for name, bit in _bits():
+        positions.setdefault(name, set()).add(bit)
+    lines = [f"        .equiv {name}, {bits.pop()}" for name, bits in positions.items() if len(bits) == 1]
+    lines += ["        .equiv SLEEP_MODE, 0", "        .equiv IDLE_MODE, 1"]
+    lines += [f"        .equiv {name}, {value}" for name, value in _SETTING.findall(_SETTINGS.read_text())]
+    return "\n".join(lines) + _CONFIG_MACRO
