@@ -15,6 +15,7 @@ from ..target import CALLEE_SAVED, CALLER_SAVED, FP, LIT5_MAX, LIT10_MAX, LNK_MA
 from .mir import MI, Imm, Mem, MFunction, Operand, Slot
 
 FRAME_POINTER_BYTES = 900  # locals above this use LNK: ADD #lit10 reaches 1023
+PROBE_REACH = 1022  # largest word offset of [Wn+lit] (isa.md §3)
 PROBE_BYTES = 8  # -fstack-check probes frames above this (kernel.md §4)
 REPEATS = {"repmov", "repfill", "repclr", "div.s", "div.u", "div.sd", "div.ud"}
 
@@ -180,7 +181,7 @@ class FrameBuilder:
                 out += _push_registers(self.saved)
             out += _adjust(self.locals, None)
         if self.stack_check and self.locals + 2 * len(self.saved) > PROBE_BYTES:
-            out.append(MI("cp0", Mem("ind", SP)))
+            out[0:0] = _probe(self.locals + 2 * len(self.saved))
         m.blocks[0].insts[0:0] = out
 
     def _epilogue(self, last: MI) -> list[MI]:
@@ -240,6 +241,15 @@ def _pushes(mi: MI) -> int:
         assert isinstance(count.value, int)
         return 2 * (count.value + 1)
     return sum(2 for a in mi.args if isinstance(a, Mem) and a.mode == "++" and a.base == SP)
+
+
+def _probe(depth: int) -> list[MI]:
+    """Read `depth` bytes above W15, so that a stack that is too short traps here, with W15 still inside it: the trap's
+    own frame (isa.md §14.2) would otherwise land in the neighbour. Two instructions may follow the read (§14.4, soft
+    traps); they are harmless. W7 may hold an argument."""
+    if depth + 2 > PROBE_REACH:
+        return [*_adjust(depth, None), MI("cp0", Mem("ind", SP)), *_adjust(-depth, None), MI("text", "nop")]
+    return [MI("text", line) for line in ("push w7", f"mov [w15+{depth}],w7", "pop w7", "nop")]
 
 
 def _adjust(amount: int, line: str | None) -> list[MI]:
