@@ -26,13 +26,15 @@ LEVEL = "s"
 
 def library(jobs: int = 0) -> bytes:
     """The archive's bytes. Builds it (seconds, once) when the cache has none for these sources and this compiler."""
-    cached = cache_dir() / f"libdspic-{fingerprint()}.a"
+    key = fingerprint()
+    cached = cache_dir() / f"libdspic-{key}.a"
     try:
         return cached.read_bytes()
     except OSError:
         pass
     content = build(jobs)
-    _store(cached, content)
+    if fingerprint() == key:  # nobody edited the compiler meanwhile
+        _store(cached, content)
     return content
 
 
