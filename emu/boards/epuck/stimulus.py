@@ -77,7 +77,7 @@ def _time(board: Epuck, word: str) -> int:
     except (ValueError, ZeroDivisionError):
         value = Fraction(-1)
     cycles = value * Fraction(board.chip.fcy) if word.endswith("s") else value
-    if cycles < 0 or not word.endswith("s") and cycles.denominator != 1:
+    if cycles < 0 or (not word.endswith("s") and cycles.denominator != 1):
         raise ValueError(f"a line begins with its time, seconds like 1.5s or a number of cycles, not {word!r}")
     return round(cycles)
 

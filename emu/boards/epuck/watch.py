@@ -24,6 +24,7 @@ class Watch:
         self._board: Final = board
         self._write: Final = write
         self._reported = [0, 0]
+        self._last_report: int | None = None
         self._next_report = 0
         self._watches_motors = False
         self._text: Final = {1: bytearray(), 2: bytearray()}
@@ -49,12 +50,16 @@ class Watch:
         """The step being reported is counted already."""
         if cycle < self._next_report:
             return
-        elapsed = max(cycle - self._next_report, 0) / self._board.chip.fcy + _MOTOR_SECONDS
+        second = self._board.chip.fcy
+        last, self._last_report = self._last_report, cycle
+        self._next_report = cycle + round(_MOTOR_SECONDS * second)  # reading the other motor may report its step
         steps = [self._board.motors.left.steps, self._board.motors.right.steps]
-        rates = [(now - before) / elapsed for now, before in zip(steps, self._reported, strict=True)]
+        text = f"motors {steps[0]} {steps[1]} steps"
+        if last is not None:
+            moved = [now - before for now, before in zip(steps, self._reported, strict=True)]
+            text += ", " + " ".join(f"{count * second / (cycle - last):.0f}" for count in moved) + " steps/s"
         self._reported = steps
-        self._next_report = cycle + round(_MOTOR_SECONDS * self._board.chip.fcy)
-        self._line(cycle, f"motors {steps[0]} {steps[1]} steps, about {rates[0]:.0f} {rates[1]:.0f} steps/s")
+        self._line(cycle, text)
 
     def _watch_uart1(self) -> None:
         self._listen(1, self._board.bluetooth)

@@ -2,10 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
 import pytest
 
 from emu.boards.epuck.board import Epuck
 from emu.machine import Machine
+from toolchain.driver import main as compile_program
+
+PROGRAMS = Path(__file__).with_name("programs")
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory) -> Callable[..., Path]:
+    """program("camera.c", "lines.s") -> path of the ELF file."""
+    folder = tmp_path_factory.mktemp("programs")
+
+    @cache
+    def build(*sources: str) -> Path:
+        target = folder / (Path(sources[0]).stem + ".elf")
+        paths = [str(PROGRAMS / source) for source in sources]
+        assert compile_program(["-Os", "-fxc16-attributes", *paths, "-o", str(target)]) == 0
+        return target
+
+    return build
 
 
 class Robot:
