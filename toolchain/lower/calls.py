@@ -81,15 +81,20 @@ def select_call(s: Selector, i: Instr) -> None:
     assert isinstance(attrs, list)
     variadic = bool(i.extra.get("vararg"))
     if variadic:
-        given = zip(i.args[:-1], attrs, strict=True)
-        args = [_private_copy(s, a, t) if (t := _byval(k)) is not None else a for a, k in given]
-
-        places = place_arguments([scalar_shape(a.type) if isinstance(a, Value) else Shape(1, True) for a in args], True)
+        fixed = i.extra["fixed"]
+        assert isinstance(fixed, int)
+        shapes = [_shape(a, k) for a, k in zip(i.args[:-1], attrs, strict=True)]
+        for k in range(fixed, len(args)):
+            t = _byval(attrs[k])
+            if t is not None:
+                args[k] = _private_copy(s, i.args[k], t)
+                shapes[k] = Shape(1, True)
+        places = place_arguments(shapes, True)
     else:
         places = place_arguments([_shape(a, k) for a, k in zip(i.args[:-1], attrs, strict=True)], False)
     target: int | str
     target = symbol(s.module, callee.name) if isinstance(callee, GlobalRef) else s.reg(callee)
-    pushed = _push_stack_arguments(s, args, attrs, places, variadic)
+    pushed = _push_stack_arguments(s, args, attrs, places)
     used = _load_register_arguments(s, args, attrs, places)
     mi = s.emit("callr", target) if isinstance(target, int) else s.emit("call", target)
     mi.also_uses = tuple(used)
@@ -137,13 +142,13 @@ def _private_copy(s: Selector, a: Value, t: Type) -> int:
 
 
 def _push_stack_arguments(
-    s: Selector, args: list[Value | int], attrs: list[dict[str, object]], places: list[Place], variadic: bool
+    s: Selector, args: list[Value | int], attrs: list[dict[str, object]], places: list[Place]
 ) -> int:
     """Push in descending distance; returns the bytes pushed."""
     pushed = 0
     for k in sorted((k for k in range(len(args)) if places[k].stack), key=lambda k: -places[k].stack):
         v = args[k]
-        t = None if variadic else _byval(attrs[k])
+        t = _byval(attrs[k])
         if isinstance(v, int):
             s.emit("mov", v, Mem("++", SP))
         elif t is not None:

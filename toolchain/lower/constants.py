@@ -18,8 +18,9 @@ Key = tuple[str, object]
 def run(m: MFunction) -> None:
     """Both rewrites."""
     counts = _definition_counts(m)
+    out = live_out(m)
     for b in m.blocks:
-        _share_in_block(b, counts)
+        _share_in_block(b, counts, out[b.name])
     _hoist_from_loops(m, counts)
 
 
@@ -51,8 +52,8 @@ def _is_call(mi: MI) -> bool:
     return mi.op in ("call", "callr", "asm")
 
 
-def _share_in_block(b: MBlock, counts: dict[int, int]) -> None:
-    """Reuse the register of an equal constant loaded a few instructions earlier."""
+def _share_in_block(b: MBlock, counts: dict[int, int], live: int) -> None:
+    """Reuse the register of an equal constant loaded a few instructions earlier; those live at the end stay."""
     known: dict[Key, tuple[int, int]] = {}
     rename: dict[int, int] = {}
     out: list[MI] = []
@@ -64,7 +65,7 @@ def _share_in_block(b: MBlock, counts: dict[int, int]) -> None:
             r = mi.args[-1]
             assert isinstance(r, int)
             found = known.get(key)
-            if found is not None and at - found[1] <= REACH:
+            if found is not None and at - found[1] <= REACH and not live >> r & 1:
                 rename[r] = found[0]
                 known[key] = (found[0], at)
                 continue

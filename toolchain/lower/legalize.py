@@ -541,7 +541,7 @@ class Legalizer:
             attrs += [attr] * len(parts)
         leaves = [legal_type(t) for t, _ in _leaves(i.type)] if i.type.kind in ("struct", "array") else []
         new = self.b.emit("call", leaves[0] if leaves else legal_type(i.type), [*args, self.use(callee)])
-        new.extra = {"attrs": attrs, "vararg": i.extra["vararg"], "tail": i.extra["tail"]}
+        new.extra = {"attrs": attrs, "vararg": i.extra["vararg"], "fixed": i.extra["fixed"], "tail": i.extra["tail"]}
         if leaves:
             new.extra["results"] = leaves
             return [new, *(self.b.emit("callresult", t, [new], index=k) for k, t in enumerate(leaves) if k)]
