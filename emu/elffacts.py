@@ -142,7 +142,7 @@ _ROWS: tuple[tuple[int, str, Place, int, int, Formula, tuple[int, int], bool], .
     (4, "FILE_REG_BYTE", _W, 0, 13, _F.ADDRESS, _NEAR_RANGE, False),
     (5, "FILE_REG", _W, 0, 13, _F.ADDRESS, _NEAR_RANGE, True),
     (6, "FILE_REG_WORD", _W, 0, 16, _F.ADDRESS, (0, 0xFFFF), True),
-    (7, "FILE_REG_WORD_WITH_DST", _W, 4, 15, _F.HALF, (0, 0x7FFF), True),
+    (7, "FILE_REG_WORD_WITH_DST", _W, 4, 15, _F.HALF, (0, 0xFFFF), True),
     (8, "WORD", _W, 4, 16, _F.ADDRESS, _WORD_RANGE, False),
     (9, "PBYTE", _P, 0, 8, _F.ADDRESS, (-128, 255), False),
     (10, "PWORD", _P, 0, 24, _F.ADDRESS, _ANY24, False),

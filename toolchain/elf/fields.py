@@ -56,7 +56,7 @@ def checked(kind: RelocationType, value: int) -> int:
     """Return `value` when it is in the range of the field; raise `FieldError` with the limits otherwise."""
     if not kind.low <= value <= kind.high:
         raise FieldError(f"value {_show(value)} is outside {_show(kind.low)}..{_show(kind.high)}")
-    if kind.even and value & 1 and kind.formula is Formula.ADDRESS:
+    if kind.even and value & 1 and kind.formula in (Formula.ADDRESS, Formula.HALF):
         raise FieldError(f"value {_show(value)} must be even")
     return value
 

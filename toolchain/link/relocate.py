@@ -60,7 +60,8 @@ class Relocator:
         if symbol.home is Home.UNDEFINED:
             value = self.absolute.get(symbol.name, 0)  # undefined weak symbols are 0 (§5)
             return Target(value, value, "")
-        return Target(symbol.value, symbol.value, "")
+        value = symbol.value - (1 << 32) if symbol.value >= 1 << 31 else symbol.value  # st_value of a negative number
+        return Target(value, value, "")
 
     def apply(self, section: Section) -> bytearray:
         """Return a copy of the section's octets with all fields filled."""
@@ -105,10 +106,10 @@ class Relocator:
                 raise FieldError("DO loop shorter than two instructions")
             return fields.checked(kind, distance >> 1)
         if formula is Formula.HALF:
-            address = target.address + 2 * _signed(field, kind.width) & 0xFFFF
             if target.address & 1:
                 raise FieldError(f"word access to the odd address {target.address:#x}")
-            return address >> 1
+            signed = target.address + 2 * _signed(field, kind.width)
+            return fields.checked(kind, signed if signed >= 0 else target.address + 2 * field) >> 1
         if formula is Formula.LOW16:
             address = target.address + _signed(field, 16)
             if address & 1:
