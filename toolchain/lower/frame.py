@@ -180,7 +180,7 @@ class FrameBuilder:
             if not m.interrupt:
                 out += _push_registers(self.saved)
             out += _adjust(self.locals, None)
-        if self.stack_check and self.locals + 2 * len(self.saved) > PROBE_BYTES:
+        if self.stack_check and self.locals > PROBE_BYTES:  # pushes are accesses and need no probe
             out[0:0] = _probe(self.locals + 2 * len(self.saved))
         m.blocks[0].insts[0:0] = out
 

@@ -300,8 +300,14 @@ class Selector:
         return Mem("ind", r)
 
     def foldable_load(self, v: Value, user: Instr) -> Instr | None:
-        """The load that defines `v`, when it may move down to its only user."""
+        """The load that defines `v`, when it may move down to its only user.
+
+        The user may be selected twice, as a sum folded into an address and for its own sake; then the register that
+        was asked for first decides.
+        """
         if not isinstance(v, Instr) or v.op != "load" or not self.single_use(v) or not self.same_block(v):
+            return None
+        if id(v) in self.wanted:
             return None
         if not self.same_block(user):
             return None
