@@ -7,7 +7,6 @@ that no event and no limit falls inside before it calls. Texts are compiled once
 
 from __future__ import annotations
 
-import linecache
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -40,12 +39,10 @@ class Block:
     last_start: int
 
 
-@lru_cache(maxsize=16384)
+@lru_cache(maxsize=4096)
 def compiled(text: str) -> CodeType:
     """The code of one function's text, shared by all machines of the process."""
-    name = f"<specialised {hash(text) & 0xFFFFFFFF:08x}>"
-    linecache.cache[name] = (len(text), None, text.splitlines(True), name)
-    return compile(text, name, "exec")
+    return compile(text, "<specialised>", "exec")
 
 
 NATIVE: Final = (None, Branch, Call, Goto, Repeat, Return, Skip)

@@ -21,6 +21,8 @@ from emu.dspic30f.places import places_of
 from emu.dspic30f.pysource import PLAIN, Source, Unsupported
 from emu.dspic30f.state import DA, LAST, RA
 
+MODES_KEPT: Final = 64
+"""Combinations of processor modes (a DO loop counts as one) whose functions are kept."""
 WARM: Final = 16
 """Times an address is reached before a function is written for it."""
 
@@ -125,6 +127,8 @@ class SpecialisedEngine:
         )
         modes = self._by_modes.get(key)
         if modes is None:
+            if len(self._by_modes) >= MODES_KEPT:
+                self._by_modes.clear()
             modes = self._by_modes[key] = _Modes(loop=loop)
         self._modes = modes
 

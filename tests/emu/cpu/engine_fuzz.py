@@ -200,8 +200,9 @@ class Program:
                     self._call,
                     self._disi,
                     self._status,
+                    self._idle,
                 ),
-                (60, 8, 8, 8, 4, 4, 2, 2),
+                (60, 8, 8, 8, 4, 4, 2, 2, 1),
             )[0]()
         self._add("BRA Expr", n=-len(self.words) - 1)
 
@@ -262,6 +263,9 @@ class Program:
     def _disi(self) -> None:
         self._add("DISI #lit14", k=self._rng.randrange(12))
 
+    def _idle(self) -> None:
+        self._add("PWRSAV #lit1", k=1)
+
     def _status(self) -> None:
         """A critical section the way kernels write it: IPL by SR, or an enable bit."""
         if self._rng.random() < 0.5:
@@ -290,8 +294,10 @@ def _handler(bits: tuple[tuple[int, int], ...]) -> list[int]:
 def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) -> list[int]:
     """Load one random program and context into both machines; returns the cycles to compare at."""
     program = Program(rng, rng.randrange(10, 80))
+    slip = rng.randrange(2)
     for machine in (plain, other):
         machine.restore(start)
+        machine.core.exceptions.ipl_slip = slip
         machine.program.put_flash(0, [*encode(BY_TEXT["GOTO Expr"], {"n": PC})])
         machine.program.put_flash(PC, program.words)
         machine.program.put_flash(SUBROUTINE, _subroutine())
