@@ -270,7 +270,11 @@ class Translator:
     def _look(self, next_pc: int) -> None:
         """The instruction before may have made an interrupt acceptable: look if any is requested at all."""
         e = self.e
-        e.end(f"br i1 {self._requests().text}, label %{self.exit(next_pc, SERVICE)}, label %{self._label(next_pc)}")
+        some = e.fresh("some")
+        e.end(f"br i1 {self._requests().text}, label %{some}, label %{self._label(next_pc)}")
+        e.start(some)
+        e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
+        e.end(f"br label %{self.exit(next_pc, SERVICE)}")
 
     def _check_retfie(self, flow: Return) -> None:
         """Native RETFIE: no trap level involved, nothing else requested (isa.md §14.3)."""

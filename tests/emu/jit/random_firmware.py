@@ -85,6 +85,14 @@ def random_words(row: Row, generator: random.Random, at: int, end: int) -> list[
     return list(codec.encode(row, x))
 
 
+def interrupt_words(generator: random.Random) -> list[int]:
+    """An instruction that changes what is acceptable: IPL, flags or enables."""
+    sfrs = DSPIC30F6014A.sfrs
+    register, bits = generator.choice((("SR", (5, 6, 7)), ("IFS0", (3, 6, 7)), ("IEC0", (3, 6, 7))))
+    syntax = generator.choice(("BSET{.B} f, #bit4", "BCLR{.B} f, #bit4", "BTG{.B} f, #bit4"))
+    return words_of(syntax, f=sfrs[register].address, b=generator.choice(bits))
+
+
 def random_firmware(seed: int) -> Firmware:
     """A program that never ends by itself, except through a reset for a fault."""
     generator = random.Random(seed)
@@ -119,6 +127,8 @@ def random_firmware(seed: int) -> Firmware:
     while at < end:
         row = generator.choice(ROWS)
         words = random_words(row, generator, at, end)
+        if generator.random() < 0.1:
+            words = interrupt_words(generator)
         if words is not None:
             at = firmware.put(at, words)
     firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40 if generator.random() < 0.8 else CODE - 2))
