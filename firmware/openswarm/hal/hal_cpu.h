@@ -16,11 +16,13 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
 #include "hal_port.h"
 /* hal_port.h defines:
  *   HAL_USED, HAL_NORETURN        attributes: referenced from assembly only; does not return
+ *   HAL_INLINE, HAL_OUTLINE       attributes: always, never copied into the caller
  *   hal_lock_state                opaque level
  *   hal_limit                     type of a stack limit
  *   HAL_ALLOCATION_FAILS()        false; a test port may say true to make the next allocation fail
  * and declares or defines inline:
  *   hal_lock_state hal_lock_slice(void);      at least level slice; nests; any context
+ *   void hal_enter_slice(void);               from thread level, which the caller has checked, to level slice
  *   hal_lock_state hal_lock_devices(void);    at least level device; nests; any context; held for <= 40 Tcy
  *   void hal_unlock(hal_lock_state before);   restore, never lower than before; takes what became due meanwhile
  *   bool hal_in_thread(void);                 level is below slice: a thread outside critical sections

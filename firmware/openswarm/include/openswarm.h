@@ -168,7 +168,7 @@ uint16 Sys_Get_LostEvents(uint16 event);
 
 typedef struct {
     uint16 heap_used;   /* bytes taken from the heap now; free lists are not counted */
-    uint16 heap_peak;   /* largest heap_used so far */
+    uint16 heap_peak;   /* largest extent of the heap so far: blocks in use and free lists between them */
     uint16 events_lost; /* messages refused for lack of memory; saturates */
     uint16 refused;     /* calls from a context that may not make them; saturates */
     uint16 deadlines_missed;

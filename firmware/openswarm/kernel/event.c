@@ -9,31 +9,40 @@
 
 #define PAYLOAD(m) ((uint8 *)(m) + sizeof(message))
 
-static event *events;                        /* in order of registration */
-static message *queue_head, *queue_tail;     /* devices locked */
+enum { BUCKETS = 8 };                        /* a power of two */
+static event *events[BUCKETS];               /* by the low bits of the identifier */
+static message *queue, **queue_end;          /* devices locked */
 static message *undelivered;                 /* the rest of the batch in delivery */
 static subscription *next_subscriber;        /* the delivery's place in the list, moved by removals */
 
 void event_init(void)
 {
-    events = NULL;
-    queue_head = NULL;
+    for (uint16 i = 0; i < BUCKETS; i++) {
+        events[i] = NULL;
+    }
+    queue = NULL;
+    queue_end = &queue;
     undelivered = NULL;
     next_subscriber = NULL;
 }
 
 /* ---- Registration ------------------------------------------------------------------------------------------- */
 
-event *event_find(uint16 id)
+static HAL_INLINE event *find(uint16 id)
 {
-    event *e = events;
+    event *e = events[id % BUCKETS];
     while (e != NULL && e->id != id) {
         e = e->next;
     }
     return e;
 }
 
-static bool event_awaited(const event *e)
+event *event_find(uint16 id)
+{
+    return find(id);
+}
+
+static HAL_OUTLINE bool event_awaited(const event *e)
 {
     for (const sys_pcb *p = os_blocked; p != NULL; p = p->next) {
         if (p->awaited == e) {
@@ -57,7 +66,7 @@ bool Sys_Register_Event(uint16 id)
         return os_refuse();
     }
     hal_lock_state lock = hal_lock_slice();
-    event **link = &events;
+    event **link = &events[id % BUCKETS];
     while (*link != NULL && (*link)->id != id) {
         link = &(*link)->next;
     }
@@ -118,7 +127,7 @@ bool Sys_Unregister_Event(uint16 id)
         return os_refuse();
     }
     hal_lock_state lock = hal_lock_slice();
-    event **link = &events;
+    event **link = &events[id % BUCKETS];
     while (*link != NULL && (*link)->id != id) {
         link = &(*link)->next;
     }
@@ -130,7 +139,7 @@ bool Sys_Unregister_Event(uint16 id)
             unlink_subscription(&e->subscribers);
         }
         wake_waiters_of(e);
-        disown_messages(queue_head, e);
+        disown_messages(queue, e);
         disown_messages(undelivered, e);
         event_forget_losses(id);
         heap_give(e, sizeof *e);
@@ -216,22 +225,21 @@ bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)
 
 void event_drop_subscriptions(uint16 pid)
 {
-    for (event *e = events; e != NULL; e = e->next) {
-        (void)unsubscribe(e, pid, NULL);
+    for (uint16 i = 0; i < BUCKETS; i++) {
+        for (event *e = events[i]; e != NULL; e = e->next) {
+            (void)unsubscribe(e, pid, NULL);
+        }
     }
 }
 
 /* ---- Sending ------------------------------------------------------------------------------------------------ */
 
-static void enqueue(message *m)
+static HAL_INLINE void enqueue(message *m)
 {
+    m->queued.next = NULL;
     hal_lock_state lock = hal_lock_devices();
-    if (queue_head == NULL) {
-        queue_head = m;
-    } else {
-        queue_tail->queued.next = m;
-    }
-    queue_tail = m;
+    *queue_end = m;
+    queue_end = &m->queued.next;
     os_pending |= OS_MESSAGES;
     hal_unlock(lock);
     if (os_eager) {
@@ -239,29 +247,43 @@ static void enqueue(message *m)
     }
 }
 
+static HAL_OUTLINE bool refuse_message(uint16 id, sys_error error)
+{
+    if (error == SYS_ERROR_MEMORY) {
+        event_lost(id);
+    }
+    return os_fail(error);
+}
+
+static HAL_INLINE void copy(void *to, const void *from, uint16 size)
+{
+    if (size == sizeof(uint16)) { /* most events; a byte each, because from may be odd */
+        ((uint8 *)to)[0] = ((const uint8 *)from)[0];
+        ((uint8 *)to)[1] = ((const uint8 *)from)[1];
+    } else if (size != 0) {
+        memcpy(to, from, size);
+    }
+}
+
 bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
 {
     bool sent = true;
-    if (size > SYS_MAXIMUM_PAYLOAD || (data == NULL && size != 0) || (size > SYS_SMALL_PAYLOAD && hal_in_isr())) {
+    if ((size > SYS_SMALL_PAYLOAD && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) || (data == NULL && size != 0)) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
     hal_lock_state lock = hal_lock_slice();
-    event *e = event_find(id);
+    event *e = find(id);
     if (e == NULL) {
-        sent = os_fail(SYS_ERROR_EVENT);
+        sent = refuse_message(id, SYS_ERROR_EVENT);
     } else if (e->subscribers != NULL || event_awaited(e)) {
         message *m = heap_take((uint16)(sizeof *m + size));
         if (m != NULL) {
-            m->queued.next = NULL;
             m->queued.event = e;
             m->queued.size = size;
-            if (size != 0) {
-                memcpy(PAYLOAD(m), data, size);
-            }
+            copy(PAYLOAD(m), data, size);
             enqueue(m);
         } else {
-            event_lost(id);
-            sent = os_fail(SYS_ERROR_MEMORY);
+            sent = refuse_message(id, SYS_ERROR_MEMORY);
         }
     }
     hal_unlock(lock);
@@ -341,8 +363,9 @@ static void deliver(message *m)
 void event_deliver_queued(void)
 {
     hal_lock_state lock = hal_lock_devices();
-    undelivered = queue_head;
-    queue_head = NULL;
+    undelivered = queue;
+    queue = NULL;
+    queue_end = &queue;
     os_pending &= (uint16)~OS_MESSAGES;
     hal_unlock(lock);
     while (undelivered != NULL) {

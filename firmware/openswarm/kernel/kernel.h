@@ -135,6 +135,6 @@ void event_forget_losses(uint16 id);
 
 /* fault.c */
 HAL_USED sys_pcb *os_overflow(void); /* kernel stack: the running thread hit its stack limit; picks the next */
-HAL_NORETURN HAL_USED void os_trap(const char *cause, uint32 pc);
+HAL_NORETURN void os_trap(const char *cause, uint32 pc);
 
 #endif

@@ -14,7 +14,6 @@ struct block { /* what a free block holds */
 };
 
 #define END (os_memory.bytes + sizeof os_memory.bytes)
-#define CLASS(size) ((size) / HEAP_STEP - 1u)
 
 os_memory_space os_memory;
 
@@ -37,53 +36,69 @@ static uint16 round_up(uint16 size)
     return (uint16)((size + (HEAP_STEP - 1u)) & ~(HEAP_STEP - 1u));
 }
 
-/* Devices locked by the caller of the two functions below: a few instructions each. */
-static void count_taken(uint16 size)
+/* Where the list of a size begins: list n holds blocks of (n + 1) * HEAP_STEP bytes, and a list head is HEAP_STEP long. */
+static block **list_of(uint16 size)
 {
-    os_statistics.heap_used += size;
-    if (os_statistics.heap_used > os_statistics.heap_peak) {
-        os_statistics.heap_peak = os_statistics.heap_used;
+    return (block **)(void *)((uint8 *)small + size - HEAP_STEP);
+}
+
+/* The peak is the largest extent, so that taking from a free list, the fast path, need not look. */
+static HAL_OUTLINE void note_extent(void)
+{
+    uint16 extent = (uint16)(brk - os_memory.bytes - SYS_KERNEL_STACK + (END - top));
+    if (extent > os_statistics.heap_peak) {
+        os_statistics.heap_peak = extent;
     }
 }
 
+/* Devices locked. */
 static void push_small(void *freed, uint16 size)
 {
     block *b = freed;
-    if ((uint8 *)freed + size == brk) {
-        brk = freed;
-    } else {
-        b->next = small[CLASS(size)];
-        small[CLASS(size)] = b;
-    }
+    b->next = *list_of(size);
+    *list_of(size) = b;
 }
 
-static void *pop_small(uint16 size)
+static HAL_INLINE void *pop_small(uint16 size)
 {
+    block **list = list_of(size);
     hal_lock_state lock = hal_lock_devices();
-    block *b = small[CLASS(size)];
+    block *b = *list;
     if (b != NULL) {
-        small[CLASS(size)] = b->next;
-    } else if ((uint16)(top - brk) >= size) {
-        b = (block *)brk;
-        brk += size;
-    }
-    if (b != NULL) {
-        count_taken(size);
+        *list = b->next;
+        os_statistics.heap_used += size;
     }
     hal_unlock(lock);
     return b;
 }
 
-/* Slow path, nothing of this size is left: cut a larger free block. At most HEAP_CLASSES short locks. */
+/* From the untouched memory between small and large blocks. */
+static void *raise_brk(uint16 size)
+{
+    void *taken = NULL;
+    hal_lock_state lock = hal_lock_devices();
+    if ((uint16)(top - brk) >= size) {
+        taken = brk;
+        brk += size;
+        os_statistics.heap_used += size;
+    }
+    hal_unlock(lock);
+    if (taken != NULL) {
+        note_extent();
+    }
+    return taken;
+}
+
+/* Nothing of this size is left and nothing is untouched: cut a larger free block. At most HEAP_CLASSES short locks. */
 static void *split_small(uint16 size)
 {
     for (uint16 bigger = (uint16)(size + HEAP_STEP); bigger <= HEAP_CLASSES * HEAP_STEP; bigger += HEAP_STEP) {
         hal_lock_state lock = hal_lock_devices();
-        block *b = small[CLASS(bigger)];
+        block *b = *list_of(bigger);
         if (b != NULL) {
-            small[CLASS(bigger)] = b->next;
+            *list_of(bigger) = b->next;
             push_small((uint8 *)b + size, (uint16)(bigger - size));
-            count_taken(size);
+            os_statistics.heap_used += size;
         }
         hal_unlock(lock);
         if (b != NULL) {
@@ -98,8 +113,8 @@ static void *split_small(uint16 size)
 static block *unlink_last(uint16 size)
 {
     hal_lock_state lock = hal_lock_devices();
-    block *first = small[CLASS(size)];
-    small[CLASS(size)] = NULL;
+    block *first = *list_of(size);
+    *list_of(size) = NULL;
     hal_unlock(lock);
     block **link = &first;
     while (*link != NULL && (uint8 *)*link + size != brk) {
@@ -109,7 +124,7 @@ static block *unlink_last(uint16 size)
     if (last != NULL) {
         *link = last->next;
     }
-    small[CLASS(size)] = first;
+    *list_of(size) = first;
     return last;
 }
 
@@ -120,14 +135,18 @@ static void shrink_small(void)
     uint16 size = HEAP_STEP;
     while (size <= HEAP_CLASSES * HEAP_STEP) {
         block *last = unlink_last(size);
-        if (last != NULL) {
-            hal_lock_state lock = hal_lock_devices();
-            push_small(last, size); /* to brk, unless an ISR has moved it meanwhile */
-            hal_unlock(lock);
-            size = HEAP_STEP;
-        } else {
+        if (last == NULL) {
             size = (uint16)(size + HEAP_STEP);
+            continue;
         }
+        hal_lock_state lock = hal_lock_devices();
+        if ((uint8 *)last + size == brk) {
+            brk = (uint8 *)last;
+        } else { /* an ISR has moved it meanwhile */
+            push_small(last, size);
+        }
+        hal_unlock(lock);
+        size = HEAP_STEP;
     }
 }
 
@@ -139,6 +158,7 @@ static bool lower_top(uint16 size)
         top -= size;
     }
     hal_unlock(lock);
+    note_extent();
     return fits;
 }
 
@@ -193,33 +213,37 @@ static void give_large(uint8 *freed, uint16 size)
     }
 }
 
+static HAL_OUTLINE void *take_slowly(uint16 size)
+{
+    void *taken;
+    if (size > HEAP_CLASSES * HEAP_STEP) {
+        taken = hal_in_isr() ? NULL : take_large(size);
+        if (taken != NULL) {
+            hal_lock_state lock = hal_lock_devices();
+            os_statistics.heap_used += size;
+            hal_unlock(lock);
+        }
+        return taken;
+    }
+    taken = raise_brk(size);
+    if (taken == NULL) {
+        taken = split_small(size);
+    }
+    if (taken == NULL && !hal_in_isr()) {
+        shrink_small();
+        taken = raise_brk(size);
+    }
+    return taken;
+}
+
 void *heap_take(uint16 size)
 {
     if (HAL_ALLOCATION_FAILS()) {
         return NULL;
     }
     size = round_up(size);
-    if (size <= HEAP_CLASSES * HEAP_STEP) {
-        void *taken = pop_small(size);
-        if (taken == NULL) {
-            taken = split_small(size);
-        }
-        if (taken == NULL && !hal_in_isr()) {
-            shrink_small();
-            taken = pop_small(size);
-        }
-        return taken;
-    }
-    if (hal_in_isr()) {
-        return NULL;
-    }
-    void *taken = take_large(size);
-    if (taken != NULL) {
-        hal_lock_state lock = hal_lock_devices();
-        count_taken(size);
-        hal_unlock(lock);
-    }
-    return taken;
+    void *taken = size <= HEAP_CLASSES * HEAP_STEP ? pop_small(size) : NULL;
+    return taken != NULL ? taken : take_slowly(size);
 }
 
 void heap_give(void *freed, uint16 size)

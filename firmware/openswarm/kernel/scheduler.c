@@ -63,10 +63,10 @@ void Sys_Yield(void)
 {
     if (!hal_in_thread()) {
         os_refuse();
-    } else {
-        (void)hal_lock_slice();
-        hal_switch(os_slice_end);
+        return;
     }
+    hal_enter_slice();
+    hal_switch(os_slice_end);
 }
 
 void Sys_Set_Scheduler(const sys_scheduler *scheduler)

@@ -9,6 +9,8 @@
 
 #define HAL_USED __attribute__((used))
 #define HAL_NORETURN __attribute__((noreturn))
+#define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
+#define HAL_OUTLINE __attribute__((noinline))            /* cold */
 #define HAL_ALLOCATION_FAILS() false
 
 typedef uint8_t hal_lock_state; /* low byte of SR */
@@ -26,13 +28,13 @@ typedef uint16_t hal_limit;
 enum { CPU_IPL_SLICE = 0x20, CPU_IPL_DEVICE = 0x80, CPU_IPL = 0xE0 };
 
 /* After a write that raises the IPL one more instruction may run at the old one (isa.md §14.3): give it a harmless one. */
-static inline __attribute__((always_inline)) void cpu_raise_ipl(uint8_t bit)
+static HAL_INLINE void cpu_raise_ipl(uint8_t bit)
 {
     CPU_SRL |= bit;
     __asm__ volatile("nop" ::: "memory");
 }
 
-static inline __attribute__((always_inline)) hal_lock_state hal_lock_slice(void)
+static HAL_INLINE hal_lock_state hal_lock_slice(void)
 {
     hal_lock_state before = CPU_SRL;
     /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. */
@@ -43,41 +45,46 @@ static inline __attribute__((always_inline)) hal_lock_state hal_lock_slice(void)
     return before;
 }
 
-static inline __attribute__((always_inline)) hal_lock_state hal_lock_devices(void)
+static HAL_INLINE void hal_enter_slice(void)
+{
+    cpu_raise_ipl(CPU_IPL_SLICE);
+}
+
+static HAL_INLINE hal_lock_state hal_lock_devices(void)
 {
     hal_lock_state before = CPU_SRL;
     cpu_raise_ipl(CPU_IPL_DEVICE);
     return before;
 }
 
-static inline __attribute__((always_inline)) void hal_unlock(hal_lock_state before)
+static HAL_INLINE void hal_unlock(hal_lock_state before)
 {
     __asm__ volatile("" ::: "memory");
     CPU_SRL = before;
 }
 
-static inline __attribute__((always_inline)) bool hal_in_thread(void)
+static HAL_INLINE bool hal_in_thread(void)
 {
     return (CPU_SRL & CPU_IPL) == 0;
 }
 
-static inline __attribute__((always_inline)) bool hal_in_isr(void)
+static HAL_INLINE bool hal_in_isr(void)
 {
     return (CPU_SRL & CPU_IPL_DEVICE) != 0;
 }
 
-static inline __attribute__((always_inline)) void hal_barrier(void)
+static HAL_INLINE void hal_barrier(void)
 {
     __asm__ volatile("" ::: "memory");
 }
 
-static inline __attribute__((always_inline)) void hal_slice_restart(void)
+static HAL_INLINE void hal_slice_restart(void)
 {
     TMR2 = 0; /* also clears the prescaler */
     IFS0bits.T2IF = 0;
 }
 
-static inline __attribute__((always_inline)) void hal_slice_force(void)
+static HAL_INLINE void hal_slice_force(void)
 {
     IFS0bits.T2IF = 1;
 }

@@ -44,15 +44,7 @@ __T2Interrupt:
         mov     #_os_memory, w15
         bclr    SR, #7                  ; IPL 1, on the kernel stack
         rcall   _os_slice_end
-
-; ---- W0 = thread to resume; kernel stack, IPL 1 ------------------------------------------------------------------
-resume:
-        bset    SR, #7                  ; IPL 5
-        mov     [w0+PCB_LIMIT], w1      ; harmless if one more interrupt slips in
-        mov     w1, SPLIM               ; above the kernel stack, where W15 still is
-        mov     [w0], w15
-        pop     w1
-        goto    w1
+        bra     resume
 
 resume_preempted:
         pop     PSVPAG
@@ -88,7 +80,15 @@ _hal_switch:
 _hal_abandon:
         mov     #_os_memory, w15
         call    w0
-        bra     resume
+
+; ---- W0 = thread to resume; kernel stack, IPL 1 ------------------------------------------------------------------
+resume:
+        bset    SR, #7                  ; IPL 5
+        mov     [w0+PCB_LIMIT], w1      ; harmless if one more interrupt slips in
+        mov     w1, SPLIM               ; above the kernel stack, where W15 still is
+        mov     [w0], w15
+        pop     w1
+        goto    w1
 
         .global _os_resume_yielded
 _os_resume_yielded:

@@ -51,6 +51,11 @@ hal_lock_state hal_lock_slice(void)
     return raise_to(SLICE);
 }
 
+void hal_enter_slice(void)
+{
+    level = SLICE;
+}
+
 hal_lock_state hal_lock_devices(void)
 {
     return raise_to(DEVICE);
