@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -33,7 +34,10 @@ def main(arguments: list[str]) -> int:
     p.add_argument("-L", dest="folders", action="append", default=[], metavar="DIR", help="search -l libraries here")
     p.add_argument("-l", dest="libraries", action="append", default=[], metavar="NAME", help="link libNAME.a")
     add_options(p)
+    p.add_argument("-T", "--script", help=argparse.SUPPRESS)
     options = p.parse_args(arguments)
+    if options.script:
+        raise ToolError(f"{options.script}: no linker script is needed, the memory map of the 30F6014A is built in")
     names = [*options.inputs, *(str(find_library(n, options.folders)) for n in options.libraries)]
     if not names:
         raise ToolError("no input files")

@@ -134,6 +134,8 @@ class Placer:
                 self._record(section, region.start)
             elif section.flags & SectionFlag.ABSOLUTE:
                 address = psv_address(section.load) if section.is_psv else section.load
+                if section.is_psv and address + section.units > PSV_WINDOW + PSV_PAGE_UNITS:
+                    raise ToolError(f"{self._name(section)} at {section.load:#x} crosses a PSV window of 32 KB")
                 self._fix(section, self.layout.program, section.load, address, "program memory")
         for section in self.by_space.get("config", []):
             self._config(section)
