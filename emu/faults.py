@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 TRAP_FLAGS: Final = {
     "OscillatorFail": ("OSCFAIL", "oscillator failure trap"),
-    "AddressError": ("ADDRERR", "address error trap (odd word address, unimplemented memory, or a wild jump)"),
+    "AddressError": ("ADDRERR", "address error trap (odd address, nothing there, or wild jump)"),
     "StackError": ("STKERR", "stack error trap (W15 above SPLIM or below RAM)"),
-    "MathError": ("MATHERR", "math error trap (division by zero, accumulator overflow or bad shift)"),
+    "MathError": ("MATHERR", "math error trap (division by zero, accumulator overflow, bad shift)"),
 }
 """Vector name to flag of INTCON1 (isa.md §14.4) and what to call it."""
 RETURN_BYTES: Final = 4
@@ -60,11 +60,11 @@ def _unhandled(machine: Machine, vectors: list[Vector], stop: Stop) -> Fault | N
             if flag and intcon1 >> fields[flag][0] & 1:
                 # Only a division stacks its own address; the others stack what follows (isa.md §14.4).
                 culprit = back if flag == "MATHERR" or back == stop.pc else back - 2
-                return Fault(f"{words} without a handler", culprit, stop.cycle)
-        return Fault("trap without a handler", back, stop.cycle)
+                return Fault(f"{words}, no handler,", culprit, stop.cycle)
+        return Fault("trap, no handler,", back, stop.cycle)
     for vector in vectors:
         if vector.irq in machine.chip.interrupts and _is_pending(machine, vector.irq):
-            return Fault(f"{vector.name} without a handler", back, stop.cycle)
+            return Fault(f"{vector.name}, no handler,", back, stop.cycle)
     return None
 
 

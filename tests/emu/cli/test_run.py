@@ -82,7 +82,7 @@ def test_a_debugger_word_ends_the_run_with_w0_as_status(build):
         ("main:\nmov #0x900, w0\nmov w0, {SPLIM}\nmov w0, w15\npush w0\npush w0\nnop\nnop\n", "stack error trap"),
         ("main:\nmov [w1], w2\n", "W1 is used as an address pointer before it was written"),
         ("main:\n.pword 0xDB0000\n", "illegal opcode DB0000"),
-        ("main:\nbset {IEC0}, #3\nbset {IFS0}, #3\nnop\nnop\nnop\n", "T1Interrupt without a handler"),
+        ("main:\nbset {IEC0}, #3\nbset {IFS0}, #3\nnop\nnop\nnop\n", "T1Interrupt, no handler,"),
         ("main:\nreset\n", "reset loop: RESET instruction"),
     ],
 )
