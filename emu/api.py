@@ -25,20 +25,29 @@ True
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from emu.loader import load_image
 from emu.machine import Machine, Stop
+from emu.peripherals import Peripherals
 
 
-def load(path: str | os.PathLike[str], *, engine: str = "auto", ipl_slip: int = 0) -> Machine:
+def load(
+    path: str | os.PathLike[str],
+    *,
+    engine: str = "auto",
+    ipl_slip: int = 0,
+    board: Callable[[Peripherals], Any] | None = None,
+) -> Machine:
     """A machine with the firmware file at `path`, ELF or Intel HEX, ready to run from reset.
 
+    `board` is what is around the chip, for example `emu.boards.epuck.board.Epuck`; bare pins without.
     Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine.
     """
     image = load_image(path)
-    machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip)
+    machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip, board=board)
     machine.load(image)
     return machine
 

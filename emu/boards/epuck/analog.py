@@ -8,6 +8,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Final
 
+from emu.boards.noise import Noise
 from emu.boards.part import Part
 from emu.peripherals import Peripherals
 
@@ -18,6 +19,9 @@ PULSE_PINS: Final = ("RF7", "RF8", "RG0", "RG1")
 TAU_SECONDS: Final = 60e-6
 """Time constant of the receiver behind its emitter (epuck.md §10)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
+
+NOISE_COUNTS, NOISE_SHARE = 5.0, 0.03
+"""Standard deviation in counts and as a share of the reflection, whichever is larger (epuck.md §5)."""
 
 RESPONSE: Final = (  # distance in mm, reflection in counts: OpenSwarm's table (epuck.md §5)
     (0.0, 3788.0), (10.0, 3548.0), (20.0, 857.0), (30.0, 474.0), (40.0, 296.0), (50.0, 205.0),
@@ -39,8 +43,9 @@ def reflection_at(distance_mm: float, table: tuple[tuple[float, float], ...] = R
 class Infrared(Part):
     """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled."""
 
-    def __init__(self, chip: Peripherals) -> None:
+    def __init__(self, chip: Peripherals, noise: Noise) -> None:
         super().__init__("ir", chip)
+        self._noise: Final = noise
         self.ambient: Final = self.array("ambient", "H", SENSORS)
         """Raw counts with the emitter off, per sensor. Falls with light."""
         self.reflection: Final = self.array("reflection", "H", SENSORS)
@@ -85,7 +90,9 @@ class Infrared(Part):
 
     def _level(self, sensor: int, cycle: int) -> int:
         lowered = self.reflection[sensor] * self._share(sensor % len(PULSE_PINS), cycle)
-        return min(max(round(self.ambient[sensor] - lowered), 0), 4095) << 4
+        deviation = max(NOISE_COUNTS, NOISE_SHARE * lowered)
+        raw = self.ambient[sensor] - lowered + self._noise.at(_FIRST_CHANNEL + sensor, cycle, deviation)
+        return min(max(round(raw), 0), 4095) << 4
 
 
 class Accelerometer(Part):
@@ -109,18 +116,23 @@ class Accelerometer(Part):
 class Microphones(Part):
     """Three microphones on AN2..AN4: 2048 in silence; sound is a function of the cycle."""
 
+    ZERO: Final = 2048
+    DEVIATION: Final = 7.0
+    """Idle noise in counts: +-20 is three deviations (epuck.md §6)."""
     _FIRST: Final = 2
 
-    def __init__(self, chip: Peripherals) -> None:
+    def __init__(self, chip: Peripherals, noise: Noise) -> None:
         super().__init__("microphones", chip)
+        self._noise: Final = noise
         for microphone in range(3):
-            chip.adc.set_input(self._FIRST + microphone, 2048 << 4)
+            self.play(microphone, None)
 
     def play(self, microphone: int, sound: Callable[[int], float] | None) -> None:
         """Let `sound(cycle)` (in counts around 0) reach microphone 0..2 (right, left, back), or None for silence."""
         self.chip.adc.catch_up(self.now)
-        self.chip.adc.source[self._FIRST + microphone] = None if sound is None else partial(self._level, sound)
+        channel = self._FIRST + microphone
+        self.chip.adc.source[channel] = partial(self._level, channel, sound)
 
-    @staticmethod
-    def _level(sound: Callable[[int], float], cycle: int) -> int:
-        return min(max(round(2048 + sound(cycle)), 0), 4095) << 4
+    def _level(self, channel: int, sound: Callable[[int], float] | None, cycle: int) -> int:
+        heard = self.ZERO + self._noise.at(channel, cycle, self.DEVIATION) + (sound(cycle) if sound is not None else 0)
+        return min(max(round(heard), 0), 4095) << 4

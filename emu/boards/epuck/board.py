@@ -11,6 +11,7 @@ from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote
 from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
 from emu.boards.epuck.stimulus import Stimulus
+from emu.boards.noise import Noise
 from emu.peripherals import Peripherals
 
 if TYPE_CHECKING:  # arrays are loaded when somebody asks for them
@@ -21,18 +22,20 @@ class Epuck:
     """An e-puck of hardware version 1.1 or 1.2: analog accelerometer, nothing at I2C address 0x3C.
 
     `chip` is `machine.peripherals`. `camera` names the sensor (PO3030K, PO6030K, PO8030D), None leaves it unplugged.
+    `seed` chooses noise and radio losses, which are off until asked for (`noise.strength`, `bluetooth.loss`).
     Raises ValueError for an unknown sensor or selector position.
     """
 
     def __init__(self, chip: Peripherals, *, camera: str | None = "PO6030K", selector: int = 0, seed: int = 0) -> None:
         self.chip: Final = chip
+        self.noise: Final = Noise(chip.kit.bus.record, seed)
         self.leds: Final = Leds(chip)
         self.motors: Final = Motors(chip)
         self.selector: Final = Selector(chip, selector)
         self.battery: Final = Battery(chip)
-        self.ir: Final = Infrared(chip)
+        self.ir: Final = Infrared(chip, self.noise)
         self.accelerometer: Final = Accelerometer(chip)
-        self.microphones: Final = Microphones(chip)
+        self.microphones: Final = Microphones(chip, self.noise)
         self.remote: Final = Remote(chip)
         self.bluetooth: Final = Bluetooth(chip, seed=seed)
         self.codec: Final = Codec(chip)

@@ -101,16 +101,26 @@ class Battery(Part):
 
 
 class Codec(Part):
-    """The Si3000 behind the DCI: takes words, returns silence; RF0 low holds it in reset (epuck.md §6)."""
+    """The Si3000 behind the DCI: takes samples and control words, returns silence; RF0 low holds it in reset
+    (epuck.md §6). A sample with bit 0 set asks for a secondary frame: the next word is a control word.
+
+    UNVERIFIED layout of control words: register number in bits 12:8, value in bits 7:0.
+    """
+
+    _REGISTERS: Final = 32
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("codec", chip)
         self._words: Final = self.cell("words", "Q")
         self._last: Final = self.cell("last", "H")
-        self.on_word: Callable[[int, int], None] | None = None
-        """on_word(word, cycle): for players and recorders."""
+        self._control_next: Final = self.cell("control_next", "B")
+        self.registers: Final = self.array("registers", "B", self._REGISTERS)
+        """What control words have written."""
+        self.on_sample: Callable[[int, int], None] | None = None
+        """on_sample(sample, cycle), sample -32768..32767: for players and recorders."""
         chip.dci.on_word = self._take
         chip.dci.source = lambda _slot, _cycle: 0
+        self.pins.watch("RF0", self._reset_moved)
 
     @property
     def is_on(self) -> bool:
@@ -129,11 +139,23 @@ class Codec(Part):
         return self._last.value
 
     def _take(self, word: int, _slot: int, cycle: int) -> None:
-        if self.is_on:
-            self._words.value += 1
-            self._last.value = word
-            if self.on_word is not None:
-                self.on_word(word, cycle)
+        if not self.is_on:
+            return
+        self._words.value += 1
+        self._last.value = word
+        if self._control_next.value:
+            self._control_next.value = 0
+            self.registers[word >> 8 & self._REGISTERS - 1] = word & 0xFF
+            return
+        self._control_next.value = word & 1
+        if self.on_sample is not None:
+            self.on_sample(word - (word >> 15 << 16), cycle)
+
+    def _reset_moved(self, _cycle: int, changed: int, levels: int) -> None:
+        if not changed & levels:
+            self._control_next.value = 0
+            for number in range(self._REGISTERS):
+                self.registers[number] = 0
 
 
 class Bluetooth(Part):

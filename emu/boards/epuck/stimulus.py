@@ -8,13 +8,14 @@
     2.0s    battery   3.3             volts
     2.5s    tilt      0.1 0 0.98      acceleration x y z in g
     3.0s    uart1     "hello\\r"       bytes for UART1 or uart2
-    4.0s    pin       RF6 0           any input pin
     3.5s    uart1     "x" framing     the same with a broken stop bit; also parity, break
+    4.0s    pin       RF6 0           any input pin
     5.0s    camera    unplug          or: plug
     5.0s    picture   room.png        what the camera sees; paths are relative to the working folder
     6.0s    lamp      0.5             brightness of the scene, 1 = as in the picture
     7.0s    bluetooth down            or: up
     8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
+    0       noise     1               sensor noise as the reference says; 0 = none
 
 Times are seconds (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep the order of the file.
 """
@@ -98,6 +99,7 @@ def _action(board: Epuck, words: list[str]) -> Action:
         "lamp": _lamp,
         "bluetooth": _bluetooth,
         "i2c": _i2c,
+        "noise": _noise,
     }
     if not words or words[0] not in kinds:
         raise ValueError(f"expected one of {', '.join(kinds)} behind the time")
@@ -206,6 +208,14 @@ def _bluetooth(board: Epuck, words: list[str]) -> Action:
     if words[0] not in ("up", "down"):
         raise ValueError(f"the link is `up` or `down`, not {words[0]!r}")
     return lambda: setattr(board.bluetooth, "connected", words[0] == "up")
+
+
+def _noise(board: Epuck, words: list[str]) -> Action:
+    _count(words, 1)
+    strength = float(words[0])
+    if not 0 <= strength <= 100:
+        raise ValueError("strength of noise is 0 (none) to 100, 1 = as the reference says")
+    return lambda: setattr(board.noise, "strength", strength)
 
 
 def _i2c(board: Epuck, words: list[str]) -> Action:

@@ -10,8 +10,8 @@ from emu.boards.epuck.simple import Bluetooth
 from emu.peripherals.uart import Uart
 
 TOPICS: Final = ("leds", "motors", "uart1", "uart2", "sound")
-_MOTOR_SECONDS: Final = 0.1
-"""Motors are reported at most this often."""
+_PAUSE_SECONDS: Final = 0.1
+"""Motors and sound are reported at most this often."""
 
 
 class Watch:
@@ -27,6 +27,7 @@ class Watch:
         self._last_report: int | None = None
         self._next_report = 0
         self._watches_motors = False
+        self._loudest = self._next_sound = 0
         self._text: Final = {1: bytearray(), 2: bytearray()}
         for topic in topics:
             if topic not in TOPICS:
@@ -52,7 +53,7 @@ class Watch:
             return
         second = self._board.chip.fcy
         last, self._last_report = self._last_report, cycle
-        self._next_report = cycle + round(_MOTOR_SECONDS * second)  # reading the other motor may report its step
+        self._next_report = cycle + round(_PAUSE_SECONDS * second)  # reading the other motor may report its step
         steps = [self._board.motors.left.steps, self._board.motors.right.steps]
         text = f"motors {steps[0]} {steps[1]} steps"
         if last is not None:
@@ -101,4 +102,13 @@ class Watch:
                     self._line(now, f"{side} motor: {motor.lost} steps lost, {motor.illegal} illegal patterns")
 
     def _watch_sound(self) -> None:
-        self._board.codec.on_word = lambda word, cycle: self._line(cycle, f"sound {word:04x}")
+        self._board.codec.on_sample = self._sample
+
+    def _sample(self, sample: int, cycle: int) -> None:
+        """Sound is told like motors: the loudest sample of a tenth of a second."""
+        self._loudest = max(self._loudest, abs(sample))
+        if cycle >= self._next_sound:
+            if self._loudest:
+                self._line(cycle, f"sound up to {self._loudest}")
+            self._loudest = 0
+            self._next_sound = cycle + round(_PAUSE_SECONDS * self._board.chip.fcy)

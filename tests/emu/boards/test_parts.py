@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from itertools import pairwise
 
 import pytest
@@ -234,6 +235,34 @@ def test_codec_takes_words_only_out_of_reset(robot):
     robot.at(5000)
     assert robot.board.codec.words == 2
     assert robot.read("RXBUF0") == 0
+
+
+def test_codec_control_words_follow_samples_that_ask_for_them(robot):
+    """§6: LSB = 1 of the primary word requests a secondary frame; DAC volume 0x5F into register 7."""
+    heard = []
+    robot.board.codec.on_sample = lambda sample, _cycle: heard.append(sample)
+    robot.output("RF0", 1)
+    robot.at(100)
+    for word in (0x7FFF, 0x075F, 0x8000, 0x0002):
+        robot.board.chip.dci.on_word(word, 0, 200)
+    assert robot.board.codec.registers[7] == 0x5F
+    assert heard == [0x7FFF, -0x8000, 2]
+    robot.output("RF0", 0)
+    assert robot.board.codec.registers[7] == 0
+
+
+def test_noise_is_off_repeatable_and_as_strong_as_asked(robot):
+    """§5: sigma = max(5, 3 %); §6: microphones +-20."""
+    ir, microphones = robot.board.ir, robot.board.microphones
+    assert {ir._level(0, cycle) >> 4 for cycle in range(100)} == {3800}
+    robot.board.noise.strength = 1.0
+    codes = [ir._level(0, cycle) >> 4 for cycle in range(0, 200_000, 100)]
+    assert codes == [ir._level(0, cycle) >> 4 for cycle in range(0, 200_000, 100)]
+    assert codes != [ir._level(1, cycle) >> 4 for cycle in range(0, 200_000, 100)]
+    assert statistics.mean(codes) == pytest.approx(3800, abs=0.5)
+    assert statistics.stdev(codes) == pytest.approx(5, rel=0.1)
+    silence = [microphones._level(2, None, cycle) >> 4 for cycle in range(2000)]
+    assert statistics.stdev(silence) == pytest.approx(7, rel=0.1)
 
 
 def send(robot, data):

@@ -20,6 +20,10 @@ SCRIPT = """
 0.005s pin RB2 1
 0.006s remote ok
 0.007s camera unplug
+0.008s bluetooth down
+0.008s lamp 0.5
+0.008s noise 1
+0.008s uart2 "x" framing
 """
 
 
@@ -40,6 +44,9 @@ def test_steps_happen_at_their_times(robot):
     assert [robot.read("U2RXREG") for _ in range(3)] == [0x6F, 0x6B, 0x0D]
     robot.at(FCY // 10)
     assert 0x6E not in robot.board.chip.i2c.wire.devices
+    assert not robot.board.bluetooth.connected
+    assert (robot.board.camera.lamp, robot.board.noise.strength) == (0.5, 1.0)
+    assert robot.read("U2STA") & 4
 
 
 @pytest.mark.parametrize(
@@ -60,6 +67,12 @@ def test_steps_happen_at_their_times(robot):
         ("1s uart1 hello", "malformed|expected|invalid"),
         ("1s battery 9", "0 to 5 V"),
         ("1s camera off", "expected `plug`"),
+        ("1s picture", "expected 1 arguments"),
+        ("1s lamp -1", "brightness is"),
+        ("1s bluetooth off", "`up` or `down`"),
+        ("1s i2c sda", "expected `sda CLOCKS`"),
+        ("1s noise -1", "strength of noise"),
+        ('1s uart1 "x" wrong', "expected one of framing"),
         ('1s uart1 "open', "No closing quotation"),
     ],
 )

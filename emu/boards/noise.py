@@ -1,0 +1,40 @@
+"""Repeatable noise without state: a function of seed, channel and cycle, so that looking twice gives the same value."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.peripherals.kit import Cell
+from emu.record import Record
+
+_ONES: Final = (1 << 64) - 1
+_SCALE_ONE: Final = 1 << 16
+
+
+class Noise:
+    """Gaussian noise for analog inputs. Its strength, 0 (off, the default) or 1 (as the reference says) or between,
+    and its seed are in the record."""
+
+    def __init__(self, record: Record, seed: int = 0) -> None:
+        self._seed: Final = Cell(record, "noise.seed", "Q", seed & _ONES)
+        self._strength: Final = Cell(record, "noise.strength", "Q")
+
+    @property
+    def strength(self) -> float:
+        """Factor on every deviation."""
+        return self._strength.value / _SCALE_ONE
+
+    @strength.setter
+    def strength(self, strength: float) -> None:
+        self._strength.value = round(strength * _SCALE_ONE)
+
+    def at(self, channel: int, cycle: int, deviation: float) -> float:
+        """Noise of standard deviation `deviation` on a channel in a cycle."""
+        if not self._strength.value:
+            return 0.0
+        x = (self._seed.value + (cycle << 8 | channel) * 0x9E37_79B9_7F4A_7C15) & _ONES  # SplitMix64
+        x = (x ^ x >> 30) * 0xBF58_476D_1CE4_E5B9 & _ONES
+        x = (x ^ x >> 27) * 0x94D0_49BB_1331_11EB & _ONES
+        x ^= x >> 31
+        uniform = sum(x >> shift & 0xFFFF for shift in (0, 16, 32, 48)) / 0x10000 - 2  # four of variance 1/12
+        return uniform * 3**0.5 * deviation * self.strength
