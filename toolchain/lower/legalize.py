@@ -104,7 +104,7 @@ class Legalizer:
         """i1 and odd widths arrive with undefined upper bits (abi-elf.md §2.2): make i1 clean."""
         new = self.values[id(old)]
         if old.type is I1 or old.type.bits == 1:
-            clean = self.b.emit("and", I8, [self.b.emit("bits", I8, [new]), const(I8, 1)])
+            clean = self.b.emit("and", I16, [self.b.emit("bits", I16, [new]), const(I16, 1)])
             return self.b.emit("trunc", I1, [clean])
         return new
 
@@ -550,7 +550,7 @@ class Legalizer:
     def clean_result(self, t: Type, new: Value) -> Value | None:
         """i1 results come with undefined upper bits (abi-elf.md §2.3)."""
         if t.bits == 1:
-            low = self.b.emit("and", I8, [self.b.emit("bits", I8, [new]), const(I8, 1)])
+            low = self.b.emit("and", I16, [self.b.emit("bits", I16, [new]), const(I16, 1)])
             return self.b.emit("trunc", I1, [low])
         return new if t is not VOID else None
 
