@@ -62,6 +62,16 @@ def test_assemble_link_and_convert(files, capsys):
     assert "call" not in text
 
 
+def test_size_counts_flash_and_ram_only(files, capsys):
+    """Three bytes per instruction word; configuration words are no flash, EEPROM is counted apart."""
+    text = HELLO + " .section __FOSC.sec,code\n .pword 1\n .section .eedata,eedata\n .word 1\n"
+    (files / "c.s").write_text(text)
+    assert main(["as", "c.s"]) == 0
+    assert main(["size", "--json", "c.o"]) == 0
+    row = json.loads(capsys.readouterr().out)["c.o"]
+    assert row == {"code": 5 * 3, "const": 6, "eeprom": 2, "data": 0, "bss": 2}
+
+
 def test_ld_writes_hex_when_the_output_is_called_so(files):
     """A robot's boot loader takes HEX."""
     assert main(["as", "hello.s", "-o", "h.o"]) == 0

@@ -10,6 +10,11 @@ from toolchain.elf import constants as c
 from toolchain.elf.model import Section
 from toolchain.elf.read import is_object, read_executable, read_object
 from toolchain.files import read_bytes
+from toolchain.link.memory import config_sections
+
+
+CONFIG_SECTIONS = {name for word in config_sections() for name in (word, word.removesuffix(".sec"))}
+"""Configuration words have code flags but are no flash (abi-elf.md §6.6)."""
 
 
 def totals(sections: list[Section]) -> dict[str, int]:
@@ -21,7 +26,7 @@ def totals(sections: list[Section]) -> dict[str, int]:
             result["const"] += words * 3
         elif section.is_eedata:
             result["eeprom"] += section.units
-        elif section.is_code and section.flags & SectionFlag.ALLOC:
+        elif section.is_code and section.flags & SectionFlag.ALLOC and section.name not in CONFIG_SECTIONS:
             result["code"] += words * 3
         elif section.is_ram:
             result["bss" if section.type == c.SHT_NOBITS else "data"] += section.units
