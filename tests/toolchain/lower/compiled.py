@@ -19,7 +19,12 @@ def llvm(source: str, level: str = "s", *flags: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "unit.c"
         path.write_text(source)
-        command = [*clang_program(), *front_end_flags(CcOptions(level=level, debug="-g" in flags)), "-ffreestanding", "-w"]
+        command = [
+            *clang_program(),
+            *front_end_flags(CcOptions(level=level, debug="-g" in flags)),
+            "-ffreestanding",
+            "-w",
+        ]
         done = subprocess.run([*command, "-S", "-emit-llvm", str(path), "-o", "-"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -94,13 +94,13 @@ def test_volatile_accesses_are_neither_merged_nor_dropped() -> None:
 
 def test_a_minimal_interrupt_function_saves_nothing() -> None:
     """abi-elf.md §2.5: a minimal handler is 2 words."""
-    source = '#include <dspic30f6014a.h>\nunsigned N; OS_ISR(_T1Interrupt) { N++; }'
+    source = "#include <dspic30f6014a.h>\nunsigned N; OS_ISR(_T1Interrupt) { N++; }"
     assert body(assembly(source), "_T1Interrupt") == ["inc _N", "retfie"]
 
 
 def test_an_interrupt_function_with_a_call_saves_all_scratch_registers() -> None:
     """abi-elf.md §2.5, rules 2 and 3."""
-    source = '#include <dspic30f6014a.h>\nvoid g(void); OS_ISR(_T1Interrupt) { g(); }'
+    source = "#include <dspic30f6014a.h>\nvoid g(void); OS_ISR(_T1Interrupt) { g(); }"
     lines = body(assembly(source), "_T1Interrupt")
     assert lines[:5] == ["push _RCOUNT", *(f"mov.d w{r},[w15++]" for r in (0, 2, 4, 6))]
     assert lines[-6:] == [*(f"mov.d [--w15],w{r}" for r in (6, 4, 2, 0)), "pop _RCOUNT", "retfie"]

@@ -8,7 +8,6 @@ from tests.toolchain.lower.compiled import assembly
 from toolchain.ir.model import UnsupportedError
 
 CASES = [
-    ("int f(int a){\n int r; __asm__(\"mov %1,%0\" : \"=a\"(r) : \"r\"(a)); return r; }", "constraint", 2),
     ("void (__builtin_disi)(unsigned); void f(unsigned n){\n (__builtin_disi)(n); }", "__builtin_disi", 2),
     ("void __builtin_frobnicate(void); void f(void){\n __builtin_frobnicate(); }", "__builtin_frobnicate", 2),
 ]
