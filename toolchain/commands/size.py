@@ -12,7 +12,6 @@ from toolchain.elf.read import is_object, read_executable, read_object
 from toolchain.files import read_bytes
 from toolchain.link.memory import config_sections
 
-
 CONFIG_SECTIONS = {name for word in config_sections() for name in (word, word.removesuffix(".sec"))}
 """Configuration words have code flags but are no flash (abi-elf.md §6.6)."""
 
