@@ -5,6 +5,8 @@
 #include "io.h"
 #include "kernel.h"
 
+#include <string.h>
+
 #define MASK (SYS_UART_TX - 1u)
 typedef char ring_is_a_power_of_two[(SYS_UART_TX & (SYS_UART_TX - 1)) == 0 && SYS_UART_TX <= 128 ? 1 : -1];
 
@@ -61,9 +63,11 @@ static bool write_message(uint8 uart, const void *message, uint16 size)
         hal_uart_transmit(uart);
     } else {
         c->wants_ready = true;
-        c->statistics.tx_refused++;
     }
     hal_unlock(device_lock);
+    if (!fits) {
+        os_count(&c->statistics.tx_refused);
+    }
     hal_unlock(lock);
     return fits || os_fail(SYS_ERROR_BUSY);
 }
@@ -113,12 +117,10 @@ bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put_byte)
 
 /* ---- Receiving -------------------------------------------------------------------------------------------------- */
 
-static void pass_on(uint8 uart, uint16 size)
+static void pass_on(uint8 uart, const uint8 *bytes, uint16 size)
 {
-    channel *c = &channels[uart];
-    c->used = 0;
-    if (!Sys_Send_Event(events[uart].received, c->received, size)) {
-        c->statistics.rx_lost++;
+    if (!Sys_Send_Event(events[uart].received, bytes, size)) {
+        os_count(&channels[uart].statistics.rx_lost);
     }
 }
 
@@ -129,15 +131,16 @@ void uart_received(uint8 uart, uint8 byte)
     c->quiet = false;
     uint16 size = c->decode(byte, c->received, &c->used);
     if (size != 0) {
-        pass_on(uart, size);
+        c->used = 0;
+        pass_on(uart, c->received, size);
     } else if (c->used == 0 && used > 1) {
-        c->statistics.rx_damaged++;
+        os_count(&c->statistics.rx_damaged);
     }
 }
 
 void uart_overrun(uint8 uart)
 {
-    channels[uart].statistics.rx_lost++;
+    os_count(&channels[uart].statistics.rx_lost);
 }
 
 uint16 Sys_Chunk_Rx(uint8 byte, uint8 *buffer, uint16 *used)
@@ -153,7 +156,9 @@ void uart_tick(void)
     for (uint8 uart = 0; uart < SYS_UARTS; uart++) {
         channel *c = &channels[uart];
         if (c->quiet && c->used != 0 && c->decode == Sys_Chunk_Rx) {
-            pass_on(uart, c->used);
+            uint16 size = c->used;
+            c->used = 0;
+            pass_on(uart, c->received, size);
         }
         c->quiet = true;
     }
@@ -173,13 +178,17 @@ sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor wanted)
 sys_rx_processor Sys_Set_RxProcessor(uint8 uart, sys_rx_processor wanted)
 {
     channel *c = &channels[uart];
+    uint8 left[SYS_UART_RX];
     hal_lock_state lock = hal_lock_devices();
     sys_rx_processor before = c->decode;
+    uint16 size = c->used;
     c->decode = wanted != NULL ? wanted : Sys_Chunk_Rx;
-    if (c->used != 0) {
-        pass_on(uart, c->used);
-    }
+    c->used = 0;
+    memcpy(left, c->received, sizeof left);
     hal_unlock(lock);
+    if (size != 0) {
+        pass_on(uart, left, size <= sizeof left ? size : (uint16)sizeof left);
+    }
     return before;
 }
 

@@ -33,19 +33,20 @@ bool os_refuse(void)
 
 void event_lost(uint16 id)
 {
-    uint16 i = 1;
+    bool counted = false;
     os_count(&os_statistics.events_lost);
-    hal_lock_state lock = hal_lock_devices();
-    while (i <= SYS_LOSS_COUNTERS && losses[i].count != 0 && losses[i].event != id) {
-        i++;
+    for (uint16 i = 1; i <= SYS_LOSS_COUNTERS && !counted; i++) {
+        hal_lock_state lock = hal_lock_devices();
+        counted = losses[i].count == 0 || losses[i].event == id;
+        if (counted) {
+            losses[i].event = id;
+            losses[i].count = (uint16)(losses[i].count + (losses[i].count != 0xFFFFu));
+        }
+        hal_unlock(lock);
     }
-    if (i > SYS_LOSS_COUNTERS) {
-        i = 0;
-    } else {
-        losses[i].event = id;
+    if (!counted) {
+        os_count(&losses[0].count);
     }
-    hal_unlock(lock);
-    os_count(&losses[i].count);
 }
 
 void event_forget_losses(uint16 id)

@@ -267,14 +267,14 @@ static HAL_INLINE void copy(void *to, const void *from, uint16 size)
 
 bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
 {
-    bool sent = true;
+    sys_error error = SYS_OK;
     if ((size > SYS_SMALL_PAYLOAD && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) || (data == NULL && size != 0)) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
     hal_lock_state lock = hal_lock_slice();
     event *e = find(id);
     if (e == NULL) {
-        sent = refuse_message(id, SYS_ERROR_EVENT);
+        error = SYS_ERROR_EVENT;
     } else if (e->subscribers != NULL || event_awaited(e)) {
         message *m = heap_take((uint16)(sizeof *m + size));
         if (m != NULL) {
@@ -283,11 +283,11 @@ bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
             copy(PAYLOAD(m), data, size);
             enqueue(m);
         } else {
-            sent = refuse_message(id, SYS_ERROR_MEMORY);
+            error = SYS_ERROR_MEMORY;
         }
     }
     hal_unlock(lock);
-    return sent;
+    return error == SYS_OK || refuse_message(id, error);
 }
 
 bool Sys_Send_IntEvent(uint16 id, uint16 value)
