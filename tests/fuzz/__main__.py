@@ -10,7 +10,7 @@ HERE = Path(__file__).parent
 
 
 def main() -> int:
-    for script in sorted(HERE.glob("fuzz_*.py")):
+    for script in [*sorted(HERE.glob("fuzz_*.py")), HERE / "csmith_campaign.py"]:
         print(f"{script.name}:", flush=True)
         status = subprocess.run([sys.executable, str(script)], check=False).returncode
         if status:

@@ -1,0 +1,164 @@
+"""Random C programs: -O0 and -Os must give one checksum on the emulator, and avr-gcc with simavr the same one.
+
+`python tests/fuzz/csmith_campaign.py [--count N] [--seed S] [--jobs J] [--keep DIR]`. Needs Debian's `csmith`; the AVR,
+another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are installed. Programs that run too long at -O0 or do not fit
+into 8 kB of RAM are counted as skipped. Exit status 0 when all checksums agree; sources of failures are kept in DIR.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tests.toolchain.c_programs import build, run  # noqa: E402
+
+RUNTIME = Path(__file__).parent / "csmith_runtime"
+HEADERS = Path("/usr/include/csmith")
+LEVELS = ("-O0", "-Os")
+CYCLES = 15_000_000
+PLATFORM = "integer size = 2\npointer size = 2\n"
+GENERATOR = (
+    "--max-funcs 5 --max-block-depth 3 --max-block-size 3 --max-expr-complexity 6 --max-array-dim 2 "
+    "--max-array-len-per-dim 5 --no-argc --concise --max-struct-fields 5 --max-union-fields 3"
+).split()
+AVR = ["avr-gcc", "-mmcu=atmega1284p", "-Os", "-w", "-std=gnu11"]
+AVR_SECONDS = 20
+MEMORY = re.compile(r"does not fit|no room for the stack|overflow")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """`kind` is agreed, skipped or failed."""
+
+    seed: int
+    kind: str
+    reason: str = ""
+
+
+def available() -> bool:
+    """Whether csmith and its headers are installed."""
+    return shutil.which("csmith") is not None and (HEADERS / "safe_math.h").exists()
+
+
+def avr_available() -> bool:
+    """Whether the AVR reference can take part."""
+    return all(shutil.which(name) for name in ("avr-gcc", "simavr"))
+
+
+def generate(seed: int, folder: Path) -> Path:
+    """Program number `seed`; the generator reads the sizes of int and pointers from platform.info."""
+    (folder / "platform.info").write_text(PLATFORM)
+    text = subprocess.run(
+        ["csmith", "--seed", str(seed), *GENERATOR], cwd=folder, capture_output=True, text=True, check=True, timeout=60
+    ).stdout
+    path = folder / f"csmith_{seed}.c"
+    path.write_text(text)
+    return path
+
+
+def ours(source: Path, level: str, folder: Path) -> tuple[str, str]:
+    """(checksum, "") or ("", why there is none)."""
+    image = folder / f"{source.stem}{level}.elf"
+    flags = ["-w", "-std=gnu11", f"-I{RUNTIME}", f"-I{HEADERS}"]
+    built = build([source], image, level, *flags)
+    if built.status != 0:
+        return "", f"memory: {built.first_error}" if MEMORY.search(built.messages) else f"build: {built.first_error}"
+    ran = run(image, CYCLES, engine="interp")
+    if ran.status is None:
+        return "", ran.why
+    return ran.uart.decode("latin-1").strip(), ""
+
+
+def on_avr(source: Path, folder: Path) -> str:
+    """Checksum by avr-gcc and simavr; "" when it does not build, end or print."""
+    image = folder / f"{source.stem}.avr.elf"
+    command = [*AVR, f"-I{RUNTIME}", f"-I{HEADERS}", str(source), "-o", str(image)]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        return ""
+    try:
+        said = subprocess.run(
+            ["simavr", "-m", "atmega1284p", "-f", "16000000", str(image)],
+            capture_output=True, text=True, check=False, timeout=AVR_SECONDS,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return ""
+    plain = re.sub(r"\x1b\[\d*m", "", said.stdout + said.stderr)  # simavr colours what the UART says
+    found = re.search(r"\b[0-9A-F]{8}\b", plain)
+    return found[0] if found else ""
+
+
+def examine(seed: int, keep: Path | None = None) -> Verdict:
+    """Generate, build and run one program everywhere."""
+    with tempfile.TemporaryDirectory(prefix="csmith-") as name:
+        folder = Path(name)
+        source = generate(seed, folder)
+        verdict = compare(seed, source, folder)
+        if verdict.kind == "failed" and keep is not None:
+            keep.mkdir(parents=True, exist_ok=True)
+            shutil.copy(source, keep / source.name)
+        return verdict
+
+
+def compare(seed: int, source: Path, folder: Path) -> Verdict:
+    """Checksums of one program at both levels and on the AVR."""
+    sums = {}
+    for level in LEVELS:
+        sums[level], why = ours(source, level, folder)
+        if why.startswith("memory"):
+            return Verdict(seed, "skipped", "does not fit into the device's memory")
+        if why == "trap: stack error":
+            return Verdict(seed, "skipped", "needs more stack than there is RAM")
+        if why.startswith("limit") and level == LEVELS[0]:
+            return Verdict(seed, "skipped", f"still running after {CYCLES} cycles at -O0")
+        if why:
+            return Verdict(seed, "failed", f"{level}: {why}")
+    reference = on_avr(source, folder) if avr_available() else ""
+    if len(set(sums.values())) != 1:
+        return Verdict(seed, "failed", f"{sums}, avr {reference or 'unknown'}")
+    if reference and reference != sums[LEVELS[0]]:
+        return Verdict(seed, "failed", f"{sums[LEVELS[0]]} at every level, avr {reference}")
+    return Verdict(seed, "agreed", "with avr" if reference else "levels only")
+
+
+def _examine(work: tuple[int, Path | None]) -> Verdict:
+    try:
+        return examine(*work)
+    except Exception as error:
+        return Verdict(work[0], "failed", f"internal error: {type(error).__name__}: {error}")
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, epilog="example: csmith_campaign.py --count 1000 --jobs 2")
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1, help="number of the first program")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--keep", type=Path, help="folder for the sources of failures")
+    options = parser.parse_args()
+    if not available():
+        print("csmith is not installed (Debian package csmith): nothing to do", file=sys.stderr)
+        return 0
+    work = [(seed, options.keep) for seed in range(options.seed, options.seed + options.count)]
+    counts: Counter[str] = Counter()
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for verdict in pool.map(_examine, work):
+            counts[verdict.kind if verdict.kind != "agreed" else f"agreed {verdict.reason}"] += 1
+            if verdict.kind == "failed":
+                print(f"failed: seed {verdict.seed}: {verdict.reason}", flush=True)
+    print(", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())))
+    return 1 if counts["failed"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
