@@ -119,13 +119,15 @@ class Machine:
     def _connect(self, wires: Wires) -> None:
         """The few lines between the CPU and the devices."""
         sequencer = self.core.sequencer
+        power = sequencer.power
         wires.reset = self._device_reset
-        wires.wake = sequencer.wake
+        wires.wake = power.wake
         wires.stall_until = sequencer.hold_until
         wires.trap = self.core.traps.request_flag
-        sequencer.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
-        sequencer.wires.power = self._power
-        sequencer.wires.interrupted = lambda: self._interrupt
+        power.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
+        power.wires.power = self._power
+        power.wires.can_wake = lambda: self.peripherals.watchdog.is_enabled
+        power.wires.interrupted = lambda: self._interrupt
 
     def _power(self, mode: int, cycle: int) -> None:
         """The CPU stops after `cycle` - 1, or runs again from `cycle`."""

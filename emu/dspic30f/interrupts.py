@@ -214,6 +214,15 @@ class Exceptions:
                     return self._u64[source.since]
         return None
 
+    def armed(self) -> bool:
+        """Whether any interrupt of priority 1 or more is enabled."""
+        for _flags, enables, sources in self._words:
+            enabled = self._u16[enables]
+            for bit, source in sources.items():
+                if enabled >> bit & 1 and self._u16[source.priority] >> source.shift & 7:
+                    return True
+        return False
+
     def enter(self, accepted: Accepted, last: int) -> None:
         """Push PC, SRL and IPL3, and continue at the handler (isa.md §14.2)."""
         state = self._state

@@ -20,7 +20,6 @@ visible from e + 1, hard traps from e. An illegal opcode, an uninitialised point
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -45,6 +44,7 @@ from emu.dspic30f.isa.flow import (
     Sleep,
 )
 from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.power import PowerSaving, Sleeping
 from emu.dspic30f.registers import CoreRegisters
 from emu.dspic30f.state import (
     DA,
@@ -60,7 +60,7 @@ from emu.dspic30f.state import (
     SLEEP,
     State,
 )
-from emu.events import NEVER, Events
+from emu.events import Events
 from emu.program import ProgramMemory
 
 EDT_MATURE: Final = 3
@@ -78,17 +78,6 @@ class Step:
     cycles: int
     window_extra: int
     """PSV cycles outside REPEAT (isa.md §13.3)."""
-
-
-@dataclass(slots=True)
-class Wires:
-    """Lines from the core to whoever wired it."""
-
-    clear_watchdog: Callable[[], None] = lambda: None
-    power: Callable[[int, int], None] = lambda mode, cycle: None
-    """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
-    interrupted: Callable[[], bool] = lambda: False
-    """Somebody wants the run to end now, even if the CPU sleeps."""
 
 
 class Sequencer:
@@ -109,7 +98,7 @@ class Sequencer:
         self.registers: Final = registers
         self.exceptions: Final = exceptions
         self.builder: Final = builder
-        self.wires: Final = Wires()
+        self.power: Final = PowerSaving(state, events, exceptions)
         self._hold: Final = state.record.reserve("cpu.hold", "Q").index
         self._steps: Final[dict[int, Step]] = {}
         program.changed.append(self._forget)
@@ -137,8 +126,10 @@ class Sequencer:
             state.cycle = max(state.cycle, hold)
             state.record.u64[self._hold] = 0
         while True:
-            if state.mode != RUN and not self._sleep(limit):
-                return self.wires.interrupted() or events.deadline != NEVER
+            if state.mode != RUN:
+                sleeping = self.power.pass_time(limit)
+                if sleeping is not Sleeping.ENDED:
+                    return sleeping is Sleeping.GOES_ON
             last = state.cycle - 1
             if events.deadline > last >= 0:
                 return True
@@ -148,41 +139,6 @@ class Sequencer:
                 return True
             self.exceptions.enter(accepted, last)
             events.kick()
-
-    def _sleep(self, limit: int) -> bool:
-        """Let time pass until something wakes the CPU, at most to `limit`. True if it runs again (isa.md §11).
-
-        The cycle in which the waking flag is first 1 counts as that of an instruction: UNVERIFIED.
-        """
-        state, events = self.state, self.events
-        while True:
-            if events.deadline < state.cycle:
-                events.settle(state.cycle - 1)
-                since = self.exceptions.waking()
-                if since is not None:
-                    state.cycle = max(state.cycle, since + 1)
-                    self.wake()
-                if state.mode == RUN:
-                    return True
-            if self.wires.interrupted():
-                return False
-            due = events.deadline
-            if due < limit:
-                due = events.next_due()
-            if due == NEVER:
-                events.settle(state.cycle - 1)
-                return False
-            if due >= limit:
-                state.cycle = max(state.cycle, limit)
-                return False
-            state.cycle = max(state.cycle, due + 1)
-
-    def wake(self) -> None:
-        """Leave Idle or Sleep: execution goes on."""
-        if self.state.mode != RUN:
-            self.state.mode = RUN
-            self.wires.power(RUN, self.state.cycle)
-            self.events.kick()
 
     # Instructions
 
@@ -289,12 +245,9 @@ class Sequencer:
                 self.registers.disi(count, last)
             case ClearWatchdog():
                 self.events.arrive(last)
-                self.wires.clear_watchdog()
+                self.power.wires.clear_watchdog()
             case Sleep(mode):
-                self.events.arrive(last)
-                state.mode = IDLE if mode == "idle" else SLEEP
-                self.wires.power(state.mode, last + 1)
-                self.events.kick()
+                self.power.stop(IDLE if mode == "idle" else SLEEP, last)
             case Reset():
                 state.cycle = last + 1
                 state.pc = pc

@@ -318,6 +318,14 @@ def test_sleeping_with_nothing_to_wake_it_halts(engine: str) -> None:
     assert (stop.reason, stop.pc) == ("halt", rig.labels["end"])
 
 
+def test_idling_beside_a_timer_that_interrupts_nobody_halts(engine: str) -> None:
+    """design §10: nothing is enabled that could wake the CPU, though T1 matches for ever."""
+    rig = Rig("mov w0, 0x102\nmov w1, 0x104\npwrsav #1\nend: nop", engine, w0=99, w1=0x8000)
+    stop = rig.run(20_000_000)
+    assert (stop.reason, stop.pc) == ("halt", rig.labels["end"])
+    assert stop.cycle <= 1_001_000
+
+
 def test_a_timer_interrupt_comes_with_its_period(engine: str) -> None:
     """isa.md §14.3 and the timer's own rule: period PR + 1; every handler starts 4 cycles after its flag in NOPs."""
     rig = Rig("mov w0, 0x102\nmov w1, 0x104\n" + "nop\n" * 400 + "isr: bclr 0x84, #3\nretfie", engine, w0=49, w1=0x8000)

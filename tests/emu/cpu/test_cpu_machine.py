@@ -52,6 +52,7 @@ def test_an_sfr_hook_sees_accesses_with_values_and_cycles(engine: str) -> None:
 def test_a_sleeping_run_can_be_ended_from_outside(engine: str) -> None:
     """engine contract: also while only time passes."""
     rig = Rig("mov w0, 0x102\nmov w1, 0x104\npwrsav #1\nend: nop", engine, w0=99, w1=0x8000)
+    rig.enable(6, 4)
     rig.at(5000, rig.machine.interrupt)
     stop = rig.machine.run(10_000_000)
     assert (stop.reason, stop.cycle) == ("interrupted", 5001)
