@@ -1,5 +1,7 @@
 """Linked images run on the emulator: start-up, constants, function pointers above 64 K, EEPROM, interrupt vectors."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -100,3 +102,17 @@ def test_a_linked_program_starts_and_finds_everything(tmp_path, objects, form, p
         "__exit_status": 42,
     }
     assert [machine.peek(at["zero"] + 2 * i) for i in range(4)] == [0] * 4
+
+
+def test_an_assembly_program_talks_on_uart1_from_the_timer_interrupt(tmp_path):
+    """By command line: as, ld, emu run; 115,200 baud at 14.7456 MIPS is BRG 7, one character every 1500 Tcy."""
+    here = Path(__file__).parent
+
+    def run(*words):
+        return subprocess.run([sys.executable, "-m", *map(str, words)], capture_output=True, cwd=tmp_path, timeout=60)
+
+    assert run("toolchain", "as", "-g", here / "uart_hello.s", "-o", "hello.o").returncode == 0
+    assert run("toolchain", "as", CRT0, "-o", "crt0.o").returncode == 0
+    assert run("toolchain", "ld", "hello.o", "crt0.o", "-o", "hello.elf").returncode == 0
+    done = run("emu", "run", "hello.elf", "--seconds", "1", "--exit-code")
+    assert (done.stdout, done.returncode) == (b"hello from T1\r\n" * 4, 0)
