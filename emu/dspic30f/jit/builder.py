@@ -51,6 +51,12 @@ class Surroundings:
     """Addresses of interrupt flag registers, each with that of its enables."""
     trap_flags: int
     """Bits of INTCON1 that request a trap."""
+    idle_stops: tuple[tuple[int, int], ...]
+    """Control registers and their bits that stop a device in Idle."""
+    watchdog: int
+    """Byte offset of the due cycle of the watchdog's time-out."""
+    rcon_idle: int
+    rcon_wdto: int
     do_start: int = -1
     do_end: int = -1
     """The DO loop that is active: its first and last instruction; -1: none."""

@@ -31,6 +31,9 @@ BLOCK_LEVEL, STEP_LEVEL = 2, 0
 COLD_CYCLES: Final = 1000
 """Longest cold run before native code is looked for again, in Tcy."""
 
+NATIVE_CYCLES: Final = 30_000_000
+"""Longest native run before Python can handle signals, in Tcy."""
+
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
 
@@ -110,7 +113,7 @@ class JitEngine:
                 self._miss(limit)
                 return
             self._prepare()
-        self._env[LIMIT] = limit
+        self._env[LIMIT] = min(limit, state.cycle + NATIVE_CYCLES)
         start = state.cycle
         why = self._dispatch(self._core.record.address, self._env_address)
         self.counts.runs += 1
@@ -180,7 +183,8 @@ class JitEngine:
         reads, writes = access_kinds(core)
         start, end = loop if loop is not None else (-1, -1)
         around = Surroundings(self._offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
-                              self._words, tuple(sorted(words.items())), core.traps.flags, start, end)
+                              self._words, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
+                              start, end)
         table = ctypes.c_uint64 * self._words
         return Code(context, around, table(), table())
 
@@ -245,6 +249,18 @@ def offsets(core: Core) -> dict[str, int]:
     offset |= {name: 2 * core.state.at[name] for name in ("W0S", "W1S", "W2S", "W3S", "SRS")}
     offset["flash"] = core.program.flash_offset
     return offset
+
+
+def idle_facts(core: Core) -> tuple[tuple[tuple[int, int], ...], int, int, int]:
+    """What decides whether Idle is simple: stop-in-Idle bits, the watchdog's event slot, and the RCON bits."""
+    stops = []
+    for sfr in core.chip.sfrs.values():
+        bits = sum(1 << lsb for name, (lsb, _width) in sfr.fields.items() if name.endswith("SIDL"))
+        if bits:
+            stops.append((sfr.address, bits))
+    watchdog = core.record.fields["events.due"].offset + 8 * core.events.names.index("wdt.timeout")
+    rcon = core.chip.sfrs["RCON"].fields
+    return tuple(sorted(stops)), watchdog, 1 << rcon["IDLE"][0], 1 << rcon["WDTO"][0]
 
 
 def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access, int]]]:

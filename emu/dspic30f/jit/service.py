@@ -1,4 +1,4 @@
-"""Native work at an instruction boundary: simple periodic events, and accepting and entering interrupts.
+"""Native work at an instruction boundary: simple periodic events, interrupts, and the time spent in Idle.
 
 The rules are those of sequencer.py and interrupts.py; everything out of the ordinary (traps, DISI, NSTDIS, requests
 that are not visible yet, events that are not a plain timer match, a stack that does not hold) is left to them: the
@@ -13,8 +13,9 @@ from typing import Final
 
 from emu.dspic30f.core import Core
 from emu.dspic30f.interrupts import ALTIVT, UNMASKABLE
+from emu.dspic30f.power import STIR
 from emu.dspic30f.registers import NSTDIS
-from emu.dspic30f.state import IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA
+from emu.dspic30f.state import IDLE, IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA, RUN
 from emu.record import DATA_BYTES
 
 DONE, PYTHON = 0, 1
@@ -103,7 +104,8 @@ def _head(b: Boundary) -> str:
               "p.due": o["events.due"], "p.intcon1": o["INTCON1"], "p.intcon2": o["INTCON2"], "p.sr": o["SR"],
               "p.corcon": o["CORCON"], "p.pc": o["cpu.pc"], "p.disi": o["cpu.disi_end"], "p.sp": o["WREG15"],
               "p.splim": o["SPLIM"], "p.armed": o["cpu.limit_armed"], "p.stall": o["cpu.stall"],
-              "p.inttreg": o["INTTREG"], "p.repeat": o["cpu.repeat"], "p.flash": o["flash"]}
+              "p.inttreg": o["INTTREG"], "p.repeat": o["cpu.repeat"],
+              "p.mode": o["cpu.mode"], "p.slept": o["cpu.slept"], "p.power": o["wdt.mode"], "p.flash": o["flash"]}
     return "\n".join([
         "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {", "first:",
         *(_at(name, offset) for name, offset in places.items()),
@@ -115,17 +117,42 @@ python:
   ret i64 {PYTHON}
 done:
   ret i64 {DONE}
+stop:
+  ret i64 {PYTHON}
 again:
   %cycle = load i64, ptr %p.cycle
   %last = sub i64 %cycle, 1
-  %over = icmp uge i64 %cycle, %limit
-  br i1 %over, label %stop, label %due
-stop:
-  ret i64 {PYTHON}
-due:
   %deadline = load i64, ptr %p.deadline
   %early = icmp ugt i64 %deadline, %last
-  br i1 %early, label %done, label %fire"""])
+  %mode = load i16, ptr %p.mode
+  %awake = icmp eq i16 %mode, {RUN}
+  br i1 %awake, label %running, label %resting
+running:
+  %over = icmp uge i64 %cycle, %limit
+  br i1 %over, label %stop, label %due
+due:
+  br i1 %early, label %done, label %fire
+resting:
+  %idle = icmp eq i16 %mode, {IDLE}
+  br i1 %idle, label %idling, label %python
+idling:
+  br i1 %early, label %sleep, label %fire
+sleep:
+  %slept = load i64, ptr %p.slept
+  %stir = add i64 %slept, {STIR}
+  %long = icmp ugt i64 %deadline, %stir
+  br i1 %long, label %python, label %nap
+nap:
+  %far = icmp uge i64 %deadline, %limit
+  br i1 %far, label %doze, label %jump
+doze:
+  %until = call i64 @llvm.umax.i64(i64 %cycle, i64 %limit)
+  store i64 %until, ptr %p.cycle
+  ret i64 {PYTHON}
+jump:
+  %then = add i64 %deadline, 1
+  store i64 %then, ptr %p.cycle
+  br label %again"""])
 
 
 def _events(b: Boundary) -> str:
@@ -206,7 +233,38 @@ def _accept(b: Boundary) -> str:
   %ipl16 = or i16 %ipl.low7, %ipl.high
   %ipl = zext i16 %ipl16 to i64
   %disi = load i64, ptr %p.disi
-  br label %pick
+  br i1 %awake, label %pick, label %wake
+wake:
+  %wreq = phi i64 [ %all, %asked ], [ %wreq1, %wtake ]
+  %wnone = icmp eq i64 %wreq, 0
+  br i1 %wnone, label %again, label %wtake
+wtake:
+  %wirq = call i64 @llvm.cttz.i64(i64 %wreq, i1 true)
+  %wreqm = sub i64 %wreq, 1
+  %wreq1 = and i64 %wreq, %wreqm
+  %wpp = getelementptr {table}, ptr @place, i64 0, i64 %wirq
+  %wplace = load i64, ptr %wpp
+  %wps = getelementptr {table}, ptr @shift, i64 0, i64 %wirq
+  %wshift = load i64, ptr %wps
+  %p.wipc = getelementptr i8, ptr %rec, i64 %wplace
+  %wipc = load i16, ptr %p.wipc
+  %wipc64 = zext i16 %wipc to i64
+  %wlev = lshr i64 %wipc64, %wshift
+  %wlevel = and i64 %wlev, 7
+  %wakes = icmp ne i64 %wlevel, 0
+  br i1 %wakes, label %rouse, label %wake
+rouse:
+  %wpr = getelementptr {table}, ptr @since, i64 0, i64 %wirq
+  %wrise.off = load i64, ptr %wpr
+  %p.wrise = getelementptr i8, ptr %rec, i64 %wrise.off
+  %wrise = load i64, ptr %p.wrise
+  %wrise1 = add i64 %wrise, 1
+  %wcycle = call i64 @llvm.umax.i64(i64 %cycle, i64 %wrise1)
+  store i64 %wcycle, ptr %p.cycle
+  store i16 {RUN}, ptr %p.mode
+  store i8 {RUN}, ptr %p.power
+  store i64 0, ptr %p.deadline
+  br label %again
 pick:
   %req = phi i64 [ %all, %asked ], [ %req1, %next ]
   %best = phi i64 [ %ipl, %asked ], [ %best1, %next ]

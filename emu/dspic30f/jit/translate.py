@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.isa.builder import Context
-from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Repeat, Return, Skip
+from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Repeat, Return, Skip, Sleep
 from emu.dspic30f.jit.builder import (
     DEADLINE,
     INTERPRET,
@@ -25,7 +25,7 @@ from emu.dspic30f.jit.region import Region, Step
 from emu.dspic30f.jit.repeat import Repeats
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import MemoryVariables, Variables, pointer
-from emu.dspic30f.state import FIRST, IPL3, NOT_REPEATING, PC_MASK, RA
+from emu.dspic30f.state import FIRST, IDLE, IPL3, NOT_REPEATING, PC_MASK, RA
 from emu.events import NEVER
 
 PROLOGUE: Final = """declare i16 @llvm.fshl.i16(i16, i16, i16)
@@ -193,7 +193,9 @@ class Translator:
         if isinstance(flow, Repeat):
             self._repeats.translate(step, flow, stall)
             return True, 0
-        if not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip)):
+        if isinstance(flow, Sleep) and flow.mode == "idle":
+            self._check_idle()
+        elif not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip)):
             raise NeedsInterpreter
         if isinstance(flow, Return) and flow.kind == "retfie":
             self._check_retfie(flow)
@@ -247,8 +249,11 @@ class Translator:
             e.start(other)
             self.jump(step.next_pc)
             return
-        assert isinstance(flow, (Goto, Call, Return))
+        assert isinstance(flow, (Goto, Call, Return, Sleep))
         self.advance(cycles, mask)
+        if isinstance(flow, Sleep):
+            self._idle(step.next_pc)
+            return
         if isinstance(flow.target, int):
             self.jump(flow.target)
             return
@@ -256,6 +261,29 @@ class Translator:
             repeats = (flow.srl & RA) != 0
             self.e.store(pointer(e, self.around.offset["cpu.repeat"]), self.b.select(repeats, FIRST, NOT_REPEATING), 16)
         self.v.leave(flow.target & PC_MASK, NEXT)
+
+    # -- Idle -------------------------------------------------------------------------------------------------------
+    def _check_idle(self) -> None:
+        """Native Idle: no device stops in it, and no watchdog runs (dspic30f6014a.md §4, §17)."""
+        e = self.e
+        stops: Number = 0
+        for address, bits in self.around.idle_stops:
+            stops = stops | (e.load(pointer(e, address), 16) & bits)
+        self.b.guard((stops == 0) & (e.load(pointer(e, self.around.watchdog), 64) == -1))
+        if self.exact:
+            self.b.guard(self.fits(2))
+
+    def _idle(self, next_pc: int) -> None:
+        """The CPU stops; the boundary behind lets time pass."""
+        e, offset = self.e, self.around.offset
+        place = pointer(e, offset["RCON"])
+        kept = e.load(place, 16) & (0xFFFF & ~self.around.rcon_wdto)
+        e.store(place, kept | self.around.rcon_idle, 16)
+        e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
+        e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
+        e.store(pointer(e, offset["wdt.mode"]), IDLE, 8)
+        e.store(pointer(e, offset["events.deadline"]), 0, 64)
+        e.end(f"br label %{self.exit(next_pc, SERVICE)}")
 
     # -- interrupts -------------------------------------------------------------------------------------------------
     def _requests(self) -> Value:
