@@ -16,15 +16,16 @@ enum { LOG_PERIOD_MS = 250 };
 #define NOTHING_LEFT SPEED(55)
 #define NOTHING_RIGHT SPEED(99)
 
+/* True on the first call and then on every 250th. */
 static bool wait250times(sys_event_data *data)
 {
     static uint16 counter = 0;
+    bool due = counter == 0;
     (void)data;
-    if (++counter < LOG_PERIOD_MS) {
-        return false;
+    if (++counter == LOG_PERIOD_MS) {
+        counter = 0;
     }
-    counter = 0;
-    return true;
+    return due;
 }
 
 static void loggingThread(void)
