@@ -1,8 +1,8 @@
 """Random C programs: -O0 and -Os must give one checksum on the emulator, and avr-gcc with simavr the same one.
 
 `python tests/fuzz/csmith_campaign.py [--count N] [--seed S] [--jobs J] [--keep DIR]`. Needs Debian's `csmith`; the AVR,
-another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are installed. Programs that run too long at -O0 or do not fit
-into 8 kB of RAM are counted as skipped. Exit status 0 when all checksums agree; sources of failures are kept in DIR.
+another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are installed. Programs that run too long at
+-O0 or do not fit into 8 kB of RAM are skipped. Exit status 0 when all checksums agree; DIR keeps sources of failures.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ HEADERS = Path("/usr/include/csmith")
 LEVELS = ("-O0", "-Os")
 CYCLES = 15_000_000
 PLATFORM = "integer size = 2\npointer size = 2\n"
-GENERATOR = (
-    "--max-funcs 5 --max-block-depth 3 --max-block-size 3 --max-expr-complexity 6 --max-array-dim 2 "
-    "--max-array-len-per-dim 5 --no-argc --concise --max-struct-fields 5 --max-union-fields 3"
-).split()
+GENERATOR = [
+    *("--max-funcs", "5", "--max-block-depth", "3", "--max-block-size", "3", "--max-expr-complexity", "6"),
+    *("--max-array-dim", "2", "--max-array-len-per-dim", "5", "--max-struct-fields", "5", "--max-union-fields", "3"),
+    *("--no-argc", "--concise"),
+]
 AVR = ["avr-gcc", "-mmcu=atmega1284p", "-Os", "-w", "-std=gnu11"]
 AVR_SECONDS = 20
 MEMORY = re.compile(r"does not fit|no room for the stack|overflow")
