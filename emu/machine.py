@@ -224,9 +224,15 @@ class Machine:
             return self._reset_by(reset)
 
     def _arrive(self) -> Stop | None:
-        """Bring the devices to the present cycle, for whoever looks at the machine between runs."""
+        """Bring the devices to the present cycle, for whoever looks at the machine between runs.
+
+        What is due in the very cycle a sleeping CPU has got to is left for the next run: cutting a run in two must
+        not show, not even in the cycle in which nothing is left to happen.
+        """
+        cycle = self.state.cycle
         try:
-            self.events.arrive(self.state.cycle)
+            self.events.arrive(cycle if self.state.mode == RUN else cycle - 1)
+            self.events.now = cycle
         except DeviceReset as reset:
             return self._reset_by(reset)
         return None
