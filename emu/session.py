@@ -26,6 +26,8 @@ FIRST_SLICE, SHORTEST_SLICE, LONGEST_SLICE = 20_000, 2_000, 100_000_000
 PACED_SLICES_PER_SECOND: Final = 200
 POLL_SECONDS: Final = 0.1
 """Longest wait without looking for Ctrl-C."""
+STUCK_SECONDS: Final = 3.0
+"""How long a run may take to notice that it should end."""
 FOREVER: Final = 1 << 62
 """Limit in Tcy when there is none: 10,000 years."""
 
@@ -75,6 +77,7 @@ class Session:
                     self.machine.uart[number].drain()
             self._show_output()
         finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
             for number, handler in earlier:
                 signal.signal(number, handler)
         return stop, time.perf_counter() - self._start
@@ -91,19 +94,23 @@ class Session:
                 stop = self._outlive(stop)
             if stop is not None:
                 return stop
-            if machine.cycle >= self.limit:
-                return machine.stopped("limit")
             if self._realtime:
                 slice_cycles = round(self._hz / PACED_SLICES_PER_SECOND)
                 wait_for_input(list(self.ports.values()), (machine.cycle - self._wall_cycle()) / self._hz)
-            else:
+            if machine.cycle >= self.limit:
+                return machine.stopped("limit")
+            if not self._realtime:
                 slice_cycles = _adapted(slice_cycles, time.perf_counter() - before)
         return machine.stopped("interrupted")
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        """Ctrl-C and SIGTERM end the run at the next boundary; the second one, or a run that is stuck, at once."""
         if self.interrupted:
             raise KeyboardInterrupt
         self.interrupted = True
+        self.machine.interrupt()
+        signal.signal(signal.SIGALRM, self._on_signal)
+        signal.setitimer(signal.ITIMER_REAL, STUCK_SECONDS)
 
     def _collector(self, number: int) -> Callable[[int, int], Any]:
         sent = self._sent[number]

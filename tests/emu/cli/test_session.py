@@ -1,0 +1,119 @@
+"""Sessions: slices change nothing, stamps bring the same run back, the Python examples run."""
+
+from __future__ import annotations
+
+import doctest
+import os
+from pathlib import Path
+
+import pytest
+from programs import ECHO, SPIN, executable
+
+import emu
+import emu.api
+from emu import session as sessions
+from emu.console import Port
+from emu.loader import parse_image
+from emu.session import Session
+from emu.stamps import Stamp
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def machine_with(source, vectors=None, engine="interp"):
+    machine = emu.Machine(engine=engine)
+    machine.load(parse_image(executable(source, vectors), "program.elf"))
+    return machine
+
+
+@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+@pytest.mark.parametrize("length", [1, 7, 1280, 1_000_000])
+def test_slices_change_nothing(monkeypatch, length, engine):
+    """The same input, stamped at the same cycles, ends in the same state however the run is cut."""
+    stamps = [Stamp(100, 1, b"hello"), Stamp(9_000, 1, b"x"), Stamp(40_000, 1, b"yz")]
+
+    def ended(slice_cycles, name):
+        monkeypatch.setattr(sessions, "FIRST_SLICE", slice_cycles)
+        monkeypatch.setattr(sessions, "_adapted", lambda cycles, seconds: cycles)
+        machine = machine_with(ECHO, {"U1RXInterrupt": "receive"}, name)
+        port = Port(None, None)
+        port.capture = bytearray()
+        stop, _ = Session(machine, {1: port}, limit=200_000, replay=list(stamps)).run()
+        return stop, bytes(port.capture), machine.snapshot()
+
+    stop, said, state = ended(length, engine)
+    assert said == b"ifmmpyz{"
+    assert (stop, said, state) == ended(333, "plain")
+
+
+def test_a_paced_run_takes_as_long_as_the_robot(monkeypatch):
+    """The host's clock is replaced: a run sleeps for what simulated time is ahead of it."""
+    now = [0.0]
+    waited = []
+
+    def wait(ports, seconds):
+        waited.append(seconds)
+        now[0] += max(seconds, 0.0)
+        return False
+
+    monkeypatch.setattr(sessions, "wait_for_input", wait)
+    monkeypatch.setattr(sessions.time, "perf_counter", lambda: now[0])
+    stop, host_seconds = Session(machine_with(SPIN), {}, limit=147_456, realtime=True).run()
+    assert stop.reason == "limit"
+    assert host_seconds == pytest.approx(0.01, rel=0.01)
+    assert sum(waited) == pytest.approx(0.01, rel=0.01)
+
+
+def test_a_watched_variable_reports_every_change_with_its_cycle():
+    machine = machine_with(SPIN)
+    changes = list(emu.watch(machine, "counter", cycles=20))
+    assert [(change.old, change.new) for change in changes] == [(0, 1), (1, 2), (2, 3), (3, 4)]
+    assert [change.cycle for change in changes] == [5, 9, 13, 17]
+    assert {change.pc for change in changes} == {0x106}
+
+
+def test_memory_is_read_and_written_by_name():
+    """Registers by data-sheet name, W registers, variables by C or object name."""
+    machine = machine_with(SPIN)
+    machine.poke("counter", 0x1234)
+    assert machine.peek("_counter") == machine.peek(0x800) == 0x1234
+    machine.poke("W5", 7)
+    assert machine.w[5] == machine.peek("WREG5") == 7
+    machine.write("TRISB", 0x00FF)
+    assert machine.read("TRISB") == 0x00FF
+    with pytest.raises(KeyError, match="no register or variable 'nothing'"):
+        machine.peek("nothing")
+
+
+def test_hooks_are_called_on_pc_register_and_byte():
+    machine = machine_with(ECHO, {"U1RXInterrupt": "receive"})
+    seen = []
+    machine.hook_pc(machine.image.symbols.find("receive").address, lambda: seen.append(("pc", machine.cycle)))
+    machine.hook_sfr("U1BRG", lambda is_write, word: seen.append(("sfr", is_write, word)))
+    machine.uart[1].on_byte = lambda byte, cycle: seen.append(("byte", byte))
+    machine.uart[1].feed(b"A")
+    assert machine.run().reason == "halt"
+    assert [entry[0] for entry in seen] == ["sfr", "pc", "byte"]
+    assert ("sfr", True, 7) in seen
+    assert ("byte", ord("B")) in seen
+
+
+def test_the_documented_example_runs(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    result = doctest.testmod(emu.api)
+    assert result.attempted >= 10
+    assert result.failed == 0
+
+
+def test_names_load_lazily():
+    """Design §2: tools that need only the table or the chip's data pay for nothing else."""
+    code = (
+        "import sys, emu.chips.dspic30f6014a, emu.elffacts; print('emu.machine' in sys.modules, 'numpy' in sys.modules)"
+    )
+    assert os.popen(f'{sys_executable()} -c "{code}"').read().split() == ["False", "False"]
+
+
+def sys_executable():
+    import sys
+
+    return sys.executable
