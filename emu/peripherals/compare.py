@@ -50,8 +50,6 @@ class Compare(Peripheral):
         self._pin_event: Final = self.slot("pin", self._pin_due)
         self._flag_event: Final = self.slot("flag", lambda _due: self._line.request())
         kit.pins.watch(site.fault_pin, self._fault_edge)
-        for number in (2, 3):
-            timers[number].on_change.append(self._plan)
 
     @property
     def _timer(self) -> Timer:
@@ -133,6 +131,7 @@ class Compare(Peripheral):
             self.events.cancel(event)
         mode = self.con["OCM"]
         self.con["OCFLT"] = 0
+        self.restored()
         if mode == _OFF:
             self._port.disown(self._pin)
             return
@@ -161,3 +160,11 @@ class Compare(Peripheral):
         """Off; the pins were given back by the ports."""
         self._level.value = 0
         self._phase.value = _RISE
+        self.restored()
+
+    def restored(self) -> None:
+        """Follow the time base only while the channel is on."""
+        on, chosen = self.con["OCM"] != _OFF, self._timer
+        for number in (2, 3):
+            timer = self._timers[number]
+            timer.tell_changes(self._plan, on and timer is chosen)

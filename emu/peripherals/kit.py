@@ -46,21 +46,21 @@ class Wires:
 class Cell:
     """One scalar in the record."""
 
-    __slots__ = ("_index", "_view")
+    __slots__ = ("_view", "index")
 
     def __init__(self, record: Record, name: str, kind: str, initial: int = 0) -> None:
-        self._index: Final = record.reserve(name, kind).index
+        self.index: Final = record.reserve(name, kind).index
         self._view: Final = {"B": record.u8, "H": record.u16, "I": record.u32, "Q": record.u64, "q": record.s64}[kind]
-        self._view[self._index] = initial
+        self._view[self.index] = initial
 
     @property
     def value(self) -> int:
         """The number held, in the range of its kind."""
-        return self._view[self._index]
+        return self._view[self.index]
 
     @value.setter
     def value(self, number: int) -> None:
-        self._view[self._index] = number
+        self._view[self.index] = number
 
 
 @dataclass

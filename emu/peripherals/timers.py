@@ -76,8 +76,8 @@ class Timer(Peripheral):
         self._port, self._pin = parse_pin(site.clock_pin)
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
-        self.on_change: Final[list[Callable[[], None]]] = []
-        """Called after the course of the count has changed: output compare plans anew (§9)."""
+        self._on_change: Final[list[Callable[[], None]]] = []
+        self._words: Final = (self.tmr.address >> 1, self.pr.address >> 1)
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
         self.pr.written_by(self._course_written)
@@ -135,6 +135,13 @@ class Timer(Peripheral):
 
     def count(self, cycle: int) -> int:
         """The count in `cycle`, which is not before the last write to the timer."""
+        tick = self.tick.value
+        if tick:
+            tmr, pr = self._words
+            u16 = self.record.u16
+            start, limit = u16[tmr], u16[pr]
+            count = start + max(cycle - self.base.value, 0) // tick
+            return count if start <= limit and count <= limit else advance(start, count - start, limit, 0xFFFF)
         if self.is_taken:
             assert self.low is not None
             return self.low.count(cycle) >> 16
@@ -193,9 +200,11 @@ class Timer(Peripheral):
         self.tick.value = self._prescale if narrow else 0
         periodic = narrow and self.limit != 0 and not self._is_gated and not self._on_match
         self.period.value = (self.limit + 1) * self._prescale if periodic else 0
-        if not self._match_stands(rewritten):
+        if self._match_stands(rewritten):
+            self.period.value = 0  # the one behind it is not a period away: let Python plan it
+        else:
             self._post(self.now)
-        for listener in self.on_change:
+        for listener in self._on_change:
             listener()
 
     def _match_stands(self, rewritten: bool) -> bool:
@@ -228,6 +237,9 @@ class Timer(Peripheral):
 
     def _tmr_written(self, _old: int, new: int, lanes: int) -> None:
         """The written count stands from the next cycle; the prescaler restarts (§7 rules 6, 8)."""
+        if self.period.value and lanes == 0xFFFF:
+            self._replan_simply(0, new)
+            return
         if self.is_taken:
             assert self.low is not None
             self.low.high_written(new, lanes)
@@ -244,6 +256,27 @@ class Timer(Peripheral):
         self.base.value = self.now + 1
         self._plan(rewritten=True)
 
+    def _replan_simply(self, old_limit: int, written: int | None) -> None:
+        """PR or (`written`) TMR of a plain periodic timer changed: the same as below, without the rare cases."""
+        tmr, pr = self._words
+        u16 = self.record.u16
+        tick, limit, start, base = self.tick.value, u16[pr], u16[tmr], self.now + 1
+        if written is None:
+            counts, rest = divmod(base - self.base.value, tick)
+            start = advance(start, counts, old_limit, 0xFFFF)
+            base -= rest
+        due = self.events.due(self._match)
+        stands = due == self.now + 1 or (due == self.now + 2 and written is None and start == limit)
+        u16[tmr] = start
+        self.base.value = base
+        self.period.value = 0 if stands else (limit + 1) * tick
+        if not stands:
+            counts_ahead = counts_until(start, limit, limit, 0xFFFF)
+            assert counts_ahead is not None  # PR is not 0
+            self.events.set(self._match, base + counts_ahead * tick + 1)
+        for listener in self._on_change:
+            listener()
+
     def high_written(self, new: int, lanes: int) -> None:
         """A direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
         assert self.high is not None
@@ -253,6 +286,9 @@ class Timer(Peripheral):
 
     def _course_written(self, old: int, new: int, _lanes: int) -> None:
         """PR changed: what was counted until the next cycle was counted with the old PR."""
+        if self.period.value and new:
+            self._replan_simply(old, None)
+            return
         owner = self.low if self.is_taken and self.low is not None else self
         shift = 0 if owner is self else 16
         previous = owner.limit & ~(0xFFFF << shift) | old << shift
@@ -336,7 +372,7 @@ class Timer(Peripheral):
         self._start = count = advance(start, 1, self.limit, self.top)
         if count == self.limit and count != 0:
             self.events.set(self._match, cycle + 2)
-        for listener in self.on_change:
+        for listener in self._on_change:
             listener()
 
     def _gate(self, cycle: int, opened: bool) -> None:
@@ -364,17 +400,26 @@ class Timer(Peripheral):
             self._on_match.append(on_match) if wanted else self._on_match.remove(on_match)
             self._plan()
 
+    def tell_changes(self, on_change: Callable[[], None], wanted: bool) -> None:
+        """Call `on_change()` whenever the course of the count has changed, or no longer (output compare, §9)."""
+        if wanted != (on_change in self._on_change):
+            self._on_change.append(on_change) if wanted else self._on_change.remove(on_change)
+
     # -- match -------------------------------------------------------------------------------------------------------
 
     def _fire(self, due: int) -> None:
         (self.high or self).line.request() if self.is_wide else self.line.request()
-        if self.period.value:
-            self.events.set(self._match, due + self.period.value)
+        period = self.period.value
+        if period:
+            self.events.set(self._match, due + period)
             return
         for listener in self._on_match:
             listener(due)
-        if self._source.value in (TCY, WAVE):
+        source = self._source.value
+        if source in (TCY, WAVE):
             self._post(due - 1)
+        if self.tick.value and self.limit and not self._is_gated and not self._on_match:
+            self.period.value = (self.limit + 1) * self.tick.value
 
     # -- power and reset ---------------------------------------------------------------------------------------------
 

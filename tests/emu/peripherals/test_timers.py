@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -366,3 +368,55 @@ def test_only_plain_16_bit_matches_are_offered_to_native_code(rig):
     rig.write("T2CON", TON)
     rig.write("PR2", 0)
     assert offered() == 0
+
+
+class Ticking:
+    """A timer that does tick: one step per Tcy, written from the rules of §7 alone."""
+
+    def __init__(self):
+        self.count = self.prescaler = 0
+        self.period, self.control = 0xFFFF, 0
+        self.coming = self.flag = False
+
+    def step(self, writes):
+        """One cycle; `writes` were made in it and act from the next on."""
+        control, period = writes.get("CON", self.control), writes.get("PR", self.period)
+        clocks = (1, 8, 64, 256)
+        stepped = False
+        if self.control & TON:
+            self.prescaler += 1
+            if self.prescaler == clocks[self.control >> 4 & 3]:
+                self.prescaler, stepped = 0, True
+                self.count = 0 if self.count in (self.period, 0xFFFF) else self.count + 1
+        if (control ^ self.control) & (TON | 0x30):
+            self.prescaler = 0
+        if "TMR" in writes:
+            self.count, self.prescaler, stepped = writes["TMR"], 0, False
+        self.flag |= self.coming
+        reached = stepped and self.count == self.period == period != 0
+        self.coming = reached and bool(control & TON)
+        self.control, self.period = control, period
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_computed_timer_agrees_with_a_ticking_one_under_any_writes(rig, seed):
+    """§7 rules 1-8, 10: count in every cycle and flag in every cycle, writes at random."""
+    draw, model = random.Random(seed), Ticking()
+    for cycle in range(4000):
+        rig.at(cycle)
+        assert rig.read("TMR1") == model.count, cycle
+        assert rig.flag("T1IF") == model.flag, cycle
+        if model.flag:
+            rig.write("IFS0", 0)
+            model.flag = False
+        writes = {}
+        if draw.random() < 0.06:
+            name = draw.choice(("PR", "PR", "TMR", "TMR", "CON"))
+            values = {
+                "PR": (0, 1, 2, 3, 7, 20, model.count, (model.count + 1) & 0xFFFF, 0xFFFF),
+                "TMR": (0, 1, 5, 0xFFFD, model.period, max(model.period - 1, 0)),
+                "CON": (TON, TON, TON, TON | 0x10, TON | TSIDL, 0),
+            }
+            writes[name] = draw.choice(values[name])
+            rig.write({"PR": "PR1", "TMR": "TMR1", "CON": "T1CON"}[name], writes[name])
+        model.step(writes)
