@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from emu.boards.epuck.pixels import decode, encode
 from emu.boards.epuck.scan import HREF, PCLK, VSYNC
 from emu.boards.epuck.sensors import SENSORS
 
@@ -332,3 +333,137 @@ def test_pictures_of_any_size_are_scaled_and_bad_shapes_refused(robot):
         robot.board.camera.show(np.zeros((3, 4, 2), np.uint8))
     with pytest.raises(ValueError, match="no sensor"):
         Robot(camera="OV7670")
+
+
+def test_po8030d_delivers_the_openswarm_window():
+    """openswarm-original.md §5.5: register values for 160 x 160 centred, zoom 8."""
+    robot = Robot(camera="PO8030D")
+    picture = scene()
+    robot.board.camera.show(picture)
+    window = {0x08: 0x00, 0x09: 0x3B, 0x10: 0x00, 0x11: 0xA0, 0x12: 0x01, 0x13: 0xE4, 0x6A: 0x02, 0x6C: 0xC0}
+    mode = {0x4E: 0x30, 0xB7: 3, 0x93: 0x80, 0x94: 0x80}
+    robot.configure([*((0, reg, value) for reg, value in window.items()), *((1, r, v) for r, v in mode.items())])
+    pixels = capture(robot, 20, 2 * 40, skip_lines=1).reshape(20, 40, 2)[:, ::2]
+    assert np.array_equal(pixels, rgb565(picture[160:320:8, 240:400:8]))
+
+
+def test_t1_counts_one_edge_of_pclk_per_byte(robot):
+    """§2: PCLK is T1CK; §7.4: once per byte, only within lines."""
+    robot.configure(po6030())
+    camera = robot.board.camera
+    robot.write("PR1", 0xFFFF)
+    robot.at(camera.scan.href(5) - 100).write("TMR1", 0)
+    robot.write("T1CON", 0x8002)
+    robot.at(camera.scan.href(6) - 100)
+    assert robot.read("TMR1") == camera.scan.course.line_bytes == 202
+    robot.at(camera.scan.href(6) + 8 * 10 + 1)
+    assert robot.read("TMR1") == 202 + 11
+
+
+def test_polling_portc_sees_the_sync_lines(robot):
+    """§2: HREF is RC3, VSYNC RC4."""
+    robot.configure(po6030())
+    scan = robot.board.camera.scan
+    edge, vsync = scan.href(0), scan.edge_cycle(VSYNC, 1)
+    assert [robot.at(cycle).read("PORTC") & (HREF | VSYNC) for cycle in (edge - 1, edge)] == [0, HREF]
+    assert [robot.at(cycle).read("PORTC") & VSYNC for cycle in (vsync - 1, vsync)] == [0, VSYNC]
+
+
+def grey_level(robot):
+    return int(capture(robot, 1, 2)[0][0])
+
+
+def test_automatic_exposure_follows_the_lamp_in_ten_frames(robot):
+    """§7.6: converges in 5 to 10 frames."""
+    camera = robot.board.camera
+    camera.show(np.full((48, 64), 120, np.uint8))
+    robot.configure(po6030(form="grey"))
+    frame = camera.scan.course.frame_tcy
+    assert grey_level(robot) == 120
+    camera.lamp = 0.5
+    levels = []
+    for _ in range(10):
+        levels.append(grey_level(robot))
+    assert levels == sorted(levels)
+    assert levels[0] < 100
+    assert grey_level(robot) == pytest.approx(120, abs=1)
+    robot.later(20 * frame)
+    assert grey_level(robot) == 120
+
+
+def test_without_automatic_exposure_the_lamp_shows(robot):
+    """§7.6: fixed settings."""
+    robot.board.camera.show(np.full((48, 64), 120, np.uint8))
+    robot.configure([*po6030(form="grey"), (2, 0x04, 0x99)])
+    robot.board.camera.lamp = 0.5
+    robot.later(40_000_000)
+    assert grey_level(robot) == 60
+
+
+def test_po3030k_manual_exposure_and_gain():
+    """§7.2: D4 = 0x0C both off; B0 exposure, 15 global gain 0x10 = 1, 16 red gain 0x40 = 1."""
+    robot = Robot(camera="PO3030K")
+    robot.board.camera.show(np.full((480, 640, 3), 64, np.uint8))
+    robot.configure([*po3030(), (0, 0xD4, 0x0C), (0, 0x15, 0x20), (0, 0x16, 0x60)])
+    assert list(capture(robot, 1, 2)[0]) == list(rgb565(np.array([192, 128, 128])))
+
+
+def test_only_the_pixels_of_lines_that_are_read_are_asked_for(robot):
+    """A renderer works for columns of the window and for lines somebody reads."""
+    asked = []
+
+    def pixels(y, columns, cycle):
+        asked.append((y, columns.tolist(), cycle))
+        return np.zeros((len(columns), 3), np.uint8)
+
+    robot.board.camera.sample(pixels)
+    robot.configure(po6030())
+    robot.later(5_000_000)
+    assert asked == []
+    capture(robot, 2, 4, skip_lines=1)
+    assert [y for y, _, _ in asked] == [160, 168]
+    assert asked[0][1] == list(range(236, 640, 4))
+    assert asked[0][2] == robot.board.camera.scan.href(40, 3)
+
+
+def test_frame_is_the_picture_the_sensor_sends(robot):
+    """As on the bus: window, format, gains."""
+    picture = scene()
+    robot.board.camera.show(picture)
+    robot.configure(po6030())
+    frame = robot.board.camera.frame()
+    assert frame.shape == (120, 101, 3)
+    assert np.array_equal(frame[38], picture[152, 236::4] & [0xF8, 0xFC, 0xF8])
+
+
+@pytest.mark.parametrize("form", ["rgb565", "grey", "yuv"])
+def test_decoding_gives_back_what_the_format_keeps(form):
+    """Grey scales survive every format to its precision; colours survive RGB565 and, within 3, YUV pairs."""
+    grey = np.repeat(np.arange(0, 256, 8, dtype=np.uint8)[:, None], 3, axis=1)
+    assert np.abs(decode(encode(grey, form, (1.0, 1.0, 1.0)), form).astype(int) - grey).max() <= 4
+    if form != "grey":
+        red = np.tile(np.array([200, 96, 40], np.uint8), (4, 1))
+        assert np.abs(decode(encode(red, form, (1.0, 1.0, 1.0)), form).astype(int) - red).max() <= 4
+
+
+def test_turned_sensors_see_a_turned_picture(robot):
+    """§7.1: PO3030K robots have the array mounted turned by 90 degrees."""
+    marked = np.zeros((64, 48), np.uint8)
+    marked[0, 0] = 255  # top left of an upright, high picture
+    robot.board.camera.show(marked, turned=90)
+    robot.configure([(1, 0x80, 0x20), (0, 0x90, 0xC0), (1, 0x38, 0x0D)])
+    frame = robot.board.camera.frame()
+    assert frame[-1, 0].tolist() == [255] * 3
+    assert frame[0, 0].tolist() == [0] * 3
+    with pytest.raises(ValueError, match="turned by"):
+        robot.board.camera.show(marked, turned=45)
+
+
+def test_plug_is_part_of_a_snapshot(robot):
+    """A camera that was there at the time of the snapshot answers and ticks again."""
+    state = robot.machine.snapshot()
+    robot.board.camera.unplug()
+    robot.machine.restore(state)
+    assert 0x6E in robot.board.chip.i2c.wire.devices
+    edge = robot.board.camera.scan.edge_cycle(HREF, 1)
+    assert robot.at(edge).read("PORTC") & HREF
