@@ -24,23 +24,30 @@ MM_PER_STEP: Final = 0.128
 """Travel of the wheel's rim per step in mm (epuck.md §3)."""
 
 _NOWHERE: Final = 4
+"""Index before the first pattern."""
+_ILLEGAL: Final = -1
+
+_MEANING: Final = tuple(_NOWHERE if nibble == 0 else PHASES.get(nibble, _ILLEGAL) for nibble in range(16))
+"""Phase index of a nibble; _NOWHERE for all coils off, _ILLEGAL for what is no phase."""
+
+_STEPS, _LOST, _ILLEGALS, _INDEX, _NIBBLE, _SINCE, _SETTLED, _ON_TIME = range(8)
+"""Places in `motor.<side>.state`."""
 
 
 class Stepper(Part):
-    """One motor. `steps` counts full steps, forward positive."""
+    """One motor. `steps` counts full steps, forward positive.
+
+    State is one run of signed 64-bit numbers in the record, because edges come by the thousand per second.
+    """
 
     def __init__(self, name: str, chip: Peripherals, shift: int, forward: int) -> None:
         super().__init__(name, chip)
         self._shift: Final = shift
         self._forward: Final = forward
-        self._steps: Final = self.cell("steps", "q")
-        self._lost: Final = self.cell("lost")
-        self._illegal: Final = self.cell("illegal")
-        self._index: Final = self.cell("index", "B", _NOWHERE)
-        self._nibble: Final = self.cell("nibble", "B")
-        self._since: Final = self.cell("since", "Q")
-        self._settled: Final = self.cell("settled", "B", 1)
-        self._on_time: Final = self.cell("on_time", "Q")
+        first = self.record.reserve(f"{name}.state", "q", 8).index
+        self._state: Final = self.record.s64[first : first + 8]
+        self._state[_INDEX] = _NOWHERE
+        self._state[_SETTLED] = 1
         self._on_step: Callable[[int, int], None] | None = None
         self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True)
 
@@ -48,26 +55,27 @@ class Stepper(Part):
     def steps(self) -> int:
         """Steps made so far; negative = backward."""
         self._catch_up()
-        return self._steps.value
+        return self._state[_STEPS]
 
     @property
     def lost(self) -> int:
         """Jumps by two phases: the rotor does not follow."""
         self._catch_up()
-        return self._lost.value
+        return self._state[_LOST]
 
     @property
     def illegal(self) -> int:
         """Patterns that are no phase and stood for 1 us or more."""
         self._catch_up()
-        return self._illegal.value
+        return self._state[_ILLEGALS]
 
     @property
     def coil_cycles(self) -> int:
         """Tcy during which at least one coil was on: what the battery pays for."""
         self._catch_up()
-        running = max(self.now - self._since.value, 0) if self._nibble.value else 0
-        return self._on_time.value + running
+        state = self._state
+        running = max(self.now - state[_SINCE], 0) if state[_NIBBLE] else 0
+        return state[_ON_TIME] + running
 
     def listen(self, on_step: Callable[[int, int], None]) -> None:
         """Call on_step(cycle, direction) at each step, when the next pattern shows that it was one; `cycle` is when
@@ -77,39 +85,42 @@ class Stepper(Part):
 
     def _catch_up(self) -> None:
         self.pins.flush()
-        self._settle(self.now)
+        state = self._state
+        if not state[_SETTLED] and self.now - state[_SINCE] >= SETTLE:
+            self._settle()
 
     def _changed(self, cycle: int, _changed: int, levels: int) -> None:
-        nibble = levels >> self._shift & 0xF
-        self._settle(cycle)
-        if self._nibble.value:
-            self._on_time.value += cycle - self._since.value
-        self._nibble.value = nibble
-        self._since.value = cycle
-        self._settled.value = 0
+        """A new pattern: what the last one was is known now."""
+        state = self._state
+        stood = cycle - state[_SINCE]
+        if stood >= SETTLE and not state[_SETTLED]:
+            self._settle()
+        if state[_NIBBLE]:
+            state[_ON_TIME] += stood
+        state[_NIBBLE] = levels >> self._shift & 0xF
+        state[_SINCE] = cycle
+        state[_SETTLED] = 0
 
-    def _settle(self, cycle: int) -> None:
-        """Count the present pattern if it has stood long enough by `cycle`."""
-        if self._settled.value or cycle - self._since.value < SETTLE:
-            return
-        self._settled.value = 1
-        nibble = self._nibble.value
-        if nibble == 0:
+    def _settle(self) -> None:
+        """The present pattern has stood long enough to count."""
+        state = self._state
+        state[_SETTLED] = 1
+        index = _MEANING[state[_NIBBLE]]
+        if index == _NOWHERE:
             return  # all off: friction in the gear keeps the rotor where it is
-        index = PHASES.get(nibble)
-        if index is None:
-            self._illegal.value += 1
+        if index == _ILLEGAL:
+            state[_ILLEGALS] += 1
             return
-        before = self._index.value
-        self._index.value = index
-        moved = (index - before) % 4 if before != _NOWHERE else 0
+        before = state[_INDEX]
+        state[_INDEX] = index
+        moved = (index - before) & 3 if before != _NOWHERE else 0
         if moved == 2:
-            self._lost.value += 1
+            state[_LOST] += 1
         elif moved:
             direction = self._forward if moved == 1 else -self._forward
-            self._steps.value += direction
+            state[_STEPS] += direction
             if self._on_step is not None:
-                self._on_step(self._since.value, direction)
+                self._on_step(state[_SINCE], direction)
 
 
 class Motors:
