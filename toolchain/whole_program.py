@@ -52,14 +52,17 @@ def merge(modules: list[tuple[Path, llvm.ModuleRef]]) -> llvm.ModuleRef:
 
 
 def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
-    """Names that native objects, given as (name, content), want from elsewhere."""
-    from toolchain.elf.model import Home
+    """Names that native objects, given as (name, content), want from elsewhere or define themselves.
+
+    A definition on both sides must reach the linker, which reports it.
+    """
+    from toolchain.elf.model import Bind
     from toolchain.elf.read import is_object, read_object
 
     names: set[str] = set()
     for name, content in objects:
         if is_object(content):
-            names.update(s.name for s in read_object(content, name).symbols if s.home is Home.UNDEFINED)
+            names.update(s.name for s in read_object(content, name).symbols if s.bind is not Bind.LOCAL)
     return names
 
 

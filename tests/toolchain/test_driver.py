@@ -1,0 +1,282 @@
+"""The compiler driver from the outside: options, outputs, dependency files, bad input (issue B, "Must show" 6)."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.toolchain.c_programs import run
+from toolchain import driver
+from toolchain.cc_options import parse
+from toolchain.clang import clang_program
+from toolchain.elf.read import is_object
+from toolchain.errors import ToolError
+
+
+def cc(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:
+    """Exit status and stderr of one run in this process."""
+    status = driver.main([str(word) for word in words])
+    return status, capsys.readouterr().err
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_the_hidden_clang_command_of_the_wheel_exists() -> None:
+    """design §5: the front end is `ziglang`'s clang."""
+    said = subprocess.run([*clang_program(), "--version"], capture_output=True, text=True, check=True).stdout
+    assert said.startswith("clang version")
+
+
+def test_predefined_macros_are_those_of_the_device(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """abi-elf.md §2.9; no MSP430 macro of the borrowed target may remain (design §5)."""
+    source = write(tmp_path, "empty.c", "")
+    assert driver.main(["-E", "-dM", str(source)]) == 0
+    macros = capsys.readouterr().out
+    assert "MSP430" not in macros.upper()
+    for name in ("__dsPIC30F__", "__dsPIC30F6014A__", "__HAS_DSP__"):
+        assert f"#define {name} 1" in macros
+    for text in ("__SIZEOF_INT__ 2", "__SIZEOF_LONG__ 4", "__SIZEOF_POINTER__ 2", "__SIZEOF_DOUBLE__ 8",
+                 "__SIZEOF_WCHAR_T__ 2", "__WCHAR_TYPE__ unsigned short"):  # fmt: skip
+        assert f"#define {text}" in macros
+    assert "__CHAR_UNSIGNED__" not in macros
+    assert "__XC16__" not in macros
+
+
+def test_compile_link_and_run(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Two C files and one assembly file to one image; the status of main arrives."""
+    a = write(tmp_path, "a.c", "int b(int); extern int c(void); int main(void) { return b(20) + c(); }\n")
+    b = write(tmp_path, "b.c", "int b(int x) { return 2 * x; }\n")
+    s = write(tmp_path, "c.s", "\t.section .text,code\n\t.global _c\n_c: mov #2,w0\n\treturn\n")
+    image = tmp_path / "x.elf"
+    assert cc(capsys, "-Os", "-Wall", a, b, s, "-o", image) == (0, "")
+    assert run(image, engine="interp").status == 42
+
+
+@pytest.mark.parametrize("flags", [(), ("-flto",), ("-g",)])
+def test_separate_compilation(capsys: pytest.CaptureFixture[str], tmp_path: Path, flags: tuple[str, ...]) -> None:
+    """-c, then linking the objects; with -flto they are bitcode and still optimised as one program."""
+    a = write(tmp_path, "a.c", "int b(int); static int k = 3; int main(void) { return b(20) + k; }\n")
+    b = write(tmp_path, "b.c", "static int k = 1; int b(int x) { return 2 * x + k; }\n")
+    for source in (a, b):
+        assert cc(capsys, "-Os", "-c", *flags, source, "-o", source.with_suffix(".o")) == (0, "")
+    assert is_object((tmp_path / "a.o").read_bytes()) == (flags != ("-flto",))
+    image = tmp_path / "x.elf"
+    assert cc(capsys, "-Os", tmp_path / "a.o", tmp_path / "b.o", "-o", image) == (0, "")
+    assert run(image, engine="interp").status == 44
+
+
+def test_whole_program_and_separate_linking_agree(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """-fno-lto gives the same result; whole-program optimisation, the default, is not larger."""
+    a = write(tmp_path, "a.c", "int b(int); int main(void) { return b(20) + b(1); }\n")
+    b = write(tmp_path, "b.c", "int unused(int x) { return x / 3; } int b(int x) { return 2 * x; }\n")
+    sizes = []
+    for flag in ("-flto", "-fno-lto"):
+        image = tmp_path / f"x{flag}.elf"
+        assert cc(capsys, "-Os", flag, a, b, "-o", image) == (0, "")
+        assert run(image, engine="interp").status == 42
+        sizes.append(image.stat().st_size)
+    assert sizes[0] <= sizes[1]
+
+
+def test_hex_output_equals_the_elf(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """-o x.hex writes what `toolchain hex` makes of the ELF (abi-elf.md §6.8)."""
+    source = write(tmp_path, "a.c", "const int t[3] = {1, 2, 3}; volatile int i = 2; int main(void) { return t[i]; }\n")
+    assert cc(capsys, "-Os", source, "-o", tmp_path / "x.hex") == (0, "")
+    assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
+    assert (tmp_path / "x.hex").read_text().endswith(":00000001ff\n")
+    assert run(tmp_path / "x.hex", engine="interp").status == run(tmp_path / "x.elf", engine="interp").status == 3
+
+
+def test_dependency_file_names_headers_and_output(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """-MMD: user headers, no system headers, as gcc does."""
+    write(tmp_path, "mine.h", "#define N 3\n")
+    source = write(tmp_path, "a.c", '#include <stdint.h>\n#include "mine.h"\nint main(void) { return N; }\n')
+    assert cc(capsys, "-c", "-MMD", source, "-o", tmp_path / "a.o") == (0, "")
+    text = (tmp_path / "a.d").read_text()
+    assert text.startswith(str(tmp_path / "a.o"))
+    assert "mine.h" in text
+    assert "stdint.h" not in text
+    assert cc(capsys, "-c", "-MD", "-MF", tmp_path / "deps", "-MT", "target", source, "-o", tmp_path / "a.o")[0] == 0
+    assert (tmp_path / "deps").read_text().startswith("target:")
+    assert "stdint.h" in (tmp_path / "deps").read_text()
+
+
+def test_diagnostics_carry_the_users_file_and_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """All clang diagnostics pass through; a warning does not fail the run."""
+    source = write(tmp_path, "warn.c", "int main(void)\n{\n    int unused = 3;\n    return 0;\n}\n")
+    status, said = cc(capsys, "-Wall", source, "-o", tmp_path / "x.elf")
+    assert status == 0
+    assert f"{source}:3:9: warning: unused variable" in said
+
+
+def test_single_precision_constants(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """-fsingle-precision-constant: no double arithmetic for 1.1 * float."""
+    source = write(tmp_path, "a.c", "float f(float x) { return x * 1.1; }\n")
+    assert cc(capsys, "-Os", "-S", source, "-o", tmp_path / "double.s") == (0, "")
+    assert cc(capsys, "-Os", "-S", "-fsingle-precision-constant", source, "-o", tmp_path / "single.s") == (0, "")
+    assert "muldf3" in (tmp_path / "double.s").read_text()
+    assert "muldf3" not in (tmp_path / "single.s").read_text()
+
+
+def test_xc16_attributes_on_request(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """-fxc16-attributes accepts Microchip's spelling of interrupt functions (abi-elf.md §2.5)."""
+    source = write(tmp_path, "a.c", "int n; void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void) { n++; }\n"
+                   "int main(void) { return 0; }\n")  # fmt: skip
+    assert cc(capsys, source, "-o", tmp_path / "x.elf")[0] == 1
+    assert cc(capsys, "-fxc16-attributes", source, "-o", tmp_path / "x.elf") == (0, "")
+
+
+def test_a_program_replaces_library_functions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Library functions are archive members and weak: the program's own memcpy and __putchar win."""
+    source = write(tmp_path, "a.c", """
+#include <stdio.h>
+#include <string.h>
+static int said, copied;
+int __putchar(int c) { said++; return c; }
+void *memcpy(void *to, const void *from, size_t n) { copied++; char *d = to; const char *s = from; while (n--) *d++ = *s++; return to; }
+int main(void) { char a[40], b[40] = "x"; volatile size_t n = 40; memcpy(a, b, n); memset(b, 0, n); printf("%s!", a); return said * 10 + copied; }
+""")  # fmt: skip
+    assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
+    assert run(tmp_path / "x.elf", engine="interp").status == 21
+
+
+def test_only_what_is_used_is_linked(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """An empty main: start-up code, vectors and nothing else of the library."""
+    source = write(tmp_path, "a.c", "int main(void) { return 0; }\n")
+    assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
+    from toolchain.elf.read import read_executable
+
+    image = read_executable((tmp_path / "x.elf").read_bytes(), "x.elf")
+    words = sum(len(s.data) // 4 for s in image.sections if s.is_code and s.name == ".text")
+    assert words < 90
+
+
+BAD_COMMAND_LINES = [
+    (["-Os"], "no input files"),
+    (["nowhere.c"], "nowhere.c: no such file"),
+    (["--frobnicate", "a.c"], "unknown option '--frobnicate'"),
+    (["-fshort-double", "a.c"], "double is always 64-bit"),
+    (["-mcpu=33FJ128", "a.c"], "device '33FJ128' is not supported"),
+    (["a.c", "-o"], "option '-o' needs a value"),
+    (["a.c", "-o", "a.c"], "would overwrite an input"),
+    (["-c", "a.c", "b.c", "-o", "x.o"], "takes exactly one input"),
+    (["a.xyz"], "unknown kind of file"),
+    (["-x", "fortran", "a.c"], "unknown language 'fortran'"),
+    (["a.c", "-o", "missing/x.elf"], "does not exist"),
+    (["a.c", "-lnone"], "cannot find libnone.a"),
+    (["a.c", "-Wl,--frob"], "unknown linker option '--frob'"),
+    (["a.c", "-Wl,--heap=lots"], "needs a number, not 'lots'"),
+    (["a.c", "-j", "0"], "positive number"),
+    (["@nothere"], "cannot read response file"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), BAD_COMMAND_LINES)
+def test_bad_command_lines_say_what_is_wrong(
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit status 2, one clear message, no output file."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.c", "b.c"):
+        write(tmp_path, name, "int main(void) { return 0; }\n" if name == "a.c" else "")
+    write(tmp_path, "a.xyz", "")
+    before = sorted(os.listdir(tmp_path))
+    status, said = cc(capsys, *words)
+    assert status == 2
+    assert message in said
+    assert sorted(os.listdir(tmp_path)) == before
+
+
+BAD_PROGRAMS = [
+    ("C error", {"a.c": "int main(void) { return x; }\n"}, 1, "a.c:1:25: error: use of undeclared identifier 'x'"),
+    ("missing header", {"a.c": '#include "none.h"\n'}, 1, "'none.h' file not found"),
+    ("undefined symbol", {"a.c": "int f(void), g(void); int main(void) { return f() + g(); }\n"}, 2, "undefined symbol _f"),
+    ("undefined symbols are all listed", {"a.c": "int f(void), g(void); int main(void) { return f() + g(); }\n"}, 2,
+     "undefined symbol _g"),
+    ("duplicate in C", {"a.c": "int f(void) { return 1; } int main(void) { return f(); }\n", "b.c": "int f(void) { return 2; }\n"},
+     2, "duplicate symbol"),
+    ("duplicate of C and assembly", {"a.c": "int f(void) { return 1; } int main(void) { return f(); }\n",
+     "b.s": "\t.section .text,code\n\t.global _f\n_f: return\n"}, 2, "duplicate symbol _f"),
+    ("assembly error", {"a.c": "int main(void) { return 0; }\n", "b.s": "\tfrob w0,w1\n"}, 2, "b.s:1"),
+    ("RAM overflow", {"a.c": "char big[9000]; int main(void) { big[3] = 1; return *(volatile char *)&big[8000]; }\n"}, 2,
+     "overflows by"),
+    ("flash overflow", {"a.c": "const unsigned char t[40000] = {1}; int main(void) { volatile int i = 3; return t[i]; }\n"}, 2,
+     "_t"),
+    ("handler without attribute", {"a.c": "int n; void _T1Interrupt(void) { n++; } int main(void) { return n; }\n"}, 2,
+     "not an interrupt function"),
+    ("handler with a wrong name", {"a.c": "#include <xc.h>\nint n; OS_ISR(_T1Interupt) { n++; } int main(void) { return n; }\n"}, 2,
+     "_T1Interrupt"),
+    ("unsupported operand", {"a.c": "int main(void)\n{\n    int x;\n    __asm__(\"nop\" : \"=a\"(x));\n    return x;\n}\n"}, 1, "a.c:4"),
+    ("bitcode that is none", {"a.bc": "nonsense"}, 2, "not readable as LLVM IR"),
+    ("object that is none", {"a.o": "nonsense"}, 2, "a.o"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("files", "status", "message"), [p[1:] for p in BAD_PROGRAMS], ids=[p[0] for p in BAD_PROGRAMS]
+)
+def test_bad_programs_leave_a_message_and_no_output(
+    files: dict[str, str], status: int, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Issue B, "Must show" 6: 1 for C errors, 2 for everything else, no output file, no traceback."""
+    paths = [write(tmp_path, name, text) for name, text in files.items()]
+    before = sorted(os.listdir(tmp_path))
+    got, said = cc(capsys, "-Os", *paths, "-o", tmp_path / "x.elf")
+    assert got == status, said
+    assert message in said
+    assert "Traceback" not in said
+    assert sorted(os.listdir(tmp_path)) == before
+
+
+def test_errors_of_all_files_are_reported(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """The parallel front end finishes every file before it gives up, and reports in command-line order."""
+    paths = [write(tmp_path, f"{n}.c", f"int f{n} = x{n};\n") for n in range(4)]
+    status, said = cc(capsys, "-j", 2, *paths, "-o", tmp_path / "x.elf")
+    assert status == 1
+    places = [said.index(f"x{n}'") for n in range(4)]
+    assert places == sorted(places)
+
+
+def test_options_reach_their_stage() -> None:
+    """The split of the command line between front end, back end and linker."""
+    options = parse(["-O2", "-DX=1", "-I", "inc", "-Wall", "-Wl,--heap=64,--gc-sections", "-fstack-check", "-g", __file__ + "c"][:-1]
+                    + ["-x", "c", __file__])  # fmt: skip
+    assert options.level == "2"
+    assert options.clang == ["-DX=1", "-I", "inc", "-Wall"]
+    assert options.linker == ["--heap=64", "--gc-sections"]
+    assert options.stack_check
+    assert options.debug
+
+
+def test_response_files_nest(tmp_path: Path) -> None:
+    """@file, with quoting; an endless nest is refused."""
+    write(tmp_path, "a.c", "")
+    inner = write(tmp_path, "inner", f"-DNAME='a b' {tmp_path / 'a.c'}")
+    outer = write(tmp_path, "outer", f"-O1 @{inner}")
+    options = parse([f"@{outer}"])
+    assert options.clang == ["-DNAME=a b"]
+    assert options.level == "1"
+    inner.write_text(f"@{outer}")
+    with pytest.raises(ToolError, match="nest too deeply"):
+        parse([f"@{outer}"])
+
+
+def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every command has --help with an example."""
+    assert driver.main(["--help"]) == 0
+    assert "example: python -m toolchain cc" in capsys.readouterr().out
+
+
+def test_messages_need_none_of_the_heavy_parts() -> None:
+    """Design: warm start below a second; a usage error imports neither llvmlite nor the back end."""
+    code = "import sys\nfrom toolchain.cli import main\nmain(['cc', '--nonsense'])\nprint([m for m in sys.modules if 'llvmlite' in m])"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "[]"
