@@ -3,7 +3,7 @@
 Everything is an array in the record with one word per port (A..G = 0..6), so a simulation reads and writes levels
 without calls per pin:
 
-- `input`: level the outside applies; `open`: 1 where nothing outside drives the pin (a pull-up decides then);
+- `input`: level the outside applies; `open`: 1 where nothing outside drives the pin low, so that a pull-up can lift it;
 - `drive`, `output`: what the chip drives, and with which level;
 - `level`: what the digital input buffers see (0 where the pin is analog).
 
@@ -67,6 +67,8 @@ class Pins:
         self.output: Final = words("output")
         self.level: Final = words("level")
         self.pullup: Final = words("pullup")
+        for port in range(len(PORTS)):
+            self.open[port] = 0xFFFF  # nothing is connected yet
         self.analog: Final = words("analog")
         self.before: Final = words("before")
         """What PORT reads still return in the cycle after the chip changed its outputs (§6)."""
@@ -77,6 +79,8 @@ class Pins:
         """Pins whose changes Python must hear of at once."""
         self.lazy: Final = words("lazy")
         """Pins whose changes may wait in `ring`."""
+        self.waving: Final = words("waving")
+        """Pins whose levels an attached waveform supplies."""
         self._told: Final = words("told")
         """Levels the lazy watchers know."""
         ring = record.reserve("pins.ring", "Q", RING).index
@@ -146,10 +150,14 @@ class Pins:
         """Let a function of the cycle supply the levels of the pins in `mask`; edge watchers do not hear of them."""
         if all(entry[1] is not waveform for entry in self._waveforms[port]):
             self._waveforms[port].append((mask, waveform))
+            self.waving[port] |= mask
 
     def detach(self, port: int, waveform: Waveform) -> None:
         """Undo `attach`."""
         self._waveforms[port] = [entry for entry in self._waveforms[port] if entry[1] is not waveform]
+        self.waving[port] = 0
+        for mask, _waveform in self._waveforms[port]:
+            self.waving[port] |= mask
 
     def waveform(self, port: int, mask: int) -> Waveform | None:
         """The waveform on the pins in `mask`, if one is attached."""
@@ -182,6 +190,7 @@ class Pins:
         """The outside lets go of one pin."""
         port, mask = parse_pin(name)
         self.open[port] |= mask
+        self.input[port] &= ~mask
         self.apply(port, self._events.now if cycle is None else cycle)
 
     def get(self, name: str) -> int:
@@ -205,7 +214,7 @@ class Pins:
 
     def apply(self, port: int, cycle: int, by_chip: bool = False) -> None:
         """Recompute a port's levels after any of the arrays changed; they hold from `cycle` on."""
-        outside = self.input[port] & ~self.open[port] | self.pullup[port] & self.open[port]
+        outside = self.input[port] | self.pullup[port] & self.open[port]
         drive = self.drive[port]
         level = (self.output[port] & drive | outside & ~drive) & ~self.analog[port]
         old = self.level[port]

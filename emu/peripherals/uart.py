@@ -133,9 +133,10 @@ class Uart(Peripheral):
 
     # -- transmit ----------------------------------------------------------------------------------------------------
 
-    def _tx_written(self, _old: int, new: int, _lanes: int) -> None:
-        if not self.is_enabled or self._tx_count.value == FIFO:
-            return  # a full FIFO drops the character (§10.1)
+    def _tx_written(self, _old: int, new: int, lanes: int) -> None:
+        """The low byte pushes; a full FIFO drops the character (§10.1)."""
+        if not lanes & 0xFF or not self.is_enabled or self._tx_count.value == FIFO:
+            return
         self._tx[self._tx_count.value] = new & (1 << self._data_bits) - 1
         self._tx_count.value += 1
         self.sta["UTXBF"] = self._tx_count.value == FIFO

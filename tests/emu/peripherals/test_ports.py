@@ -104,12 +104,13 @@ def test_every_change_notice_input_sits_on_its_pin(rig, number, pin):
 
 def test_pull_up_lifts_a_pin_nothing_drives(rig):
     """§6.2: CNPU."""
-    rig.dev.pins.release("RG6")
     assert rig.at(2).read("PORTG") & 0x40 == 0
     rig.write("CNPU1", 1 << 8)
     assert rig.at(4).read("PORTG") & 0x40
     rig.dev.pins.set("RG6", 0)
     assert rig.at(5).read("PORTG") & 0x40 == 0
+    rig.dev.pins.release("RG6")
+    assert rig.at(6).read("PORTG") & 0x40
 
 
 @pytest.mark.parametrize(("number", "pin"), list(enumerate(["RF6", "RA12", "RA13", "RA14", "RA15"])))
