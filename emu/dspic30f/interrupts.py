@@ -65,10 +65,9 @@ class Exceptions:
         self._u64: Final = state.record.u64
         self._ram_start: Final = chip.data["ram"].start
         self._inttreg: Final = state.at["INTTREG"]
+        self._names: Final = [vector.name for vector in chip.vectors]
         self._look: Final = events.slot("cpu.look", lambda _due: events.kick())
         self.ipl_slip = 0
-        self.entered = ""
-        """The last exception entered and where it returns to, for messages."""
         self._slip_cycle: Final = state.record.reserve("cpu.slip_cycle", "Q").index
         self._slip_words: Final = state.record.reserve("cpu.slip_words", "H", 1 + FLAG_WORDS).index
         self._words: Final = self._tables(chip)
@@ -236,12 +235,19 @@ class Exceptions:
         alternate = state.intcon2 & ALTIVT
         vector = accepted.vector.aivt if alternate else accepted.vector.ivt
         state.pc = self._program.word(vector) & PC_MASK
-        self.entered = f"{accepted.vector.name} at {pc:06X}"
         state.mode = RUN
         state.repeat = NOT_REPEATING
         state.stall = 0
         state.cycle = first
         self._u16[self._inttreg] = accepted.level << 8 | accepted.vector.slot
+
+    def latest(self) -> str:
+        """The exception entered last, as INTTREG and the stack tell it, for messages; empty if there was none."""
+        slot, top = self._u16[self._inttreg] & 0x3F, self._u16[STACK_POINTER]
+        if not slot or slot >= len(self._names) or self._data.faulty(top - 4 & 0xFFFF, 2):
+            return ""
+        low, high = self._u16[top - 4 >> 1], self._u16[top - 2 >> 1]
+        return f"{self._names[slot]} at {(high & 0x7F) << 16 | low:06X}"
 
     def _push(self, value: int, cycle: int) -> None:
         """One word at [W15++] with the checks of every stack access (isa.md §10)."""

@@ -68,8 +68,8 @@ class PowerSaving:
         """
         state, events = self._state, self._events
         while True:
-            if events.deadline < state.cycle:
-                events.settle(state.cycle - 1)
+            if events.deadline <= state.cycle:
+                events.settle(state.cycle)
                 since = self._exceptions.waking()
                 if since is not None:
                     state.cycle = max(state.cycle, since + 1)
@@ -85,9 +85,9 @@ class PowerSaving:
                 state.cycle = max(state.cycle, limit)
                 return Sleeping.GOES_ON
             if due == NEVER or (due > state.record.u64[self._slept] + STIR and self._is_final()):
-                events.settle(state.cycle - 1)
+                events.settle(state.cycle)
                 return Sleeping.FOR_EVER
-            state.cycle = max(state.cycle, due + 1)
+            state.cycle = max(state.cycle, due)
 
     def _is_final(self) -> bool:
         """Nothing is enabled that could wake the CPU, whatever the devices still do."""

@@ -206,7 +206,7 @@ class Sequencer:
         state = self.state
         traps = self.exceptions.traps
         if state.ipl >= traps.address.vector.level:
-            entered = self.exceptions.entered
+            entered = self.exceptions.latest()
             origin = f", after {entered}" if entered else ""
             raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}{origin}")
         traps.request(traps.address, max(state.cycle, 1) - 1)
