@@ -19,6 +19,8 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   HAL_INLINE, HAL_OUTLINE       attributes: always, never copied into the caller
  *   hal_lock_state                opaque level
  *   hal_limit                     type of a stack limit
+ *   HAL_STACK_GUARD               bytes at the end of a thread's stack that belong to the port (hal_limits.h)
+ *   HAL_STACK_GROWS_DOWN          if it does
  *   HAL_ALLOCATION_FAILS()        false; a test port may say true to make the next allocation fail
  * and declares or defines inline:
  *   hal_lock_state hal_lock_slice(void);      at least level slice; nests; any context
@@ -42,12 +44,6 @@ void hal_start(void);
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg);
 /* The thread is gone and not running; release what hal_stack_init took beside the block. */
 void hal_stack_release(sys_pcb *process);
-/* Bytes of the stack never written since hal_stack_init. */
-uint16_t hal_stack_unused(const sys_pcb *process, const uint8_t *stack);
-
-uint16_t hal_kernel_stack_unused(void); /* since hal_init */
-bool hal_kernel_stack_intact(void);     /* its last word was never written; asserted after every round of handlers */
-
 /* Thread at level slice: save it, run pick() on the kernel stack and resume what it returns. Comes back when the caller
  * is resumed, at thread level. */
 void hal_switch(hal_pick pick);

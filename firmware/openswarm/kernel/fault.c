@@ -37,9 +37,12 @@ static HAL_NORETURN void stop(const char *cause, const char *prefix, uint32 numb
     hal_stop();
 }
 
-void os_trap(const char *cause, uint32 pc)
+/* Called by the port, on a stack of its own choice, with everything masked. */
+void os_trap(uint16 cause, uint32 pc)
 {
-    stop(cause, " at 0x", pc, 16);
+    static const char *const causes[] = {"oscillator failure", "address error", "math error", "unexpected interrupt",
+                                         "kernel stack overflow", "main stack overflow"};
+    stop(causes[cause], " at 0x", pc, 16);
 }
 
 void Sys_Assertion_Failed(const char *file, uint16 line)
@@ -56,7 +59,7 @@ sys_pcb *os_overflow(void)
     board_failsafe();
     os_count(&os_statistics.overflows);
     if (pid == 0) {
-        os_trap("stack overflow", 0);
+        os_trap(OS_MAIN_OVERFLOW, 0);
     }
     char *end = put_text(put_number(put_text(line, "stack overflow: thread "), pid, 10), " ended\r\n");
     (void)Sys_Send_Event(SYS_SEND_UART1, line, (uint16)(end - line));

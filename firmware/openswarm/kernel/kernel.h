@@ -94,6 +94,10 @@ void heap_init(void);
 void *heap_take(uint16 size);            /* NULL: none left. Sizes above HEAP_CLASSES * HEAP_STEP: not in an ISR */
 void heap_give(void *block, uint16 size); /* the size it was taken with */
 
+/* stack.c */
+void stack_paint(uint8 *stack, uint16 bytes);
+bool kernel_stack_is_intact(void); /* its last byte was never written; asserted after every round of handlers */
+
 /* event.c */
 void event_init(void);
 void event_deliver_queued(void);           /* kernel stack: all messages queued when it began */
@@ -135,6 +139,7 @@ void event_forget_losses(uint16 id);
 
 /* fault.c */
 HAL_USED sys_pcb *os_overflow(void); /* kernel stack: the running thread hit its stack limit; picks the next */
-HAL_NORETURN void os_trap(const char *cause, uint32 pc);
+enum { OS_MAIN_OVERFLOW = 5 };
+HAL_NORETURN HAL_USED void os_trap(uint16 cause, uint32 pc);
 
 #endif

@@ -27,6 +27,7 @@ void heap_init(void)
         small[i] = NULL;
     }
     large = NULL;
+    stack_paint(os_memory.bytes, SYS_KERNEL_STACK);
     brk = os_memory.bytes + SYS_KERNEL_STACK;
     top = END;
 }

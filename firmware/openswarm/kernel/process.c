@@ -192,6 +192,7 @@ uint16 Sys_Start_ProcessWith(const sys_process_config *config)
         p->block = block;
         p->wait.result = NULL;
         p->awaited = NULL;
+        stack_paint(block + extra, stack);
         if (hal_stack_init(p, block + extra, stack, config->entry, config->arg)) {
             set_period(p, config);
             pid = unused_pid();
@@ -357,21 +358,4 @@ sys_state Sys_Get_ProcessState(uint16 pid)
     }
     hal_unlock(lock);
     return state;
-}
-
-uint16 Sys_Get_UnusedStack(uint16 pid)
-{
-    uint16 unused = 0;
-    hal_lock_state lock = hal_lock_slice();
-    const sys_pcb *p = process_find(pid);
-    if (p != NULL && p->block != NULL) {
-        unused = hal_stack_unused(p, p->block + (process_periodic(p) != NULL ? sizeof(periodic) : 0));
-    }
-    hal_unlock(lock);
-    return unused;
-}
-
-uint16 Sys_Get_UnusedKernelStack(void)
-{
-    return hal_kernel_stack_unused();
 }

@@ -21,7 +21,7 @@ static void work(void)
         clock_wake_due();
     }
     os_delivering = false;
-    SYS_ASSERT(hal_kernel_stack_intact());
+    SYS_ASSERT(kernel_stack_is_intact());
 }
 
 static sys_pcb *dispatch(sys_pcb *next)

@@ -1,5 +1,5 @@
-/* UART1 (Bluetooth) and UART2 of the e-puck, both 115,200 baud 8N1 (epuck.md §2). The interrupt entries are in the port's
- * switch.S. */
+/* UART1 (Bluetooth) and UART2 of the e-puck, both 115,200 baud 8N1 (epuck.md §2). The interrupt entries are in
+ * vectors.S. */
 #include "io.h"
 #include "kernel.h"
 

@@ -1,9 +1,9 @@
-/* dsPIC30F port of hal_cpu.h: timers, first frames, stack paint. The rest is in switch.S and hal_port.h. */
+/* dsPIC30F port of hal_cpu.h: timers, first frames. The rest is in switch.S and hal_port.h. */
 #include "kernel.h"
 
-/* 1 ms is 14,745.6 Tcy at 14.7456 MHz: five periods are exactly 5 ms (kernel time, README.md). */
+/* 1 ms is 14,745.6 Tcy at 14.7456 MHz: five periods are exactly 5 ms (README.md). */
 static const uint16 clock_period[5] = {14745, 14746, 14746, 14745, 14746};
-enum { SLICE_PERIOD = 18432 /* counts of 8 Tcy: 10 ms */, PAINT = 0xA5A5 };
+enum { SLICE_PERIOD = 18432 /* counts of 8 Tcy: 10 ms */ };
 
 /* What switch.S assumes. */
 #define ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
@@ -13,10 +13,8 @@ ASSUME(status_is_fifth, offsetof(sys_pcb, status) == 8);
 ASSUME(pcb_is_18_bytes, sizeof(sys_pcb) == 18);
 ASSUME(dsp_is_bit_4, SYS_DSP == 1 << 4 && SYS_READY == 1);
 ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
-#undef ASSUME
 
 extern void os_resume_yielded(void), os_thread_start(void);
-
 static uint8 clock_phase;
 
 HAL_USED void cpu_clock_isr(void)
@@ -27,38 +25,9 @@ HAL_USED void cpu_clock_isr(void)
     os_clock_tick();
 }
 
-static void paint(uint16 *from, const uint16 *end)
-{
-    while (from < end) {
-        *from++ = PAINT;
-    }
-}
-
-static uint16 painted(const uint16 *lowest, const uint16 *end)
-{
-    const uint16 *p = end;
-    while (p > lowest && p[-1] == PAINT) {
-        p--;
-    }
-    return (uint16)((const uint8 *)end - (const uint8 *)p);
-}
-
-#define KERNEL_STACK_END ((uint16 *)(void *)(os_memory.bytes + SYS_KERNEL_STACK))
-
 void hal_init(sys_pcb *process)
 {
     process->limit = SPLIM;
-    paint((uint16 *)(void *)os_memory.bytes, KERNEL_STACK_END);
-}
-
-uint16_t hal_kernel_stack_unused(void)
-{
-    return painted((uint16 *)(void *)os_memory.bytes, KERNEL_STACK_END);
-}
-
-bool hal_kernel_stack_intact(void)
-{
-    return KERNEL_STACK_END[-1] == PAINT;
 }
 
 void hal_start(void)
@@ -81,7 +50,6 @@ void hal_start(void)
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg)
 {
     uint16 *frame = (uint16 *)(void *)stack;
-    paint(frame, (uint16 *)process);
     (void)bytes;
     *frame++ = (uint16)os_thread_start;
     *frame++ = 0;
@@ -97,19 +65,6 @@ bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*ent
 void hal_stack_release(sys_pcb *process)
 {
     (void)process;
-}
-
-uint16_t hal_stack_unused(const sys_pcb *process, const uint8_t *stack)
-{
-    const uint8 *end = (const uint8 *)process - HAL_STACK_GUARD;
-    return painted((const uint16 *)(const void *)stack, (const uint16 *)(const void *)end);
-}
-
-HAL_NORETURN HAL_USED void cpu_trap(uint16 number, uint32 pc)
-{
-    static const char *const causes[] = {"oscillator failure", "address error", "math error", "unexpected interrupt",
-                                         "kernel stack overflow"};
-    os_trap(causes[number], pc);
 }
 
 void hal_stop(void)

@@ -17,10 +17,10 @@
         .equ    STKERR, 2
         .equ    IPL3, 3
 
+        .global __T2Interrupt, _hal_switch, _hal_abandon, _os_resume_yielded, _os_thread_start, _hal_idle, __StackError
         .text
 
 ; ---- Preemption: 10 ms timer, IPL 1 -----------------------------------------------------------------------------
-        .global __T2Interrupt
 __T2Interrupt:
         bset    SR, #7                  ; IPL 5: only the camera may still stack on this thread
         push.d  w0
@@ -61,7 +61,6 @@ resume_preempted:
         retfie
 
 ; ---- void hal_switch(hal_pick): thread stack, IPL 1 ----------------------------------------------------------------
-        .global _hal_switch
 _hal_switch:
         push.d  w8
         push.d  w10
@@ -76,7 +75,6 @@ _hal_switch:
         mov     w15, [w1]               ; PCB_SP
 
 ; ---- void hal_abandon(hal_pick): any stack, IPL 1 ------------------------------------------------------------------
-        .global _hal_abandon
 _hal_abandon:
         mov     #_os_memory, w15
         call    w0
@@ -90,7 +88,6 @@ resume:
         pop     w1
         goto    w1
 
-        .global _os_resume_yielded
 _os_resume_yielded:
 resume_yielded:
         pop     w14
@@ -100,7 +97,6 @@ resume_yielded:
         retfie                          ; the high word of a return address holds SRL = 0: back to IPL 0
 
 ; First instructions of every thread; the initial frame puts entry into W8 and its argument into W9.
-        .global _os_thread_start
 _os_thread_start:
         mov     _os_running, w1
         mov     [w1+PCB_STATUS], w0
@@ -175,7 +171,6 @@ resume_dsp:
 
 ; ---- void hal_idle(const volatile uint16_t *pending): kernel stack, IPL 1 -------------------------------------------
 ; At IPL 7 an interrupt ends PWRSAV without being taken, so none slips in between the test and the sleep.
-        .global _hal_idle
 _hal_idle:
         bclr    IEC0, #T2IE             ; no slice while nothing runs
         bset    SR, #6
@@ -193,15 +188,10 @@ _hal_idle:
 #include "isr.inc"
 
         isr     __T1Interrupt, _cpu_clock_isr
-        isr     __U1RXInterrupt, _uart1_receive_isr
-        isr     __U1TXInterrupt, _uart1_transmit_isr
-        isr     __U2RXInterrupt, _uart2_receive_isr
-        isr     __U2TXInterrupt, _uart2_transmit_isr
 
 ; ---- Traps --------------------------------------------------------------------------------------------------------
 ; Stack limit. A soft trap: the write has happened, within the thread's own block. The thread is given up, and with it an
 ; ISR entry that had not yet left its stack; that interrupt's flag is still set. On the kernel stack it is the end.
-        .global __StackError
 __StackError:
         setm    SPLIM
         nop
@@ -223,7 +213,7 @@ __StackError:
         bra     fatal
         .endm
 
-        trap    __OscillatorFail, 0
+        trap    __OscillatorFail, 0     ; numbers: fault.c
         trap    __AddressError, 1
         trap    __MathError, 2
         trap    __DefaultInterrupt, 3
@@ -235,4 +225,4 @@ fatal:
         mov     [w15-2], w3
         and     #0x7F, w3
         mov     #_os_memory, w15
-        bra     _cpu_trap
+        bra     _os_trap

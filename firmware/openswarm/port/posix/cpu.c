@@ -205,23 +205,6 @@ void hal_stack_release(sys_pcb *process)
     free(c);
 }
 
-uint16_t hal_stack_unused(const sys_pcb *process, const uint8_t *stack)
-{
-    (void)process;
-    (void)stack;
-    return HAL_DEFAULT_STACK; /* nominal: a host thread never runs on the kernel's heap */
-}
-
-uint16_t hal_kernel_stack_unused(void)
-{
-    return HAL_KERNEL_STACK;
-}
-
-bool hal_kernel_stack_intact(void)
-{
-    return true;
-}
-
 void hal_switch(hal_pick pick)
 {
     context *self = os_running->sp;

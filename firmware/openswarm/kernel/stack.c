@@ -1,0 +1,56 @@
+/* How much of a stack was never used: stacks are painted before their first use and looked at from the far end.
+ *
+ * Stacks grow upwards, away from the start of their block, unless the port defines HAL_STACK_GROWS_DOWN. */
+#include "kernel.h"
+
+enum { PAINT = 0xA5 };
+
+void stack_paint(uint8 *stack, uint16 bytes)
+{
+    while (bytes-- > 0) {
+        *stack++ = PAINT;
+    }
+}
+
+static uint16 unused(const uint8 *stack, uint16 bytes)
+{
+    uint16 n = 0;
+#ifdef HAL_STACK_GROWS_DOWN
+    while (n < bytes && stack[n] == PAINT) {
+        n++;
+    }
+#else
+    while (n < bytes && stack[bytes - 1u - n] == PAINT) {
+        n++;
+    }
+#endif
+    return n;
+}
+
+/* The guard at the end of a thread's stack is not the thread's to use. */
+uint16 Sys_Get_UnusedStack(uint16 pid)
+{
+    uint16 bytes = 0;
+    hal_lock_state lock = hal_lock_slice();
+    const sys_pcb *p = process_find(pid);
+    if (p != NULL && p->block != NULL) {
+        const uint8 *stack = p->block + ((p->status & SYS_PERIODIC) ? sizeof(periodic) : 0);
+        bytes = unused(stack, (uint16)((const uint8 *)p - stack - HAL_STACK_GUARD));
+    }
+    hal_unlock(lock);
+    return bytes;
+}
+
+uint16 Sys_Get_UnusedKernelStack(void)
+{
+    return unused(os_memory.bytes, SYS_KERNEL_STACK);
+}
+
+bool kernel_stack_is_intact(void)
+{
+#ifdef HAL_STACK_GROWS_DOWN
+    return os_memory.bytes[0] == PAINT;
+#else
+    return os_memory.bytes[SYS_KERNEL_STACK - 1] == PAINT;
+#endif
+}
