@@ -141,8 +141,23 @@ def test_a_program_replaces_library_functions(capsys: pytest.CaptureFixture[str]
 #include <string.h>
 static int said, copied;
 int __putchar(int c) { said++; return c; }
-void *memcpy(void *to, const void *from, size_t n) { copied++; char *d = to; const char *s = from; while (n--) *d++ = *s++; return to; }
-int main(void) { char a[40], b[40] = "x"; volatile size_t n = 40; memcpy(a, b, n); memset(b, 0, n); printf("%s!", a); return said * 10 + copied; }
+void *memcpy(void *to, const void *from, size_t n)
+{
+    char *d = to;
+    const char *s = from;
+    for (copied++; n--;)
+        *d++ = *s++;
+    return to;
+}
+int main(void)
+{
+    char a[40], b[40] = "x";
+    volatile size_t n = 40;
+    memcpy(a, b, n);
+    memset(b, 0, n);
+    printf("%s!", a);
+    return said * 10 + copied;
+}
 """)  # fmt: skip
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
     assert run(tmp_path / "x.elf", engine="interp").status == 21
@@ -195,34 +210,35 @@ def test_bad_command_lines_say_what_is_wrong(
     assert sorted(os.listdir(tmp_path)) == before
 
 
-BAD_PROGRAMS = [
-    ("C error", {"a.c": "int main(void) { return x; }\n"}, 1, "a.c:1:25: error: use of undeclared identifier 'x'"),
-    ("missing header", {"a.c": '#include "none.h"\n'}, 1, "'none.h' file not found"),
-    ("undefined symbol", {"a.c": "int f(void), g(void); int main(void) { return f() + g(); }\n"}, 2, "undefined symbol _f"),
-    ("undefined symbols are all listed", {"a.c": "int f(void), g(void); int main(void) { return f() + g(); }\n"}, 2,
-     "undefined symbol _g"),
-    ("duplicate in C", {"a.c": "int f(void) { return 1; } int main(void) { return f(); }\n", "b.c": "int f(void) { return 2; }\n"},
-     2, "duplicate symbol"),
-    ("duplicate of C and assembly", {"a.c": "int f(void) { return 1; } int main(void) { return f(); }\n",
-     "b.s": "\t.section .text,code\n\t.global _f\n_f: return\n"}, 2, "duplicate symbol _f"),
-    ("assembly error", {"a.c": "int main(void) { return 0; }\n", "b.s": "\tfrob w0,w1\n"}, 2, "b.s:1"),
-    ("RAM overflow", {"a.c": "char big[9000]; int main(void) { big[3] = 1; return *(volatile char *)&big[8000]; }\n"}, 2,
-     "overflows by"),
-    ("flash overflow", {"a.c": "const unsigned char t[40000] = {1}; int main(void) { volatile int i = 3; return t[i]; }\n"}, 2,
-     "_t"),
-    ("handler without attribute", {"a.c": "int n; void _T1Interrupt(void) { n++; } int main(void) { return n; }\n"}, 2,
-     "not an interrupt function"),
-    ("handler with a wrong name", {"a.c": "#include <xc.h>\nint n; OS_ISR(_T1Interupt) { n++; } int main(void) { return n; }\n"}, 2,
-     "_T1Interrupt"),
-    ("unsupported operand", {"a.c": "int main(void)\n{\n    int x;\n    __asm__(\"nop\" : \"=a\"(x));\n    return x;\n}\n"}, 1, "a.c:4"),
-    ("bitcode that is none", {"a.bc": "nonsense"}, 2, "not readable as LLVM IR"),
-    ("object that is none", {"a.o": "nonsense"}, 2, "a.o"),
-]  # fmt: skip
+EMPTY_MAIN = "int main(void) { return 0; }\n"
+TWO_UNKNOWN = "int f(void), g(void); int main(void) { return f() + g(); }\n"
+F_IN_C = "int f(void) { return 1; } int main(void) { return f(); }\n"
+F_IN_ASSEMBLY = "\t.section .text,code\n\t.global _f\n_f: return\n"
+MUCH_RAM = "char big[9000]; int main(void) { big[3] = 1; return *(volatile char *)&big[8000]; }\n"
+MUCH_CONST = "const unsigned char t[40000] = {1}; int main(void) { volatile int i = 3; return t[i]; }\n"
+PLAIN_HANDLER = "int n; void _T1Interrupt(void) { n++; } int main(void) { return n; }\n"
+MISSPELT_HANDLER = "#include <xc.h>\nint n; OS_ISR(_T1Interupt) { n++; } int main(void) { return n; }\n"
+STRANGE_OPERAND = 'int main(void)\n{\n    int x;\n    __asm__("nop" : "=a"(x));\n    return x;\n}\n'
+
+BAD_PROGRAMS = {
+    "C error": ({"a.c": "int main(void) { return x; }\n"}, 1, "a.c:1:25: error: use of undeclared identifier 'x'"),
+    "missing header": ({"a.c": '#include "none.h"\n'}, 1, "'none.h' file not found"),
+    "undefined symbol": ({"a.c": TWO_UNKNOWN}, 2, "undefined symbol _f"),
+    "undefined symbols are all listed": ({"a.c": TWO_UNKNOWN}, 2, "undefined symbol _g"),
+    "duplicate in C": ({"a.c": F_IN_C, "b.c": "int f(void) { return 2; }\n"}, 2, "duplicate symbol"),
+    "duplicate of C and assembly": ({"a.c": F_IN_C, "b.s": F_IN_ASSEMBLY}, 2, "duplicate symbol _f"),
+    "assembly error": ({"a.c": EMPTY_MAIN, "b.s": "\tfrob w0,w1\n"}, 2, "b.s:1"),
+    "RAM overflow": ({"a.c": MUCH_RAM}, 2, "overflows by"),
+    "constants overflow": ({"a.c": MUCH_CONST}, 2, "_t"),
+    "handler without attribute": ({"a.c": PLAIN_HANDLER}, 2, "not an interrupt function"),
+    "handler with a wrong name": ({"a.c": MISSPELT_HANDLER}, 2, "_T1Interrupt"),
+    "unsupported operand": ({"a.c": STRANGE_OPERAND}, 1, "a.c:4"),
+    "bitcode that is none": ({"a.bc": "nonsense"}, 2, "not readable as LLVM IR"),
+    "object that is none": ({"a.o": "nonsense"}, 2, "a.o"),
+}
 
 
-@pytest.mark.parametrize(
-    ("files", "status", "message"), [p[1:] for p in BAD_PROGRAMS], ids=[p[0] for p in BAD_PROGRAMS]
-)
+@pytest.mark.parametrize(("files", "status", "message"), BAD_PROGRAMS.values(), ids=BAD_PROGRAMS.keys())
 def test_bad_programs_leave_a_message_and_no_output(
     files: dict[str, str], status: int, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -247,8 +263,8 @@ def test_errors_of_all_files_are_reported(capsys: pytest.CaptureFixture[str], tm
 
 def test_options_reach_their_stage() -> None:
     """The split of the command line between front end, back end and linker."""
-    options = parse(["-O2", "-DX=1", "-I", "inc", "-Wall", "-Wl,--heap=64,--gc-sections", "-fstack-check", "-g", __file__ + "c"][:-1]
-                    + ["-x", "c", __file__])  # fmt: skip
+    words = ["-O2", "-DX=1", "-I", "inc", "-Wall", "-Wl,--heap=64,--gc-sections", "-fstack-check", "-g"]
+    options = parse([*words, "-x", "c", __file__])
     assert options.level == "2"
     assert options.clang == ["-DX=1", "-I", "inc", "-Wall"]
     assert options.linker == ["--heap=64", "--gc-sections"]
@@ -277,6 +293,9 @@ def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_messages_need_none_of_the_heavy_parts() -> None:
     """Design: warm start below a second; a usage error imports neither llvmlite nor the back end."""
-    code = "import sys\nfrom toolchain.cli import main\nmain(['cc', '--nonsense'])\nprint([m for m in sys.modules if 'llvmlite' in m])"
+    code = (
+        "import sys\nfrom toolchain.cli import main\nmain(['cc', '--nonsense'])\n"
+        "print([name for name in sys.modules if 'llvmlite' in name])"
+    )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
