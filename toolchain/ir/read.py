@@ -195,7 +195,7 @@ class Reader:
                     t = self._struct(c, True)
                     c.expect(">")
                     return t
-                raise c.error("vector type")
+                return self._array(c, "vector", ">")
         if token[0] == "%":
             name = name_of(token)
             if name not in self.types:
@@ -247,6 +247,13 @@ class Reader:
                 return ConstAgg(t, self._list(c, "]"))
             case "{":
                 return ConstAgg(t, self._list(c, "}"))
+            case "<" if t.kind == "vector":
+                return ConstAgg(t, self._list(c, ">"))
+            case "splat":
+                c.expect("(")
+                lane = self.typed(c)
+                c.expect(")")
+                return ConstAgg(t, [lane] * t.count)
             case "<":
                 c.expect("{")
                 elems = self._list(c, "}")
@@ -694,7 +701,8 @@ class Reader:
         t = self.type(c)
         a = self.value(c, t)
         c.expect(",")
-        i = Instr(op, I1, [a, self.value(c, t)])
+        result = Type("vector", 0, (I1,), t.count) if t.kind == "vector" else I1
+        i = Instr(op, result, [a, self.value(c, t)])
         i.extra["pred"] = pred
         return i
 
@@ -772,6 +780,24 @@ class Reader:
         self._flags(c)
         a = self.typed(c)
         return Instr(op, a.type, [a])
+
+    def _operands(self, c: Cursor) -> list[Value]:
+        """`type value, type value...` up to the attachments."""
+        args = [self.typed(c)]
+        while c.peek() == "," and not c.tokens[c.at + 1].startswith("!"):
+            c.next()
+            args.append(self.typed(c))
+        return args
+
+    def _lane(self, c: Cursor) -> Instr:
+        op = c.tokens[c.at - 1]
+        args = self._operands(c)
+        t = args[0].type
+        if op == "extractelement":
+            t = t.elems[0]
+        elif op == "shufflevector":
+            t = Type("vector", 0, t.elems, args[2].type.count)
+        return Instr(op, t, args)
 
     def _extractvalue(self, c: Cursor) -> Instr:
         a = self.typed(c)
@@ -910,6 +936,9 @@ INSTRS: dict[str, Callable[[Reader, Cursor], Instr]] = {
     "fneg": Reader._unary,
     "extractvalue": Reader._extractvalue,
     "insertvalue": Reader._insertvalue,
+    "extractelement": Reader._lane,
+    "insertelement": Reader._lane,
+    "shufflevector": Reader._lane,
     "va_arg": Reader._va_arg,
     "atomicrmw": Reader._atomicrmw,
     "cmpxchg": Reader._cmpxchg,

@@ -37,10 +37,11 @@ from ..ir.model import (
     struct_offsets,
 )
 from ..target import ARGUMENT_REGISTERS
-from . import intrinsics, softfloat
+from . import intrinsics, softfloat, vectors
 from .build import Builder, const, legal_type
 from .cfg import reverse_postorder
 
+AGGREGATES = ("struct", "array", "vector")
 SIGNED_OPS = frozenset(("sdiv", "srem", "ashr"))
 CLEAN_OPS = frozenset(("udiv", "urem", "lshr", "sdiv", "srem", "ashr"))
 DIVIDE_NAMES = {"udiv": "__udiv{}3", "sdiv": "__div{}3", "urem": "__umod{}3", "srem": "__mod{}3"}
@@ -69,7 +70,8 @@ class Legalizer:
         f = self.function
         old_args, f.args = f.args, []
         for a in old_args:
-            leaves = [Arg(legal_type(t), a.name, a.index, a.attrs) for t, _ in _leaves(a.type)]
+            passed = [vectors.packed_type(a.type)] if a.type.kind == "vector" else [t for t, _ in _leaves(a.type)]
+            leaves = [Arg(legal_type(t), a.name, a.index, a.attrs) for t in passed]
             f.args += leaves
             if a.type.kind in ("struct", "array"):
                 self.parts[id(a)] = list(leaves)
@@ -81,7 +83,9 @@ class Legalizer:
             if entry:
                 entry = False
                 for a in old_args:
-                    if id(a) in self.values:
+                    if a.type.kind == "vector":
+                        self.parts[id(a)] = vectors.unpack(self, self.values.pop(id(a)), a.type)
+                    elif id(a) in self.values:
                         self.values[id(a)] = self.argument(a)
             for i in block.instrs:
                 self.b.line = i.line
@@ -123,6 +127,8 @@ class Legalizer:
 
     def use(self, v: Value) -> Value:
         """The legal value that stands for an operand."""
+        if isinstance(v, vectors.Lane):
+            return self.fields(v.source)[v.index]
         found = self.values.get(id(v))
         if found is not None:
             return found
@@ -169,15 +175,20 @@ class Legalizer:
 
     def instr(self, i: Instr) -> None:
         """Translate one instruction and record its value."""
-        handler = HANDLERS.get(i.op)
-        if handler is None:
-            raise UnsupportedError(f"instruction '{i.op}'")
-        result = handler(self, i)
+        lanes = vectors.lane_count(i)
+        result = vectors.expand(self, i, lanes) if lanes else self.translate(i)
         if isinstance(result, list):
             self.parts[id(i)] = result
         elif result is not None:
             self.values[id(i)] = result
             self.alive.append(i)
+
+    def translate(self, i: Instr) -> Value | list[Value] | None:
+        """Translate one instruction without recording its value."""
+        handler = HANDLERS.get(i.op)
+        if handler is None:
+            raise UnsupportedError(f"instruction '{i.op}'")
+        return handler(self, i)
 
     def binary(self, i: Instr) -> Value:
         op, t = i.op, i.type
@@ -234,19 +245,21 @@ class Legalizer:
         return softfloat.compare(self.b, i.pred, i.args[0].type.bits, self.use(i.args[0]), self.use(i.args[1]))
 
     def select(self, i: Instr) -> Value | list[Value]:
-        if i.type.kind in ("struct", "array"):
+        if i.type.kind in AGGREGATES:
             c = self.use(i.args[0])
             return [self.b.select(c, a, b) for a, b in zip(self.fields(i.args[1]), self.fields(i.args[2]), strict=True)]
         return self.b.select(self.use(i.args[0]), self.use(i.args[1]), self.use(i.args[2]))
 
     def freeze(self, i: Instr) -> Value | list[Value]:
-        if id(i.args[0]) in self.parts:
-            return self.parts[id(i.args[0])]
+        if i.type.kind in AGGREGATES:
+            return [const(p.type, 0) if isinstance(p, Undef) else p for p in self.fields(i.args[0])]
         a = self.use(i.args[0])
         return const(a.type, 0) if isinstance(a, Undef) else a
 
-    def cast(self, i: Instr) -> Value:
+    def cast(self, i: Instr) -> Value | list[Value]:
         a, t = i.args[0], i.type
+        if i.op == "bitcast" and "vector" in (a.type.kind, t.kind):
+            return vectors.bitcast(self, i)
         target = legal_type(t)
         match i.op:
             case "zext":
@@ -350,7 +363,7 @@ class Legalizer:
 
     def load(self, i: Instr) -> Value | list[Value]:
         p = self.use(i.args[0])
-        if i.type.kind in ("struct", "array"):
+        if i.type.kind in AGGREGATES:
             return self.load_aggregate(i, p)
         align = i.extra.get("align", 2)
         assert isinstance(align, int)
@@ -377,7 +390,7 @@ class Legalizer:
 
     def store(self, i: Instr) -> None:
         v, p = i.args[0], self.use(i.args[1])
-        if v.type.kind in ("struct", "array"):
+        if v.type.kind in AGGREGATES:
             self.store_aggregate(v, p, i.volatile)
             return
         if isinstance(v, Undef) and not i.volatile:
@@ -443,7 +456,7 @@ class Legalizer:
         assert isinstance(indices, list)
         first, count = _leaf_range(i.args[0].type, indices)
         parts = self.fields(i.args[0])[first : first + count]
-        return parts if i.type.kind in ("struct", "array") else parts[0]
+        return parts if i.type.kind in AGGREGATES else parts[0]
 
     def insertvalue(self, i: Instr) -> list[Value]:
         indices = i.extra["indices"]
@@ -451,13 +464,13 @@ class Legalizer:
         first, count = _leaf_range(i.type, indices)
         parts = list(self.fields(i.args[0]))
         v = i.args[1]
-        parts[first : first + count] = self.fields(v) if v.type.kind in ("struct", "array") else [self.use(v)]
+        parts[first : first + count] = self.fields(v) if v.type.kind in AGGREGATES else [self.use(v)]
         return parts
 
     # -- control flow -------------------------------------------------------------------------------------------------
 
     def phi(self, i: Instr) -> Value:
-        if i.type.kind in ("struct", "array"):
+        if i.type.kind in AGGREGATES:
             raise UnsupportedError(f"phi of type {i.type}")
         new = self.b.emit("phi", legal_type(i.type), [])
         new.blocks = list(i.blocks)
@@ -509,7 +522,7 @@ class Legalizer:
         self.jump("indirectbr", [self.use(i.args[0])], i.blocks)
 
     def ret(self, i: Instr) -> None:
-        values = [self.use(a) for a in i.args if a.type.bits] or [p for a in i.args for p in self.fields(a)]
+        values = [v for a in i.args for v in self.passed(a)]
         if sum(max(1, v.type.bits // 16) for v in values) > ARGUMENT_REGISTERS:
             raise UnsupportedError(f"returning {i.args[0].type} in registers")
         self.jump("ret", values, [])
@@ -525,6 +538,8 @@ class Legalizer:
     def call(self, i: Instr) -> Value | list[Value] | None:
         callee = i.args[-1]
         if isinstance(callee, GlobalRef):
+            if callee.name.startswith("llvm.") and i.type.kind == "vector":
+                return vectors.intrinsic(self, i)
             if callee.name.startswith("llvm."):
                 return intrinsics.expand(self, i, callee.name)
             if callee.name.startswith("__builtin_"):
@@ -536,16 +551,25 @@ class Legalizer:
         given = i.extra["attrs"]
         assert isinstance(given, list)
         for a, attr in zip(i.args[:-1], given, strict=True):
-            parts = self.fields(a) if a.type.kind in ("struct", "array") else [self.use(a)]
+            parts = self.passed(a)
             args += parts
             attrs += [attr] * len(parts)
         leaves = [legal_type(t) for t, _ in _leaves(i.type)] if i.type.kind in ("struct", "array") else []
-        new = self.b.emit("call", leaves[0] if leaves else legal_type(i.type), [*args, self.use(callee)])
+        result = vectors.packed_type(i.type) if i.type.kind == "vector" else legal_type(i.type)
+        new = self.b.emit("call", leaves[0] if leaves else result, [*args, self.use(callee)])
         new.extra = {"attrs": attrs, "vararg": i.extra["vararg"], "fixed": i.extra["fixed"], "tail": i.extra["tail"]}
         if leaves:
             new.extra["results"] = leaves
             return [new, *(self.b.emit("callresult", t, [new], index=k) for k, t in enumerate(leaves) if k)]
+        if i.type.kind == "vector":
+            return vectors.unpack(self, new, i.type)
         return self.clean_result(i.type, new)
+
+    def passed(self, a: Value) -> list[Value]:
+        """The values an argument or result travels as."""
+        if a.type.kind == "vector":
+            return [vectors.pack(self, a)]
+        return self.fields(a) if a.type.kind in AGGREGATES else [self.use(a)]
 
     def clean_result(self, t: Type, new: Value) -> Value | None:
         """i1 results come with undefined upper bits (abi-elf.md §2.3)."""
@@ -626,7 +650,7 @@ def _pieces(size: int, even: bool) -> list[tuple[int, int]]:
 
 def _leaves(t: Type, at: int = 0) -> list[tuple[Type, int]]:
     """Scalar members of an aggregate with their offsets."""
-    if t.kind == "array":
+    if t.kind in ("array", "vector"):
         step = size_of(t.elems[0])
         return [leaf for k in range(t.count) for leaf in _leaves(t.elems[0], at + k * step)]
     if t.kind == "struct":
@@ -639,7 +663,7 @@ def _leaf_range(t: Type, indices: list[int]) -> tuple[int, int]:
     """Position of a member among the leaves, and how many leaves it has."""
     first = 0
     for n in indices:
-        members = [t.elems[0]] * t.count if t.kind == "array" else list(t.elems)
+        members = [t.elems[0]] * t.count if t.kind != "struct" else list(t.elems)
         first += sum(len(_leaves(m)) for m in members[:n])
         t = members[n]
     return first, len(_leaves(t))
@@ -667,6 +691,9 @@ HANDLERS: dict[str, Callable[[Legalizer, Instr], Value | list[Value] | None]] = 
     "store": Legalizer.store,
     "extractvalue": Legalizer.extractvalue,
     "insertvalue": Legalizer.insertvalue,
+    "extractelement": vectors.extractelement,
+    "insertelement": vectors.insertelement,
+    "shufflevector": vectors.shufflevector,
     "phi": Legalizer.phi,
     "br": Legalizer.br,
     "switch": Legalizer.switch,
