@@ -154,6 +154,8 @@ class Assembler:
 
     def assign(self, name: str, text: str, once: bool = False) -> None:
         """Set `name` to the value of `text` (.set, .equ, =; `once` for .equiv)."""
+        if name in (".", "$"):
+            raise ExprError("the location counter is moved by .org or .space, not by an assignment")
         symbol = self.symbol(name)
         if isinstance(symbol.place, Label) or symbol.constant or (once and symbol.place is not None):
             raise ExprError(f"symbol {name} is already defined")

@@ -140,6 +140,7 @@ def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
         (".balign 4\n", "use .align"), (".quad 1\n", "two .long"), (".loc 1 2\n", "does not exist"),
         ("1 + 2\n", "cannot read"),
         (".if 1\n .else\n .else\n .endif\n", "second .else"), ("bra 1b\n", "not defined before"),
+        (" . = . + 4\n", ".org"),
         ("bra 9f\n", "label 9: is used but"), (" bra .Lx\n", "label .Lx is used but"),
         (".frob\n", "unknown directive"),
         (".global 1x\n", "expected a symbol"), (".section\n", "bad section name"), (".popsection\n", "without"),

@@ -1,5 +1,8 @@
 """Symbols across objects and libraries, section collection, and what is said when names are missing."""
 
+import shutil
+import subprocess
+
 import pytest
 
 from toolchain.asm.assemble import assemble
@@ -65,6 +68,24 @@ def test_archives_round_trip_and_are_readable_by_gnu_ar():
     assert [(m.name, m.data) for m in read_members(data, "l")] == [(m.name, m.data) for m in members]
     archive = open_archive(data, "l")
     assert {name: m.name for name, m in archive.index.items()} == {"x": "x.o", "y": "a_name_longer_than_fifteen.o"}
+
+
+@pytest.mark.skipif(shutil.which("ar") is None, reason="GNU ar is not installed")
+def test_gnu_ar_and_ours_read_each_others_archives(tmp_path):
+    """Same format both ways, symbol index and long names included."""
+    members = [member("x.o", ".global x\nx: nop\n"), member("a_name_longer_than_fifteen.o", ".global y\ny: nop\n")]
+    (tmp_path / "ours.a").write_bytes(archive_bytes(members))
+    for entry in members:
+        (tmp_path / entry.name).write_bytes(entry.data)
+
+    def gnu_ar(*words):
+        return subprocess.run(["ar", *words], cwd=tmp_path, capture_output=True, check=True).stdout
+
+    assert gnu_ar("t", "ours.a").decode().split() == [entry.name for entry in members]
+    assert gnu_ar("p", "ours.a", members[1].name) == members[1].data
+    gnu_ar("rcs", "theirs.a", *(entry.name for entry in members))
+    theirs = open_archive((tmp_path / "theirs.a").read_bytes(), "theirs.a")
+    assert [(m.name, m.data) for m in theirs.members] == [(m.name, m.data) for m in members]
 
 
 def test_an_archive_without_index_is_searched_too():
