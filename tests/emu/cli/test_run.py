@@ -48,7 +48,7 @@ def test_uart1_goes_to_standard_output_and_the_last_line_says_why_and_where(buil
     assert done.stdout == b"hi!\n"
     assert done.returncode == 0
     last = done.stderr.decode().splitlines()[-1]
-    assert last.startswith("halt at 0x00011e (_forever) after 5,254 cycles, 0.000356 s simulated, ")
+    assert last.startswith("halt at 0x00011e (_forever) after 5,253 cycles, 0.000356 s simulated, ")
     assert last.endswith(" x real time")
 
 
@@ -57,7 +57,7 @@ def test_json_is_one_object_with_the_uart_text(build, capfd):
     facts = json.loads(capfd.readouterr().out)
     assert facts["reason"] == "halt"
     assert facts["uart1"] == "hi!\n"
-    assert (facts["pc"], facts["symbol"], facts["cycles"], facts["status"]) == (0x11E, "_forever", 5254, 0)
+    assert (facts["pc"], facts["symbol"], facts["cycles"], facts["status"]) == (0x11E, "_forever", 5253, 0)
 
 
 def test_exit_code_hands_over_the_status_start_up_code_left(build):
