@@ -184,7 +184,7 @@ class Adc(Peripheral):
         if self.con1["ASAM"] and self.con1["SSRC"] == _AUTO:
             missing = max(self.con2["SMPI"] - self._count.value, 0)
             end += missing * (self.con3["SAMC"] + _CONVERSION_TAD) * self._tad_halves
-        self.events.set(self._step, end + 1 >> 1)
+        self.events.set(self._step, max(end + 1 >> 1, self.now + 1))  # a shorter setting may end it in the past
 
     def _due(self, due: int) -> None:
         if self.catch_up(due):

@@ -92,7 +92,7 @@ class Dci(Peripheral):
             return
         self._slot.value = slot
         self._frame.value = frame
-        self.events.set(self._word_event, frame + (slot + 1) * self._slot_time)
+        self.events.set(self._word_event, max(frame + (slot + 1) * self._slot_time, self.now + 1))
 
     def _word_done(self, due: int) -> None:
         """One slot has passed: a word went out, a word came in."""

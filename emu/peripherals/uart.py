@@ -365,7 +365,8 @@ class Uart(Peripheral):
         for index in range(bit + 1, 16):
             if wave >> index & 1 != wave >> bit & 1:
                 self._edge_bit.value = index
-                self.events.set(self._edge_event, self._rx_start.value + index * self.bit_time)
+                edge = self._rx_start.value + index * self.bit_time
+                self.events.set(self._edge_event, max(edge, due + 1))
                 return
 
     # -- control -----------------------------------------------------------------------------------------------------

@@ -34,6 +34,7 @@ class Rig:
     def at(self, cycle: int) -> Rig:
         """Make `cycle` the cycle of the next access."""
         assert cycle >= self.events.now
+        assert self.events.next_due() > self.events.now or self.events.next_due() == self.events.now == 0
         self.events.arrive(cycle)
         self.events.settle(cycle)
         return self

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
+
+from .conftest import Rig
 
 ADON, ASAM, SAMP, DONE = 0x8000, 4, 2, 1
 AUTO, TIMER3, INT0 = 7 << 5, 2 << 5, 1 << 5
@@ -212,3 +216,33 @@ def test_idle_with_adsidl_waits(rig):
     rig.at(1020).dev.wake(1020)
     assert not rig.at(1080).flag("ADIF")
     assert rig.at(1081).flag("ADIF")
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_looking_at_the_converter_does_not_change_what_it_does(seed):
+    """Conversions are caught up on access: a rig that polls every cycle agrees with one that never looks."""
+    outcomes = []
+    for polls in (False, True):
+        draw, rig, seen = random.Random(seed), Rig(), []
+        for channel in range(16):
+            rig.dev.adc.source[channel] = lambda cycle, channel=channel: (cycle * 16 + channel * 997) & 0xFFFF
+        rig.write("ADCSSL", draw.randrange(1, 0x10000))
+        rig.write("ADCHS", draw.randrange(0x2000) & 0x1F1F)
+        rig.write("ADCON2", draw.randrange(5) << 2 | draw.choice((0, 0x400)) | draw.choice((0, 1)))
+        rig.write("ADCON3", draw.randrange(32) << 8 | draw.randrange(12))
+        changes = {draw.randrange(3000): draw.randrange(0x10000) for _ in range(6)}
+        rig.write("ADCON1", ADON | ASAM | AUTO | draw.randrange(4) << 8)
+        for cycle in range(1, 3000):
+            rig.at(cycle)
+            if polls:
+                rig.read("ADCON1")
+                rig.read("ADCBUF3")
+            if cycle in changes:
+                name = ("ADCSSL", "ADCHS", "ADCON3")[changes[cycle] % 3]
+                rig.write(name, changes[cycle] & (0x0F1F if name == "ADCHS" else 0xFFF))
+            if rig.flag("ADIF"):
+                seen.append(cycle)
+                rig.clear_flags()
+        outcomes.append((seen, [rig.read(f"ADCBUF{n:X}") for n in range(16)], rig.record.snapshot()))
+    assert outcomes[0][0]
+    assert outcomes[0][:2] == outcomes[1][:2]
