@@ -17,7 +17,7 @@
     8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
     0       noise     1               sensor noise as the reference says; 0 = none
 
-Times are seconds (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep the order of the file.
+Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep the order of the file.
 """
 
 from __future__ import annotations
@@ -71,16 +71,19 @@ def parse(board: Epuck, text: str, name: str = "stimulus") -> list[Step]:
     return sorted(steps, key=lambda step: step.cycle)
 
 
+_UNITS: Final = {"ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000), "s": Fraction(1)}
+
+
 def _time(board: Epuck, word: str) -> int:
     """Cycle of a time. Fractions are exact, so 0.1s is the same cycle on every host."""
+    unit = next((unit for unit in _UNITS if word.endswith(unit)), "")
     try:
-        value = Fraction(word.removesuffix("s"))
+        value = Fraction(word.removesuffix(unit))
     except (ValueError, ZeroDivisionError):
         value = Fraction(-1)
-    cycles = value * Fraction(board.chip.fcy) if word.endswith("s") else value
-    if cycles < 0 or (not word.endswith("s") and cycles.denominator != 1):
-        raise ValueError(f"a line begins with its time, seconds like 1.5s or a number of cycles, not {word!r}")
-    return round(cycles)
+    if value < 0 or not (unit or value.denominator == 1):
+        raise ValueError(f"a line begins with its time, like 1.5s, 200ms, 50us or a number of cycles, not {word!r}")
+    return round(value * _UNITS[unit] * Fraction(board.chip.fcy)) if unit else int(value)
 
 
 def _action(board: Epuck, words: list[str]) -> Action:

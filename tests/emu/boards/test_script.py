@@ -11,11 +11,11 @@ FCY = 14_745_600
 
 SCRIPT = """
 # what happens to the robot
-0.001s selector 5
+1ms    selector 5
 20000  battery 3.2          # cycles
 0.002s ir 3 20
 0.002s light 2 1000
-0.003s tilt 0 0 -1
+3000us tilt 0 0 -1
 0.004s uart2 "ok\\r"
 0.005s pin RB2 1
 0.006s remote ok
