@@ -121,11 +121,12 @@ stop:
   ret i64 {PYTHON}
 again:
   %cycle = load i64, ptr %p.cycle
-  %last = sub i64 %cycle, 1
+  %before = sub i64 %cycle, 1
   %deadline = load i64, ptr %p.deadline
-  %early = icmp ugt i64 %deadline, %last
   %mode = load i16, ptr %p.mode
   %awake = icmp eq i16 %mode, {RUN}
+  %last = select i1 %awake, i64 %before, i64 %cycle
+  %early = icmp ugt i64 %deadline, %last
   br i1 %awake, label %running, label %resting
 running:
   %over = icmp uge i64 %cycle, %limit
@@ -150,8 +151,7 @@ doze:
   store i64 %until, ptr %p.cycle
   ret i64 {PYTHON}
 jump:
-  %then = add i64 %deadline, 1
-  store i64 %then, ptr %p.cycle
+  store i64 %deadline, ptr %p.cycle
   br label %again"""])
 
 
