@@ -14,7 +14,7 @@ from emu.peripherals.compare import Compare
 from emu.peripherals.dci import Dci
 from emu.peripherals.i2c import I2c
 from emu.peripherals.interrupts import Interrupts
-from emu.peripherals.kit import Kit, Peripheral, Wires
+from emu.peripherals.kit import IDLE, Cell, Kit, Peripheral, Wires
 from emu.peripherals.lvd import LowVoltageDetect
 from emu.peripherals.nvm import Nvm
 from emu.peripherals.oscillator import Oscillator
@@ -86,6 +86,12 @@ class Peripherals:
             self.pmd,
         )
 
+        self._idle_bits: Final = [
+            (register.address >> 1, 1 << chip.sfrs[register.name].fields[bit][0])
+            for register, bit in (device.idle_bit for device in self.all if device.idle_bit is not None)
+        ]
+        """Word and mask of every SIDL bit: Idle is entered thousands of times a second, mostly with none set."""
+        self._stopped: Final = Cell(kit.bus.record, "power.stopped", "B")
         self.on_restored: Final[list[Callable[[], None]]] = []
         """Parts of a board that keep something derived from the record."""
 
@@ -115,6 +121,7 @@ class Peripherals:
         self.resets.record_cause(cause, kept)
         if cause != "POR":  # the clock selection survives (§4)
             self.oscillator.con.value = osccon
+        self._stopped.value = 0
         for device in self.all:
             device.power_up(power_on=cause == "POR")
 
@@ -122,6 +129,10 @@ class Peripherals:
         """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""
         self.watchdog.clear(cycle)
         self.watchdog.power_mode(mode)
+        u16 = self.kit.bus.record.u16
+        if mode == IDLE and not any(u16[word] & bit for word, bit in self._idle_bits):
+            return
+        self._stopped.value = 1
         for device in self.all:
             if device.stops_in(mode):
                 device.freeze(cycle, mode)
@@ -129,6 +140,9 @@ class Peripherals:
     def wake(self, cycle: int) -> None:
         """The CPU runs again; `cycle` is the first in which the stopped clocks tick."""
         self.watchdog.power_mode(0)
+        if not self._stopped.value:
+            return
+        self._stopped.value = 0
         for device in self.all:
             if device.is_frozen:
                 device.thaw(cycle)

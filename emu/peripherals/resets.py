@@ -48,6 +48,11 @@ class Watchdog(Peripheral):
         self._timeout: Final = self.slot("timeout", self._expired)
         resets.rcon.written_by(self._rcon_written)
         kit.power_mode = lambda: self._mode.value
+        fields = kit.chip.sfrs["RCON"].fields
+        self._wdto, self._swdten, self._sleep, self._idle = (
+            1 << fields[name][0] for name in ("WDTO", "SWDTEN", "SLEEP", "IDLE")
+        )
+        self._fwdten: Final = 1 << kit.chip.config["FWDT"].fields["FWDTEN"][0]
 
     def stops_in(self, mode: int) -> bool:
         """Never: the LPRC runs in every power mode."""
@@ -56,8 +61,7 @@ class Watchdog(Peripheral):
     @property
     def is_enabled(self) -> bool:
         """FWDTEN in the configuration word, or SWDTEN."""
-        word = self.kit.chip.config["FWDT"]
-        return bool(word.field(self.kit.program.config[1], "FWDTEN") or self._resets.rcon["SWDTEN"])
+        return bool(self.kit.program.config[1] & self._fwdten or self._resets.rcon.value & self._swdten)
 
     @property
     def period(self) -> int:
@@ -69,7 +73,8 @@ class Watchdog(Peripheral):
 
     def clear(self, cycle: int) -> None:
         """CLRWDT or PWRSAV in `cycle`: counter and prescalers restart, WDTO falls (§4)."""
-        self._resets.rcon["WDTO"] = 0  # UNVERIFIED: the family manual says so (§4)
+        rcon = self._resets.rcon
+        rcon.value &= ~self._wdto  # UNVERIFIED: the family manual says so (§4)
         self._arm(cycle)
 
     def _arm(self, cycle: int) -> None:
@@ -79,15 +84,14 @@ class Watchdog(Peripheral):
             self.events.cancel(self._timeout)
 
     def _rcon_written(self, old: int, new: int, _lanes: int) -> None:
-        swdten = 1 << self.kit.chip.sfrs["RCON"].fields["SWDTEN"][0]
-        if (old ^ new) & swdten and (not self.is_enabled or self.events.due(self._timeout) == NEVER):
+        if (old ^ new) & self._swdten and (not self.is_enabled or self.events.due(self._timeout) == NEVER):
             self._arm(self.now)
 
     def power_mode(self, mode: int) -> None:
         """The CPU goes to sleep (IDLE or SLEEP) or runs again (0)."""
         self._mode.value = mode
         if mode:
-            self._resets.rcon["SLEEP" if mode == SLEEP else "IDLE"] = 1
+            self._resets.rcon.value |= self._sleep if mode == SLEEP else self._idle
 
     def _expired(self, due: int) -> None:
         if self._mode.value in (IDLE, SLEEP):
