@@ -25,6 +25,8 @@ ATTEMPTS: Final = 50
 """Windows looked at for one that no other interrupt disturbs."""
 SETTLING: Final = 5
 """Windows passed over until every thread has yielded once."""
+CALL_CYCLES: Final = 2
+"""Cycles of CALL and RCALL (isa.md §13.1)."""
 MASK_STEPS: Final = 150_000
 """Instructions watched for the longest masked window."""
 DISI_LEVEL: Final = 6
@@ -75,7 +77,8 @@ def measures() -> Iterator[Measure]:
     yield Measure("send to waiting thread running", Scenario(waiters=1, sender=2), reaching("latency_woken"))
     yield Measure("C interrupt: flag to first instruction", Scenario(threads=1), isr_entry)
     yield Measure("C interrupt: last instruction to interrupted thread", Scenario(threads=1), isr_exit)
-    yield Measure("1 ms clock with nothing to do", Scenario(threads=1), tick("T1", "_T1Interrupt"))
+    yield Measure("1 ms clock with nothing to do, thread running", Scenario(threads=1), tick("T1", "_T1Interrupt"))
+    yield Measure("1 ms clock with nothing to do, idle", Scenario(), tick("T1", "_T1Interrupt", "hal_idle"))
     yield Measure("slice end with one ready thread", Scenario(threads=1), tick("T2", "_T2Interrupt"))
 
 
@@ -136,7 +139,7 @@ def preemption(ready: int) -> Taken:
 
 
 def switch(into: str) -> Taken:
-    """From the first instruction of Sys_Yield to the first of another thread in `into`."""
+    """From the call of Sys_Yield to the first instruction of another thread in `into`."""
 
     @_undisturbed
     def take(meter: Meter) -> Window:
@@ -147,7 +150,7 @@ def switch(into: str) -> Taken:
             target.run_to("Sys_Yield")
         before = _running(meter)
         arrived = meter.inside(into)
-        return meter.follow(lambda: arrived() and _running(meter) != before)
+        return meter.follow(lambda: arrived() and _running(meter) != before, meter.machine.cycle - CALL_CYCLES)
 
     def settled(meter: Meter) -> Window:
         for _ in range(SETTLING):
@@ -157,10 +160,16 @@ def switch(into: str) -> Taken:
     return settled
 
 
+def _to_send(meter: Meter) -> None:
+    """To the first instruction of Sys_Send_Event, called by the application and by nobody else."""
+    meter.target.run_to("latency_send")
+    meter.target.run_to("Sys_Send_Event")
+
+
 @_undisturbed
 def sending(meter: Meter) -> Window:
-    """From the first instruction of latency_send to the one after its call."""
-    meter.target.run_to("latency_send")
+    """From the first instruction of Sys_Send_Event to the one after its call."""
+    _to_send(meter)
     return meter.follow(meter.returned())
 
 
@@ -175,7 +184,7 @@ def _interrupt(meter: Meter) -> None:
 def sending_from_isr(meter: Meter) -> Window:
     """As `sending`, called from a C interrupt function."""
     _interrupt(meter)
-    meter.target.run_to("latency_send")
+    _to_send(meter)
     return meter.follow(meter.returned())
 
 
@@ -197,24 +206,25 @@ def isr_exit(meter: Meter) -> Window:
 
 
 def reaching(name: str) -> Taken:
-    """From the first instruction of latency_send to that of the function `name`."""
+    """From the first instruction of Sys_Send_Event to that of the function `name`."""
 
     @_undisturbed
     def take(meter: Meter) -> Window:
-        meter.target.run_to("latency_send")
+        _to_send(meter)
         return meter.follow(meter.inside(name))
 
     return take
 
 
-def tick(irq: str, vector: str) -> Taken:
-    """From an interrupt's flag to the next instruction of the thread it interrupted."""
+def tick(irq: str, vector: str, back: str = "latency_spin") -> Taken:
+    """From an interrupt's flag to the next instruction of the function it interrupted, or woke."""
 
     def take(meter: Meter) -> Window:
         for _ in range(2):
+            level = meter.level(irq)
             meter.target.run_to(vector)
-            spinning = meter.inside("latency_spin")
-            window = meter.follow(lambda: spinning() and meter.machine.state.ipl == 0, meter.rise(irq))  # noqa: B023
+            there = meter.inside(back)
+            window = meter.follow(lambda: there() and meter.machine.state.ipl < level, meter.rise(irq))  # noqa: B023
         return window
 
     return take

@@ -86,6 +86,12 @@ class Meter:
         register, bit = source.flag
         return int(record.u64[flag_since(record, chip.sfrs[register].address, bit)])
 
+    def level(self, irq_name: str) -> int:
+        """Priority an interrupt has been given."""
+        source = next(s for s in self.machine.chip.interrupts.values() if s.name == irq_name)
+        group, shift = source.priority
+        return int(self.machine.peek(group)) >> shift & 7
+
     def request(self, irq_name: str, priority: int) -> None:
         """Enable an interrupt at `priority` and set its flag, as a device would."""
         machine = self.machine
