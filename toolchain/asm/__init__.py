@@ -1,0 +1,1 @@
+"""Assembler: pic30-as source text to relocatable objects."""

@@ -1,0 +1,1 @@
+"""ELF for dsPIC30F: model, reader, writer."""

@@ -1,0 +1,1 @@
+"""Linker: objects and archives to an image."""
