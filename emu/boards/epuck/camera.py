@@ -12,7 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.exposure import Exposure
-from emu.boards.epuck.scan import HREF, PCLK, VSYNC, Scan, course_of
+from emu.boards.epuck.scan import HREF, LINE_PIXELS, PCLK, VSYNC, Scan, course_of
 from emu.boards.epuck.sensors import SENSORS, Picture, Timing
 from emu.boards.part import Part
 from emu.events import NEVER
@@ -31,7 +31,6 @@ DATA_PORT: Final = 3
 DATA_MASK: Final = 0xFF00
 SYNC_PORT: Final = 2
 RESET_PIN: Final = "RC13"
-_LINE_BYTES: Final = 2 * 1024
 
 RowSource = Callable[[int, int], "Pixels"]
 """rows(y, cycle): line y (0 = top) of the upright scene, 640 x 3 values, as seen in `cycle`."""
@@ -54,7 +53,7 @@ class Camera(Part, I2cDevice):
         self._pointer: Final = self.cell("pointer", "B")
         self._pointer_next: Final = self.cell("pointer_next", "B")
         self._plugged: Final = self.cell("plugged", "B")
-        self._line: Final = self.array("line", "B", _LINE_BYTES)
+        self._line: Final = self.array("line", "B", 2 * LINE_PIXELS)
         self._line_from: Final = self.cell("line_from", "Q")
         self._line_to: Final = self.cell("line_to", "Q")
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)

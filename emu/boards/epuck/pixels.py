@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from emu.boards.epuck.scan import course_of
 from emu.boards.epuck.sensors import GREY, HEIGHT, RGB565, WIDTH, YUV, Picture, Timing
 
 Pixels = NDArray[np.uint8]
@@ -16,7 +17,8 @@ Pixels = NDArray[np.uint8]
 
 def scene_columns(timing: Timing, picture: Picture) -> NDArray[np.intp]:
     """Scene column (0 = left, 0..639) of every pixel of a line. Beside the array its edge is seen."""
-    columns = np.arange(timing.first_column, timing.end_column, timing.scale_x) - picture.origin_x
+    pixels = course_of(timing).line_bytes // timing.bytes_per_pixel
+    columns = timing.first_column + timing.scale_x * np.arange(pixels) - picture.origin_x
     return np.clip(WIDTH - 1 - columns if picture.flip_x else columns, 0, WIDTH - 1)
 
 

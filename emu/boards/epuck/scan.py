@@ -17,6 +17,9 @@ from emu.record import Record
 HREF, VSYNC, PCLK = 1 << 3, 1 << 4, 1 << 14
 """RC3, RC4, RC14 (epuck.md §2)."""
 
+LINE_PIXELS: Final = 1024
+"""Longest line: no sensor has more columns, but registers can ask for them."""
+
 
 @dataclass(frozen=True, slots=True)
 class Course:
@@ -39,13 +42,14 @@ def course_of(timing: Timing) -> Course:
     """Columns and rows to Tcy."""
     row = timing.columns * timing.column_tcy
     visible = min(timing.end_row, timing.rows) - timing.first_row
-    pixels = max(-(-(timing.end_column - timing.first_column) // timing.scale_x), 0)
+    width = min(min(timing.end_column, timing.columns) - timing.first_column, timing.columns - 1)
+    pixels = min(max(-(-width // timing.scale_x), 0), LINE_PIXELS)
     fall = min(timing.vsync_end_row, timing.rows) * row
     return Course(
         frame_tcy=row * timing.rows,
         first_href=timing.first_row * row + timing.first_column * timing.column_tcy,
         line_tcy=row * timing.scale_y,
-        lines=max(-(-visible // timing.scale_y), 0),
+        lines=max(-(-visible // timing.scale_y), 0) if pixels else 0,
         line_bytes=pixels * timing.bytes_per_pixel,
         byte_tcy=max(timing.column_tcy * timing.scale_x // timing.bytes_per_pixel, 1),
         vsync_rise=min(timing.vsync_row * row + timing.vsync_column * timing.column_tcy, fall),

@@ -17,7 +17,7 @@
     8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
     0       noise     1               sensor noise as the reference says; 0 = none
 
-Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep the order of the file.
+Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep theirs.
 """
 
 from __future__ import annotations
