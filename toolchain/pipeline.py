@@ -12,11 +12,28 @@ from typing import Protocol
 
 from .ir.model import BlockAddress, ConstAgg, ConstExpr, Function, Module, UnsupportedError, Value
 from .ir.read import read_module
-from .lower import branches, cfg, combine, constants, data, emit, frame, isr, legalize, peephole, regalloc, schedule, select, switch, tails
+from .lower import (
+    branches,
+    cfg,
+    combine,
+    constants,
+    data,
+    emit,
+    frame,
+    isr,
+    legalize,
+    peephole,
+    regalloc,
+    schedule,
+    select,
+    switch,
+    tails,
+)
 from .lower.debuginfo import DebugInfo
 from .lower.dwarf import DwarfWriter, FunctionInfo
 from .lower.mir import MFunction
 from .lower.names import symbol
+from .lower.variables import Ranges
 
 
 class CompileOptions(Protocol):
@@ -46,6 +63,7 @@ class Context:
     options: CompileOptions
     interrupt: str
     taken: set[str]  # blocks whose address somebody in the module takes
+    probe: bool  # check the stack limit at entry
     machine: MFunction | None = None
 
     @property
@@ -113,7 +131,7 @@ FUNCTION_PASSES = [
     Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
     Pass("constants", _constants, ("machine",)),
     Pass("allocate", _allocate, ("machine",), ("real-registers",)),
-    Pass("frame", lambda c: frame.build_frame(c.m, c.options.stack_check), ("real-registers",), ("framed",)),
+    Pass("frame", lambda c: frame.build_frame(c.m, c.probe), ("real-registers",), ("framed",)),
     Pass("peephole", lambda c: peephole.run(c.m), ("framed",)),
     Pass("schedule", _schedule, ("framed",)),
     Pass("tail-calls", lambda c: branches.tail_calls(c.m), ("framed",)),
@@ -225,10 +243,14 @@ class ModuleCompiler:
     def function(self, f: Function) -> None:
         """Compile one definition."""
         self.serial += 1
-        interrupt = isr.interrupt_kind(f.name, self.notes.get(f.name, set()))
+        notes = self.notes.get(f.name, set())
+        interrupt = isr.interrupt_kind(f.name, notes)
+        probe = isr.wants_probe(notes, self.options.stack_check and not interrupt)
         if interrupt and (f.args or f.ret.kind != "void"):
             raise UnsupportedError("an interrupt function takes and returns nothing", f"function '{f.name}'")
-        c = Context(self.module, self.dwarf.info, f, self.options, interrupt, self.taken.get(f.name, set()))
+        if not self.options.debug:
+            f.dbg_records = []
+        c = Context(self.module, self.dwarf.info, f, self.options, interrupt, self.taken.get(f.name, set()), probe)
         try:
             for p in FUNCTION_PASSES:
                 p.run(c)
@@ -237,12 +259,17 @@ class ModuleCompiler:
         self.header(f, interrupt)
         name = symbol(self.module, f.name)
         rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
-        self.lines += emit.Emitter(c.m, str(self.serial), False).text(rows.mark if rows is not None else no_rows)
+        ranges = Ranges(str(self.serial))
+        emitter = emit.Emitter(c.m, str(self.serial), False)
+        self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges)
         self.lines.append(f"\t.size {name},.-{name}")
         if rows is not None and f.dbg is not None:
             end = f".Lend{self.serial}"
             self.lines.append(f"{end}:")
-            self.dwarf.add_function(FunctionInfo(name, f.dbg, end, c.m.frame_base, rows.rows, frame_variables(f, c.m)))
+            ranges.close(end)
+            frame_vars = frame_variables(f, c.m)
+            info = FunctionInfo(name, f.dbg, end, c.m.frame_base, rows.rows, frame_vars, ranges.found)
+            self.dwarf.add_function(info)
 
     def header(self, f: Function, interrupt: str) -> None:
         """Section, symbol and type. Each function has a section of its own for --gc-sections."""

@@ -1,7 +1,7 @@
 """DWARF 2 as assembler data directives (abi-elf.md §6.7): units, functions, variables, types and the line table.
 
 Code addresses are PC units, variables data addresses, both 4 bytes. Frame variables are relative to W15 at entry, which
-the frame base expresses through W15 or W14. Variables that live in registers have no location here yet: debuggers
+the frame base expresses through W15 or W14. Variables in registers have location lists; where neither applies, debuggers
 report them as optimised out.
 """
 
@@ -31,7 +31,7 @@ FORMS = {"addr": 0x01, "block1": 0x0A, "data1": 0x0B, "data2": 0x05, "data4": 0x
          "sdata": 0x0D, "ref4": 0x13}  # fmt: skip
 ENCODINGS = {"address": 1, "boolean": 2, "float": 4, "signed": 5, "signed_char": 6, "unsigned": 7, "unsigned_char": 8}
 LANGUAGE_C89 = 1
-OP_ADDR, OP_PLUS_UCONST, OP_BREG0, OP_FBREG = 0x03, 0x23, 0x70, 0x91  # DWARF 2 §7.7.1
+OP_ADDR, OP_PLUS_UCONST, OP_REG0, OP_BREG0, OP_FBREG, OP_PIECE = 0x03, 0x23, 0x50, 0x70, 0x91, 0x93  # DWARF 2 §7.7.1
 LINE_BASE, LINE_RANGE, OPCODE_BASE = -10, 245, 10  # abi-elf.md §6.7, C units
 STANDARD_LENGTHS = (0, 1, 1, 1, 1, 0, 0, 0, 1)
 SPECIFIERS = {"DW_TAG_const_type": "const_type", "DW_TAG_volatile_type": "volatile_type",
@@ -50,6 +50,7 @@ class FunctionInfo:
     frame_base: tuple[int, int]  # register, offset of W15 at entry from it
     rows: list[tuple[str, str, int]] = field(default_factory=list)  # label, position node, line
     variables: list[tuple[str, int]] = field(default_factory=list)  # DILocalVariable, offset from W15 at entry
+    ranges: dict[str, list[tuple[str, str, tuple[int, ...]]]] = field(default_factory=dict)  # start, end, registers
 
 
 @dataclass
@@ -98,6 +99,7 @@ class Unit:
         self.files: list[tuple[str, str]] = []
         self.functions: list[FunctionInfo] = []
         self.globals: list[tuple[str, str]] = []  # DIGlobalVariable, assembler symbol
+        self.lists: list[list[tuple[str, str, tuple[int, ...]]]] = []  # location lists, for .debug_loc
 
     def file_number(self, ref: str) -> int:
         """1-based number of the file of a node."""
@@ -111,7 +113,7 @@ class Unit:
         directory, name = self.info.file(self.ref)
         top = Die("compile_unit", [
             ("producer", "string", PRODUCER), ("language", "data1", LANGUAGE_C89), ("name", "string", name),
-            ("comp_dir", "string", directory), ("stmt_list", "data4", f".Ldbg_line{self.number}"),
+            ("comp_dir", "string", directory), ("low_pc", "addr", 0), ("stmt_list", "data4", f".Ldbg_line{self.number}"),
         ])  # fmt: skip
         body = [self._variable(ref, s) for ref, s in self.globals] + [self._function(f) for f in self.functions]
         top.children = list(self.types.values()) + body
@@ -154,20 +156,22 @@ class Unit:
         ]
         die = Die("subprogram", attributes)
         located = dict(f.variables)
-        wanted = list(dict.fromkeys([*self._parameters(node), *located]))
-        for ref in wanted:
-            if ref in located or self.info.number(ref, "arg"):
-                die.children.append(self._local(ref, located.get(ref)))
+        for ref in dict.fromkeys([*self._parameters(node), *located, *f.ranges]):
+            if self.info.subprogram(ref) == f.subprogram:  # not a variable of an inlined function
+                die.children.append(self._local(ref, located.get(ref), f.ranges.get(ref)))
         return die
 
     def _parameters(self, subprogram: dict[str, str]) -> list[str]:
         retained = self.info.items(subprogram.get("retainedNodes", ""))
         return [r for r in retained if self.info.number(r, "arg")]
 
-    def _local(self, ref: str, offset: int | None) -> Die:
+    def _local(self, ref: str, offset: int | None, ranges: list[tuple[str, str, tuple[int, ...]]] | None) -> Die:
         attributes = self._declared(ref) + self._type_attribute(self.info.node(ref).get("type"))
         if offset is not None:
             attributes.append(("location", "block1", [str(OP_FBREG), *_sleb(offset)]))
+        elif ranges:
+            attributes.append(("location", "data4", f".Ldbg_loc{self.number}_{len(self.lists)}"))
+            self.lists.append(ranges)
         return Die("formal_parameter" if self.info.number(ref, "arg") else "variable", attributes)
 
     # -- types --------------------------------------------------------------------------------------------------------
@@ -323,6 +327,9 @@ class DwarfWriter:
             self._info(unit, tree)
         self.out += ["\t.section .debug_abbrev,info", ".Ldbg_abbrev:"]
         self._abbreviations()
+        self.out.append("\t.section .debug_loc,info")
+        for unit, _ in trees:
+            self._locations(unit)
         self.out.append("\t.section .debug_line,info")
         for unit, _ in trees:
             self._lines(unit)
@@ -380,6 +387,21 @@ class DwarfWriter:
                 data += [*_uleb(ATTRIBUTES[name]), *_uleb(FORMS[form])]
             self.out.append(f"\t.byte {','.join([*data, '0', '0'])}")
         self.out.append("\t.byte 0")
+
+    # -- .debug_loc ---------------------------------------------------------------------------------------------------
+
+    def _locations(self, unit: Unit) -> None:
+        """Start, end, expression; the unit's base address is 0. A pair of zeros ends a list."""
+        for k, ranges in enumerate(unit.lists):
+            self.out.append(f".Ldbg_loc{unit.number}_{k}:")
+            for start, end, registers in ranges:
+                data: list[str] = []
+                for r in registers:
+                    data.append(str(OP_REG0 + r))
+                    if len(registers) > 1:
+                        data += [str(OP_PIECE), "2"]
+                self.out += [f"\t.4byte {start},{end}", f"\t.2byte {len(data)}", f"\t.byte {','.join(data)}"]
+            self.out.append("\t.4byte 0,0")
 
     # -- .debug_line --------------------------------------------------------------------------------------------------
 

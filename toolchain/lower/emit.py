@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from .mir import MI, File, Imm, MBlock, Mem, MFunction, Operand
+from .mir import MI, File, Imm, Located, MBlock, Mem, MFunction, Operand
 from .names import block_label
+from .variables import Ranges
 
 MEM_TEXT = {"ind": "[w{}]", "++": "[w{}++]", "--": "[w{}--]", "+": "[++w{}]", "-": "[--w{}]"}
 RENAMED = {
@@ -69,23 +70,23 @@ class Emitter:
         self.serial += 1
         return f".L{self.prefix}_i{self.serial}"
 
-    def text(self, location: Callable[[str | None], str]) -> list[str]:
+    def text(self, location: Callable[[str | None], str], ranges: Ranges) -> list[str]:
         """All lines. `location` gives the line-table label text for a !dbg reference, or ""."""
         for block in self.m.blocks:
-            self._block(block, location)
+            self._block(block, location, ranges)
         return self.lines
 
-    def _block(self, block: MBlock, location: Callable[[str | None], str]) -> None:
+    def _block(self, block: MBlock, location: Callable[[str | None], str], ranges: Ranges) -> None:
         if block.name in self.targets:
             self.lines.append(f"{self.label(block.name)}:")
         if block.address_taken:
             self.lines.append(f"{block_label(self.m.name, block.name)}:")
         pending = 0
         label = ""
+        state: tuple[Located, ...] | None = block.variables
         for mi in block.insts:
-            mark = location(mi.line)
-            if mark:
-                self.lines.append(mark)
+            self.lines += [mark for mark in (ranges.at(state), location(mi.line)) if mark]
+            state = mi.variables
             if mi.op == "skip":
                 label = self._skip(mi)
                 pending = mi.count

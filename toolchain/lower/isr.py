@@ -38,3 +38,10 @@ def interrupt_kind(name: str, notes: set[str]) -> str:
         raise UnsupportedError("both auto_psv and no_auto_psv", name)
     kind = "no_auto_psv" if "no_auto_psv" in words else "auto_psv"
     return kind + (",shadow" if "shadow" in words else "")
+
+
+def wants_probe(notes: set[str], default: bool) -> bool:
+    """Whether a function's frame is probed against SPLIM: -fstack-check, overruled by "os_probe" or "os_no_probe"."""
+    if "os_no_probe" in notes:
+        return False
+    return default or "os_probe" in notes

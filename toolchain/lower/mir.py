@@ -165,7 +165,7 @@ class MI:
     """
 
     __slots__ = ("also_defs", "also_uses", "args", "byte", "cc", "count", "epilogue", "info", "late", "line", "op", "pred", "tail",
-                 "text", "volatile")  # fmt: skip
+                 "text", "variables", "volatile")  # fmt: skip
 
     def __init__(self, op: str, *args: Operand, byte: bool = False, cc: str = "", line: str | None = None) -> None:
         self.op = op
@@ -182,6 +182,7 @@ class MI:
         self.volatile = False
         self.tail = False  # call: the callee does not look at our frame, and nothing follows but the epilogue
         self.epilogue = False  # put before RETURN by the frame pass
+        self.variables: tuple[Located, ...] | None = None  # variables in registers behind it; None: as before
         self.text = ""  # asm: template; \0n:m\0 stands for operand n with modifier m
 
     def uses(self) -> list[int]:
@@ -261,6 +262,9 @@ def _show(a: Operand) -> str:
     return str(a)
 
 
+Located = tuple[str, tuple[int, ...]]  # DILocalVariable, registers of its words
+
+
 @dataclass(slots=True)
 class MBlock:
     """Straight-line code; ends in branches. Successors by name."""
@@ -270,6 +274,7 @@ class MBlock:
     succs: list[str] = field(default_factory=list)
     depth: int = 0  # loop nesting
     address_taken: bool = False
+    variables: tuple[Located, ...] = ()  # variables in registers at the start
 
 
 @dataclass(slots=True)
@@ -297,6 +302,7 @@ class MFunction:
     interrupt: str = ""  # "", "no_auto_psv", "auto_psv"; "shadow" may be appended after a comma
     tables: list[tuple[str, list[str]]] = field(default_factory=list)
     slot_of: dict[int, int] = field(default_factory=dict)  # id(IR value) -> frame object, for debug information
+    in_registers: list[Located] = field(default_factory=list)  # source variables and the registers of their values
     locals_base: int = 0  # offset of the locals from W15 at entry
     frame_base: tuple[int, int] = (15, 0)  # register, and W15 at entry relative to it, in the body
     frame_bytes: int = 0  # locals and saved registers, known after the frame pass

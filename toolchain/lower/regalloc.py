@@ -15,6 +15,7 @@ from ..ir.model import UnsupportedError
 from ..target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
 from .liveness import bits, live_out, members, remove_dead
 from .mir import FIRST_VIRTUAL, MI, MFunction
+from . import variables
 from .spill import rewrite_spills
 
 WORD_COLOURS = bits(list(ALLOCATABLE))
@@ -332,6 +333,8 @@ def g_members(g: Graph, n: int) -> list[int]:
 
 def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
     rename = {r: colour[g.find(r)] for r in [*g.adjacent, *g.alias] if g.find(r) in colour}
+    if m.in_registers:
+        variables.annotate(m, rename)
     for b in m.blocks:
         out: list[MI] = []
         for mi in b.insts:
@@ -343,7 +346,10 @@ def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
             elif mi.op == "join":
                 out += _pair_moves(mi, ((mi.args[0], mi.args[1], 0), (mi.args[0], mi.args[2], 1)), True)
             elif mi.is_copy() and mi.args[0] == mi.args[1]:
-                continue
+                if out:
+                    out[-1].variables = mi.variables
+                elif mi.variables is not None:
+                    b.variables = mi.variables
             else:
                 out.append(mi)
         b.insts = out

@@ -386,6 +386,12 @@ class Selector:
                 mb.insts += chunk
             self.m.blocks.append(mb)
         self.m.slot_of = dict(self.slots)
+        for record in self.f.dbg_records:
+            found = (
+                self.registers.get(id(record.value)) if record.kind == "dbg_value" and not record.expression else None
+            )
+            if found is not None:
+                self.m.in_registers.append((record.variable, found))
         return self.m
 
     def phi_input(self, phi: Instr) -> tuple[int, ...]:

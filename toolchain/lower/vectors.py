@@ -13,7 +13,9 @@ from .build import const, legal_type
 if TYPE_CHECKING:
     from .legalize import Legalizer
 
-OWN = frozenset(("extractelement", "insertelement", "shufflevector", "bitcast", "load", "store", "freeze", "call", "ret"))
+OWN = frozenset(
+    ("extractelement", "insertelement", "shufflevector", "bitcast", "load", "store", "freeze", "call", "ret")
+)
 
 
 class Lane(Value):
@@ -130,5 +132,3 @@ def pack(lz: Legalizer, v: Value) -> Value:
         wide = lz.b.shift("shl", lz.b.cast("zext", part, t), k * lane.bits) if t.bits > part.type.bits else part
         whole = lz.b.binary("or", whole, wide)
     return whole
-
-
