@@ -1,7 +1,7 @@
 """Share of hardware-specific lines in the kernel: `python firmware/tools/hardware_share.py [--json]`.
 
 Physical lines, comments and blanks included, as the paper counts: 489 of 2,783 lines, 17.6 %, without I/O device
-implementations (openswarm-original.md §1). Hardware-specific is port/dspic30f; portable are kernel, public interface and
+implementations (openswarm-original.md §1). Hardware-specific is port/dspic30f; portable are kernel, interface and
 HAL contracts. Devices (io, board, openswarm_io.h, hal_io.h) and the other ports are not counted at all.
 """
 

@@ -1,4 +1,7 @@
-; INT1 at IPL 4 for measurements: set IFS1.INT1IF from outside.
+; INT1 at IPL 4 for measurements: set IFS1.INT1IF from outside. Its flag is cleared before the C function runs.
 #include "isr.inc"
         .text
-        isr     __INT1Interrupt, _latency_isr
+        isr     __INT1Interrupt, acknowledge
+acknowledge:
+        bclr    IFS1, #0
+        bra     _latency_isr

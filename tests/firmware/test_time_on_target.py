@@ -1,0 +1,136 @@
+"""Slices, masked windows, idle and motor steps of the kernel on the emulated robot."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from emu import Machine
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.test_on_target import FCY, INT1IF, T2IF, T3IF, load, place, run_to
+
+SLICE = 147_456
+
+
+def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
+    """Issue 4, Must show 7; kernel.md §3: ISR time counts, handler time does not, a handler that resends for ever
+    starves nobody. The slice is 147,456 Tcy from dispatch to the next T2 interrupt."""
+    machine = load(image("slices", TARGET_APPS))
+    ends: list[int] = []
+    restarts: list[int] = []
+    machine.hook_pc(place(machine, "_T2Interrupt"), lambda *_: ends.append(machine.cycle))
+    machine.hook_sfr("TMR2", lambda write, _: restarts.append(machine.cycle) if write else None)
+    machine.run(cycles=12 * SLICE)
+    assert len(ends) >= 9
+    slices = [end - max(at for at in restarts if at < end) for end in ends]
+    late = [length - SLICE for length in slices]
+    assert all(-8 <= extra <= 400 for extra in late), "one timer count, or an ISR of the storm, and nothing else"
+    assert any(b - a > SLICE + 2_000 for a, b in pairwise(ends)), "handlers took their time between slices"
+    assert all(machine.peek(machine.address_of("spins") + 2 * i) for i in range(3))
+    assert machine.peek("stormed") - machine.peek("handled") <= 110
+
+
+def masked_windows(machine: Machine, cycles: int) -> dict[int, int]:
+    """Longest run of cycles with IPL >= level, for levels 5 and 6, outside ISRs of that level; single-stepped."""
+    longest = {5: 0, 6: 0}
+    since: dict[int, int | None] = {5: None, 6: None}
+    stepper = place(machine, "_T3Interrupt")
+    end = machine.cycle + cycles
+    inside_stepper = False
+    while machine.cycle < end:
+        inside_stepper = machine.pc == stepper or (inside_stepper and machine.peek("SR") >> 5 & 7 >= 5)
+        machine.step()
+        ipl = machine.peek("SR") >> 5 & 7
+        for level in (5, 6):
+            if ipl >= level and not inside_stepper:
+                since[level] = machine.cycle if since[level] is None else since[level]
+                longest[level] = max(longest[level], machine.cycle - (since[level] or 0))
+            else:
+                since[level] = None
+    return longest
+
+
+def test_nothing_masks_the_stepper_for_long_or_the_camera_at_all(image: Build) -> None:
+    """kernel.md §6: masked at IPL 1-5 at most 40 Tcy; IPL 6 only around PWRSAV, which listing1's idle does."""
+    machine = load(image("points", TARGET_APPS))
+    run_to(machine, "scenario_begin")
+    machine.step()
+    run_to(machine, "scenario_begin")
+    machine.poke("IFS0", machine.peek("IFS0") | T2IF | T3IF)
+    windows = masked_windows(machine, 12_000)
+    assert 10 <= windows[5] <= 40
+    assert windows[6] == 0
+
+
+def test_an_interrupt_never_falls_between_the_test_and_the_sleep(image: Build) -> None:
+    """kernel.md §4, idle: a device interrupt at each instruction of the idle loop is handled at once, not in 1 ms."""
+    machine = load(image("latency"))
+    run_to(machine, "latency_begin")
+    wanted = machine.address_of("latency_wanted")
+    machine.poke(wanted + 4, 1)  # one subscriber
+    machine.poke(wanted + 10, 2)  # of 2-byte messages
+    run_to(machine, "latency_ready")
+    machine.write("IPC4", 4)
+    machine.write("IEC1", INT1IF)
+    clock = place(machine, "_T1Interrupt")
+    run_to(machine, "_T1Interrupt")
+    begin = machine.snapshot()
+    handler = place(machine, "latency_handler")
+    worst = boundary = 0
+    asleep = 0
+    while asleep < 3:  # from a clock interrupt until the core has slept for a while
+        at = machine.snapshot()
+        machine.write("IFS1", INT1IF)
+        came = machine.cycle
+        stop = machine.run(cycles=FCY // 1000, until=lambda: machine.pc in (handler, clock))
+        assert stop.reason == "until"
+        if machine.pc == clock:  # it was taken on the way into this interrupt; the handler follows
+            machine.run(cycles=2_000, until=handler)
+        assert machine.pc == handler
+        worst = max(worst, machine.cycle - came)
+        machine.restore(at)
+        before = machine.cycle
+        machine.step()
+        asleep += machine.cycle - before > 100
+        boundary += 1
+    machine.restore(begin)
+    assert boundary > 50
+    assert worst < 1_500, "far less than the 14,746 Tcy to the next clock interrupt"
+
+
+@pytest.mark.parametrize("speed", [129, 100, 68, 1, -64, -129])
+def test_the_average_motor_speed_is_exact(image: Build, speed: int) -> None:
+    """epuck.md §3: v mm/s are v * 1000 / 129 steps/s; left forward is the previous index, right the next."""
+    machine = load(image("latency"))
+    run_to(machine, "latency_ready")
+    motors = machine.address_of("stepper_left")
+    assert machine.peek("T3CON") == 0
+    machine.poke(motors, -5 * speed & 0xFFFF)
+    machine.poke(motors + 6, 0x0F)
+    machine.poke(motors + 8, 5 * speed & 0xFFFF)
+    machine.poke(motors + 14, 0x0F)
+    machine.write("T3CON", 0x8000)
+    machine.write("IEC0", machine.peek("IEC0") | T3IF)
+    sequence = {0xA: 0, 0x6: 1, 0x5: 2, 0x9: 3}
+    ticks = 0
+    steps = [0, 0]
+    last = [sequence[0xA], sequence[0xA]]
+    rti = place(machine, "_T3Interrupt")
+
+    def tick(*_: object) -> None:
+        nonlocal ticks
+        coils = machine.peek("LATD")
+        ticks += 1
+        if ticks == 1:
+            return
+        for motor, nibble in enumerate((coils & 15, coils >> 4 & 15)):
+            index = sequence[nibble]
+            steps[motor] += (index - last[motor] + 1) % 4 - 1
+            last[motor] = index
+
+    machine.hook_pc(rti, tick)
+    machine.run(cycles=1536 * 700)
+    exact = (ticks - 1) * 5 * speed / 6192
+    assert abs(steps[1] - exact) <= 1
+    assert abs(-steps[0] - exact) <= 1
