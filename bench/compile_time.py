@@ -1,0 +1,114 @@
+"""Compile time: 3,000 lines of C to ELF, again after a change of one file, and the driver's own start.
+
+`python -m bench.compile_time [--lines N] [--json]`. Host seconds; goals (issue B): 15 s, 5 s, 1 s on 2 cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+FILES = 10
+
+# One unit of generated source: functions of the kinds firmware is made of. {n} makes names unique.
+UNIT = """
+struct item{n} {{ struct item{n} *next; int key; long weight; unsigned char flags; }};
+static struct item{n} pool{n}[6];
+static const int table{n}[8] = {{1, 2, 4, 8, 16, 32, 64, {n} & 127}};
+int lookup{n}(int i)
+{{
+    int sum = 0;
+    for (int k = 0; k < 8; k++)
+        if ((i >> k) & 1)
+            sum += table{n}[k];
+    return sum;
+}}
+long insert{n}(int key, long weight)
+{{
+    struct item{n} *at = &pool{n}[key % 6];
+    at->key = key;
+    at->weight += weight;
+    at->flags |= 1u << (key & 7);
+    at->next = key > 3 ? pool{n} : 0;
+    return at->weight;
+}}
+int classify{n}(int c)
+{{
+    switch (c) {{
+    case 0: return 3;
+    case 1: return lookup{n}(c);
+    case 2: return (int)insert{n}(c, {n});
+    case 3: return 7;
+    case 7: return 9;
+    default: return c * {n} / 7;
+    }}
+}}
+unsigned checksum{n}(const unsigned char *p, unsigned count)
+{{
+    unsigned crc = {n};
+    while (count--) {{
+        crc ^= *p++;
+        for (int k = 0; k < 8; k++)
+            crc = crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1;
+    }}
+    return crc;
+}}
+"""
+
+
+def write_program(folder: Path, lines: int) -> tuple[list[Path], int]:
+    """FILES source files of about `lines` lines together, and a main that uses every unit."""
+    units = max(FILES, lines // UNIT.count("\n"))
+    texts = ["" for _ in range(FILES)]
+    calls, prototypes = [], []
+    for n in range(units):
+        texts[n % FILES] += UNIT.format(n=n)
+        prototypes.append(f"int classify{n}(int); unsigned checksum{n}(const unsigned char *, unsigned);")
+        calls.append(f"    sum += classify{n}(sum & 7) + (int)checksum{n}((const unsigned char *)&sum, 2);")
+    paths = []
+    for number, text in enumerate(texts):
+        paths.append(folder / f"part{number}.c")
+        paths[-1].write_text(text)
+    main = folder / "main.c"
+    main.write_text(
+        "\n".join(prototypes) + "\nint main(void)\n{\n    int sum = 3;\n" + "\n".join(calls) + "\n    return sum;\n}\n"
+    )
+    return [main, *paths], sum(path.read_text().count("\n") for path in [main, *paths])
+
+
+def timed(*words: str) -> float:
+    """Wall seconds of one run of the driver in a process of its own."""
+    started = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "toolchain", "cc", *words], cwd=ROOT, check=False, capture_output=True)
+    return time.perf_counter() - started
+
+
+def main() -> int:
+    """Print the figures; exit status 0."""
+    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python -m bench.compile_time --lines 3000")
+    parser.add_argument("--lines", type=int, default=3000)
+    parser.add_argument("--json", action="store_true")
+    options, _ = parser.parse_known_args()
+    with tempfile.TemporaryDirectory(prefix="compile-") as name:
+        folder = Path(name)
+        sources, lines = write_program(folder, options.lines)
+        words = ["-Os", *map(str, sources), "-o", str(folder / "x.elf")]
+        (folder / "warm.c").write_text("int main(void) { return 0; }\n")
+        timed("-Os", str(folder / "warm.c"), "-o", str(folder / "warm.elf"))  # builds the run-time library once
+        figures = {"lines": float(lines), "full_s": timed(*words)}
+        sources[3].write_text(sources[3].read_text().replace("crc ^= *p++", "crc ^= *p++ + 1", 1))
+        figures["one_file_changed_s"] = timed(*words)
+        figures["usage_error_s"] = timed("--nonsense")
+        figures["empty_main_s"] = timed("-Os", str(folder / "warm.c"), "-o", str(folder / "warm.elf"))
+    print(json.dumps(figures) if options.json else "\n".join(f"{k:20} {v:8.2f}" for k, v in figures.items()))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
