@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 from emu.elffacts import SectionFlag
 from toolchain.asm.finish import KEEP_PREFIX
 from toolchain.elf.model import Home, Section
 from toolchain.link.memory import CHIP, config_sections
 from toolchain.link.resolve import Resolution
+
+SECTION_LIMIT = re.compile(r"\.(startof|sizeof|endof)\.(.+)")
+"""Names the assembler gives to `.startof.(section)` and its kin (abi-elf.md §4.2)."""
 
 ROOT_NAMES = frozenset((".reset", ".init", ".user_init", ".ivt", ".aivt"))
 
@@ -40,6 +45,9 @@ def live_sections(resolution: Resolution, names: list[str], collect: bool) -> se
     """Return the sections to link: all of them, or with `collect` those reachable from `names` and the fixed roots."""
     if not collect:
         return set(resolution.owner)
+    by_name: dict[str, list[Section]] = {}
+    for section in resolution.owner:
+        by_name.setdefault(section.name, []).append(section)
     live: set[Section] = set()
     work = _roots(resolution, names)
     while work:
@@ -53,4 +61,6 @@ def live_sections(resolution: Resolution, names: list[str], collect: bool) -> se
             target = resolution.lookup(reloc.symbol)
             if target.home is Home.SECTION and target.section is not None and target.section not in live:
                 work.append(target.section)
+            elif limit := SECTION_LIMIT.fullmatch(reloc.symbol.name):
+                work += by_name.get(limit[2], [])
     return live

@@ -22,7 +22,7 @@ from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Section, Sym
 from toolchain.errors import ToolError
 from toolchain.link import dinit, synthesize
 from toolchain.link.archive import Archive
-from toolchain.link.gc import live_sections, vector_names
+from toolchain.link.gc import SECTION_LIMIT, live_sections, vector_names
 from toolchain.link.image import Output, build_executable, build_outputs
 from toolchain.link.memory import script_symbols
 from toolchain.link.options import LinkOptions
@@ -31,7 +31,6 @@ from toolchain.link.relocate import Relocator
 from toolchain.link.resolve import Resolution, check, resolve
 
 LINKER_OBJECT = "<linker>"
-_LIMITS = re.compile(r"\.(startof|sizeof|endof)\.(.+)")
 
 
 @dataclass(slots=True)
@@ -69,7 +68,7 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
     live |= set(own.sections)
     absolute = script_symbols() | options.define
     absolute |= dict.fromkeys(_LINKER_SYMBOLS, 0)
-    provided = set(absolute) | {n for n in resolution.wanted if _LIMITS.fullmatch(n)}
+    provided = set(absolute) | {n for n in resolution.wanted if SECTION_LIMIT.fullmatch(n)}
     check(resolution, provided, live)
     _check_handlers(resolution, live)
     messages = _foreign_processors(objects)
@@ -181,7 +180,7 @@ def _section_limits(resolution: Resolution, layout: Layout) -> dict[str, int]:
     """Values of `.startof.(x)`, `.sizeof.(x)`, `.endof.(x)` in address units (abi-elf.md §4.2)."""
     result: dict[str, int] = {}
     for name in resolution.wanted:
-        match = _LIMITS.fullmatch(name)
+        match = SECTION_LIMIT.fullmatch(name)
         if match is None:
             continue
         parts = [p for s, p in layout.placed.items() if s.name == match[2] or s.name.startswith(match[2] + ".")]

@@ -137,6 +137,18 @@ def test_collection_keeps_what_the_roots_reach(image):
     assert "gone" in image(text).symbols
 
 
+def test_collection_keeps_sections_whose_limits_are_asked_for(image):
+    """`.startof.(x)` is a use of section x."""
+    text = (
+        ".global __reset\n__reset: mov #.startof.(mine), w0\n .section mine,bss,near\nkept: .space 4\n"
+        " .section not,bss\nx: .space 2\n"
+    )
+    out = image(text, gc_sections=True)
+    assert "kept" in out.symbols
+    assert "x" not in out.symbols
+    assert out.words("__reset", 1)[0] >> 4 & 0xFFFF == out.symbols["kept"]
+
+
 def test_undefined_names_in_discarded_sections_do_not_matter(image):
     """Only what is linked must be complete."""
     text = ".global __reset\n__reset: nop\n .section x,code\n call missing\n"
