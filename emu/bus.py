@@ -41,6 +41,8 @@ class Bus:
         self.on_write: Final[list[WriteHook | None]] = [None] * words
         self.modelled: Final = [False] * words
         """Set for registers a device or the CPU stands behind; others are reported once when touched."""
+        self.watched: Final[set[int]] = set()
+        """Registers every access of which somebody outside wants to see."""
         self.report: Callable[[int, bool], None] | None = None
         """Called as report(address, is_write) at the first touch of a register nobody models."""
         self._reported: set[int] = set()

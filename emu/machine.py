@@ -399,4 +399,5 @@ class Machine:
             hook(True, self.record.u16[word])
 
         bus.on_read[word], bus.on_write[word] = on_read, on_write
+        bus.watched.add(word)
         self.runner.forget()

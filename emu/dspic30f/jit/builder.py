@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from emu.dspic30f.isa.builder import Context, Side, Size
+from emu.dspic30f.jit.devices import NativeRegister
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import Variables, pointer
 from emu.dspic30f.registers import NSTDIS
@@ -57,6 +58,8 @@ class Surroundings:
     """Byte offset of the due cycle of the watchdog's time-out."""
     rcon_idle: int
     rcon_wdto: int
+    native: Mapping[int, NativeRegister] = field(default_factory=dict)
+    """Device registers with native accesses, by even address."""
     do_start: int = -1
     do_end: int = -1
     """The DO loop that is active: its first and last instruction; -1: none."""
@@ -76,6 +79,8 @@ class Pending:
     """Truth values: the instruction read the PSV window."""
     stop: bool = False
     """The next boundary must look at interrupts."""
+    replanned: bool = False
+    """The deadline may have come nearer: the function must be left."""
     touches_sfr: bool = False
     """An SFR that events may change, or that devices hear of, is accessed."""
     sr: Number | None = None
@@ -96,6 +101,8 @@ class LlvmBuilder:
         self.around: Final = around
         self.context: Final = context
         self.pc = 0
+        self.now: Number = 0
+        """Cycle of the data access of the instruction being translated."""
         self.psv_cycles: int | None = 2
         self.pending = Pending()
         self.repeating: Number | None = None
@@ -292,6 +299,11 @@ class LlvmBuilder:
             value = self._sr_word()
             return value if size == 2 else (value >> 8 if ea & 1 else value & 0xFF)
         self.pending.touches_sfr |= self.around.offset["SR"] < word_address < RAM
+        native = self.around.native.get(word_address)
+        if native is not None and self.repeating is None:
+            shown = native.read(self)
+            if shown is not None:
+                return shown if size == 2 else (shown >> 8 if ea & 1 else shown & 0xFF)
         if word_address == self.around.offset["RCOUNT"] and self.repeating is not None and size == 2:
             return self.repeating
         if word_address < RAM and (self.around.reads.get(word_address) != "plain" or self.repeating is not None):
@@ -324,11 +336,16 @@ class LlvmBuilder:
             self.pending.stores.append(lambda: self.e.store(pointer(self.e, ea), v, 8 * size))
             return
         self.pending.touches_sfr = True
+        native = self.around.native.get(word_address)
+        lanes = 0xFFFF if size == 2 else (0xFF00 if ea & 1 else 0x00FF)
+        placed = v << 8 if lanes == 0xFF00 else v
+        if native is not None and self.repeating is None:
+            if not native.write(self, placed, lanes):
+                raise NeedsInterpreter
+            return
         how, mask = self.around.writes.get(word_address, ("slow", 0))
         if how == "slow" or self.repeating is not None:
             raise NeedsInterpreter
-        lanes = 0xFFFF if size == 2 else (0xFF00 if ea & 1 else 0x00FF)
-        placed = v << 8 if lanes == 0xFF00 else v
         if how == "sr":
             old = self._sr_word()
             nstdis = self.e.load(pointer(self.e, self.around.offset["INTCON1"]), 16) & NSTDIS

@@ -19,6 +19,7 @@ from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, W_END, Access, Surroundings
 from emu.dspic30f.jit.compiler import Compiler
+from emu.dspic30f.jit.devices import NativeRegister, native_registers
 from emu.dspic30f.jit.region import discover
 from emu.dspic30f.jit.runtime import BLOCKS, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
@@ -184,9 +185,14 @@ class JitEngine:
         start, end = loop if loop is not None else (-1, -1)
         around = Surroundings(self._offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
                               self._words, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
-                              start, end)
+                              self._native_registers(), start, end)
         table = ctypes.c_uint64 * self._words
         return Code(context, around, table(), table())
+
+    def _native_registers(self) -> dict[int, NativeRegister]:
+        """Without those somebody watches."""
+        watched = self._core.bus.watched
+        return {at: one for at, one in native_registers(self._core).items() if at >> 1 not in watched}
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
@@ -211,8 +217,9 @@ class JitEngine:
         code.regions[pc] = {word for at, step in region.steps.items() for word in (at >> 1, (at >> 1) + 1)}
         self.counts.regions += 1
         identity = (region.words(), pc, code.context, sorted(code.around.offset.items()),
-                    sorted(code.around.reads.items()), sorted(code.around.writes.items()), code.around.initialised,
-                    code.around.limit_armed, code.around.do_start, code.around.do_end)
+                    sorted(code.around.reads.items()), sorted(code.around.writes.items()),
+                    sorted(code.around.native.items()), code.around.idle_stops, code.around.watchdog,
+                    code.around.initialised, code.around.limit_armed, code.around.do_start, code.around.do_end)
         name = repr(identity).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
             translator = Translator(region, code.around, code.context, exact)
@@ -280,6 +287,8 @@ def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access,
         word = address >> 1
         if bus.modelled[word] and bus.on_read[word] is None and bus.compute[word] is None:
             reads[address] = "plain"
+        if word in bus.watched:
+            continue
         if address in special:
             writes[address] = (special[address], bus.writable[word])
         elif bus.modelled[word] and bus.on_write[word] is None and not bus.clear_only[word]:

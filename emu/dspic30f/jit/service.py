@@ -120,6 +120,7 @@ done:
 stop:
   ret i64 {PYTHON}
 again:
+  %within = phi i1 [ false, %first ], [ false, %jump ], [ false, %wake ], [ true, %rouse ], [ true, %push ]
   %cycle = load i64, ptr %p.cycle
   %before = sub i64 %cycle, 1
   %deadline = load i64, ptr %p.deadline
@@ -129,7 +130,8 @@ again:
   %early = icmp ugt i64 %deadline, %last
   br i1 %awake, label %running, label %resting
 running:
-  %over = icmp uge i64 %cycle, %limit
+  %reached = icmp uge i64 %cycle, %limit
+  %over = select i1 %within, i1 false, i1 %reached
   br i1 %over, label %stop, label %due
 due:
   br i1 %early, label %done, label %fire

@@ -189,6 +189,7 @@ class Translator:
             stall = (1 if hit else 0) if isinstance(hit, int) else hit != 0
         psv_cycles = 1 if row.psv_class == "mov" else 2
         b.begin(step.pc, psv_cycles)
+        b.now = self.v.get("cycle") + stall + (1 if step.facts.flow is Return else row.cycles - 1)
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
         if isinstance(flow, Repeat):
             self._repeats.translate(step, flow, stall)
@@ -215,6 +216,9 @@ class Translator:
             self.advance(cycles, mask)
             if step.pc == self.around.do_end:
                 self._loop_again()
+                return True, mask
+            if b.pending.replanned:
+                self.e.end(f"br label %{self.exit(step.next_pc, NEXT)}")
                 return True, mask
             if b.pending.stop:
                 self._look(step.next_pc)

@@ -93,6 +93,18 @@ def interrupt_words(generator: random.Random) -> list[int]:
     return words_of(syntax, f=sfrs[register].address, b=generator.choice(bits))
 
 
+def device_words(generator: random.Random) -> list[int]:
+    """An access to a timer or port that native code makes by itself."""
+    name = generator.choice(("TMR1", "TMR2", "TMR3", "PR1", "LATA", "LATD", "LATF", "PORTA", "PORTB", "PORTD", "TRISD"))
+    address = DSPIC30F6014A.sfrs[name].address
+    if generator.random() < 0.4:
+        return words_of("MOV{.W} f, Wnd", f=address, d=generator.randrange(8))
+    if name.startswith(("TMR", "PR")) or generator.random() < 0.5:
+        return literal(generator.randrange(20, 600), 7) + words_of("MOV{.W} Wns, f", s=7, f=address)
+    syntax = generator.choice(("BSET{.B} f, #bit4", "BCLR{.B} f, #bit4", "BTG{.B} f, #bit4", "BTSC{.B} f, #bit4"))
+    return words_of(syntax, f=address + generator.randrange(2), b=generator.randrange(8))
+
+
 def random_firmware(seed: int) -> Firmware:
     """A program that never ends by itself, except through a reset for a fault."""
     generator = random.Random(seed)
@@ -127,8 +139,8 @@ def random_firmware(seed: int) -> Firmware:
     while at < end:
         row = generator.choice(ROWS)
         words = random_words(row, generator, at, end)
-        if generator.random() < 0.1:
-            words = interrupt_words(generator)
+        if generator.random() < 0.2:
+            words = generator.choice((interrupt_words, device_words))(generator)
         if words is not None:
             at = firmware.put(at, words)
     firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40 if generator.random() < 0.8 else CODE - 2))
