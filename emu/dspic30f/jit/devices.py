@@ -279,7 +279,8 @@ def _ports(core: Core, registers: dict[int, NativeRegister]) -> None:
         lat = sfrs[f"LAT{letter}"]
         places = PortPlaces(
             number, lat.address, sfrs[f"PORT{letter}"].address, fields[f"port{letter}.owned"].offset,
-            word("output"), word("level"), word("drive"), word("analog"), word("eager"), word("lazy"), word("before"), word("waving"),
+            word("output"), word("level"), word("drive"), word("analog"), word("eager"), word("lazy"), word("before"),
+            word("waving"),
             fields["pins.changed"].offset + 8 * number, fields["pins.ring"].offset, fields["pins.ring_count"].offset,
             fields["pins.ring"].count, lat.writable)
         registers[lat.address] = Latch(places, is_port=False)
