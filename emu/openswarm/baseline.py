@@ -46,7 +46,7 @@ class Sources:
     """Names places for the baseline: file below `firmware/`, and the text of the line where the file can be read."""
 
     def __init__(self, image_path: str) -> None:
-        self._roots: Final = [Path(), *Path(image_path).resolve().parents[:4]]
+        self._roots: Final = [Path(), Path("firmware"), *Path(image_path).resolve().parents[:4]]
         self._files: Final[dict[str, list[str]]] = {}
 
     def name(self, place: str) -> str:
