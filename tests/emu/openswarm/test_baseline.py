@@ -41,15 +41,15 @@ def test_the_places_that_grew_are_named_largest_first():
 
 
 def test_places_are_named_by_the_text_of_their_line_so_that_lines_may_move(tmp_path):
-    source = tmp_path / "firmware" / "openswarm" / "kernel" / "event.c"
+    source = tmp_path / "firmware" / "openswarm" / "kernel" / "sample.c"
     source.parent.mkdir(parents=True)
     source.write_text("one\n    return   m;\n")
     sources = Sources(str(tmp_path / "firmware" / "build" / "app" / "firmware.elf"))
-    assert sources.name(f"{source}:2") == "kernel/event.c: return m;"
-    assert sources.name("openswarm/kernel/event.c:2") == "kernel/event.c: return m;"
-    assert sources.name(f"{source}:9") == "kernel/event.c: line 9"
+    assert sources.name(f"{source}:2") == "kernel/sample.c: return m;"
+    assert sources.name("openswarm/kernel/sample.c:2") == "kernel/sample.c: return m;"
+    assert sources.name(f"{source}:9") == "kernel/sample.c: line 9"
     assert sources.name("_hal_idle") == "_hal_idle"
-    assert sources.names({f"{source}:2": 3, "openswarm/kernel/event.c:2": 4}) == {"kernel/event.c: return m;": 7}
+    assert sources.names({f"{source}:2": 3, "openswarm/kernel/sample.c:2": 4}) == {"kernel/sample.c: return m;": 7}
 
 
 @pytest.mark.parametrize(
