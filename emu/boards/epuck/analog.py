@@ -74,6 +74,10 @@ class Infrared(Part):
         """Whether the emitter of a sensor is on: other robots may see it."""
         return bool(self._lit[sensor % len(PULSE_PINS)])
 
+    def lines_lit(self) -> list[bool]:
+        """Whether each pulse line lights its two emitters."""
+        return [bool(lit) for lit in self._lit]
+
     def _share(self, line: int, cycle: int) -> float:
         """How far the receivers of a line have settled to full light, 0..1."""
         tau = TAU_SECONDS * self.chip.fcy

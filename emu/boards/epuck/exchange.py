@@ -46,22 +46,24 @@ class Outputs:
         self.camera_running = False
         """The camera is plugged in and out of reset."""
         self.speaker_on = False
+        self._levels = b""
 
     def update(self) -> None:
         """Take over the present state, and make the past final: what the ADC sampled up to now is done."""
         board = self._board
         board.chip.adc.catch_up(board.chip.adc.now)
-        for side, motor in ((LEFT, board.motors.left), (RIGHT, board.motors.right)):
-            self.steps[side] = motor.steps
-            self.lost[side] = motor.lost
-            self.illegal[side] = motor.illegal
-            self.coil_cycles[side] = motor.coil_cycles
-        for index, name in enumerate(LED_PINS):
-            self.leds[index] = board.leds[name]
-        for line in range(len(PULSE_PINS)):
-            self.emitters[line] = board.ir.is_lit(line)
+        left, right = board.motors.left.counts(), board.motors.right.counts()
+        self.steps[:] = left[0], right[0]
+        self.lost[:] = left[1], right[1]
+        self.illegal[:] = left[2], right[2]
+        self.coil_cycles[:] = left[3], right[3]
+        levels = board.chip.pins.level.tobytes()
+        if levels != self._levels:
+            self._levels = levels
+            self.leds[:] = board.leds.states()
+            self.emitters[:] = board.ir.lines_lit()
+            self.speaker_on = board.codec.is_on
         self.camera_running = board.camera is not None and board.camera.is_plugged and board.camera.scan.running
-        self.speaker_on = board.codec.is_on
 
 
 class Inputs:
@@ -81,21 +83,29 @@ class Inputs:
         """0..15."""
         self.battery = board.battery.volts
         """V."""
-        self._done: Final = (self.distance.copy(), self.share.copy(), self.ambient.copy(), self.acceleration.copy())
+        self._surfaces = self._light = self._motion = b""
+        self._applied = [(float("nan"), float("nan"))] * SENSORS
 
     def apply(self) -> None:
         """Let what has changed since the last time hold from the present cycle on. Raises ValueError out of range."""
         board = self._board
-        distance, share, ambient, acceleration = self._done
-        for sensor in np.flatnonzero((self.distance != distance) | (self.share != share)).tolist():
-            board.ir.set_distance(sensor, float(self.distance[sensor]), float(self.share[sensor]))
-        for sensor in np.flatnonzero(self.ambient != ambient).tolist():
-            board.ir.set_ambient(sensor, int(self.ambient[sensor]))
-        if not np.array_equal(self.acceleration, acceleration):
+        surfaces = self.distance.tobytes() + self.share.tobytes()
+        if surfaces != self._surfaces:
+            self._surfaces = surfaces
+            for sensor, wanted in enumerate(zip(self.distance.tolist(), self.share.tolist(), strict=True)):
+                if wanted != self._applied[sensor]:
+                    board.ir.set_distance(sensor, *wanted)
+                    self._applied[sensor] = wanted
+        light = self.ambient.tobytes()
+        if light != self._light:
+            self._light = light
+            for sensor, counts in enumerate(self.ambient.tolist()):
+                board.ir.set_ambient(sensor, counts)
+        motion = self.acceleration.tobytes()
+        if motion != self._motion:
+            self._motion = motion
             board.accelerometer.set_g(*self.acceleration.tolist())
         if self.selector != board.selector.position:
             board.selector.position = self.selector
         if self.battery != board.battery.volts:
             board.battery.volts = self.battery
-        for done, given in zip(self._done, (self.distance, self.share, self.ambient, self.acceleration), strict=True):
-            done[:] = given

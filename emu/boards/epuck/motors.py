@@ -77,6 +77,12 @@ class Stepper(Part):
         running = max(self.now - state[_SINCE], 0) if state[_NIBBLE] else 0
         return state[_ON_TIME] + running
 
+    def counts(self) -> tuple[int, int, int, int]:
+        """`steps`, `lost`, `illegal` and `coil_cycles` in one call."""
+        coil_cycles = self.coil_cycles
+        state = self._state
+        return state[_STEPS], state[_LOST], state[_ILLEGALS], coil_cycles
+
     def listen(self, on_step: Callable[[int, int], None]) -> None:
         """Call on_step(cycle, direction) at each step, when the next pattern shows that it was one; `cycle` is when
         the step's pattern appeared."""

@@ -48,6 +48,11 @@ class Leds(Part):
         """Names of the LEDs that are on."""
         return tuple(name for name in LED_PINS if self[name])
 
+    def states(self) -> list[bool]:
+        """Whether each LED is lit: ring LEDs 0-7, front, body."""
+        level = self.pins.level
+        return [level[port] & mask != 0 for port, mask in self._places.values()]
+
 
 class Selector(Part):
     """The 16-position switch on RG6..RG9 (epuck.md §2)."""
@@ -120,13 +125,13 @@ class Codec(Part):
         """on_sample(sample, cycle), sample -32768..32767: for players and recorders."""
         chip.dci.on_word = self._take
         chip.dci.source = lambda _slot, _cycle: 0
+        self._port, self._pin = parse_pin("RF0")
         self.pins.watch("RF0", self._reset_moved)
 
     @property
     def is_on(self) -> bool:
         """AUDIO_ON."""
-        port, mask = parse_pin("RF0")
-        return bool(self.pins.drive[port] & self.pins.output[port] & mask)
+        return bool(self.pins.drive[self._port] & self.pins.output[self._port] & self._pin)
 
     @property
     def words(self) -> int:
