@@ -25,8 +25,8 @@ SOURCES = Path(__file__).parent / "codegen_src"
 
 XC16_OS_WORDS = {
     "sat": 8, "crc16": 19, "dot": 12, "find": 12, "itoa10": 25, "add32": 3, "sub32": 3, "neg32": 3, "shl1": 3,
-    "sar1": 3, "lt32": 8, "ltu32": 8, "eq32": 8, "shlv32": 6, "mul16": 2, "mulss": 2, "muluu": 2, "mul32": 10, "div16": 4,
-    "mod16": 5, "divu10": 4, "div32": 1, "shl4": 6, "shr8": 5,
+    "sar1": 3, "lt32": 8, "ltu32": 8, "eq32": 8, "shlv32": 6, "mul16": 2, "mulss": 2, "muluu": 2, "mul32": 10,
+    "div16": 4, "mod16": 5, "divu10": 4, "div32": 1, "shl4": 6, "shr8": 5,
 }  # fmt: skip
 """abi-elf.md §8.2, both tables, column -Os. mul32 there is 4 words and a call of ___mulsi3; its 6 words (§2.8) are
 added, because ours is complete in itself. div32 calls a helper on both sides, not counted."""

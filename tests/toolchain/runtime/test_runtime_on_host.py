@@ -1,0 +1,87 @@
+"""The run-time library's C sources compiled for the host: soft float against the hardware, math against libm.
+
+A million random pairs and all edge classes per operation; seconds, because the comparison itself is C.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+RUNTIME = HERE.parents[2] / "toolchain" / "runtime"
+INCLUDE = HERE.parents[2] / "toolchain" / "include"
+PAIRS = 1_000_000
+MATH_ARGUMENTS = 200_000
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C compiler")
+
+
+def compile_host(output: Path, *words: object) -> None:
+    """gcc for the host; its diagnostics are part of a failure."""
+    command = [
+        "gcc",
+        "-std=gnu11",
+        "-O2",
+        "-fno-builtin",
+        "-ffp-contract=off",
+        *map(str, words),
+        "-o",
+        str(output),
+        "-lm",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def soft_float_sources() -> list[Path]:
+    return sorted([*RUNTIME.glob("f32_*.c"), *RUNTIME.glob("f64_*.c")])
+
+
+def test_soft_float_equals_the_hardware(tmp_path: Path) -> None:
+    """IEC 60559 (C11 annex F): + - * /, comparisons, conversions, in both precisions, bit for bit."""
+    program = tmp_path / "softfloat"
+    compile_host(program, HERE / "softfloat_host.c", *soft_float_sources())
+    done = subprocess.run([program, str(PAIRS)], capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout
+    lines = done.stdout.splitlines()
+    assert len(lines) == 28
+    assert all(int(line.split()[1]) >= PAIRS and line.endswith(" 0 failures") for line in lines)
+
+
+def test_the_comparison_notices_a_wrong_rounding(tmp_path: Path) -> None:
+    """The test above can fail: ties away from even must be found."""
+    for source in soft_float_sources():
+        text = source.read_text().replace("+ 0x3F +", "+ 0x40 +").replace("+ 0x1FF +", "+ 0x200 +")
+        (tmp_path / source.name).write_text(text)
+    for header in RUNTIME.glob("*.h"):
+        shutil.copy(header, tmp_path)
+    program = tmp_path / "softfloat"
+    compile_host(program, HERE / "softfloat_host.c", *sorted(tmp_path.glob("f*.c")))
+    done = subprocess.run([program, "20000"], capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 1
+    assert "addsf3(" in done.stdout
+
+
+def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
+    """C11 7.12; exact functions exactly, elementary ones within the bounds stated in math_host.c."""
+    objects = []
+    for name in ("round", "double", "single"):
+        objects.append(tmp_path / f"math_{name}.o")
+        compile_host(
+            objects[-1], "-include", HERE / "math_prefix.h", "-isystem", INCLUDE, "-c", RUNTIME / f"math_{name}.c"
+        )
+    program = tmp_path / "math"
+    compile_host(program, HERE / "math_host.c", *objects, RUNTIME / "f64_pack.c", RUNTIME / "f32_pack.c")
+    done = subprocess.run([program, str(MATH_ARGUMENTS)], capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("source", [*soft_float_sources(), *sorted(RUNTIME.glob("math_*.c"))], ids=lambda p: p.name)
+def test_sources_compile_without_warnings(source: Path, tmp_path: Path) -> None:
+    """House rule: -Wall -Wextra -Werror. The helpers' names are gcc's own, whose prototypes differ on the host."""
+    flags = ["-Wall", "-Wextra", "-Werror", "-Wno-builtin-declaration-mismatch", "-isystem", INCLUDE]
+    compile_host(tmp_path / "x.o", *flags, "-c", source)
