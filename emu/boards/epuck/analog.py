@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from bisect import bisect_left
+from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import pairwise
 from typing import Final
@@ -29,15 +30,19 @@ RESPONSE: Final = (  # distance in mm, reflection in counts: OpenSwarm's table (
 )  # fmt: skip
 
 
-def reflection_at(distance_mm: float, table: tuple[tuple[float, float], ...] = RESPONSE) -> float:
+_NEAR: Final = tuple(distance for distance, _ in RESPONSE)
+_SLOPE: Final = tuple(math.log(low / high) / (far - near) for (near, high), (far, low) in pairwise(RESPONSE))
+"""Of the logarithm, per mm, behind each point of the table."""
+
+
+def reflection_at(distance_mm: float) -> float:
     """Reflection in counts of a white surface at `distance_mm`, interpolated on a log scale; 0 behind the table."""
-    if distance_mm <= table[0][0]:
-        return table[0][1]
-    for (near, high), (far, low) in pairwise(table):
-        if distance_mm <= far:
-            share = (distance_mm - near) / (far - near)
-            return math.exp(math.log(high) * (1 - share) + math.log(low) * share)
-    return 0.0
+    if distance_mm <= _NEAR[0]:
+        return RESPONSE[0][1]
+    if not distance_mm <= _NEAR[-1]:
+        return 0.0
+    place = bisect_left(_NEAR, distance_mm) - 1
+    return RESPONSE[place][1] * math.exp(_SLOPE[place] * (distance_mm - _NEAR[place]))
 
 
 class Infrared(Part):
@@ -62,8 +67,13 @@ class Infrared(Part):
 
     def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
         """Put a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
+        self.set_distances([(sensor, millimetres, share)])
+
+    def set_distances(self, surfaces: Iterable[tuple[int, float, float]]) -> None:
+        """As `set_distance` for several (sensor, millimetres, share)."""
         self.chip.adc.catch_up(self.now)
-        self.reflection[sensor] = round(reflection_at(millimetres) * share)
+        for sensor, millimetres, share in surfaces:
+            self.reflection[sensor] = round(reflection_at(millimetres) * share)
 
     def set_ambient(self, sensor: int, counts: int) -> None:
         """Ambient light at a sensor as raw counts 0..4095 (dark is high)."""

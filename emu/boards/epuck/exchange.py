@@ -84,7 +84,6 @@ class Inputs:
         self.battery = board.battery.volts
         """V."""
         self._surfaces = self._light = self._motion = b""
-        self._applied = [(float("nan"), float("nan"))] * SENSORS
 
     def apply(self) -> None:
         """Let what has changed since the last time hold from the present cycle on. Raises ValueError out of range."""
@@ -92,10 +91,7 @@ class Inputs:
         surfaces = self.distance.tobytes() + self.share.tobytes()
         if surfaces != self._surfaces:
             self._surfaces = surfaces
-            for sensor, wanted in enumerate(zip(self.distance.tolist(), self.share.tolist(), strict=True)):
-                if wanted != self._applied[sensor]:
-                    board.ir.set_distance(sensor, *wanted)
-                    self._applied[sensor] = wanted
+            board.ir.set_distances(zip(range(SENSORS), self.distance.tolist(), self.share.tolist(), strict=True))
         light = self.ambient.tobytes()
         if light != self._light:
             self._light = light
