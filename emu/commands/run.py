@@ -8,6 +8,7 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import asdict
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
@@ -233,9 +234,9 @@ def _facts(machine: Machine, image: Image, stop: Stop, fault: Fault | None, host
 
 
 def _statistics(machine: Machine) -> dict[str, Any]:
-    """What the engine counted, plus the resets seen."""
-    counted: dict[str, Any] = getattr(machine, "stats", dict)()
-    return {"engine": machine.engine, "resets": len(machine.resets), **counted}
+    """What the engine counted, if it counts, and the resets seen."""
+    counts = getattr(machine.runner, "counts", None)
+    return {"engine": machine.engine, "resets": len(machine.resets), **(asdict(counts) if counts else {})}
 
 
 def _place(image: Image, pc: int) -> dict[str, str | None]:
