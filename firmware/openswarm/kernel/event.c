@@ -271,7 +271,7 @@ bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
     if ((size > SYS_SMALL_PAYLOAD && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) || (data == NULL && size != 0)) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = hal_lock_slice_here();
     event *e = find(id);
     if (e == NULL) {
         error = SYS_ERROR_EVENT;

@@ -140,6 +140,6 @@ void event_forget_losses(uint16 id);
 /* fault.c */
 HAL_USED sys_pcb *os_overflow(void); /* kernel stack: the running thread hit its stack limit; picks the next */
 enum { OS_MAIN_OVERFLOW = 5 };
-HAL_NORETURN HAL_USED void os_trap(uint16 cause, uint32 pc);
+HAL_NORETURN HAL_USED void os_trap(uint16 cause, uint16 pc, uint16 pc_high);
 
 #endif

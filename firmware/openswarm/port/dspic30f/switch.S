@@ -17,7 +17,7 @@
         .equ    STKERR, 2
         .equ    IPL3, 3
 
-        .global __T2Interrupt, _hal_switch, _hal_abandon, _os_resume_yielded, _os_thread_start, _hal_idle, __StackError
+        .global __T2Interrupt, _hal_switch, _hal_abandon, _os_resume_yielded, _os_thread_start, _hal_idle, __StackError, os_isr_exit
         .text
 
 ; ---- Preemption: 10 ms timer, IPL 1 -----------------------------------------------------------------------------
@@ -188,6 +188,15 @@ _hal_idle:
 #include "isr.inc"
 
         isr     __T1Interrupt, _cpu_clock_isr
+os_isr_exit:
+        pop.d   w6
+        pop.d   w4
+        pop.d   w2
+        pop     RCOUNT
+        pop     w0
+        mov     w0, w15                 ; back to the interrupted stack
+        pop.d   w0
+        retfie
 
 ; ---- Traps --------------------------------------------------------------------------------------------------------
 ; Stack limit. A soft trap: the write has happened, within the thread's own block. The thread is given up, and with it an
@@ -221,8 +230,8 @@ kernel_stack_error:
         mov     #4, w0
 fatal:
         setm    SPLIM
-        mov     [w15-4], w2             ; stacked PC
-        mov     [w15-2], w3
-        and     #0x7F, w3
+        mov     [w15-4], w1             ; stacked PC
+        mov     [w15-2], w2
+        and     #0x7F, w2
         mov     #_os_memory, w15
         bra     _os_trap
