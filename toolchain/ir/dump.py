@@ -138,7 +138,18 @@ class Dumper:
                 indices = i.extra["indices"]
                 assert isinstance(indices, list)
                 return f"{i.op} " + ", ".join([*(self.typed(a) for a in args), *map(str, indices)])
-            case "zext" | "sext" | "trunc" | "bitcast" | "ptrtoint" | "inttoptr" | "fptosi" | "fptoui" | "sitofp" | "uitofp":
+            case (
+                "zext"
+                | "sext"
+                | "trunc"
+                | "bitcast"
+                | "ptrtoint"
+                | "inttoptr"
+                | "fptosi"
+                | "fptoui"
+                | "sitofp"
+                | "uitofp"
+            ):
                 return f"{i.op} {self.typed(args[0])} to {i.type}"
             case "fpext" | "fptrunc":
                 return f"{i.op} {self.typed(args[0])} to {i.type}"

@@ -75,7 +75,9 @@ def _check_operands(
     i: Instr, b: Block, have: set[int], args: set[int], at_end: dict[str, set[int]], preds: list[str]
 ) -> list[str]:
     if i.op == "phi":
-        found = [] if sorted(i.blocks) == sorted(preds) else [f"phi {i!r} of block {b.name} does not name its predecessors"]
+        found = (
+            [] if sorted(i.blocks) == sorted(preds) else [f"phi {i!r} of block {b.name} does not name its predecessors"]
+        )
         places = [at_end.get(n, set()) for n in i.blocks]
     else:
         found, places = [], [have] * len(i.args)
@@ -98,6 +100,8 @@ def _check_legal(f: Function) -> list[str]:
             if i.op in GONE_WHEN_LEGAL:
                 found.append(f"{i.op} is left in block {b.name}")
             for v in [i, *i.args]:
-                if v.type.kind in ("float", "struct", "array") or v.type.kind == "int" and v.type.bits not in LEGAL_WIDTHS:
+                if v.type.kind in ("float", "struct", "array") or (
+                    v.type.kind == "int" and v.type.bits not in LEGAL_WIDTHS
+                ):
                     found.append(f"{i!r} in block {b.name} has an operand of type {v.type}")
     return found

@@ -1,4 +1,4 @@
-"""Selection of arithmetic, logic, shifts, multiplication, division and width changes."""
+"""Selection of addition, subtraction, logic and width changes."""
 
 from __future__ import annotations
 
@@ -6,19 +6,18 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..ir.model import I1, ConstInt, Instr, Value
-from .mir import MI, Imm, Mem, OpInfo
+from .mir import Imm, Mem
 from .rules import CARRY_OP, COMMUTES, REGISTER_OP, ImmRule, immediate_rule
 
 if TYPE_CHECKING:
     from .select import Selector
 
 
+from .shifts import fill
+
+
 def _words(v: Value) -> int:
     return max(1, v.type.bits // 16)
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-# add sub and or xor
 
 
 def select_binary(s: Selector, i: Instr) -> None:
@@ -201,323 +200,6 @@ def _wide_add_immediate(s: Selector, op: str, a: tuple[int, ...], words: list[in
         carry = True
 
 
-# ---------------------------------------------------------------------------------------------------------------------
-# shifts
-
-
-def select_shift(s: Selector, i: Instr) -> None:
-    """shl lshr ashr by constants or variables, any width."""
-    a, n = i.args
-    if isinstance(n, ConstInt):
-        if _words(i) == 1:
-            _shift_word(s, i, n.value)
-        else:
-            _shift_wide_constant(s, i.op, s.regs(a), n.value, s.value_regs(i))
-    elif _words(i) == 1:
-        _shift_word_variable(s, i)
-    else:
-        _shift_wide_variable(s, i)
-
-
-SHIFT_OP = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
-
-
-def _extended_byte(s: Selector, v: Value, signed: bool, user: Instr) -> int:
-    """A byte value extended to a word."""
-    r = s.temp()
-    s.emit("se" if signed else "ze", s.source(v, user), r)
-    return r
-
-
-def _shift_word(s: Selector, i: Instr, n: int) -> None:
-    d, byte = s.result(i), i.type.bits == 8
-    if n >= i.type.bits:
-        s.emit("clr", d)
-        return
-    if byte and i.op != "shl":
-        if n == 1:
-            s.emit("lsr1" if i.op == "lshr" else "asr1", s.source(i.args[0], i), d, byte=True)
-            return
-        wide = _extended_byte(s, i.args[0], i.op == "ashr", i)
-        s.emit(SHIFT_OP[i.op], wide, Imm(n), d)
-        return
-    if n == 1 and not byte:
-        s.emit(SHIFT_OP[i.op] + "1", s.source(i.args[0], i), d)
-        return
-    s.emit(SHIFT_OP[i.op], s.reg(i.args[0]), Imm(n), d)
-
-
-def _shift_word_variable(s: Selector, i: Instr) -> None:
-    """Native for words; the count uses its low 5 bits, counts of 16 and more are undefined in the IR."""
-    d, byte = s.result(i), i.type.bits == 8
-    a = _extended_byte(s, i.args[0], i.op == "ashr", i) if byte and i.op != "shl" else s.reg(i.args[0])
-    s.emit(SHIFT_OP[i.op], a, s.reg(i.args[1]), d)
-
-
-def _shift_wide_constant(s: Selector, op: str, a: tuple[int, ...], n: int, d: tuple[int, ...]) -> None:
-    """Whole words move; the rest is shifted with neighbours' bits brought in."""
-    count = len(a)
-    jump, bits = n // 16, n % 16
-    if jump >= count:
-        for r in d:
-            s.emit("clr", r)
-        return
-    if bits == 0:
-        _move_words(s, op, a, jump, d)
-    elif bits == 1 and jump == 0:
-        _shift_by_one(s, op, a, d)
-    elif op == "shl":
-        for k in range(count - 1, -1, -1):
-            if k < jump:
-                s.emit("clr", d[k])
-            elif k == jump:
-                s.emit("sl", a[0], Imm(bits), d[k])
-            else:
-                _combine(s, "sl", a[k - jump], bits, "lsr", a[k - jump - 1], d[k])
-    else:
-        top = count - 1
-        for k in range(count):
-            if k + jump > top:
-                _fill(s, op, a[top], d[k])
-            elif k + jump == top:
-                s.emit(SHIFT_OP[op], a[top], Imm(bits), d[k])
-            else:
-                _combine(s, "lsr", a[k + jump], bits, "sl", a[k + jump + 1], d[k])
-
-
-def _combine(s: Selector, op: str, main: int, bits: int, other_op: str, other: int, d: int) -> None:
-    """d = main shifted by bits | neighbour shifted the other way."""
-    x, y = s.temp(), s.temp()
-    s.emit(op, main, Imm(bits), x)
-    s.emit(other_op, other, Imm(16 - bits), y)
-    s.emit("ior", x, y, d)
-
-
-def _fill(s: Selector, op: str, top: int, d: int) -> None:
-    """Word above the value: zero or sign."""
-    if op == "ashr":
-        s.emit("asr", top, Imm(15), d)
-    else:
-        s.emit("clr", d)
-
-
-def _move_words(s: Selector, op: str, a: tuple[int, ...], jump: int, d: tuple[int, ...]) -> None:
-    count = len(a)
-    for k in range(count):
-        source = k - jump if op == "shl" else k + jump
-        if 0 <= source < count:
-            s.copy(a[source], d[k])
-        elif op == "shl":
-            s.emit("clr", d[k])
-        else:
-            _fill(s, op, a[count - 1], d[k])
-
-
-def _shift_by_one(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
-    """Through the carry: SL/RLC upward, LSR or ASR/RRC downward (abi-elf.md §8.1)."""
-    if op == "shl":
-        for k in range(len(a)):
-            s.emit("sl1" if k == 0 else "rlc", a[k], d[k])
-        return
-    top = len(a) - 1
-    for k in range(top, -1, -1):
-        s.emit(("asr1" if op == "ashr" else "lsr1") if k == top else "rrc", a[k], d[k])
-
-
-def _shift_wide_variable(s: Selector, i: Instr) -> None:
-    """A loop of one-bit shifts on copies (abi-elf.md §8.1: 5 words for 32 bits)."""
-    d = s.value_regs(i)
-    a = s.regs(i.args[0])
-    n = s.regs(i.args[1])[0]
-    count = s.temp()
-    for x, r in zip(a, d, strict=True):
-        s.copy(x, r)
-    s.copy(n, count)
-    mi = MI("shiftloop", i.op, count, *d, line=s.line)
-    mi.info = OpInfo("nb" + "b" * len(d), "cznv", words=len(d) + 3)
-    s.out.append(mi)
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-# multiplication and division
-
-
-def _extension_kind(v: Value) -> tuple[str, Value] | None:
-    """("s" or "u", narrow value) when a wide value is an extension of at most 16 bits, or a small constant."""
-    if isinstance(v, Instr) and v.op in ("zext", "sext") and v.args[0].type.bits in (8, 16):
-        return ("s" if v.op == "sext" else "u"), v.args[0]
-    return None
-
-
-def select_mul(s: Selector, i: Instr) -> None:
-    """One word: low half of a product. 32 bits of two extended words: one MUL. Else sums of partial products."""
-    if _words(i) == 1:
-        _mul_word(s, i)
-        return
-    a, b = i.args
-    ka, kb = _extension_kind(a), _extension_kind(b)
-    if ka is not None and i.type.bits == 32 and (kb is not None or isinstance(b, ConstInt)):
-        if kb is not None or _fits(b, ka[0]):
-            _mul_extended(s, i, ka, kb)
-            return
-    _mul_wide(s, i, ka, kb)
-
-
-def _fits(b: Value, kind: str) -> bool:
-    return isinstance(b, ConstInt) and (b.value <= 0xFFFF or (kind == "s" and -0x8000 <= b.signed < 0))
-
-
-def _pair(s: Selector, kind: str, a: int, b: int | Imm | Mem) -> tuple[int, int]:
-    """MUL.kind a, b -> fresh (low, high) registers."""
-    p = s.m.new_pair()
-    s.emit(f"mul.{kind}", a, b, p)
-    low, high = s.temp(), s.temp()
-    s.m.pair_hints[low] = high
-    s.emit("split", low, high, p)
-    return low, high
-
-
-def _product(s: Selector, kind: str, a: int, b: int | Imm | Mem, low: int, high: int) -> None:
-    p = s.m.new_pair()
-    s.emit(f"mul.{kind}", a, b, p)
-    s.emit("split", low, high, p)
-
-
-def _mul_word(s: Selector, i: Instr) -> None:
-    a, b = i.args
-    right: int | Imm | Mem
-    if isinstance(b, ConstInt):
-        right = Imm(b.value) if b.value <= 31 else s.reg(b)
-    else:
-        if i.type.bits == 16:
-            operand = s.source(b, i)
-            assert isinstance(operand, int | Mem)
-            right = operand
-        else:
-            right = s.reg(b)
-    kind = "su" if isinstance(right, Imm) else "ss"
-    p = s.m.new_pair()
-    s.emit(f"mul.{kind}", s.reg(a), right, p)
-    s.emit("splitlo", s.result(i), p)
-
-
-def _narrow_reg(s: Selector, kind: str, v: Value) -> int:
-    """The 16-bit register of an extended value; bytes are extended first."""
-    if v.type.bits == 16:
-        return s.reg(v)
-    r = s.temp()
-    s.emit("se" if kind == "s" else "ze", s.reg(v), r)
-    return r
-
-
-def _mul_extended(s: Selector, i: Instr, ka: tuple[str, Value], kb: tuple[str, Value] | None) -> None:
-    low, high = s.value_regs(i)
-    x = _narrow_reg(s, *ka)
-    if kb is not None:
-        _product(s, ka[0] + kb[0], x, _narrow_reg(s, *kb), low, high)
-        return
-    b = i.args[1]
-    assert isinstance(b, ConstInt)
-    if b.value <= 31:
-        _product(s, ka[0] + "u", x, Imm(b.value), low, high)
-        return
-    t = s.temp()
-    s.load_imm(b.value & 0xFFFF, t)
-    _product(s, ka[0] + ("u" if b.value <= 0xFFFF else "s"), x, t, low, high)
-
-
-def _mul_wide(s: Selector, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str, Value] | None) -> None:
-    """Schoolbook product modulo 2^bits. Words known to be zero are skipped."""
-    n = _words(i)
-    a, b = s.regs(i.args[0]), s.regs(i.args[1])
-    d = s.value_regs(i)
-    zero_a, zero_b = _zero_words(i.args[0], ka), _zero_words(i.args[1], kb)
-    total: list[int | None] = [None] * n
-    for k in range(n):
-        for j in range(k + 1):
-            if j in zero_a or k - j in zero_b:
-                continue
-            if k + 1 < n:
-                low, high = _pair(s, "uu", a[j], b[k - j])
-                _accumulate(s, total, k, low, high)
-            else:
-                p, low = s.m.new_pair(), s.temp()
-                s.emit("mul.ss", a[j], b[k - j], p)
-                s.emit("splitlo", low, p)
-                _accumulate(s, total, k, low, None)
-    for r, t in zip(d, total, strict=True):
-        if t is None:
-            s.emit("clr", r)
-        else:
-            s.copy(t, r)
-
-
-def _zero_words(v: Value, kind: tuple[str, Value] | None) -> set[int]:
-    if isinstance(v, ConstInt):
-        return {k for k in range(_words(v)) if not v.value >> 16 * k & 0xFFFF}
-    if isinstance(v, Instr) and v.op == "zext":
-        return set(range(max(1, v.args[0].type.bits // 16), _words(v)))
-    return set()
-
-
-def _accumulate(s: Selector, total: list[int | None], k: int, low: int, high: int | None) -> None:
-    """total += (high:low) << 16k, with the carry running to the top."""
-    parts = [low] if high is None else [low, high]
-    carry = False
-    for j, part in enumerate(parts):
-        at = k + j
-        if at >= len(total):
-            return
-        old = total[at]
-        if old is None and not carry:
-            total[at] = part
-            continue
-        r = s.temp()
-        if old is None:
-            s.emit("addc", part, Imm(0), r)
-        else:
-            s.emit("addc" if carry else "add", old, part, r)
-        total[at] = r
-        carry = True
-    at = k + len(parts)
-    while carry and at < len(total):
-        old = total[at]
-        r = s.temp()
-        if old is None:
-            zero = s.temp()
-            s.emit("clr", zero)
-            s.emit("addc", zero, Imm(0), r)
-        else:
-            s.emit("addc", old, Imm(0), r)
-        total[at] = r
-        at += 1
-
-
-def select_divide(s: Selector, i: Instr) -> None:
-    """16-bit DIV under REPEAT #17: quotient in W0, remainder in W1 (isa.md §6.7). The divisor must survive them."""
-    signed = i.op in ("sdiv", "srem")
-    m, n = s.reg(i.args[0]), s.reg(i.args[1])
-    mi = s.emit("div.s" if signed else "div.u", m, n)
-    mi.also_defs = (0, 1)
-    mi.late = (1,)
-    quotient = i.op in ("sdiv", "udiv")
-    other = i.extra.get("other")
-    if isinstance(other, Instr) and id(other) in s.needed:
-        s.copy(1 if quotient else 0, s.value_regs(other)[0])
-    if id(i) in s.wanted:
-        s.copy(0 if quotient else 1, s.result(i))
-
-
-def select_divother(s: Selector, i: Instr) -> None:
-    """The second result of a division: the division itself copies it out."""
-    s.value_regs(i)
-    s.needed.add(id(i.args[0]))
-
-
-# ---------------------------------------------------------------------------------------------------------------------
-# width changes and single-word helpers
-
-
 def select_extend(s: Selector, i: Instr) -> None:
     """zext and sext. Words of the source are shared, not copied."""
     v, signed = i.args[0], i.op == "sext"
@@ -527,7 +209,7 @@ def select_extend(s: Selector, i: Instr) -> None:
             if k < _words(v):
                 s.load_leaf(v, k, r)
             else:
-                _fill(s, "ashr" if signed else "lshr", d[_words(v) - 1], r)
+                fill(s, "ashr" if signed else "lshr", d[_words(v) - 1], r)
         if v.type.bits == 8:
             s.emit("se" if signed else "ze", d[0], d[0])
         return
@@ -550,7 +232,7 @@ def select_extend(s: Selector, i: Instr) -> None:
         if signed and k > low:
             s.copy(d[low], d[k])
         else:
-            _fill(s, "ashr" if signed else "lshr", d[low - 1], d[k])
+            fill(s, "ashr" if signed else "lshr", d[low - 1], d[k])
 
 
 def _byte_source(s: Selector, v: Value, i: Instr) -> int | Mem:
@@ -573,10 +255,6 @@ def select_swap(s: Selector, i: Instr) -> None:
 
 SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     **dict.fromkeys(("add", "sub", "and", "or", "xor"), select_binary),
-    **dict.fromkeys(("shl", "lshr", "ashr"), select_shift),
-    "mul": select_mul,
-    **dict.fromkeys(("udiv", "sdiv", "urem", "srem"), select_divide),
-    "divother": select_divother,
     "zext": select_extend,
     "sext": select_extend,
     "ff1l": select_unary,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..ir.model import I1, ConstInt, Instr, Undef, Value
 from .build import SWAPPED
-from .mir import CC_INVERSE, MI, File, Imm
+from .mir import CC_INVERSE, MI, Imm
 from .rules import CONDITION, immediate_rule
 
 if TYPE_CHECKING:

@@ -76,7 +76,7 @@ def _sleb(value: int) -> list[str]:
     out = []
     while True:
         byte, value = value & 0x7F, value >> 7
-        done = value == 0 and not byte & 0x40 or value == -1 and byte & 0x40
+        done = (value == 0 and not byte & 0x40) or (value == -1 and byte & 0x40)
         out.append(str(byte | (0 if done else 0x80)))
         if done:
             return out

@@ -16,12 +16,7 @@ from ..ir.model import (
     I64,
     VOID,
     Arg,
-    Block,
-    BlockAddress,
-    ConstAgg,
-    ConstExpr,
     ConstInt,
-    ConstZero,
     Function,
     GlobalRef,
     InlineAsm,
@@ -32,36 +27,22 @@ from ..ir.model import (
     UnsupportedError,
     Value,
     int_type,
-    size_of,
-    store_size,
-    struct_offsets,
 )
 from ..target import ARGUMENT_REGISTERS
 from . import intrinsics, softfloat, vectors
 from .build import Builder, const, legal_type
 from .cfg import reverse_postorder
+from .legal_base import AGGREGATES, leaves_of
+from .legal_memory import MemoryLegalizer
 
-AGGREGATES = ("struct", "array", "vector")
 SIGNED_OPS = frozenset(("sdiv", "srem", "ashr"))
 CLEAN_OPS = frozenset(("udiv", "urem", "lshr", "sdiv", "srem", "ashr"))
 DIVIDE_NAMES = {"udiv": "__udiv{}3", "sdiv": "__div{}3", "urem": "__umod{}3", "srem": "__mod{}3"}
 LIBGCC_MODE = {32: "si", 64: "di", 128: "ti"}
 
 
-class Legalizer:
-    """State for one function. `values` maps old values to legal ones; aggregates map to lists of legal values."""
-
-    def __init__(self, module: Module, function: Function, where: Callable[[str | None], str]) -> None:
-        self.module = module
-        self.function = function
-        self.where = where
-        self.values: dict[int, Value] = {}
-        self.parts: dict[int, list[Value]] = {}
-        self.blocks: list[Block] = []
-        self.tail: dict[str, str] = {}  # old block name -> name of the new block that holds its terminator
-        self.fixups: list[tuple[Instr, list[Value]]] = []
-        self.serial = 0
-        self.alive: list[object] = []  # keeps ids in `values` unique while the map lives
+class Legalizer(MemoryLegalizer):
+    """Arithmetic, control flow and calls; the table of handlers."""
 
     # -- entry --------------------------------------------------------------------------------------------------------
 
@@ -70,7 +51,7 @@ class Legalizer:
         f = self.function
         old_args, f.args = f.args, []
         for a in old_args:
-            passed = [vectors.packed_type(a.type)] if a.type.kind == "vector" else [t for t, _ in _leaves(a.type)]
+            passed = [vectors.packed_type(a.type)] if a.type.kind == "vector" else [t for t, _ in leaves_of(a.type)]
             leaves = [Arg(legal_type(t), a.name, a.index, a.attrs) for t in passed]
             f.args += leaves
             if a.type.kind in ("struct", "array"):
@@ -111,65 +92,6 @@ class Legalizer:
             clean = self.b.emit("and", I16, [self.b.emit("bits", I16, [new]), const(I16, 1)])
             return self.b.emit("trunc", I1, [clean])
         return new
-
-    def begin(self, name: str) -> Block:
-        """Start a new block; instructions go there from now on."""
-        block = Block(name)
-        self.blocks.append(block)
-        return block
-
-    def fresh(self, hint: str) -> str:
-        """A block name nobody uses."""
-        self.serial += 1
-        return f"{hint}.L{self.serial}"
-
-    # -- operands -----------------------------------------------------------------------------------------------------
-
-    def use(self, v: Value) -> Value:
-        """The legal value that stands for an operand."""
-        if isinstance(v, vectors.Lane):
-            return self.fields(v.source)[v.index]
-        found = self.values.get(id(v))
-        if found is not None:
-            return found
-        if isinstance(v, ConstInt):
-            t = legal_type(v.type)
-            return v if t is v.type else const(t, v.value)
-        if isinstance(v, Undef):
-            return Undef(legal_type(v.type))
-        if isinstance(v, GlobalRef | BlockAddress):
-            v.type = I16
-            return v
-        if isinstance(v, InlineAsm):
-            return v
-        if isinstance(v, ConstExpr):
-            return self.const_expr(v)
-        raise UnsupportedError(f"operand {v!r} of type {v.type}")
-
-    def const_expr(self, v: ConstExpr) -> Value:
-        """A constant expression computed in place."""
-        args = [self.use(a) for a in v.args]
-        if v.op in ("ptrtoint", "inttoptr", "trunc", "zext", "sext", "bitcast", "addrspacecast", "ptrtoaddr"):
-            t = legal_type(v.type)
-            return self.b.cast(
-                "trunc" if t.bits < args[0].type.bits else "sext" if v.op == "sext" else "zext", args[0], t
-            )
-        return self.b.binary(v.op, args[0], args[1])
-
-    def zero_extended(self, v: Value) -> Value:
-        """Legal value with the bits above the original width cleared."""
-        new, bits = self.use(v), v.type.bits
-        if v.type.kind == "ptr" or new.type.bits == bits:
-            return new
-        return self.b.binary("and", new, const(new.type, (1 << bits) - 1))
-
-    def sign_extended(self, v: Value) -> Value:
-        """Legal value with the bits above the original width filled with the sign."""
-        new, bits = self.use(v), v.type.bits
-        if v.type.kind == "ptr" or new.type.bits == bits:
-            return new
-        pad = new.type.bits - bits
-        return self.b.shift("ashr", self.b.shift("shl", new, pad), pad)
 
     # -- instructions -------------------------------------------------------------------------------------------------
 
@@ -285,188 +207,6 @@ class Legalizer:
             return self.to_bool(low) if t.bits == 1 else low
         return self.b.call("__extendsfdf2" if i.op == "fpext" else "__truncdfsf2", target, [self.use(a)])
 
-    def to_bool(self, v: Value) -> Value:
-        """Bit 0 of a value as a clean i1."""
-        if isinstance(v, ConstInt):
-            return const(I1, v.value & 1)
-        if v.type is I1:
-            return v
-        if v.type.bits > 16:
-            v = self.b.cast("trunc", v, I16)
-        return self.b.icmp("ne", self.b.binary("and", v, const(v.type, 1)), const(v.type, 0))
-
-    # -- memory -------------------------------------------------------------------------------------------------------
-
-    def gep(self, i: Instr) -> Value:
-        """Address arithmetic: base + scaled indices + one constant."""
-        t = i.extra["type"]
-        assert isinstance(t, Type)
-        address, offset = self.use(i.args[0]), 0
-        for k, index in enumerate(i.args[1:]):
-            if k and t.kind == "struct":
-                assert isinstance(index, ConstInt)
-                offset += struct_offsets(t)[index.value]
-                t = t.elems[index.value]
-                continue
-            if k:
-                t = t.elems[0]
-            stride = size_of(t)
-            if isinstance(index, ConstInt):
-                offset += index.signed * stride
-                continue
-            scaled = self.use(index)
-            if scaled.type.bits < 16:
-                scaled = self.b.cast("sext", self.sign_extended(index), I16)
-            elif scaled.type.bits > 16:
-                scaled = self.b.cast("trunc", scaled, I16)
-            if stride:
-                address = self.b.binary("add", address, self.b.binary("mul", scaled, const(I16, stride)))
-        return self.b.binary("add", address, const(I16, offset)) if offset & 0xFFFF else address
-
-    def alloca(self, i: Instr) -> Value:
-        """Fixed-size objects become frame slots, others move the stack pointer."""
-        t = i.extra["type"]
-        assert isinstance(t, Type)
-        size = size_of(t)
-        count = self.use(i.args[0]) if i.args else const(I16, 1)
-        align = i.extra.get("align", 1)
-        assert isinstance(align, int)
-        slack = align if align > 2 else 0
-        if isinstance(count, ConstInt) and (self.blocks[0] is self.b.block):
-            return self.aligned(self.b.emit("slot", I16, [], size=size * count.value + slack), slack)
-        if count.type.bits > 16:
-            count = self.b.cast("trunc", count, I16)
-        elif count.type.bits < 16:
-            count = self.b.cast("zext", count, I16)
-        total = self.b.add(self.b.binary("mul", count, const(I16, size)), slack)
-        return self.aligned(self.b.emit("dynalloca", I16, [total]), slack)
-
-    def aligned(self, p: Value, align: int) -> Value:
-        """The next multiple of `align` (0: as is); the stack itself is aligned to 2 only."""
-        return self.b.binary("and", self.b.add(p, align - 1), const(I16, -align)) if align else p
-
-    def even(self, p: Value, align: int) -> bool:
-        """Whether a pointer is known to be even, so that word accesses do not trap (isa.md §3)."""
-        if align >= 2:
-            return True
-        offset = 0
-        while isinstance(p, Instr) and p.op == "add" and isinstance(p.args[1], ConstInt):
-            offset += p.args[1].value
-            p = p.args[0]
-        if isinstance(p, ConstInt):
-            return not (p.value + offset) & 1
-        if isinstance(p, GlobalRef):
-            var = self.module.globals.get(p.name)
-            strong = var is not None and var.init is not None and var.linkage in ("", "internal", "private")
-            return strong and not (p.offset + offset) & 1
-        return isinstance(p, Instr) and p.op in ("slot", "dynalloca") and not offset & 1
-
-    def load(self, i: Instr) -> Value | list[Value]:
-        p = self.use(i.args[0])
-        if i.type.kind in AGGREGATES:
-            return self.load_aggregate(i, p)
-        align = i.extra.get("align", 2)
-        assert isinstance(align, int)
-        self.guard(i)
-        t = legal_type(i.type)
-        value = self.load_bits(t, store_size(i.type), p, self.even(p, align), i.volatile)
-        return self.to_bool(value) if i.type.bits == 1 else value
-
-    def load_bits(self, t: Type, size: int, p: Value, even: bool, volatile: bool) -> Value:
-        """Load `size` bytes into the low end of a legal type."""
-        if t is I1:
-            return self.b.load(I8, p, volatile)
-        if even and size * 8 == t.bits:
-            return self.b.load(t, p, volatile)
-        if size == 1:
-            return self.b.cast("zext", self.b.load(I8, p, volatile), t)
-        value: Value | None = None
-        for at, step in _pieces(size, even):
-            part = self.b.load(I16 if step == 2 else I8, self.b.add(p, at), volatile)
-            wide = self.b.shift("shl", self.b.cast("zext", part, t), at * 8)
-            value = wide if value is None else self.b.binary("or", value, wide)
-        assert value is not None
-        return value
-
-    def store(self, i: Instr) -> None:
-        v, p = i.args[0], self.use(i.args[1])
-        if v.type.kind in AGGREGATES:
-            self.store_aggregate(v, p, i.volatile)
-            return
-        if isinstance(v, Undef) and not i.volatile:
-            return
-        align = i.extra.get("align", 2)
-        assert isinstance(align, int)
-        self.guard(i)
-        value = self.b.cast("zext", self.use(v), I8) if v.type.bits == 1 else self.zero_extended(v)
-        self.store_bits(value, store_size(v.type), p, self.even(p, align), i.volatile)
-
-    def store_bits(self, v: Value, size: int, p: Value, even: bool, volatile: bool) -> None:
-        """Store the low `size` bytes of a legal value."""
-        if even and size * 8 == v.type.bits:
-            self.b.store(v, p, volatile)
-            return
-        if size == 1:
-            self.b.store(self.b.cast("trunc", v, I8), p, volatile)
-            return
-        for at, step in _pieces(size, even):
-            part = self.b.cast("trunc", self.b.shift("lshr", v, at * 8) if at else v, I16 if step == 2 else I8)
-            self.b.store(part, self.b.add(p, at), volatile)
-
-    def guard(self, i: Instr) -> None:
-        """Atomic accesses wider than a word are made with interrupts of priority 1-6 held off (isa.md §12)."""
-        if "ordering" in i.extra and store_size(i.args[0].type if i.op == "store" else i.type) > 2:
-            self.disi(12)
-
-    def disi(self, cycles: int) -> None:
-        self.b.emit("builtin", VOID, [const(I16, cycles)], name="__builtin_disi")
-
-    def load_aggregate(self, i: Instr, p: Value) -> list[Value]:
-        out = []
-        for t, at in _leaves(i.type):
-            q = self.b.add(p, at)
-            out.append(self.load_bits(legal_type(t), store_size(t), q, self.even(q, 2), i.volatile))
-        return out
-
-    def store_aggregate(self, v: Value, p: Value, volatile: bool) -> None:
-        for (t, at), part in zip(_leaves(v.type), self.fields(v), strict=True):
-            q = self.b.add(p, at)
-            self.store_bits(part, store_size(t), q, self.even(q, 2), volatile)
-
-    # -- aggregates in registers --------------------------------------------------------------------------------------
-
-    def fields(self, v: Value) -> list[Value]:
-        """Leaves of a first-class aggregate, in memory order."""
-        found = self.parts.get(id(v))
-        if found is not None:
-            return found
-        leaves = _leaves(v.type)
-        if isinstance(v, Undef):
-            return [Undef(legal_type(t)) for t, _ in leaves]
-        if isinstance(v, ConstZero):
-            return [const(legal_type(t), 0) for t, _ in leaves]
-        if isinstance(v, ConstAgg):
-            return [
-                self.use(x) if x.type.bits else y for x in v.elems for y in ([x] if x.type.bits else self.fields(x))
-            ]
-        raise UnsupportedError(f"aggregate operand of type {v.type}")
-
-    def extractvalue(self, i: Instr) -> Value | list[Value]:
-        indices = i.extra["indices"]
-        assert isinstance(indices, list)
-        first, count = _leaf_range(i.args[0].type, indices)
-        parts = self.fields(i.args[0])[first : first + count]
-        return parts if i.type.kind in AGGREGATES else parts[0]
-
-    def insertvalue(self, i: Instr) -> list[Value]:
-        indices = i.extra["indices"]
-        assert isinstance(indices, list)
-        first, count = _leaf_range(i.type, indices)
-        parts = list(self.fields(i.args[0]))
-        v = i.args[1]
-        parts[first : first + count] = self.fields(v) if v.type.kind in AGGREGATES else [self.use(v)]
-        return parts
-
     # -- control flow -------------------------------------------------------------------------------------------------
 
     def phi(self, i: Instr) -> Value:
@@ -554,7 +294,7 @@ class Legalizer:
             parts = self.passed(a)
             args += parts
             attrs += [attr] * len(parts)
-        leaves = [legal_type(t) for t, _ in _leaves(i.type)] if i.type.kind in ("struct", "array") else []
+        leaves = [legal_type(t) for t, _ in leaves_of(i.type)] if i.type.kind in ("struct", "array") else []
         result = vectors.packed_type(i.type) if i.type.kind == "vector" else legal_type(i.type)
         new = self.b.emit("call", leaves[0] if leaves else result, [*args, self.use(callee)])
         new.extra = {"attrs": attrs, "vararg": i.extra["vararg"], "fixed": i.extra["fixed"], "tail": i.extra["tail"]}
@@ -596,77 +336,6 @@ class Legalizer:
         for k in range(1, len(types)):
             values.append(self.b.emit("asmresult", legal_type(types[k]), [new], index=k))
         return values if i.type.kind == "struct" else values[0]
-
-    def va_arg(self, i: Instr) -> Value:
-        """Step the pointer down by the rounded size, then read (abi-elf.md §2.4)."""
-        if i.type.kind not in ("int", "float", "ptr"):
-            raise UnsupportedError(f"va_arg of type {i.type}")
-        pp = self.use(i.args[0])
-        size = (store_size(i.type) + 1) // 2 * 2
-        p = self.b.add(self.b.load(I16, pp), -size)
-        self.b.store(p, pp)
-        value = self.load_bits(legal_type(i.type), store_size(i.type), p, True, False)
-        return self.to_bool(value) if i.type.bits == 1 else value
-
-    # -- atomics ------------------------------------------------------------------------------------------------------
-
-    def atomicrmw(self, i: Instr) -> Value:
-        """Read, modify, write with interrupts of priority 1-6 held off for the length of the sequence."""
-        kind = str(i.extra["kind"])
-        p, v = self.use(i.args[0]), self.use(i.args[1])
-        t = legal_type(i.type)
-        self.disi(8 + 8 * (t.bits // 16))
-        old = self.b.load(t, p, True)
-        if kind in ("add", "sub", "and", "or", "xor"):
-            new = self.b.binary(kind, old, v)
-        elif kind == "xchg":
-            new = v
-        elif kind == "nand":
-            new = self.b.binary("xor", self.b.binary("and", old, v), const(t, -1))
-        elif kind in ("max", "min", "umax", "umin"):
-            pred = ("u" if kind[0] == "u" else "s") + ("gt" if kind.endswith("max") else "lt")
-            new = self.b.select(self.b.icmp(pred, old, v), old, v)
-        else:
-            raise UnsupportedError(f"atomicrmw {kind}")
-        self.b.store(new, p, True)
-        return old
-
-    def cmpxchg(self, i: Instr) -> list[Value]:
-        p, expected, new = (self.use(a) for a in i.args)
-        t = legal_type(i.args[1].type)
-        self.disi(12 + 10 * (t.bits // 16))
-        old = self.b.load(t, p, True)
-        same = self.b.icmp("eq", old, expected)
-        self.b.store(self.b.select(same, new, old), p, True)
-        return [old, same]
-
-
-def _pieces(size: int, even: bool) -> list[tuple[int, int]]:
-    """(offset, bytes) of the accesses that cover `size` bytes."""
-    if not even:
-        return [(k, 1) for k in range(size)]
-    return [(k, 2) for k in range(0, size - 1, 2)] + ([(size - 1, 1)] if size & 1 else [])
-
-
-def _leaves(t: Type, at: int = 0) -> list[tuple[Type, int]]:
-    """Scalar members of an aggregate with their offsets."""
-    if t.kind in ("array", "vector"):
-        step = size_of(t.elems[0])
-        return [leaf for k in range(t.count) for leaf in _leaves(t.elems[0], at + k * step)]
-    if t.kind == "struct":
-        offsets = struct_offsets(t)
-        return [leaf for e, o in zip(t.elems, offsets, strict=False) for leaf in _leaves(e, at + o)]
-    return [(t, at)]
-
-
-def _leaf_range(t: Type, indices: list[int]) -> tuple[int, int]:
-    """Position of a member among the leaves, and how many leaves it has."""
-    first = 0
-    for n in indices:
-        members = [t.elems[0]] * t.count if t.kind != "struct" else list(t.elems)
-        first += sum(len(_leaves(m)) for m in members[:n])
-        t = members[n]
-    return first, len(_leaves(t))
 
 
 HANDLERS: dict[str, Callable[[Legalizer, Instr], Value | list[Value] | None]] = {

@@ -243,7 +243,7 @@ def _modify_wide(s: Selector, store: Instr, op: Instr, p: Value) -> bool:
     if load is None or not s.is_leaf(s.decompose(p)[0]) or id(s.decompose(p)[0]) in s.slots:
         return False
     targets = [s.address(p, False, 2 * k, _words(op)) for k in range(_words(op))]
-    if not all(isinstance(t, File) and t.near for t in targets) or s.is_leaf(b) and not isinstance(b, ConstInt):
+    if not all(isinstance(t, File) and t.near for t in targets) or (s.is_leaf(b) and not isinstance(b, ConstInt)):
         return False
     s.folded.add(id(load))
     registers = None if isinstance(b, ConstInt) else s.regs(b)

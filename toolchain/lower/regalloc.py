@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from ..ir.model import UnsupportedError
 from ..target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
+from . import variables
 from .liveness import bits, live_out, members, remove_dead
 from .mir import FIRST_VIRTUAL, MI, MFunction
-from . import variables
 from .spill import rewrite_spills
 
 WORD_COLOURS = bits(list(ALLOCATABLE))

@@ -29,7 +29,7 @@ def _signature(mi: MI) -> tuple[object, ...]:
 
 def _ending(b: MBlock) -> tuple[object, ...] | None:
     """What the block does last: where it jumps, or how it returns."""
-    if not b.insts or b.address_taken and len(b.insts) < 2:
+    if not b.insts or (b.address_taken and len(b.insts) < 2):
         return None
     last = b.insts[-1]
     if last.op == "jump" and (len(b.insts) < 2 or b.insts[-2].op != "bra"):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..ir.model import ConstInt, Instr, Type, Undef, UnsupportedError, Value, int_type
 from .build import const, legal_type
+from .lanes import Lane
 
 if TYPE_CHECKING:
     from .legalize import Legalizer
@@ -16,17 +17,6 @@ if TYPE_CHECKING:
 OWN = frozenset(
     ("extractelement", "insertelement", "shufflevector", "bitcast", "load", "store", "freeze", "call", "ret")
 )
-
-
-class Lane(Value):
-    """One lane of a vector value, resolved when its legal value is asked for."""
-
-    __slots__ = ("index", "source")
-
-    def __init__(self, source: Value, index: int) -> None:
-        super().__init__(source.type.elems[0])
-        self.source = source
-        self.index = index
 
 
 def lane_count(i: Instr) -> int:

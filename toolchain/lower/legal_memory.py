@@ -1,0 +1,214 @@
+"""Legalisation of addresses, loads, stores, locals and atomics. Odd addresses are accessed byte by byte (isa.md §3)."""
+
+from __future__ import annotations
+
+from ..ir.model import (
+    I1,
+    I8,
+    I16,
+    VOID,
+    ConstInt,
+    GlobalRef,
+    Instr,
+    Type,
+    Undef,
+    UnsupportedError,
+    Value,
+    size_of,
+    store_size,
+    struct_offsets,
+)
+from .build import const, legal_type
+from .legal_base import AGGREGATES, LegalizerBase, leaves_of
+
+
+class MemoryLegalizer(LegalizerBase):
+    """Everything that touches memory."""
+
+    # -- memory -------------------------------------------------------------------------------------------------------
+
+    def gep(self, i: Instr) -> Value:
+        """Address arithmetic: base + scaled indices + one constant."""
+        t = i.extra["type"]
+        assert isinstance(t, Type)
+        address, offset = self.use(i.args[0]), 0
+        for k, index in enumerate(i.args[1:]):
+            if k and t.kind == "struct":
+                assert isinstance(index, ConstInt)
+                offset += struct_offsets(t)[index.value]
+                t = t.elems[index.value]
+                continue
+            if k:
+                t = t.elems[0]
+            stride = size_of(t)
+            if isinstance(index, ConstInt):
+                offset += index.signed * stride
+                continue
+            scaled = self.use(index)
+            if scaled.type.bits < 16:
+                scaled = self.b.cast("sext", self.sign_extended(index), I16)
+            elif scaled.type.bits > 16:
+                scaled = self.b.cast("trunc", scaled, I16)
+            if stride:
+                address = self.b.binary("add", address, self.b.binary("mul", scaled, const(I16, stride)))
+        return self.b.binary("add", address, const(I16, offset)) if offset & 0xFFFF else address
+
+    def alloca(self, i: Instr) -> Value:
+        """Fixed-size objects become frame slots, others move the stack pointer."""
+        t = i.extra["type"]
+        assert isinstance(t, Type)
+        size = size_of(t)
+        count = self.use(i.args[0]) if i.args else const(I16, 1)
+        align = i.extra.get("align", 1)
+        assert isinstance(align, int)
+        slack = align if align > 2 else 0
+        if isinstance(count, ConstInt) and (self.blocks[0] is self.b.block):
+            return self.aligned(self.b.emit("slot", I16, [], size=size * count.value + slack), slack)
+        if count.type.bits > 16:
+            count = self.b.cast("trunc", count, I16)
+        elif count.type.bits < 16:
+            count = self.b.cast("zext", count, I16)
+        total = self.b.add(self.b.binary("mul", count, const(I16, size)), slack)
+        return self.aligned(self.b.emit("dynalloca", I16, [total]), slack)
+
+    def aligned(self, p: Value, align: int) -> Value:
+        """The next multiple of `align` (0: as is); the stack itself is aligned to 2 only."""
+        return self.b.binary("and", self.b.add(p, align - 1), const(I16, -align)) if align else p
+
+    def even(self, p: Value, align: int) -> bool:
+        """Whether a pointer is known to be even, so that word accesses do not trap (isa.md §3)."""
+        if align >= 2:
+            return True
+        offset = 0
+        while isinstance(p, Instr) and p.op == "add" and isinstance(p.args[1], ConstInt):
+            offset += p.args[1].value
+            p = p.args[0]
+        if isinstance(p, ConstInt):
+            return not (p.value + offset) & 1
+        if isinstance(p, GlobalRef):
+            var = self.module.globals.get(p.name)
+            strong = var is not None and var.init is not None and var.linkage in ("", "internal", "private")
+            return strong and not (p.offset + offset) & 1
+        return isinstance(p, Instr) and p.op in ("slot", "dynalloca") and not offset & 1
+
+    def load(self, i: Instr) -> Value | list[Value]:
+        p = self.use(i.args[0])
+        if i.type.kind in AGGREGATES:
+            return self.load_aggregate(i, p)
+        align = i.extra.get("align", 2)
+        assert isinstance(align, int)
+        self.guard(i)
+        t = legal_type(i.type)
+        value = self.load_bits(t, store_size(i.type), p, self.even(p, align), i.volatile)
+        return self.to_bool(value) if i.type.bits == 1 else value
+
+    def load_bits(self, t: Type, size: int, p: Value, even: bool, volatile: bool) -> Value:
+        """Load `size` bytes into the low end of a legal type."""
+        if t is I1:
+            return self.b.load(I8, p, volatile)
+        if even and size * 8 == t.bits:
+            return self.b.load(t, p, volatile)
+        if size == 1:
+            return self.b.cast("zext", self.b.load(I8, p, volatile), t)
+        value: Value | None = None
+        for at, step in _pieces(size, even):
+            part = self.b.load(I16 if step == 2 else I8, self.b.add(p, at), volatile)
+            wide = self.b.shift("shl", self.b.cast("zext", part, t), at * 8)
+            value = wide if value is None else self.b.binary("or", value, wide)
+        assert value is not None
+        return value
+
+    def store(self, i: Instr) -> None:
+        v, p = i.args[0], self.use(i.args[1])
+        if v.type.kind in AGGREGATES:
+            self.store_aggregate(v, p, i.volatile)
+            return
+        if isinstance(v, Undef) and not i.volatile:
+            return
+        align = i.extra.get("align", 2)
+        assert isinstance(align, int)
+        self.guard(i)
+        value = self.b.cast("zext", self.use(v), I8) if v.type.bits == 1 else self.zero_extended(v)
+        self.store_bits(value, store_size(v.type), p, self.even(p, align), i.volatile)
+
+    def store_bits(self, v: Value, size: int, p: Value, even: bool, volatile: bool) -> None:
+        """Store the low `size` bytes of a legal value."""
+        if even and size * 8 == v.type.bits:
+            self.b.store(v, p, volatile)
+            return
+        if size == 1:
+            self.b.store(self.b.cast("trunc", v, I8), p, volatile)
+            return
+        for at, step in _pieces(size, even):
+            part = self.b.cast("trunc", self.b.shift("lshr", v, at * 8) if at else v, I16 if step == 2 else I8)
+            self.b.store(part, self.b.add(p, at), volatile)
+
+    def guard(self, i: Instr) -> None:
+        """Atomic accesses wider than a word are made with interrupts of priority 1-6 held off (isa.md §12)."""
+        if "ordering" in i.extra and store_size(i.args[0].type if i.op == "store" else i.type) > 2:
+            self.disi(12)
+
+    def disi(self, cycles: int) -> None:
+        self.b.emit("builtin", VOID, [const(I16, cycles)], name="__builtin_disi")
+
+    def load_aggregate(self, i: Instr, p: Value) -> list[Value]:
+        out = []
+        for t, at in leaves_of(i.type):
+            q = self.b.add(p, at)
+            out.append(self.load_bits(legal_type(t), store_size(t), q, self.even(q, 2), i.volatile))
+        return out
+
+    def store_aggregate(self, v: Value, p: Value, volatile: bool) -> None:
+        for (t, at), part in zip(leaves_of(v.type), self.fields(v), strict=True):
+            q = self.b.add(p, at)
+            self.store_bits(part, store_size(t), q, self.even(q, 2), volatile)
+
+    def va_arg(self, i: Instr) -> Value:
+        """Step the pointer down by the rounded size, then read (abi-elf.md §2.4)."""
+        if i.type.kind not in ("int", "float", "ptr"):
+            raise UnsupportedError(f"va_arg of type {i.type}")
+        pp = self.use(i.args[0])
+        size = (store_size(i.type) + 1) // 2 * 2
+        p = self.b.add(self.b.load(I16, pp), -size)
+        self.b.store(p, pp)
+        value = self.load_bits(legal_type(i.type), store_size(i.type), p, True, False)
+        return self.to_bool(value) if i.type.bits == 1 else value
+
+    # -- atomics ------------------------------------------------------------------------------------------------------
+
+    def atomicrmw(self, i: Instr) -> Value:
+        """Read, modify, write with interrupts of priority 1-6 held off for the length of the sequence."""
+        kind = str(i.extra["kind"])
+        p, v = self.use(i.args[0]), self.use(i.args[1])
+        t = legal_type(i.type)
+        self.disi(8 + 8 * (t.bits // 16))
+        old = self.b.load(t, p, True)
+        if kind in ("add", "sub", "and", "or", "xor"):
+            new = self.b.binary(kind, old, v)
+        elif kind == "xchg":
+            new = v
+        elif kind == "nand":
+            new = self.b.binary("xor", self.b.binary("and", old, v), const(t, -1))
+        elif kind in ("max", "min", "umax", "umin"):
+            pred = ("u" if kind[0] == "u" else "s") + ("gt" if kind.endswith("max") else "lt")
+            new = self.b.select(self.b.icmp(pred, old, v), old, v)
+        else:
+            raise UnsupportedError(f"atomicrmw {kind}")
+        self.b.store(new, p, True)
+        return old
+
+    def cmpxchg(self, i: Instr) -> list[Value]:
+        p, expected, new = (self.use(a) for a in i.args)
+        t = legal_type(i.args[1].type)
+        self.disi(12 + 10 * (t.bits // 16))
+        old = self.b.load(t, p, True)
+        same = self.b.icmp("eq", old, expected)
+        self.b.store(self.b.select(same, new, old), p, True)
+        return [old, same]
+
+
+def _pieces(size: int, even: bool) -> list[tuple[int, int]]:
+    """(offset, bytes) of the accesses that cover `size` bytes."""
+    if not even:
+        return [(k, 1) for k in range(size)]
+    return [(k, 2) for k in range(0, size - 1, 2)] + ([(size - 1, 1)] if size & 1 else [])
