@@ -34,6 +34,8 @@ def main() -> int:
         while pairs < options.pairs:
             pairs += check_pairs(seed, min(BATCH, -(-(options.pairs - pairs) // CONTEXTS)), CONTEXTS, options.engine)
             seed += 1
+            if seed % 10 == 0:
+                print(f"{pairs} pairs, no difference so far", flush=True)
         while programs < options.programs:
             count = min(BATCH, options.programs - programs)
             cycles += check_programs(seed, count, options.engine)
