@@ -33,6 +33,7 @@ class Port:
         """If set, what the firmware sends is collected here instead."""
         self.lost = 0
         """Bytes the firmware sent that nobody took."""
+        self._discards: Final = out_fd is None
         self._close: Final = close
 
     def write(self, data: bytes) -> None:
@@ -53,7 +54,8 @@ class Port:
                 self.out_fd = None
             except OSError:
                 self.out_fd = None
-        self.lost += len(data)
+        if not self._discards:
+            self.lost += len(data)
 
     def read(self) -> bytes:
         """What has arrived from outside, at once; an ended input sets `in_fd` to None."""

@@ -22,6 +22,13 @@ def test_a_file_gets_every_byte_and_gives_none(tmp_path):
     assert path.read_bytes() == b"\x00hello\xff"
 
 
+def test_no_port_at_all_loses_nothing():
+    port = open_port("none", 2)
+    port.write(b"into the void")
+    assert port.lost == 0
+    assert port.read() == b""
+
+
 def test_a_pseudo_terminal_carries_raw_bytes_both_ways(capsys):
     port = open_port("pty", 2)
     name = capsys.readouterr().err.split()[-1]
