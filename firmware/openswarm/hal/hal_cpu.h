@@ -24,7 +24,6 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   HAL_ALLOCATION_FAILS()        false; a test port may say true to make the next allocation fail
  * and declares or defines inline:
  *   hal_lock_state hal_lock_slice(void);      at least level slice; nests; any context
- *   hal_lock_state hal_lock_slice_here(void); the same, inlined where speed counts
  *   void hal_enter_slice(void);               from thread level, which the caller has checked, to level slice
  *   hal_lock_state hal_lock_devices(void);    at least level device; nests; any context; held for <= 40 Tcy
  *   void hal_unlock(hal_lock_state before);   restore, never lower than before; takes what became due meanwhile

@@ -1,6 +1,6 @@
 /* Motors: speed events through a replaceable post-processor to the stepper driver. */
-#include "hal_cpu.h"
 #include "io.h"
+#include "kernel.h"
 
 static sys_motor_processor processor;
 static sys_wheel_speeds speeds;
@@ -40,7 +40,7 @@ bool Sys_Connect_Motors(uint16 event)
 
 sys_motor_processor Sys_Set_MotorProcessor(sys_motor_processor wanted)
 {
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     sys_motor_processor before = processor;
     processor = wanted != NULL ? wanted : Sys_Default_MotorProcessor;
     hal_unlock(lock);

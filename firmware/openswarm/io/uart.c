@@ -53,7 +53,7 @@ static bool write_message(uint8 uart, const void *message, uint16 size)
     if (hal_in_isr()) {
         return os_refuse();
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     writing = c;
     writing_head = c->head;
     bool fits = c->encode(message, size, put);
@@ -168,7 +168,7 @@ void uart_tick(void)
 
 sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor wanted)
 {
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     sys_tx_processor before = channels[uart].encode;
     channels[uart].encode = wanted != NULL ? wanted : Sys_Raw_Tx;
     hal_unlock(lock);

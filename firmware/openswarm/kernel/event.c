@@ -54,7 +54,7 @@ static HAL_OUTLINE bool event_awaited(const event *e)
 
 bool Sys_IsEventRegistered(uint16 id)
 {
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     bool found = event_find(id) != NULL;
     hal_unlock(lock);
     return found;
@@ -65,7 +65,7 @@ bool Sys_Register_Event(uint16 id)
     if (hal_in_isr()) {
         return os_refuse();
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     event **link = &events[id % BUCKETS];
     while (*link != NULL && (*link)->id != id) {
         link = &(*link)->next;
@@ -126,7 +126,7 @@ bool Sys_Unregister_Event(uint16 id)
     if (hal_in_isr()) {
         return os_refuse();
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     event **link = &events[id % BUCKETS];
     while (*link != NULL && (*link)->id != id) {
         link = &(*link)->next;
@@ -181,7 +181,7 @@ bool Sys_Subscribe_to_Event(uint16 id, uint16 pid, sys_handler handler, sys_cond
     if (handler == NULL) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     event *e = event_find(id);
     bool done = e == NULL                     ? os_fail(SYS_ERROR_EVENT)
                 : process_find(pid) == NULL ? os_fail(SYS_ERROR_PROCESS)
@@ -211,7 +211,7 @@ bool Sys_Unsubscribe_Handler(uint16 id, uint16 pid, sys_handler handler)
     if (hal_in_isr()) {
         return os_refuse();
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     event *e = event_find(id);
     bool done = e != NULL ? unsubscribe(e, pid, handler) : os_fail(SYS_ERROR_EVENT);
     hal_unlock(lock);
@@ -271,7 +271,7 @@ bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
     if ((size > SYS_SMALL_PAYLOAD && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) || (data == NULL && size != 0)) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
-    hal_lock_state lock = hal_lock_slice_here();
+    hal_lock_state lock = hal_lock_slice();
     event *e = find(id);
     if (e == NULL) {
         error = SYS_ERROR_EVENT;
@@ -418,7 +418,7 @@ sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 id, sys_condition condition
         os_refuse();
         return NULL;
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     release_own_result(self);
     event *e = event_find(id);
     if (e == NULL) {
@@ -451,7 +451,7 @@ void Sys_Clear_EventData(sys_event_data **data)
     if (data == NULL || *data == NULL) {
         return;
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     message *m = os_running->wait.result;
     if (m != NULL && *data == &m->data && !os_delivering) {
         release_own_result(os_running);

@@ -119,6 +119,9 @@ sys_pcb *process_scan_blocked(void);
 sys_pcb *process_scan_next(void);
 bool process_scan_holds(const sys_pcb *process); /* still blocked */
 
+/* hal_lock_slice() as a call; inlined only where speed counts */
+HAL_OUTLINE hal_lock_state os_lock_slice(void);
+
 /* scheduler.c: the two ways into the kernel stack; both pick the next thread */
 HAL_USED sys_pcb *os_slice_end(void); /* the running thread stays ready */
 HAL_USED sys_pcb *os_schedule(void);  /* it does not */

@@ -182,7 +182,7 @@ uint16 Sys_Start_ProcessWith(const sys_process_config *config)
         os_fail(SYS_ERROR_ARGUMENT);
         return 0;
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     uint16 size = (uint16)(extra + stack + sizeof(sys_pcb));
     uint8 *block = heap_take(size);
     if (block != NULL) {
@@ -242,7 +242,7 @@ void Sys_Sleep(uint16 ms)
     } else if (!hal_in_thread()) {
         os_refuse();
     } else {
-        (void)hal_lock_slice();
+        (void)os_lock_slice();
         process_block(NULL, ms);
     }
 }
@@ -258,7 +258,7 @@ static sys_pcb *retire_running(void)
 void Sys_Run_SystemThread(void)
 {
     if (os_running == &os_system && hal_in_thread()) {
-        (void)hal_lock_slice();
+        (void)os_lock_slice();
         hal_abandon(retire_running);
     }
     os_refuse();
@@ -266,7 +266,7 @@ void Sys_Run_SystemThread(void)
 
 void Sys_Start_CriticalSection(void)
 {
-    hal_lock_state before = hal_lock_slice();
+    hal_lock_state before = os_lock_slice();
     if (critical_depth++ == 0) { /* an ISR in between leaves the depth as it was */
         critical_before = before;
     }
@@ -319,7 +319,7 @@ sys_pcb *process_end_running(void)
 
 void os_thread_returned(void)
 {
-    (void)hal_lock_slice();
+    (void)os_lock_slice();
     hal_abandon(process_end_running);
 }
 
@@ -328,7 +328,7 @@ bool Sys_Kill_Process(uint16 pid)
     if (hal_in_isr()) {
         return os_refuse();
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     if (!os_delivering && pid == os_running->pid && pid != 0) {
         hal_abandon(process_end_running);
     }
@@ -351,7 +351,7 @@ uint16 Sys_Get_ProcessID(void)
 sys_state Sys_Get_ProcessState(uint16 pid)
 {
     sys_state state = SYS_UNKNOWN;
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     const sys_pcb *p = process_find(pid);
     if (p != NULL) {
         state = (p == os_running && !os_delivering) ? SYS_RUNNING : (sys_state)(p->status & OS_STATE);

@@ -5,6 +5,11 @@ volatile uint16 os_pending;
 bool os_eager;
 bool os_delivering;
 
+hal_lock_state os_lock_slice(void)
+{
+    return hal_lock_slice();
+}
+
 static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
 
 /* ---- Dispatch: kernel stack, slice level ------------------------------------------------------------------------ */
@@ -71,7 +76,7 @@ void Sys_Yield(void)
 
 void Sys_Set_Scheduler(const sys_scheduler *scheduler)
 {
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     pick_thread = scheduler->pick;
     os_eager = scheduler->eager;
     hal_unlock(lock);
@@ -150,7 +155,7 @@ bool Sys_Wait_for_Period(void)
     if (timing == NULL) {
         return os_fail(SYS_ERROR_PROCESS);
     }
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     uint16 now = clock_now();
     bool met = !is_late(timing, now);
     if (!met && !(self->status & OS_MISSED)) {

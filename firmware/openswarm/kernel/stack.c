@@ -31,7 +31,7 @@ static uint16 unused(const uint8 *stack, uint16 bytes)
 uint16 Sys_Get_UnusedStack(uint16 pid)
 {
     uint16 bytes = 0;
-    hal_lock_state lock = hal_lock_slice();
+    hal_lock_state lock = os_lock_slice();
     const sys_pcb *p = process_find(pid);
     if (p != NULL && p->block != NULL) {
         const uint8 *stack = p->block + ((p->status & SYS_PERIODIC) ? sizeof(periodic) : 0);

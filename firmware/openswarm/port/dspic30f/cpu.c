@@ -25,11 +25,6 @@ HAL_USED void cpu_clock_isr(void)
     os_clock_tick();
 }
 
-HAL_OUTLINE hal_lock_state hal_lock_slice(void)
-{
-    return hal_lock_slice_here();
-}
-
 void hal_init(sys_pcb *process)
 {
     process->limit = SPLIM;

@@ -34,9 +34,7 @@ static HAL_INLINE void cpu_raise_ipl(uint8_t bit)
     __asm__ volatile("nop" ::: "memory");
 }
 
-hal_lock_state hal_lock_slice(void); /* hal_lock_slice_here(), as a call */
-
-static HAL_INLINE hal_lock_state hal_lock_slice_here(void)
+static HAL_INLINE hal_lock_state hal_lock_slice(void)
 {
     hal_lock_state before = CPU_SRL;
     /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. */

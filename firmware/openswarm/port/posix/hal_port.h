@@ -14,7 +14,6 @@ bool host_allocation_fails(void);
 #define HAL_ALLOCATION_FAILS() host_allocation_fails()
 
 hal_lock_state hal_lock_slice(void);
-#define hal_lock_slice_here hal_lock_slice
 void hal_enter_slice(void);
 hal_lock_state hal_lock_devices(void);
 void hal_unlock(hal_lock_state before);

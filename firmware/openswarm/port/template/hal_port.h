@@ -12,7 +12,6 @@ typedef int hal_lock_state; /* replace: whatever restores your interrupt mask */
 typedef void *hal_limit;    /* replace: stack limit register, or any type if there is none */
 
 hal_lock_state hal_lock_slice(void);
-#define hal_lock_slice_here hal_lock_slice
 void hal_enter_slice(void);
 hal_lock_state hal_lock_devices(void);
 void hal_unlock(hal_lock_state before);
