@@ -166,6 +166,15 @@ class Camera(Part, I2cDevice):
         """Frame rate at the present clock and setting."""
         return self.chip.fcy / self.scan.course.frame_tcy
 
+    def align(self, cycle: int, line: int = 0) -> None:
+        """Shift the sensor's phase so that HREF of a line (0 = first of the frame) rises in `cycle`, which is to come:
+        for tests that put an edge on a chosen instruction. On a robot the phase is chance."""
+        course = self.scan.course
+        start = cycle - course.first_href - line * course.line_tcy
+        start -= max(-(-(start - self.now) // course.frame_tcy), 0) * course.frame_tcy
+        self._line_to.value = 0
+        self.pins.change_waveform(self.now, partial(self.scan.begin, course, start, self.scan.running))
+
     # -- pixel bus ---------------------------------------------------------------------------------------------------
 
     def bits(self, cycle: int) -> int:

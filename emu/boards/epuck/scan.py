@@ -62,7 +62,7 @@ class Scan:
 
     def __init__(self, record: Record) -> None:
         self._cells: Final = {part.name: Cell(record, f"camera.{part.name}", "Q", 1) for part in fields(Course)}
-        self._start: Final = Cell(record, "camera.frame_start", "Q")
+        self._start: Final = Cell(record, "camera.frame_start", "q")
         self._running: Final = Cell(record, "camera.running", "B")
         self.course = Course(*(1 for _ in self._cells))
         self.start = 0

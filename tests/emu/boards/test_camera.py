@@ -467,3 +467,17 @@ def test_plug_is_part_of_a_snapshot(robot):
     assert 0x6E in robot.board.chip.i2c.wire.devices
     edge = robot.board.camera.scan.edge_cycle(HREF, 1)
     assert robot.at(edge).read("PORTC") & HREF
+
+
+@pytest.mark.parametrize("line", [0, 40, 119])
+def test_an_edge_can_be_put_on_any_cycle(robot, line):
+    """Tests of interrupt latency align HREF with an instruction; counters that wait for it see the new edge."""
+    robot.configure(po6030())
+    camera = robot.board.camera
+    robot.at(10_000).write("T4CON", 0x8002)
+    wanted = robot.events.now + 12_345
+    camera.align(wanted, line)
+    assert camera.scan.bits(wanted) & ~camera.scan.bits(wanted - 1) & HREF
+    before = robot.at(wanted).read("TMR4")
+    assert robot.at(wanted + 1).read("TMR4") == before + 1
+    assert camera.scan.line_at(wanted) == (line, wanted)

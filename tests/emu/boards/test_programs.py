@@ -73,13 +73,28 @@ def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_16
     assert {later - earlier for earlier, later in pairwise(reads[:40])} == {8, 24}
 
 
-def test_engines_agree_to_the_bit_with_the_camera_running(program):
-    """Design §4.3: same picture, same record, same cycle."""
+@pytest.mark.parametrize(
+    ("sources", "cycles"),
+    [
+        (("camera.c", "lines.s"), 900_000),
+        (("steps.c",), 3_000_000),
+        (("proximity.c",), 400_000),
+        (("startup.c",), 150_000),
+        (("serial.c",), 200_000),
+    ],
+)
+def test_engines_agree_to_the_bit_on_a_busy_robot(program, sources, cycles):
+    """Design §4.3: same inputs, same record, same cycle; noise, remote control and radio included."""
     states = []
     for engine in ("interp", "auto"):
-        machine = start(program("camera.c", "lines.s"), engine)
-        machine.board.camera.show(picture())
-        machine.run_until(900_000)
+        machine = start(program(*sources), engine, seed=7)
+        robot = machine.board
+        robot.camera.show(picture())
+        robot.noise.strength = 1.0
+        robot.bluetooth.loss = 0.2
+        robot.stimulus.play(parse(robot, '1ms remote ok\n2ms ir 0 20\n3ms uart1 "hello"\n4ms lamp 0.7'))
+        machine.run_until(cycles)
+        robot.outputs.update()
         states.append((machine.cycle, machine.record.field_at, machine.snapshot()))
     (cycle, name, one), (other_cycle, _, two) = states
     assert cycle == other_cycle
