@@ -1,7 +1,7 @@
 """Optimised LLVM IR text -> pic30-as assembly text: the ordered list of passes.
 
-Each pass sits in its own file and states what it needs and ensures. FUNCTION_PASSES is the order; `check_order` verifies
-the constraints at import, so a pass cannot be moved to where its needs do not hold.
+Each pass sits in its own file and states what it needs and ensures. FUNCTION_PASSES is the order; `check_order`
+verifies the constraints at import, so a pass cannot be moved to where its needs do not hold.
 """
 
 from __future__ import annotations

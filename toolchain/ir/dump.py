@@ -1,4 +1,4 @@
-"""Function -> text. Raw IR comes out as LLVM IR that `read` accepts again; legal IR as the same with its own operations."""
+"""Function -> text. Raw IR comes out as LLVM IR that `read` accepts again; legal IR with its own operations."""
 
 from __future__ import annotations
 

@@ -101,6 +101,7 @@ def name_of(token: str) -> str:
 
 
 PARAM_WORDS = {
-    "noundef", "signext", "zeroext", "inreg", "noalias", "nocapture", "nofree", "nest", "returned", "nonnull", "readonly",
+    "noundef", "signext", "zeroext", "inreg", "noalias", "nocapture", "nofree", "nest", "returned", "nonnull",
+    "readonly",
     "readnone", "writeonly", "immarg", "swiftself", "noext", "writable", "dead_on_unwind", "allocptr", "dead_on_return",
 }  # fmt: skip

@@ -1,7 +1,7 @@
 """LLVM IR text -> `model.Module`.
 
-One pass over the lines; a function body line is one instruction (a switch runs to its closing bracket). Anything outside
-the grammar that clang 22 prints for C raises `UnsupportedError` with the line number of the .ll text.
+One pass over the lines; a function body line is one instruction (a switch runs to its closing bracket). Anything
+outside the grammar that clang 22 prints for C raises `UnsupportedError` with the line number of the .ll text.
 """
 
 from __future__ import annotations

@@ -7,8 +7,10 @@ from .model import Arg, Block, Const, Function, InlineAsm, Instr, MetaRef, Value
 TERMINATORS = frozenset(("ret", "br", "switch", "brtable", "indirectbr", "unreachable"))
 LEGAL_WIDTHS = frozenset((1, 8, *range(16, 272, 16)))
 GONE_WHEN_LEGAL = frozenset((
-    "getelementptr", "alloca", "fadd", "fsub", "fmul", "fdiv", "frem", "fneg", "fcmp", "fptosi", "fptoui", "sitofp", "uitofp",
-    "fpext", "fptrunc", "extractvalue", "insertvalue", "freeze", "bitcast", "ptrtoint", "inttoptr", "va_arg", "atomicrmw",
+    "getelementptr", "alloca", "fadd", "fsub", "fmul", "fdiv", "frem", "fneg", "fcmp", "fptosi", "fptoui",
+    "sitofp", "uitofp",
+    "fpext", "fptrunc", "extractvalue", "insertvalue", "freeze", "bitcast", "ptrtoint", "inttoptr", "va_arg",
+    "atomicrmw",
     "cmpxchg", "fence",
 ))  # fmt: skip
 

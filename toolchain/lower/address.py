@@ -76,10 +76,13 @@ class AddressSelector(ValueSelector):
             r = self.temp()
             self.emit("lea", Slot(self.slots[id(base)], offset), r)
             return Mem("ind", r)
-        if count == 1 and offset == 0 and isinstance(base, Instr) and base.op == "add" and self.address_only(base):
-            if not isinstance(base.args[1], ConstInt):
-                return Mem("idx", self.reg(base.args[0]), self.reg(base.args[1]))
+        if isinstance(base, Instr) and count == 1 and offset == 0 and self._is_index_sum(base):
+            return Mem("idx", self.reg(base.args[0]), self.reg(base.args[1]))
         return self.offset_operand(self.reg(base), offset, byte)
+
+    def _is_index_sum(self, base: Instr) -> bool:
+        """base + index, wanted only as an address."""
+        return base.op == "add" and not isinstance(base.args[1], ConstInt) and self.address_only(base)
 
     def _constant_global(self, name: str) -> bool:
         var = self.module.globals.get(name)

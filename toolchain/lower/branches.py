@@ -174,7 +174,8 @@ def _holds(cc: str, a: int, b: int, mask: int) -> bool | None:
     """Condition after comparing a with b, for the conditions that follow CP."""
     sign = (mask >> 1) + 1
     x, y = a - 2 * (a & sign), b - 2 * (b & sign)
-    answers = {"z": a == b, "nz": a != b, "c": a >= b, "nc": a < b, "gtu": a > b, "leu": a <= b, "lt": x < y, "ge": x >= y,
+    answers = {"z": a == b, "nz": a != b, "c": a >= b, "nc": a < b, "gtu": a > b, "leu": a <= b, "lt": x < y,
+               "ge": x >= y,
                "gt": x > y, "le": x <= y}  # fmt: skip
     return answers.get(cc)
 
@@ -183,7 +184,8 @@ def _holds(cc: str, a: int, b: int, mask: int) -> bool | None:
 # skips
 
 SKIP_WHEN = {"z": "cpseq", "nz": "cpsne", "lt": "cpslt", "gt": "cpsgt"}
-TWO_WORDS = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s", "div.u", "div.sd", "div.ud", "asm", "text",
+TWO_WORDS = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s", "div.u", "div.sd", "div.ud",
+             "asm", "text",
              "shiftloop", "brtable", "lea"}  # fmt: skip
 
 
@@ -246,7 +248,7 @@ def _flags_needed(b: MBlock, skip_at: int) -> bool:
 
 
 def tail_calls(m: MFunction) -> None:
-    """CALL, epilogue, RETURN -> epilogue, BRA. The callee returns to our caller; see `MI.tail` for when that is sound."""
+    """CALL, epilogue, RETURN -> epilogue, BRA: the callee returns to our caller. `MI.tail` says when that is sound."""
     if m.interrupt:
         return
     for b in m.blocks:

@@ -37,7 +37,7 @@ def _pwrsav(s: Selector, i: Instr) -> None:
 
 
 def _osccon(byte: str, keys: tuple[int, int]) -> Callable[[Selector, Instr], None]:
-    """Key, key, value as three consecutive byte writes; addressed through a register, so no instruction comes between."""
+    """Key, key, value as three consecutive byte writes through a register, so that no instruction comes between."""
 
     def expand(s: Selector, i: Instr) -> None:
         value = s.reg(i.args[0])

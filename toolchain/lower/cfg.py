@@ -137,10 +137,11 @@ def _sink_compare(block: Block, rest: Block, second: Value, c: Value, counts: di
     """Move the second comparison next to its branch (it has no other use), and drop the select."""
     if c in block.instrs:
         block.instrs.remove(c)
-    if isinstance(second, Instr) and second.op in ("icmp", "select", "and", "or") and counts.get(id(second)) == 1:
-        if second in block.instrs:
-            block.instrs.remove(second)
-            rest.instrs.insert(0, second)
+    if not isinstance(second, Instr) or second.op not in ("icmp", "select", "and", "or"):
+        return
+    if counts.get(id(second)) == 1 and second in block.instrs:
+        block.instrs.remove(second)
+        rest.instrs.insert(0, second)
 
 
 def split_critical_edges(f: Function) -> None:
@@ -232,8 +233,10 @@ def dead_code(f: Function) -> None:
 
 
 PURE = frozenset((
-    "add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr", "udiv", "sdiv", "urem", "srem", "zext", "sext", "trunc",
-    "icmp", "select", "phi", "load", "slot", "bits", "ff1l", "ff1r", "swap", "getsp", "vastart", "divother", "callresult",
+    "add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr", "udiv", "sdiv", "urem", "srem", "zext",
+    "sext", "trunc",
+    "icmp", "select", "phi", "load", "slot", "bits", "ff1l", "ff1r", "swap", "getsp", "vastart", "divother",
+    "callresult",
     "entryword",
 ))  # fmt: skip
 

@@ -109,15 +109,19 @@ def _compare_zero(s: Selector, a: Value, pred: str, byte: bool, fold: Instr | No
     if fold is None:
         s.emit("cp0", s.reg(a), byte=byte)
         return ZERO_CONDITION[pred]
-    if pred in ("eq", "ne") and isinstance(a, Instr) and a.op == "and" and s.single_use(a) and s.same_block(a):
-        if isinstance(a.args[1], ConstInt) and _test_bits(s, a, fold):
-            return CONDITION[pred]
+    if pred in ("eq", "ne") and _is_mask(s, a) and isinstance(a, Instr) and s.same_block(a) and _test_bits(s, a, fold):
+        return CONDITION[pred]
     operand = s.near_operand(a, fold)
     if operand is not None:
         s.emit("cp0f", operand, byte=byte)
     else:
         s.emit("cp0", s.source(a, fold), byte=byte)
     return ZERO_CONDITION[pred]
+
+
+def _is_mask(s: Selector, a: Value) -> bool:
+    """x & constant, with no other user."""
+    return isinstance(a, Instr) and a.op == "and" and s.single_use(a) and isinstance(a.args[1], ConstInt)
 
 
 def _test_bits(s: Selector, a: Instr, at: Instr) -> bool:
@@ -177,11 +181,11 @@ def select_icmp(s: Selector, i: Instr) -> None:
     if i.pred == "slt" and isinstance(b, ConstInt) and b.value == 0:
         _sign_bit(s, a, d)
         return
-    if isinstance(b, ConstInt) and b.value == 0 and i.pred in ("eq", "ne") and a.type.bits in (8, 16):
-        if not (isinstance(a, Instr) and a.op == "and" and s.single_use(a)):
-            s.emit("cp", s.reg(a), Imm(1), byte=a.type.bits == 8)  # borrows exactly for 0
-            _from_carry(s, "nc" if i.pred == "eq" else "c", d)
-            return
+    zero = isinstance(b, ConstInt) and b.value == 0 and i.pred in ("eq", "ne") and a.type.bits in (8, 16)
+    if zero and not _is_mask(s, a):
+        s.emit("cp", s.reg(a), Imm(1), byte=a.type.bits == 8)  # borrows exactly for 0
+        _from_carry(s, "nc" if i.pred == "eq" else "c", d)
+        return
     cc = compare(s, i, i)
     if cc in ("c", "nc"):
         _from_carry(s, cc, d)

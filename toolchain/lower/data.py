@@ -26,7 +26,8 @@ WORDS_PER_LINE = 8
 SKIPPED_SECTIONS = ("llvm.metadata",)
 WEAK = ("weak", "weak_odr", "linkonce", "linkonce_odr", "extern_weak", "common")
 SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near", ".bss": "bss", ".data": "data",
-                 ".xbss": "bss,xmemory,near", ".xdata": "data,xmemory,near", ".ybss": "bss,ymemory", ".ydata": "data,ymemory",
+                 ".xbss": "bss,xmemory,near", ".xdata": "data,xmemory,near", ".ybss": "bss,ymemory",
+                 ".ydata": "data,ymemory",
                  ".pbss": "persist", ".eedata": "eedata"}  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """DWARF 2 as assembler data directives (abi-elf.md §6.7): units, functions, variables, types and the line table.
 
 Code addresses are PC units, variables data addresses, both 4 bytes. Frame variables are relative to W15 at entry, which
-the frame base expresses through W15 or W14. Variables in registers have location lists; where neither applies, debuggers
-report them as optimised out.
+the frame base expresses through W15 or W14. Variables in registers have location lists; where neither applies,
+debuggers report them as optimised out.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ TAGS = {"array_type": 0x01, "enumeration_type": 0x04, "formal_parameter": 0x05, 
         "pointer_type": 0x0F, "compile_unit": 0x11, "structure_type": 0x13, "subroutine_type": 0x15, "typedef": 0x16,
         "union_type": 0x17, "subrange_type": 0x21, "base_type": 0x24, "const_type": 0x26, "enumerator": 0x28,
         "subprogram": 0x2E, "variable": 0x34, "volatile_type": 0x35, "unspecified_parameters": 0x18}  # fmt: skip
-ATTRIBUTES = {"location": 0x02, "name": 0x03, "byte_size": 0x0B, "bit_offset": 0x0C, "bit_size": 0x0D, "stmt_list": 0x10,
+ATTRIBUTES = {"location": 0x02, "name": 0x03, "byte_size": 0x0B, "bit_offset": 0x0C, "bit_size": 0x0D,
+              "stmt_list": 0x10,
               "low_pc": 0x11, "high_pc": 0x12, "language": 0x13, "comp_dir": 0x1B, "const_value": 0x1C,
               "upper_bound": 0x2F, "producer": 0x25, "prototyped": 0x27, "data_member_location": 0x38,
               "decl_file": 0x3A, "decl_line": 0x3B, "declaration": 0x3C, "encoding": 0x3E, "external": 0x3F,
@@ -113,7 +114,8 @@ class Unit:
         directory, name = self.info.file(self.ref)
         top = Die("compile_unit", [
             ("producer", "string", PRODUCER), ("language", "data1", LANGUAGE_C89), ("name", "string", name),
-            ("comp_dir", "string", directory), ("low_pc", "addr", 0), ("stmt_list", "data4", f".Ldbg_line{self.number}"),
+            ("comp_dir", "string", directory), ("low_pc", "addr", 0), ("stmt_list", "data4",
+            f".Ldbg_line{self.number}"),
         ])  # fmt: skip
         body = [self._variable(ref, s) for ref, s in self.globals] + [self._function(f) for f in self.functions]
         top.children = list(self.types.values()) + body

@@ -360,7 +360,8 @@ def _powi(lz: Legalizer, i: Instr, name: str) -> Result:
 
 
 FAMILIES: list[tuple[str, Callable[[Legalizer, Instr, str], Result]]] = [
-    *((n, _nothing) for n in ("lifetime.start", "lifetime.end", "assume", "prefetch", "donothing", "va_end", "invariant",
+    *((n, _nothing) for n in ("lifetime.start", "lifetime.end", "assume", "prefetch", "donothing", "va_end",
+      "invariant",
                               "sideeffect", "experimental.noalias.scope.decl", "pseudoprobe", "fake.use")),
     *((n, _first) for n in ("expect", "annotation", "ptr.annotation", "launder.invariant.group", "ssa.copy",
                             "strip.invariant.group", "threadlocal.address", "preserve.array.access.index",

@@ -164,7 +164,8 @@ class MI:
     late    indices into args of registers that must survive past the definition (DIV divisor)
     """
 
-    __slots__ = ("also_defs", "also_uses", "args", "byte", "cc", "count", "epilogue", "info", "late", "line", "op", "pred", "tail",
+    __slots__ = ("also_defs", "also_uses", "args", "byte", "cc", "count", "epilogue", "info", "late", "line",
+                 "op", "pred", "tail",
                  "text", "variables", "volatile")  # fmt: skip
 
     def __init__(self, op: str, *args: Operand, byte: bool = False, cc: str = "", line: str | None = None) -> None:

@@ -30,10 +30,9 @@ def select_mul(s: Selector, i: Instr) -> None:
         return
     a, b = i.args
     ka, kb = _extension_kind(a), _extension_kind(b)
-    if ka is not None and i.type.bits == 32 and (kb is not None or isinstance(b, ConstInt)):
-        if kb is not None or _fits(b, ka[0]):
-            _mul_extended(s, i, ka, kb)
-            return
+    if ka is not None and i.type.bits == 32 and (kb is not None or _fits(b, ka[0])):
+        _mul_extended(s, i, ka, kb)
+        return
     _mul_wide(s, i, ka, kb)
 
 

@@ -13,8 +13,10 @@ from .mir import MI, File, Imm, MBlock, Mem, MFunction
 AT_RETURN = bits([*CALLEE_SAVED, 15])
 ALL = 0xFFFF
 # Single-register results whose N and Z describe the word or byte written.
-SETS_NZ = {"add", "sub", "subr", "addc", "subb", "and", "ior", "xor", "addl", "subl", "andl", "iorl", "xorl", "inc", "dec",
-           "inc2", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1", "lsr1", "asr1", "se", "ze", "rlc", "rrc"}  # fmt: skip
+SETS_NZ = {"add", "sub", "subr", "addc", "subb", "and", "ior", "xor", "addl", "subl", "andl", "iorl", "xorl",
+           "inc", "dec",
+           "inc2", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1", "lsr1", "asr1", "se", "ze", "rlc",
+           "rrc"}  # fmt: skip
 STICKY_Z = {"addc", "subb", "subbr", "cpb"}
 NEUTRAL_COPIES = {"mov", "clr", "setm"}
 
@@ -196,11 +198,11 @@ def drop_compares(b: MBlock) -> bool:
             r = mi.args[0]
             writer = _flag_source(b, k, r, mi.byte)
             readers = flags_read_after(b, k)
-            if writer is not None and readers is not None and readers <= {"z", "nz", "n", "nn"}:
-                if writer.op not in STICKY_Z or readers <= {"n", "nn"}:
-                    del b.insts[k]
-                    changed = True
-                    continue
+            enough = {"n", "nn"} if writer is not None and writer.op in STICKY_Z else {"z", "nz", "n", "nn"}
+            if writer is not None and readers is not None and readers <= enough:
+                del b.insts[k]
+                changed = True
+                continue
         k += 1
     return changed
 
@@ -363,9 +365,9 @@ def _merged(first: MI, second: MI) -> MI | None:
         return None
     if isinstance(b, int) and isinstance(d, int) and isinstance(a, Mem) and isinstance(c, Mem):
         low, high, x, y = (b, d, a, c) if _offset(a) == 0 else (d, b, c, a)
-        if low % 2 == 0 and high == low + 1 and low < 14 and x == Mem("ind", y.base) and y == Mem("off", x.base, 2):
-            if b != c.base:  # the first load must not change the address of the second
-                return MI("movd", x, low, line=first.line)
+        neighbours = low % 2 == 0 and high == low + 1 and low < 14 and x == Mem("ind", y.base)
+        if neighbours and y == Mem("off", x.base, 2) and b != c.base:  # the first load must not move the second
+            return MI("movd", x, low, line=first.line)
         return None
     if isinstance(a, int) and isinstance(c, int) and isinstance(b, Mem) and isinstance(d, Mem):
         low, high, x, y = (a, c, b, d) if _offset(b) == 0 else (c, a, d, b)

@@ -115,7 +115,7 @@ class Graph:
     # -- coalescing ---------------------------------------------------------------------------------------------------
 
     def coalesce(self, eager: bool) -> None:
-        """Merge copies, most frequent first, until no more can be merged safely; `eager` merges with real registers too."""
+        """Merge copies, most frequent first, while that is safe; `eager` merges with real registers too."""
         pending = sorted(self.moves, key=lambda m: -m[0])
         changed = True
         while changed and pending:

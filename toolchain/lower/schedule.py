@@ -73,10 +73,10 @@ def _fill_from_below(insts: list[MI], k: int) -> bool:
         mover = insts[j]
         if insts[j - 1].op == "skip" or insts[j - 1].pred or mover.op in ("bra", "jump"):
             return False
-        if _movable(mover) and all(_independent(mover, x) for x in insts[k + 1 : j]):
-            if not stalls(insts[k], mover) and not _flags_reach_end(insts, j, mover):
-                insts.insert(k + 1, insts.pop(j))
-                return True
+        free = _movable(mover) and all(_independent(mover, x) for x in insts[k + 1 : j])
+        if free and not stalls(insts[k], mover) and not _flags_reach_end(insts, j, mover):
+            insts.insert(k + 1, insts.pop(j))
+            return True
     return False
 
 

@@ -1,4 +1,4 @@
-"""Floating-point operations as calls of XC16's run-time names (abi-elf.md §2.8). Values are the raw bits: i32 or i64."""
+"""Floating-point operations as calls of XC16's run-time names (abi-elf.md §2.8). Values are raw bits: i32 or i64."""
 
 from __future__ import annotations
 

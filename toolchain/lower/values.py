@@ -150,10 +150,10 @@ class ValueSelector:
                 assert source is not None
                 low = self.value_regs(source)
                 return (*low, *(self.temp() for _ in range(words_of(v) - 1)))
-            if v.op in ("zext", "sext") and isinstance(source, Instr | Arg) and id(source) not in self.slots:
-                if source.type.bits >= 16:
-                    low = self.value_regs(source)
-                    return (*low, *(self.temp() for _ in range(words_of(v) - len(low))))
+            extended = v.op in ("zext", "sext") and isinstance(source, Instr | Arg) and id(source) not in self.slots
+            if extended and source is not None and source.type.bits >= 16:
+                low = self.value_regs(source)
+                return (*low, *(self.temp() for _ in range(words_of(v) - len(low))))
         made = tuple(self.temp() for _ in range(words_of(v)))
         for k in range(0, len(made) - 1, 2):
             self.m.pair_hints[made[k]] = made[k + 1]

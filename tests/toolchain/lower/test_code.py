@@ -24,7 +24,8 @@ int mul16(int a,int b){return a*b;} long muls(int a,int b){return (long)a*b;} in
 int mod16(int a,int b){return a%b;} unsigned divu10(unsigned a){return a/10;} long div32(long a,long b){return a/b;}
 long shl4(long a){return a<<4;} long shr8(long a){return a>>8;}
 """
-XC16_PRIMITIVES = {"add32": 3, "neg32": 3, "shl1": 3, "lt32": 8, "eq32": 8, "shlv": 6, "mul16": 2, "muls": 2, "div16": 4,
+XC16_PRIMITIVES = {"add32": 3, "neg32": 3, "shl1": 3, "lt32": 8, "eq32": 8, "shlv": 6, "mul16": 2, "muls": 2,
+                   "div16": 4,
                    "mod16": 5, "divu10": 4, "div32": 2, "shl4": 6, "shr8": 5}  # fmt: skip
 
 

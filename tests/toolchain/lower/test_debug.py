@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import io
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -104,7 +105,7 @@ def test_the_line_table_covers_every_statement_in_address_order(dwarf: DWARFInfo
     for unit in dwarf.iter_CUs():
         rows += [e.state for e in dwarf.line_program_for_CU(unit).get_entries() if e.state is not None]
     assert {8, 11, 12, 13, 16, 18} <= {r.line for r in rows}
-    for first, second in zip(rows, rows[1:], strict=False):
+    for first, second in pairwise(rows):
         assert first.end_sequence or first.address <= second.address
     assert rows[-1].end_sequence
 
