@@ -23,7 +23,7 @@ from emu.peripherals.pmd import ModuleDisable
 from emu.peripherals.ports import ChangeNotice, ExternalInterrupts, Port
 from emu.peripherals.resets import Resets, Watchdog
 from emu.peripherals.spi import Spi
-from emu.peripherals.timers import Timers
+from emu.peripherals.timers import timers
 from emu.peripherals.uart import Uart
 from emu.program import ProgramMemory
 
@@ -50,7 +50,7 @@ class Peripherals:
         self.ports: Final = {PORTS.index(letter): Port(letter, kit) for letter in chip.ports}
         self.change_notice: Final = ChangeNotice(kit, numbers[_CHANGE_NOTICE_IRQ])
         self.external: Final = ExternalInterrupts(kit, self.interrupts)
-        self.timer: Final = Timers(kit, self.interrupts).by_number
+        self.timer: Final = timers(kit)
         self.uart: Final = {site.number: Uart(site, kit, self.interrupts, self.ports) for site in chip.uarts}
         self.adc: Final = Adc(chip.adc, kit, self.interrupts, self.timer)
         self.external.on_int0 = self.adc.int0

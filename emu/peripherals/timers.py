@@ -1,6 +1,6 @@
 """Timers 1-5 (§7): timer, gated and counter modes, 32-bit pairs. TMR is computed on read, never ticked.
 
-The stored TMR word is the count at cycle `base`; `tick` Tcy make one count. A match posts one event, whose due date is
+`counter.py` has the count; here is what changes its course, and the match. A match posts one event, whose due date is
 the cycle the interrupt flag first reads 1: one Tcy after TMR became equal to PR (§7 rule 2). README.md tells native
 code how to fire the simple periodic case from the record alone.
 """
@@ -13,71 +13,26 @@ from typing import Final
 from emu.chips.chip import TimerSite
 from emu.device import Register
 from emu.events import NEVER
-from emu.peripherals.interrupts import Interrupts
-from emu.peripherals.kit import IDLE, SLEEP, Kit, Peripheral
-from emu.peripherals.pins import parse_pin
-
-PRESCALE: Final = (1, 8, 64, 256)
-"""Clocks per count for TCKPS = 0..3 (§7)."""
-
-STOPPED: Final = 0
-TCY: Final = 1
-PIN: Final = 2
-WAVE: Final = 3
-"""Clock sources: none, the instruction clock, edges pushed by a pin, edges of a described waveform."""
+from emu.peripherals.counter import PIN, STOPPED, TCY, WAVE, Counter
+from emu.peripherals.counting import PRESCALE, advance, counts_until
+from emu.peripherals.kit import IDLE, SLEEP, Kit
 
 
-def advance(start: int, counts: int, period: int, top: int) -> int:
-    """Count `counts` steps from `start`; after `period` (PR) comes 0, after `top` (all ones) comes 0 too."""
-    if start > period:
-        if start + counts <= top:
-            return start + counts
-        counts -= top + 1 - start
-        start = 0
-    return (start + counts) % (period + 1)
-
-
-def counts_until(start: int, target: int, period: int, top: int) -> int | None:
-    """Counts (at least 1) until the counter becomes `target`, or None if it never does."""
-    if start > period:
-        if start < target:
-            return target - start
-        return top + 1 - start + target if target <= period and (target or period) else None
-    if target > period or period == 0:
-        return None
-    return target - start if target > start else target - start + period + 1
-
-
-class Timer(Peripheral):
+class Timer(Counter):
     """One 16-bit timer, or, with T32 set, a 32-bit timer that owns its partner's registers too."""
 
-    def __init__(self, site: TimerSite, kit: Kit, interrupts: Interrupts) -> None:
-        super().__init__(f"t{site.number}", kit)
-        self.site: Final = site
-        self._interrupts: Final = interrupts
-        self.tmr: Final = self.register(f"TMR{site.number}")
-        self.pr: Final = self.register(f"PR{site.number}")
-        self.con: Final = self.register(f"T{site.number}CON")
-        self.idle_bit = (self.con, "TSIDL")
+    def __init__(self, site: TimerSite, kit: Kit) -> None:
+        super().__init__(site, kit)
         self.line: Final = self.irq(site.irq)
         self.low: Timer | None = None
         """For a type C timer: the type B timer that takes it over with T32."""
         self.high: Timer | None = None
         self._hold: Register | None = None
-        self.base: Final = self.moment("base")
-        """Cycle at which the count was the stored TMR word, with an empty prescaler if the source is Tcy."""
-        self.tick: Final = self.cell("tick")
-        """Tcy per count; 0 while stopped or clocked from outside."""
         self.period: Final = self.cell("period", "Q")
         """Tcy from one match to the next; 0 if the event is not simply periodic."""
-        self._source: Final = self.cell("source", "B")
-        self._phase: Final = self.cell("phase", "H")
-        self._before: Final = self.cell("before", "I")
-        self._port, self._pin = parse_pin(site.clock_pin)
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []
-        self._words: Final = (self.tmr.address >> 1, self.pr.address >> 1)
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
         self.pr.written_by(self._course_written)
@@ -88,106 +43,10 @@ class Timer(Peripheral):
     def pair(self, high: Timer) -> None:
         """Join with the type C partner (T2 with T3, T4 with T5)."""
         self.high, high.low = high, self
+        self.upper, high.lower = high, self
         self._hold = self.register(f"TMR{high.site.number}HLD")
 
-    # -- count -------------------------------------------------------------------------------------------------------
-
-    @property
-    def is_wide(self) -> bool:
-        """Whether this timer and its partner form a 32-bit timer."""
-        return self.high is not None and bool(self.con["T32"])
-
-    @property
-    def is_taken(self) -> bool:
-        """Whether this timer is the upper half of a 32-bit timer."""
-        return self.low is not None and self.low.is_wide
-
-    @property
-    def _start(self) -> int:
-        return self.tmr.value | (self.high.tmr.value << 16 if self.high is not None and self.is_wide else 0)
-
-    @_start.setter
-    def _start(self, count: int) -> None:
-        self.tmr.value = count
-        if self.high is not None and self.is_wide:
-            self.high.tmr.value = count >> 16
-
-    @property
-    def limit(self) -> int:
-        """PR, 32 bits wide in 32-bit mode."""
-        return self.pr.value | (self.high.pr.value << 16 if self.high is not None and self.is_wide else 0)
-
-    @property
-    def top(self) -> int:
-        """Largest count: all ones."""
-        return 0xFFFF_FFFF if self.is_wide else 0xFFFF
-
-    def _ticks(self, cycle: int) -> int:
-        """Clocks (before the prescaler) from `base` to `cycle`."""
-        source = self._source.value
-        if source == TCY:
-            return max(cycle - self.base.value, 0)
-        if source == WAVE:
-            waveform = self.kit.pins.waveform(self._port, self._pin)
-            if waveform is not None:  # an edge in cycle c is counted in c + 1 (§7 rule 9)
-                return waveform.rises(self._pin, self.base.value - 1, cycle - 1)
-        return 0
-
-    def count(self, cycle: int) -> int:
-        """The count in `cycle`, which is not before the last write to the timer."""
-        tick = self.tick.value
-        if tick:
-            tmr, pr = self._words
-            u16 = self.record.u16
-            start, limit = u16[tmr], u16[pr]
-            count = start + max(cycle - self.base.value, 0) // tick
-            return count if start <= limit and count <= limit else advance(start, count - start, limit, 0xFFFF)
-        if self.is_taken:
-            assert self.low is not None
-            return self.low.count(cycle) >> 16
-        if self._source.value == PIN:
-            return self._before.value if cycle < self.base.value else self._start
-        clocks = self._phase.value + self._ticks(cycle)
-        return advance(self._start, clocks // self._prescale, self.limit, self.top)
-
-    def read(self) -> int:
-        """TMR as an instruction reads it in the current cycle."""
-        return self.count(self.clock) & 0xFFFF
-
-    def next_cycle_at(self, target: int, after: int) -> int:
-        """First cycle behind `after` in which the count *becomes* `target`, or NEVER."""
-        if self.is_taken:
-            return NEVER
-        source = self._source.value
-        if source == PIN:  # only an edge that is on its way is known
-            arriving = after < self.base.value and self._before.value != target == self._start
-            return self.base.value if arriving else NEVER
-        if source not in (TCY, WAVE):
-            return NEVER
-        done = (self._phase.value + self._ticks(after)) // self._prescale
-        now = advance(self._start, done, self.limit, self.top)
-        more = counts_until(now, target, self.limit, self.top)
-        if more is None:
-            return NEVER
-        clocks = (done + more) * self._prescale - self._phase.value
-        if source == TCY:
-            return self.base.value + clocks
-        waveform = self.kit.pins.waveform(self._port, self._pin)
-        edge = NEVER if waveform is None else waveform.nth_rise(self._pin, self.base.value - 1, clocks)
-        return NEVER if edge == NEVER else edge + 1
-
-    @property
-    def _prescale(self) -> int:
-        return PRESCALE[self.con["TCKPS"]]
-
     # -- changes of course -------------------------------------------------------------------------------------------
-
-    def _fold(self, cycle: int, prescale: int, limit: int) -> None:
-        """Make `cycle` the base: count what has passed with the given (old) prescaler and period."""
-        clocks = self._phase.value + self._ticks(cycle)
-        self._start = advance(self._start, clocks // prescale, limit, self.top)
-        self._phase.value = clocks % prescale
-        self.base.value = cycle
 
     def _plan(self, rewritten: bool = False) -> None:
         """Publish tick and period, and post the next match behind the current cycle."""
@@ -453,11 +312,10 @@ class Timer(Peripheral):
         return count & 0xFFFF
 
 
-class Timers:
+def timers(kit: Kit) -> dict[int, Timer]:
     """The timers of a chip by number, paired."""
-
-    def __init__(self, kit: Kit, interrupts: Interrupts) -> None:
-        self.by_number: Final = {site.number: Timer(site, kit, interrupts) for site in kit.chip.timers}
-        for site in kit.chip.timers:
-            if site.kind == "B":
-                self.by_number[site.number].pair(self.by_number[site.partner])
+    by_number = {site.number: Timer(site, kit) for site in kit.chip.timers}
+    for site in kit.chip.timers:
+        if site.kind == "B":
+            by_number[site.number].pair(by_number[site.partner])
+    return by_number

@@ -17,13 +17,11 @@ from emu.peripherals.kit import SLEEP, Kit, Peripheral
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports import Port
 from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR, PATIENT, Frame, SerialLine
+from emu.peripherals.txpin import TxPin
+from emu.peripherals.uartframe import FORMATS, FRAMING_MARK, PARITY_MARK, Format, sample
 
 FIFO: Final = 4
 """Depth of the transmit and receive FIFOs (§10.1, §10.2)."""
-_PARITY: Final = 0x400
-_FRAMING: Final = 0x200
-"""Error marks of a received character, above its nine data bits."""
-
 _QUIET: Final = 0
 _COMING: Final = 1
 _SAMPLING: Final = 2
@@ -70,6 +68,7 @@ class Uart(Peripheral):
         """Cycle the start bit in TSR began or begins."""
         self._end: Final = self.moment("end", NEVER)
         self._tx_event: Final = self.slot("tx", self._tx_due)
+        self._pin: Final = TxPin(kit.pins, tx_port, self._tx_pin, self._tx_level)
 
         self._rx: Final = self.array("rx", "H", FIFO + 1)
         """FIFO; data in bits 8:0, errors above. The last element is the character in the shift register."""
@@ -82,6 +81,8 @@ class Uart(Peripheral):
         self._rx_event: Final = self.slot("rx", self._rx_due)
         self._rx_wave: Final = self.cell("rx_wave", "H")
         self._rx_start: Final = self.moment("rx_start", NEVER)
+        self._rx_bit: Final = self.cell("rx_bit", "I")
+        """Bit time of the sender in Tcy/256."""
         self._edge_bit: Final = self.cell("edge_bit", "B")
         self._edge_event: Final = self.slot("edge", self._edge_due)
 
@@ -112,24 +113,8 @@ class Uart(Peripheral):
         return self.is_enabled and bool(self.sta["UTXEN"])
 
     @property
-    def _data_bits(self) -> int:
-        return 9 if self.mode["PDSEL"] == 3 else 8
-
-    def _parity(self, data: int) -> int | None:
-        """Parity bit of a character, None without parity. PDSEL 1 = even, 2 = odd (§10)."""
-        kind = self.mode["PDSEL"]
-        return None if kind in (0, 3) else (data & 0xFF).bit_count() + (kind == 2) & 1
-
-    def _pack(self, data: int) -> tuple[int, int]:
-        """(levels, number of bits) of a frame, start bit in bit 0, up to and with the stop bits."""
-        bits = (data & (1 << self._data_bits) - 1) << 1
-        length = 1 + self._data_bits
-        parity = self._parity(data)
-        if parity is not None:
-            bits |= parity << length
-            length += 1
-        stops = 1 + self.mode["STSEL"]
-        return bits | ((1 << stops) - 1) << length, length + stops
+    def _format(self) -> Format:
+        return FORMATS[self.mode["PDSEL"] << 1 | self.mode["STSEL"]]
 
     # -- transmit ----------------------------------------------------------------------------------------------------
 
@@ -137,7 +122,7 @@ class Uart(Peripheral):
         """The low byte pushes; a full FIFO drops the character (§10.1)."""
         if not lanes & 0xFF or not self.is_enabled or self._tx_count.value == FIFO:
             return
-        self._tx[self._tx_count.value] = new & (1 << self._data_bits) - 1
+        self._tx[self._tx_count.value] = new & (1 << self._format.data_bits) - 1
         self._tx_count.value += 1
         self.sta["UTXBF"] = self._tx_count.value == FIFO
         self.sta["TRMT"] = 0
@@ -167,7 +152,8 @@ class Uart(Peripheral):
         self.sta["UTXBF"] = 0
         if not self.sta["UTXISEL"] or count == 0:
             self._interrupts.line(self.site.tx_irq).request()
-        bits, length = self._pack(data)
+        form = self._format
+        bits, length = form.pack(data), form.length
         bit = self.bit_time
         start = cycle if self._end.value == cycle else self._clock.value + -(-(cycle - self._clock.value) // bit) * bit
         if start == self._clock.value:
@@ -178,7 +164,7 @@ class Uart(Peripheral):
         self._end.value = start + length * bit
         self._shifting.value = 1
         self.events.set(self._tx_event, self._end.value)
-        self._log_frame(start, bits, length)
+        self._pin.log_frame(start, bits, length, bit)
         if self.mode["LPBACK"]:
             self._arrive(start, data, 0)
 
@@ -187,13 +173,7 @@ class Uart(Peripheral):
         if self.on_byte is not None and not self.mode["LPBACK"]:
             self.on_byte(data, start)
 
-    def drain(self) -> None:
-        """Deliver what is still in the transmitter as a robot would: the pins outlive a stopped program."""
-        while self._shifting.value or (self._tx_count.value and self.is_sending_enabled):
-            self.events.cancel(self._tx_event)
-            self._tx_due(self._end.value if self._shifting.value else self.now + 1)
-
-    def tx_level(self, cycle: int) -> int:
+    def _tx_level(self, cycle: int) -> int:
         """Level of TX in `cycle`, 1 = idle."""
         if self.sta["UTXBRK"]:
             return 0
@@ -201,30 +181,11 @@ class Uart(Peripheral):
             return 1
         return self._wave.value >> (cycle - self._start.value) // self.bit_time & 1
 
-    def bits(self, cycle: int) -> int:
-        """The TX pin as a waveform."""
-        return self._tx_pin if self.tx_level(cycle) else 0
-
-    def rises(self, mask: int, after: int, until: int) -> int:
-        """Edges of TX do not clock anything inside the chip."""
-        return 0
-
-    def nth_rise(self, mask: int, after: int, count: int) -> int:
-        """Edges of TX do not clock anything inside the chip."""
-        return NEVER
-
-    def _log_frame(self, start: int, bits: int, length: int) -> None:
-        edges = self.kit.pins.edges
-        if edges is None:
-            return
-        port = self._tx_port.index
-        others = self.kit.pins.level[port] & ~self._tx_pin
-        previous = 1
-        for index in range(length):
-            level = bits >> index & 1
-            if level != previous:
-                edges.append((start + index * self.bit_time, port, others | (self._tx_pin if level else 0)))
-            previous = level
+    def drain(self) -> None:
+        """Deliver what is still in the transmitter as a robot would: the pins outlive a stopped program."""
+        while self._shifting.value or (self._tx_count.value and self.is_sending_enabled):
+            self.events.cancel(self._tx_event)
+            self._tx_due(self._end.value if self._shifting.value else self.now + 1)
 
     # -- receive -----------------------------------------------------------------------------------------------------
 
@@ -257,7 +218,7 @@ class Uart(Peripheral):
         if frame is None:
             return
         self.line.drop()
-        _, length = self._pack(frame.data)
+        length = self._format.length
         self._line_free.value = due + (length * frame.bit + 255 >> 8 if frame.bit else length * self.bit_time)
         if self.mode["WAKE"] and self.is_frozen:
             self._interrupts.line(self.site.rx_irq).request()
@@ -268,16 +229,17 @@ class Uart(Peripheral):
 
     def _arrive(self, start: int, data: int, bit_q8: int) -> None:
         """Sample a frame whose start bit falls in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
-        wave, length = self._pack(data)
-        stop = length - 1 - self.mode["STSEL"]
-        if data & PARITY_ERROR and self._parity(data) is not None:
+        form = self._format
+        wave, length, stop = form.pack(data), form.length, form.first_stop
+        if data & PARITY_ERROR and form.parity(data) is not None:
             wave ^= 1 << stop - 1
         if data & (FRAMING_ERROR | BREAK):
             wave &= 0 if data & BREAK else (1 << stop) - 1
         tick = self.brg.value + 1
         detected = self._clock.value + -(-(start - self._clock.value) // tick) * tick
-        sampled = wave if not bit_q8 else self._sample(wave, length, detected - start, tick, bit_q8)
-        self._incoming.value = self._judge(sampled, stop)
+        sampled = wave if not bit_q8 else sample(wave, length, detected - start, tick, bit_q8)
+        self._incoming.value = form.judge(sampled)
+        self._rx_bit.value = bit_q8 or self.bit_time << 8
         self._done.value = detected + (16 * stop + 8) * tick  # the middle of the first stop bit (§10.2)
         self._rx_wave.value = (wave | 0xFFFF << length) & 0xFFFF  # behind the frame the line is high
         self._rx_start.value = start
@@ -286,25 +248,6 @@ class Uart(Peripheral):
             self.events.set(self._rx_event, start)
         else:
             self._rx_due(start)
-
-    @staticmethod
-    def _sample(wave: int, length: int, offset: int, tick: int, bit_q8: int) -> int:
-        """What a receiver with 16 clocks of `tick` Tcy per bit sees: the majority of clocks 7, 8 and 9 (§10.2)."""
-        sampled = 0
-        for index in range(length):
-            times = (offset + (16 * index + clock) * tick for clock in (7, 8, 9))
-            votes = sum(wave >> min(time * 256 // bit_q8, length - 1) & 1 for time in times)
-            sampled |= (votes >= 2) << index
-        return sampled
-
-    def _judge(self, sampled: int, stop: int) -> int:
-        """Data and error marks of a sampled frame whose first stop bit has index `stop`."""
-        data = sampled >> 1 & (1 << self._data_bits) - 1
-        parity = self._parity(data)
-        marks = 0 if sampled >> stop & 1 else _FRAMING
-        if parity is not None and sampled >> stop - 1 & 1 != parity:
-            marks |= _PARITY
-        return data | marks
 
     def _rx_due(self, due: int) -> None:
         if self._receiving.value == _COMING:
@@ -323,7 +266,7 @@ class Uart(Peripheral):
         """A character is complete: FIFO, or the shift register when the FIFO is full (§10.2)."""
         if self._held.value or self.sta["OERR"]:
             return
-        if self.sta["ADDEN"] and self._data_bits == 9 and not character & 0x100:
+        if self.sta["ADDEN"] and self._format.data_bits == 9 and not character & 0x100:
             return
         count = self._rx_count.value
         if count == FIFO:
@@ -342,8 +285,8 @@ class Uart(Peripheral):
         """URXDA, PERR and FERR belong to the character at the top of the FIFO (§10.2)."""
         top = self._rx[0] if self._rx_count.value else 0
         self.sta["URXDA"] = self._rx_count.value > 0
-        self.sta["PERR"] = bool(top & _PARITY)
-        self.sta["FERR"] = bool(top & _FRAMING)
+        self.sta["PERR"] = bool(top & PARITY_MARK)
+        self.sta["FERR"] = bool(top & FRAMING_MARK)
 
     def _rx_read(self) -> int:
         """Reading pops; an empty FIFO returns the last character again."""
@@ -365,7 +308,7 @@ class Uart(Peripheral):
         for index in range(bit + 1, 16):
             if wave >> index & 1 != wave >> bit & 1:
                 self._edge_bit.value = index
-                edge = self._rx_start.value + index * self.bit_time
+                edge = self._rx_start.value + (index * self._rx_bit.value + 128 >> 8)
                 self.events.set(self._edge_event, max(edge, due + 1))
                 return
 
@@ -452,9 +395,9 @@ class Uart(Peripheral):
     def restored(self) -> None:
         """The TX pin carries the waveform while the sender is enabled."""
         if self.is_sending_enabled:
-            self.kit.pins.attach(self._tx_port.index, self._tx_pin, self)
+            self.kit.pins.attach(self._tx_port.index, self._tx_pin, self._pin)
         else:
-            self.kit.pins.detach(self._tx_port.index, self)
+            self.kit.pins.detach(self._tx_port.index, self._pin)
         if self._capture is not None:
             self._capture.autobaud = bool(self.mode["ABAUD"])
 

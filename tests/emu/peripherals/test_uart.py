@@ -334,15 +334,16 @@ def test_wake_raises_the_interrupt_at_the_start_edge_in_sleep(rig):
     assert rig.field("U1MODE", "WAKE") == 0
 
 
-def test_autobaud_lets_the_capture_module_time_the_bits(rig):
-    """§10 ABAUD: IC1 captures every edge of 0x55 against timer 3: 128 Tcy apart."""
+@pytest.mark.parametrize(("baud", "bit"), [(0, 128), (57600, 256), (230400, 64), (100000, 147.456)])
+def test_autobaud_lets_the_capture_module_time_the_senders_bits(rig, baud, bit):
+    """§10 ABAUD: IC1 captures every edge of 0x55 against timer 3, whatever rate the sender has."""
     enable(rig, mode=ABAUD)
     rig.write("T3CON", 0x8000)
     rig.write("IC1CON", 1)
-    rig.dev.uart[1].feed(b"\x55", cycle=1001)
-    rig.at(1001 + 3 * 128 + 2)
+    rig.dev.uart[1].feed(b"\x55", cycle=1001, baud=baud)
+    rig.at(1001 + round(3 * bit) + 2)
     times = [rig.read("IC1BUF") for _ in range(4)]
-    assert [later - times[0] for later in times] == [0, 128, 256, 384]
+    assert [later - times[0] for later in times] == [round(index * bit) for index in range(4)]
 
 
 def test_long_feeds_do_not_lose_bytes(rig):

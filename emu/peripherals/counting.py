@@ -1,0 +1,29 @@
+"""The arithmetic of a timer's counter (§7 rules 1, 4, 5), in closed form."""
+
+from __future__ import annotations
+
+from typing import Final
+
+PRESCALE: Final = (1, 8, 64, 256)
+"""Clocks per count for TCKPS = 0..3 (§7)."""
+
+
+def advance(start: int, counts: int, period: int, top: int) -> int:
+    """Count `counts` steps from `start`; after `period` (PR) comes 0, after `top` (all ones) comes 0 too."""
+    if start > period:
+        if start + counts <= top:
+            return start + counts
+        counts -= top + 1 - start
+        start = 0
+    return (start + counts) % (period + 1)
+
+
+def counts_until(start: int, target: int, period: int, top: int) -> int | None:
+    """Counts (at least 1) until the counter becomes `target`, or None if it never does."""
+    if start > period:
+        if start < target:
+            return target - start
+        return top + 1 - start + target if target <= period and (target or period) else None
+    if target > period or period == 0:
+        return None
+    return target - start if target > start else target - start + period + 1
