@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { WORKERS = 8, LOG_PERIOD_MS = 250, MESSAGE = 24 };
+enum { WORKERS = 8, LOG_PERIOD_MS = 250, MESSAGE = 24, LOGGER_STACK = 192 };
 
 static volatile uint16 checksum[WORKERS];
 
@@ -36,8 +36,9 @@ static bool every250(sys_event_data *data)
     return counter == 0;
 }
 
-static void logger(void)
+static void logger(void *unused)
 {
+    (void)unused;
     char message[MESSAGE];
     for (;;) {
         sys_event_data *data = Sys_Wait_for_Condition(SYS_1ms_TIMER, every250);
@@ -53,7 +54,8 @@ int main(void)
     for (uint16 n = 0; n < WORKERS; n++) {
         Sys_Start_Process(worker);
     }
-    Sys_Start_Process(logger);
+    static const sys_process_config logging = {.entry = logger, .stack = LOGGER_STACK};
+    Sys_Start_ProcessWith(&logging);
     Sys_Start_Kernel();
     Sys_Run_SystemThread();
     return 0;

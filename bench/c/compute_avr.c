@@ -1,0 +1,30 @@
+/* compute.c on an ATmega2560: says `D` on the first UART when it is done, because emulators end differently.
+ * simavr shows a line when it is complete. */
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+
+#define main compute_main
+#include "compute.c"
+#undef main
+
+static void say(char letter)
+{
+    while (!(UCSR0A & _BV(UDRE0))) {
+    }
+    UDR0 = (uint8_t)letter;
+}
+
+int main(void)
+{
+    compute_main();
+    UCSR0B = _BV(TXEN0);
+    say('D');
+    say('\n');
+    while (!(UCSR0A & _BV(TXC0))) {
+    }
+    cli();
+    sleep_mode();
+    for (;;) {
+    }
+}

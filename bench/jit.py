@@ -1,0 +1,175 @@
+"""Speed of native code: C that computes, the kernel with busy threads, an interrupt storm; beside simavr and QEMU.
+
+    python bench/jit.py [--seconds S] [--repeat N] [--json]
+
+Each figure is the median of N paired runs and counts host CPU time, as a multiple of real time (14.7456 MIPS). The
+interpreter runs the same image for a shorter time. simavr and qemu-system-avr run the same C source, compiled by
+avr-gcc -Os for an ATmega2560; the comparison is rounds of that source per host second. Absent tools are named and
+left out. Compile time is reported apart: cold fills an empty cache, warm finds it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+import emu  # noqa: E402
+from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
+
+HERE = Path(__file__).parent
+MIPS = 14_745_600  # design §4.2
+WARM_UP = 100_000_000
+INTERPRETER_SHARE = 100
+"""The interpreter runs this much less."""
+
+
+def build(source: Path, output: Path, *flags: str) -> None:
+    """Compile one file for the robot at -Os."""
+    command = [sys.executable, "-m", "toolchain", "cc", "-Os", *flags, str(source), "-o", str(output)]
+    subprocess.run(command, check=True, cwd=ROOT)
+
+
+def build_kernel(output: Path) -> None:
+    """The kernel with eight computing threads (firmware/apps/compute)."""
+    subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), "APP=compute", f"PYTHON={sys.executable}"],
+                   check=True, stdout=subprocess.DEVNULL)
+    shutil.copy(ROOT / "firmware" / "build" / "compute" / "firmware.elf", output)
+
+
+def machine(image: Path, engine: str) -> emu.Machine:
+    """A loaded machine past its start-up; native code is complete before it is timed."""
+    loaded = emu.load(image, engine=engine)
+    if isinstance(loaded.runner, JitEngine):
+        loaded.runner.wait = True
+    loaded.run(cycles=WARM_UP if engine == "jit" else WARM_UP // INTERPRETER_SHARE)
+    return loaded
+
+
+def times_real(target: emu.Machine, cycles: int) -> float:
+    """Multiple of real time at which `target` runs `cycles`."""
+    start = time.process_time()
+    target.run(cycles=cycles)
+    return cycles / MIPS / (time.process_time() - start)
+
+
+def measure(image: Path, cycles: int, repeat: int) -> dict[str, float]:
+    """Medians of paired runs of one image under both engines."""
+    native, plain = machine(image, "jit"), machine(image, "interp")
+    pairs = [(times_real(native, cycles), times_real(plain, cycles // INTERPRETER_SHARE)) for _ in range(repeat)]
+    fast = statistics.median(pair[0] for pair in pairs)
+    return {"jit": fast, "interp": statistics.median(pair[1] for pair in pairs),
+            "ratio": statistics.median(a / b for a, b in pairs)}
+
+
+def compile_seconds(image: Path) -> tuple[float, float]:
+    """Host seconds to the same point of a run with an empty cache and with a full one, above the second's own run."""
+    with tempfile.TemporaryDirectory() as cache:
+        os.environ["OPENSWARM_CACHE"] = cache
+        spent = []
+        for _ in range(2):
+            start = time.perf_counter()
+            machine(image, "jit")
+            spent.append(time.perf_counter() - start)
+        del os.environ["OPENSWARM_CACHE"]
+    return spent[0], spent[1]
+
+
+def cycles_per_round(image: Path, rounds: int) -> float:
+    """Tcy of one round of compute.c, from a whole run."""
+    return emu.load(image).run().cycle / rounds
+
+
+def avr_image(folder: Path, rounds: int) -> Path:
+    """compute.c for the AVR emulators."""
+    output = folder / f"avr{rounds}.elf"
+    subprocess.run(["avr-gcc", "-mmcu=atmega2560", "-Os", "-fno-lto", f"-DROUNDS={rounds}",
+                    str(HERE / "c" / "compute_avr.c"), "-o", str(output)], check=True)
+    return output
+
+
+def until_done(command: list[str]) -> float:
+    """Host seconds until the emulator has printed the D of compute_avr.c."""
+    start = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+    assert process.stdout is not None
+    while (byte := process.stdout.read(1)) not in (b"D", b""):
+        pass
+    spent = time.perf_counter() - start
+    process.kill()
+    process.wait()
+    if byte == b"":
+        raise RuntimeError(f"{command[0]} ended without having finished the program")
+    return spent
+
+
+EMULATORS = {
+    "simavr": lambda image: ["simavr", "-m", "atmega2560", "-f", "16000000", str(image)],
+    "qemu-system-avr": lambda image: ["qemu-system-avr", "-M", "mega2560", "-bios", str(image), "-nographic"],
+}
+
+
+def others(folder: Path, repeat: int) -> tuple[dict[str, float], list[str]]:
+    """Rounds of compute.c per host second in other emulators, start-up subtracted, and notes on absent ones."""
+    found: dict[str, float] = {}
+    notes = []
+    for name, command in EMULATORS.items():
+        if not shutil.which(name) or not shutil.which("avr-gcc"):
+            notes.append(f"{name}: left out, install the Debian packages gcc-avr avr-libc simavr qemu-system-misc")
+            continue
+        few, many = (20, 200) if name == "simavr" else (100, 2000)
+        images = avr_image(folder, few), avr_image(folder, many)
+        pairs = [(until_done(command(images[0])), until_done(command(images[1]))) for _ in range(repeat)]
+        found[name] = statistics.median((many - few) / (long - short) for short, long in pairs)
+    return found, notes
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=30.0, help="simulated seconds per run (default %(default)s)")
+    parser.add_argument("--repeat", type=int, default=3, help="paired runs (default %(default)s)")
+    parser.add_argument("--json", action="store_true", help="one JSON object")
+    options = parser.parse_args()
+    cycles = int(options.seconds * MIPS)
+    report: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        build(HERE / "c" / "compute.c", folder / "compute.elf", "-DROUNDS=65000")
+        build(HERE / "c" / "compute.c", folder / "rounds.elf", "-DROUNDS=50")
+        build(HERE / "c" / "storm.c", folder / "storm.elf")
+        build_kernel(folder / "kernel.elf")
+        for image in ("compute", "kernel", "storm"):
+            report[image] = measure(folder / f"{image}.elf", cycles, options.repeat)
+            report[image]["cold_s"], report[image]["warm_s"] = compile_seconds(folder / f"{image}.elf")
+        ours = report["compute"]["jit"] * MIPS / cycles_per_round(folder / "rounds.elf", 50)
+        rates, notes = others(folder, options.repeat)
+        report["rounds_per_s"] = {"jit": ours, **rates}
+        report["notes"] = notes
+    if options.json:
+        print(json.dumps(report))
+        return 0
+    print(f"{'program':10}{'jit':>12}{'interpreter':>14}{'ratio':>9}{'cold start':>13}{'warm start':>12}")
+    for image in ("compute", "kernel", "storm"):
+        row = report[image]
+        print(f"{image:10}{row['jit']:>9.1f} x {row['interp']:>12.3f} x{row['ratio']:>9.0f}"
+              f"{row['cold_s']:>11.2f} s{row['warm_s']:>10.2f} s")
+    for name, rate in report["rounds_per_s"].items():
+        print(f"{name:18}{rate:10.1f} rounds of compute.c per second, ours is {ours / rate:.1f} times that")
+    for note in report["notes"]:
+        print(note)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
