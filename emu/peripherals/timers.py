@@ -45,6 +45,7 @@ class Timer(Counter):
         self.high, high.low = high, self
         self.upper, high.lower = high, self
         self._hold = self.register(f"TMR{high.site.number}HLD")
+        self.tmr.read_by(self._read_and_latch)
 
     # -- changes of course -------------------------------------------------------------------------------------------
 
@@ -183,7 +184,6 @@ class Timer(Counter):
             half.base.value = cycle
             half._before.value = count
             half._source.value = half._choose_source()
-        self.restored()
         for half in halves:
             half._plan()
 
@@ -286,7 +286,6 @@ class Timer(Counter):
         """Stopped; the count survives every reset but power-on in silicon, and reads 0 here."""
         for cell in (self.base, self.tick, self.period, self._source, self._phase, self._before):
             cell.value = 0
-        self.restored()
 
     def stops_in(self, mode: int) -> bool:
         """Only timer 1 as asynchronous counter runs in Sleep (§7)."""
@@ -300,15 +299,11 @@ class Timer(Counter):
         self._fold(max(cycle, self.base.value), self._prescale, self.limit)
         super().freeze(cycle, mode)
 
-    def restored(self) -> None:
-        """Reading TMR of the lower half latches the upper half in 32-bit mode only (§7)."""
-        if self.high is not None:
-            self.bus.on_read[self.tmr.address >> 1] = self._read_and_latch if self.is_wide else None
-
     def _read_and_latch(self) -> int:
+        """Reading the lower half latches the upper half, in 32-bit mode (§7)."""
         count = self.count(self.clock)
-        assert self._hold is not None
-        self._hold.value = count >> 16
+        if self._hold is not None and self.is_wide:
+            self._hold.value = count >> 16
         return count & 0xFFFF
 
 
