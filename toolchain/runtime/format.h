@@ -21,7 +21,7 @@ typedef struct {
     int precision; /* -1: none given */
 } spec_t;
 
-/* Runs `format` into `sink`; returns the count. */
+/* Runs `format` into `sink`; returns the count. In format.s, which knows the layout of both structures. */
 int __format(sink_t *sink, const char *format, va_list arguments);
 
 /* Emits prefix, zeros and digits padded to the field width. `digits` are in reverse order; `prefix` holds up to two
@@ -31,7 +31,7 @@ void __format_field(sink_t *sink, const spec_t *spec, unsigned prefix, const cha
 void __format_pad(sink_t *sink, char character, int count);
 
 /* The conversions that need 64-bit integers and doubles. The driver links them when a format string of the program
- * mentions them; until then they are null. They take their argument from *arguments. */
+ * mentions them; until then they are null. */
 void __format_wide(sink_t *sink, const spec_t *spec, unsigned long long value, int negative);
 void __format_double(sink_t *sink, const spec_t *spec, double value);
 

@@ -1,0 +1,162 @@
+"""The printf family on the emulator: its stack, and its digits against Python's, whose printf rules are C's."""
+
+from __future__ import annotations
+
+import random
+import re
+from pathlib import Path
+
+import emu
+from tests.toolchain.c_programs import build, run
+
+SNPRINTF_STACK = 56
+"""Issue B: bytes of stack snprintf may use for %u %d %lu %x %s %c, its return address included."""
+
+STACK_PROGRAM = """
+#include <stdio.h>
+char to[80];
+volatile unsigned u = 54321;
+volatile unsigned long ul = 4000000000ul;
+volatile int d = -12345;
+int main(void) { return snprintf(to, sizeof to, "%u %d %12lu %-6x %08lX %s %.2s %c", u, d, ul, 0xBEEF, ul, "text", "cut", 'z'); }
+"""
+
+FORMAT_PROGRAM = """
+#include <stdio.h>
+{values}
+int main(void)
+{{
+{calls}
+    return 0;
+}}
+"""
+
+
+def stack_use(machine: emu.Machine, function: str) -> int:
+    """Bytes from the call of `function` to the highest W15 before it returns, return address included."""
+    image = machine.image
+    assert image is not None
+    symbol = image.symbols.find(function)
+    assert symbol is not None
+    machine.run(until=symbol.address)
+    entry = highest = machine.w[15]
+    while machine.w[15] != entry - 4:
+        assert machine.step() is None
+        highest = max(highest, machine.w[15])
+    return highest - (entry - 4)
+
+
+def test_snprintf_fits_into_its_stack_budget(tmp_path: Path) -> None:
+    """Measured on the emulator, instruction by instruction."""
+    (tmp_path / "a.c").write_text(STACK_PROGRAM)
+    assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os").status == 0
+    assert stack_use(emu.load(tmp_path / "a.elf", engine="interp"), "_snprintf") <= SNPRINTF_STACK
+
+
+def outputs(calls: list[tuple[str, str]], folder: Path) -> list[str]:
+    """What printf prints for each (format, C expression)."""
+    values = "\n".join(f"volatile __typeof__({value}) v{i} = {value};" for i, (_, value) in enumerate(calls))
+    text = "\n".join(f'    printf("{form}\\n", v{i});' for i, (form, _) in enumerate(calls))
+    (folder / "a.c").write_text(FORMAT_PROGRAM.format(values=values, calls=text))
+    built = build([folder / "a.c"], folder / "a.elf", "-Os", "-Wall")
+    assert built.status == 0, built.messages
+    ran = run(folder / "a.elf", 100_000_000, engine="interp")
+    assert ran.status == 0, ran
+    return ran.uart.decode().splitlines()
+
+
+def test_integers_in_every_form(tmp_path: Path) -> None:
+    """C11 7.21.6.1: flags, width, precision, length, for random values."""
+    rng = random.Random(7216)
+    calls, expected = [], []
+    for _ in range(120):
+        conversion = rng.choice("duxXo")
+        flags = "".join(f for f in "-0#" + ("+ " if conversion == "d" else "") if rng.random() < 0.3)
+        flags = flags if conversion in "xXo" else flags.replace("#", "")
+        width = rng.choice(["", str(rng.randrange(1, 15))])
+        precision = rng.choice(["", "", f".{rng.randrange(8)}"])
+        if precision:
+            flags = flags.replace("0", "")
+        if "-" in flags:
+            flags = flags.replace("0", "")
+        if "+" in flags:
+            flags = flags.replace(" ", "")
+        length, bits, suffix = rng.choice([("", 16, ""), ("l", 32, "l"), ("ll", 64, "ll")])
+        value = rng.getrandbits(rng.randint(1, bits))
+        if conversion == "d" and value >> bits - 1:
+            value -= 1 << bits
+        if conversion == "d" and value == -(1 << bits - 1):
+            value += 1
+        form = f"%{flags}{width}{precision}"
+        calls.append((f"{form}{length}{conversion}", f"{value}{suffix if conversion == 'd' else 'u' + suffix}"))
+        if conversion == "o" and "#" in flags:  # C writes 0 in front, Python 0o
+            form = form.replace("#", "")
+            digits = f"{value:o}" if value else "0"
+            digits = digits if digits.startswith("0") else "0" + digits
+            want = int(precision[1:] or 0) if precision else None
+            body = digits.rjust(want or 0, "0") if want is not None else digits
+            body = body if "0" not in flags or "-" in flags or not width else body.rjust(int(width), "0")
+            expected.append(body.ljust(int(width or 0)) if "-" in flags else body.rjust(int(width or 0)))
+        else:
+            expected.append(_python_integer(form + conversion, value))
+    assert outputs(calls, tmp_path) == expected
+
+
+def _python_integer(form: str, value: int) -> str:
+    """Python's % with two differences of C taken back: precision 0 prints 0 as nothing, # leaves 0 alone."""
+    if value == 0:
+        form = form.replace("#", "")
+        if ".0" in form and not re.search(r"\.0\d", form):
+            sign = "+" if "+" in form else " " if " " in form else ""
+            width = int("0" + "".join(re.findall(r"[1-9]\d*", form.split(".")[0])[:1]))
+            return sign.ljust(width) if "-" in form else sign.rjust(width)
+    return form % value
+
+
+def test_floating_point_digits_are_exact(tmp_path: Path) -> None:
+    """%f %e %g for values whose integer and fraction fit 64 bits: every digit as Python's, ties to even."""
+    rng = random.Random(1999)
+    values = [
+        0.0,
+        1.0,
+        -1.0,
+        0.5,
+        1.5,
+        2.5,
+        0.125,
+        9.995,
+        999999.5,
+        0.1,
+        123456789.125,
+        1e15,
+        4294967296.5,
+        -0.75,
+        100.0,
+    ]
+    values += [rng.choice((-1, 1)) * rng.random() * 10 ** rng.randint(-2, 12) for _ in range(45)]
+    calls, expected = [], []
+    for value in values:
+        for form in (
+            f"%.{rng.randrange(0, 9)}f",
+            "%g",
+            f"%{rng.randrange(1, 20)}.{rng.randrange(0, 6)}e",
+            "%+010.3f",
+            "%-12.4g",
+        ):
+            if "e" in form or "g" in form:
+                if value != 0 and not 1e-2 < abs(value) < 1e12:
+                    continue
+            calls.append((form, repr(value)))
+            expected.append(form % value)
+    assert outputs(calls, tmp_path) == expected
+
+
+def test_special_floating_values(tmp_path: Path) -> None:
+    """C11 7.21.6.1p8: infinity, NaN, negative zero, very large and very small numbers."""
+    calls = [("%f", "__builtin_inf()"), ("%F", "-__builtin_inf()"), ("%5.1f|", "__builtin_nan(\"\")"), ("%f", "-0.0"),
+             ("%08.1f", "__builtin_inf()"), ("%g", "1e300"), ("%g", "1e-300"), ("%.3e", "1.7976931348623157e308"),
+             ("%.1f", "1e22"), ("%g", "1e-5"), ("%G", "1e-10"), ("%g", "100000.0"), ("%g", "1000000.0"), ("%#g", "1.0")]  # fmt: skip
+    assert outputs(calls, tmp_path) == [
+        "inf", "-INF", "  nan|", "-0.000000", "     inf", "1e+300", "1e-300", "1.798e+308", "10000000000000000000000.0",
+        "1e-05", "1E-10", "100000", "1e+06", "1.00000",
+    ]  # fmt: skip
