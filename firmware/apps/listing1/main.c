@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { LOG_PERIOD_MS = 250 };
+enum { LOG_PERIOD_MS = 250, FIRST_LOG_MS = 5 /* soon, so that 5 s show 20 lines */ };
 
 /* Table of the clustering controller: percent of the maximum wheel speed, 129 mm/s (openswarm-original.md §8). */
 #define SPEED(percent) ((uint16)((percent) * 129L / 100))
@@ -16,16 +16,15 @@ enum { LOG_PERIOD_MS = 250 };
 #define NOTHING_LEFT SPEED(55)
 #define NOTHING_RIGHT SPEED(99)
 
-/* True on the first call and then on every 250th. */
 static bool wait250times(sys_event_data *data)
 {
-    static uint16 counter = 0;
-    bool due = counter == 0;
+    static uint16 counter = LOG_PERIOD_MS - FIRST_LOG_MS;
     (void)data;
-    if (++counter == LOG_PERIOD_MS) {
-        counter = 0;
+    if (++counter < LOG_PERIOD_MS) {
+        return false;
     }
-    return due;
+    counter = 0;
+    return true;
 }
 
 static void loggingThread(void)
