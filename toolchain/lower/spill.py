@@ -75,7 +75,7 @@ def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], again
         for mi in unit:
             if _is_remat_definition(mi, again):
                 continue
-            direct = _direct_move(mi, slot_of) if size == 1 else None
+            direct = _direct_move(mi, slot_of, again) if size == 1 else None
             if direct is not None:
                 kept.append(direct)
                 continue
@@ -96,9 +96,9 @@ def _is_remat_definition(mi: MI, again: dict[int, MI]) -> bool:
     return any(mi is source for source in again.values())
 
 
-def _direct_move(mi: MI, slot_of: dict[int, int]) -> MI | None:
-    """A copy from or to a spilled register is itself the load or store."""
-    if not mi.is_copy():
+def _direct_move(mi: MI, slot_of: dict[int, int], again: dict[int, MI]) -> MI | None:
+    """A copy from or to a spilled register is itself the load or store, unless a constant must be loaded for it."""
+    if not mi.is_copy() or mi.args[0] in again:
         return None
     source, dest = mi.args
     assert isinstance(source, int)
