@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { LOG_PERIOD_MS = 250, FIRST_LOG_MS = 5 /* soon, so that 5 s show 20 lines */ };
+enum { LOG_PERIOD_MS = 250, FIRST_LOG_MS = 50 /* soon, so that 5 s show 20 lines */ };
 
 /* Table of the clustering controller: percent of the maximum wheel speed, 129 mm/s (openswarm-original.md §8). */
 #define SPEED(percent) ((uint16)((percent) * 129L / 100))
