@@ -1,4 +1,4 @@
-"""Damaged and random firmware, executed: a run always ends with a reason, never with an exception of the emulator's own.
+"""Damaged and random firmware, executed: a run always ends with a reason, never with an exception of the emulator.
 
 Run `python tests/fuzz/fuzz_run.py [COUNT [SEED]]`; exits 1 with the first image that made something else happen.
 """
