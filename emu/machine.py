@@ -354,7 +354,11 @@ class Machine:
     # State
 
     def snapshot(self) -> bytes:
-        """A copy of the whole state. Whoever continues from it looks for work first: the deadline is derived data."""
+        """A copy of the whole state. Whoever continues from it looks for work first: the deadline is derived data.
+
+        Equal machines give equal copies whatever their engines: pin changes that wait to be told are told first.
+        """
+        self.pins.flush()
         self.events.kick()
         return self.record.snapshot()
 

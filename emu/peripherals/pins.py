@@ -131,12 +131,15 @@ class Pins:
         table[port] |= 0 if inputs_only else mask
 
     def flush(self) -> None:
-        """Tell the lazy watchers what native code has done to the pins."""
+        """Tell the lazy watchers what native code has done to the pins. The ring is left clean, as if never used."""
         count = self._u64[self._count]
         if not count:
             return
         self._u64[self._count] = 0
-        for entry in self.ring[:count].tolist():
+        entries = self.ring[:count].tolist()
+        for place in range(count):
+            self.ring[place] = 0
+        for entry in entries:
             self._tell_lazy(entry >> 24, entry >> 16 & 0xFF, entry & 0xFFFF)
 
     def _tell_lazy(self, cycle: int, port: int, level: int) -> None:
