@@ -65,6 +65,8 @@ class Scan:
         self._start: Final = Cell(record, "camera.frame_start", "q")
         self._running: Final = Cell(record, "camera.running", "B")
         self.course = Course(*(1 for _ in self._cells))
+        self.edges_per_frame: dict[int, int] = {}
+        """Rising edges of each sync line in a frame."""
         self.start = 0
         self.running = False
 
@@ -78,7 +80,12 @@ class Scan:
 
     def restored(self) -> None:
         """Take over what the record says."""
-        self.course = Course(*(cell.value for cell in self._cells.values()))
+        self.course = course = Course(*(cell.value for cell in self._cells.values()))
+        self.edges_per_frame = {
+            HREF: course.lines,
+            PCLK: course.lines * course.line_bytes,
+            VSYNC: int(course.vsync_rise < course.vsync_fall),
+        }
         self.start = self._start.value
         self.running = bool(self._running.value)
 
@@ -131,7 +138,7 @@ class Scan:
         frame, offset = self.place(cycle)
         if not self.running or frame < 0:
             return 0
-        earlier = frame * self.edges_per_frame(mask)
+        earlier = frame * self.edges_per_frame[mask]
         if mask == VSYNC:
             return earlier + (course.vsync_rise <= offset and course.vsync_rise < course.vsync_fall)
         behind = offset - course.first_href
@@ -141,17 +148,10 @@ class Scan:
         inside = (behind - (lines - 1) * course.line_tcy) // course.byte_tcy + 1
         return earlier + (lines - 1) * course.line_bytes + min(inside, course.line_bytes)
 
-    def edges_per_frame(self, mask: int) -> int:
-        """Rising edges of one sync line in a frame."""
-        course = self.course
-        if mask == VSYNC:
-            return int(course.vsync_rise < course.vsync_fall)
-        return course.lines * (course.line_bytes if mask == PCLK else 1)
-
     def edge_cycle(self, mask: int, number: int) -> int:
         """Cycle of the `number`-th (1 = first) rising edge since the start, or NEVER."""
         course = self.course
-        per_frame = self.edges_per_frame(mask)
+        per_frame = self.edges_per_frame[mask]
         if not self.running or not per_frame:
             return NEVER
         frame, index = divmod(number - 1, per_frame)
