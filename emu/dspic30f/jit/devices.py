@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from emu.dspic30f.jit.builder import LlvmBuilder
 
 PORTS: Final = "ABCDEFG"
-PLANNED_ALONE: Final = (1, 4, 5)
-"""Timers no other device plans by: their period can change without telling anybody."""
+TIME_BASES: Final = (2, 3)
+"""Timers that output compares may plan by (dspic30f6014a.md §9)."""
 
 
 class NativeRegister(Protocol):
@@ -56,8 +56,8 @@ class TimerPlaces:
     period: int
     due: int
     deadline: int
-    alone: bool
-    """No other device plans by this timer."""
+    planners: tuple[int, ...]
+    """Control registers of the devices that plan by this timer: while all are 0, nobody need be told of changes."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,9 @@ class Count:
     def write(self, b: LlvmBuilder, value: Number, lanes: int) -> bool:
         """The written count stands from the next cycle, with an empty prescaler."""
         t = self.timer
-        if lanes != 0xFFFF or not t.alone:
+        if lanes != 0xFFFF:
             return False
+        _guard_alone(b, t)
         tick, limit = _load(b, t.tick, 32), _load(b, t.pr, 16)
         b.guard((_load(b, t.period, 64) != 0) & (limit != 0))
         due = _load(b, t.due, 64)
@@ -102,6 +103,7 @@ class Period:
         t = self.timer
         if lanes != 0xFFFF:
             return False
+        _guard_alone(b, t)
         limit = value & 0xFFFF
         tick, stored, old = _load(b, t.tick, 32), _load(b, t.tmr, 16), _load(b, t.pr, 16)
         base, next_cycle = _load(b, t.base, 64), b.now + 1
@@ -114,6 +116,13 @@ class Period:
         _replan(b, t, tick, limit, start, next_cycle - _divide(b, "urem", passed, safe), stands)
         b.pending.stores.append(lambda: _store(b, t.pr, limit, 16))
         return True
+
+
+def _guard_alone(b: LlvmBuilder, t: TimerPlaces) -> None:
+    users: Number = 0
+    for address in t.planners:
+        users = users | _load(b, address, 16)
+    b.guard(users == 0)
 
 
 def _replan(
@@ -251,6 +260,7 @@ def native_registers(core: Core) -> dict[int, NativeRegister]:
 
 def _timers(core: Core, registers: dict[int, NativeRegister]) -> None:
     fields, sfrs, names = core.record.fields, core.chip.sfrs, core.events.names
+    planners = tuple(sfrs[f"OC{site.number}CON"].address for site in core.chip.compares)
     for site in core.chip.timers:
         n = site.number
         if f"t{n}.match" not in names or fields[f"t{n}.tick"].kind != "I":
@@ -261,10 +271,9 @@ def _timers(core: Core, registers: dict[int, NativeRegister]) -> None:
             sfrs[f"TMR{n}"].address, sfrs[f"PR{n}"].address, con.address, wide_bit, fields[f"t{n}.base"].offset,
             fields[f"t{n}.tick"].offset, fields[f"t{n}.period"].offset,
             fields["events.due"].offset + 8 * names.index(f"t{n}.match"), fields["events.deadline"].offset,
-            n in PLANNED_ALONE)
+            planners if n in TIME_BASES else ())
         registers[places.tmr] = Count(places)
-        if places.alone:
-            registers[places.pr] = Period(places)
+        registers[places.pr] = Period(places)
 
 
 def _ports(core: Core, registers: dict[int, NativeRegister]) -> None:

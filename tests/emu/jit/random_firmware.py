@@ -95,7 +95,7 @@ def interrupt_words(generator: random.Random) -> list[int]:
 
 def device_words(generator: random.Random) -> list[int]:
     """An access to a timer or port that native code makes by itself."""
-    name = generator.choice(("TMR1", "TMR2", "TMR3", "PR1", "LATA", "LATD", "LATF", "PORTA", "PORTB", "PORTD", "TRISD"))
+    name = generator.choice(("TMR1", "TMR2", "TMR3", "PR1", "PR2", "PR3", "LATA", "LATD", "LATF", "PORTA", "PORTB", "PORTD", "TRISD"))
     address = DSPIC30F6014A.sfrs[name].address
     if generator.random() < 0.4:
         return words_of("MOV{.W} f, Wnd", f=address, d=generator.randrange(8))
