@@ -24,6 +24,7 @@ from .lower import (
     legalize,
     peephole,
     regalloc,
+    returns,
     schedule,
     select,
     switch,
@@ -108,6 +109,11 @@ def _schedule(c: Context) -> None:
         schedule.run(c.m)
 
 
+def _returns(c: Context) -> None:
+    if c.options.level != "0":
+        returns.run(c.m)
+
+
 def _tails(c: Context) -> None:
     if c.options.level == "s":
         tails.run(c.m)
@@ -136,7 +142,8 @@ FUNCTION_PASSES = [
     Pass("schedule", _schedule, ("framed",)),
     Pass("tail-calls", lambda c: branches.tail_calls(c.m), ("framed",)),
     Pass("tails", _tails, ("framed",)),
-    Pass("branches", lambda c: branches.run(c.m, c.options.level != "0"), ("framed",)),
+    Pass("branches", lambda c: branches.run(c.m, c.options.level != "0"), ("framed",), ("laid-out",)),
+    Pass("returns", _returns, ("laid-out",)),
 ]
 
 

@@ -1,0 +1,62 @@
+"""Returns: RETURN instead of a branch to it, and RETLW for constant results.
+
+RETLW #lit10, W0 loads the result while returning (isa.md §5.7): a word less than MOV and RETURN, the same three cycles.
+Needs: the final order of blocks. Changes nothing else.
+"""
+
+from __future__ import annotations
+
+import copy
+
+from ..target import LIT10_MAX
+from .branches import remove_unreached
+from .mir import MI, Imm, MBlock, MFunction
+
+RESULT = 0  # W0
+
+
+def run(m: MFunction) -> None:
+    """Both rewrites."""
+    _return_early(m)
+    if not m.interrupt:
+        for b in m.blocks:
+            _load_while_returning(b)
+
+
+def _return_early(m: MFunction) -> None:
+    """A branch to a block that only returns is as long as the return itself."""
+    bare = {b.name: b.insts[0] for b in m.blocks if len(b.insts) == 1 and b.insts[0].op == "ret"}
+    for b in m.blocks:
+        if b.insts and b.insts[-1].op == "jump" and str(b.insts[-1].args[0]) in bare:
+            target = str(b.insts[-1].args[0])
+            b.insts[-1] = copy.copy(bare[target])
+            if not any(mi.op == "bra" and mi.args[0] == target for mi in b.insts):
+                b.succs = [s for s in b.succs if s != target]
+    remove_unreached(m)
+
+
+def _load_while_returning(b: MBlock) -> None:
+    """MOV #k,W0; epilogue; RETURN -> epilogue; RETLW #k,W0."""
+    if not b.insts or b.insts[-1].op != "ret" or b.insts[-1].text:
+        return
+    for k in range(len(b.insts) - 2, -1, -1):
+        mi = b.insts[k]
+        value = _constant(mi)
+        if value is not None:
+            b.insts[-1].text = f"retlw #{value},w{RESULT}"
+            del b.insts[k]
+            return
+        if RESULT in mi.defs() or RESULT in mi.uses() or mi.pred or mi.op in ("call", "callr", "asm", "text", "bra"):
+            return
+
+
+def _constant(mi: MI) -> int | None:
+    """What a constant load puts into the result register, if RETLW can."""
+    if mi.pred or mi.byte or not mi.args or mi.args[-1] != RESULT:
+        return None
+    if mi.op == "clr":
+        return 0
+    source = mi.args[0]
+    if mi.op == "mov" and isinstance(source, Imm) and isinstance(source.value, int) and 0 <= source.value <= LIT10_MAX:
+        return source.value
+    return None
