@@ -16,6 +16,7 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
 #include "hal_port.h"
 /* hal_port.h defines:
  *   HAL_USED, HAL_NORETURN        attributes: referenced from assembly only; does not return
+ *   HAL_UNLIKELY(condition)       a hint for the order of branches
  *   HAL_INLINE, HAL_OUTLINE       attributes: always, never copied into the caller
  *   hal_lock_state                opaque level
  *   hal_limit                     type of a stack limit
@@ -50,7 +51,7 @@ void hal_switch(hal_pick pick);
 /* As hal_switch, but the caller's context is given up. */
 HAL_NORETURN void hal_abandon(hal_pick pick);
 
-/* Kernel stack, slice level: sleep until an interrupt, unless *pending is set. Test and sleep are one act: an interrupt
+/* Kernel stack, slice level: sleep until an interrupt, unless the low byte of *pending is set. Test and sleep are one act: an interrupt
  * that sets *pending after the test ends the sleep. Comes back at slice level with interrupts taken. */
 void hal_idle(const volatile uint16_t *pending);
 

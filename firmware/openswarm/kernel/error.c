@@ -75,5 +75,6 @@ uint16 Sys_Get_LastError(void)
 
 const sys_statistics *Sys_Get_Statistics(void)
 {
+    heap_note_peak();
     return &os_statistics;
 }

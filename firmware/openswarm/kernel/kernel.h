@@ -72,8 +72,9 @@ typedef struct {
     uint16 period, deadline, release, due;
 } periodic;
 
-/* os_pending: what the kernel has to do before the next thread runs. */
-enum { OS_MESSAGES = 1, OS_ALARM = 2 };
+/* os_pending: why the next thread of the ring cannot simply run. The low byte, OS_WORK, must be worked off and keeps the
+ * kernel from idling; the high byte says that a scheduler chooses. One word, so that a slice end tests it once. */
+enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
 
 extern volatile uint16 os_pending;
 extern sys_pcb *os_running;   /* &os_system while idle */
@@ -93,6 +94,8 @@ extern os_memory_space os_memory;
 void heap_init(void);
 void *heap_take(uint16 size);            /* NULL: none left. Sizes above HEAP_CLASSES * HEAP_STEP: not in an ISR */
 void heap_give(void *block, uint16 size); /* the size it was taken with */
+
+void heap_note_peak(void);
 
 /* stack.c */
 void stack_paint(uint8 *stack, uint16 bytes);

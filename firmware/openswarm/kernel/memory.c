@@ -43,8 +43,8 @@ static block **list_of(uint16 size)
     return (block **)(void *)((uint8 *)small + size - HEAP_STEP);
 }
 
-/* The peak is the largest extent, so that taking from a free list, the fast path, need not look. */
-static HAL_OUTLINE void note_extent(void)
+/* The peak is the largest extent; it is noted before the extent shrinks and when somebody asks, not on each taking. */
+void heap_note_peak(void)
 {
     uint16 extent = (uint16)(brk - os_memory.bytes - SYS_KERNEL_STACK + (END - top));
     if (extent > os_statistics.heap_peak) {
@@ -60,7 +60,8 @@ static void push_small(void *freed, uint16 size)
     *list_of(size) = b;
 }
 
-static HAL_INLINE void *pop_small(uint16 size)
+/* From the list of the size, or from the untouched memory between small and large blocks. */
+static HAL_INLINE void *take_small(uint16 size)
 {
     block **list = list_of(size);
     hal_lock_state lock = hal_lock_devices();
@@ -68,26 +69,13 @@ static HAL_INLINE void *pop_small(uint16 size)
     if (b != NULL) {
         *list = b->next;
         os_statistics.heap_used += size;
-    }
-    hal_unlock(lock);
-    return b;
-}
-
-/* From the untouched memory between small and large blocks. */
-static void *raise_brk(uint16 size)
-{
-    void *taken = NULL;
-    hal_lock_state lock = hal_lock_devices();
-    if ((uint16)(top - brk) >= size) {
-        taken = brk;
+    } else if ((uint16)(top - brk) >= size) {
+        b = (block *)(void *)brk;
         brk += size;
         os_statistics.heap_used += size;
     }
     hal_unlock(lock);
-    if (taken != NULL) {
-        note_extent();
-    }
-    return taken;
+    return b;
 }
 
 /* Nothing of this size is left and nothing is untouched: cut a larger free block. At most HEAP_CLASSES short locks. */
@@ -134,6 +122,7 @@ static block *unlink_last(uint16 size)
 static void shrink_small(void)
 {
     uint16 size = HEAP_STEP;
+    heap_note_peak();
     while (size <= HEAP_CLASSES * HEAP_STEP) {
         block *last = unlink_last(size);
         if (last == NULL) {
@@ -159,7 +148,6 @@ static bool lower_top(uint16 size)
         top -= size;
     }
     hal_unlock(lock);
-    note_extent();
     return fits;
 }
 
@@ -207,6 +195,7 @@ static void give_large(uint8 *freed, uint16 size)
     }
     if ((uint8 *)large == top) {
         uint16 lowest = large->size;
+        heap_note_peak();
         large = large->next;
         hal_lock_state lock = hal_lock_devices();
         top += lowest;
@@ -226,13 +215,10 @@ static HAL_OUTLINE void *take_slowly(uint16 size)
         }
         return taken;
     }
-    taken = raise_brk(size);
-    if (taken == NULL) {
-        taken = split_small(size);
-    }
+    taken = split_small(size);
     if (taken == NULL && !hal_in_isr()) {
         shrink_small();
-        taken = raise_brk(size);
+        taken = take_small(size);
     }
     return taken;
 }
@@ -243,7 +229,7 @@ void *heap_take(uint16 size)
         return NULL;
     }
     size = round_up(size);
-    void *taken = size <= HEAP_CLASSES * HEAP_STEP ? pop_small(size) : NULL;
+    void *taken = size <= HEAP_CLASSES * HEAP_STEP ? take_small(size) : NULL;
     return taken != NULL ? taken : take_slowly(size);
 }
 

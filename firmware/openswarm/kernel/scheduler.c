@@ -38,7 +38,7 @@ static sys_pcb *dispatch(sys_pcb *next)
 
 sys_pcb *os_schedule(void)
 {
-    if (os_pending != 0) {
+    if ((os_pending & OS_WORK) != 0) {
         work();
     }
     while (os_ring == NULL) {
@@ -57,16 +57,17 @@ sys_pcb *os_schedule(void)
 
 sys_pcb *os_slice_end(void)
 {
-    os_ring = os_ring->next;
-    if (os_pending != 0 || pick_thread != NULL) {
+    sys_pcb *ended = os_running; /* that is os_ring->next: the ring turns by one */
+    os_ring = ended;
+    if (HAL_UNLIKELY(os_pending != 0)) {
         return os_schedule();
     }
-    return dispatch(os_ring->next);
+    return dispatch(ended->next);
 }
 
 void Sys_Yield(void)
 {
-    if (!hal_in_thread()) {
+    if (HAL_UNLIKELY(!hal_in_thread())) {
         os_refuse();
         return;
     }
@@ -79,6 +80,12 @@ void Sys_Set_Scheduler(const sys_scheduler *scheduler)
     hal_lock_state lock = os_lock_slice();
     pick_thread = scheduler->pick;
     os_eager = scheduler->eager;
+    hal_lock_state device_lock = hal_lock_devices();
+    os_pending &= (uint16)~OS_CHOICE;
+    if (pick_thread != NULL) {
+        os_pending |= OS_CHOICE;
+    }
+    hal_unlock(device_lock);
     hal_unlock(lock);
 }
 

@@ -69,8 +69,9 @@ void hal_stack_release(sys_pcb *process)
 
 void hal_stop(void)
 {
+    CPU_SRL |= CPU_IPL;
+    IEC0 = IEC1 = IEC2 = 0; /* nothing wakes the CPU again: the robot rests, an emulated run ends */
     for (;;) {
-        CPU_SRL |= CPU_IPL;
         __asm__ volatile("pwrsav #1");
     }
 }

@@ -176,7 +176,7 @@ _hal_idle:
         bset    SR, #6
         bset    SR, #7
         nop
-        cp0     [w0]
+        cp0.b   [w0]
         bra     nz, 1f
         pwrsav  #1
 1:      bclr    SR, #7

@@ -224,7 +224,7 @@ void hal_idle(const volatile uint16_t *pending)
     if (idle_hook != NULL) {
         idle_hook(++idles);
     }
-    if (*pending == 0) {
+    if ((*pending & OS_WORK) == 0) {
         if (virtual_time) {
             __atomic_fetch_add(&ticks_pending, 1, __ATOMIC_SEQ_CST);
         } else {
@@ -232,7 +232,7 @@ void hal_idle(const volatile uint16_t *pending)
             sigemptyset(&alarm_only);
             sigaddset(&alarm_only, SIGALRM);
             sigprocmask(SIG_BLOCK, &alarm_only, &before);
-            if (*pending == 0 && ticks_pending == 0) {
+            if ((*pending & OS_WORK) == 0 && ticks_pending == 0) {
                 sigsuspend(&before);
             }
             sigprocmask(SIG_SETMASK, &before, NULL);

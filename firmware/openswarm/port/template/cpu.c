@@ -187,7 +187,7 @@ void hal_abandon(hal_pick pick)
 /* Replace: mask everything, test, sleep in a way that a masked interrupt ends, unmask. */
 void hal_idle(const volatile uint16_t *pending)
 {
-    if (*pending == 0) {
+    if ((*pending & OS_WORK) == 0) {
         clock_interrupt();
     }
 }

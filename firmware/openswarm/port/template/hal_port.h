@@ -4,6 +4,7 @@
 
 #define HAL_USED /* your compiler's "referenced from assembly only" */
 #define HAL_NORETURN __attribute__((noreturn))
+#define HAL_UNLIKELY(condition) __builtin_expect(condition, 0)
 #define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
 #define HAL_OUTLINE __attribute__((noinline))            /* cold */
 #define HAL_ALLOCATION_FAILS() false
