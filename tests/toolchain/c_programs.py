@@ -1,6 +1,6 @@
 """Compile C programs with our driver and run them on the emulator, all in this process.
 
-A program's verdict is the status it leaves when it sleeps after `main` or `exit`: anything else is a fault with a reason.
+A program's verdict is the status it leaves when it sleeps after `main` or `exit`; other ends are faults with a reason.
 """
 
 from __future__ import annotations

@@ -6,6 +6,8 @@
 #define HUGE_VALF __builtin_huge_valf()
 #define INFINITY __builtin_inff()
 #define NAN __builtin_nanf("")
+#define FP_ILOGB0 (-__INT_MAX__ - 1)
+#define FP_ILOGBNAN __INT_MAX__
 #define M_E 2.7182818284590452354
 #define M_LN2 0.69314718055994530942
 #define M_PI 3.14159265358979323846
@@ -30,6 +32,8 @@ double fmod(double x, double y);
 double modf(double x, double *whole);
 double frexp(double x, int *exponent);
 double ldexp(double x, int exponent);
+int ilogb(double x);
+int ilogbl(long double x);
 double copysign(double magnitude, double sign);
 double fmin(double x, double y);
 double fmax(double x, double y);
@@ -56,6 +60,7 @@ float fmodf(float x, float y);
 float modff(float x, float *whole);
 float frexpf(float x, int *exponent);
 float ldexpf(float x, int exponent);
+int ilogbf(float x);
 float copysignf(float magnitude, float sign);
 float fminf(float x, float y);
 float fmaxf(float x, float y);

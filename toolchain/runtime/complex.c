@@ -1,9 +1,12 @@
-/* Products and quotients of complex numbers, which compilers call by these names (C11 annex G.5.1). */
-#include "softfloat.h"
-
+/* Products and quotients of complex numbers, which compilers call by these names. Infinities and NaN follow the plain
+ * formulas, not annex G of C11. */
+#include <float.h>
 #include <math.h>
 
-#define COMPLEX_ARITHMETIC(type, multiply, divide, absolute)                                                     \
+/* Division (M. Baudin, R. L. Smith, "A robust complex division in Scilab", 2012): the larger part of the divisor is
+ * divided out; where that ratio is too small to be exact the products are reordered; operands close to the ends of the
+ * exponent range are moved away from them first. */
+#define COMPLEX_ARITHMETIC(type, multiply, divide, part, larger, scale, exponent, smallest, lowest, highest)     \
     type _Complex multiply(type a, type b, type c, type d);                                                      \
     type _Complex divide(type a, type b, type c, type d);                                                        \
     type _Complex multiply(type a, type b, type c, type d)                                                       \
@@ -13,21 +16,39 @@
         __imag__ result = a * d + b * c;                                                                         \
         return result;                                                                                           \
     }                                                                                                            \
-    /* Smith's method: the divisor's larger part is divided out first, so that its square cannot overflow. */    \
+    /* (a + b * (d / c)) / (c + d * (d / c)) for |c| >= |d| */                                                   \
+    static type part(type a, type b, type c, type d)                                                             \
+    {                                                                                                            \
+        type ratio = d / c;                                                                                      \
+        type divisor = c + d * ratio;                                                                            \
+        return (a + (ratio >= smallest || ratio <= -smallest ? b * ratio : d * (b / c))) / divisor;              \
+    }                                                                                                            \
+    /* Power of two that brings two numbers away from overflow and underflow; 0 for most. */                     \
+    static int part##_shift(type x, type y)                                                                      \
+    {                                                                                                            \
+        type size = larger(x < 0 ? -x : x, y < 0 ? -y : y);                                                      \
+        if (!isfinite(size) || size == 0)                                                                        \
+            return 0;                                                                                            \
+        int binary = exponent(size);                                                                             \
+        return binary >= highest - 2 ? -3 : binary < lowest / 2 ? -binary : 0;                                   \
+    }                                                                                                            \
     type _Complex divide(type a, type b, type c, type d)                                                         \
     {                                                                                                            \
         type _Complex result;                                                                                    \
-        if (absolute(c) >= absolute(d)) {                                                                        \
-            type ratio = d / c, scale = c + d * ratio;                                                           \
-            __real__ result = (a + b * ratio) / scale;                                                           \
-            __imag__ result = (b - a * ratio) / scale;                                                           \
+        int top = part##_shift(a, b), bottom = part##_shift(c, d), back = bottom - top;                          \
+        a = scale(a, top);                                                                                       \
+        b = scale(b, top);                                                                                       \
+        c = scale(c, bottom);                                                                                    \
+        d = scale(d, bottom);                                                                                    \
+        if ((c < 0 ? -c : c) >= (d < 0 ? -d : d)) {                                                              \
+            __real__ result = scale(part(a, b, c, d), back);                                                     \
+            __imag__ result = scale(part(b, -a, c, d), back);                                                    \
         } else {                                                                                                 \
-            type ratio = c / d, scale = d + c * ratio;                                                           \
-            __real__ result = (a * ratio + b) / scale;                                                           \
-            __imag__ result = (b * ratio - a) / scale;                                                           \
+            __real__ result = scale(part(b, a, d, c), back);                                                     \
+            __imag__ result = scale(part(-a, b, d, c), back);                                                    \
         }                                                                                                        \
         return result;                                                                                           \
     }
 
-COMPLEX_ARITHMETIC(float, __mulsc3, __divsc3, fabsf)
-COMPLEX_ARITHMETIC(double, __muldc3, __divdc3, fabs)
+COMPLEX_ARITHMETIC(float, __mulsc3, __divsc3, quotient_single, fmaxf, ldexpf, ilogbf, FLT_MIN, FLT_MIN_EXP, FLT_MAX_EXP)
+COMPLEX_ARITHMETIC(double, __muldc3, __divdc3, quotient_double, fmax, ldexp, ilogb, DBL_MIN, DBL_MIN_EXP, DBL_MAX_EXP)

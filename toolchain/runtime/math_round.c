@@ -70,6 +70,23 @@ double frexp(double x, int *exponent)
     return f64_value((bits & F64_SIGN) | (uint64_t)(F64_BIAS - 1) << 52 | (significand >> 11 & F64_MANTISSA));
 }
 
+int ilogb(double x)
+{
+    uint64_t magnitude = f64_bits(x) & ~F64_SIGN;
+    if (magnitude == 0)
+        return FP_ILOGB0;
+    if (magnitude >= F64_INF)
+        return magnitude > F64_INF ? FP_ILOGBNAN : __INT_MAX__;
+    int16_t biased;
+    __f64_unpack(magnitude, &biased);
+    return biased - F64_BIAS;
+}
+
+int ilogbl(long double x)
+{
+    return ilogb((double)x);
+}
+
 double ldexp(double x, int exponent)
 {
     uint64_t bits = f64_bits(x), magnitude = bits & ~F64_SIGN;

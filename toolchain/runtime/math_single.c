@@ -80,6 +80,18 @@ float frexpf(float x, int *exponent)
     return f32_value((bits & F32_SIGN) | (uint32_t)(F32_BIAS - 1) << 23 | (significand >> 8 & F32_MANTISSA));
 }
 
+int ilogbf(float x)
+{
+    uint32_t magnitude = f32_bits(x) & ~F32_SIGN;
+    if (magnitude == 0)
+        return FP_ILOGB0;
+    if (magnitude >= F32_INF)
+        return magnitude > F32_INF ? FP_ILOGBNAN : __INT_MAX__;
+    int16_t biased;
+    __f32_unpack(magnitude, &biased);
+    return biased - F32_BIAS;
+}
+
 float ldexpf(float x, int exponent)
 {
     uint32_t bits = f32_bits(x), magnitude = bits & ~F32_SIGN;

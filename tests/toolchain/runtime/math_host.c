@@ -14,6 +14,7 @@
 ONE(DECLARE1)
 TWO(DECLARE2)
 double rt_frexp(double, int *), rt_ldexp(double, int), rt_modf(double, double *);
+int rt_ilogb(double), rt_ilogbf(float);
 float rt_frexpf(float, int *), rt_ldexpf(float, int), rt_modff(float, float *);
 
 static uint64_t state = 0x9E3779B97F4A7C15u; /* xorshift64*, fixed seed */
@@ -118,12 +119,14 @@ int main(int argc, char **argv)
         measure(x, exponent, rt_ldexp(x, exponent), ldexp(x, exponent), 53, -1021);
         measure(x, 0, rt_frexp(x, &got), frexp(x, &want), 53, -1021);
         failed |= isfinite(x) && got != want;
+        failed |= isfinite(x) && x != 0 && rt_ilogb(x) != ilogb(x);
         measure(x, 1, rt_modf(x, &rt_whole), modf(x, &whole), 53, -1021);
         measure(x, 2, rt_whole, whole, 53, -1021);
         float y = (float)sample(i, -140, 127), wholef, rt_wholef;
         measure(y, exponent, rt_ldexpf(y, exponent / 8), ldexpf(y, exponent / 8), 24, -125);
         measure(y, 0, rt_frexpf(y, &got), frexpf(y, &want), 24, -125);
         failed |= isfinite(y) && got != want;
+        failed |= isfinite(y) && y != 0 && rt_ilogbf(y) != ilogbf(y);
         measure(y, 1, rt_modff(y, &rt_wholef), modff(y, &wholef), 24, -125);
         measure(y, 2, rt_wholef, wholef, 24, -125);
     }

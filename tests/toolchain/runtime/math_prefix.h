@@ -49,3 +49,6 @@
 #define tanf rt_tanf
 #define trunc rt_trunc
 #define truncf rt_truncf
+#define ilogb rt_ilogb
+#define ilogbf rt_ilogbf
+#define ilogbl rt_ilogbl

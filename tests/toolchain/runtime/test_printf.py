@@ -18,7 +18,8 @@ char to[80];
 volatile unsigned u = 54321;
 volatile unsigned long ul = 4000000000ul;
 volatile int d = -12345;
-int main(void) { return snprintf(to, sizeof to, "%u %d %12lu %-6x %08lX %s %.2s %c", u, d, ul, 0xBEEF, ul, "text", "cut", 'z'); }
+#define FORMAT "%u %d %12lu %-6x %08lX %s %.2s %c"
+int main(void) { return snprintf(to, sizeof to, FORMAT, u, d, ul, 0xBEEF, ul, "text", "cut", 'z'); }
 """
 
 FORMAT_PROGRAM = """
@@ -143,9 +144,8 @@ def test_floating_point_digits_are_exact(tmp_path: Path) -> None:
             "%+010.3f",
             "%-12.4g",
         ):
-            if "e" in form or "g" in form:
-                if value != 0 and not 1e-2 < abs(value) < 1e12:
-                    continue
+            if form[-1] in "eg" and value != 0 and not 1e-2 < abs(value) < 1e12:
+                continue
             calls.append((form, repr(value)))
             expected.append(form % value)
     assert outputs(calls, tmp_path) == expected
@@ -155,7 +155,8 @@ def test_special_floating_values(tmp_path: Path) -> None:
     """C11 7.21.6.1p8: infinity, NaN, negative zero, very large and very small numbers."""
     calls = [("%f", "__builtin_inf()"), ("%F", "-__builtin_inf()"), ("%5.1f|", "__builtin_nan(\"\")"), ("%f", "-0.0"),
              ("%08.1f", "__builtin_inf()"), ("%g", "1e300"), ("%g", "1e-300"), ("%.3e", "1.7976931348623157e308"),
-             ("%.1f", "1e22"), ("%g", "1e-5"), ("%G", "1e-10"), ("%g", "100000.0"), ("%g", "1000000.0"), ("%#g", "1.0")]  # fmt: skip
+             ("%.1f", "1e22"), ("%g", "1e-5"), ("%G", "1e-10"), ("%g", "100000.0"), ("%g", "1000000.0"),
+             ("%#g", "1.0")]  # fmt: skip
     assert outputs(calls, tmp_path) == [
         "inf", "-INF", "  nan|", "-0.000000", "     inf", "1e+300", "1e-300", "1.798e+308", "10000000000000000000000.0",
         "1e-05", "1E-10", "100000", "1e+06", "1.00000",
