@@ -142,12 +142,15 @@ class Camera(Part, I2cDevice):
 
     def plug(self) -> None:
         """Connect the camera."""
-        self._plugged.value = 1
-        self.pins.change_waveform(self.now, self._connect)
+        self._set_plugged(True)
 
     def unplug(self) -> None:
         """Take the camera off its connector: no answers, no edges."""
-        self._plugged.value = 0
+        self._set_plugged(False)
+
+    def _set_plugged(self, plugged: bool) -> None:
+        self._plugged.value = plugged
+        self._line_to.value = 0
         self.pins.change_waveform(self.now, self._connect)
 
     def _connect(self) -> None:

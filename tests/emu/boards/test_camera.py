@@ -481,3 +481,15 @@ def test_an_edge_can_be_put_on_any_cycle(robot, line):
     before = robot.at(wanted).read("TMR4")
     assert robot.at(wanted + 1).read("TMR4") == before + 1
     assert camera.scan.line_at(wanted) == (line, wanted)
+
+
+def test_unplugging_in_the_middle_of_a_line_ends_it_at_once(robot):
+    """Fault input: what was rendered is no longer on the bus, for every reader of the record."""
+    robot.board.camera.show(np.full((480, 640), 255, np.uint8))
+    robot.configure(po6030())
+    camera = robot.board.camera
+    robot.at(camera.scan.href(10) + 100)
+    assert robot.read("PORTD") >> 8 == 255
+    camera.unplug()
+    assert robot.read("PORTD") >> 8 == 0
+    assert robot.machine.record.u64[robot.machine.record.fields["camera.line_to"].index] <= robot.events.now

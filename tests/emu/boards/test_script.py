@@ -125,3 +125,10 @@ def test_unknown_topics_are_refused(robot):
     """Bad usage."""
     with pytest.raises(ValueError, match="cannot watch 'smell'"):
         Watch(robot.board, ["smell"], print)
+
+
+def test_a_script_may_press_more_often_than_frames_fit(robot):
+    """64 frames wait, the rest is lost, nothing fails."""
+    robot.board.stimulus.play(parse(robot.board, "1000 remote ok\n" * 100))
+    robot.at(2000)
+    assert robot.read("PORTF") & 0x40
