@@ -248,3 +248,25 @@ def test_stuck_data_line_ends_the_probe_with_collisions_not_in_a_hang(program):
     assert machine.run(cycles=40_000_000).reason == "halt"
     assert machine.peek("camera_id") != 0x6030
     assert machine.peek("I2CSTAT") & 1 << 10
+
+
+def test_scanning_driver_measures_everything_at_the_vendors_rates(program):
+    """epuck.md §5: 900 Tcy per scan (and the handler's time), 65 scans per pair, all four pairs in about 15.9 ms."""
+    machine = start(program("adscan.c"))
+    robot = machine.board
+    robot.inputs.distance[:] = [10, 20, 30, 40, 50, 60, 80, np.inf]
+    robot.inputs.acceleration[:] = 0.25, -0.25, 1
+    robot.inputs.apply()
+    robot.microphones.play(1, lambda _cycle: 100.0)
+    machine.run_until(2 * FCY // 10)
+    array = {
+        name: [machine.peek(machine.address_of(name) + 2 * index) for index in range(count)]
+        for name, count in (("reflected", 8), ("ambient", 8), ("acceleration", 3), ("microphone", 3))
+    }
+    assert array["reflected"] == pytest.approx([3548, 857, 474, 296, 205, 153, 84, 0], rel=0.01, abs=2)
+    assert array["ambient"] == [3800] * 8
+    assert array["acceleration"] == [2248, 1848, 2848]
+    assert array["microphone"] == [2048, 2148, 2048]
+    period = 2 * FCY / 10 / machine.peek("scans")
+    assert 900 <= period <= 1000
+    assert machine.peek("rounds") == pytest.approx(machine.peek("scans") / 260, abs=1)
