@@ -70,7 +70,7 @@ void hal_stack_release(sys_pcb *process)
 void hal_stop(void)
 {
     CPU_SRL |= CPU_IPL;
-    IEC0 = IEC1 = IEC2 = 0; /* nothing wakes the CPU again: the robot rests, an emulated run ends */
+    IEC0 = IEC1 = IEC2 = INTCON1 = 0; /* nothing wakes the CPU again: the robot rests, an emulated run ends */
     for (;;) {
         __asm__ volatile("pwrsav #1");
     }
