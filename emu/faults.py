@@ -1,6 +1,7 @@
 """Why a run ended badly, in words: resets the core asked for, and traps or interrupts nobody handles.
 
-What enters: a machine that stopped, its image. What leaves: a `Fault`, or None when the firmware simply ended.
+What enters: a machine that stopped, its image. What leaves: a `Fault`, or None when the firmware simply ended. A trap
+that is handled is none, unless the firmware never comes back from it but goes to sleep inside.
 An unhandled exception is seen as its vector's handler being a debugger word: both XC16's linker and ours put one into
 vectors without a function (abi-elf.md §3.3).
 """
@@ -11,19 +12,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.chips.chip import Vector
-from emu.dspic30f.state import IPL3, STACK_POINTER
+from emu.dspic30f.state import IPL3, RUN, STACK_POINTER
 from emu.image import Image
 
 if TYPE_CHECKING:
     from emu.machine import Machine, Stop
 
 TRAP_FLAGS: Final = {
-    "OscillatorFail": ("OSCFAIL", "oscillator failure trap"),
-    "AddressError": ("ADDRERR", "address error trap (odd address, nothing there, or wild jump)"),
-    "StackError": ("STKERR", "stack error trap (W15 above SPLIM or below RAM)"),
-    "MathError": ("MATHERR", "math error trap (division by zero, accumulator overflow, bad shift)"),
+    "OSCFAIL": "oscillator failure trap",
+    "ADDRERR": "address error trap (odd address, nothing there, or wild jump)",
+    "STKERR": "stack error trap (W15 above SPLIM or below RAM)",
+    "MATHERR": "math error trap (division by zero, accumulator overflow, bad shift)",
 }
-"""Vector name to flag of INTCON1 (isa.md §14.4) and what to call it."""
+"""Flags of INTCON1 by falling priority (isa.md §14.4) and what to call them."""
 RETURN_BYTES: Final = 4
 """What an exception pushes (isa.md §14.2)."""
 
@@ -41,6 +42,10 @@ def fault_of(machine: Machine, image: Image, stop: Stop) -> Fault | None:
     """The fault behind `stop`, None if it is none."""
     if stop.reason == "fault":
         return Fault(stop.detail, stop.pc, stop.cycle)
+    if machine.state.mode != RUN and machine.peek("CORCON") & IPL3:
+        name, _, back = machine.core.exceptions.entered.partition(" at ")
+        culprit = int(back, 16) - 2 if back else stop.pc
+        return Fault(f"{name or 'a'} trap, in whose handler the firmware went to sleep,", culprit, stop.cycle)
     if stop.reason != "breakpoint":
         return None
     vectors = [vector for vector in image.chip.vectors if stop.pc in (image.word(vector.ivt), image.word(vector.aivt))]
@@ -53,19 +58,21 @@ def _unhandled(machine: Machine, vectors: list[Vector], stop: Stop) -> Fault | N
     """The exception that led to the shared default handler, told by flags; None if the code was merely called."""
     back = _return_address(machine) or stop.pc
     if machine.peek("CORCON") & IPL3:
-        intcon1 = machine.peek("INTCON1")
-        fields = machine.chip.sfrs["INTCON1"].fields
-        for vector in vectors:
-            flag, words = TRAP_FLAGS.get(vector.name, ("", ""))
-            if flag and intcon1 >> fields[flag][0] & 1:
-                # Only a division stacks its own address; the others stack what follows (isa.md §14.4).
-                culprit = back if flag == "MATHERR" or back == stop.pc else back - 2
-                return Fault(f"{words}, no handler,", culprit, stop.cycle)
-        return Fault("trap, no handler,", back, stop.cycle)
+        words = _trap(machine)
+        # Only a division stacks its own address; the others stack what follows (isa.md §14.4).
+        culprit = back if words == TRAP_FLAGS["MATHERR"] or back == stop.pc else back - 2
+        return Fault(f"{words or 'trap'}, no handler,", culprit, stop.cycle)
     for vector in vectors:
         if vector.irq in machine.chip.interrupts and _is_pending(machine, vector.irq):
             return Fault(f"{vector.name}, no handler,", back, stop.cycle)
     return None
+
+
+def _trap(machine: Machine) -> str:
+    """What the flags of INTCON1 say, empty if none is set."""
+    intcon1 = machine.peek("INTCON1")
+    fields = machine.chip.sfrs["INTCON1"].fields
+    return next((words for flag, words in TRAP_FLAGS.items() if intcon1 >> fields[flag][0] & 1), "")
 
 
 def _return_address(machine: Machine) -> int:

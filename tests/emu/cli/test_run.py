@@ -112,6 +112,16 @@ def test_a_trap_with_a_handler_is_no_fault(build, capfd):
     assert "halt" in capfd.readouterr().err
 
 
+def test_a_firmware_that_sleeps_inside_a_trap_has_given_up(build, capfd):
+    path = build(
+        "main:\nmov #0x801, w1\nmov [w1], w2\nnop\nhandler:\nbclr {INTCON1}, #3\npwrsav #1\nforever:\nbra @forever\n",
+        {"AddressError": "handler"},
+    )
+    assert main(["run", path]) == 1
+    err = capfd.readouterr().err
+    assert "AddressError trap, in whose handler the firmware went to sleep, at 0x000102 (_main+0x2)" in err
+
+
 @pytest.mark.parametrize(
     ("limit", "cycles"),
     [(["--cycles", "1000"], 1000), (["--seconds", "0.01"], 147456), (["--seconds", "1/100"], 147456)],
