@@ -109,6 +109,11 @@ def _schedule(c: Context) -> None:
         schedule.run(c.m)
 
 
+def _combine(c: Context) -> None:
+    if c.options.level != "0":
+        combine.combine(c.function)
+
+
 def _returns(c: Context) -> None:
     if c.options.level != "0":
         returns.run(c.m)
@@ -128,7 +133,7 @@ FUNCTION_PASSES = [
     Pass("legalize", _legalize, ("ssa", "reachable"), ("legal",)),
     Pass("unreachable-again", lambda c: cfg.remove_unreachable(c.function), ("legal",)),
     Pass("dead-code", lambda c: cfg.dead_code(c.function), ("legal",)),
-    Pass("combine", lambda c: combine.combine(c.function), ("legal",)),
+    Pass("combine", _combine, ("legal",)),
     Pass("dead-code-again", lambda c: cfg.dead_code(c.function), ("legal",)),
     Pass("split-logical", lambda c: cfg.split_logical_branches(c.function), ("legal",), ("no-logical-branches",)),
     Pass("sink-compares", lambda c: cfg.sink_compares(c.function), ("legal",)),

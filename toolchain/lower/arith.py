@@ -121,7 +121,11 @@ def _wide_binary(s: Selector, i: Instr) -> None:
     left, right = s.regs(a), s.regs(b)
     known = _known_zero_words(b) if i.op in ("or", "xor", "and") else set()
     known_a = _known_zero_words(a) if i.op in ("or", "xor", "and") else set()
+    zero_b = _known_zero_words(b) if i.op in ("add", "sub") else set()
     for k, (x, y, r) in enumerate(zip(left, right, d, strict=True)):
+        if k in zero_b and k:
+            s.emit(CARRY_OP[i.op], x, Imm(0), r)
+            continue
         if k in known or k in known_a:
             if i.op == "and":
                 s.emit("clr", r)

@@ -9,6 +9,7 @@ countdowns   `n-- != 0`: the decrement moves to the test, whose carry answers it
 from __future__ import annotations
 
 from ..ir.model import Block, ConstInt, Function, Instr, Value
+from . import induction
 from .cfg import loop_depths, predecessors, reverse_postorder
 
 REMAINDER = {"udiv": "urem", "sdiv": "srem"}
@@ -29,6 +30,7 @@ def combine(f: Function) -> None:
     """Needs: legal IR. Ensures: the rewrites above, where they apply."""
     remainders(f)
     pair_divisions(f)
+    induction.run(f)
     increments(f)
     countdowns(f)
 

@@ -209,11 +209,11 @@ class FrameBuilder:
         out += _push_registers(self.saved)
         if "no_auto_psv" not in self.m.interrupt:
             out.append(MI("text", "push _PSVPAG"))
+            load = [MI("mov", Imm("__const_psvpage"), 0), _text("mov w0,_PSVPAG", uses=(0,))]
             if 0 in self.saved or "shadow" in self.m.interrupt:
-                out += [MI("mov", Imm("__const_psvpage"), 0), MI("text", "mov w0,_PSVPAG")]
+                out += load
             else:
-                out += [MI("text", "push w0"), MI("mov", Imm("__const_psvpage"), 0), MI("text", "mov w0,_PSVPAG"),
-                        MI("text", "pop w0")]  # fmt: skip
+                out += [_text("push w0", uses=(0,)), *load, _text("pop w0", defs=(0,))]
         return out
 
     def _interrupt_exit(self, line: str | None) -> list[MI]:
@@ -283,6 +283,13 @@ def _load_far(r: int, offset: int, line: str | None) -> list[MI]:
     if offset <= WORD_OFFSET[1]:
         return [MI("mov", Mem("off", FP, offset) if offset else Mem("ind", FP), r, line=line)]
     return [MI("mov", Imm(offset), r, line=line), MI("mov", Mem("idx", FP, r), r, line=line)]
+
+
+def _text(text: str, uses: tuple[int, ...] = (), defs: tuple[int, ...] = ()) -> MI:
+    """An instruction given as text, with the registers later passes must know about."""
+    mi = MI("text", text)
+    mi.also_uses, mi.also_defs = uses, defs
+    return mi
 
 
 def _push_registers(registers: list[int]) -> list[MI]:
