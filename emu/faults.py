@@ -25,6 +25,8 @@ TRAP_FLAGS: Final = {
     "MATHERR": "math error trap (division by zero, accumulator overflow, bad shift)",
 }
 """Flags of INTCON1 by falling priority (isa.md §14.4) and what to call them."""
+VECNUM: Final = 0x3F
+"""Field of INTTREG: slot of the exception entered last (isa.md §14.4)."""
 RETURN_BYTES: Final = 4
 """What an exception pushes (isa.md §14.2)."""
 
@@ -43,9 +45,8 @@ def fault_of(machine: Machine, image: Image, stop: Stop) -> Fault | None:
     if stop.reason == "fault":
         return Fault(stop.detail, stop.pc, stop.cycle)
     if machine.state.mode != RUN and machine.peek("CORCON") & IPL3:
-        name, _, back = machine.core.exceptions.entered.partition(" at ")
-        culprit = int(back, 16) - 2 if back else stop.pc
-        return Fault(f"{name or 'a'} trap, in whose handler the firmware went to sleep,", culprit, stop.cycle)
+        name = machine.chip.vectors[machine.peek("INTTREG") & VECNUM].name
+        return Fault(f"{name} trap, in whose handler the firmware went to sleep,", stop.pc, stop.cycle)
     if stop.reason != "breakpoint":
         return None
     vectors = [vector for vector in image.chip.vectors if stop.pc in (image.word(vector.ivt), image.word(vector.aivt))]
