@@ -88,7 +88,7 @@ class JitEngine:
         self._state: Final = core.state
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2
-        self._compiler: Final = Compiler()
+        self.compiler = Compiler()
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
         self._env_address: Final = ctypes.addressof(self._env)
         self._codes: Final[dict[object, Code]] = {}
@@ -125,7 +125,9 @@ class JitEngine:
             self.counts.interpreted += 1
             sequencer.execute()
         elif why in (MISS, DEADLINE):
-            self._miss(limit)
+            cycle = state.cycle
+            if cycle == start or (cycle < limit and self._core.events.deadline >= cycle):
+                self._miss(limit)
 
     def forget(self) -> None:
         """Hooked addresses must come back to Python: translate anew around them."""
@@ -146,7 +148,7 @@ class JitEngine:
         if self._state.repeat != NOT_REPEATING:
             self._core.sequencer.execute()
             return
-        for tag, address in self._compiler.poll():
+        for tag, address in self.compiler.poll():
             self._install(tag, address)
         heat = code.heat.get(pc, 0) + 1
         code.heat[pc] = heat
@@ -197,7 +199,7 @@ class JitEngine:
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
         text = dispatch_text(boundary_of(self._core, self._offset), 2 * self._words)
-        address = self._compiler.now(text, BLOCK_LEVEL, self._compiler.key(BLOCK_LEVEL, text.encode()))
+        address = self.compiler.now(text, BLOCK_LEVEL, self.compiler.key(BLOCK_LEVEL, text.encode()))
         self._dispatch = Call(address)
 
     def _fetch(self, pc: int) -> Insn | None:
@@ -223,14 +225,14 @@ class JitEngine:
         name = repr(identity).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
             translator = Translator(region, code.around, code.context, exact)
-            key = self._compiler.key(level, b"exact" if exact else b"block", name)
+            key = self.compiler.key(level, b"exact" if exact else b"block", name)
             text = translator.text()
             tag = (code, translator.entries, exact)
-            address = self._compiler.now(text, level, key) if self.wait else self._compiler.from_disk(key)
+            address = self.compiler.now(text, level, key) if self.wait else self.compiler.from_disk(key)
             if address is not None:
                 self._install(tag, address)
             else:
-                self._compiler.request(text, level, key, tag)
+                self.compiler.request(text, level, key, tag)
 
     def _install(self, tag: Any, address: int) -> None:
         code, entries, exact = tag
@@ -246,7 +248,7 @@ class JitEngine:
 
     def close(self) -> None:
         """End the compile process."""
-        self._compiler.close()
+        self.compiler.close()
 
 
 def offsets(core: Core) -> dict[str, int]:

@@ -23,6 +23,11 @@ FLOWS = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RE
 LEFT_OUT = ("RESET", "PWRSAV")
 """They end the run or only wait; their own tests check them."""
 
+DEVICE_REGISTERS = (
+    "TMR1", "TMR2", "TMR3", "PR1", "PR2", "PR3", "LATA", "LATD", "LATF", "PORTA", "PORTB", "PORTD", "TRISD",
+)  # fmt: skip
+"""Registers with native accesses, and one that changes what they do."""
+
 ROWS = [row for row in table.ROWS if row.mnemonic not in LEFT_OUT]
 BY_SYNTAX = {row.syntax: row for row in table.ROWS}
 
@@ -95,7 +100,7 @@ def interrupt_words(generator: random.Random) -> list[int]:
 
 def device_words(generator: random.Random) -> list[int]:
     """An access to a timer or port that native code makes by itself."""
-    name = generator.choice(("TMR1", "TMR2", "TMR3", "PR1", "PR2", "PR3", "LATA", "LATD", "LATF", "PORTA", "PORTB", "PORTD", "TRISD"))
+    name = generator.choice(DEVICE_REGISTERS)
     address = DSPIC30F6014A.sfrs[name].address
     if generator.random() < 0.4:
         return words_of("MOV{.W} f, Wnd", f=address, d=generator.randrange(8))
