@@ -373,3 +373,54 @@ def test_slave_matches_ten_bit_addresses(slave):
     run_slave(slave, lambda: seen.append((slave.read("I2CRCV"), slave.field("I2CSTAT", "ADD10"))))
     assert result.acknowledged == [True, True, True]
     assert seen == [(0xA5, 1), (0x33, 1)]
+
+
+def sniff(rig, cycles):
+    """What a logic analyser on RG2 and RG3 decodes: S, P and (byte, acknowledged)."""
+    seen, bits = [], []
+    pins = rig.dev.pins
+    before = pins.get("RG2"), pins.get("RG3")
+    end = rig.events.now + cycles
+    while rig.events.now < end:
+        rig.at(rig.events.now + 3)
+        scl, sda = pins.get("RG2"), pins.get("RG3")
+        if before[0] and scl and sda != before[1]:
+            seen.append("P" if sda else "S")
+            bits = []
+        elif scl and not before[0]:
+            bits.append(sda)
+            if len(bits) == 9:
+                seen.append((int("".join(map(str, bits[:8])), 2), not bits[8]))
+                bits = []
+        before = scl, sda
+        step = rig.pending and rig.pending[0]
+        if step and rig.flag("MI2CIF"):
+            rig.clear_flags()
+            name, value = rig.pending.pop(0)
+            rig.write(name, value)
+    return seen
+
+
+def test_a_logic_analyser_decodes_the_transaction_from_the_pins(bus):
+    """§11: start, address, register, repeated start, address, data with NACK, stop; the slave stretches each byte."""
+    memory = Memory()
+    memory.delay = 700
+    bus.dev.i2c.wire.attach(0x6E, memory)
+    bus.pending = [
+        ("I2CTRN", 0xDC),
+        ("I2CTRN", 0x5A),
+        ("I2CCON", BASE | RSEN),
+        ("I2CTRN", 0xDD),
+        ("I2CCON", BASE | RCEN),
+        ("I2CCON", BASE | ACKEN | ACKDT),
+        ("I2CCON", BASE | PEN),
+    ]
+    bus.write("I2CCON", BASE | SEN)
+    assert sniff(bus, 15_000) == ["S", (0xDC, True), (0x5A, True), "S", (0xDD, True), (0x5A, False), "P"]
+
+
+def test_a_logic_analyser_sees_the_missing_acknowledge(bus):
+    """§11: nobody answers at 0x3C."""
+    bus.pending = [("I2CTRN", 0x3C), ("I2CCON", BASE | PEN)]
+    bus.write("I2CCON", BASE | SEN)
+    assert sniff(bus, 5_000) == ["S", (0x3C, False), "P"]
