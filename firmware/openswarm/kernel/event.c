@@ -28,18 +28,23 @@ void event_init(void)
 
 /* ---- Registration ------------------------------------------------------------------------------------------- */
 
-static HAL_INLINE event *find(uint16 id)
+static HAL_OUTLINE event *find_from(event *e, uint16 id)
 {
-    event *e = events[id % BUCKETS];
     while (e != NULL && e->id != id) {
         e = e->next;
     }
     return e;
 }
 
+static HAL_INLINE event *find(uint16 id)
+{
+    event *first = events[id % BUCKETS];
+    return first != NULL && first->id == id ? first : find_from(first, id);
+}
+
 event *event_find(uint16 id)
 {
-    return find(id);
+    return find_from(events[id % BUCKETS], id);
 }
 
 static HAL_OUTLINE bool event_awaited(const event *e)
@@ -66,26 +71,21 @@ bool Sys_Register_Event(uint16 id)
         return os_refuse();
     }
     hal_lock_state lock = os_lock_slice();
-    event **link = &events[id % BUCKETS];
-    while (*link != NULL && (*link)->id != id) {
-        link = &(*link)->next;
-    }
-    bool registered = *link != NULL;
-    if (!registered) {
-        event *e = heap_take(sizeof *e);
+    event *e = event_find(id);
+    if (e == NULL) {
+        e = heap_take(sizeof *e);
         if (e != NULL) {
             e->id = id;
-            e->next = NULL;
+            e->next = events[id % BUCKETS]; /* the application's events are found before the system's */
             e->subscribers = NULL;
             hal_barrier();
-            *link = e;
-            registered = true;
+            events[id % BUCKETS] = e;
         } else {
             os_fail(SYS_ERROR_MEMORY);
         }
     }
     hal_unlock(lock);
-    return registered;
+    return e != NULL;
 }
 
 static void unlink_subscription(subscription **link)
@@ -255,11 +255,12 @@ static HAL_OUTLINE bool refuse_message(uint16 id, sys_error error)
     return os_fail(error);
 }
 
+typedef uint16 __attribute__((may_alias)) any_word;
+
 static HAL_INLINE void copy(void *to, const void *from, uint16 size)
 {
-    if (size == sizeof(uint16)) { /* most events; a byte each, because from may be odd */
-        ((uint8 *)to)[0] = ((const uint8 *)from)[0];
-        ((uint8 *)to)[1] = ((const uint8 *)from)[1];
+    if (size == sizeof(any_word) && ((uintptr_t)from & 1u) == 0) { /* most events */
+        *(any_word *)to = *(const any_word *)from;
     } else if (size != 0) {
         memcpy(to, from, size);
     }
@@ -268,7 +269,10 @@ static HAL_INLINE void copy(void *to, const void *from, uint16 size)
 bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
 {
     sys_error error = SYS_OK;
-    if ((size > SYS_SMALL_PAYLOAD && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) || (data == NULL && size != 0)) {
+    if (HAL_UNLIKELY(size > SYS_SMALL_PAYLOAD) && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) {
+        return os_fail(SYS_ERROR_ARGUMENT);
+    }
+    if (HAL_UNLIKELY(data == NULL) && size != 0) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
     hal_lock_state lock = hal_lock_slice();

@@ -14,7 +14,7 @@
 #define HAL_OUTLINE __attribute__((noinline))            /* cold */
 #define HAL_ALLOCATION_FAILS() false
 
-typedef uint8_t hal_lock_state; /* low byte of SR */
+typedef uint16_t hal_lock_state; /* SR; its low byte is restored */
 typedef uint16_t hal_limit;
 
 #define CPU_TEXT_(x) #x
@@ -37,12 +37,11 @@ static HAL_INLINE void cpu_raise_ipl(uint8_t bit)
 
 static HAL_INLINE hal_lock_state hal_lock_slice(void)
 {
-    hal_lock_state before = CPU_SRL;
-    /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. */
-    __asm__ volatile("mov [w15+" CPU_TEXT(HAL_CALL_DEPTH) "], w0" ::: CPU_W0);
-    if (!(before & CPU_IPL_DEVICE)) {
-        cpu_raise_ipl(CPU_IPL_SLICE);
-    }
+    hal_lock_state before = SR;
+    /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. Level device
+     * or above stays; otherwise IPL 1, and the NOP is the harmless instruction of cpu_raise_ipl(). */
+    __asm__ volatile("mov [w15+" CPU_TEXT(HAL_CALL_DEPTH) "], w0\n\tbtss %0, #7\n\tbset _SR, #5\n\tnop" ::"r"(before)
+                     : CPU_W0, "memory");
     return before;
 }
 
@@ -53,7 +52,7 @@ static HAL_INLINE void hal_enter_slice(void)
 
 static HAL_INLINE hal_lock_state hal_lock_devices(void)
 {
-    hal_lock_state before = CPU_SRL;
+    hal_lock_state before = SR;
     cpu_raise_ipl(CPU_IPL_DEVICE);
     return before;
 }
@@ -61,7 +60,7 @@ static HAL_INLINE hal_lock_state hal_lock_devices(void)
 static HAL_INLINE void hal_unlock(hal_lock_state before)
 {
     __asm__ volatile("" ::: "memory");
-    CPU_SRL = before;
+    CPU_SRL = (uint8_t)before;
 }
 
 static HAL_INLINE bool hal_in_thread(void)
