@@ -119,7 +119,7 @@ def test_a_firmware_that_sleeps_inside_a_trap_has_given_up(build, capfd):
     )
     assert main(["run", path]) == 1
     err = capfd.readouterr().err
-    assert "AddressError trap, in whose handler the firmware went to sleep, at 0x00010c (_forever)" in err
+    assert "AddressError trap, in whose handler the firmware went to sleep, at 0x00010a (_forever)" in err
 
 
 @pytest.mark.parametrize(
