@@ -170,14 +170,25 @@ def _make_pointer(loop: Loop, counter: Counter, scale: int, sums: list[tuple[Ins
         pointer.blocks.append(name)
     loop.header.instrs.insert(0, pointer)
     home = next(block for block in loop.body if counter.step in block.instrs)
-    home.instrs.insert(home.instrs.index(counter.step) + 1, step)
+    stride = counter.amount * scale
+    early = next((i for i, _, ahead in sums if stride < 0 and ahead == stride and i in home.instrs), None)
+    if early is not None:  # walking down, the stepped pointer is the one wanted: addressing gets [--Wn]
+        home.instrs.insert(home.instrs.index(early), step)
+    else:
+        home.instrs.insert(home.instrs.index(counter.step) + 1, step)
     loop.inside |= {id(pointer), id(step)}
     for i, _, ahead in sums:
-        if ahead:
+        if i is early:
+            _replace(loop.f, i, step)
+        elif ahead:
             i.args = [pointer, const(I16, ahead)]
         else:
-            for user in _users(loop.f, i):
-                user.args = [pointer if a is i else a for a in user.args]
+            _replace(loop.f, i, pointer)
+
+
+def _replace(f: Function, old: Instr, new: Instr) -> None:
+    for user in _users(f, old):
+        user.args = [new if a is old else a for a in user.args]
 
 
 # ---------------------------------------------------------------------------------------------------------------------
