@@ -185,7 +185,10 @@ def loop_depths(f: Function) -> dict[str, int]:
 
 
 def natural_loops(succs: dict[str, list[str]], entry: str) -> dict[str, set[str]]:
-    """Header -> blocks of its loop, from the back edges of a depth-first search."""
+    """Header -> blocks of its loop, from the back edges of a depth-first search.
+
+    Cycles that can be entered elsewhere than at the header are left out: walking back from their tail reaches `entry`.
+    """
     state = {entry: 1}
     back: list[tuple[str, str]] = []
     stack = [(entry, list(succs[entry]))]
@@ -214,7 +217,7 @@ def natural_loops(succs: dict[str, list[str]], entry: str) -> dict[str, set[str]
             if n not in body:
                 body.add(n)
                 work += preds[n]
-    return bodies
+    return {head: body for head, body in bodies.items() if head == entry or entry not in body}
 
 
 def dead_code(f: Function) -> None:
