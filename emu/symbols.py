@@ -61,7 +61,7 @@ class Symbols:
         return self._by_name.get("_" + name) or self._by_name.get(name)
 
     def code(self, pc: int) -> tuple[Symbol, int] | None:
-        """The function or label `pc` belongs to, and the distance from it in PC units."""
+        """The function or label `pc` belongs to, and the distance from it in PC units; None behind a function's end."""
         return self._code.below(pc)
 
     def data(self, address: int) -> tuple[Symbol, int] | None:
@@ -104,7 +104,9 @@ class _Ladder:
         for symbols, addresses in ((self._good, self._good_addresses), (self._all, self._addresses)):
             index = bisect_right(addresses, address) - 1
             if index >= 0:
-                return symbols[index], address - addresses[index]
+                distance = address - addresses[index]
+                if not symbols[index].size or distance < symbols[index].size:
+                    return symbols[index], distance
         return None
 
     def at(self, address: int) -> list[Symbol]:

@@ -75,6 +75,7 @@ def test_an_address_is_named_by_function_or_global_label_never_by_compiler_label
     assert symbols.text(0x106) == "_main+0x2"
     assert symbols.text(0x100) == "__reset"
     assert symbols.text(0x202) == "_helper+0x2"
+    assert symbols.text(0x204) == "0x000204"
     assert symbols.text(0x002) == "0x000002"
 
 
