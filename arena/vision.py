@@ -1,0 +1,175 @@
+"""What a robot's camera sees: rays through pixel columns, with heights (epuck.md §7.6).
+
+A ray through column u hits discs and a wall; a pixel's row says at which height it passes each of them. What is nearest
+and tall enough is seen. `Eye.classes` answers for many columns of one row at once, `Eye.column` for one column: two ways
+to the same answer, compared in the tests. Lengths cm; rows and columns are those of the upright 640 x 480 picture.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arena import bodies
+from arena.scene import Scene
+from arena.world import Poses
+
+NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE = range(6)
+"""What a pixel shows; NOTHING is only an answer of the whole sensor, ABOVE is the room over the walls."""
+NAMES: Final = ("nothing", "object", "robot", "wall", "floor", "above")
+
+COLOURS: Final = np.array(
+    [(100, 90, 90), (90, 14, 14), (10, 48, 14), (112, 100, 100), (100, 90, 88), (120, 110, 110)], dtype=np.uint8
+)
+"""As the sensor shows them in the light of the experiment: made to lie near the references of the firmware's
+classifier, red (80,0,0), green (0,40,0), white (100,80,80) (openswarm-original.md §8). UNVERIFIED on a robot."""
+
+_NEAREST: Final = 0.05
+"""Depth of what touches the lens."""
+Disc = tuple[float, float, float, float, int]
+"""Ahead and left of the camera, radius, height, class."""
+
+
+class Eye:
+    """One robot's view at one pose of everything. `own` is the index of the robot that looks, at (x, y, heading)."""
+
+    def __init__(self, scene: Scene, poses: Poses, own: int, pose: tuple[float, float, float] | None = None) -> None:
+        x, y, heading = pose if pose is not None else poses.robots[own]
+        self._cos, self._sin = math.cos(heading), math.sin(heading)
+        self._x = x + bodies.CAMERA_AHEAD * self._cos
+        self._y = y + bodies.CAMERA_AHEAD * self._sin
+        self._width, self._height = scene.arena.width_cm, scene.arena.height_cm
+        self._range = scene.camera.range_cm
+        self.discs: Final[list[Disc]] = []
+        self._collect([place for place in poses.objects], scene.objects.radius_cm, bodies.OBJECT_HEIGHT, OBJECT)
+        others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
+        self._collect(others, bodies.ROBOT_RADIUS, bodies.ROBOT_HEIGHT, ROBOT)
+        self.discs.sort()
+
+    def _collect(self, places: list[tuple[float, float]], radius: float, height: float, kind: int) -> None:
+        """Keep what the picture's widest ray can touch within range."""
+        cos, sin, own_x, own_y = self._cos, self._sin, self._x, self._y
+        limit = self._range + radius
+        for x, y in places:
+            dx, dy = x - own_x, y - own_y
+            ahead = dx * cos + dy * sin
+            if -radius < ahead < limit:
+                left = dy * cos - dx * sin
+                if abs(left) - 1.2 * radius < 0.54 * (ahead + radius):  # tan 28 deg, and the ray's slope to the rim
+                    self.discs.append((ahead, left, radius, height, kind))
+
+    def hits(self, slope: float, discs: list[Disc] | None = None) -> list[tuple[float, float, int]]:
+        """(depth, height, class) of the discs a ray meets, nearest first; slope = left per ahead."""
+        found = []
+        a = 1 + slope * slope
+        reach = self._range / math.sqrt(a)
+        for ahead, left, radius, height, kind in self.discs if discs is None else discs:
+            b = ahead + slope * left
+            c = ahead * ahead + left * left - radius * radius
+            root = b * b - a * c
+            if root <= 0 or b <= 0:
+                continue
+            depth = max((b - math.sqrt(root)) / a, _NEAREST)
+            if depth <= reach:
+                found.append((depth, height, kind))
+        found.sort()
+        return found
+
+    def wall_depth(self, slope: float) -> float:
+        """Depth at which a ray meets a wall."""
+        east = self._cos - slope * self._sin
+        north = self._sin + slope * self._cos
+        to_x = (self._width - self._x) / east if east > 0 else -self._x / east if east < 0 else math.inf
+        to_y = (self._height - self._y) / north if north > 0 else -self._y / north if north < 0 else math.inf
+        return max(min(to_x, to_y), _NEAREST)
+
+    def column(self, u: float, rows: tuple[int, ...], discs: list[Disc] | None = None) -> list[int]:
+        """Classes of the pixels of one column in some rows."""
+        slope = slope_of(u)
+        hits = self.hits(slope, discs)
+        wall = -1.0
+        seen = []
+        for v in rows:
+            rise = (bodies.CENTRE_Y - v) / bodies.FOCAL_PIXELS
+            for depth, height, kind in hits:
+                z = bodies.CAMERA_HEIGHT + rise * depth
+                if z < 0:
+                    seen.append(FLOOR)
+                    break
+                if z <= height:
+                    seen.append(kind)
+                    break
+            else:
+                if wall < 0:
+                    wall = self.wall_depth(slope)
+                z = bodies.CAMERA_HEIGHT + rise * wall
+                seen.append(FLOOR if z < 0 else WALL if z <= bodies.WALL_HEIGHT else ABOVE)
+        return seen
+
+    def within(self, u_low: float, u_high: float) -> list[Disc]:
+        """The discs that rays through columns u_low..u_high can meet: a quick, generous choice."""
+        right, left = slope_of(u_high), slope_of(u_low)
+        return [
+            disc
+            for disc in self.discs
+            if disc[1] - 1.1 * disc[2] <= left * disc[0] and disc[1] + 1.1 * disc[2] >= right * disc[0]
+        ]
+
+    def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Classes of the pixels of one row in some columns."""
+        slopes = (bodies.CENTRE_X - columns) / bodies.FOCAL_PIXELS
+        rise = (bodies.CENTRE_Y - v) / bodies.FOCAL_PIXELS
+        a = 1 + slopes * slopes
+        nearest = self._wall_depths(slopes)
+        z = bodies.CAMERA_HEIGHT + rise * nearest
+        seen = np.where(z < 0, FLOOR, np.where(z <= bodies.WALL_HEIGHT, WALL, ABOVE))
+        blocked = np.full(len(slopes), math.inf)
+        for ahead, left, radius, height, kind in self.within(float(columns.min()), float(columns.max())):
+            b = ahead + slopes * left
+            root = b * b - a * (ahead * ahead + left * left - radius * radius)
+            meets = (root > 0) & (b > 0)
+            depth = np.maximum((b - np.sqrt(np.where(meets, root, 0.0))) / a, _NEAREST)
+            z = bodies.CAMERA_HEIGHT + rise * depth
+            shows = meets & (depth * np.sqrt(a) <= self._range) & (z <= height) & (depth < blocked)
+            seen[shows] = np.where(z < 0, FLOOR, kind)[shows]
+            blocked[shows] = depth[shows]
+        return seen
+
+    def _wall_depths(self, slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+        east = self._cos - slopes * self._sin
+        north = self._sin + slopes * self._cos
+        with np.errstate(divide="ignore", invalid="ignore"):
+            to_x = np.where(east > 0, (self._width - self._x) / east, -self._x / east)
+            to_y = np.where(north > 0, (self._height - self._y) / north, -self._y / north)
+        to_x[east == 0] = math.inf
+        to_y[north == 0] = math.inf
+        return np.maximum(np.minimum(to_x, to_y), _NEAREST)
+
+
+def slope_of(u: float) -> float:
+    """Left per ahead of the ray through column u (epuck.md §7.6)."""
+    return (bodies.CENTRE_X - u) / bodies.FOCAL_PIXELS
+
+
+# -- the sensor of the clustering firmware (openswarm-original.md §8, revision A) ---------------------------------------
+
+WINDOW_COLUMNS: Final = tuple(240 + 8 * x for x in (6, 9, 12, 15))
+WINDOW_ROWS: Final = tuple(160 + 8 * y for y in (4, 6, 8, 10, 12, 14))
+"""Its 24 pixels in the whole picture: every 8th pixel of the 160 x 160 in the middle."""
+VOTES: Final = 2
+
+
+def sensor_of(eye: Eye) -> int:
+    """OBJECT, ROBOT or NOTHING by the votes of 24 pixels with perfect colours."""
+    discs = eye.within(WINDOW_COLUMNS[0], WINDOW_COLUMNS[-1])
+    if not discs:
+        return NOTHING
+    red = green = 0
+    for u in WINDOW_COLUMNS:
+        seen = eye.column(u, WINDOW_ROWS, discs)
+        red += seen.count(OBJECT)
+        green += seen.count(ROBOT)
+    return OBJECT if red >= VOTES else ROBOT if green >= VOTES else NOTHING

@@ -1,0 +1,177 @@
+"""The world seen from above: walls, discs that rub on the floor, e-pucks with force-limited wheels (epuck.md §4).
+
+Lengths cm, masses kg, time s. One `step` is one quantum, always of the same length; what acts on the bodies between two
+steps is only the wheel speeds given to it. The same calls give the same numbers, to the bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import pymunk
+from numpy.typing import NDArray
+
+from arena import bodies
+from arena.placement import place_all
+from arena.scene import Scene
+
+ITERATIONS: Final = 20
+"""Of the constraint solver (epuck.md §4)."""
+WALL_THICKNESS: Final = 20.0
+"""Half thickness of the walls' segments in cm: nothing tunnels through."""
+STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START = range(4)
+"""Independent generators of a trial: `generator(seed, stream, robot)`."""
+
+
+def generator(seed: int, stream: int, robot: int = 0) -> np.random.Generator:
+    """The generator of one purpose and robot, independent of all others."""
+    return np.random.default_rng([seed, stream, robot])
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Where everything is. Robots: x, y, heading; objects: x, y. cm and rad."""
+
+    robots: list[tuple[float, float, float]]
+    objects: list[tuple[float, float]]
+
+
+class World:
+    """One arena with everything in it, placed by `seed`. Raises SceneError if there is no room."""
+
+    def __init__(self, scene: Scene, seed: int) -> None:
+        robots, objects = place_all(scene, generator(seed, STREAM_WORLD))
+        self._build(scene, seed, robots, objects)
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        seed: int,
+        robots: Sequence[tuple[float, float, float]],
+        objects: Sequence[tuple[float, float]],
+    ) -> World:
+        """A world with everything at given places (cm, rad): for calibrations and tests."""
+        world = cls.__new__(cls)
+        world._build(scene, seed, robots, objects)
+        return world
+
+    def _build(
+        self,
+        scene: Scene,
+        seed: int,
+        robots: Sequence[tuple[float, float, float]],
+        objects: Sequence[tuple[float, float]],
+    ) -> None:
+        self.scene = scene
+        self.dt = scene.clock.quantum_tcy / 14_745_600
+        self.ticks = 0
+        """Steps made so far."""
+        self.space = pymunk.Space()
+        self.space.iterations = ITERATIONS
+        self.space.collision_slop = 0.01
+        self._add_walls()
+        self.robots = [self._add_robot(*pose) for pose in robots]
+        self._drives = [self._add_drive(body) for body in self.robots]
+        self.objects = [self._add_object(x, y) for x, y in objects]
+        self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
+        self._noise = [(1.0, 1.0)] * len(robots)
+        self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
+        self.poses = self._read()
+
+    # -- building ----------------------------------------------------------------------------------------------------
+
+    def _add_walls(self) -> None:
+        width, height, half = self.scene.arena.width_cm, self.scene.arena.height_cm, WALL_THICKNESS
+        corners = [(-half, -half), (width + half, -half), (width + half, height + half), (-half, height + half)]
+        for one, other in zip(corners, corners[1:] + corners[:1], strict=True):
+            wall = pymunk.Segment(self.space.static_body, one, other, half)
+            wall.friction = bodies.CONTACT_FRICTION
+            self.space.add(wall)
+
+    def _disc(self, mass: float, radius: float, x: float, y: float) -> pymunk.Body:
+        body = pymunk.Body(mass, bodies.disc_moment(mass, radius))
+        body.position = x, y
+        shape = pymunk.Circle(body, radius)
+        shape.friction = math.sqrt(bodies.CONTACT_FRICTION)  # pymunk multiplies the two
+        self.space.add(body, shape)
+        return body
+
+    def _add_robot(self, x: float, y: float, heading: float) -> pymunk.Body:
+        body = self._disc(bodies.ROBOT_MASS, bodies.ROBOT_RADIUS, x, y)
+        body.angle = heading
+        return body
+
+    def _add_drive(self, robot: pymunk.Body) -> pymunk.Body | None:
+        """The wheels: a body that moves as commanded and pulls the robot along with at most the tyres' grip."""
+        thrust = self.scene.robots.thrust_n
+        if math.isinf(thrust):
+            return None
+        wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        push = pymunk.PivotJoint(wheels, robot, (0, 0), (0, 0))
+        turn = pymunk.GearJoint(wheels, robot, 0.0, 1.0)
+        for joint, force in ((push, bodies.newton(thrust)), (turn, bodies.newton(thrust) * self.scene.robots.axle_cm / 2)):
+            joint.max_bias = 0.0
+            joint.max_force = force
+            self.space.add(joint)
+        self.space.add(wheels)
+        return wheels
+
+    def _add_object(self, x: float, y: float) -> pymunk.Body:
+        """Its friction on the floor is two joints of limited force that want it to stand still."""
+        setting = self.scene.objects
+        body = self._disc(setting.mass_kg, setting.radius_cm, x, y)
+        grip = pymunk.PivotJoint(self.space.static_body, body, (0, 0), (0, 0))
+        hold = pymunk.GearJoint(self.space.static_body, body, 0.0, 1.0)
+        mu = setting.floor_friction
+        grip.max_force = bodies.floor_force(setting.mass_kg, mu)
+        hold.max_force = bodies.floor_torque(setting.mass_kg, setting.radius_cm, mu)
+        for joint in (grip, hold):
+            joint.max_bias = 0.0
+            self.space.add(joint)
+        return body
+
+    # -- one quantum -------------------------------------------------------------------------------------------------
+
+    def step(self, wheels: Sequence[tuple[float, float]]) -> None:
+        """Act and physics: wheel speeds (left, right) in cm/s as commanded, for one quantum."""
+        self._draw_noise()
+        axle, dt = self.scene.robots.axle_cm, self.dt
+        for index, (left, right) in enumerate(wheels):
+            noise = self._noise[index]
+            left, right = left * noise[0], right * noise[1]
+            body, drive = self.robots[index], self._drives[index]
+            turn = (right - left) / axle
+            ahead = (left + right) / 2
+            heading = self.poses.robots[index][2] + turn * dt / 2
+            moved = drive if drive is not None else body
+            moved.velocity = ahead * math.cos(heading), ahead * math.sin(heading)
+            moved.angular_velocity = turn
+        self.space.step(dt)
+        self.ticks += 1
+        self.poses = self._read()
+
+    def _draw_noise(self) -> None:
+        share = self.scene.robots.wheel_noise
+        if not share or self.ticks % self._noise_ticks:
+            return
+        for index, rng in enumerate(self._wheel_rng):
+            left, right = rng.uniform(1 - share, 1 + share, 2).tolist()
+            self._noise[index] = left, right
+
+    def _read(self) -> Poses:
+        robots = [(*body.position, body.angle) for body in self.robots]
+        return Poses(robots, [(x, y) for x, y in (body.position for body in self.objects)])
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start."""
+        return self.ticks * self.scene.clock.quantum_tcy / 14_745_600
+
+    def object_places(self) -> NDArray[np.float64]:
+        """Objects' centres, n x 2, cm."""
+        return np.array(self.poses.objects, dtype=float).reshape(-1, 2)
