@@ -11,6 +11,7 @@ import argparse
 import json
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -69,6 +70,7 @@ def cycles(level: str, folder: Path, names: list[str]) -> dict[str, int]:
     if driver.main([level, "-fno-lto", *sources, "-o", str(image)]) != 0:
         raise SystemExit(1)
     machine = emu.load(image, engine="interp")
+    assert machine.image is not None
     entries = {symbol.address: name for name in names if (symbol := machine.image.symbols.find("_" + name))}
     measured: dict[str, int] = {}
     while len(measured) < len(entries):
@@ -76,9 +78,14 @@ def cycles(level: str, folder: Path, names: list[str]) -> dict[str, int]:
         if stop.reason != "until":
             break
         name, start, top = entries[machine.pc], machine.cycle, machine.w[15]
-        machine.run(cycles=2_000_000, until=lambda depth=top: machine.w[15] == depth - 4)
+        machine.run(cycles=2_000_000, until=_returned(machine, top - 4))
         measured[name] = machine.cycle - start
     return measured
+
+
+def _returned(machine: emu.Machine, depth: int) -> Callable[[], bool]:
+    """True when the stack pointer is back where it was before the call."""
+    return lambda: machine.w[15] == depth
 
 
 def measure(level: str) -> list[Figure]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shlex
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -128,13 +129,18 @@ def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
     return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
 
 
-def run_jobs(jobs: list[Job], parallel: int) -> None:
+def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
     """Run `jobs`, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
 
+    With `show` the commands are printed first.
     Raises CompileError after the last job when any of them failed.
     """
     program = clang_program()
     colour = ["-fdiagnostics-color=always"] if os.isatty(2) else []
+
+    if show:
+        for job in jobs:
+            print(shlex.join([*program, *job.arguments]), file=sys.stderr)
 
     def run(job: Job) -> subprocess.CompletedProcess[bytes]:
         return subprocess.run([*program, *colour, *job.arguments], capture_output=True, check=False)

@@ -78,7 +78,7 @@ def _preprocess(options: CcOptions) -> None:
 
     jobs = [preprocess_job(options, item, options.output) for item in options.inputs
             if item.language in IR_SOURCES | {"assembler-with-cpp"}]  # fmt: skip
-    run_jobs(jobs, options.jobs)
+    run_jobs(jobs, options.jobs, options.verbose)
 
 
 def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
@@ -89,7 +89,7 @@ def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     sources = [item for item in options.inputs if item.language in IR_SOURCES]
     targets = {item: scratch / f"{number}.front.ll" for number, item in enumerate(sources)}
     if targets:
-        run_jobs([ir_job(options, item, target) for item, target in targets.items()], options.jobs)
+        run_jobs([ir_job(options, item, target) for item, target in targets.items()], options.jobs, options.verbose)
     modules: dict[Input, bytes] = {}
     for item in options.inputs:
         if item in targets:
@@ -109,7 +109,7 @@ def _optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
     os.write(handle, ir)
     os.close(handle)
     after = Path(before).with_suffix(".opt.ll")
-    run_jobs([optimise_job(options, Path(before), after)], 1)
+    run_jobs([optimise_job(options, Path(before), after)], 1, options.verbose)
     return after.read_text()
 
 

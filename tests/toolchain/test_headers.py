@@ -1,0 +1,90 @@
+"""The headers: the generated device header is current, and layouts and limits are XC16's (abi-elf.md §1)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from tests.toolchain.c_programs import build, run
+from toolchain.device_header import HEADER, header
+
+INCLUDE = Path(__file__).resolve().parents[2] / "toolchain" / "include"
+
+
+def test_the_committed_device_header_is_what_the_generator_writes() -> None:
+    """Refresh with `python -m toolchain.device_header`."""
+    assert HEADER.read_text() == header(DSPIC30F6014A)
+
+
+def test_every_register_has_the_address_of_the_chip_table(tmp_path: Path) -> None:
+    """dspic30f6014a.md §1: all registers at once, words, bytes and bit-field structs, through the linker.
+
+    Compared at run time: the compiler takes for granted that no object has the address of WREG0.
+    """
+    names = list(DSPIC30F6014A.sfrs.values())
+    rows = ", ".join(f"{{(unsigned)&{sfr.name}, sizeof {sfr.name}, {sfr.address}, {sfr.size}}}" for sfr in names)
+    fields = "".join(
+        f"    if ((unsigned)&{sfr.name}bits != {sfr.address} || sizeof {sfr.name}bits > {sfr.size}) return 2;\n"
+        for sfr in names
+        if sfr.fields
+    )
+    (tmp_path / "a.c").write_text(
+        f"""#include <dspic30f6014a.h>
+int main(void)
+{{
+    static const volatile struct {{ unsigned at, size, want, want_size; }} rows[] = {{ {rows} }};
+    for (unsigned i = 0; i < sizeof rows / sizeof *rows; i++)
+        if (rows[i].at != rows[i].want || rows[i].size != rows[i].want_size) return 1;
+{fields}    return 0;
+}}
+"""
+    )
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
+    assert (built.status, built.messages) == (0, "")
+    assert run(tmp_path / "a.elf", engine="interp").status == 0
+
+
+def test_bit_fields_are_where_the_chip_table_says(tmp_path: Path) -> None:
+    """Every field of every register that is plain memory for software: write all ones through the struct."""
+    lines = []
+    for sfr in DSPIC30F6014A.sfrs.values():
+        for name, (lsb, width) in sfr.fields.items():
+            mask = (1 << width) - 1 << lsb
+            lines.append(
+                f"    {{ union {{ {sfr.name}BITS bits; unsigned word; }} u = {{0}}; u.bits.{name} = ~0; "
+                f"if (u.word != {mask:#x}u) return 1; }}"
+            )
+    body = "\n".join(lines)
+    (tmp_path / "a.c").write_text(f"#include <dspic30f6014a.h>\nint main(void)\n{{\n{body}\n    return 0;\n}}\n")
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall", "-Wno-bitfield-constant-conversion")
+    assert (built.status, built.messages) == (0, "")
+    assert run(tmp_path / "a.elf", engine="interp").status == 0
+
+
+@pytest.mark.parametrize("path", sorted(INCLUDE.glob("*.h")), ids=lambda p: p.name)
+def test_header_stands_alone_and_twice(path: Path, tmp_path: Path) -> None:
+    """Each header includes what it needs, and may be included again."""
+    line = f"#include <{path.name}>\n"
+    (tmp_path / "a.c").write_text(line + line + "int main(void) { return 0; }\n")
+    built = build([tmp_path / "a.c"], tmp_path / "a.o", "-c", "-std=c11", "-Wall", "-Wextra", "-pedantic")
+    assert (built.status, built.messages) == (0, "")
+
+
+def test_configuration_words_reach_the_image(tmp_path: Path) -> None:
+    """_FOSC(CSW_FSCM_OFF & XT_PLL8) and its relatives; dspic30f6014a.md §2, abi-elf.md §6.6."""
+    (tmp_path / "a.c").write_text(
+        "#include <p30F6014A.h>\n_FOSC(CSW_FSCM_OFF & XT_PLL8);\n_FWDT(WDT_OFF);\n"
+        "_FBORPOR(PBOR_OFF & MCLR_EN & PWRT_64);\n"
+        "int main(void) { return 0; }\n"
+    )
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os")
+    assert built.status == 0, built.messages
+    from emu.loader import load_image
+
+    words = {block.base: block.words for block in load_image(tmp_path / "a.elf").blocks if block.base >= 0xF80000}
+    flat = {base + 2 * i: word & 0xFFFF for base, part in words.items() for i, word in enumerate(part)}
+    assert flat[0xF80000] == 0xFFE6
+    assert flat[0xF80002] == 0x7FFF
+    assert flat[0xF80004] == 0xFF7F
