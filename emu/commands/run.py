@@ -112,7 +112,7 @@ def run(options: argparse.Namespace) -> int:
     status = exit_status(machine, image, stop, fault) if options.exit_code else EXIT_FAULT if fault else EXIT_OK
     facts = _facts(machine, image, stop, fault, host_seconds)
     if options.stats:
-        facts["stats"] = _statistics(machine)
+        facts["stats"] = _statistics(machine, host_seconds)
     for number, count in lost.items():
         print(f"emu run: UART{number}: {count} bytes lost, nobody read them", file=sys.stderr)
     if options.json:
@@ -131,6 +131,9 @@ def _machine(options: argparse.Namespace, image: Image) -> Machine:
         machine = Machine(image.chip, engine=options.engine, ipl_slip=options.ipl_slip, board=board_of(options))
     except ValueError as error:
         raise CommandError(str(error)) from None
+    measure_time = getattr(machine.runner, "measure_time", None)
+    if options.stats and measure_time is not None:
+        measure_time()
     machine.load(image)
     set_up(machine, options)
     for address in _addresses(image, options.breaks):
@@ -233,10 +236,17 @@ def _facts(machine: Machine, image: Image, stop: Stop, fault: Fault | None, host
     return facts
 
 
-def _statistics(machine: Machine) -> dict[str, Any]:
-    """What the engine counted, if it counts, and the resets seen."""
-    counts = getattr(machine.runner, "counts", None)
-    return {"engine": machine.engine, "resets": len(machine.resets), **(asdict(counts) if counts else {})}
+def _statistics(machine: Machine, host_seconds: float) -> dict[str, Any]:
+    """What the engine counted, if it counts, the resets seen, and where the time of the host went."""
+    runner = machine.runner
+    counts = getattr(runner, "counts", None)
+    facts = {"engine": machine.engine, "resets": len(machine.resets), **(asdict(counts) if counts else {})}
+    seconds: dict[str, float] | None = getattr(runner, "seconds", None)
+    if seconds is not None:
+        facts["interrupts entered natively"] = getattr(runner, "interrupts", 0)
+        facts |= {f"seconds in {activity}": round(spent, 3) for activity, spent in seconds.items()}
+        facts["seconds in events and console"] = round(max(host_seconds - sum(seconds.values()), 0.0), 3)
+    return facts
 
 
 def _place(image: Image, pc: int) -> dict[str, str | None]:

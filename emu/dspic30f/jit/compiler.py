@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -33,6 +34,17 @@ class Refused(RuntimeError):
     """LLVM did not accept generated IR: a defect of the translator."""
 
 
+def packed(entries: Sequence[int], code: bytes) -> bytes:
+    """An object and the program addresses at which it can be entered, as one blob."""
+    return struct.pack(f"<I{len(entries)}I", len(entries), *entries) + code
+
+
+def unpacked(blob: bytes) -> tuple[list[int], bytes]:
+    """The two parts of `packed`."""
+    (count,) = struct.unpack_from("<I", blob)
+    return list(struct.unpack_from(f"<{count}I", blob, 4)), blob[4 + 4 * count :]
+
+
 class Compiler:
     """Objects by name. Every module exports one function, called `entry`."""
 
@@ -42,7 +54,7 @@ class Compiler:
         self._process: subprocess.Popen[bytes] | None = None
         self._selector = selectors.DefaultSelector()
         self._received = bytearray()
-        self._waiting: dict[int, tuple[str, object]] = {}
+        self._waiting: dict[int, tuple[str, Sequence[int], object]] = {}
         self._outbox: deque[tuple[int, int, bytes]] = deque()
         self._in_flight = False
         self._tickets = 0
@@ -66,32 +78,34 @@ class Compiler:
         """Name of the object for a piece of code identified by what it is made from (not by its IR text)."""
         return self.cache.key(self._host_name(), bytes([level]), *identity)
 
-    def from_disk(self, key: str) -> int | None:
-        """Address of the cached code for `key`, or None."""
-        code = self.cache.get(key)
-        if code is None:
+    def from_disk(self, key: str) -> tuple[int, list[int]] | None:
+        """Address of the cached code for `key` and the entries kept with it, or None."""
+        blob = self.cache.get(key)
+        if blob is None:
             return None
         self.statistics.from_disk += 1
-        return self.load(code)
+        entries, code = unpacked(blob)
+        return self.load(code), entries
 
-    def now(self, text: str, level: int, key: str) -> int:
+    def now(self, text: str, level: int, key: str, entries: Sequence[int] = ()) -> int:
         """Compile `text` in this process and return its address."""
-        address = self.from_disk(key)
-        if address is not None:
-            return address
         if self._backend is None:
             self._backend = Backend()
         code = self._backend.compile(text, level)
         self.statistics.compiled += 1
-        self.cache.put(key, code)
+        self.cache.put(key, packed(entries, code))
         return self.load(code)
 
-    def request(self, text: str, level: int, key: str, tag: object) -> None:
+    def request(self, text: str, level: int, key: str, entries: Sequence[int], tag: object) -> None:
         """Have `text` compiled in the background; `poll` will yield (tag, address)."""
         self.statistics.requested += 1
         self._tickets += 1
-        self._waiting[self._tickets] = (key, tag)
-        self._outbox.append((self._tickets, level, text.encode()))
+        self._waiting[self._tickets] = (key, entries, tag)
+        piece = (self._tickets, level, text.encode())
+        if level:
+            self._outbox.append(piece)
+        else:  # quick to compile, and it ends the interpreter's share
+            self._outbox.appendleft(piece)
         self._send()
 
     def _send(self) -> None:
@@ -184,8 +198,8 @@ class Compiler:
         del received[:end]
         self._in_flight = False
         self._send()
-        key, tag = self._waiting.pop(ticket)
+        key, entries, tag = self._waiting.pop(ticket)
         self.statistics.compiled += 1
-        self.cache.put(key, code)
+        self.cache.put(key, packed(entries, code))
         self._ready.append((tag, self.load(code)))
         return True

@@ -249,12 +249,33 @@ class Latch:
         return True
 
 
+@dataclass(frozen=True)
+class Standing:
+    """A register its device changes by itself, but not before a cycle it has published."""
+
+    address: int
+    until: int
+
+    def read(self, b: LlvmBuilder) -> Number | None:
+        """What is stored, until then."""
+        b.guard(b.now < _load(b, self.until, 64))
+        return _load(b, self.address, 16)
+
+    def write(self, b: LlvmBuilder, value: Number, lanes: int) -> bool:
+        """The device's."""
+        return False
+
+
 def native_registers(core: Core) -> dict[int, NativeRegister]:
     """What can be native on this machine, by even SFR address, from the fields its devices have reserved."""
     registers: dict[int, NativeRegister] = {}
     _timers(core, registers)
     if "pins.level" in core.record.fields:
         _ports(core, registers)
+    if "adc.stands_until" in core.record.fields:
+        until, sfrs = core.record.fields["adc.stands_until"].offset, core.chip.sfrs
+        for name in ("ADCON1", "ADCON2", *(f"ADCBUF{index:X}" for index in range(16))):
+            registers[sfrs[name].address] = Standing(sfrs[name].address, until)
     return registers
 
 

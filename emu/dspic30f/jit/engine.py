@@ -7,8 +7,10 @@ yet. Code arrives from the disk cache at once or from the compile process later;
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any, Final, Protocol
 
 from emu.bus import SFR_END
@@ -54,10 +56,14 @@ class Code:
 
     context: Context
     around: Surroundings
+    identity: bytes
+    """Hash of all that code depends on apart from program words."""
     blocks: Any
     steps: Any
     regions: dict[int, set[int]] = field(default_factory=dict)
     """Start of each requested region to the program words it was made from."""
+    entries: set[int] = field(default_factory=set)
+    """Leaders of all requested regions."""
     heat: dict[int, int] = field(default_factory=dict)
     """How often an address without code was reached."""
 
@@ -95,9 +101,14 @@ class JitEngine:
         self._code: Code | None = None
         self._key: object = None
         self._dispatch: Any = None
+        self._native: Callable[..., Any] = lambda record, env: self._dispatch(record, env)
+        self._interpret: Callable[[], None] = core.sequencer.execute
+        self._run_cold: Callable[[int], None] = cold.run
         self._at: Final = {name: core.state.at[name] for name in ("CORCON", "MODCON", "XBREV", "INTCON1", "SR")}
         self._offset: Final = offsets(core)
         self.counts: Final = Counts()
+        self.seconds: dict[str, float] | None = None
+        """Host seconds by activity once `measure_time` was called."""
         core.program.changed.append(self._flash_changed)
 
     # -- the engine -------------------------------------------------------------------------------------------------
@@ -116,18 +127,37 @@ class JitEngine:
             self._prepare()
         self._env[LIMIT] = min(limit, state.cycle + NATIVE_CYCLES)
         start = state.cycle
-        why = self._dispatch(self._core.record.address, self._env_address)
+        why = self._native(self._core.record.address, self._env_address)
         self.counts.runs += 1
         if self._hooks and state.pc in self._hooks:  # the machine calls hooks, once per arrival
             if state.cycle == start:
                 sequencer.execute()
         elif why == INTERPRET:
             self.counts.interpreted += 1
-            sequencer.execute()
+            self._interpret()
         elif why in (MISS, DEADLINE):
             cycle = state.cycle
             if cycle == start or (cycle < limit and self._core.events.deadline >= cycle):
                 self._miss(limit)
+
+    def measure_time(self) -> None:
+        """Note from now on where host time goes (`emu run --stats`); costs a little itself."""
+        seconds = self.seconds = dict.fromkeys(("native code", "side effects", "cold code", "translation"), 0.0)
+
+        def timed(activity: str, work: Callable[..., Any]) -> Callable[..., Any]:
+            def run(*arguments: Any) -> Any:
+                start = perf_counter()
+                try:
+                    return work(*arguments)
+                finally:
+                    seconds[activity] += perf_counter() - start
+
+            return run
+
+        self._native = timed("native code", self._native)
+        self._interpret = timed("side effects", self._interpret)
+        self._run_cold = timed("cold code", self._run_cold)
+        self._request = timed("translation", self._request)  # type: ignore[method-assign]
 
     def forget(self) -> None:
         """Hooked addresses must come back to Python: translate anew around them."""
@@ -157,7 +187,7 @@ class JitEngine:
             if code.steps[pc >> 1]:
                 return
         self.counts.cold += 1
-        self._cold.run(min(limit, self._state.cycle + COLD_CYCLES))
+        self._run_cold(min(limit, self._state.cycle + COLD_CYCLES))
 
     # -- modes ------------------------------------------------------------------------------------------------------
     def _select(self) -> None:
@@ -189,7 +219,7 @@ class JitEngine:
                               self._words, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
                               self._native_registers(), start, end)
         table = ctypes.c_uint64 * self._words
-        return Code(context, around, table(), table())
+        return Code(context, around, identity_of(context, around), table(), table())
 
     def _native_registers(self) -> dict[int, NativeRegister]:
         """Without those somebody watches."""
@@ -199,8 +229,11 @@ class JitEngine:
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
         text = dispatch_text(boundary_of(self._core, self._offset), 2 * self._words)
-        address = self.compiler.now(text, BLOCK_LEVEL, self.compiler.key(BLOCK_LEVEL, text.encode()))
-        self._dispatch = Call(address)
+        key = self.compiler.key(BLOCK_LEVEL, text.encode())
+        kept = self.compiler.from_disk(key)
+        self._dispatch = Call(kept[0] if kept is not None else self.compiler.now(text, BLOCK_LEVEL, key))
+        if self.seconds is None:
+            self._native = self._dispatch
 
     def _fetch(self, pc: int) -> Insn | None:
         """Decoded instruction for the translator; none where Python must see the program counter."""
@@ -212,27 +245,27 @@ class JitEngine:
 
     def _request(self, code: Code, pc: int) -> None:
         """Get native code for the region at `pc`, from disk or from the compile process."""
-        region = discover(pc, self._fetch)
+        region = discover(pc, self._fetch, code.entries)
         code.regions[pc] = set()
         if not region.steps:
             return
         code.regions[pc] = {word for at, step in region.steps.items() for word in (at >> 1, (at >> 1) + 1)}
+        code.entries |= region.leaders
         self.counts.regions += 1
-        identity = (region.words(), pc, code.context, sorted(code.around.offset.items()),
-                    sorted(code.around.reads.items()), sorted(code.around.writes.items()),
-                    sorted(code.around.native.items()), code.around.idle_stops, code.around.watchdog,
-                    code.around.initialised, code.around.limit_armed, code.around.do_start, code.around.do_end)
-        name = repr(identity).encode()
+        identity = repr((region.words(), sorted(region.leaders), pc)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
+            key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
+            kept = self.compiler.from_disk(key)
+            if kept is not None:
+                address, entries = kept
+                self._install((code, entries, exact), address)
+                continue
             translator = Translator(region, code.around, code.context, exact)
-            key = self.compiler.key(level, b"exact" if exact else b"block", name)
-            text = translator.text()
-            tag = (code, translator.entries, exact)
-            address = self.compiler.now(text, level, key) if self.wait else self.compiler.from_disk(key)
-            if address is not None:
-                self._install(tag, address)
+            text, entries = translator.text(), translator.entries
+            if self.wait:
+                self._install((code, entries, exact), self.compiler.now(text, level, key, entries))
             else:
-                self.compiler.request(text, level, key, tag)
+                self.compiler.request(text, level, key, entries, (code, entries, exact))
 
     def _install(self, tag: Any, address: int) -> None:
         code, entries, exact = tag
@@ -249,6 +282,12 @@ class JitEngine:
     def close(self) -> None:
         """End the compile process."""
         self.compiler.close()
+
+
+def identity_of(context: Context, around: Surroundings) -> bytes:
+    """Hash of processor modes and surroundings."""
+    parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in vars(around).values()]
+    return hashlib.sha256(repr((context, parts)).encode()).digest()
 
 
 def offsets(core: Core) -> dict[str, int]:

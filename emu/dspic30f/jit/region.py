@@ -6,7 +6,7 @@ addresses at which native code can be entered; a block runs from a leader to the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -63,14 +63,14 @@ ENDS: Final = (Goto, Call, Return, Reset, Sleep)
 """Flows behind which the next word is not reached by falling through."""
 
 
-def discover(start: int, fetch: Fetch) -> Region:
-    """The region entered at `start`."""
+def discover(start: int, fetch: Fetch, known: Container[int] = ()) -> Region:
+    """The region entered at `start`; it ends where `known` code can be entered."""
     region = Region(start)
     work = [start]
     region.leaders.add(start)
     while work and len(region.steps) < LIMIT:
         pc = work.pop(0)
-        while pc not in region.steps and len(region.steps) < LIMIT:
+        while pc not in region.steps and len(region.steps) < LIMIT and (pc == start or pc not in known):
             insn = fetch(pc)
             if insn is None:
                 break
