@@ -22,12 +22,14 @@ unsigned digits(unsigned v, char *out) { unsigned n = 0;
   do { out[n++] = '0' + v % 10; v /= 10; } while (v); return n; }
 int divide(int a, int b) { return b ? a / b * 7 + a % b : -1; }
 int pick(int x) { switch (x & 31) {
-  case 0: return 4; case 1: return 9; case 2: return x; case 3: return -1; case 4: return 8; case 5: return x * 3; case 6: return 7; case 7: case 8: case 9: return 2; case 20: return 1; case 30: return 5; } return 0; }
+  case 0: return 4; case 1: return 9; case 2: return x; case 3: return -1; case 4: return 8;
+  case 5: return x * 3; case 6: return 7; case 7: case 8: case 9: return 2; case 20: return 1;
+  case 30: return 5; } return 0; }
 int sparse(long x) { switch (x % 200000) {
   case 1: return 5; case 3000: return 7; case 70000: return 9; case -5: return 2; }
   return 0; }
 int logic(int a, int b, int c) { return (a > 3 && b < c) || (a == b && !(c & 8)) ? a - c : b; }
-int nested(int *m, int n) { int s = 0; n &= 7; 
+int nested(int *m, int n) { int s = 0; n &= 7;
   for (int i = 0; i < n; i++) for (int j = 0; j < i; j++) s += m[i * 4 + j] ^ m[j];
   return s; }
 unsigned long bits(unsigned long v) { unsigned long r = 0;
