@@ -8,6 +8,7 @@ ratiometric: 0..65535 of AVDD, so a level of `code << 4` converts to `code`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
@@ -22,6 +23,10 @@ from emu.peripherals.timers import Timer
 FULL_SCALE: Final = 0x10000
 """AVDD in units of analog level."""
 _CONVERSION_TAD: Final = 14
+FOREVER: Final = 1 << 62
+"""A cycle that never comes, as a number native code can compare with its sign."""
+_COURSES: Final = 64
+"""Register settings remembered; firmware has a handful."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
 
 _OFF, _WAITING, _SAMPLING, _CONVERTING = range(4)
@@ -32,6 +37,33 @@ _MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
 
 AnalogSource = Callable[[int], int]
 """Analog level 0..65535 as a function of the cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What the control registers ask for; times in half Tcy."""
+
+    tad: int
+    sampling: int
+    """From the start of sampling to the conversion; NEVER if something else ends it."""
+    again: bool
+    """ASAM: sampling follows every conversion."""
+    scanned: tuple[int, ...]
+    """Channels of multiplexer A in turn; empty without scan."""
+    inputs: tuple[tuple[int, int], tuple[int, int]]
+    """(positive channel, CH0N) of multiplexers A and B."""
+    alternates: bool
+    results: int
+    """Conversions per interrupt."""
+    in_halves: bool
+    form: int
+    references: int
+    """VCFG."""
+
+    @property
+    def conversion(self) -> int:
+        """From the end of sampling to the result."""
+        return _CONVERSION_TAD * self.tad
 
 
 class Adc(Peripheral):
@@ -70,7 +102,16 @@ class Adc(Peripheral):
         self._use_b: Final = self.cell("use_b", "B")
         self._next: Final = self.cell("next", "B")
         self._count: Final = self.cell("count", "B")
+        self._stands: Final = self.moment("stands_until", FOREVER)
+        """First cycle in which ADCBUFx, ADCON1 and ADCON2 may differ from what is stored."""
         self._step: Final = self.slot("step", self._due)
+        self._settings: Final = tuple(
+            (register.address >> 1, ~sum(1 << kit.chip.sfrs[register.name].fields[bit][0] for bit in owned) & 0xFFFF)
+            for register, owned in (
+                (self.con1, ("SAMP", "DONE")), (self.con2, ("BUFS",)), (self.con3, ()), (self.chs, ()), (self.cssl, ()))
+        )  # fmt: skip
+        """Record words and bits the course depends on."""
+        self._courses: Final[dict[tuple[int, ...], Course]] = {}
 
     # -- inputs ------------------------------------------------------------------------------------------------------
 
@@ -88,49 +129,61 @@ class Adc(Peripheral):
         source = self.source[channel]
         return source(cycle) if source is not None else self.input[channel]
 
-    def _references(self) -> tuple[int, int]:
+    def _course(self) -> Course:
+        """The present course, remembered by the contents of the registers."""
+        u16 = self.record.u16
+        key = tuple([u16[word] & bits for word, bits in self._settings])
+        course = self._courses.get(key)
+        if course is None:
+            if len(self._courses) >= _COURSES:
+                self._courses.clear()
+            course = self._courses[key] = self._read_course()
+        return course if not self.con3["ADRC"] else self._read_course()  # Fcy is no register
+
+    def _read_course(self) -> Course:
+        tad = round(2 * _RC_TAD_SECONDS * self.kit.fcy()) if self.con3["ADRC"] else self.con3["ADCS"] + 1
+        con2, chs = self.con2, self.chs
+        return Course(
+            tad=tad,
+            sampling=self.con3["SAMC"] * tad if self.con1["SSRC"] == _AUTO else NEVER,
+            again=bool(self.con1["ASAM"]),
+            scanned=tuple(number for number in range(16) if con2["CSCNA"] and self.cssl.value >> number & 1),
+            inputs=((chs["CH0SA"], chs["CH0NA"]), (chs["CH0SB"], chs["CH0NB"])),
+            alternates=bool(con2["ALTS"]),
+            results=con2["SMPI"] + 1,
+            in_halves=bool(con2["BUFM"]),
+            form=self.con1["FORM"],
+            references=con2["VCFG"],
+        )
+
+    def _references(self, vcfg: int) -> tuple[int, int]:
         """VCFG (§13): bit 0 selects VREF+, bit 1 VREF-; 1xx are the supplies."""
-        vcfg = self.con2["VCFG"]
         if vcfg & 4:
             return 0, FULL_SCALE
         return self._vref_low.value if vcfg & 2 else 0, self._vref_high.value if vcfg & 1 else FULL_SCALE
 
-    def _sample(self, cycle: int) -> int:
+    def _sample(self, course: Course, cycle: int) -> int:
         """Code of the input selected for this sample, 0..4095; the selection moves on."""
         use_b = bool(self._use_b.value)
-        low, high = self._references()
-        if not use_b and self.con2["CSCNA"] and self.cssl.value:
-            scanned = [number for number in range(16) if self.cssl.value >> number & 1]
-            place = self._scan.value % len(scanned)
-            channel, negative = scanned[place], self.chs["CH0NA"]
-            self._scan.value = (place + 1) % len(scanned)
-        else:
-            channel, negative = (self.chs["CH0SB"], self.chs["CH0NB"]) if use_b else (
-                self.chs["CH0SA"],
-                self.chs["CH0NA"],
-            )  # fmt: skip
-        self._use_b.value = self.con2["ALTS"] and not use_b
+        low, high = self._references(course.references)
+        channel, negative = course.inputs[use_b]
+        if course.scanned and not use_b:
+            place = self._scan.value % len(course.scanned)
+            channel = course.scanned[place]
+            self._scan.value = (place + 1) % len(course.scanned)
+        if course.alternates or use_b:
+            self._use_b.value = course.alternates and not use_b
         zero = self._level(1, cycle) if negative else low
         span = max(high - low, 1)
         return min(max((self._level(channel, cycle) - zero) * 4096 // span, 0), 4095)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
-    @property
-    def _tad_halves(self) -> int:
-        """TAD in half Tcy."""
-        if self.con3["ADRC"]:
-            return round(2 * _RC_TAD_SECONDS * self.kit.fcy())
-        return self.con3["ADCS"] + 1
-
-    def _end_of_state(self) -> int:
-        """Half cycle the present state ends by itself, or NEVER."""
-        begun = 2 * self._mark.value + self._half.value
-        if self._state.value == _CONVERTING:
-            return begun + _CONVERSION_TAD * self._tad_halves
-        if self._state.value == _SAMPLING and self.con1["SSRC"] == _AUTO:
-            return begun + self.con3["SAMC"] * self._tad_halves
-        return NEVER
+    def _duration(self, course: Course, state: int) -> int:
+        """Half Tcy after which a state ends by itself, or NEVER."""
+        if state == _CONVERTING:
+            return course.conversion
+        return course.sampling if state == _SAMPLING else NEVER
 
     def _enter(self, state: int, halves: int) -> None:
         self._state.value = state
@@ -139,34 +192,49 @@ class Adc(Peripheral):
         self.con1["SAMP"] = state == _SAMPLING
         if state == _CONVERTING:
             self.con1["DONE"] = 0
-            self._held.value = self._sample(halves + 1 >> 1)
+            self._held.value = self._sample(self._course(), halves + 1 >> 1)
 
     def catch_up(self, cycle: int) -> bool:
         """Carry out every conversion that ends at or before `cycle`. True if one of them raised the interrupt."""
-        interrupted = False
+        state = self._state.value
+        if state <= _WAITING:
+            return False
+        course = self._course()
+        begun = 2 * self._mark.value + self._half.value
+        interrupted, moved = False, False
+        held, done = self._held.value, 0
         while True:
-            end = self._end_of_state()
-            if end == NEVER or end + 1 >> 1 > cycle:
-                return interrupted
-            if self._state.value == _SAMPLING:
-                self._enter(_CONVERTING, end)
+            duration = self._duration(course, state)
+            if duration == NEVER or begun + duration + 1 >> 1 > cycle:
+                break
+            begun += duration
+            moved = True
+            if state == _SAMPLING:
+                state, done = _CONVERTING, 0
+                held = self._sample(course, begun + 1 >> 1)
             else:
-                interrupted |= self._store()
-                self._enter(_SAMPLING if self.con1["ASAM"] else _WAITING, end)
+                interrupted |= self._store(course, held)
+                state, done = (_SAMPLING if course.again else _WAITING), 1
+        if moved:
+            self._state.value, self._held.value = state, held
+            self._mark.value, self._half.value = begun >> 1, begun & 1
+            self.con1["SAMP"] = state == _SAMPLING
+            self.con1["DONE"] = done
+            self._stands.value = FOREVER if duration == NEVER else begun + duration + 1 >> 1
+        return interrupted
 
-    def _store(self) -> bool:
+    def _store(self, course: Course, code: int) -> bool:
         """A conversion is complete: buffer, pointer, halves; True at every SMPI + 1 results."""
-        code = self._held.value
-        form = self.con1["FORM"]
-        value = code - 2048 if form & 1 else code
-        self._buffers[self._next.value].value = (value << 4 if form & 2 else value) & 0xFFFF
-        self.con1["DONE"] = 1
-        self._count.value += 1
-        self._next.value = (self._next.value + 1) % 16
-        if self._count.value <= self.con2["SMPI"]:
+        value = code - 2048 if course.form & 1 else code
+        place = self._next.value
+        self._buffers[place].value = value << 4 if course.form & 2 else value
+        count = self._count.value + 1
+        if count < course.results:
+            self._count.value = count
+            self._next.value = (place + 1) % 16
             return False
         self._count.value = 0
-        if self.con2["BUFM"]:
+        if course.in_halves:
             self.con2["BUFS"] = 1 - self.con2["BUFS"]
             self._next.value = 8 * self.con2["BUFS"]
         else:
@@ -175,15 +243,19 @@ class Adc(Peripheral):
 
     def _plan(self) -> None:
         """Post the next interrupt, or the end of the state if what follows depends on somebody else."""
-        end = self._end_of_state()
-        if end == NEVER:
+        course, state = self._course(), self._state.value
+        duration = self._duration(course, state)
+        if duration == NEVER:
             self.events.cancel(self._step)
+            self._stands.value = FOREVER
             return
-        if self._state.value == _SAMPLING:
-            end += _CONVERSION_TAD * self._tad_halves
-        if self.con1["ASAM"] and self.con1["SSRC"] == _AUTO:
-            missing = max(self.con2["SMPI"] - self._count.value, 0)
-            end += missing * (self.con3["SAMC"] + _CONVERSION_TAD) * self._tad_halves
+        end = 2 * self._mark.value + self._half.value + duration
+        self._stands.value = end + 1 >> 1
+        if state == _SAMPLING:
+            end += course.conversion
+        if course.again and course.sampling != NEVER:
+            missing = max(course.results - 1 - self._count.value, 0)
+            end += missing * (course.sampling + course.conversion)
         self.events.set(self._step, max(end + 1 >> 1, self.now + 1))  # a shorter setting may end it in the past
 
     def _due(self, due: int) -> None:
@@ -197,7 +269,7 @@ class Adc(Peripheral):
 
     def _catch_up_now(self) -> None:
         """Bring the registers to the current cycle; an interrupt cannot fall due here before its event."""
-        if not self.is_frozen and self._state.value > _WAITING:
+        if self._state.value > _WAITING and not self.is_frozen:
             self.catch_up(self.now)
 
     # -- control -----------------------------------------------------------------------------------------------------
@@ -278,6 +350,7 @@ class Adc(Peripheral):
     def reset(self, power_on: bool) -> None:
         """Off; all channels analog."""
         self._state.value = _OFF
+        self._stands.value = FOREVER
         self._route(self.now)
         self.restored()
 

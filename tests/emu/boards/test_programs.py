@@ -79,6 +79,7 @@ def test_handler_reads_the_bus_16_to_18_tcy_behind_href_and_frames_come_every_16
         (("camera.c", "lines.s"), 900_000),
         (("steps.c",), 3_000_000),
         (("proximity.c",), 400_000),
+        (("adscan.c",), 400_000),
         (("startup.c",), 150_000),
         (("serial.c",), 200_000),
     ],
