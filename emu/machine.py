@@ -91,6 +91,13 @@ class Machine:
         self._stopped_at: tuple[int, int] | None = None
         self._last_reset = ("", 0, 0, 0)
         self._interrupt = False
+        self._clock: Final = (
+            self.record.u64,
+            self.state.at["cpu.cycle"],
+            self.events.deadline_index,
+            self.state.at["cpu.mode"],
+        )
+        """What `run_until` looks at first: the view of the record, indices of the cycle, the deadline and the mode."""
         self.runner: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
         self.image: Image | None = None
         """What `load` was given last."""
@@ -144,6 +151,10 @@ class Machine:
 
     def run_until(self, cycle: int) -> Stop | None:
         """Run to the first instruction boundary at or after `cycle`; None if nothing stopped the run before."""
+        u64, now, deadline, mode = self._clock
+        if u64[now] < cycle < u64[deadline] < NEVER and self.record.u16[mode] != RUN and not self._interrupt:
+            u64[now] = u64[self.events.now_index] = cycle  # asleep, and nothing is due before `cycle`
+            return None
         state, sequencer, engine, hooks = self.state, self.core.sequencer, self.runner, self._pc_hooks
         stop = None
         while stop is None and state.cycle < cycle:
