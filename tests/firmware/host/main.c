@@ -1,48 +1,11 @@
 #include "test.h"
 
 static test *first;
-char trace[4096];
-static size_t noted;
 
 void test_add(test *t)
 {
     t->next = first;
     first = t;
-}
-
-void note(char c)
-{
-    if (noted + 1 < sizeof trace) {
-        trace[noted++] = c;
-    }
-}
-
-void boot(void)
-{
-    host_use_virtual_time();
-    Sys_Init_Kernel();
-    Sys_Start_Kernel();
-}
-
-uint16 heap_now(void)
-{
-    return Sys_Get_Statistics()->heap_used;
-}
-
-bool lists_are_well_formed(void)
-{
-    unsigned members = 0;
-    for (const sys_pcb *p = os_ring; p != NULL; p = p->next != os_ring ? p->next : NULL) {
-        if (++members > 1000 || (p->status & OS_OFF_RING)) {
-            return false;
-        }
-    }
-    for (const sys_pcb *p = os_blocked; p != NULL; p = p->next) {
-        if (++members > 1000 || (p->status & OS_STATE) != SYS_BLOCKED) {
-            return false;
-        }
-    }
-    return members >= 1;
 }
 
 int main(int argc, char **argv)

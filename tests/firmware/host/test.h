@@ -1,10 +1,11 @@
-/* A host test: one function, run in a process of its own as PID 0 of a fresh kernel under virtual time.
- *     ./kernel_tests            list        ./kernel_tests NAME   run one; exit status 0 = passed */
+/* A kernel test: one function, run as PID 0 of a fresh kernel. On a host each has a process of its own and virtual time:
+ *     ./kernel_tests            list        ./kernel_tests NAME   run one; exit status 0 = passed
+ * target/bugs runs the tests of original_bugs.c on the emulated robot, each from reset. */
 #ifndef TEST_H
 #define TEST_H
 
-#include "board.h"
-#include "host.h"
+#include "../../../firmware/openswarm/board/host/board.h"
+#include "../../../firmware/openswarm/port/posix/host.h"
 #include "io.h"
 #include "kernel.h"
 #include "openswarm.h"
@@ -13,6 +14,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#ifdef __dsPIC30F__
+#define TEST(identifier, statement) static void __attribute__((unused)) identifier(void)
+#define CHECK(condition) ((condition) ? (void)0 : Sys_Assertion_Failed(#condition, __LINE__))
+#define CHECK_EQ(got, wanted) CHECK((long)(got) == (long)(wanted))
+#else
+#include <unistd.h>
 
 typedef struct test {
     const char *name, *says;
@@ -49,6 +57,8 @@ void test_add(test *t);
         }                                                                            \
     } while (0)
 
+#endif
+
 enum { E1 = SYS_FIRST_USER_EVENT, E2, E3, E4, E_NEVER };
 
 void boot(void);                 /* virtual time, Sys_Init_Kernel, Sys_Start_Kernel */
@@ -58,7 +68,5 @@ bool lists_are_well_formed(void); /* ring, blocked list, states */
 /* What happened, in order: a short text both threads and handlers append to. */
 extern char trace[];
 void note(char c);
-
-#include <unistd.h>
 
 #endif

@@ -1,0 +1,3 @@
+#include "isr.inc"
+        .text
+        isr     __INT1Interrupt, _bugs_isr
