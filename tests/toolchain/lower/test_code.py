@@ -107,6 +107,17 @@ def test_an_interrupt_function_with_a_call_saves_all_scratch_registers() -> None
     assert lines[-6:] == [*(f"mov.d [--w15],w{r}" for r in (6, 4, 2, 0)), "pop _RCOUNT", "retfie"]
 
 
+def test_auto_psv_loads_the_page_before_anything_else() -> None:
+    """abi-elf.md §2.5, rule 6: also when the body overwrites W0 at once."""
+    source = "extern volatile unsigned char P; const int k = 3; volatile unsigned char Q; volatile unsigned N;"
+    source += '__attribute__((annotate("os_isr:auto_psv"))) void _T2Interrupt(void) { Q = P; N = *(volatile int *)&k; }'
+    lines = body(assembly(source), "_T2Interrupt")
+    at = lines.index("push _PSVPAG")
+    assert lines[at + 1 : at + 3] == ["mov #__const_psvpage,w0", "mov w0,_PSVPAG"]
+    assert "pop _PSVPAG" in lines
+    assert lines[-1] == "retfie"
+
+
 def test_stack_check_probes_only_frames_above_eight_bytes() -> None:
     """kernel.md §4: a read through W15 above SPLIM traps at entry, before W15 moves: the trap's frame stays inside."""
     small = assembly("void g(char*); void f(void){ char b[4]; g(b); }", stack_check=True)
