@@ -1,0 +1,161 @@
+"""Many trials: which are missing, on how many workers, with what progress. What enters: a `Plan`; what leaves: files.
+
+A trial is the unit of work: it depends on its plan and seed alone, so the number of workers cannot show in a file. A
+finished trial is kept; one that was interrupted starts again from its seed (experiment.md §3).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import platform
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from arena.brain import Brain, ScriptedBrain
+from arena.record import MANIFEST, RecordError, write_json, write_trial
+from arena.scene import Scene
+from arena.trial import run_trial
+
+Report = Callable[[int, float], None]
+"""report(trial, seconds simulated)."""
+_queue: Any = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is. `image` is the firmware, None for scripted brains; `brain` its name for people."""
+
+    scene: Scene
+    brain: str
+    controller: str
+    image: Path | None
+    trials: int
+    seconds: float
+    seed: int
+
+    def key(self) -> dict[str, Any]:
+        """What a trial depends on beside its seed: recorded in every file."""
+        digest = hashlib.sha256(self.image.read_bytes()).hexdigest() if self.image is not None else None
+        scene = json.loads(json.dumps(asdict(self.scene)))
+        return {
+            "scene": scene,
+            "brain": self.brain,
+            "controller": self.controller,
+            "image_sha256": digest,
+            "seconds": self.seconds,
+        }
+
+
+@dataclass(frozen=True)
+class Done:
+    """A trial that is finished: host seconds it took, faults as (robot, seconds, why)."""
+
+    trial: int
+    host_s: float
+    faults: list[tuple[int, float, str]]
+
+
+def trial_path(folder: Path, number: int) -> Path:
+    """File of a trial, counted from 1."""
+    return folder / f"trial-{number:04d}.parquet"
+
+
+def make_brains(plan: Plan, seed: int) -> list[Brain]:
+    """One brain per robot. Raises emu.LoadError for an unusable image."""
+    robots = range(plan.scene.robots.count)
+    if plan.image is None:
+        return [ScriptedBrain(plan.scene, seed, robot, plan.controller) for robot in robots]
+    from arena.emulated import EmulatedBrain  # the emulator is loaded by those who need it
+
+    return [EmulatedBrain(plan.scene, seed, robot, plan.image) for robot in robots]
+
+
+def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None) -> Done:
+    """Run trial `number` (from 1) and write its file. Raises SceneError, RecordError, emu.LoadError."""
+    start = time.perf_counter()
+    seed = plan.seed + number - 1
+    brains = make_brains(plan, seed)
+    try:
+        progress = None if report is None else (lambda seconds: report(number, seconds))
+        result = run_trial(plan.scene, seed, brains, plan.seconds, progress)
+    finally:
+        for brain in brains:
+            brain.close()
+    about = plan.key() | {"seed": seed, "faults": [list(fault) for fault in result.faults]}
+    write_trial(trial_path(folder, number), result.rows, about)
+    return Done(number, time.perf_counter() - start, result.faults)
+
+
+def open_folder(plan: Plan, folder: Path, command: list[str]) -> list[int]:
+    """Make or continue the folder of a run; numbers of the trials still to do. Raises RecordError if it holds another."""
+    key = plan.key() | {"seed": plan.seed}
+    manifest = folder / MANIFEST
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        before = json.loads(manifest.read_text()) if manifest.exists() else None
+    except (OSError, ValueError) as error:
+        raise RecordError(f"{manifest}: {error}") from None
+    if before is not None and before.get("key") != key:
+        changed = [name for name in key if before.get("key", {}).get(name) != key[name]]
+        raise RecordError(f"{folder}: holds another run (different {', '.join(changed)}); choose another --out")
+    write_json(manifest, (before or {"host": []}) | {"key": key, "versions": versions(), "command": command})
+    return [number for number in range(1, plan.trials + 1) if not trial_path(folder, number).exists()]
+
+
+def versions() -> dict[str, str]:
+    """Of everything a result can depend on."""
+    found = {"python": platform.python_version(), "machine": platform.machine(), "system": sys.platform}
+    for name in ("openswarm", "pymunk", "numpy", "pyarrow", "llvmlite"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+def run_all(plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None]) -> None:
+    """Run trials `numbers` on `jobs` workers; 1 = in this process. Raises what a trial raises, after the others of its
+    moment; files of finished trials stay."""
+    if jobs <= 1 or len(numbers) <= 1:
+        for number in numbers:
+            done(run_one(plan, number, folder, report))
+        return
+    context = multiprocessing.get_context("spawn")
+    queue: Any = context.Queue()
+    with ProcessPoolExecutor(min(jobs, len(numbers)), context, _begin, (queue,)) as pool:
+        pending = {pool.submit(_work, plan, number, folder) for number in numbers}
+        try:
+            while pending:
+                finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
+                while not queue.empty():
+                    report(*queue.get())
+                for future in finished:
+                    done(future.result())
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _begin(queue: Any) -> None:
+    global _queue
+    _queue = queue
+
+
+def _work(plan: Plan, number: int, folder: Path) -> Done:
+    return run_one(plan, number, folder, lambda trial, seconds: _queue.put((trial, seconds)))
+
+
+def note_host_time(folder: Path, done: Done) -> None:
+    """Keep how long a trial took, and its faults, in the manifest: not in the file, whose bytes must not depend on it."""
+    manifest = folder / MANIFEST
+    value = json.loads(manifest.read_text())
+    value["host"].append({"trial": done.trial, "host_s": round(done.host_s, 2), "faults": done.faults})
+    write_json(manifest, value)

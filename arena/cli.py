@@ -1,0 +1,52 @@
+"""The command line: `python -m arena run | compare | plot | replay | sweep | scenes`.
+
+Exit status: 0 done; 1 a robot's firmware stopped during a trial; 2 bad input; 130 interrupted (finished trials are kept).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+
+import emu
+from arena.commands import compare, plot, replay, run, sweep
+from arena.record import RecordError
+from arena.scene import SceneError, load_scene, scenes
+
+FAULT, BAD_INPUT, INTERRUPTED = 1, 2, 130
+COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
+    "run": (run.parser, run.run),
+    "sweep": (sweep.parser, sweep.run),
+    "compare": (compare.parser, compare.run),
+    "plot": (plot.parser, plot.run),
+    "replay": (replay.parser, replay.run),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the process's exit status."""
+    parser = argparse.ArgumentParser(
+        prog="arena",
+        description="Robots with real firmware in a simulated arena.",
+        epilog="example: arena run clustering --brain scripted --trials 4 --minutes 10 --out results/scripted-A",
+    )
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, (make, _) in COMMANDS.items():
+        one = make()
+        commands.add_parser(name, parents=[one], help=one.description, description=one.description, epilog=one.epilog,
+                            formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False)  # fmt: skip
+    commands.add_parser("scenes", help="list the scenes that come along")
+    options = parser.parse_args(arguments)
+    try:
+        if options.command == "scenes":
+            for name in scenes():
+                print(f"{name:20} {load_scene(name).description}")
+            return 0
+        return COMMANDS[options.command][1](options)
+    except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
+        print(f"arena: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("arena: interrupted; finished trials are kept, the same command goes on", file=sys.stderr)
+        return INTERRUPTED

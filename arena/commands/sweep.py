@@ -1,0 +1,52 @@
+"""`arena sweep SCENE --vary SECTION.KEY=V1,V2 ...`: a run for every combination of values, and a table."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+
+from arena.commands import run as single
+from arena.commands.compare import courses
+from arena.record import trials_in
+
+EXAMPLE = "example: arena sweep clustering --brain scripted --vary camera.range_cm=100,150,inf --vary robots.count=3,5"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options of `run`, and the grid."""
+    made = single.parser()
+    made.description, made.epilog = "run a grid of scene values", EXAMPLE
+    made.add_argument("--vary", action="append", default=[], required=True, metavar="SECTION.KEY=V1,V2,...")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status of the worst run. Raises as `run`."""
+    axes = []
+    for axis in options.vary:
+        place, equals, values = axis.partition("=")
+        if not equals or not values:
+            raise ValueError(f"--vary {axis!r}: expected SECTION.KEY=V1,V2,...")
+        axes.append([f"{place}={value}" for value in values.split(",")])
+    base = options.out or Path("results") / f"sweep-{Path(options.scene).stem}"
+    quiet = argparse.Namespace(**vars(options))
+    status, rows = 0, []
+    for settings in itertools.product(*axes):
+        quiet.set = [*options.set, *settings]
+        quiet.out = base / "-".join(settings)
+        status = max(status, single.run(quiet))
+        ends = [one.share[-1] for _, one in courses(trials_in(quiet.out)).values()]
+        areas = [one.area for _, one in courses(trials_in(quiet.out)).values()]
+        rows.append({"values": settings, "n": len(ends), "share": float(np.mean(ends)), "sd": float(np.std(ends)),
+                     "area": float(np.mean(areas))})  # fmt: skip
+    if options.json:
+        print(json.dumps({"sweep": rows}))
+    else:
+        for row in rows:
+            print(f"{', '.join(row['values']):50} n {row['n']:3}  share {row['share']:.2f} sd {row['sd']:.2f}  "
+                  f"mean compactness {row['area']:.0f}")  # fmt: skip
+    return status

@@ -1,0 +1,173 @@
+"""`EmulatedBrain`: the firmware itself, on an emulated e-puck, joined to the world through pins, volts and pixels.
+
+In: poses once per quantum, pixels whenever the firmware's camera driver reads a line. Out: motor steps, LEDs, lines of
+UART1 (Bluetooth). Poses are extrapolated within the quantum to the cycle in which a line is read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import emu
+from arena import bodies
+from arena.brain import Line, Reading, switched_on
+from arena.scene import FCY, Scene
+from arena.vision import COLOURS, Eye
+from arena.world import STREAM_SENSORS, Poses, generator
+from emu.boards.epuck.board import Epuck
+from emu.dspic30f.state import RUN
+
+WINDOW_S: Final = 0.010
+"""Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
+OK_AFTER_S: Final = 1.0
+"""The remote control's OK, which starts the published program, comes this long after power-on."""
+LINE_LIMIT: Final = 200
+"""Bytes after which a line without an end is taken as one."""
+_NOISE: Final = 1 << 14
+"""Values of pixel noise drawn once per robot; each line of pixels starts at a random one."""
+
+
+class EmulatedBrain:
+    """A machine with `image` (ELF or HEX), switched on at its own moment. Raises emu.LoadError for an unusable image."""
+
+    def __init__(self, scene: Scene, seed: int, robot: int, image: str | Path) -> None:
+        self._scene = scene
+        self._robot = robot
+        self._quantum = scene.clock.quantum_tcy
+        self._on_at = switched_on(seed, robot)
+        self._rng = generator(seed, STREAM_SENSORS, robot)
+        noise = self._rng.normal(0.0, scene.camera.pixel_noise, _NOISE + 3 * 640)
+        self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
+        board = partial(Epuck, camera=scene.camera.sensor, seed=seed * 1000 + robot)
+        self.machine = emu.load(image, board=board)
+        self._board: Epuck = self.machine.board
+        assert self._board.camera is not None
+        self._board.camera.sample(self._pixels)
+        self._board.remote.press("ok", cycle=round(OK_AFTER_S * FCY))
+        self.machine.uart[1].on_byte = self._byte
+        self._poses = Poses([], [])
+        self._pose = (0.0, 0.0, 0.0)
+        self._moved = (0.0, 0.0, 0.0)
+        self._start = 0
+        window = max(round(WINDOW_S / (self._quantum / FCY)), 1)
+        self._counts: deque[tuple[int, int]] = deque([(0, 0)], maxlen=window + 1)
+        self._said: list[Line] = []
+        self._text = bytearray()
+        self._text_at = 0
+        self._busy = self._probes = 0
+        self._fault = ""
+
+    # -- one quantum -------------------------------------------------------------------------------------------------
+
+    def think(self, tick: int, poses: Poses) -> tuple[float, float]:
+        """As `Brain.think`."""
+        end = (tick + 1) * self._quantum - self._on_at
+        if end <= 0 or self._fault:
+            return 0.0, 0.0
+        self._look_around(tick, poses)
+        machine = self.machine
+        probe = end - int(self._rng.integers(self._quantum))
+        for until in (probe, end):
+            stop = machine.run_until(until) if until > machine.cycle else None
+            if stop is not None and stop.reason != "limit":
+                self._fault = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}: {stop.detail}".rstrip(": ")
+                return 0.0, 0.0
+            if until == probe:
+                self._probes += 1
+                self._busy += machine.state.mode == RUN
+        return self._speeds()
+
+    def _look_around(self, tick: int, poses: Poses) -> None:
+        pose = poses.robots[self._robot]
+        if self._poses.robots:
+            before = self._pose
+            self._moved = (pose[0] - before[0], pose[1] - before[1], pose[2] - before[2])
+        self._poses, self._pose = poses, pose
+        self._start = tick * self._quantum - self._on_at
+        if self.machine.peek("ADCON1") & 0x8000:
+            self._board.inputs.distance[:] = infrared(self._scene, poses, self._robot)
+            self._board.inputs.apply()
+
+    def _speeds(self) -> tuple[float, float]:
+        motors = self._board.motors
+        self._counts.append((motors.left.steps, motors.right.steps))
+        (left0, right0), (left, right) = self._counts[0], self._counts[-1]
+        rate = bodies.CM_PER_STEP * FCY / (self._quantum * (len(self._counts) - 1))
+        return (left - left0) * rate, (right - right0) * rate
+
+    # -- what the firmware reads and says ----------------------------------------------------------------------------
+
+    def _pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
+        share = (cycle - self._start) / self._quantum
+        x, north, heading = (at + share * step for at, step in zip(self._pose, self._moved, strict=True))
+        eye = Eye(self._scene, self._poses, self._robot, (x, north, heading))
+        colours = COLOURS[eye.classes(y, columns)].astype(np.int16)
+        first = int(self._rng.integers(_NOISE))
+        noise = self._noise[first : first + 3 * len(columns)].reshape(-1, 3)
+        return np.clip(colours + noise, 0, 255).astype(np.uint8)
+
+    def _byte(self, byte: int, cycle: int) -> None:
+        if byte in b"\r\n" or len(self._text) >= LINE_LIMIT:
+            if self._text:
+                self._said.append(Line(self._text_at, self._text.decode("ascii", "backslashreplace")))
+            self._text.clear()
+        if byte not in b"\r\n":
+            if not self._text:
+                self._text_at = cycle
+            self._text.append(byte)
+
+    # -- what is recorded --------------------------------------------------------------------------------------------
+
+    def reading(self) -> Reading:
+        """As `Brain.reading`. `load` comes from looking at the CPU once per quantum at a random cycle."""
+        load = self._busy / self._probes if self._probes else 0.0
+        self._busy = self._probes = 0
+        leds = sum(1 << bit for bit, lit in enumerate(self._board.leds.states()) if lit)
+        return Reading(-1, load, leds, self._fault)
+
+    def lines(self) -> list[Line]:
+        """As `Brain.lines`."""
+        said, self._said = self._said, []
+        return said
+
+    def close(self) -> None:
+        """Memory goes with the object."""
+
+
+def infrared(scene: Scene, poses: Poses, robot: int) -> list[float]:
+    """mm from each infrared sensor to what its axis meets: wall, object or robot; inf beyond the sensors' range.
+
+    One ray per sensor from the body's edge; reflectivity and angle of the surface are left at a white wall's.
+    """
+    x, y, heading = poses.robots[robot]
+    discs = [(ox - x, oy - y, scene.objects.radius_cm) for ox, oy in poses.objects]
+    discs += [(one[0] - x, one[1] - y, bodies.ROBOT_RADIUS) for i, one in enumerate(poses.robots) if i != robot]
+    reach = bodies.ROBOT_RADIUS + bodies.IR_RANGE
+    near = [(dx, dy, r) for dx, dy, r in discs if dx * dx + dy * dy < (reach + r) ** 2]
+    found = []
+    for bearing in bodies.IR_BEARINGS_DEG:
+        angle = heading - math.radians(bearing)
+        east, north = math.cos(angle), math.sin(angle)
+        distance = min(_to_wall(x, east, scene.arena.width_cm), _to_wall(y, north, scene.arena.height_cm))
+        for dx, dy, r in near:
+            along = dx * east + dy * north
+            root = r * r - (dx * dx + dy * dy - along * along)
+            if root > 0 and along > 0:
+                distance = min(distance, along - math.sqrt(root))
+        gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
+        found.append(10 * gap if gap <= bodies.IR_RANGE else math.inf)
+    return found
+
+
+def _to_wall(at: float, direction: float, size: float) -> float:
+    """Along a ray to the walls at 0 and `size` of one axis."""
+    if direction == 0:
+        return math.inf
+    return ((size if direction > 0 else 0.0) - at) / direction

@@ -1,0 +1,112 @@
+"""Trials on disk: one Parquet file each, with what it was made from in its metadata, beside a manifest in JSON.
+
+A file appears whole or not at all (written beside its place, then renamed), and the same trial gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from arena.trial import Rows
+
+LOG: Final = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("text", pa.string())]))
+MANIFEST: Final = "manifest.json"
+
+
+class RecordError(Exception):
+    """A record cannot be written or read; the text names the file."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recorded trial. `columns` as in docs/experiment.md; `about` is its metadata."""
+
+    path: Path
+    columns: dict[str, Any]
+    about: dict[str, Any]
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """s."""
+        return np.array(self.columns["t"])
+
+    @property
+    def objects(self) -> NDArray[np.float64]:
+        """samples x objects x 2, cm."""
+        return self._places("o", int(self.about["scene"]["objects"]["count"]))
+
+    @property
+    def robots(self) -> NDArray[np.float64]:
+        """samples x robots x 2, cm."""
+        return self._places("r", int(self.about["scene"]["robots"]["count"]))
+
+    def _places(self, letter: str, count: int) -> NDArray[np.float64]:
+        if not count:
+            return np.zeros((len(self.times), 0, 2))
+        pairs = [np.column_stack([self.columns[f"{letter}{i}_x"], self.columns[f"{letter}{i}_y"]]) for i in range(count)]
+        return np.stack(pairs, axis=1)
+
+
+def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
+    """Write a trial. Raises RecordError, for example on a full disk; then no file is left."""
+    arrays = {}
+    for name, values in rows.columns.items():
+        kind = LOG if name == "log" else pa.int16() if name.endswith(("_seen", "_leds")) else pa.float64()
+        arrays[name] = pa.array(values, kind)
+    table = pa.table(arrays).replace_schema_metadata({"arena": json.dumps(about, sort_keys=True)})
+    part = path.with_name(path.name + ".part")
+    try:
+        pq.write_table(table, part, compression="zstd")
+        os.replace(part, path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink()
+        raise RecordError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def read_trial(path: Path) -> Trial:
+    """Read a trial. Raises RecordError for what is none."""
+    try:
+        table = pq.read_table(path)
+        about = json.loads((table.schema.metadata or {})[b"arena"])
+    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+        raise RecordError(f"{path}: is no recorded trial: {error}") from None
+    columns = {name: table[name].to_pylist() if name == "log" else table[name].to_numpy() for name in table.column_names}
+    return Trial(path, columns, about)
+
+
+def trials_in(folder: Path) -> list[Trial]:
+    """All finished trials of a run, or the one if `folder` is a file. Raises RecordError if there is none."""
+    if folder.is_file():
+        return [read_trial(folder)]
+    paths = sorted(folder.glob("trial-*.parquet"))
+    if not paths:
+        raise RecordError(f"{folder}: no finished trials (trial-*.parquet) here")
+    return [read_trial(path) for path in paths]
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON whole or not at all. Raises RecordError."""
+    write_text(path, json.dumps(value, indent=2, sort_keys=True, default=str) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all. Raises RecordError."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink()
+        raise RecordError(f"{path}: cannot be written: {error.strerror or error}") from None
