@@ -14,9 +14,12 @@ import sys
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from threading import RLock
 from typing import Any, Final
 
-from emu.dspic30f.jit.cache import ObjectCache
+from emu.dspic30f.jit.cache import ObjectCache, folder
 from emu.dspic30f.jit.worker import REFUSED, REPLY, REQUEST, Backend
 
 
@@ -45,12 +48,23 @@ def unpacked(blob: bytes) -> tuple[list[int], bytes]:
     return list(struct.unpack_from(f"<{count}I", blob, 4)), blob[4 + 4 * count :]
 
 
+@cache
+def _shared(_where: Path) -> Compiler:
+    return Compiler()
+
+
+def shared_compiler() -> Compiler:
+    """The compiler all machines of this process use: one compile process, one cache."""
+    return _shared(folder())
+
+
 class Compiler:
-    """Objects by name. Every module exports one function, called `entry`."""
+    """Objects by name. Every module exports one function, called `entry`. Threads may share one."""
 
     def __init__(self, cache: ObjectCache | None = None) -> None:
         self.cache: Final = cache if cache is not None else ObjectCache()
         self.statistics: Final = Statistics()
+        self._lock = RLock()
         self._process: subprocess.Popen[bytes] | None = None
         self._selector = selectors.DefaultSelector()
         self._received = bytearray()
@@ -98,6 +112,10 @@ class Compiler:
 
     def request(self, text: str, level: int, key: str, entries: Sequence[int], tag: object) -> None:
         """Have `text` compiled in the background; `poll` will yield (tag, address)."""
+        with self._lock:
+            self._post(text, level, key, entries, tag)
+
+    def _post(self, text: str, level: int, key: str, entries: Sequence[int], tag: object) -> None:
         self.statistics.requested += 1
         self._tickets += 1
         self._waiting[self._tickets] = (key, entries, tag)
@@ -123,6 +141,10 @@ class Compiler:
         """Code that has arrived since the last call, loaded. Raises Refused on a translator defect."""
         if not self._waiting:
             return []
+        with self._lock:
+            return self._collect()
+
+    def _collect(self) -> list[tuple[object, int]]:
         while self._selector.select(0):
             assert self._process is not None
             assert self._process.stdout is not None
@@ -144,6 +166,10 @@ class Compiler:
 
     def load(self, code: bytes) -> int:
         """Address of `entry` in an object file."""
+        with self._lock:
+            return self._load(code)
+
+    def _load(self, code: bytes) -> int:
         import llvmlite.binding as llvm
 
         if self._loader is None:
@@ -157,18 +183,6 @@ class Compiler:
         self._keep[address] = library
         self.statistics.loaded += 1
         return address
-
-    def unload(self, address: int) -> None:
-        """Give the memory of a piece of code back (its flash words were rewritten)."""
-        del self._keep[address]
-
-    def close(self) -> None:
-        """End the compile process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-            self._process = None
-            self._waiting.clear()
 
     def _start(self) -> subprocess.Popen[bytes]:
         if self._process is None:

@@ -20,7 +20,7 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, W_END, Access, Surroundings
-from emu.dspic30f.jit.compiler import Compiler
+from emu.dspic30f.jit.compiler import shared_compiler
 from emu.dspic30f.jit.devices import NativeRegister, native_registers
 from emu.dspic30f.jit.region import discover
 from emu.dspic30f.jit.runtime import BLOCKS, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
@@ -94,7 +94,7 @@ class JitEngine:
         self._state: Final = core.state
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2
-        self.compiler = Compiler()
+        self.compiler = shared_compiler()
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
         self._env_address: Final = ctypes.addressof(self._env)
         self._codes: Final[dict[object, Code]] = {}
@@ -278,11 +278,6 @@ class JitEngine:
         """Program words in [start, end) are new: whatever was made from the old ones is stale."""
         self._codes.clear()
         self._key = None
-
-    def close(self) -> None:
-        """End the compile process."""
-        self.compiler.close()
-
 
 def identity_of(context: Context, around: Surroundings) -> bytes:
     """Hash of processor modes and surroundings."""
