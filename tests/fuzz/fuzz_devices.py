@@ -18,7 +18,7 @@ from peripherals.device_programs import difference  # noqa: E402
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--programs", type=int, default=400, help="random programs (default %(default)s)")
+    parser.add_argument("--programs", type=int, default=150, help="random programs (default %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="first seed (default %(default)s)")
     parser.add_argument("--engine", default="jit", help="engine to compare with the plain one (default %(default)s)")
     options = parser.parse_args()
