@@ -1,0 +1,255 @@
+"""Clean-up passes over real registers: random code computes the same before and after each of them."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+
+from toolchain.lower import branches, layout, peephole, returns, schedule, tails
+from toolchain.lower.mir import MI, Imm, MBlock, Mem, MFunction, Operand
+
+WORD = 0xFFFF
+DATA = 0x1000
+THREE = ("add", "sub", "and", "ior", "xor")
+ONE = ("inc", "dec", "inc2", "dec2", "com", "neg")
+
+
+class Machine:
+    """W registers, Z N C OV and memory, for the operations `generate` uses (isa.md §6.1, §6.2)."""
+
+    def __init__(self, m: MFunction) -> None:
+        self.blocks = m.block_map()
+        self.order = [b.name for b in m.blocks]
+        self.w = {r: (r * 2 + DATA if 3 <= r <= 5 else r * 3) for r in range(16)}
+        self.memory: dict[int, int] = {}
+        self.flags = dict.fromkeys("znvc", False)
+
+    def read(self, a: Operand, byte: bool) -> int:
+        if isinstance(a, Imm):
+            assert isinstance(a.value, int)
+            return a.value & WORD
+        if isinstance(a, Mem):
+            at = self.address(a, byte)
+            return self.memory.get(at, at * 7 & WORD)
+        assert isinstance(a, int)
+        return self.w[a]
+
+    def address(self, a: Mem, byte: bool) -> int:
+        size = 1 if byte else 2
+        before = {"+": size, "-": -size}.get(a.mode, 0)
+        self.w[a.base] = self.w[a.base] + before & WORD
+        at = self.w[a.base] + (a.off if a.mode == "off" else 0) & WORD
+        self.w[a.base] = self.w[a.base] + {"++": size, "--": -size}.get(a.mode, 0) & WORD
+        return at
+
+    def write(self, a: Operand, value: int, byte: bool) -> None:
+        if isinstance(a, Mem):
+            self.memory[self.address(a, byte)] = value & WORD
+        else:
+            assert isinstance(a, int)
+            self.w[a] = value & WORD
+
+    def arithmetic(self, a: int, b: int, carry: int) -> int:
+        total = a + b + carry
+        result = total & WORD
+        self.flags["c"] = total > WORD
+        self.flags["v"] = bool(~(a ^ b) & (a ^ result) & 0x8000)
+        self.logic(result)
+        return result
+
+    def logic(self, result: int) -> int:
+        self.flags["z"], self.flags["n"] = result & WORD == 0, bool(result & 0x8000)
+        return result & WORD
+
+    def holds(self, cc: str) -> bool:
+        z, n, v, c = (self.flags[k] for k in "znvc")
+        return {"z": z, "nz": not z, "n": n, "nn": not n, "c": c, "nc": not c, "lt": n != v, "ge": n == v,
+                "gt": not z and n == v, "le": z or n != v, "gtu": c and not z, "leu": not c or z}[cc]  # fmt: skip
+
+    def skips(self, text: str) -> bool:
+        """Outcome of a skip instruction given as text."""
+        name, operands = text.split(" ", 1)
+        a, b = operands.split(",")
+        x = self.w[int(a[1:])]
+        if name in ("btsc", "btss"):
+            return bool(x >> int(b[1:]) & 1) == (name == "btss")
+        y = self.w[int(b[1:])]
+        sx, sy = (k - 0x10000 if k & 0x8000 else k for k in (x, y))
+        return {"cpseq": x == y, "cpsne": x != y, "cpslt": sx < sy, "cpsgt": sx > sy}[name]
+
+    def run(self) -> tuple[int, dict[int, int]]:
+        """W0 at the return and all memory written."""
+        name, fuel = self.order[0], 2000
+        while True:
+            block, skip = self.blocks[name], 0
+            at = self.order.index(name) + 1
+            name = self.order[at] if at < len(self.order) else ""
+            for mi in block.insts:
+                fuel -= 1
+                if fuel == 0 or mi.op == "ret":
+                    if mi.text:
+                        self.w[0] = int(mi.text.split("#")[1].split(",")[0])
+                    return (-1 if fuel == 0 else self.w[0]), self.memory
+                if skip:
+                    skip -= 1
+                elif mi.op == "skip":
+                    skip = mi.count if (self.skips(mi.text) if mi.text else self.holds(mi.cc)) else 0
+                elif mi.op == "jump" or (mi.op == "bra" and self.holds(mi.cc)):
+                    name = str(mi.args[0])
+                    break
+                elif mi.op != "bra":
+                    self.step(mi)
+
+    def step(self, mi: MI) -> None:
+        a = mi.args
+        match mi.op:
+            case "mov":
+                self.write(a[1], self.read(a[0], mi.byte), mi.byte)
+            case "movd":
+                self.pair(a[0], a[1])
+            case "clr" | "setm":
+                self.write(a[0], 0 if mi.op == "clr" else WORD, mi.byte)
+            case "cp":
+                self.arithmetic(self.read(a[0], False), ~self.read(a[1], False) & WORD, 1)
+            case "subl":
+                assert isinstance(a[1], int)
+                self.w[a[1]] = self.arithmetic(self.w[a[1]], ~self.read(a[0], False) & WORD, 1)
+            case "cp0":
+                self.arithmetic(self.read(a[0], False), WORD, 1)
+            case "btst":
+                self.flags["z"] = not self.read(a[0], False) >> self.read(a[1], False) & 1
+            case "and" | "ior" | "xor":
+                x, y = self.read(a[0], False), self.read(a[1], False)
+                self.write(a[2], self.logic({"and": x & y, "ior": x | y, "xor": x ^ y}[mi.op]), False)
+            case "com":
+                self.write(a[1], self.logic(~self.read(a[0], False) & WORD), False)
+            case "neg":
+                self.write(a[1], self.arithmetic(0, ~self.read(a[0], False) & WORD, 1), False)
+            case "add" | "sub":
+                x, y = self.read(a[0], False), self.read(a[1], False)
+                self.write(a[2], self.arithmetic(x, y if mi.op == "add" else ~y & WORD, int(mi.op == "sub")), False)
+            case _:
+                k = {"inc": 1, "inc2": 2, "dec": -1, "dec2": -2}[mi.op]
+                x = self.read(a[0], False)
+                self.write(a[1], self.arithmetic(x, k if k > 0 else ~-k & WORD, int(k < 0)), False)
+
+    def pair(self, source: Operand, dest: Operand) -> None:
+        if isinstance(source, Mem):
+            assert isinstance(dest, int)
+            at = self.w[source.base]
+            self.w[dest], self.w[dest + 1] = (self.memory.get(k, k * 7 & WORD) for k in (at, at + 2))
+        else:
+            assert isinstance(source, int)
+            low, high = self.w[source], self.w[source + 1]
+            if isinstance(dest, Mem):
+                at = self.w[dest.base]
+                self.memory[at], self.memory[at + 2] = low, high
+            else:
+                assert isinstance(dest, int)
+                self.w[dest], self.w[dest + 1] = low, high
+
+
+def instruction(rng: random.Random) -> list[MI]:
+    """One random piece of straight-line code; W3-W5 serve as pointers."""
+    a, b, d = (rng.randrange(3) + rng.choice((0, 5)) for _ in range(3))
+    p = rng.randrange(3, 6)
+    match rng.randrange(11):
+        case 0:
+            return [MI("mov", Imm(rng.choice((0, 1, 5, 5, 0xFFFF))), d)]
+        case 1:
+            return [MI("mov", a, d)]
+        case 2:
+            return [MI("mov", Mem("ind", p), d), MI(rng.choice(("inc2", "dec2")), p, p)]
+        case 3:
+            return [MI("inc2", p, p), MI("mov", a, Mem("ind", p))]
+        case 4:
+            return [MI("mov", a, Mem("ind", p)), MI("mov", b, Mem("off", p, 2))]
+        case 5:
+            low = rng.choice((0, 6))
+            return [MI("mov", Mem("ind", p), low), MI("mov", Mem("off", p, 2), low + 1)]
+        case 6:
+            test = rng.choice((MI("cp", a, b), MI("cp0", a), MI("btst", a, Imm(3))))
+            skip = MI("skip", "", cc=rng.choice(("z", "nz") if test.op == "btst" else ("z", "nz", "lt", "gt", "ge")))
+            guarded = MI(rng.choice(THREE), d, b, d)
+            skip.count, guarded.pred = 1, True
+            return [test, skip, guarded]
+        case 7:
+            return [MI(rng.choice(ONE), a, d)]
+        case 8:
+            return [MI(rng.choice(("clr", "setm")), d)]
+        case _:
+            return [MI(rng.choice(THREE), a, rng.choice((b, Mem("ind", p))), d)]
+
+
+def generate(seed: int) -> MFunction:
+    """Six blocks in a row with forward branches, ending in a few different returns."""
+    rng = random.Random(seed)
+    m = MFunction("random")
+    names = [f"b{k}" for k in range(6)] + ["out"]
+    for k, name in enumerate(names):
+        insts = [mi for _ in range(rng.randrange(1, 7)) for mi in instruction(rng)]
+        if name == "out" or rng.random() < 0.1:
+            insts += [MI("mov", Imm(rng.randrange(8)), 0)] if rng.random() < 0.5 else []
+            insts.append(MI("ret"))
+            insts[-1].also_uses = (0,)
+            m.blocks.append(MBlock(name, insts, []))
+            continue
+        one, two = rng.choice(names[k + 1 :]), names[k + 1]
+        if rng.random() < 0.7:
+            r = rng.randrange(3)
+            insts.append(rng.choice((MI("cp0", r), MI("cp", r, Imm(5)), MI("cp", r, 6))))
+            insts.append(MI("bra", one, cc=rng.choice(("z", "nz", "lt", "ge", "gtu", "nn"))))
+            m.blocks.append(MBlock(name, [*insts, MI("jump", two)], list(dict.fromkeys([one, two]))))
+        else:
+            m.blocks.append(MBlock(name, [*insts, MI("jump", one)], [one]))
+    return m
+
+
+PASSES: dict[str, Callable[[MFunction], None]] = {
+    "peephole": peephole.run,
+    "schedule": schedule.run,
+    "tails": tails.run,
+    "layout": layout.run,
+    "branches": lambda m: branches.run(m, True),
+    "returns": returns.run,
+}
+
+
+def reachable(m: MFunction) -> MFunction:
+    """Without the blocks nobody branches to, as selection produces functions."""
+    branches.thread_jumps(m)
+    return m
+
+
+@pytest.mark.parametrize("name", list(PASSES))
+def test_a_clean_up_pass_keeps_behaviour(name: str) -> None:
+    """Each pass alone, on 300 random functions."""
+    for seed in range(300):
+        m = reachable(generate(seed))
+        PASSES[name](m)
+        assert Machine(m).run() == Machine(reachable(generate(seed))).run(), f"seed {seed}\n{m.dump()}"
+
+
+def test_all_clean_up_passes_in_order_keep_behaviour() -> None:
+    """In the order of toolchain/pipeline.py."""
+    for seed in range(300, 700):
+        m = reachable(generate(seed))
+        for name, step in PASSES.items():
+            if name != "layout":
+                step(m)
+        assert Machine(m).run() == Machine(reachable(generate(seed))).run(), f"seed {seed}\n{m.dump()}"
+
+
+def test_stalls_are_found_as_the_manual_lists_them() -> None:
+    """isa.md §13.2, both tables."""
+    direct = MI("add", 0, 1, 2)
+    assert not schedule.stalls(direct, MI("mov", 2, 3))
+    assert schedule.stalls(direct, MI("mov", Mem("ind", 2), 3))
+    assert schedule.stalls(direct, MI("mov", Mem("++", 2), 3))
+    assert not schedule.stalls(direct, MI("mov", 0, Mem("ind", 2)))
+    stepped = MI("add", 0, 1, Mem("++", 2))
+    assert not schedule.stalls(stepped, MI("mov", 2, 3))
+    assert schedule.stalls(stepped, MI("mov", Mem("ind", 2), 3))
+    assert not schedule.stalls(MI("mov", Mem("++", 1), 2), MI("mov", Mem("++", 1), 3))
