@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import re
 import sys
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Final, NoReturn
 
 EXIT_OK: Final = 0
@@ -13,6 +16,10 @@ EXIT_BAD_INPUT: Final = 2
 """Exit statuses of design §10."""
 BAD_INPUT_STATUS: Final = 126
 """Bad input or usage with --exit-code (design §10)."""
+
+
+TEN_YEARS: Final = 10 * 366 * 24 * 3600
+"""Longest simulated time a command accepts, in seconds."""
 
 
 class CommandError(Exception):
@@ -36,3 +43,22 @@ class Parser(argparse.ArgumentParser):
         """Print what is wrong in one line and leave."""
         print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
         sys.exit(BAD_INPUT_STATUS if "--exit-code" in self.arguments else EXIT_BAD_INPUT)
+
+
+def seconds(text: str) -> Fraction:
+    """A time above 0 s and up to ten years, like `5`, `0.25` or `1/3`, exactly. Raises argparse's error otherwise."""
+    if re.fullmatch(r"\d{1,12}(\.\d{0,12})?|\.\d{1,12}|\d{1,12}/\d{1,12}", text):
+        with contextlib.suppress(ZeroDivisionError):
+            value = Fraction(text)
+            if 0 < value <= TEN_YEARS:
+                return value
+    raise argparse.ArgumentTypeError(f"expected seconds above 0, like 5 or 0.25, not {text!r}")
+
+
+def cycles(text: str) -> int:
+    """A number of instruction cycles above 0, decimal or 0x. Raises argparse's error otherwise."""
+    if re.fullmatch(r"\d{1,18}|0x[0-9a-fA-F]{1,15}", text):
+        value = int(text, 16 if text.startswith("0x") else 10)
+        if value:
+            return value
+    raise argparse.ArgumentTypeError(f"expected a number of cycles above 0, not {text!r}")

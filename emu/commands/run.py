@@ -12,7 +12,7 @@ from dataclasses import asdict
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, cycles, seconds
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.console import SPECIFICATIONS, Port, open_port
 from emu.faults import Fault, fault_of
@@ -47,8 +47,8 @@ def parser() -> Parser:
     made = Parser("run", DESCRIPTION, "emu run firmware.elf --seconds 5 --uart2 log.txt")
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
     limit = made.add_mutually_exclusive_group()
-    limit.add_argument("--seconds", metavar="S", type=_positive_fraction, help="stop after S simulated seconds")
-    limit.add_argument("--cycles", metavar="N", type=_positive_int, help="stop after N instruction cycles")
+    limit.add_argument("--seconds", metavar="S", type=seconds, help="stop after S simulated seconds")
+    limit.add_argument("--cycles", metavar="N", type=cycles, help="stop after N instruction cycles")
     made.add_argument("--uart1", metavar="WHERE", default="-", help=f"{SPECIFICATIONS} (default -: stdout and stdin)")
     made.add_argument("--uart2", metavar="WHERE", default="none", help=f"{SPECIFICATIONS} (default none)")
     made.add_argument("--break", dest="breaks", metavar="SYM|ADDR", action="append", default=[], help="stop there")
@@ -66,20 +66,6 @@ def parser() -> Parser:
     add_board_options(made)
     add_watch_option(made)
     return made
-
-
-def _positive_int(text: str) -> int:
-    number = int(text, 0)
-    if number <= 0:
-        raise ValueError
-    return number
-
-
-def _positive_fraction(text: str) -> Fraction:
-    number = Fraction(text)
-    if number <= 0:
-        raise ValueError
-    return number
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ import sys
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final
 
-from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.faults import fault_of
 from emu.loader import load_image
@@ -33,7 +33,7 @@ def parser() -> Parser:
     made = Parser("screenshot", DESCRIPTION, example)
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
     made.add_argument("-o", "--output", metavar="FILE.png", default="frame.png", help="default frame.png")
-    made.add_argument("--seconds", metavar="S", type=_positive, default=Fraction(2), help="simulated time (default 2)")
+    made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(2), help="simulated time (default 2)")
     made.add_argument("--buffer", metavar="SYM|ADDR", help="variable or data address of the frame")
     made.add_argument("--size", metavar="WxH", type=_size, help="pixels of the frame, for example 20x20")
     made.add_argument("--format", choices=FORMATS, default="rgb565", help="of the frame (default rgb565)")
@@ -42,16 +42,6 @@ def parser() -> Parser:
     made.add_argument("--json", action="store_true", help="print one JSON object")
     add_board_options(made)
     return made
-
-
-def _positive(text: str) -> Fraction:
-    try:
-        number = Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        number = Fraction(0)
-    if number <= 0:
-        raise argparse.ArgumentTypeError(f"expected a positive number, not {text!r}")
-    return number
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -335,12 +335,24 @@ def test_bad_requests_are_one_line_and_status_2_or_126(build, capfd, arguments, 
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--seconds", "0"], ["--seconds", "x"], ["--cycles", "-1"], ["--cycles", "1", "--seconds", "1"]]
+    ("arguments", "expected"),
+    [
+        (["--seconds", "0"], "expected seconds above 0, like 5 or 0.25, not '0'"),
+        (["--seconds", "x"], "expected seconds above 0"),
+        (["--seconds", "1/0"], "expected seconds above 0"),
+        (["--seconds", "1e999999999"], "expected seconds above 0"),
+        (["--cycles=-1"], "expected a number of cycles above 0, not '-1'"),
+        (["--cycles", "0"], "expected a number of cycles above 0"),
+        (["--cycles", "1", "--seconds", "1"], "not allowed with argument"),
+    ],
 )
-def test_bad_limits_are_usage_mistakes(build, arguments):
+def test_bad_limits_are_usage_mistakes(build, capfd, arguments, expected):
     with pytest.raises(SystemExit) as caught:
         main(["run", build(HELLO), *arguments])
     assert caught.value.code == 2
+    err = capfd.readouterr().err
+    assert expected in err
+    assert err.count("\n") == 1
 
 
 def test_nothing_is_left_of_a_trace_that_cannot_be_finished(build, tmp_path, capfd):
