@@ -52,6 +52,11 @@ class Uart(Peripheral):
         self.on_byte: Callable[[int, int], None] | None = None
         """on_byte(byte, start_cycle): a frame has left TX; its start bit began in start_cycle."""
         self._capture: Capture | None = None
+        fields = kit.chip.sfrs[prefix + "STA"].fields
+        self._trmt, self._utxbf, self._utxen, self._utxisel = (
+            1 << fields[name][0] for name in ("TRMT", "UTXBF", "UTXEN", "UTXISEL")
+        )
+        self._uarten: Final = 1 << kit.chip.sfrs[prefix + "MODE"].fields["UARTEN"][0]
         tx_port, self._tx_pin = parse_pin(site.tx_pin)
         rx_port, self._rx_pin = parse_pin(site.rx_pin)
         self._tx_port: Final = ports[tx_port]
@@ -105,7 +110,7 @@ class Uart(Peripheral):
     @property
     def is_enabled(self) -> bool:
         """UARTEN."""
-        return bool(self.mode["UARTEN"])
+        return bool(self.mode.value & self._uarten)
 
     @property
     def is_sending_enabled(self) -> bool:
@@ -114,19 +119,20 @@ class Uart(Peripheral):
 
     @property
     def _format(self) -> Format:
-        return FORMATS[self.mode["PDSEL"] << 1 | self.mode["STSEL"]]
+        return FORMATS[self.mode.value & 7]  # PDSEL and STSEL, sfr.csv
 
     # -- transmit ----------------------------------------------------------------------------------------------------
 
     def _tx_written(self, _old: int, new: int, lanes: int) -> None:
         """The low byte pushes; a full FIFO drops the character (§10.1)."""
-        if not lanes & 0xFF or not self.is_enabled or self._tx_count.value == FIFO:
+        count = self._tx_count.value
+        if not lanes & 0xFF or not self.is_enabled or count == FIFO:
             return
-        self._tx[self._tx_count.value] = new & (1 << self._format.data_bits) - 1
-        self._tx_count.value += 1
-        self.sta["UTXBF"] = self._tx_count.value == FIFO
-        self.sta["TRMT"] = 0
-        if self.is_sending_enabled and not self._shifting.value:
+        self._tx[count] = new & (1 << self._format.data_bits) - 1
+        self._tx_count.value = count + 1
+        status = self.sta.value & ~self._trmt
+        self.sta.value = status | self._utxbf if count + 1 == FIFO else status
+        if status & self._utxen and not self._shifting.value:
             self.events.set(self._tx_event, self.now + 1)
 
     def _tx_due(self, due: int) -> None:
@@ -144,13 +150,14 @@ class Uart(Peripheral):
 
     def _load(self, cycle: int) -> None:
         """FIFO to TSR; the start bit begins at the next edge of the free-running bit clock (§10.1)."""
-        data = self._tx[0]
+        waiting = self._tx
+        data = waiting[0]
+        waiting[0], waiting[1], waiting[2] = waiting[1], waiting[2], waiting[3]
         count = self._tx_count.value - 1
-        for index in range(count):
-            self._tx[index] = self._tx[index + 1]
         self._tx_count.value = count
-        self.sta["UTXBF"] = 0
-        if not self.sta["UTXISEL"] or count == 0:
+        status = self.sta.value & ~self._utxbf
+        self.sta.value = status
+        if not status & self._utxisel or count == 0:
             self._interrupts.line(self.site.tx_irq).request()
         form = self._format
         bits, length = form.pack(data), form.length
