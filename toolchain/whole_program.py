@@ -13,9 +13,8 @@ from pathlib import Path
 import llvmlite.binding as llvm
 
 from toolchain.errors import ToolError
+from toolchain.isr_names import VECTOR_FUNCTIONS
 
-# abi-elf.md §2.7: the linker finds handlers by these names.
-VECTOR_NAME = re.compile(r"_(Alt)?\w*(Interrupt\d*|OscillatorFail|AddressError|StackError|MathError|ReservedTrap\d)")
 VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.weak_odr, llvm.Linkage.linkonce_any,
                     llvm.Linkage.linkonce_odr, llvm.Linkage.common}  # fmt: skip
 BITCODE_MAGIC = b"BC\xc0\xde"
@@ -88,7 +87,7 @@ def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
         if value.is_declaration or value.linkage not in VISIBLE_LINKAGES:
             continue
         name = value.name
-        if name in keep or name.startswith("llvm.") or VECTOR_NAME.fullmatch(name):
+        if name in keep or name.startswith("llvm.") or name in VECTOR_FUNCTIONS:
             continue
         value.linkage = llvm.Linkage.internal
 
