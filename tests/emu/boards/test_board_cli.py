@@ -86,7 +86,7 @@ def test_screenshot_without_buffer_shows_what_the_sensor_sees(program, scene, tm
         (["screenshot", "IMAGE", "--buffer", "nowhere", "--size", "2x2"], "no register or variable 'nowhere'"),
         (["screenshot", "IMAGE", "--buffer", "0x2700", "--size", "20x20"], "does not lie in RAM"),
         (["screenshot", "IMAGE", "--size", "20"], "WIDTHxHEIGHT"),
-        (["screenshot", "IMAGE", "--seconds", "0"], "positive number"),
+        (["screenshot", "IMAGE", "--seconds", "0"], "expected seconds above 0"),
         (["screenshot", "IMAGE", "--board", "none"], "no sensor"),
         (["screenshot", "IMAGE", "--buffer", "0x800", "--size", "3x1", "--format", "yuv"], "no whole number"),
     ],
