@@ -29,7 +29,8 @@ TARGET_FLAGS = [
     "-fno-slp-vectorize",
 ]
 # Plain char is signed (abi-elf.md §1.1; MSP430 says unsigned), wchar_t is unsigned short.
-LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident"]
+# A pragma that nobody understands (XC16's `#pragma config`) must not pass in silence.
+LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas"]
 # Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
 ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "fwrite", "fputc", "fputs", "exp2", "exp2f", "exp10", "ldexp",
                     "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf"]  # fmt: skip
