@@ -10,12 +10,20 @@ from typing import Final, NamedTuple, Protocol
 
 from arena import bodies
 from arena.controllers import steps_per_second
-from arena.scene import FCY, Scene
+from arena.scene import Scene
 from arena.vision import NOTHING, OBJECT, Eye, sensor_of
 from arena.world import STREAM_SENSORS, STREAM_START, Poses, generator
 
 SPREAD_TCY: Final = 1_600_000
 """Robots are switched on within one camera frame of each other, each at its own moment."""
+
+
+LATENCY_TCY: Final = 147_456
+"""From the middle of the window's rows to the new wheel speed, 10 ms: the sensor sends the other rows for 8.7 ms
+(500 rows in a frame, epuck.md §7.1), then the firmware classifies and its motor interrupt follows."""
+FIRST_LOOK_TCY: Final = 1_600_000
+"""From power-on to the first look."""
+NEVER: Final = 1 << 62
 
 
 class Line(NamedTuple):
@@ -63,34 +71,46 @@ def switched_on(seed: int, robot: int) -> int:
 class ScriptedBrain:
     """The clustering controller in Python, on the same sensor geometry and frame rate as the firmware's camera.
 
-    It looks once per frame; the answer turns the wheels from the next quantum on. `lead_tcy` is the time from power-on to
-    the first frame's middle.
+    It looks once per frame, at the pose extrapolated to that cycle; `LATENCY_TCY` later the wheels turn accordingly.
+    Both happen at their own cycle within a quantum. `FIRST_LOOK_TCY` after power-on comes the first look.
     """
 
-    def __init__(self, scene: Scene, seed: int, robot: int, controller: str, lead_tcy: int = 0) -> None:
+    def __init__(self, scene: Scene, seed: int, robot: int, controller: str) -> None:
         self._scene = scene
         self._robot = robot
         self._controller = controller
         self._quantum = scene.clock.quantum_tcy
-        self._next_look = switched_on(seed, robot) + lead_tcy
+        self._next_look = switched_on(seed, robot) + FIRST_LOOK_TCY
         self._rng = generator(seed, STREAM_SENSORS, robot)
         self._missing = scene.camera.false_negative
         self._inventing = scene.camera.false_positive
         self._reading = Reading()
-        self._wheels = (0.0, 0.0)
+        self._wheels = self._wanted = (0.0, 0.0)
+        self._change_at = NEVER
+        self._before: tuple[float, float, float] | None = None
 
     def think(self, tick: int, poses: Poses) -> tuple[float, float]:
-        """As `Brain.think`."""
-        wheels = self._wheels
-        if self._next_look < (tick + 1) * self._quantum:
-            self._next_look += self._scene.camera.frame_tcy
-            self._reading.seen = seen = self._look(poses)
+        """As `Brain.think`. A change in the middle of the quantum counts with its share."""
+        start = tick * self._quantum
+        end = start + self._quantum
+        pose = poses.robots[self._robot]
+        if self._next_look < end:
+            ahead = max(self._next_look - start, 0) / self._quantum
+            self._reading.seen = seen = self._look(poses, extrapolated(self._before or pose, pose, ahead))
             left, right = steps_per_second(self._controller, seen)
-            self._wheels = left * bodies.CM_PER_STEP, right * bodies.CM_PER_STEP
-        return wheels
+            self._wanted = left * bodies.CM_PER_STEP, right * bodies.CM_PER_STEP
+            self._change_at = self._next_look + LATENCY_TCY
+            self._next_look += self._scene.camera.frame_tcy
+        self._before = pose
+        if self._change_at >= end:
+            return self._wheels
+        old, new = self._wheels, self._wanted
+        share = min((end - self._change_at) / self._quantum, 1.0)
+        self._wheels, self._change_at = new, NEVER
+        return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
 
-    def _look(self, poses: Poses) -> int:
-        seen = sensor_of(Eye(self._scene, poses, self._robot))
+    def _look(self, poses: Poses, pose: tuple[float, float, float]) -> int:
+        seen = sensor_of(Eye(self._scene, poses, self._robot, pose))
         if seen != NOTHING and self._missing and self._rng.random() < self._missing:
             return NOTHING
         if seen == NOTHING and self._inventing and self._rng.random() < self._inventing:
@@ -109,6 +129,12 @@ class ScriptedBrain:
         """Nothing to give back."""
 
 
-def seconds_of(tick: int, scene: Scene) -> float:
-    """Start of a quantum in seconds."""
-    return tick * scene.clock.quantum_tcy / FCY
+def extrapolated(
+    before: tuple[float, float, float], pose: tuple[float, float, float], quanta: float
+) -> tuple[float, float, float]:
+    """Where a robot will be after a share of a quantum if it goes on as in the last one."""
+    return (
+        pose[0] + quanta * (pose[0] - before[0]),
+        pose[1] + quanta * (pose[1] - before[1]),
+        pose[2] + quanta * (pose[2] - before[2]),
+    )

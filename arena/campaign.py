@@ -28,6 +28,10 @@ Report = Callable[[int, float], None]
 """report(trial, seconds simulated)."""
 _queue: Any = None
 
+SELECTOR = {"A": 8, "B": 9}
+"""Position of the robots' switch for a controller: bit 0 chooses B, bit 3 lets the project's own firmware start without
+the remote control (firmware/apps/clustering)."""
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -75,7 +79,8 @@ def make_brains(plan: Plan, seed: int) -> list[Brain]:
         return [ScriptedBrain(plan.scene, seed, robot, plan.controller) for robot in robots]
     from arena.emulated import EmulatedBrain  # the emulator is loaded by those who need it
 
-    return [EmulatedBrain(plan.scene, seed, robot, plan.image) for robot in robots]
+    selector = SELECTOR[plan.controller]
+    return [EmulatedBrain(plan.scene, seed, robot, plan.image, selector) for robot in robots]
 
 
 def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None) -> Done:
@@ -95,7 +100,10 @@ def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None)
 
 
 def open_folder(plan: Plan, folder: Path, command: list[str]) -> list[int]:
-    """Make or continue the folder of a run; numbers of the trials still to do. Raises RecordError if it holds another."""
+    """Make or continue the folder of a run; numbers of the trials still to do.
+
+    Raises RecordError if it holds another run.
+    """
     key = plan.key() | {"seed": plan.seed}
     manifest = folder / MANIFEST
     try:
@@ -121,7 +129,9 @@ def versions() -> dict[str, str]:
     return found
 
 
-def run_all(plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None]) -> None:
+def run_all(
+    plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None]
+) -> None:
     """Run trials `numbers` on `jobs` workers; 1 = in this process. Raises what a trial raises, after the others of its
     moment; files of finished trials stay."""
     if jobs <= 1 or len(numbers) <= 1:
@@ -154,7 +164,7 @@ def _work(plan: Plan, number: int, folder: Path) -> Done:
 
 
 def note_host_time(folder: Path, done: Done) -> None:
-    """Keep how long a trial took, and its faults, in the manifest: not in the file, whose bytes must not depend on it."""
+    """Keep how long a trial took, and its faults, in the manifest: a trial's bytes must not depend on host time."""
     manifest = folder / MANIFEST
     value = json.loads(manifest.read_text())
     value["host"].append({"trial": done.trial, "host_s": round(done.host_s, 2), "faults": done.faults})

@@ -1,6 +1,6 @@
 """The command line: `python -m arena run | compare | plot | replay | sweep | scenes`.
 
-Exit status: 0 done; 1 a robot's firmware stopped during a trial; 2 bad input; 130 interrupted (finished trials are kept).
+Exit status: 0 done; 1 a robot's firmware stopped in a trial; 2 bad input; 130 interrupted (finished trials are kept).
 """
 
 from __future__ import annotations

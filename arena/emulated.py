@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import emu
 from arena import bodies
-from arena.brain import Line, Reading, switched_on
+from arena.brain import Line, Reading, extrapolated, switched_on
 from arena.scene import FCY, Scene
 from arena.vision import COLOURS, Eye
 from arena.world import STREAM_SENSORS, Poses, generator
@@ -28,6 +28,8 @@ WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
 OK_AFTER_S: Final = 1.0
 """The remote control's OK, which starts the published program, comes this long after power-on."""
+PROBE_TCY: Final = 147_456
+"""Mean time between two looks at whether the CPU is idle, at random cycles: 10 ms, 90,000 looks in 15 minutes."""
 LINE_LIMIT: Final = 200
 """Bytes after which a line without an end is taken as one."""
 _NOISE: Final = 1 << 14
@@ -35,9 +37,12 @@ _NOISE: Final = 1 << 14
 
 
 class EmulatedBrain:
-    """A machine with `image` (ELF or HEX), switched on at its own moment. Raises emu.LoadError for an unusable image."""
+    """A machine with `image` (ELF or HEX), switched on at its own moment; `selector` is the switch's position.
 
-    def __init__(self, scene: Scene, seed: int, robot: int, image: str | Path) -> None:
+    Raises emu.LoadError for an unusable image.
+    """
+
+    def __init__(self, scene: Scene, seed: int, robot: int, image: str | Path, selector: int = 0) -> None:
         self._scene = scene
         self._robot = robot
         self._quantum = scene.clock.quantum_tcy
@@ -45,7 +50,7 @@ class EmulatedBrain:
         self._rng = generator(seed, STREAM_SENSORS, robot)
         noise = self._rng.normal(0.0, scene.camera.pixel_noise, _NOISE + 3 * 640)
         self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
-        board = partial(Epuck, camera=scene.camera.sensor, seed=seed * 1000 + robot)
+        board = partial(Epuck, camera=scene.camera.sensor, selector=selector, seed=seed * 1000 + robot)
         self.machine = emu.load(image, board=board)
         self._board: Epuck = self.machine.board
         assert self._board.camera is not None
@@ -54,7 +59,7 @@ class EmulatedBrain:
         self.machine.uart[1].on_byte = self._byte
         self._poses = Poses([], [])
         self._pose = (0.0, 0.0, 0.0)
-        self._moved = (0.0, 0.0, 0.0)
+        self._before = self._pose
         self._start = 0
         window = max(round(WINDOW_S / (self._quantum / FCY)), 1)
         self._counts: deque[tuple[int, int]] = deque([(0, 0)], maxlen=window + 1)
@@ -62,6 +67,7 @@ class EmulatedBrain:
         self._text = bytearray()
         self._text_at = 0
         self._busy = self._probes = 0
+        self._probe_at = 1
         self._fault = ""
 
     # -- one quantum -------------------------------------------------------------------------------------------------
@@ -73,22 +79,20 @@ class EmulatedBrain:
             return 0.0, 0.0
         self._look_around(tick, poses)
         machine = self.machine
-        probe = end - int(self._rng.integers(self._quantum))
-        for until in (probe, end):
-            stop = machine.run_until(until) if until > machine.cycle else None
-            if stop is not None and stop.reason != "limit":
+        while machine.cycle < end:
+            stop = machine.run_until(min(self._probe_at, end))
+            if stop is not None:
                 self._fault = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}: {stop.detail}".rstrip(": ")
                 return 0.0, 0.0
-            if until == probe:
+            if machine.cycle >= self._probe_at:
                 self._probes += 1
                 self._busy += machine.state.mode == RUN
+                self._probe_at = machine.cycle + 1 + int(self._rng.integers(2 * PROBE_TCY))
         return self._speeds()
 
     def _look_around(self, tick: int, poses: Poses) -> None:
         pose = poses.robots[self._robot]
-        if self._poses.robots:
-            before = self._pose
-            self._moved = (pose[0] - before[0], pose[1] - before[1], pose[2] - before[2])
+        self._before = self._pose if self._poses.robots else pose
         self._poses, self._pose = poses, pose
         self._start = tick * self._quantum - self._on_at
         if self.machine.peek("ADCON1") & 0x8000:
@@ -105,13 +109,13 @@ class EmulatedBrain:
     # -- what the firmware reads and says ----------------------------------------------------------------------------
 
     def _pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
-        share = (cycle - self._start) / self._quantum
-        x, north, heading = (at + share * step for at, step in zip(self._pose, self._moved, strict=True))
-        eye = Eye(self._scene, self._poses, self._robot, (x, north, heading))
+        pose = extrapolated(self._before, self._pose, (cycle - self._start) / self._quantum)
+        eye = Eye(self._scene, self._poses, self._robot, pose)
         colours = COLOURS[eye.classes(y, columns)].astype(np.int16)
         first = int(self._rng.integers(_NOISE))
         noise = self._noise[first : first + 3 * len(columns)].reshape(-1, 3)
-        return np.clip(colours + noise, 0, 255).astype(np.uint8)
+        pixels: NDArray[np.uint8] = np.clip(colours + noise, 0, 255).astype(np.uint8)
+        return pixels
 
     def _byte(self, byte: int, cycle: int) -> None:
         if byte in b"\r\n" or len(self._text) >= LINE_LIMIT:
@@ -126,7 +130,7 @@ class EmulatedBrain:
     # -- what is recorded --------------------------------------------------------------------------------------------
 
     def reading(self) -> Reading:
-        """As `Brain.reading`. `load` comes from looking at the CPU once per quantum at a random cycle."""
+        """As `Brain.reading`. `load` comes from looking at the CPU at random cycles."""
         load = self._busy / self._probes if self._probes else 0.0
         self._busy = self._probes = 0
         leds = sum(1 << bit for bit, lit in enumerate(self._board.leds.states()) if lit)

@@ -13,7 +13,7 @@ ROOT: Final = Path(__file__).resolve().parent.parent / "firmware"
 APPLICATIONS: Final = {"openswarm": "clustering", "bare": "clustering-bare"}
 
 
-def image_for(brain: str, controller: str) -> Path | None:
+def image_for(brain: str) -> Path | None:
     """The image of a brain, built if it is one of ours; None for `scripted`. Raises LoadError for a file that is no
     image, ValueError for a name that is none or firmware that cannot be built."""
     if brain == "scripted":
@@ -28,13 +28,11 @@ def image_for(brain: str, controller: str) -> Path | None:
     application = APPLICATIONS[brain]
     if not (ROOT / "apps" / application).is_dir():
         raise ValueError(f"--brain {brain}: there is no firmware/apps/{application} beside this package")
-    out = ROOT / "build" / f"{application}-{controller}"
-    command = ["make", "-C", str(ROOT), f"APP={application}", f"OUT={out}", f"DEFINES=-DCONTROLLER_{controller}",
-               f"PYTHON={sys.executable}"]  # fmt: skip
+    command = ["make", "-C", str(ROOT), f"APP={application}", f"PYTHON={sys.executable}"]
     try:
         built = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
         raise ValueError(f"--brain {brain}: make cannot be run: {error}") from None
     if built.returncode:
         raise ValueError(f"--brain {brain}: {' '.join(command)} failed:\n{built.stderr.strip()}")
-    return out / "firmware.elf"
+    return ROOT / "build" / application / "firmware.elf"

@@ -31,8 +31,8 @@ def compactness(places: Places, radius_cm: float) -> float:
 
 
 def clusters(places: Places, reach_cm: float) -> list[int]:
-    """For each object the number of its cluster: connected parts of the graph of adjacent objects, numbered in the order
-    of their first object."""
+    """For each object the number of its cluster: connected parts of the graph of adjacent objects, numbered in the
+    order of their first object."""
     count = len(places)
     near = ((places[:, None, :] - places[None, :, :]) ** 2).sum(axis=2) < reach_cm**2
     label = [-1] * count

@@ -35,7 +35,8 @@ def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float,
     for index, ((x, y), radius) in enumerate(zip(chosen, radii, strict=True)):
         nearest = min(x, y, scene.arena.width_cm - x, scene.arena.height_cm - y)
         if nearest < radius:
-            raise SceneError(f"{scene.name}: no room: the mark at ({x:g}, {y:g}) cm is nearer to a wall than {radius:g} cm")
+            where = f"the mark at ({x:g}, {y:g}) cm is nearer to a wall than {radius:g} cm"
+            raise SceneError(f"{scene.name}: no room: {where}")
         for (other_x, other_y), other in zip(chosen[:index], radii[:index], strict=True):
             if math.hypot(x - other_x, y - other_y) < radius + other:
                 raise SceneError(f"{scene.name}: no room: marks are {scene.marks.spacing_cm:g} cm apart")

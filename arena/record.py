@@ -53,7 +53,8 @@ class Trial:
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
         if not count:
             return np.zeros((len(self.times), 0, 2))
-        pairs = [np.column_stack([self.columns[f"{letter}{i}_x"], self.columns[f"{letter}{i}_y"]]) for i in range(count)]
+        names = [f"{letter}{i}" for i in range(count)]
+        pairs = [np.column_stack([self.columns[f"{name}_x"], self.columns[f"{name}_y"]]) for name in names]
         return np.stack(pairs, axis=1)
 
 
@@ -81,7 +82,8 @@ def read_trial(path: Path) -> Trial:
         about = json.loads((table.schema.metadata or {})[b"arena"])
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise RecordError(f"{path}: is no recorded trial: {error}") from None
-    columns = {name: table[name].to_pylist() if name == "log" else table[name].to_numpy() for name in table.column_names}
+    names = table.column_names
+    columns = {name: table[name].to_pylist() if name == "log" else table[name].to_numpy() for name in names}
     return Trial(path, columns, about)
 
 

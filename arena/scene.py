@@ -74,9 +74,10 @@ class CameraSetting:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Lock-step of world and brains, and how often rows are written."""
+    """Lock-step of world and brains, another one when all brains are scripted, and how often rows are written."""
 
-    quantum_ms: float = 10.0
+    quantum_ms: float = 1.0
+    scripted_quantum_ms: float = 10.0
     sample_s: float = 0.5
 
     @property
@@ -120,6 +121,11 @@ _SECTIONS: Final[Mapping[str, type[Any]]] = {
 }
 
 T = TypeVar("T")
+
+
+def scripted(scene: Scene) -> Scene:
+    """The scene as scripted brains live in it: with their own, longer quantum."""
+    return scene.with_values(clock__quantum_ms=scene.clock.scripted_quantum_ms)
 
 
 def scenes() -> list[str]:
@@ -194,6 +200,7 @@ def _checked(scene: Scene, path: str) -> Scene:
         "camera.false_negative": (scene.camera.false_negative, 0, 1),
         "camera.false_positive": (scene.camera.false_positive, 0, 1),
         "clock.quantum_ms": (scene.clock.quantum_ms, 0.1, 20),
+        "clock.scripted_quantum_ms": (scene.clock.scripted_quantum_ms, 0.1, 20),
         "clock.sample_s": (scene.clock.sample_s, 0.02, 60),
     }
     for key, (value, low, high) in limits.items():

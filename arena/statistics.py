@@ -1,7 +1,7 @@
 """Comparing two runs (experiment.md §5): equivalence by two one-sided tests, Wilcoxon's signed ranks, bootstrap bands.
 
-Differences are taken seed by seed. Everything is computed here from its definition; nothing is random but the bootstrap,
-which is seeded.
+Differences are taken seed by seed. Everything is computed here from its definition; nothing is random but the
+bootstrap, which is seeded.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One trial: a world, its brains, and rows of what happened. The order of a quantum is fixed: think, act, physics, record.
+"""One trial: a world, its brains, and rows of what happened. A quantum is: think, act, physics, record, in this order.
 
 Robots think in the order of their numbers; none sees a half-moved world.
 """
@@ -86,7 +86,8 @@ class _Recorder:
             zip(world.poses.robots, wheels, self._brains, strict=True)
         ):
             reading = brain.reading()
-            row[f"r{index}_x"], row[f"r{index}_y"], row[f"r{index}_heading"] = round(x, 4), round(y, 4), round(heading, 4)
+            row[f"r{index}_x"], row[f"r{index}_y"] = round(x, 4), round(y, 4)
+            row[f"r{index}_heading"] = round(heading, 4)
             row[f"r{index}_left"], row[f"r{index}_right"] = round(left, 4), round(right, 4)
             row[f"r{index}_seen"] = reading.seen
             row[f"r{index}_load"] = round(reading.load, 4)

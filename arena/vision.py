@@ -1,8 +1,9 @@
 """What a robot's camera sees: rays through pixel columns, with heights (epuck.md §7.6).
 
-A ray through column u hits discs and a wall; a pixel's row says at which height it passes each of them. What is nearest
-and tall enough is seen. `Eye.classes` answers for many columns of one row at once, `Eye.column` for one column: two ways
-to the same answer, compared in the tests. Lengths cm; rows and columns are those of the upright 640 x 480 picture.
+A ray through column u hits discs and a wall; a pixel's row says at which height it passes each of them. What is
+nearest and tall enough is seen. `Eye.classes` answers for many columns of one row at once, `Eye.column` for one
+column: two ways to the same answer, compared in the tests. Lengths cm; rows and columns are those of the upright
+640 x 480 picture.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Eye:
         self._width, self._height = scene.arena.width_cm, scene.arena.height_cm
         self._range = scene.camera.range_cm
         self.discs: Final[list[Disc]] = []
-        self._collect([place for place in poses.objects], scene.objects.radius_cm, bodies.OBJECT_HEIGHT, OBJECT)
+        self._collect(poses.objects, scene.objects.radius_cm, bodies.OBJECT_HEIGHT, OBJECT)
         others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
         self._collect(others, bodies.ROBOT_RADIUS, bodies.ROBOT_HEIGHT, ROBOT)
         self.discs.sort()
@@ -120,7 +121,7 @@ class Eye:
 
     def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp]:
         """Classes of the pixels of one row in some columns."""
-        slopes = (bodies.CENTRE_X - columns) / bodies.FOCAL_PIXELS
+        slopes: NDArray[np.float64] = (bodies.CENTRE_X - columns.astype(np.float64)) / bodies.FOCAL_PIXELS
         rise = (bodies.CENTRE_Y - v) / bodies.FOCAL_PIXELS
         a = 1 + slopes * slopes
         nearest = self._wall_depths(slopes)
@@ -154,7 +155,7 @@ def slope_of(u: float) -> float:
     return (bodies.CENTRE_X - u) / bodies.FOCAL_PIXELS
 
 
-# -- the sensor of the clustering firmware (openswarm-original.md §8, revision A) ---------------------------------------
+# -- the sensor of the clustering firmware (openswarm-original.md §8, revision A) ------------------------------------
 
 WINDOW_COLUMNS: Final = tuple(240 + 8 * x for x in (6, 9, 12, 15))
 WINDOW_ROWS: Final = tuple(160 + 8 * y for y in (4, 6, 8, 10, 12, 14))

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 import pymunk
+import pymunk.batch
 from numpy.typing import NDArray
 
 from arena import bodies
@@ -81,6 +82,8 @@ class World:
         self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
         self._noise = [(1.0, 1.0)] * len(robots)
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
+        self._buffer = pymunk.batch.Buffer()
+        self._order = self._find_order()
         self.poses = self._read()
 
     # -- building ----------------------------------------------------------------------------------------------------
@@ -114,7 +117,8 @@ class World:
         wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         push = pymunk.PivotJoint(wheels, robot, (0, 0), (0, 0))
         turn = pymunk.GearJoint(wheels, robot, 0.0, 1.0)
-        for joint, force in ((push, bodies.newton(thrust)), (turn, bodies.newton(thrust) * self.scene.robots.axle_cm / 2)):
+        grip = bodies.newton(thrust)
+        for joint, force in ((push, grip), (turn, grip * self.scene.robots.axle_cm / 2)):
             joint.max_bias = 0.0
             joint.max_force = force
             self.space.add(joint)
@@ -163,9 +167,21 @@ class World:
             left, right = rng.uniform(1 - share, 1 + share, 2).tolist()
             self._noise[index] = left, right
 
+    def _find_order(self) -> list[int]:
+        """Where robots and objects are in pymunk's list of all bodies, which stays as it is while none is removed."""
+        self._buffer.clear()
+        pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._buffer)
+        found = np.frombuffer(self._buffer.int_buf(), dtype=np.int64).tolist()
+        return [found.index(body.id) for body in [*self.robots, *self.objects]]
+
     def _read(self) -> Poses:
-        robots = [(*body.position, body.angle) for body in self.robots]
-        return Poses(robots, [(x, y) for x, y in (body.position for body in self.objects)])
+        """All poses in one call: asking body by body costs more than the physics."""
+        self._buffer.clear()
+        fields = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
+        pymunk.batch.get_space_bodies(self.space, fields, self._buffer)
+        values = np.frombuffer(self._buffer.float_buf(), dtype=np.float64).reshape(-1, 3)[self._order].tolist()
+        robots = [(x, y, heading) for x, y, heading in values[: len(self.robots)]]
+        return Poses(robots, [(x, y) for x, y, _ in values[len(self.robots) :]])
 
     @property
     def seconds(self) -> float:

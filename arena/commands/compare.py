@@ -34,10 +34,11 @@ def parser() -> argparse.ArgumentParser:
 
 def courses(trials: list[Trial]) -> dict[int, tuple[Trial, Course]]:
     """Metrics of each trial by seed."""
-    return {
-        int(trial.about["seed"]): (trial, course(trial.times, trial.objects, trial.about["scene"]["objects"]["radius_cm"]))
-        for trial in trials
-    }
+    found = {}
+    for trial in trials:
+        radius = trial.about["scene"]["objects"]["radius_cm"]
+        found[int(trial.about["seed"])] = (trial, course(trial.times, trial.objects, radius))
+    return found
 
 
 def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, Any]:
@@ -69,9 +70,14 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
         result = equivalence(x, y, margin if margin is not None else 0.1 * float(abs(y.mean())) or 1e-9)
         rows.append({"measure": name, "first": _spread(x), "second": _spread(y), **asdict(result),
                      "equivalent": result.equivalent, "wilcoxon_p": signed_rank_p(x, y)})  # fmt: skip
-    loads = [float(np.mean([trial.columns[f"r{i}_load"][1:].mean() for trial, _ in runs.values()
-                            for i in range(trial.about["scene"]["robots"]["count"])])) for runs in (ones, others)]  # fmt: skip
+    loads = [_load([trial for trial, _ in runs.values()]) for runs in (ones, others)]
     return {"seeds": seeds, "at": at, "measures": rows, "cpu_load": loads, "published": PUBLISHED}
+
+
+def _load(trials: list[Trial]) -> float:
+    """Mean CPU load over robots, trials and time."""
+    robots = range(trials[0].about["scene"]["robots"]["count"])
+    return float(np.mean([trial.columns[f"r{robot}_load"][1:].mean() for trial in trials for robot in robots]))
 
 
 def _spread(values: Values) -> dict[str, float]:
@@ -88,9 +94,10 @@ def run(options: argparse.Namespace) -> int:
     for row in result["measures"]:
         x, y = row["first"], row["second"]
         verdict = "equivalent" if row["equivalent"] else "equivalence not shown"
+        chance = f"p = {row['p']:.3f}; Wilcoxon p = {row['wilcoxon_p']:.3f}"
         print(f"{row['measure']}\n    X {x['mean']:.3f} sd {x['sd']:.3f}   Y {y['mean']:.3f} sd {y['sd']:.3f}\n"
               f"    X - Y {row['mean']:+.3f}, 90 % interval {row['low']:+.3f} to {row['high']:+.3f}, "
-              f"margin {row['margin']:.3f}: {verdict} (p = {row['p']:.3f}); Wilcoxon p = {row['wilcoxon_p']:.3f}")  # fmt: skip
+              f"margin {row['margin']:.3f}: {verdict} ({chance})")  # fmt: skip
     print(f"CPU load: X {result['cpu_load'][0]:.1%}, Y {result['cpu_load'][1]:.1%} (0 for scripted brains)")
     print(f"Published: {result['published']}")
     return 0

@@ -17,9 +17,9 @@ from arena.controllers import CONTROLLERS
 from arena.firmware import image_for
 from arena.metrics import course, time_to
 from arena.record import Trial, trials_in
-from arena.scene import Scene, load_scene
+from arena.scene import Scene, load_scene, scripted
 
-EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/openswarm-A"
+EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/os-A"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -33,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--robots", type=int, metavar="N", help="instead of the scene's number")
     made.add_argument("--objects", type=int, metavar="N", help="instead of the scene's number")
     made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
-    made.add_argument("--seed", type=int, default=1, help="of the first trial; the next has the next number (default 1)")
+    made.add_argument("--seed", type=int, default=1, help="of the first trial, then counted on (default 1)")
     made.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="worker processes")
     made.add_argument("--out", type=Path, metavar="FOLDER", help="default results/SCENE-BRAIN-CONTROLLER")
     made.add_argument("--json", action="store_true", help="results as JSON on standard output")
@@ -70,7 +70,9 @@ def run(options: argparse.Namespace) -> int:
     if options.trials < 1 or not options.minutes > 0:
         raise ValueError("--trials and --minutes must be positive")
     scene = changed(load_scene(options.scene), options.set, options.robots, options.objects)
-    image = image_for(options.brain, options.controller)
+    image = image_for(options.brain)
+    if image is None:
+        scene = scripted(scene)
     name = Path(options.brain).stem
     plan = Plan(scene, name, options.controller, image, options.trials, 60 * options.minutes, options.seed)
     folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"

@@ -6,6 +6,7 @@ import argparse
 import itertools
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
         axes.append([f"{place}={value}" for value in values.split(",")])
     base = options.out or Path("results") / f"sweep-{Path(options.scene).stem}"
     quiet = argparse.Namespace(**vars(options))
-    status, rows = 0, []
+    status = 0
+    rows: list[dict[str, Any]] = []
     for settings in itertools.product(*axes):
         quiet.set = [*options.set, *settings]
         quiet.out = base / "-".join(settings)
