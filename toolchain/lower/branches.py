@@ -50,10 +50,15 @@ def thread_jumps(m: MFunction) -> None:
 
 
 def remove_unreached(m: MFunction) -> None:
-    """Drop blocks without predecessors; the first block stays."""
-    reached = (
-        {m.blocks[0].name} | {s for b in m.blocks for s in b.succs} | {b.name for b in m.blocks if b.address_taken}
-    )
+    """Drop blocks control cannot reach from the entry or through an address."""
+    blocks = m.block_map()
+    work = [m.blocks[0].name, *(b.name for b in m.blocks if b.address_taken)]
+    reached = set(work)
+    while work:
+        for s in blocks[work.pop()].succs:
+            if s not in reached:
+                reached.add(s)
+                work.append(s)
     m.blocks = [b for b in m.blocks if b.name in reached]
 
 
@@ -85,6 +90,7 @@ def hoist_edge_moves(m: MFunction) -> None:
     The edge's block then only jumps, and the branch can go straight to its target. Moves leave the flags alone.
     """
     blocks = m.block_map()
+    out = live_out(m, ALL if m.interrupt else AT_RETURN)
     preds: dict[str, int] = {}
     for b in m.blocks:
         for s in b.succs:
@@ -100,7 +106,7 @@ def hoist_edge_moves(m: MFunction) -> None:
             moves = edge.insts[:-1]
             if edge.insts[-1].op != "jump" or len(moves) > MAX_HOISTED or not all(_is_neutral(mi) for mi in moves):
                 continue
-            if bits([r for mi in moves for r in mi.defs()]) & live_in(m, other):
+            if bits([r for mi in moves for r in mi.defs()]) & live_in(blocks[other], out[other]):
                 continue
             b.insts[-2:-2] = moves
             edge.insts = edge.insts[-1:]
@@ -115,11 +121,9 @@ def _is_neutral(mi: MI) -> bool:
     return mi.op in NEUTRAL and not mi.byte and not mi.pred and all(isinstance(a, int | Imm) for a in mi.args)
 
 
-def live_in(m: MFunction, name: str) -> int:
-    """Registers live at the start of a block."""
-    out = live_out(m, ALL if m.interrupt else AT_RETURN)
-    block = m.block_map()[name]
-    live = out[name]
+def live_in(block: MBlock, live: int) -> int:
+    """Registers live at the start of a block, from those live at its end. Moving copies up an edge leaves them as they
+    are for every block but the emptied one, so one analysis serves the whole pass."""
     for mi in reversed(block.insts):
         live = live & ~bits(mi.defs()) | bits(mi.uses())
     return live
@@ -139,7 +143,7 @@ def thread_constants(m: MFunction) -> None:
             continue
         goal = str(target.insts[1].args[0] if taken else target.insts[2].args[0])
         b.insts[-1] = MI("jump", goal, line=b.insts[-1].line)
-        b.succs = [goal]
+        b.succs = list(dict.fromkeys(str(mi.args[0]) for mi in b.insts if mi.op in ("bra", "jump")))
 
 
 def _decide(b: MBlock, test: MI, cc: str) -> bool | None:

@@ -139,13 +139,13 @@ class Machine:
         if isinstance(source, Mem):
             assert isinstance(dest, int)
             at = self.w[source.base]
-            self.w[dest], self.w[dest + 1] = (self.memory.get(k, k * 7 & WORD) for k in (at, at + 2))
+            self.w[dest], self.w[dest + 1] = (self.memory.get(k, k * 7 & WORD) for k in (at, at + 2 & WORD))
         else:
             assert isinstance(source, int)
             low, high = self.w[source], self.w[source + 1]
             if isinstance(dest, Mem):
                 at = self.w[dest.base]
-                self.memory[at], self.memory[at + 2] = low, high
+                self.memory[at], self.memory[at + 2 & WORD] = low, high
             else:
                 assert isinstance(dest, int)
                 self.w[dest], self.w[dest + 1] = low, high
@@ -155,7 +155,7 @@ def instruction(rng: random.Random) -> list[MI]:
     """One random piece of straight-line code; W3-W5 serve as pointers."""
     a, b, d = (rng.randrange(3) + rng.choice((0, 5)) for _ in range(3))
     p = rng.randrange(3, 6)
-    match rng.randrange(11):
+    match rng.randrange(12):
         case 0:
             return [MI("mov", Imm(rng.choice((0, 1, 5, 5, 0xFFFF))), d)]
         case 1:
@@ -177,6 +177,8 @@ def instruction(rng: random.Random) -> list[MI]:
             return [test, skip, guarded]
         case 7:
             return [MI(rng.choice(ONE), a, d)]
+        case 9:
+            return [MI("mov", Imm(DATA + 2 * rng.randrange(9)), p), MI("mov", Mem("ind", p), d), MI("clr", b)]
         case 8:
             return [MI(rng.choice(("clr", "setm")), d)]
         case _:
@@ -199,10 +201,16 @@ def generate(seed: int) -> MFunction:
         one, two = rng.choice(names[k + 1 :]), names[k + 1]
         if rng.random() < 0.7:
             r = rng.randrange(3)
-            insts.append(rng.choice((MI("cp0", r), MI("cp", r, Imm(5)), MI("cp", r, 6))))
+            insts += rng.choice((
+                [MI("cp0", r)], [MI("cp", r, Imm(5))], [MI("cp", r, 6)], [MI("dec", r, r)],
+                [MI("dec", r, r), MI("cp0", r)], [MI("dec", r, r), MI("mov", r, 6)],
+                [MI("add", r, 6, r), MI("inc2", 3, 3)], [MI("mov", Imm(9), 7), MI("cp", r, 7)],
+            ))  # fmt: skip
             insts.append(MI("bra", one, cc=rng.choice(("z", "nz", "lt", "ge", "gtu", "nn"))))
             m.blocks.append(MBlock(name, [*insts, MI("jump", two)], list(dict.fromkeys([one, two]))))
         else:
+            same = rng.random() < 0.6  # some endings are equal, for tail merging
+            insts += [MI("add", 0, 1, 2), MI("mov", 2, Mem("ind", 3)), MI("com", 2, 0)] if same else []
             m.blocks.append(MBlock(name, [*insts, MI("jump", one)], [one]))
     return m
 
