@@ -95,7 +95,7 @@ static void build(void)
         footprint_now.events += Sys_Register_Event(FIRST_EVENT + i);
     }
     footprint_now.subscriptions = subscribe(footprint_wanted.subscriptions, footprint_wanted.events);
-    for (uint16 i = 0; i < footprint_wanted.messages; i++) { /* queued: the critical section holds their delivery back */
+    for (uint16 i = 0; i < footprint_wanted.messages; i++) { /* queued: main holds delivery back */
         footprint_now.messages += Sys_Send_Event(FIRST_EVENT, payload, footprint_wanted.payload);
     }
 }

@@ -1,5 +1,5 @@
-/* Listing 1 of the paper with its misprints corrected (README.md lists them): a reactive controller in an event handler,
- * and a thread that logs "time:(left,right)" every 250 ms. */
+/* Listing 1 of the paper with its misprints corrected (README.md lists them): a reactive controller in an event
+ * handler, and a thread that logs "time:(left,right)" every 250 ms. */
 #include <openswarm.h>
 
 #include <stdio.h>

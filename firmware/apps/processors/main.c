@@ -50,7 +50,8 @@ static bool on_unsafe_area(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
-/* ---- Commands from UART1: 'u' unsafe, 's' safe, 'f' frames, 't' text ------------------------------------------------ */
+/* ---- Commands from UART1: 'u' unsafe, 's' safe, 'f' frames, 't' text
+ * ------------------------------------------------ */
 
 static bool on_command(uint16 pid, uint16 event, sys_event_data *data)
 {

@@ -1,5 +1,5 @@
-/* Starts and kills threads, registers and removes events, sends, waits and subscribes at random; reports every second and
- * checks, whenever everything is taken down, that the heap is as it was. README.md. */
+/* Starts and kills threads, registers and removes events, sends, waits and subscribes at random; reports every
+ * second and checks, whenever everything is taken down, that the heap is as it was. README.md. */
 #include <openswarm.h>
 #include <openswarm_io.h>
 

@@ -35,7 +35,8 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   void hal_slice_force(void);               the slice ends as soon as the level allows; any context
  */
 
-/* Before any other call. No interrupt is enabled until hal_start(); the level is thread. Adopts the running context as process's; fills its sp and limit. */
+/* Before any other call. No interrupt is enabled until hal_start(); the level is thread. Adopts the running context
+ * as process's; fills its sp and limit. */
 void hal_init(sys_pcb *process);
 /* 1 ms clock (calls os_clock_tick at level device) and slice timer start, interrupts are enabled. */
 void hal_start(void);
@@ -51,8 +52,9 @@ void hal_switch(hal_pick pick);
 /* As hal_switch, but the caller's context is given up. */
 HAL_NORETURN void hal_abandon(hal_pick pick);
 
-/* Kernel stack, slice level: sleep until an interrupt, unless the low byte of *pending is set. Test and sleep are one act: an interrupt
- * that sets *pending after the test ends the sleep. Comes back at slice level with interrupts taken. */
+/* Kernel stack, slice level: sleep until an interrupt, unless the low byte of *pending is set. Test and sleep are
+ * one act: an interrupt that sets *pending after the test ends the sleep. Comes back at slice level with interrupts
+ * taken. */
 void hal_idle(const volatile uint16_t *pending);
 
 /* Mask everything and stop for ever. */

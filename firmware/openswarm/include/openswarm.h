@@ -6,8 +6,10 @@
  * Each function below carries one contract line:
  *     callers | blocks? | worst-case Tcy on the dsPIC30F | stack bytes | error codes (Sys_Get_LastError)
  * Callers: M = main before Sys_Start_Kernel, T = thread, H = event handler or condition, I = ISR of priority 4.
- * n threads, m registered events, s subscriptions of one event, d payload bytes. A call from a context that is not
- * listed is refused: it returns failure, sets SYS_ERROR_CONTEXT and adds one to sys_statistics.refused.
+ * n threads, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, d payload bytes.
+ * Cycles were measured on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. A call from a
+ * context that is not listed is refused: it returns failure, sets SYS_ERROR_CONTEXT and adds one to
+ * sys_statistics.refused.
  */
 #ifndef OPENSWARM_H
 #define OPENSWARM_H
@@ -71,7 +73,8 @@ enum {
 
 /* ---- Start-up ----------------------------------------------------------------------------------------------- */
 
-/* M | no | - | 60 | MEMORY.  Kernel, board and devices become ready; the caller becomes PID 0. No interrupt is enabled. */
+/* M | no | - | 60 | MEMORY.  Kernel, board and devices become ready; the caller becomes PID 0. No interrupt is
+ * enabled. */
 void Sys_Init_Kernel(void);
 /* M | no | - | 40 | none.  Enables clock, slices and devices. The caller goes on as the system thread. */
 void Sys_Start_Kernel(void);
@@ -98,18 +101,19 @@ typedef struct {
     uint16 deadline_ms;    /* relative to each release; 1..period_ms */
 } sys_process_config;
 
-/* MTH | no | 300 + painting the stack | 40 | MEMORY.  PID, or 0 = failed (PID 0 is the system thread). */
+/* MTH | no | 820, of which 5 per byte paint the stack | 52 | MEMORY.  PID, or 0 = failed (PID 0 is the system
+ * thread). */
 uint16 Sys_Start_Process(sys_function f);
-/* MTH | no | 300 + painting the stack | 44 | MEMORY, ARGUMENT.  As above. */
+/* MTH | no | as above | 34 | MEMORY, ARGUMENT.  As above. */
 uint16 Sys_Start_ProcessWith(const sys_process_config *config);
-/* MTH | own PID: never returns | 150 + 30 per subscription in the system | 40 | PROCESS.  Also ends its
+/* MTH | own PID: never returns | ~200 + 30 per subscription in the system | 40 | PROCESS.  Also ends its
  * subscriptions, its wait and its uncleared wait result. */
 bool Sys_Kill_Process(uint16 pid);
-/* T | no | 65 with no event pending | 26 | CONTEXT.  Hands the rest of the slice on. */
+/* T | no | 61 to a yielded thread, 69 to a preempted one | 24 | CONTEXT.  Hands the rest of the slice on. */
 void Sys_Yield(void);
-/* T | yes, ms rounded up to the next 1 ms tick | 120 + 20 n | 40 | CONTEXT.  0 ms = Sys_Yield. */
+/* T | yes, ms rounded up to the next 1 ms tick | ~150 + 20 n | 40 | CONTEXT.  0 ms = Sys_Yield. */
 void Sys_Sleep(uint16 ms);
-/* T with SYS_PERIODIC | until its next release | 140 + 20 n | 40 | CONTEXT, PROCESS.  True: the deadline was met. */
+/* T with SYS_PERIODIC | until its next release | ~170 + 20 n | 40 | CONTEXT, PROCESS.  True: the deadline was met. */
 bool Sys_Wait_for_Period(void);
 /* MTHI | no | 12 | 4 | none.  Nests. No thread switch and no handler runs until the matching End; a tick that falls
  * inside is taken there. Interrupts stay enabled. */
@@ -117,7 +121,7 @@ void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);
 /* MTHI | no | 6 | 4 | none.  In a handler: the interrupted thread; use the pid argument of the handler instead. */
 uint16 Sys_Get_ProcessID(void);
-/* MTHI | no | 30 n | 20 | none.  SYS_UNKNOWN: no such thread. */
+/* MTHI | no | 70 + 10 n | 22 | none.  SYS_UNKNOWN: no such thread. */
 sys_state Sys_Get_ProcessState(uint16 pid);
 /* MTH | no | 4 per byte | 24 | none.  Stack bytes never used so far; 0 also for an unknown PID and PID 0. */
 uint16 Sys_Get_UnusedStack(uint16 pid);
@@ -134,32 +138,34 @@ void Sys_Set_Scheduler(const sys_scheduler *scheduler);
 
 /* ---- Events ------------------------------------------------------------------------------------------------- */
 
-/* MTH | no | 60 + 8 m | 30 | MEMORY.  True also if already registered. */
+/* MTH | no | 111 + 9 b | 14 | MEMORY.  True also if already registered. */
 bool Sys_Register_Event(uint16 event);
-/* MTH | no | 100 + 8 m + 30 s + 20 n | 36 | EVENT.  Its subscriptions end, its undelivered messages are dropped,
+/* MTH | no | ~120 + 30 s + 20 n | 36 | EVENT.  Its subscriptions end, its undelivered messages are dropped,
  * its waiters wake with NULL. */
 bool Sys_Unregister_Event(uint16 event);
-/* MTHI | no | 20 + 8 m | 12 | none. */
+/* MTHI | no | 40 + 9 b | 14 | none. */
 bool Sys_IsEventRegistered(uint16 event);
-/* MTH | no | 90 + 8 m + 8 s + 8 n | 40 | EVENT, PROCESS, MEMORY, ARGUMENT.  Once per (event, pid, handler):
+/* MTH | no | 130 + 9 b + 10 s + 10 n | 18 | EVENT, PROCESS, MEMORY, ARGUMENT.  Once per (event, pid, handler):
  * subscribing again replaces the condition. condition NULL = always. */
 bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_condition condition);
-/* MTH | no | 40 + 8 m + 30 s | 36 | EVENT.  All handlers of this thread; false: there was none. */
+/* MTH | no | ~60 + 9 b + 30 s | 30 | EVENT.  All handlers of this thread; false: there was none. */
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
-/* MTH | no | 40 + 8 m + 30 s | 36 | EVENT.  One handler; false: it was not subscribed. */
+/* MTH | no | ~60 + 9 b + 30 s | 30 | EVENT.  One handler; false: it was not subscribed. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
-/* MTHI | no | 110 + 8 m + 2 d | 40 | EVENT, MEMORY, ARGUMENT.  Copies the payload and queues it. True also if nobody
- * listens; then nothing is stored. False: nothing was queued. Payloads above SYS_SMALL_PAYLOAD: not from an ISR. */
+/* MTHI | no | 108 + 9 b; 17 + d/2 more unless d = 2; 74 if nobody listens | 24 | EVENT, MEMORY, ARGUMENT.  Copies
+ * the payload and queues it. True also if nobody listens; then nothing is stored. False: nothing was queued.
+ * Payloads above SYS_SMALL_PAYLOAD: not from an ISR. */
 bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
-/* MTHI | no | 110 + 8 m | 44 | EVENT, MEMORY. */
+/* MTHI | no | 117 + 9 b | 30 | EVENT, MEMORY. */
 bool Sys_Send_IntEvent(uint16 event, uint16 value);
-/* T | yes | 150 + 8 m + 8 n | 44 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
+/* T | yes | ~180 + 9 b + 10 n | 44 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
  * result at a time: its next wait, sleep excepted, frees the previous one. */
 sys_event_data *Sys_Wait_for_Event(uint16 event);
 sys_event_data *Sys_Wait_for_Condition(uint16 event, sys_condition condition);
 /* As above; NULL with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
 sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 event, sys_condition condition, uint16 ms);
-/* T | no | 60 + 8 n | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler it only sets NULL. */
+/* T | no | ~80 + 10 n | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler it only sets
+ * NULL. */
 void Sys_Clear_EventData(sys_event_data **data);
 /* MTHI | no | 30 | 12 | none.  Messages of this event that found no memory; saturates at 65535. */
 uint16 Sys_Get_LostEvents(uint16 event);

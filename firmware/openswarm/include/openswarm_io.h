@@ -40,7 +40,8 @@ typedef bool (*sys_tx_processor)(const uint8 *message, uint16 size, sys_put put)
 typedef uint16 (*sys_rx_processor)(uint8 byte, uint8 *buffer, uint16 *used);
 
 bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put);        /* bytes as they are (default) */
-uint16 Sys_Chunk_Rx(uint8 byte, uint8 *buffer, uint16 *used);           /* full buffer, or 1 ms without a byte (default) */
+/* Full buffer, or 1 ms without a byte (default). */
+uint16 Sys_Chunk_Rx(uint8 byte, uint8 *buffer, uint16 *used);
 bool Sys_Frame_Tx(const uint8 *message, uint16 size, sys_put put);      /* COBS + CRC-16/CCITT-FALSE, 0 ends a frame */
 uint16 Sys_Frame_Rx(uint8 byte, uint8 *buffer, uint16 *used);           /* damaged frames are dropped */
 

@@ -1,8 +1,8 @@
 /* COBS framing with a checksum: a Tx/Rx-processor pair.
  *
- * A frame is COBS(message, CRC high byte, CRC low byte) followed by 0. COBS (Cheshire and Baker, IEEE/ACM Transactions on Networking 1999)
- * removes every zero, so that 0 marks the end and a damaged frame costs only itself. Checksum: CRC-16/CCITT-FALSE,
- * polynomial 0x1021, start 0xFFFF. */
+ * A frame is COBS(message, CRC high byte, CRC low byte) followed by 0. COBS (Cheshire and Baker, IEEE/ACM
+ * Transactions on Networking 1999) removes every zero, so that 0 marks the end and a damaged frame costs only
+ * itself. Checksum: CRC-16/CCITT-FALSE, polynomial 0x1021, start 0xFFFF. */
 #include "io.h"
 
 enum { CRC_BYTES = 2, LONGEST_RUN = 254 };

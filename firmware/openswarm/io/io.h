@@ -1,4 +1,5 @@
-/* Private to the device layer and the boards: what a lower layer (hal_io.h) calls, and the life cycle a board drives. */
+/* Private to the device layer and the boards: what a lower layer (hal_io.h) calls, and the life cycle a board
+ * drives. */
 #ifndef OS_IO_H
 #define OS_IO_H
 

@@ -164,7 +164,8 @@ void uart_tick(void)
     }
 }
 
-/* ---- Processors and life cycle ------------------------------------------------------------------------------------ */
+/* ---- Processors and life cycle
+ * ------------------------------------------------------------------------------------ */
 
 sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor wanted)
 {

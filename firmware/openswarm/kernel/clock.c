@@ -1,7 +1,7 @@
 /* System time, the 1 ms event and everything that waits for a moment.
  *
- * os_clock_tick compares one alarm per tick; the threads behind it are looked at only when it rings, on the kernel stack.
- * Moments are low words of the system time, ordered by their distance from base, the time of the last look. */
+ * os_clock_tick compares one alarm per tick; the threads behind it are looked at only when it rings, on the kernel
+ * stack. Moments are low words of the system time, ordered by their distance from base, the time of the last look. */
 #include "kernel.h"
 
 static volatile uint32 now_ms;

@@ -72,8 +72,8 @@ typedef struct {
     uint16 period, deadline, release, due;
 } periodic;
 
-/* os_pending: why the next thread of the ring cannot simply run. The low byte, OS_WORK, must be worked off and keeps the
- * kernel from idling; the high byte says that a scheduler chooses. One word, so that a slice end tests it once. */
+/* os_pending: why the next thread of the ring cannot simply run. The low byte, OS_WORK, must be worked off and keeps
+ * the kernel from idling; the high byte says that a scheduler chooses. One word, so that a slice end tests it once. */
 enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
 
 extern volatile uint16 os_pending;

@@ -37,7 +37,8 @@ static uint16 round_up(uint16 size)
     return (uint16)((size + (HEAP_STEP - 1u)) & ~(HEAP_STEP - 1u));
 }
 
-/* Where the list of a size begins: list n holds blocks of (n + 1) * HEAP_STEP bytes, and a list head is HEAP_STEP long. */
+/* Where the list of a size begins: list n holds blocks of (n + 1) * HEAP_STEP bytes, and a list head is HEAP_STEP
+ * long. */
 static block **list_of(uint16 size)
 {
     return (block **)(void *)((uint8 *)small + size - HEAP_STEP);

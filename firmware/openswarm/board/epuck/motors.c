@@ -1,7 +1,8 @@
 /* Stepper motors of the e-puck: rates and coils for the interrupt in stepper.S.
  *
- * T3 runs at 9,600 Hz (1,536 Tcy) while a motor turns. v mm/s are v * 1000 / 129 steps/s, that is v * 5 / 6192 steps per
- * tick: every tick adds 5 v to a fraction of 6192 and a step is due whenever it leaves 0..6191. No rounding anywhere. */
+ * T3 runs at 9,600 Hz (1,536 Tcy) while a motor turns. v mm/s are v * 1000 / 129 steps/s, that is v * 5 / 6192 steps
+ * per tick: every tick adds 5 v to a fraction of 6192 and a step is due whenever it leaves 0..6191. No rounding
+ * anywhere. */
 #include "io.h"
 #include "kernel.h"
 #include "pins.h"

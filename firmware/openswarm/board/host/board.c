@@ -1,5 +1,5 @@
-/* The e-puck's devices on a host: UART1 is standard output, motors and LEDs remember what they were told (host_board.h).
- * Works with every port that runs on a host. */
+/* The e-puck's devices on a host: UART1 is standard output, motors and LEDs remember what they were told
+ * (host_board.h). Works with every port that runs on a host. */
 #include "board.h"
 
 #include "hal_board.h"

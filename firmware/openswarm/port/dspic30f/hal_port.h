@@ -1,5 +1,6 @@
-/* dsPIC30F: the level is the CPU's interrupt priority (IPL, SR<7:5>). 0 thread, 1 slice and kernel stack, 4 devices; 5 is
- * the stepper and 6 the camera, which never call the kernel and are masked by nothing but idle (kernel level 4 only). */
+/* dsPIC30F: the level is the CPU's interrupt priority (IPL, SR<7:5>). 0 thread, 1 slice and kernel stack, 4 devices;
+ * 5 is the stepper and 6 the camera, which never call the kernel and are masked by nothing but idle (kernel level 4
+ * only). */
 #ifndef HAL_PORT_H
 #define HAL_PORT_H
 
@@ -28,7 +29,8 @@ typedef uint16_t hal_limit;
 #define CPU_SRL (*(volatile uint8_t *)&SR)
 enum { CPU_IPL_SLICE = 0x20, CPU_IPL_DEVICE = 0x80, CPU_IPL = 0xE0 };
 
-/* After a write that raises the IPL one more instruction may run at the old one (isa.md §14.3): give it a harmless one. */
+/* After a write that raises the IPL one more instruction may run at the old one (isa.md §14.3): give it a harmless
+ * one. */
 static HAL_INLINE void cpu_raise_ipl(uint8_t bit)
 {
     CPU_SRL |= bit;

@@ -17,7 +17,8 @@
         .equ    STKERR, 2
         .equ    IPL3, 3
 
-        .global __T2Interrupt, _hal_switch, _hal_abandon, _os_resume_yielded, _os_thread_start, _hal_idle, __StackError, os_isr_exit
+        .global __T2Interrupt, _hal_switch, _hal_abandon, _os_resume_yielded, _os_thread_start
+        .global _hal_idle, __StackError, os_isr_exit
         .text
 
 ; ---- Preemption: 10 ms timer, IPL 1 -----------------------------------------------------------------------------
@@ -199,8 +200,9 @@ os_isr_exit:
         retfie
 
 ; ---- Traps --------------------------------------------------------------------------------------------------------
-; Stack limit. A soft trap: the write has happened, within the thread's own block. The thread is given up, and with it an
-; ISR entry that had not yet left its stack; that interrupt's flag is still set. On the kernel stack it is the end.
+; Stack limit. A soft trap: the write has happened, within the thread's own block. The thread is given up, and with
+; it an ISR entry that had not yet left its stack; that interrupt's flag is still set. On the kernel stack it is the
+; end.
 __StackError:
         setm    SPLIM
         nop

@@ -1,8 +1,8 @@
 /* What the POSIX port offers to tests, benches and the host board, beside the HAL.
  *
  * Two kinds of time. Real: a 1 ms interval timer raises SIGALRM. Virtual (host_use_virtual_time): the clock moves 1 ms
- * each time the kernel idles and when host_tick() is called; a slice ends when host_slice() is called. Every run is then
- * the same. */
+ * each time the kernel idles and when host_tick() is called; a slice ends when host_slice() is called. Every run is
+ * then the same. */
 #ifndef HOST_H
 #define HOST_H
 

@@ -1,7 +1,8 @@
 /* Template of a port: the smallest fulfilment of hal/hal_cpu.h, on POSIX contexts instead of a CPU.
  *
- * A real port replaces, in this order: levels (interrupt mask), clock and slice timer, first frame, switch, idle. There is
- * no asynchronous interrupt here: time passes when a lock is released at thread level, UNLOCKS_PER_MS of them make 1 ms. */
+ * A real port replaces, in this order: levels (interrupt mask), clock and slice timer, first frame, switch, idle.
+ * There is no asynchronous interrupt here: time passes when a lock is released at thread level, UNLOCKS_PER_MS of
+ * them make 1 ms. */
 #include "kernel.h"
 
 #include <stdlib.h>
@@ -23,7 +24,8 @@ static ucontext_t kernel;
 static context main_context;
 static hal_pick kernel_pick;
 
-/* ---- Levels: replace by your interrupt mask. slice < device < whatever must never wait for the kernel ----------------- */
+/* ---- Levels: replace by your interrupt mask. slice < device < whatever must never wait for the kernel
+ * ----------------- */
 
 static hal_lock_state raise_to(int wanted)
 {
@@ -96,7 +98,8 @@ void hal_slice_force(void)
     slice_due = true;
 }
 
-/* ---- Contexts: replace by frames on the threads' own stacks and a dozen lines of assembly ------------------------------ */
+/* ---- Contexts: replace by frames on the threads' own stacks and a dozen lines of assembly
+ * ------------------------------ */
 
 static void kernel_loop(void)
 {

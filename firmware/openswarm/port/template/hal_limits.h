@@ -1,5 +1,5 @@
-/* Copy this folder to port/<your cpu>/ and fill it in; docs/porting.md explains each step. As it stands it runs on a host
- * and passes the conformance suite, so that every function can be replaced and tested one by one. */
+/* Copy this folder to port/<your cpu>/ and fill it in; docs/porting.md explains each step. As it stands it runs on a
+ * host and passes the conformance suite, so that every function can be replaced and tested one by one. */
 #ifndef HAL_LIMITS_H
 #define HAL_LIMITS_H
 
