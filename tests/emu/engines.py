@@ -9,6 +9,9 @@ from typing import Any, Protocol
 from rowmachine import REGISTERS, RowMachine
 
 from emu.dspic30f.engines import NAMES
+from emu.dspic30f.jit.cache import ObjectCache
+from emu.dspic30f.jit.compiler import Compiler
+from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.specialised import SpecialisedEngine
 from emu.machine import Machine
 
@@ -90,6 +93,16 @@ class Rows:
         return bytes(self.m.data[RAM_START:RAM_END])
 
 
+class NoCache(ObjectCache):
+    """Native code is made anew each time."""
+
+    def get(self, key: str) -> bytes | None:
+        return None
+
+    def put(self, key: str, code: bytes) -> None:
+        """Nothing is kept."""
+
+
 class OnMachine:
     """A whole machine with one of its engines."""
 
@@ -98,6 +111,9 @@ class OnMachine:
         self.machine = Machine(engine=name)
         if isinstance(self.machine.runner, SpecialisedEngine):  # a generated function per instruction, at once
             self.machine.runner.warm = self.machine.runner.length = 1
+        if isinstance(self.machine.runner, JitEngine):  # every instruction compiled before it runs
+            self.machine.runner.threshold, self.machine.runner.wait = 1, True
+            self.machine.runner.compiler = Compiler(NoCache())
         for half in range(len(self.machine.program.flash)):
             self.machine.program.flash[half] = 0
         self.machine.program.announce_all()
