@@ -3,7 +3,7 @@
 ; The sensor puts byte k of a line on RD8-RD15 from 8 k - 4 to 8 k + 4 Tcy behind the rise of HREF. The first read is the
 ; 11th Tcy of the interrupt function, 16-18 Tcy behind HREF, so it takes byte 2, the high byte of pixel 1; the window
 ; begins a pixel early for that (epuck.md §7.5). From there every second pixel is taken: 32 Tcy each. The low byte comes
-; 8 Tcy after the high one. RCOUNT belongs to the interrupted code and waits in W0.
+; 8 Tcy after the high one. RCOUNT belongs to the interrupted code and waits in W2.
 #include "camera_sensor.h"
         .equ    T4IF, 5                 ; IFS1 (dspic30f6014a.md §5)
         .equ    T5IF, 6
@@ -19,25 +19,27 @@ _camera_lines_left:     .space 2
         .global __T4Interrupt, __T5Interrupt
 __T4Interrupt:
         push.s
-        mov     RCOUNT, w0
+        mov     RCOUNT, w2
         bclr    IFS1, #T4IF
         clr     TMR4                    ; the next one is CAMERA_SKIPPED_LINES + 1 lines away
         mov     _camera_next_byte, w1
-        mov     #PORTD+1, w2
         mov     #CAMERA_WIDTH, w3
+        repeat  #2
         nop
+1:      mov     PORTD, w0               ; Tcy 0 of a pixel
+        swap    w0
+        mov.b   w0, [w1++]
+        repeat  #3
         nop
-        nop
-1:      mov.b   [w2], [w1++]            ; Tcy 0 of a pixel
-        repeat  #5
-        nop
-        mov.b   [w2], [w1++]            ; Tcy 8
-        repeat  #18
+        mov     PORTD, w0               ; Tcy 8
+        swap    w0
+        mov.b   w0, [w1++]
+        repeat  #16
         nop
         dec     w3, w3
         bra     nz, 1b
         mov     w1, _camera_next_byte
-        mov     w0, RCOUNT
+        mov     w2, RCOUNT
         dec     _camera_lines_left
         bra     nz, 2f
         bclr    T4CON, #TON
