@@ -74,6 +74,7 @@ def header(chip: Chip) -> str:
         "",
         "#include \"dspic_compiler.h\"",
         "",
+        "#ifndef __ASSEMBLER__",
         "#ifdef __cplusplus",
         "extern \"C\" {",
         "#endif",
@@ -82,7 +83,7 @@ def header(chip: Chip) -> str:
     for sfr in chip.sfrs.values():
         lines += declarations(sfr)
     lines += ["", "/* Bits whose name is unique on this chip. */", *bit_macros(chip), ""]
-    lines += ["#ifdef __cplusplus", "}", "#endif", "", "#endif", ""]
+    lines += ["#ifdef __cplusplus", "}", "#endif", "#endif", "", "#endif", ""]
     return "\n".join(lines)
 
 

@@ -299,3 +299,39 @@ def test_messages_need_none_of_the_heavy_parts() -> None:
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
+
+
+def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """-L and -l, members pulled by symbol; .S files see the preprocessor and the device header."""
+    from toolchain.link.archive import Member, archive_bytes
+
+    f = write(tmp_path, "f.c", "int f(int x) { return x + 2; }\n")
+    g = write(tmp_path, "g.S", "#include <dspic30f6014a.h>\n#define V 40\n\t.section .text,code\n\t.global _g\n"
+              "_g: mov #V,w0\n\tbset _LATB,#3\n\treturn\n")  # fmt: skip
+    for source in (f, g):
+        assert cc(capsys, "-Os", "-c", source, "-o", source.with_suffix(".o")) == (0, "")
+    members = [Member(name, (tmp_path / name).read_bytes()) for name in ("f.o", "g.o")]
+    (tmp_path / "libfg.a").write_bytes(archive_bytes(members))
+    main = write(tmp_path, "m.c", "int f(int), g(void); int main(void) { return f(g()); }\n")
+    assert cc(capsys, "-Os", main, f"-L{tmp_path}", "-lfg", "-lm", "-o", tmp_path / "x.elf") == (0, "")
+    assert run(tmp_path / "x.elf", engine="interp").status == 42
+
+
+def test_linker_options_pass_through(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """-Wl,--heap gives malloc its memory; the map names the library's members."""
+    source = write(tmp_path, "a.c", "#include <stdlib.h>\nint main(void) { char *p = malloc(100), *q = malloc(100); "
+                   "free(p); return p && q && malloc(90) == p ? 0 : 1; }\n")  # fmt: skip
+    words = [
+        "-Os",
+        "-fno-builtin",
+        source,
+        "-Wl,--heap=300",
+        f"-Wl,-Map={tmp_path / 'x.map'}",
+        "-o",
+        tmp_path / "x.elf",
+    ]
+    assert cc(capsys, *words) == (0, "")
+    assert run(tmp_path / "x.elf", engine="interp").status == 0
+    assert "heap.o" in (tmp_path / "x.map").read_text()
+    assert cc(capsys, "-Os", "-fno-builtin", source, "-o", tmp_path / "y.elf") == (0, "")
+    assert run(tmp_path / "y.elf", engine="interp").status == 1

@@ -5,6 +5,7 @@
 
 #include "dspic_compiler.h"
 
+#ifndef __ASSEMBLER__
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -1812,6 +1813,7 @@ extern volatile unsigned int PMD3 DSPIC_SFR; /* 0x0774 */
 
 #ifdef __cplusplus
 }
+#endif
 #endif
 
 #endif
