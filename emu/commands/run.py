@@ -128,8 +128,9 @@ def _machine(options: argparse.Namespace, image: Image) -> Machine:
     def report(address: int, is_write: bool) -> None:
         name = image.register_names.get(address, f"address {address:#06x}")
         what = "written" if is_write else "read"
+        here = machine.pc - 2  # PC has moved on already; no two-word instruction accesses a register
         print(
-            f"emu run: note: {name} is {what} at {machine.pc:#08x} ({image.symbols.text(machine.pc)}) but has no model;"
+            f"emu run: note: {name} is {what} at {here:#08x} ({image.symbols.text(here)}) but has no model;"
             " it behaves as plain memory",
             file=sys.stderr,
         )

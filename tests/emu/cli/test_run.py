@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 from programs import ECHO, HELLO, SPIN, executable
 
-from emu.chips.dspic30f6014a import SFRS
 from emu.cli import main
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -362,17 +361,12 @@ def test_nothing_is_left_of_a_trace_that_cannot_be_finished(build, tmp_path, cap
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "program.elf"]
 
 
-def test_a_register_without_a_model_is_named_once(build, capfd, monkeypatch):
-    from emu.machine import Machine
-
-    load = Machine.load
-
-    def load_without_model(machine, image):
-        load(machine, image)
-        machine.bus.modelled[SFRS["PR5"].address >> 1] = False
-        machine.bus.on_write[SFRS["PR5"].address >> 1] = None
-
-    monkeypatch.setattr(Machine, "load", load_without_model)
-    main(["run", build("main:\nmov #1, w0\nmov w0, {PR5}\nmov w0, {PR5}\npwrsav #1\n"), "--engine", "plain"])
-    err = capfd.readouterr().err
-    assert err.count("PR5 is written at 0x000104 (_main+0x4) but has no model") == 1
+@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+def test_a_register_without_a_model_is_named_once(build, capfd, engine):
+    """BSRAM and SSRAM are on the list of plain registers (docs/plain-registers.md)."""
+    source = "main:\nmov #1, w0\nmov w0, {BSRAM}\nmov {SSRAM}, w1\nmov w0, {BSRAM}\npwrsav #1\n"
+    main(["run", build(source), "--engine", engine])
+    notes = [line for line in capfd.readouterr().err.splitlines() if "note:" in line]
+    assert len(notes) == 2
+    assert "BSRAM is written at 0x000102 (_main+0x2) but has no model" in notes[0]
+    assert "SSRAM is read at 0x000104 (_main+0x4) but has no model" in notes[1]
