@@ -6,6 +6,7 @@ by `poll`. `now` compiles at once, in this process, for the few pieces the engin
 
 from __future__ import annotations
 
+import atexit
 import os
 import selectors
 import struct
@@ -189,6 +190,7 @@ class Compiler:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "emu.dspic30f.jit.worker"],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+            atexit.register(self._process.kill)
             assert self._process.stdout is not None
             self._selector.register(self._process.stdout, selectors.EVENT_READ)
         return self._process
