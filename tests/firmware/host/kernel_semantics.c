@@ -449,3 +449,27 @@ TEST(clearing_in_a_handler_leaves_the_data_to_the_kernel, "openswarm.h: Sys_Clea
     CHECK_EQ(calls, 2);
     CHECK_EQ(heap_now(), before);
 }
+
+/* ---- Real time ------------------------------------------------------------------------------------------------ */
+
+static volatile unsigned long spins[2];
+static void spin(void *which)
+{
+    for (;;) {
+        ++*(volatile unsigned long *)which;
+    }
+}
+
+TEST(a_signal_preempts_threads_that_never_call_the_kernel, "port/posix/README.md: real time; design.md §6: 10 ms slices")
+{
+    sys_process_config a = {spin, (void *)&spins[0], 0, 0, 0, 0, 0}, b = {spin, (void *)&spins[1], 0, 0, 0, 0, 0};
+    Sys_Init_Kernel();
+    CHECK(Sys_Start_ProcessWith(&a) != 0 && Sys_Start_ProcessWith(&b) != 0);
+    Sys_Start_Kernel();
+    while (spins[0] == 0 || spins[1] == 0) { /* PID 0 spins as well; the alarm of main.c ends a failure */
+    }
+    unsigned long before = spins[1];
+    while (spins[1] == before) {
+    }
+    CHECK(Sys_Get_SystemTime() > 0);
+}

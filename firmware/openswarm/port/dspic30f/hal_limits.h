@@ -5,7 +5,7 @@
 #define HAL_KERNEL_STACK 224
 #define HAL_HEAP 3072
 #define HAL_DEFAULT_STACK 128
-#define HAL_MINIMUM_STACK 96
+#define HAL_MINIMUM_STACK 112 /* exit 4, preempted 42, camera 4, guard 12, and a kernel call; SYS_DSP needs 28 more */
 /* Above a stack limit: what a frame of up to 8 bytes without probe, two more instructions and the trap itself may write
  * goes 12 bytes into the stack's own end and 8 into the PCB (kernel.h). */
 #define HAL_STACK_GUARD 12
