@@ -23,14 +23,16 @@
         type divisor = c + d * ratio;                                                                            \
         return (a + (ratio >= smallest || ratio <= -smallest ? b * ratio : d * (b / c))) / divisor;              \
     }                                                                                                            \
-    /* Power of two that brings two numbers away from overflow and underflow; 0 for most. */                     \
+    /* Power of two that brings two numbers away from overflow and subnormals; 0 for most. */                    \
     static int part##_shift(type x, type y)                                                                      \
     {                                                                                                            \
-        type size = larger(x < 0 ? -x : x, y < 0 ? -y : y);                                                      \
+        x = x < 0 ? -x : x;                                                                                      \
+        y = y < 0 ? -y : y;                                                                                      \
+        type size = larger(x, y), rest = x < y ? x : y;                                                          \
         if (!isfinite(size) || size == 0)                                                                        \
             return 0;                                                                                            \
-        int binary = exponent(size);                                                                             \
-        return binary >= highest - 2 ? -3 : binary < lowest / 2 ? -binary : 0;                                   \
+        int binary = exponent(size), lower = rest != 0 ? exponent(rest) : binary, up = highest / 4 - binary;     \
+        return binary >= highest - 2 ? -3 : lower < lowest + 60 && up > 0 ? up : 0;                              \
     }                                                                                                            \
     type _Complex divide(type a, type b, type c, type d)                                                         \
     {                                                                                                            \
