@@ -66,13 +66,13 @@ def measures() -> Iterator[Measure]:
     yield Measure("Sys_Yield to a preempted thread", Scenario(threads=1, yielders=1), switch("latency_spin"))
     for subscribers in (0, 1, 4):
         for payload in (2, 24):
-            what = f"send {payload} bytes, {subscribers} subscribers"
+            what = f"send {payload} bytes, {subscribers} subscriber{'s' if subscribers != 1 else ''}"
             yield Measure(f"{what}, thread", Scenario(subscribers=subscribers, payload=payload, sender=1), sending)
             scenario = Scenario(threads=1, subscribers=subscribers, payload=payload)
             yield Measure(f"{what}, ISR", scenario, sending_from_isr)
     for events in (8, 16):
         scenario = Scenario(subscribers=1, events=events, sender=1)
-        yield Measure(f"send 2 bytes, 1 subscribers, thread, {events} more events", scenario, sending)
+        yield Measure(f"send 2 bytes, 1 subscriber, thread, {events} more events", scenario, sending)
     yield Measure("send to handler entry", Scenario(subscribers=1, sender=1), reaching("latency_handler"))
     yield Measure("send to waiting thread running", Scenario(waiters=1, sender=2), reaching("latency_woken"))
     yield Measure("C interrupt: flag to first instruction", Scenario(threads=1), isr_entry)
