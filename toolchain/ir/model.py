@@ -63,15 +63,16 @@ LABEL = Type("label")
 META = Type("meta")
 FLOAT = Type("float", 32)
 DOUBLE = Type("float", 64)
-_INTS = {n: Type("int", n) for n in range(1, 129)}
+MAX_INT_BITS = 128  # of the input; checked products need twice that inside
+_INTS = {n: Type("int", n) for n in range(1, 2 * MAX_INT_BITS + 17)}
 I1, I8, I16, I32, I64 = (_INTS[n] for n in (1, 8, 16, 32, 64))
 
 
 def int_type(bits: int) -> Type:
-    """The integer type of that many bits, 1..128 (design §5: the legaliser accepts any N up to 128)."""
+    """The integer type of that many bits, 1..272; the reader admits up to 128 (design §5)."""
     found = _INTS.get(bits)
     if found is None:
-        raise UnsupportedError(f"integer type i{bits}: wider than 128 bits")
+        raise UnsupportedError(f"integer type i{bits}: wider than {MAX_INT_BITS} bits")
     return found
 
 

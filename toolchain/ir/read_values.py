@@ -8,6 +8,7 @@ from .lex import BINARY, CASTS, FAST_FLAGS, PARAM_WORDS, PAREN_ATTRS, TYPED_ATTR
 from .model import (
     I1,
     LABEL,
+    MAX_INT_BITS,
     META,
     PTR,
     VOID,
@@ -58,6 +59,8 @@ class ValueReader:
     def _type1(self, c: Cursor) -> Type:
         token = c.next()
         if token[0] == "i" and token[1:].isdigit():
+            if int(token[1:]) > MAX_INT_BITS:
+                raise c.error(f"integer type {token}: wider than {MAX_INT_BITS} bits")
             return int_type(int(token[1:]))
         match token:
             case "ptr":

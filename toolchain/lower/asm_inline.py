@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..ir.model import ConstInt, GlobalRef, InlineAsm, Instr, Type, UnsupportedError, Value
-from .mir import MI, Imm, Mem, Operand, OpInfo
+from .mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, OpInfo
 
 if TYPE_CHECKING:
     from .select import Selector
@@ -76,6 +76,7 @@ class AsmBuilder:
         self.after: list[tuple[int, tuple[int, ...]]] = []
         self.fixed_uses: list[int] = []
         self.fixed_defs: list[int] = []
+        self.blocks = [0, 4]  # free register runs for 64-bit operands
         self.reference: list[int] = []  # operand number in the text -> index in `operands`
 
     def run(self) -> None:
@@ -114,7 +115,9 @@ class AsmBuilder:
 
     def _check(self, c: Constraint, t: Type) -> int:
         words = max(1, t.bits // 16)
-        if words > 2:
+        if words == 4 and c.fixed is None and self.blocks and "r" in c.text:
+            c.fixed = self.blocks.pop()  # 64 bits travel in W4-W7 or W0-W3, as in calls
+        elif words > 2 and c.fixed is None:
             raise UnsupportedError(f"inline assembly operand of {t.bits} bits")
         letters = set(c.text) & REFUSED_LETTERS
         if letters and c.fixed is None:
@@ -146,6 +149,12 @@ class AsmBuilder:
         r = self.operands[at]
         if not isinstance(r, int):  # "+m": the object holds the value when the statement starts
             self.s.emit("mov", self.s.reg(v), r, byte=v.type.bits == 8)
+            self.reference.append(at)
+            return
+        if r < FIRST_VIRTUAL:
+            for k, word in enumerate(self.s.regs(v)):
+                self.s.copy(word, r + k)
+                self.fixed_uses.append(r + k)
             self.reference.append(at)
             return
         self._load(v, r, self.roles[at] == "D")
