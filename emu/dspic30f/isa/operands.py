@@ -7,6 +7,7 @@ fields as text in the spelling of binutils. Fields are found by letter, so one k
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -57,24 +58,24 @@ def register_number(token: str) -> int | None:
     return int(match[1]) if match else None
 
 
-class Kind:
+class Kind(ABC):
     """One operand, or an optional group of operands."""
 
+    @abstractmethod
     def read(self, tokens: Sequence[str], at: Site) -> Part | None:
         """Take tokens from the front; None if their shape does not fit."""
-        raise NotImplementedError
 
+    @abstractmethod
     def write(self, x: Operands, at: Site, symbol: SymbolOf | None, source: bool) -> list[str]:
         """The operand's tokens."""
-        raise NotImplementedError
 
     def number(self, value: int, at: Site) -> dict[str, int]:
-        """Fields of a numeric operand. OperandError if out of range."""
-        raise NotImplementedError
+        """Fields of a numeric operand. OperandError if out of range; TypeError if the operand is none."""
+        raise TypeError(f"{type(self).__name__} is not a numeric operand")
 
     def relocation(self, at: Site) -> str:
         """Relocation of a numeric operand that is a plain symbol; "" if it must be a number."""
-        raise NotImplementedError
+        raise TypeError(f"{type(self).__name__} is not a numeric operand")
 
 
 @dataclass(frozen=True)
