@@ -7,7 +7,7 @@ fields as text in the spelling of binutils. Fields are found by letter, so one k
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -58,7 +58,7 @@ def register_number(token: str) -> int | None:
     return int(match[1]) if match else None
 
 
-class Kind(ABC):
+class Kind:
     """One operand, or an optional group of operands."""
 
     @abstractmethod
