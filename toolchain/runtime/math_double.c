@@ -31,6 +31,10 @@ static const double cosine[] = {0.041666666666666664,    -0.0013888888888887378,
 /* x = quadrant * pi/2 + *rest, |*rest| <= pi/4; returns quadrant mod 4. */
 static int reduce(double x, double *rest)
 {
+    if (fabs(x) <= M_PI_4) {
+        *rest = x; /* exact, and keeps the sign of zero */
+        return 0;
+    }
     double turns = round(x * TWO_OVER_PI);
     *rest = ((x - turns * PIO2_1) - turns * PIO2_2) - turns * PIO2_3;
     return (int)fmod(turns, 4) & 3;
@@ -40,7 +44,11 @@ static int reduce(double x, double *rest)
 static double sine_of(double x, int quadrant)
 {
     double z = x * x;
-    double value = quadrant & 1 ? 1 - (0.5 * z - z * z * polynomial(cosine, 6, z)) : x + x * z * polynomial(sine, 6, z);
+    double value = x;
+    if (quadrant & 1)
+        value = 1 - (0.5 * z - z * z * polynomial(cosine, 6, z));
+    else if (x != 0) /* sin(-0) is -0 */
+        value = x + x * z * polynomial(sine, 6, z);
     return quadrant & 2 ? -value : value;
 }
 

@@ -155,6 +155,10 @@ static const float cosine[] = {0.0416666646f, -0.00138883001f, 2.45472988e-05f};
 
 static int reduce(float x, float *rest)
 {
+    if (fabsf(x) <= PI_4) {
+        *rest = x; /* exact, and keeps the sign of zero */
+        return 0;
+    }
     float turns = roundf(x * TWO_OVER_PI);
     *rest = (((x - turns * PIO2_1) - turns * PIO2_2) - turns * PIO2_3) - turns * PIO2_4;
     return (int)(uint16_t)(int32_t)turns & 3;
@@ -163,8 +167,11 @@ static int reduce(float x, float *rest)
 static float sine_of(float x, int quadrant)
 {
     float z = x * x;
-    float value =
-        quadrant & 1 ? 1 - (0.5f * z - z * z * polynomial(cosine, 3, z)) : x + x * z * polynomial(sine, 3, z);
+    float value = x;
+    if (quadrant & 1)
+        value = 1 - (0.5f * z - z * z * polynomial(cosine, 3, z));
+    else if (x != 0) /* sin(-0) is -0 */
+        value = x + x * z * polynomial(sine, 3, z);
     return quadrant & 2 ? -value : value;
 }
 

@@ -35,8 +35,10 @@ static void measure(double x, double y, double got, double want, int mantissa, i
         int same = isnan(want) ? isnan(got) : got == want && (want != 0 || signbit(got) == signbit(want));
         if (same)
             return;
-        if (!(isinf(want) || want == 0))
-            got = HUGE_VAL;
+        worst = HUGE_VAL; /* NaN, infinity and the sign of zero must be exact */
+        worst_x = x;
+        worst_y = y;
+        return;
     }
     int exponent;
     frexp(want, &exponent);
