@@ -1,1 +1,1 @@
-DEVICES := camera i2c
+DEVICES := camera i2c remote

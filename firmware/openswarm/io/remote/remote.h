@@ -1,0 +1,20 @@
+/* Infrared remote control: SYS_IO_REMOTECONTROL, once per key press, however long the key is held. */
+#ifndef REMOTE_H
+#define REMOTE_H
+
+#include "openswarm.h"
+
+typedef struct {
+    uint8 address; /* 0-31: the kind of device the sender means */
+    uint8 command; /* 0-63 */
+    bool toggle;   /* changes with every press */
+} sys_remote_frame;
+
+/* Sees a new frame; may change the command; true: the command becomes the payload of SYS_IO_REMOTECONTROL. ISR context. */
+typedef bool (*sys_remote_processor)(sys_remote_frame *frame);
+sys_remote_processor Sys_Set_RemoteProcessor(sys_remote_processor processor); /* MTHI; NULL: every frame */
+
+/* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
+bool Sys_Start_Remote(void);
+
+#endif
