@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-WORD_BYTES = 2
 SP = 15  # W15, grows upward, points at the next free word (abi-elf.md §2.1)
 FP = 14  # W14, frame pointer where a frame needs one, else ordinary
 WREG = 0  # W0 in file-register instructions (isa.md §2.2)
@@ -19,4 +18,3 @@ BYTE_OFFSET = (-512, 511)
 LNK_MAX = 16382  # isa.md §5.8
 NEAR_BYTES = 64  # larger objects are addressed through pointers, so that near RAM (below 0x2000, abi-elf.md §1.4) lasts
 RETURN_ADDRESS_BYTES = 4  # CALL pushes two words (isa.md §7.4)
-SPLIM_ADDRESS_SYMBOL = "_SPLIM"

@@ -43,7 +43,6 @@ class LegalizerBase:
         self.blocks: list[Block] = []
         self.tail: dict[str, str] = {}  # old block name -> name of the new block that holds its terminator
         self.fixups: list[tuple[Instr, list[Value]]] = []
-        self.serial = 0
         self.b = Builder(Block(""))  # where instructions go; set per block
         self.alive: list[object] = []  # keeps ids in `values` unique while the map lives
 
@@ -52,11 +51,6 @@ class LegalizerBase:
         block = Block(name)
         self.blocks.append(block)
         return block
-
-    def fresh(self, hint: str) -> str:
-        """A block name nobody uses."""
-        self.serial += 1
-        return f"{hint}.L{self.serial}"
 
     # -- operands -----------------------------------------------------------------------------------------------------
 

@@ -18,7 +18,6 @@ SETS_NZ = {"add", "sub", "subr", "addc", "subb", "and", "ior", "xor", "addl", "s
            "inc2", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1", "lsr1", "asr1", "se", "ze", "rlc",
            "rrc"}  # fmt: skip
 STICKY_Z = {"addc", "subb", "subbr", "cpb"}
-NEUTRAL_COPIES = {"mov", "clr", "setm"}
 
 
 def run(m: MFunction) -> None:

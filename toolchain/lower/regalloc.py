@@ -23,6 +23,7 @@ PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
 REAL = (1 << FIRST_VIRTUAL) - 1
 LOOP_WEIGHT = 8
 MAX_ROUNDS = 12
+EXACT_SPILL_NODES = 300  # up to this many, the best victim is looked for anew at every step
 TRIAL_LIMIT = 400  # instructions; larger functions are allocated once
 
 
@@ -182,9 +183,14 @@ class Graph:
         stack: list[int] = []
         ready = [n for n in remaining if self.pressure(n, self.adjacent[n] & active) < self.limit(n)]
         queued = set(ready)
+        ranked: list[int] = []  # large graphs: cheapest last, by the degrees at the start
+        if len(remaining) > EXACT_SPILL_NODES:
+            ranked = sorted(remaining, key=lambda n: (self._spill_metric(n, active), n), reverse=True)
         while remaining:
             if not ready:
-                victim = min(remaining, key=lambda n: (self._spill_metric(n, active), n))
+                while ranked and ranked[-1] not in remaining:
+                    ranked.pop()
+                victim = ranked[-1] if ranked else min(remaining, key=lambda n: (self._spill_metric(n, active), n))
                 ready.append(victim)
                 queued.add(victim)
             n = ready.pop()

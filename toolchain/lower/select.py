@@ -101,10 +101,9 @@ class Selector(AddressSelector):
 
     def phi_copies(self, targets: list[str]) -> list[tuple[int, int | tuple[Value, int]]]:
         """Moves (destination, source register or leaf word) for the edges to `targets`."""
-        blocks = {b.name: b for b in self.f.blocks} if targets else {}
         moves: list[tuple[int, int | tuple[Value, int]]] = []
         for target in targets:
-            for phi in blocks[target].phis():
+            for phi in self.by_name[target].phis():
                 if id(phi) not in self.needed:
                     continue
                 v = phi.args[phi.blocks.index(self.block.name)]

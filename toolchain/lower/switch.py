@@ -18,8 +18,8 @@ Run = tuple[int, int, str]  # first value, last value, target
 class SwitchLowering:
     """Replaces one switch; collects the new blocks and who branches where."""
 
-    def __init__(self, f: Function, block: Block, for_size: bool) -> None:
-        self.f = f
+    def __init__(self, blocks: dict[str, Block], block: Block, for_size: bool) -> None:
+        self.blocks = blocks
         self.block = block
         self.switch = block.instrs.pop()
         self.value = self.switch.args[0]
@@ -38,9 +38,8 @@ class SwitchLowering:
         if self.value.type.bits > 16 and pairs:
             pairs = self._narrow(pairs)
         self._search(self.start, _runs(pairs), 0, (1 << self.value.type.bits) - 1)
-        blocks = {b.name: b for b in self.f.blocks}
         for target in dict.fromkeys(self.switch.blocks):
-            retarget_phis(blocks[target], self.block.name, self.edges.get(target, []))
+            retarget_phis(self.blocks[target], self.block.name, self.edges.get(target, []))
         return self.new_blocks
 
     def _narrow(self, pairs: list[tuple[int, str]]) -> list[tuple[int, str]]:
@@ -166,8 +165,9 @@ def _runs(pairs: list[tuple[int, str]]) -> list[Run]:
 def lower_switches(f: Function, for_size: bool) -> None:
     """Replace every switch of the function. Ensures: terminators are br, brtable, indirectbr, ret, unreachable."""
     out: list[Block] = []
+    blocks = {b.name: b for b in f.blocks}
     for block in list(f.blocks):
         out.append(block)
         if block.instrs[-1].op == "switch":
-            out += SwitchLowering(f, block, for_size).run()
+            out += SwitchLowering(blocks, block, for_size).run()
     f.blocks = out

@@ -51,6 +51,7 @@ class ValueSelector:
         self.folded: set[int] = set()
         self.slots: dict[int, int] = {}
         self.block: Block = f.blocks[0]
+        self.by_name = {b.name: b for b in f.blocks}
         self.variadic_anchor = 0
         self.places: list[Place] = []
         self.arg_slots: dict[int, int] = {}
