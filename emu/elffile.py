@@ -171,7 +171,8 @@ def _section(reader: _Reader, header: _Header, name: str, segments: list[_Segmen
             load_address = _load_address(reader, header, name, segments)
         elif kind == "data":
             reader.warnings.append(f"section {name!r} initialises RAM without start-up code; not loaded")
-    return Section(name, kind, header.address, header.size // OCTETS_PER_UNIT, header.flags, load_address, octets)
+    size = -(-header.size // OCTETS_PER_UNIT)
+    return Section(name, kind, header.address, size, header.flags, load_address, octets)
 
 
 def _load_address(reader: _Reader, header: _Header, name: str, segments: list[_Segment]) -> int:
@@ -192,8 +193,8 @@ def _block(reader: _Reader, section: Section) -> Block:
     base = section.load_address
     assert base is not None
     what = f"section {section.name!r}"
-    if base % 2:
-        raise reader.fail(f"{what} starts at the odd program address {base:#x}")
+    if base % 2 or section.address % 2:
+        raise reader.fail(f"{what} starts at the odd address {section.address:#x} (program address {base:#x})")
     octets = section.octets
     if len(octets) % OCTETS_PER_WORD:
         reader.warnings.append(f"{what}: {len(octets)} octets are not whole program words; filled up with zeros")

@@ -80,7 +80,8 @@ def _program_pieces(image: Image, section: Section) -> list[Piece]:
     for symbol, start, end in _cuts(image, section, space):
         name = symbol.name if symbol else section.name
         shift = section.load_address - section.address
-        for address in range(start + shift, end + shift, 2):
+        first = start + start % 2  # constants may begin at odd addresses: a word belongs to whose byte comes first
+        for address in range(first + shift, end + shift, 2):
             line = image.lines.find(address) if kind == "code" else None
             words[name, line.file if line else image.lines.files.get(start, UNKNOWN)] += 1
     if section.name in START_UP_SECTIONS or section.name in (".ivt", ".aivt"):

@@ -71,7 +71,7 @@ class Section:
     @property
     def program_words(self) -> int:
         """Program words the section occupies, 0 if it is not loaded."""
-        return 0 if self.load_address is None else self.size // 2
+        return 0 if self.load_address is None else -(-self.size // 2)
 
 
 @dataclass(eq=False)

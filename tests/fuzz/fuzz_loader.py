@@ -17,6 +17,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader")]
 from dwarf_samples import debug_sections  # noqa: E402
 from elf_samples import words, xc16_like  # noqa: E402
 
+from emu.commands.info import describe  # noqa: E402
+from emu.disassembly import items  # noqa: E402
+from emu.footprint import pieces  # noqa: E402
 from emu.image import LoadError  # noqa: E402
 from emu.loader import parse_image  # noqa: E402
 
@@ -76,9 +79,10 @@ def attempt(data: bytes) -> str:
     for address, word in image.words():
         assert address % 2 == 0
         assert 0 <= word <= 0xFFFFFF
-    image.symbols.text(0x104)
     image.symbols.data(0x802)
-    image.lines.find(0x104)
+    memory = describe(image)["memory"]
+    assert sum(len(item.words) for item in items(image, 0, 1 << 24)) == memory["flash_words"]
+    assert sum(piece.rom for piece in pieces(image)) == (memory["flash_bytes"] if image.kind == "elf" else 0)
     return "loaded with unreadable debug information" if image.lines.broken else "loaded"
 
 

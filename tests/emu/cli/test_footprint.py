@@ -46,6 +46,15 @@ def test_rom_belongs_to_the_symbol_before_it_and_ram_to_its_own(image):
     assert table[".ivt"] == (186, 0)
 
 
+def test_a_word_shared_by_two_constants_is_counted_once(image):
+    """Strings follow each other at odd addresses in the PSV window (abi-elf.md §1.1)."""
+    sample = xc16_like()
+    sample.names.append(Name("_text", 0x8181, 4, size=3, kind=1))
+    table = totals(pieces(parse_image(sample.build(), "x.elf")), "name")
+    assert table["_table"] == (3, 0)
+    assert table["_text"] == (3, 0)
+
+
 def test_source_files_come_from_the_line_table(image):
     """The sample's line table covers 0x104..0x10A: three words."""
     table = totals(pieces(image), "module")

@@ -145,7 +145,7 @@ def test_words_outside_program_memory_are_refused(address):
 
 
 def test_an_odd_program_address_is_refused():
-    assert "odd program address 0x101" in refusal(ElfSample([Part(".text", 0x101, words(1))]).build())
+    assert "odd address 0x101" in refusal(ElfSample([Part(".text", 0x101, words(1))]).build())
 
 
 def test_a_psv_section_without_program_header_is_refused():
