@@ -1,0 +1,112 @@
+"""The camera's view and the line-of-sight sensor (epuck.md §7.6; openswarm-original.md §8)."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from arena import bodies
+from arena.emulated import infrared
+from arena.scene import Scene, load_scene
+from arena.vision import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL, Eye, sensor_of
+from arena.world import Poses, World
+
+ROBOT_AT = (20.0, 150.0, 0.0)
+LENS_X = ROBOT_AT[0] + bodies.CAMERA_AHEAD
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return load_scene("clustering").with_values(camera__range_cm="inf")
+
+
+def one_object(distance_cm: float, bearing: float = 0.0) -> Poses:
+    """An object whose surface is `distance_cm` from the lens."""
+    centre = distance_cm + bodies.OBJECT_RADIUS
+    return Poses([ROBOT_AT], [(LENS_X + centre * math.cos(bearing), 150 + centre * math.sin(bearing))])
+
+
+def test_rows_show_heights_by_the_pinhole_formula(scene: Scene) -> None:
+    """v = 240 + 602 (28 - z)/d in mm: an object 1 m away shows its top in row 197 and its foot in row 256."""
+    eye = Eye(scene, one_object(100.0), 0)
+    top = 240 + 602 * (28 - 100) / 1000
+    foot = 240 + 602 * 28 / 1000
+    rows = (math.floor(top) - 1, math.ceil(top), math.floor(foot), math.ceil(foot))
+    assert eye.column(320, rows) == [WALL, OBJECT, OBJECT, FLOOR]
+
+
+def test_columns_show_bearings_by_the_pinhole_formula(scene: Scene) -> None:
+    """u = 320 - 602 tan a, left positive: the edges of an object are where its tangents are."""
+    eye = Eye(scene, one_object(95.0), 0)
+    half = math.asin(bodies.OBJECT_RADIUS / 100.0)
+    edge = 602 * math.tan(half)
+    assert [eye.column(320 + du, (240,))[0] for du in (-edge - 1, -edge + 1, edge - 1, edge + 1)] == [
+        WALL, OBJECT, OBJECT, WALL]  # fmt: skip
+
+
+def test_what_is_near_hides_what_is_far_but_not_what_is_taller(scene: Scene) -> None:
+    """A robot of 55 mm before an object of 100 mm: the object shows above it, the room above the wall."""
+    poses = Poses([ROBOT_AT, (LENS_X + 50, 150, 0.0)], [(LENS_X + 80, 150)])
+    rows = (0, 190, 200, 240, 265, 400)
+    assert Eye(scene, poses, 0).column(320, rows) == [ABOVE, OBJECT, OBJECT, ROBOT, ROBOT, FLOOR]
+
+
+def test_a_row_at_once_is_the_same_as_column_by_column() -> None:
+    """Two ways to the same answer."""
+    scene = load_scene("clustering")
+    world = World(scene, 2)
+    columns = np.arange(0, 640, 7)
+    kinds = set()
+    for robot in range(5):
+        eye = Eye(scene, world.poses, robot)
+        for v in (10, 150, 200, 232, 240, 248, 272, 330):
+            slow = [eye.column(int(u), (v,))[0] for u in columns]
+            assert eye.classes(v, columns).tolist() == slow
+            kinds |= set(slow)
+    assert kinds >= {OBJECT, ROBOT, WALL, FLOOR}
+
+
+def test_objects_are_detected_to_150_cm(scene: Scene) -> None:
+    """experiment.md §1: at least 95 % at 150 cm; by geometry to about 270 cm, where one row is left."""
+    rng = np.random.default_rng(1)
+    for distance, low, high in ((20, 0.95, 1), (80, 0.95, 1), (149, 0.95, 1), (240, 0.9, 1), (300, 0, 0.05)):
+        bearings = rng.uniform(-1, 1, 200) * math.pi / 180
+        seen = [sensor_of(Eye(scene, one_object(distance, one), 0)) == OBJECT for one in bearings]
+        assert low <= np.mean(seen) <= high, distance
+
+
+def test_the_range_ends_detection(scene: Scene) -> None:
+    """docs/experiment.md §2: beyond it things look like the wall."""
+    near, far = (Eye(scene.with_values(camera__range_cm=150.0), one_object(cm), 0) for cm in (149.0, 151.0))
+    assert (sensor_of(near), sensor_of(far)) == (OBJECT, NOTHING)
+
+
+def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
+    """docs/experiment.md §3: all at 1 m, under half at 1.4 m, where a robot of 55 mm fills one row."""
+    rng = np.random.default_rng(1)
+    shares = []
+    for distance in (60.0, 100.0, 140.0, 200.0):
+        angles = rng.uniform(-1, 1, 200) * math.pi / 180
+        centre = distance + bodies.ROBOT_RADIUS
+        places = [(LENS_X + centre * math.cos(a), 150 + centre * math.sin(a), 0.0) for a in angles]
+        seen = [sensor_of(Eye(scene, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]
+        shares.append(float(np.mean(seen)))
+    assert shares[0] == shares[1] == 1.0
+    assert shares[2] < 0.5
+    assert all(one >= other for one, other in pairwise(shares))
+
+
+def test_an_object_before_a_robot_wins_the_vote(scene: Scene) -> None:
+    """openswarm-original.md §8: red is asked first."""
+    poses = Poses([ROBOT_AT, (LENS_X + 40, 152, 0.0)], [(LENS_X + 60, 146)])
+    assert sensor_of(Eye(scene, poses, 0)) == OBJECT
+
+
+def test_infrared_rays_measure_from_the_body_to_walls_and_discs(scene: Scene) -> None:
+    """epuck.md §5: bearings clockwise from the front, mm; nothing beyond the response table."""
+    poses = Poses([(8.7, 150.0, math.pi / 2)], [(17.5, 150.0)])
+    distances = infrared(scene, poses, 0)
+    assert distances[2] == pytest.approx(10 * (8.8 - 3.7 - 5.0))  # sensor 2 looks right, where the object is
+    assert distances[5] == pytest.approx(10 * (8.7 - 3.7))  # sensor 5 looks left, to the wall
+    assert distances[0] == distances[7] == math.inf

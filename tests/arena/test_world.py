@@ -1,0 +1,146 @@
+"""The world: units, calibrations of components, repeatability (docs/experiment.md §3)."""
+
+import math
+
+import numpy as np
+import pytest
+
+from arena import bodies
+from arena.brain import ScriptedBrain
+from arena.controllers import steps_per_second
+from arena.scene import Scene, SceneError, load_scene
+from arena.trial import run_trial
+from arena.vision import NOTHING, OBJECT, ROBOT
+from arena.world import World
+
+
+@pytest.fixture
+def empty() -> Scene:
+    """The arena without wheel noise, one robot, no objects, 10 ms quantum."""
+    return load_scene("clustering").with_values(
+        robots__wheel_noise=0.0, robots__count=1, objects__count=0, clock__quantum_ms=10.0
+    )
+
+
+def drive(world: World, wheels: tuple[float, float], seconds: float) -> None:
+    for _ in range(round(seconds / world.dt)):
+        world.step([wheels])
+
+
+def test_full_speed_covers_128_mm_in_a_second(empty: Scene) -> None:
+    """epuck.md §3: 1000 steps/s of 0.128 mm."""
+    world = World.of(empty, 1, [(50, 150, 0.0)], [])
+    drive(world, (12.8, 12.8), 1)
+    before = world.poses.robots[0][0]
+    drive(world, (12.8, 12.8), 1)
+    assert world.poses.robots[0][0] - before == pytest.approx(12.8, abs=1e-3)
+    assert world.poses.robots[0][1] == pytest.approx(150, abs=1e-9)
+
+
+@pytest.mark.parametrize("controller", ["A", "B"])
+@pytest.mark.parametrize("seen", [NOTHING, OBJECT, ROBOT])
+def test_circles_have_the_radius_of_the_kinematics(empty: Scene, controller: str, seen: int) -> None:
+    """epuck.md §8: R = axle/2 (vl + vr)/(vr - vl); A and nothing: 7.57 cm with whole mm/s."""
+    left, right = (steps * bodies.CM_PER_STEP for steps in steps_per_second(controller, seen))
+    world = World.of(empty, 1, [(200, 150, 0.0)], [])
+    places = []
+    for _ in range(800):
+        world.step([(left, right)])
+        places.append(world.poses.robots[0][:2])
+    path = np.array(places[100:])
+    fit = np.linalg.lstsq(np.column_stack([2 * path, np.ones(len(path))]), (path**2).sum(axis=1), rcond=None)[0]
+    radius = math.sqrt(fit[2] + fit[0] ** 2 + fit[1] ** 2)
+    assert radius == pytest.approx(2.55 * (left + right) / abs(right - left), rel=1e-3)
+
+
+@pytest.mark.parametrize(("objects", "moves"), [(4, True), (5, True), (6, False)])
+def test_one_robot_pushes_five_objects_but_not_six(empty: Scene, objects: int, moves: bool) -> None:
+    """experiment.md §1 and epuck.md §4: 1.0 N against 0.199 N per object."""
+    scene = empty.with_values(objects__count=objects)
+    world = World.of(scene, 1, [(20, 150, 0.0)], [(28.71 + 10 * k, 150) for k in range(objects)])
+    drive(world, (12.8, 12.8), 2)
+    before = world.poses.robots[0][0]
+    drive(world, (12.8, 12.8), 1)
+    assert (world.poses.robots[0][0] - before > 10) == moves
+    if not moves:
+        assert world.poses.robots[0][0] - before < 0.1
+
+
+@pytest.mark.parametrize(("quantum_ms", "half_a_step"), [(10.0, 0.064), (1.0, 0.0064)])
+def test_a_pushed_object_slides_as_friction_allows(empty: Scene, quantum_ms: float, half_a_step: float) -> None:
+    """epuck.md §4: v^2 / (2 mu g) from full speed, plus half a step of the integrator."""
+    scene = empty.with_values(objects__count=1, clock__quantum_ms=quantum_ms)
+    world = World.of(scene, 1, [(20, 150, 0.0)], [(28.71, 150)])
+    drive(world, (12.8, 12.8), 2)
+    before = world.poses.objects[0][0]
+    drive(world, (0.0, 0.0), 1)
+    slid = world.poses.objects[0][0] - before
+    assert slid == pytest.approx(12.8**2 / (2 * bodies.FLOOR_FRICTION * bodies.GRAVITY) + half_a_step, abs=0.02)
+
+
+def test_walls_hold_a_pushing_robot(empty: Scene) -> None:
+    """A robot at a wall stays inside, its wheels slip."""
+    world = World.of(empty, 1, [(390, 150, 0.0)], [])
+    drive(world, (12.8, 12.8), 3)
+    assert world.poses.robots[0][0] == pytest.approx(400 - bodies.ROBOT_RADIUS, abs=0.05)
+
+
+def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
+    """epuck.md §4: the velocity override pushes what a drive of limited force does not."""
+    reached = []
+    for thrust in (1.0, "inf"):
+        scene = empty.with_values(objects__count=8, robots__thrust_n=thrust)
+        world = World.of(scene, 1, [(20, 150, 0.0)], [(28.71 + 10 * k, 150) for k in range(8)])
+        drive(world, (12.8, 12.8), 2)
+        reached.append(world.poses.robots[0][0] - 20)
+    assert reached[0] < 1 < 10 < reached[1]
+
+
+def test_wheel_noise_stays_within_its_share() -> None:
+    """epuck.md §4: uniform 5 %, a new draw per 0.1 s."""
+    scene = load_scene("clustering").with_values(
+        objects__count=0, robots__count=1, robots__thrust_n="inf", clock__quantum_ms=10.0
+    )
+    world = World.of(scene, 3, [(100, 150, 0.0)], [])
+    speeds = []
+    for _ in range(300):
+        before = world.poses.robots[0]
+        world.step([(6.4, 6.4)])
+        after = world.poses.robots[0]
+        speeds.append(math.dist(before[:2], after[:2]) / world.dt)
+    assert 0.95 * 6.4 - 0.01 <= min(speeds) < 0.98 * 6.4 < 1.02 * 6.4 < max(speeds) <= 1.05 * 6.4 + 0.01
+    assert len({round(speed, 6) for speed in speeds}) <= 31
+
+
+def test_two_copies_live_the_same_life_to_the_bit() -> None:
+    """design.md §7: seeded, repeatable."""
+    scene = load_scene("clustering").with_values(clock__quantum_ms=10.0)
+    rows = [run_trial(scene, 5, [ScriptedBrain(scene, 5, i, "A") for i in range(5)], 20).rows for _ in range(2)]
+    other = run_trial(scene, 6, [ScriptedBrain(scene, 6, i, "A") for i in range(5)], 20).rows
+    assert rows[0].columns == rows[1].columns
+    assert rows[0].columns["r0_x"] != other.columns["r0_x"]
+
+
+def test_nothing_overlaps_at_the_start_and_everything_is_on_a_mark() -> None:
+    """epuck.md §8: 165 marks every 25 cm."""
+    poses = World(load_scene("clustering"), 1).poses
+    places = [pose[:2] for pose in poses.robots] + poses.objects
+    assert len(set(places)) == 25
+    assert all((x - 25) % 25 == 0 and (y - 25) % 25 == 0 for x, y in places)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"objects__count": 161}, "no room: 166 robots and objects on 165 marks"),
+        ({"objects__radius_cm": 30.0}, "no room"),
+        ({"marks__spacing_cm": 5.0}, "no room: marks are 5 cm apart"),
+        ({"robots__count": -1}, "robots.count is -1; expected 0 to 1000"),
+        ({"robots__wheels": 3}, "no scene value robots.wheels"),
+        ({"objects__mass_kg": "heavy"}, "objects.mass_kg is 'heavy'; expected float"),
+    ],
+)
+def test_impossible_scenes_are_refused_with_the_reason(values: dict[str, object], message: str) -> None:
+    """Bad input: what, where, what was expected."""
+    with pytest.raises(SceneError, match=message):
+        World(load_scene("clustering").with_values(**values), 1)
