@@ -102,11 +102,11 @@ def test_registers_survive_preemption_under_a_storm(image: Build) -> None:
         switches += 1
 
     machine.hook_pc(place(machine, "_T2Interrupt"), count)
-    machine.run(cycles=6_000_000)
+    machine.run(cycles=3_000_000)
     assert machine.peek("broken") == 0
-    assert switches > 5_000
+    assert switches > 2_500
     assert all(words(machine, "checked", 4))
-    assert machine.peek("stormed") > 3_000
+    assert machine.peek("stormed") > 1_500
     assert machine.peek("stormed") - machine.peek("handled") <= 1
 
 
@@ -144,7 +144,7 @@ def test_a_trap_stops_the_motors_and_reports(image: Build) -> None:
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
     machine.pc = 0x018000  # unimplemented program memory (isa.md §14.4)
-    machine.run(cycles=FCY // 10)
+    machine.run(cycles=FCY // 100)
     assert machine.peek("LATD") & 0xFF == 0
     assert b"address trap at 0x" in said
     assert b" in thread " in said
@@ -231,10 +231,10 @@ def interrupt_every_boundary(machine: Machine, stride: int, phase: int) -> int:
 @pytest.mark.parametrize("ipl_slip", [0, 1])
 def test_interrupts_at_every_instruction_change_nothing(image: Build, ipl_slip: int) -> None:
     """Issue 4, Must show 3: tick, a device that sends, and the stepper, together at instruction boundaries of a round
-    of kernel calls (here every 17th; tests/fuzz/fuzz_kernel.py tries all); kernel.md §4 `--ipl-slip`. Bugs 7, 12, 13
+    of kernel calls (here every 37th; tests/fuzz/fuzz_kernel.py tries more); kernel.md §4 `--ipl-slip`. Bugs 7, 12, 13
     of openswarm-original.md §7."""
     machine = start_of_scenario(image("points", TARGET_APPS), ipl_slip)
-    assert interrupt_every_boundary(machine, 17, 8 * ipl_slip) > 100
+    assert interrupt_every_boundary(machine, 37, 18 * ipl_slip) > 80
 
 
 def test_a_thread_keeps_64_of_its_128_bytes(image: Build) -> None:

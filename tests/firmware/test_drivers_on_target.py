@@ -1,0 +1,183 @@
+"""The drivers beside the kernel, and the clustering programs, on the emulated robot."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from emu.boards.epuck.board import Epuck
+from emu.boards.epuck.pixels import decode
+from emu.loader import load_image
+from emu.machine import Machine
+from tests.firmware.conftest import Build
+
+FCY = 14_745_600
+HREF = 1 << 3
+START = 8
+"""Selector bit that starts without the remote control (apps/clustering/README.md)."""
+PROGRAMS = ["clustering", "clustering-bare"]
+SCENES = {"object": (80, 0, 0), "robot": (0, 40, 0), "nothing": (100, 80, 80)}
+TABLES = {
+    0: {"nothing": (50, 100), "object": (100, 50), "robot": (10, 50)},
+    1: {"nothing": (55, 99), "object": (98, 50), "robot": (89, 53)},
+}
+"""Percent of 129 mm/s by selector bit 0 (epuck.md §8)."""
+
+
+def robot(path: Path, engine: str = "jit", **options) -> Machine:
+    image = load_image(path)
+    machine = Machine(image.chip, engine=engine, board=partial(Epuck, **options))
+    machine.load(image)
+    return machine
+
+
+def plain(colour: tuple[int, int, int]) -> np.ndarray:
+    return np.full((480, 640, 3), colour, np.uint8)
+
+
+def noise(seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
+
+
+def captured(machine: Machine) -> np.ndarray:
+    at = machine.address_of("frame")
+    return decode(bytes(machine.record.bytes[at : at + 800]), "rgb565").reshape(20, 20, 3)
+
+
+def window(picture: np.ndarray) -> np.ndarray:
+    """160 x 160 centred, every eighth pixel, as RGB565 keeps it (epuck.md §7.5)."""
+    return picture[160:320:8, 240:400:8] & np.array([0xF8, 0xFC, 0xF8], np.uint8)
+
+
+def steps(machine: Machine) -> tuple[int, int]:
+    motors = machine.board.motors
+    return motors.left.steps, motors.right.steps
+
+
+# -- clustering --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_colour_gives_the_wheel_speeds_of_the_controller(image: Build, program: str, table: int) -> None:
+    """epuck.md §8, openswarm-original.md §8: v mm/s, truncated, are v * 1000 / 129 steps/s; both within a step."""
+    machine = robot(image(program), selector=START + table)
+    for scene, percent in TABLES[table].items():
+        machine.board.camera.show(plain(SCENES[scene]))
+        machine.run(cycles=FCY // 2)  # the change is seen in the next frame
+        before = steps(machine)
+        machine.run(cycles=FCY)
+        made = [now - then for now, then in zip(steps(machine), before, strict=True)]
+        for count, share in zip(made, percent, strict=True):
+            assert count == pytest.approx(share * 129 // 100 * 1000 / 129, abs=1), scene
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_the_remote_control_starts_and_stops(image: Build, program: str) -> None:
+    """openswarm-original.md §8: OK enables clustering, STANDBY stops; other keys and a held key change nothing."""
+    machine = robot(image(program))
+    machine.board.camera.show(plain(SCENES["object"]))
+    machine.run(cycles=FCY // 4)
+    assert steps(machine) == (0, 0)
+    machine.board.remote.press("ok", repeat=3)
+    machine.run(cycles=FCY // 2)
+    moving = steps(machine)
+    assert moving[0] > 100
+    assert "front" in machine.board.leds.lit
+    machine.board.remote.press(1)
+    machine.run(cycles=FCY // 4)
+    assert steps(machine)[0] > moving[0]
+    machine.board.remote.press("standby")
+    machine.run(cycles=FCY // 4)
+    stopped = steps(machine)
+    machine.run(cycles=FCY // 4)
+    assert steps(machine) == stopped
+    assert "front" not in machine.board.leds.lit
+
+
+def test_the_bare_program_has_nothing_of_the_kernel(image: Build) -> None:
+    """experiment.md §4: its map contains no kernel object."""
+    symbols = load_image(image("clustering-bare")).symbols
+    for name in ("_Sys_Init_Kernel", "_Sys_Send_Event", "_os_memory", "_os_running", "_hal_switch"):
+        assert symbols.find(name) is None, name
+    assert symbols.find("_line_of_sight") is not None or symbols.find("_camera_capture_next") is not None
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_without_a_camera_nothing_hangs_and_the_robot_stands(image: Build, program: str) -> None:
+    """Issue 6, Must show 8: camera unplugged."""
+    machine = robot(image(program), selector=START, camera=None)
+    assert machine.run(cycles=FCY // 2).reason == "limit"
+    assert steps(machine) == (0, 0)
+
+
+# -- camera ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sensor", ["PO6030K", "PO3030K", "PO8030D"])
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_pixel_is_right(image: Build, program: str, sensor: str) -> None:
+    """Issue 6, Must show 1; epuck.md §7.5."""
+    machine = robot(image(program), selector=START, camera=sensor)
+    machine.board.camera.show(noise())
+    machine.run(cycles=8_000_000)
+    assert np.array_equal(captured(machine), window(noise()))
+
+
+@pytest.mark.parametrize("engine", ["interp", "jit"])
+def test_reads_come_16_to_18_tcy_behind_href(image: Build, engine: str) -> None:
+    """epuck.md §7.5, kernel.md §4: whatever the kernel does, with motors and 1 ms events running; 1,600,000 Tcy apart
+    frame by frame (9.216 frames/s, openswarm-original.md §5.5)."""
+    machine = robot(image("clustering"), engine=engine, selector=START)
+    machine.board.camera.show(plain(SCENES["object"]))
+    reads: list[int] = []
+    machine.hook_sfr("PORTD", lambda is_write, _value: None if is_write else reads.append(machine.events.now))
+    machine.run(cycles=6_000_000)
+    scan = machine.board.camera.scan
+    firsts = reads[::40]
+    assert len(firsts) >= 2 * 20
+    edges = [scan.edge_cycle(HREF, scan.edges(HREF, first)) for first in firsts]
+    assert {first - edge for first, edge in zip(firsts, edges, strict=True)} <= {16, 17, 18}
+    assert edges[20] - edges[0] == 1_600_000
+
+
+def test_pixels_are_right_at_every_phase_of_the_camera(image: Build) -> None:
+    """kernel.md §4: more than about 2 Tcy of extra delay would swap bytes. The sensor's phase goes through all residues
+    of the motor tick's 1,536 Tcy in steps of 29 (they share no divisor), against clock, slices and handlers."""
+    machine = robot(image("clustering"), selector=START)
+    camera = machine.board.camera
+    camera.show(noise())
+    machine.run(cycles=FCY // 2)
+    for phase in range(0, 1536, 29):
+        camera.align(machine.cycle + 700_000 + phase, line=40)
+        machine.run(cycles=1_700_000)
+        assert np.array_equal(captured(machine), window(noise())), phase
+
+
+def test_votes_and_ties_are_those_of_the_original(image: Build) -> None:
+    """openswarm-original.md §8: 24 pixels, two votes, red before green, dark is red, first wins on ties."""
+    machine = robot(image("clustering"), selector=START)
+
+    def seen(picture: np.ndarray) -> int:
+        machine.board.camera.show(picture)
+        machine.run(cycles=FCY // 4)
+        return machine.peek("speeds")  # of the left wheel: differs for all three
+
+    def with_votes(red: int, green: int) -> np.ndarray:
+        picture = plain(SCENES["nothing"])
+        places = [(x, y) for y in (4, 6, 8, 10, 12, 14) for x in (6, 9, 12, 15)]
+        for number, (x, y) in enumerate(places[-red - green :] if red + green else []):
+            picture[160 + 8 * y, 240 + 8 * x] = SCENES["object"] if number < red else SCENES["robot"]
+        return picture
+
+    object_, robot_, nothing = (seen(plain(SCENES[name])) for name in ("object", "robot", "nothing"))
+    assert len({object_, robot_, nothing}) == 3
+    assert seen(with_votes(1, 1)) == nothing
+    assert seen(with_votes(2, 0)) == object_
+    assert seen(with_votes(0, 2)) == robot_
+    assert seen(with_votes(2, 22)) == object_
+    assert seen(with_votes(1, 2)) == robot_
+    assert seen(plain((0, 16, 0))) == object_, "dark is nearer than green"
