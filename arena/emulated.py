@@ -22,7 +22,6 @@ from arena.scene import FCY, Scene
 from arena.vision import COLOURS, Eye
 from arena.world import STREAM_SENSORS, Poses, generator
 from emu.boards.epuck.board import Epuck
-from emu.dspic30f.state import RUN
 
 WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
@@ -86,7 +85,7 @@ class EmulatedBrain:
                 return 0.0, 0.0
             if machine.cycle >= self._probe_at:
                 self._probes += 1
-                self._busy += machine.state.mode == RUN
+                self._busy += not machine.is_asleep
                 self._probe_at = machine.cycle + 1 + int(self._rng.integers(2 * PROBE_TCY))
         return self._speeds()
 

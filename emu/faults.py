@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.chips.chip import Vector
-from emu.dspic30f.state import IPL3, RUN, STACK_POINTER
+from emu.dspic30f.state import IPL3, STACK_POINTER
 from emu.image import Image
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def fault_of(machine: Machine, image: Image, stop: Stop) -> Fault | None:
     """The fault behind `stop`, None if it is none."""
     if stop.reason == "fault":
         return Fault(stop.detail, stop.pc, stop.cycle)
-    if machine.state.mode != RUN and machine.peek("CORCON") & IPL3:
+    if machine.is_asleep and machine.peek("CORCON") & IPL3:
         name = machine.chip.vectors[machine.peek("INTTREG") & VECNUM].name
         return Fault(f"{name} trap, in whose handler the firmware went to sleep,", stop.pc, stop.cycle)
     if stop.reason != "breakpoint":

@@ -114,6 +114,11 @@ class Machine:
         return self.state.cycle
 
     @property
+    def is_asleep(self) -> bool:
+        """Whether the CPU stands in Idle or Sleep."""
+        return self.state.mode != RUN
+
+    @property
     def pc(self) -> int:
         """Program address of the next instruction."""
         return self.state.pc
