@@ -104,7 +104,8 @@ def link_options(options: CcOptions, objects: list[ObjectFile]) -> LinkOptions:
 def _apply(result: LinkOptions, name: str, value: str) -> bool:
     switches = {
         "gc-sections": ("gc_sections", True), "no-gc-sections": ("gc_sections", False),
-        "no-data-init": ("data_init", False), "data-init": ("data_init", True), "pack-data": ("pack_data", True), "no-pack-data": ("pack_data", False),
+        "no-data-init": ("data_init", False), "data-init": ("data_init", True),
+        "pack-data": ("pack_data", True), "no-pack-data": ("pack_data", False),
         "handles": ("handles", True), "no-handles": ("handles", False), "isr": ("isr", True), "no-isr": ("isr", False),
     }  # fmt: skip
     numbers = {"heap": "heap", "stack": "stack", "stackguard": "stack_guard", "fill-upper": "fill_upper"}

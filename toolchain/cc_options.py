@@ -53,8 +53,8 @@ CLANG_FLAGS = {
     "-fno-fast-math", "-funroll-loops", "-fno-unroll-loops", "-fno-math-errno", "-fmath-errno", "-ftrapping-math",
     "-fno-trapping-math", "-fms-extensions", "-fgnu89-inline", "-fno-gnu89-inline", "-fpack-struct",
     "-fcolor-diagnostics", "-fno-color-diagnostics", "-fdiagnostics-color", "-fno-diagnostics-color",
-    "-fdiagnostics-color=always", "-fdiagnostics-color=never", "-fno-delete-null-pointer-checks", "-fno-signed-zeros", "-ffinite-math-only",
-    "-fstrict-flex-arrays", "-fdollars-in-identifiers", "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
+    "-fdiagnostics-color=always", "-fdiagnostics-color=never", "-fno-delete-null-pointer-checks",
+    "-fno-signed-zeros", "-ffinite-math-only", "-fstrict-flex-arrays", "-fdollars-in-identifiers", "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
     "-fno-strict-overflow", "-fstrict-overflow", "-ffp-contract=off", "-ffp-contract=on", "-ffp-contract=fast",
     "-dM", "-dD", "-dI",
 }  # fmt: skip
