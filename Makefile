@@ -14,8 +14,8 @@ run: firmware.elf
 	$(PY) -m emu run firmware.elf --seconds $(SECONDS)
 
 test: $(STAMP)
-	$(PY) -m ruff check emu toolchain tests bench
-	$(PY) -m mypy emu toolchain
+	$(PY) -m ruff check emu toolchain arena tests bench
+	$(PY) -m mypy emu toolchain arena
 	$(PY) -m pytest -n auto tests
 
 bench: $(STAMP)
@@ -27,7 +27,7 @@ fuzz: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; set PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[arena,test]'
 	touch $@
 
 clean:
