@@ -1,0 +1,162 @@
+"""The command line: same bytes for any number of workers, resuming, bad input (docs/experiment.md)."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from arena.cli import main
+from arena.record import RecordError, read_trial, trials_in, write_trial
+from arena.trial import Rows
+
+SHORT = ["--brain", "scripted", "--minutes", "0.1", "--controller", "A"]
+
+
+def run(*arguments: object) -> int:
+    return main(["run", "clustering", *SHORT, *map(str, arguments)])
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.parquet")}
+
+
+def test_one_worker_two_workers_and_a_second_run_write_the_same_bytes(tmp_path: Path) -> None:
+    """issue "Must show" 5."""
+    for folder, jobs in (("one", 1), ("two", 2), ("again", 1)):
+        assert run("--trials", 3, "--jobs", jobs, "--out", tmp_path / folder) == 0
+    assert len(contents(tmp_path / "one")) == 3
+    assert contents(tmp_path / "one") == contents(tmp_path / "two") == contents(tmp_path / "again")
+
+
+def test_finished_trials_are_kept_and_an_unfinished_one_starts_from_its_seed(tmp_path: Path) -> None:
+    """As after an interrupt: one file missing, half a file of another run of the same trial beside it."""
+    run("--trials", 3, "--jobs", 1, "--out", tmp_path / "a")
+    before = contents(tmp_path / "a")
+    kept = tmp_path / "a" / "trial-0001.parquet"
+    stamp = kept.stat().st_mtime_ns
+    (tmp_path / "a" / "trial-0002.parquet").unlink()
+    (tmp_path / "a" / "trial-0002.parquet.part").write_bytes(b"half")
+    assert run("--trials", 3, "--jobs", 1, "--out", tmp_path / "a") == 0
+    assert contents(tmp_path / "a") == before
+    assert kept.stat().st_mtime_ns == stamp
+
+
+def test_a_folder_of_another_run_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Different seed, same folder: exit status 2."""
+    run("--trials", 1, "--jobs", 1, "--out", tmp_path)
+    assert run("--trials", 1, "--jobs", 1, "--seed", 9, "--out", tmp_path) == 2
+    assert "holds another run (different seed)" in capsys.readouterr().err
+
+
+def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
+    """Seed, scene, brain and versions."""
+    run("--trials", 1, "--jobs", 1, "--seed", 7, "--robots", 2, "--objects", 3, "--out", tmp_path)
+    (trial,) = trials_in(tmp_path)
+    assert trial.about["seed"] == 7
+    assert trial.about["scene"]["robots"]["count"] == 2
+    assert trial.objects.shape == (len(trial.times), 3, 2)
+    assert trial.times[-1] == pytest.approx(6.0, abs=0.01)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["key"]["controller"] == "A"
+    assert manifest["versions"]["pymunk"]
+    assert manifest["host"][0]["trial"] == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "nowhere", *SHORT], "there is no scene 'nowhere'; known: clustering"),
+        (["run", "clustering", *SHORT, "--objects", "200"], "no room: 205 robots and objects on 165 marks"),
+        (["run", "clustering", "--brain", "lost.elf"], "no such file"),
+        (["run", "clustering", "--brain", __file__], "test_campaign.py"),
+        (["run", "clustering", *SHORT, "--set", "range=3"], "expected SECTION.KEY=VALUE"),
+        (["run", "clustering", *SHORT, "--set", "camera.range_cm=far"], "camera.range_cm is 'far'; expected float"),
+        (["run", "clustering", *SHORT, "--trials", "0"], "must be positive"),
+        (["compare", "nowhere", "elsewhere"], "no finished trials"),
+        (["replay", "nowhere.parquet"], "no such file"),
+        (["replay", __file__], "is no recorded trial"),
+        (["sweep", "clustering", *SHORT, "--vary", "camera"], "expected SECTION.KEY=V1,V2"),
+    ],
+)
+def test_bad_input_is_explained_without_a_traceback(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Exit status 2."""
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name = 3", "unexpected 'name'"),
+        ("", "a scene needs a name"),
+        ('name = "x"\n[robots]\nwheels = 2', "unknown key robots.wheels"),
+        ('name = "x"\n[clock]\nquantum_ms = 50', "clock.quantum_ms is 50.0; expected 0.1 to 20"),
+        ('name = "x"\nrobots = \n', "line 2"),
+    ],
+)
+def test_scene_files_with_mistakes_are_named(
+    text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """File, key, expectation."""
+    path = tmp_path / "my.toml"
+    path.write_text(text)
+    assert main(["run", str(path), *SHORT]) == 2
+    error = capsys.readouterr().err
+    assert "my.toml" in error
+    assert message in error
+
+
+def test_a_new_scene_needs_no_code(tmp_path: Path) -> None:
+    """A TOML file elsewhere is as good as one that comes along."""
+    path = tmp_path / "small.toml"
+    path.write_text('name = "small"\n[robots]\ncount = 1\n[objects]\ncount = 2\n')
+    assert main(["run", str(path), *SHORT, "--trials", "1", "--out", str(tmp_path / "out")]) == 0
+    assert trials_in(tmp_path / "out")[0].about["scene"]["name"] == "small"
+
+
+def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path) -> None:
+    """/dev/full answers every write with ENOSPC, through a link where the part file would be."""
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    (tmp_path / "trial-0001.parquet.part").symlink_to("/dev/full")
+    rows = Rows()
+    rows.add({"t": 0.0, "log": []})
+    with pytest.raises(RecordError, match=r"trial-0001\.parquet: cannot be written: .*[Nn]o space"):
+        write_trial(tmp_path / "trial-0001.parquet", rows, {})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_compare_finds_a_run_equivalent_to_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All differences are 0."""
+    run("--trials", 2, "--jobs", 1, "--out", tmp_path)
+    capsys.readouterr()
+    assert main(["compare", str(tmp_path), str(tmp_path), "--at", "5", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert all(row["equivalent"] and row["mean"] == 0 and row["wilcoxon_p"] == 1 for row in result["measures"])
+    assert main(["compare", str(tmp_path), str(tmp_path)]) == 2  # trials of 6 s have no share at 600 s
+    assert "less than --at 600" in capsys.readouterr().err
+
+
+def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two by two."""
+    vary = ["--vary", "robots.count=1,2", "--vary", "camera.range_cm=100,inf"]
+    out = ["--trials", "1", "--jobs", "1", "--out", str(tmp_path)]
+    assert main(["sweep", "clustering", *SHORT, *vary, *out]) == 0
+    assert len(list(tmp_path.glob("*/trial-0001.parquet"))) == 4
+    assert read_trial(tmp_path / "robots.count=2-camera.range_cm=inf" / "trial-0001.parquet").robots.shape[1] == 2
+    assert "robots.count=2, camera.range_cm=inf" in capsys.readouterr().out
+
+
+def test_plot_draws_the_figures(tmp_path: Path) -> None:
+    """Figure 4, Figure 5, trajectories, CPU load."""
+    run("--trials", 2, "--jobs", 1, "--out", tmp_path / "run")
+    assert main(["plot", str(tmp_path / "run"), "--out", str(tmp_path / "figures")]) == 0
+    names = {path.name for path in (tmp_path / "figures").iterdir() if path.stat().st_size > 5000}
+    assert names == {"figure4-snapshots.png", "figure5-clustering.png", "trajectories.png", "cpu-load.png"}
