@@ -54,7 +54,8 @@ CLANG_FLAGS = {
     "-fno-trapping-math", "-fms-extensions", "-fgnu89-inline", "-fno-gnu89-inline", "-fpack-struct",
     "-fcolor-diagnostics", "-fno-color-diagnostics", "-fdiagnostics-color", "-fno-diagnostics-color",
     "-fdiagnostics-color=always", "-fdiagnostics-color=never", "-fno-delete-null-pointer-checks",
-    "-fno-signed-zeros", "-ffinite-math-only", "-fstrict-flex-arrays", "-fdollars-in-identifiers", "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
+    "-fno-signed-zeros", "-ffinite-math-only", "-fstrict-flex-arrays", "-fdollars-in-identifiers",
+    "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
     "-fno-strict-overflow", "-fstrict-overflow", "-ffp-contract=off", "-ffp-contract=on", "-ffp-contract=fast",
     "-dM", "-dD", "-dI",
 }  # fmt: skip
