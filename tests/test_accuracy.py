@@ -10,7 +10,7 @@ PAGE = (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8")
 
 
 def sources():
-    for folder in ("emu", "toolchain", "firmware"):
+    for folder in ("emu", "toolchain", "firmware", "arena"):
         for suffix in ("py", "c", "h", "s", "S"):
             yield from (path for path in (ROOT / folder).rglob(f"*.{suffix}") if "build" not in path.parts)
 
@@ -26,7 +26,7 @@ def test_every_file_with_an_unverified_choice_is_on_the_page():
 
 
 def test_every_file_the_page_names_exists():
-    names = re.findall(r"`((?:emu|isa|toolchain|firmware|docs|tests)/[\w./-]+)", PAGE)
+    names = re.findall(r"`((?:emu|isa|toolchain|firmware|arena|docs|tests)/[\w./-]+)", PAGE)
     assert len(names) > 40
     for name in names:
         path = ROOT / ("emu/dspic30f/" + name if name.startswith("isa/") else name)
