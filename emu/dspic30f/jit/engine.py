@@ -37,6 +37,9 @@ COLD_CYCLES: Final = 1000
 NATIVE_CYCLES: Final = 30_000_000
 """Longest native run before Python can handle signals, in Tcy."""
 
+MODES: Final = ("CORCON", "MODCON", "XBREV", "INTCON1", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")
+"""Registers that decide which code is valid: Python writes them, and chooses anew."""
+
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
 
@@ -317,13 +320,14 @@ def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access,
         special[sfrs["SR"].address] = "sr"
     if core.state.limit_armed:
         special[sfrs["SPLIM"].address] = "plain"
+    modes = {sfrs[name].address for name in MODES}
     reads: dict[int, Access] = {}
     writes: dict[int, tuple[Access, int]] = {}
     for address in range(W_END, SFR_END, 2):
         word = address >> 1
         if bus.modelled[word] and bus.on_read[word] is None and bus.compute[word] is None:
             reads[address] = "plain"
-        if word in bus.watched:
+        if word in bus.watched or address in modes:
             continue
         if address in special:
             writes[address] = (special[address], bus.writable[word])

@@ -191,6 +191,8 @@ class Translator:
         b.begin(step.pc, psv_cycles)
         b.now = self.v.get("cycle") + stall + (1 if step.facts.flow is Return else row.cycles - 1)
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
+        if flow is not None and step.pc == self.around.do_end:
+            raise NeedsInterpreter  # undefined on silicon; the sequencer says what happens here
         if isinstance(flow, Repeat):
             self._repeats.translate(step, flow, stall)
             return True, 0

@@ -110,6 +110,14 @@ def device_words(generator: random.Random) -> list[int]:
     return words_of(syntax, f=address + generator.randrange(2), b=generator.randrange(8))
 
 
+def mode_words(generator: random.Random) -> list[int]:
+    """A write to a register that decides which native code is valid, or to the state of a DO loop."""
+    name = generator.choice(("CORCON", "MODCON", "XBREV", "DOENDL", "DOSTARTL", "DCOUNT", "PSVPAG", "SPLIM"))
+    value = {"DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2), "DOSTARTL": CODE, "DCOUNT": 2, "SPLIM": 0x2600,
+             "CORCON": generator.getrandbits(16) & 0x10F7}.get(name, generator.getrandbits(16))
+    return literal(value, 7) + words_of("MOV{.W} Wns, f", s=7, f=DSPIC30F6014A.sfrs[name].address)
+
+
 def random_firmware(seed: int) -> Firmware:
     """A program that never ends by itself, except through a reset for a fault."""
     generator = random.Random(seed)
@@ -145,7 +153,7 @@ def random_firmware(seed: int) -> Firmware:
         row = generator.choice(ROWS)
         words = random_words(row, generator, at, end)
         if generator.random() < 0.2:
-            words = generator.choice((interrupt_words, device_words))(generator)
+            words = generator.choice((interrupt_words, device_words, mode_words))(generator)
         if words is not None:
             at = firmware.put(at, words)
     firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40 if generator.random() < 0.8 else CODE - 2))
