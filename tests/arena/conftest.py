@@ -1,0 +1,66 @@
+"""Images the tests put into robots."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def clustering_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The project's clustering firmware, built in a folder of its own."""
+    if not (ROOT / "firmware" / "apps" / "clustering").is_dir():
+        pytest.skip("firmware/apps/clustering is not in this checkout")
+    out = tmp_path_factory.mktemp("clustering")
+    command = ["make", "-C", str(ROOT / "firmware"), "APP=clustering", f"OUT={out}", f"PYTHON={sys.executable}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    return out / "firmware.elf"
+
+
+@pytest.fixture(scope="session")
+def talking_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Starts the left motor's coils, says a line, and runs into an illegal opcode after about a second."""
+    return _assembled(tmp_path_factory.mktemp("talking"), TALKING)
+
+
+def _assembled(folder: Path, text: str) -> Path:
+    source, image = folder / "main.s", folder / "main.elf"
+    source.write_text(text)
+    command = [sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(image)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=ROOT, check=False)
+    assert done.returncode == 0, done.stderr
+    return image
+
+
+TALKING = """
+        .include "p30F6014A.inc"
+        .text
+        .global _main
+_main:  mov     #7, w0
+        mov     w0, U1BRG               ; 115,200 baud (epuck.md)
+        mov     #0x8000, w0
+        mov     w0, U1MODE
+        bset    U1STA, #10              ; UTXEN
+        mov     #'h', w0
+        mov     w0, U1TXREG
+        mov     #'i', w0
+        mov     w0, U1TXREG
+        mov     #10, w0
+        mov     w0, U1TXREG
+        bclr    TRISA, #6
+        bset    LATA, #6                ; LED 0
+        mov     #100, w1                ; 100 * 147456 Tcy = 1 s
+2:      mov     #49151, w0
+1:      dec     w0, w0
+        bra     nz, 1b
+        dec     w1, w1
+        bra     nz, 2b
+        .pword  0xDB0000                ; no instruction
+3:      bra     3b
+"""

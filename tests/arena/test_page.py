@@ -1,0 +1,89 @@
+"""The replay page in a real browser: loads from disk, scrubs, plays, and shows the poses of the Parquet file."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from arena.cli import main
+from arena.record import read_trial
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
+SAMPLE = 7
+PROBE = """<pre id="result"></pre><script>
+const found = {before: sample, samples: d.t.length};
+scrub.value = %d; scrub.dispatchEvent(new Event("input"));
+found.scrubbed = sample;
+found.state = document.getElementById("state").textContent;
+found.robots = d.robots.map(r => [r.x[sample], r.y[sample], r.heading[sample]]);
+const pixel = (x, y) => [...g.getImageData(Math.round(x), Math.round(y), 1, 1).data];
+found.pixels = d.robots.map(r => pixel(X(r.x[sample]) - 3, Y(r.y[sample])));
+found.corner = pixel(3, 3);
+document.getElementById("speed").value = "64";
+play.click();
+found.playing = play.textContent;
+setTimeout(() => {
+  found.after = sample; found.end = play.textContent;
+  document.getElementById("result").textContent = JSON.stringify(found);
+}, 2000);
+</script></html>"""
+
+
+@pytest.fixture
+def trial(tmp_path: Path) -> Path:
+    """Eight seconds of two robots."""
+    arguments = ["--brain", "scripted", "--trials", "1", "--minutes", "0.1333", "--robots", "2", "--jobs", "1"]
+    assert main(["run", "clustering", *arguments, "--out", str(tmp_path)]) == 0
+    return tmp_path / "trial-0001.parquet"
+
+
+def test_the_page_holds_the_file_and_loads_nothing_from_elsewhere(trial: Path) -> None:
+    """Self-contained: no address in it, data equal to the record."""
+    assert main(["replay", str(trial)]) == 0
+    text = trial.with_suffix(".html").read_text()
+    assert not re.search(r"https?:|src=|href=|@import", text)
+    data = json.loads(re.search(r'id="trial">(.*?)</script>', text, re.S).group(1))  # type: ignore[union-attr]
+    record = read_trial(trial)
+    assert data["t"] == record.times.tolist()
+    assert np.array_equal(np.array(data["objects"]), record.objects)
+    assert data["robots"][1]["x"] == record.columns["r1_x"].tolist()
+    assert len(data["clusters"]) == len(data["t"])
+
+
+def test_text_from_robots_cannot_end_the_page(trial: Path) -> None:
+    """A firmware may say anything."""
+    from arena.page import page
+
+    record = read_trial(trial)
+    record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": "</script><b>"}]
+    assert page(record).count("</script>") == 2
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Path) -> None:
+    """Issue "Must show" 6."""
+    main(["replay", str(trial)])
+    page = trial.with_suffix(".html")
+    probed = tmp_path / "probed.html"
+    probed.write_text(page.read_text().replace("</html>", PROBE % SAMPLE))
+    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
+               "--virtual-time-budget=4000", "--dump-dom", probed.as_uri()]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    match = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.S)
+    assert match is not None, done.stderr[-2000:]
+    found = json.loads(match.group(1).replace("&amp;", "&"))
+    record = read_trial(trial)
+    assert (found["before"], found["samples"]) == (0, len(record.times))
+    assert found["scrubbed"] == SAMPLE
+    assert found["state"].startswith(f"{record.times[SAMPLE]:.1f} s, largest cluster")
+    expected = [[record.columns[f"r{i}_{key}"][SAMPLE] for key in ("x", "y", "heading")] for i in range(2)]
+    assert found["robots"] == expected
+    assert found["corner"] == [0, 0, 0, 0]
+    assert all(pixel[3] == 255 for pixel in found["pixels"])  # something is drawn where the robots are
+    assert found["playing"] == "Pause"
+    assert found["after"] == len(record.times) - 1
+    assert found["end"] == "Play"
