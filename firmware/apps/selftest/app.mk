@@ -1,0 +1,3 @@
+DEVICES := camera i2c remote analog
+# snprintf needs about 110 bytes of a thread's stack, the interrupts another 62.
+override DEFINES += -DSYS_DEFAULT_STACK=384
