@@ -82,7 +82,7 @@ def clustering(runs: Runs) -> Figure:
     share_axis.axhline(86.5, linestyle=":", color="k", linewidth=1)
     share_axis.set(xlabel="time (s)", ylabel="objects in the largest cluster (%)", ylim=(0, 105),
                    title="(a) dotted: 86.5 % of ref. [10] at 600 s, real robots")  # fmt: skip
-    spread_axis.set(xlabel="time (s)", ylabel="compactness u, Eq. (2)", yscale="log", title="(b)")
+    spread_axis.set(xlabel="time (s)", ylabel="compactness u, Eq. (2)", ylim=(0, None), title="(b)")
     share_axis.legend(fontsize=8)
     return figure
 
@@ -92,7 +92,7 @@ def _band(axis: Axes, name: str, times: Any, values: Any) -> None:
     (line,) = axis.plot(times, mean, label=f"{name} (n = {len(values)})")
     low, high = bootstrap_band(values)
     axis.fill_between(times, low, high, color=line.get_color(), alpha=0.3, linewidth=0)
-    axis.plot(times, mean + deviation, "--", times, np.maximum(mean - deviation, 1e-3), "--", color=line.get_color(),
+    axis.plot(times, mean + deviation, "--", times, mean - deviation, "--", color=line.get_color(),
               linewidth=0.6)  # fmt: skip
 
 

@@ -1,0 +1,93 @@
+"""Time per simulated second in the arena: physics, rendering, emulation, and the rest; with what a trial takes.
+
+In: nothing (the clustering firmware is built). Out: CPU seconds of this process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from arena.brain import Brain, ScriptedBrain
+from arena.emulated import EmulatedBrain
+from arena.firmware import image_for
+from arena.scene import Scene, load_scene, scripted
+from arena.world import World
+
+TRIAL_S = 900
+
+
+class Clock:
+    """CPU time spent in some functions."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*arguments: Any) -> Any:
+            start = time.perf_counter()
+            try:
+                return function(*arguments)
+            finally:
+                self.seconds += time.perf_counter() - start
+
+        return timed
+
+
+def measure(scene: Scene, brains: list[Brain], seconds: float, warm_up: float) -> dict[str, float]:
+    """CPU seconds per simulated second: all, physics, rendering."""
+    world = World(scene, 1)
+    physics, rendering = Clock(), Clock()
+    step = physics.around(world.step)
+    for brain in brains:
+        if isinstance(brain, EmulatedBrain):
+            brain.machine.board.camera.sample(rendering.around(brain._pixels))
+    for tick in range(round((warm_up + seconds) / world.dt)):
+        if tick == round(warm_up / world.dt):
+            physics.seconds = rendering.seconds = 0.0
+            start = time.process_time(), time.perf_counter()
+        poses = world.poses
+        step([brain.think(tick, poses) for brain in brains])
+    cpu, wall = time.process_time() - start[0], time.perf_counter() - start[1]
+    return {
+        "cpu_s": cpu / seconds,
+        "physics": physics.seconds / wall,
+        "rendering": rendering.seconds / wall,
+        "trial_cpu_s": TRIAL_S * cpu / seconds,
+        "real_time": seconds / cpu,
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, epilog="example: python bench/arena.py --seconds 20")
+    parser.add_argument("--seconds", type=float, default=5.0, help="simulated time of each measurement (default 5)")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    scene = load_scene("clustering")
+    robots = range(scene.robots.count)
+    quick = scripted(scene)
+    image = image_for("openswarm")
+    assert image is not None
+    results = {
+        "scripted": measure(quick, [ScriptedBrain(quick, 1, i, "A") for i in robots], 20 * options.seconds, 5.0),
+        "openswarm": measure(scene, [EmulatedBrain(scene, 1, i, image, 8) for i in robots], options.seconds, 3.0),
+    }
+    if options.json:
+        print(json.dumps(results))
+        return 0
+    for name, one in results.items():
+        print(f"{name:10} {one['cpu_s'] * 1000:7.1f} ms CPU per simulated second ({one['real_time']:.1f} x real time): "
+              f"physics {one['physics']:.0%}, rendering {one['rendering']:.0%}; "
+              f"{len(robots)} robots, 15 min: {one['trial_cpu_s']:.0f} s of one core")  # fmt: skip
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
