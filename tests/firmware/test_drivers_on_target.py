@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from emu.boards.epuck.analog import RESPONSE
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.pixels import decode
 from emu.loader import load_image
@@ -181,3 +182,96 @@ def test_votes_and_ties_are_those_of_the_original(image: Build) -> None:
     assert seen(with_votes(2, 22)) == object_
     assert seen(with_votes(1, 2)) == robot_
     assert seen(plain((0, 16, 0))) == object_, "dark is nearer than green"
+
+
+# -- I2C --
+
+
+def i2c_wire(machine: Machine):
+    return machine.board.camera.chip.i2c.wire
+
+
+def test_a_slave_that_holds_sda_is_clocked_free(image: Build) -> None:
+    """Issue 6, Must show 3: a slave stuck in the middle of a byte lets go after some clocks; the camera then works."""
+    machine = robot(image("clustering"), selector=START)
+    i2c_wire(machine).hold(sda=True, clocks=7)
+    machine.board.camera.show(noise())
+    machine.run(cycles=5_000_000)
+    assert machine.board.camera.chip.i2c.wire.sda_high
+    assert np.array_equal(captured(machine), window(noise()))
+
+
+@pytest.mark.parametrize("lines", [{"sda": True}, {"scl": True}])
+def test_a_line_that_stays_low_stops_the_camera_not_the_robot(image: Build, lines: dict[str, bool]) -> None:
+    """Issue 6, Must show 3 and 8: the kernel starts and says which device failed."""
+    machine = robot(image("selftest"))
+    i2c_wire(machine).hold(**lines)
+    assert b"camera 0000 FAIL" in said(machine, FCY // 2)
+
+
+def test_a_slave_may_stretch_the_clock(image: Build) -> None:
+    """dspic30f6014a.md §11: the master waits for SCL; 1 ms at each byte is within the driver's patience."""
+    machine = robot(image("clustering"), selector=START)
+    machine.board.camera.stretch = lambda _cycle: FCY // 1000
+    machine.board.camera.show(noise())
+    machine.run(cycles=7_000_000)
+    assert np.array_equal(captured(machine), window(noise()))
+
+
+def test_a_bit_lasts_151_tcy(image: Build) -> None:
+    """dspic30f6014a.md §11: I2CBRG = 150."""
+    machine = robot(image("clustering"))
+    machine.run(cycles=100_000)
+    assert machine.peek("I2CBRG") == 150
+
+
+# -- analog inputs, self-test --
+
+
+def said(machine: Machine, cycles: int) -> bytes:
+    heard = bytearray()
+    machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
+    machine.run(cycles=cycles)
+    return bytes(heard)
+
+
+def test_the_self_test_finds_every_device(image: Build) -> None:
+    """Issue 6: selftest exercises every device and reports over UART1; 1 s at 129 mm/s is 1000 steps."""
+    machine = robot(image("selftest"), selector=5)
+    machine.board.camera.show(plain(SCENES["robot"]))
+    report = said(machine, 5 * FCY // 2)
+    assert b"FAIL" not in report
+    for line in (b"selector 5", b"camera 6030", b"green", b"leds done", b"motors done", b"end"):
+        assert line in report, line
+    assert steps(machine) == pytest.approx((1000, 1000), abs=2)
+    assert machine.board.motors.left.illegal == 0
+
+
+def test_distance_follows_the_reference_curve(image: Build) -> None:
+    """Issue 6, Must show 4; epuck.md §5, column OpenSwarm: 0-10 cm through emitter, converter and driver. Noise is 3 %
+    of the reflection or 5 counts, which is 10 mm where the curve is flat."""
+    machine = robot(image("selftest"))
+    machine.run(cycles=FCY // 10)
+    reflection, distance = machine.address_of("reflection"), machine.address_of("millimetres")
+    for mm, counts in RESPONSE:
+        for sensor in range(8):
+            machine.board.ir.set_distance(sensor, mm)
+        machine.run(cycles=FCY // 20)
+        for sensor in range(8):
+            seen = machine.peek(reflection + 2 * sensor)
+            assert seen == pytest.approx(counts, abs=max(40, 0.2 * counts)), (mm, sensor)
+            found = machine.record.bytes[distance + sensor]
+            assert (found == 255 and mm >= 90) or abs(found - mm) <= 5 + mm / 4, (mm, sensor, found)
+
+
+def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
+    """epuck.md §5: reflection = ambient - lit."""
+    machine = robot(image("selftest"))
+    for sensor in range(8):
+        machine.board.ir.set_distance(sensor, 20)
+    for ambient in (3800, 2500, 1500):
+        for sensor in range(8):
+            machine.board.ir.set_ambient(sensor, ambient)
+        machine.run(cycles=FCY // 10)
+        at = machine.address_of("reflection")
+        assert all(abs(machine.peek(at + 2 * sensor) - 857) < 150 for sensor in range(8)), ambient

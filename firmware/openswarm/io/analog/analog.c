@@ -13,7 +13,7 @@ static const uint16 table[TABLE_LAST + 1] = {3788, 3548, 857, 474, 296, 205, 153
 
 static sys_proximity_processor processor;
 static uint16 ambient[SYS_PROXIMITY_SENSORS], reflection[SYS_PROXIMITY_SENSORS];
-static uint8 distance[SYS_PROXIMITY_SENSORS];
+static uint8 millimetres[SYS_PROXIMITY_SENSORS];
 static uint16 latest[HAL_ANALOG_FIXED]; /* microphones, then axes */
 static uint8 rounds;
 
@@ -40,7 +40,7 @@ static void measured(uint8 sensor, uint16 raw, bool lit)
         ambient[sensor] = raw;
     } else {
         reflection[sensor] = raw < ambient[sensor] ? (uint16)(ambient[sensor] - raw) : 0;
-        distance[sensor] = processor(sensor, reflection[sensor]);
+        millimetres[sensor] = processor(sensor, reflection[sensor]);
     }
 }
 
@@ -53,7 +53,7 @@ void analog_scanned(const hal_analog_scan *scan)
     measured((uint8)(scan->pair + PAIRS), scan->near[1], scan->lit);
     if (scan->lit && scan->pair == PAIRS - 1 && ++rounds == ROUNDS_PER_EVENT) {
         rounds = 0;
-        (void)Sys_Send_Event(SYS_IO_PROXIMITY, distance, sizeof distance);
+        (void)Sys_Send_Event(SYS_IO_PROXIMITY, millimetres, sizeof millimetres);
     }
 }
 
