@@ -1,6 +1,7 @@
 /* Asks every device and reports on UART1. README.md. */
 #include <analog.h>
 #include <camera.h>
+#include <i2c.h>
 #include <openswarm.h>
 #include <openswarm_io.h>
 #include <remote.h>
@@ -40,6 +41,17 @@ static void report_rest(void)
     report("sound", Sys_Get_Sound(0), Sys_Get_Sound(1), Sys_Get_Sound(2), true);
 }
 
+/* The camera's type over I2C while everything runs; result 0 is I2C_DONE. */
+static void report_i2c(void)
+{
+    enum { CAMERA = 0x6E /* epuck.md §7.1 */ };
+    static const uint8 type_register = 0;
+    uint8 type = 0;
+    i2c_transfer transfer = {CAMERA, sizeof type_register, sizeof type, &type_register, &type};
+    i2c_result result = Sys_I2C_Transfer(&transfer);
+    report("i2c", (sint16)result, type, 0, result == I2C_DONE);
+}
+
 static void light_leds(void)
 {
     for (uint8 led = 0; led < SYS_LEDS; led++) {
@@ -67,6 +79,7 @@ static void test(void)
     char line[LINE];
     snprintf(line, sizeof line, "camera %04x%s\r\n", Sys_Get_CameraType(), camera ? "" : " FAIL");
     say(line);
+    report_i2c();
     report_proximity();
     report_rest();
     light_leds();
@@ -103,6 +116,7 @@ int main(void)
     Sys_Init_Kernel();
     camera = Sys_Start_Camera();
     Sys_Start_Remote();
+    Sys_Start_I2C();
     Sys_Start_Analog();
     Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, tell, NULL);
     Sys_Subscribe_to_Event(SYS_IO_REMOTECONTROL, 0, tell_key, NULL);

@@ -1,0 +1,17 @@
+/* I2C for threads: the interrupt does the transfer, the thread sleeps. */
+#ifndef I2C_H
+#define I2C_H
+
+#include "i2c_master.h"
+#include "openswarm.h"
+
+enum { SYS_I2C_TIMEOUT_MS = 25 };
+
+/* M | no | - | 30.  Between Sys_Init_Kernel and Sys_Start_Kernel; drivers that poll the bus run before or after it. */
+void Sys_Start_I2C(void);
+
+/* T | until done, at most SYS_I2C_TIMEOUT_MS and 4 ms of recovery | - | 60 | CONTEXT, BUSY.  I2C_DONE, or why not: after a
+ * time-out or collision the bus has been recovered. I2C_BUSY: refused, another thread's transfer is on its way. */
+i2c_result Sys_I2C_Transfer(const i2c_transfer *transfer);
+
+#endif
