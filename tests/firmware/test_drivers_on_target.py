@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -216,6 +217,37 @@ def test_a_slave_may_stretch_the_clock(image: Build) -> None:
     machine.board.camera.show(noise())
     machine.run(cycles=7_000_000)
     assert np.array_equal(captured(machine), window(noise()))
+
+
+def after_camera_line(machine: Machine, act: Callable[[], None]) -> bytes:
+    """The self-test's report when `act` happens between its camera line and its I2C transfer by interrupt."""
+    heard = bytearray()
+    machine.uart[1].on_byte = lambda byte, _cycle: heard.append(byte)
+    while b"camera" not in heard or not heard.endswith(b"\n"):
+        assert machine.run(cycles=FCY // 1000).reason == "limit"
+    act()
+    machine.run(cycles=FCY // 5)
+    return bytes(heard)
+
+
+def test_faults_of_a_running_bus_are_survived(image: Build) -> None:
+    """Issue 6, Must show 3: by interrupt, under the kernel; the report goes on behind each fault."""
+
+    def report(act: Callable[[Machine], None]) -> bytes:
+        machine = robot(image("selftest"))
+        heard = after_camera_line(machine, lambda: act(machine))
+        assert b"proximity 0" in heard
+        return heard
+
+    def stretch(machine: Machine, cycles: int) -> None:
+        machine.board.camera.stretch = lambda _cycle: cycles
+
+    assert b"i2c 0 96 0\r" in report(lambda machine: None)
+    assert b"i2c 0 96 0\r" in report(lambda machine: i2c_wire(machine).hold(sda=True, clocks=5))
+    assert b"i2c 0 96 0\r" in report(lambda machine: stretch(machine, FCY // 1000))
+    assert b"i2c 2 0 0 FAIL" in report(lambda machine: machine.board.camera.unplug())  # I2C_NO_ACK
+    assert b"i2c 5 0 0 FAIL" in report(lambda machine: i2c_wire(machine).hold(sda=True))  # I2C_STUCK
+    assert b"i2c 4 0 0 FAIL" in report(lambda machine: stretch(machine, FCY))  # I2C_TIMEOUT
 
 
 def test_a_bit_lasts_151_tcy(image: Build) -> None:
