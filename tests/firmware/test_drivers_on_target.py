@@ -307,3 +307,21 @@ def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
         machine.run(cycles=FCY // 10)
         at = machine.address_of("reflection")
         assert all(abs(machine.peek(at + 2 * sensor) - 857) < 150 for sensor in range(8)), ambient
+
+
+# -- engines --
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_engines_agree_to_the_bit(image: Build, program: str) -> None:
+    """Issue 6, Must show 6: registers, memory, devices and robot after frames, a change of scene and a remote key."""
+    states = []
+    for engine in ("interp", "jit"):
+        machine = robot(image(program), engine=engine, selector=START)
+        machine.board.camera.show(noise())
+        machine.run(cycles=3_456_789)
+        machine.board.camera.show(plain(SCENES["object"]))
+        machine.board.remote.press("standby")
+        machine.run(cycles=2_345_678)
+        states.append((machine.cycle, machine.pc, bytes(machine.record.bytes)[:0x2800], steps(machine)))
+    assert states[0] == states[1]
