@@ -65,6 +65,10 @@ def time_to(times: NDArray[np.float64], shares: NDArray[np.float64], share: floa
     return float(times[reached[0]]) if len(reached) else float("nan")
 
 
+HALF_QUANTUM_S: Final = 0.011
+"""Samples are taken at the end of the quantum nearest to the time asked; quanta last up to 20 ms (scene.py)."""
+
+
 @dataclass(frozen=True)
 class Course:
     """The metrics of one trial over time."""
@@ -75,8 +79,8 @@ class Course:
     compactness: NDArray[np.float64]
 
     def at(self, seconds: float, values: NDArray[np.float64]) -> float:
-        """A value at the last sample not after `seconds`."""
-        return float(values[max(int(np.searchsorted(self.times, seconds + 1e-6)) - 1, 0)])
+        """A value at the last sample not after `seconds`, give or take half of the longest quantum."""
+        return float(values[max(int(np.searchsorted(self.times, seconds + HALF_QUANTUM_S)) - 1, 0)])
 
     @property
     def area(self) -> float:

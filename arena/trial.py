@@ -5,6 +5,7 @@ Robots think in the order of their numbers; none sees a half-moved world.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -49,18 +50,20 @@ def run_trial(
     A robot whose firmware stops stands still; the others go on. Raises SceneError if there is no room.
     """
     world = world or World(scene, seed)
-    quanta = round(seconds / world.dt)
-    per_sample = max(round(scene.clock.sample_s / world.dt), 1)
+    quanta = math.ceil(seconds / world.dt - 0.5)
     per_second = max(round(1 / world.dt), 1)
     recorder = _Recorder(world, brains)
     wheels: list[tuple[float, float]] = [STOPPED] * len(brains)
     recorder.sample(wheels)
+    samples = 1
     for tick in range(quanta):
         poses = world.poses
         wheels = [brain.think(tick, poses) for brain in brains]
         world.step(wheels)
-        if (tick + 1) % per_sample == 0:
+        # a sample is the end of the quantum nearest to the time asked
+        if world.seconds >= samples * scene.clock.sample_s - world.dt / 2:
             recorder.sample(wheels)
+            samples += 1
         if progress is not None and (tick + 1) % per_second == 0:
             progress(world.seconds)
     return Result(recorder.rows, recorder.faults)
