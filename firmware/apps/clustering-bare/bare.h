@@ -2,7 +2,12 @@
 #ifndef BARE_H
 #define BARE_H
 
+#include <p30F6014A.h>
 #include <stdint.h>
+
+#ifndef OS_ISR /* Microchip's header does not have this spelling */
+#define OS_ISR(name) void __attribute__((__interrupt__, __no_auto_psv__)) name(void)
+#endif
 
 void motors_init(void);
 void motors_drive(uint8_t left_mm_s, uint8_t right_mm_s); /* 0..129, forward */

@@ -1,6 +1,4 @@
 /* Stepper motors from T3 at 9,600 Hz. v mm/s are v * 1000 / 129 steps/s (epuck.md §3), that is 5 v / 6192 of a step per tick. */
-#include <p30F6014A.h>
-
 #include "bare.h"
 
 enum { TICK_TCY = 1536, STEP = 6192, RATE = 5, PRIORITY = 5, TIMER_ON = 0x8000 };

@@ -1,7 +1,5 @@
 /* RC-5 by sampling, as the robot's library does it: t = 0 is the falling edge in the middle of the first start bit, the
  * line is low 2.1 ms later; from 3.0 ms on there is a bit every 1.778 ms, toggle first (epuck.md §6). */
-#include <p30F6014A.h>
-
 #include "bare.h"
 
 enum {
