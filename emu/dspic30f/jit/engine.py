@@ -240,7 +240,7 @@ class JitEngine:
 
     def _fetch(self, pc: int) -> Insn | None:
         """Decoded instruction for the translator; none where Python must see the program counter."""
-        if pc >> 1 >= self._words or pc in self._hooks:
+        if pc >> 1 >= self._words or pc in self._hooks or not self._core.program.executable(pc):
             return None
         flash = self._core.program.flash
         second = flash[(pc >> 1) + 1] if (pc >> 1) + 1 < self._words else 0

@@ -140,3 +140,18 @@ def test_a_folder_that_cannot_be_written_only_costs_the_cache(tmp_path: Path) ->
     cache.put(cache.key(b"one"), b"code")
     assert cache.get(cache.key(b"one")) is None
     assert cache.stores == 0
+
+
+def test_vectors_are_not_executed_as_instructions() -> None:
+    """A jump into vector space is an address error in native code too (isa.md §14.4, cause 5)."""
+    firmware = counting_firmware()
+    firmware.put(0x08, [0x1100])
+    firmware.put(0x1100, words_of("CLR{.B} f", B=0, f=0x80) + words_of("BRA Expr", n=-1))
+    firmware.put(0x180, words_of("GOTO Expr", n=0x5C))
+    plain, native = pair(firmware)
+    for machine in (plain, native):
+        machine.run(1_000)
+        machine.pc = 0x180
+        machine.run(50)
+    assert plain.pc == 0x1102
+    assert not difference(plain, native)
