@@ -7,12 +7,8 @@ import sys
 import tomllib
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[1]
 LINTER = Path(sys.executable).with_name("lint-imports")
-
-pytestmark = pytest.mark.skipif(not LINTER.exists(), reason="import-linter is not installed")
 
 
 def lint(folder: Path) -> subprocess.CompletedProcess[str]:
