@@ -13,6 +13,8 @@ from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.state import FLAGS, OAB, SAB
 
 ACCUMULATOR_FLAGS: Final = ("OA", "OB", "SA", "SB")
+BITS: Final = FLAGS | {"OAB": OAB.bit_length() - 1, "SAB": SAB.bit_length() - 1}
+"""SR bits that are variables: what rows name, and the two sums that follow."""
 
 
 class Variables:
@@ -39,7 +41,7 @@ class Variables:
         """Current value: "W0".."W15", a flag of `state.FLAGS`, "A0"/"A1" (accumulators), "cycle", "stall", "pc"."""
         self._used.setdefault(name)
         if name not in self._known:
-            bit = name in FLAGS
+            bit = name in BITS
             self._known[name] = self._emitter.let(f"load {'i1' if bit else 'i64'}, ptr %x.{name}", bit)
         return self._known[name]
 
@@ -47,7 +49,7 @@ class Variables:
         """Assign."""
         self._used.setdefault(name)
         self._written.add(name)
-        bit = name in FLAGS
+        bit = name in BITS
         text = truth(value) if bit else wide(value)
         self._emitter.line(f"store {'i1' if bit else 'i64'} {text}, ptr %x.{name}")
         self._known[name] = Value(self._emitter, text, bit)
@@ -62,17 +64,20 @@ class Variables:
         """Assign several flags."""
         for name, value in flags.items():
             self.set(name, value)
+        if any(name in ACCUMULATOR_FLAGS for name in flags):
+            self.set("OAB", self.get("OA") | self.get("OB"))
+            self.set("SAB", self.get("SA") | self.get("SB"))
 
     def prologue(self, emitter: Emitter) -> None:
         """Declare and load everything used; goes into the function's first block, written last."""
         for name in self._used:
-            bit = name in FLAGS
+            bit = name in BITS
             emitter.line(f"%x.{name} = alloca {'i1' if bit else 'i64'}")
-        sr = emitter.load(pointer(emitter, self._offset["SR"]), 16) if any(n in FLAGS for n in self._used) else None
+        sr = emitter.load(pointer(emitter, self._offset["SR"]), 16) if any(n in BITS for n in self._used) else None
         for name in self._used:
-            if name in FLAGS:
+            if name in BITS:
                 assert sr is not None
-                bit_text = truth(sr & (1 << FLAGS[name]))
+                bit_text = truth(sr & (1 << BITS[name]))
                 emitter.line(f"store i1 {bit_text}, ptr %x.{name}")
             elif name[0] == "A":
                 value = accumulator(emitter, self._offset["ACCBL" if name == "A1" else "ACCAL"])
@@ -83,7 +88,7 @@ class Variables:
 
     def write_back(self, emitter: Emitter) -> None:
         """Store everything written to the record; goes into the function's one exit block."""
-        flags = [name for name in FLAGS if name in self._written]
+        flags = [name for name in BITS if name in self._written]
         if flags:
             self._write_sr(emitter, flags)
         for name in sorted(self._written - set(flags)):
@@ -98,16 +103,11 @@ class Variables:
 
     def _write_sr(self, emitter: Emitter, flags: list[str]) -> None:
         place = pointer(emitter, self._offset["SR"])
-        mask = sum(1 << FLAGS[name] for name in flags)
-        derived = any(name in ACCUMULATOR_FLAGS for name in flags)
-        if derived:
-            mask |= OAB | SAB
+        mask = sum(1 << BITS[name] for name in flags)
         word: Number = emitter.load(place, 16) & (0xFFFF & ~mask)
         for name in flags:
             bit = emitter.let(f"load i1, ptr %x.{name}", bit=True)
-            word = word | (bit << FLAGS[name])
-        if derived:
-            word = _with_sums(emitter, word)
+            word = word | (bit << BITS[name])
         emitter.store(place, word, 16)
 
     def _home(self, name: str) -> tuple[int, int]:
