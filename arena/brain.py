@@ -23,6 +23,10 @@ LATENCY_TCY: Final = 258_484
 FIRST_LOOK_TCY: Final = 853_232
 """from power-on to the first such row: both as the `clustering` firmware does it, which reads the region to its end
 (16.4 ms) before it answers. tests/arena/test_emulated.py measures both."""
+OK_AT_TCY: Final = 14_745_600
+"""The remote control's OK, which starts all robots together (experiment.md §4), begins 1 s after the trial does."""
+OK_DECODED_TCY: Final = 354_275
+"""From there until the `clustering` firmware has understood it, 24.0 ms; the bare one needs 345,804."""
 NEVER: Final = 1 << 62
 
 
@@ -72,7 +76,8 @@ class ScriptedBrain:
     """The clustering controller in Python, on the same sensor geometry and frame rate as the firmware's camera.
 
     It looks once per frame, at the pose extrapolated to that cycle; `LATENCY_TCY` later the wheels turn accordingly.
-    Both happen at their own cycle within a quantum. `FIRST_LOOK_TCY` after power-on comes the first look.
+    Both happen at their own cycle within a quantum. `FIRST_LOOK_TCY` after power-on comes the first look; it stands
+    still until the remote control's OK.
     """
 
     def __init__(self, scene: Scene, seed: int, robot: int, controller: str) -> None:
@@ -97,9 +102,10 @@ class ScriptedBrain:
         if self._next_look < end:
             ahead = max(self._next_look - start, 0) / self._quantum
             self._reading.seen = seen = self._look(poses, extrapolated(self._before or pose, pose, ahead))
-            left, right = steps_per_second(self._controller, seen)
-            self._wanted = left * bodies.CM_PER_STEP, right * bodies.CM_PER_STEP
-            self._change_at = self._next_look + LATENCY_TCY
+            if self._next_look + LATENCY_TCY >= OK_AT_TCY + OK_DECODED_TCY:
+                left, right = steps_per_second(self._controller, seen)
+                self._wanted = left * bodies.CM_PER_STEP, right * bodies.CM_PER_STEP
+                self._change_at = self._next_look + LATENCY_TCY
             self._next_look += self._scene.camera.frame_tcy
         self._before = pose
         if self._change_at >= end:

@@ -28,8 +28,8 @@ Report = Callable[[int, float], None]
 """report(trial, seconds simulated)."""
 _queue: Any = None
 
-SELECTOR = {"A": 8, "B": 9}
-"""Position of the robots' switch for a controller: bit 0 chooses B, bit 3 lets the project's own firmware start without
+SELECTOR = {"A": 0, "B": 1}
+"""Position of the robots' switch for a controller: bit 0 chooses B, bit 3 would start the project's own firmware without
 the remote control (firmware/apps/clustering)."""
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import emu
 from arena import bodies
-from arena.brain import Line, Reading, extrapolated, switched_on
+from arena.brain import OK_AT_TCY, Line, Reading, extrapolated, switched_on
 from arena.scene import FCY, Scene
 from arena.vision import COLOURS, Eye
 from arena.world import STREAM_SENSORS, Poses, generator
@@ -25,8 +25,6 @@ from emu.boards.epuck.board import Epuck
 
 WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
-OK_AFTER_S: Final = 1.0
-"""The remote control's OK, which starts the published program, comes this long after power-on."""
 PROBE_TCY: Final = 147_456
 """Mean time between two looks at whether the CPU is idle, at random cycles: 10 ms, 90,000 looks in 15 minutes."""
 LINE_LIMIT: Final = 200
@@ -54,7 +52,7 @@ class EmulatedBrain:
         self._board: Epuck = self.machine.board
         assert self._board.camera is not None
         self._board.camera.sample(self._pixels)
-        self._board.remote.press("ok", cycle=round(OK_AFTER_S * FCY))
+        self._board.remote.press("ok", cycle=OK_AT_TCY - self._on_at)
         self.machine.uart[1].on_byte = self._byte
         self._poses = Poses([], [])
         self._pose = (0.0, 0.0, 0.0)
