@@ -28,13 +28,24 @@ OK_AT_TCY: Final = 14_745_600
 OK_DECODED_TCY: Final = 354_275
 """From there until the `clustering` firmware has understood it, 24.0 ms; the bare one needs 345,804."""
 NEVER: Final = 1 << 62
+STRIP_COLUMNS: Final = range(240, 400)
+STRIP_PIXELS: Final = 20
+"""Recorded strips of the camera's picture: the region the clustering firmware reads, 160 columns of the 640 in 20
+pixels (openswarm-original.md §8)."""
 
 
 class Line(NamedTuple):
-    """A line a robot said by Bluetooth: Tcy since the robot was switched on at its first byte."""
+    """A line a robot said by Bluetooth: Tcy since the trial's start at its first byte."""
 
     cycle: int
     text: str
+
+
+class Lights(NamedTuple):
+    """A robot's LEDs changed: Tcy since the trial's start; bit n: ring LED n, 8 front, 9 body."""
+
+    cycle: int
+    leds: int
 
 
 @dataclass(slots=True)
@@ -47,6 +58,11 @@ class Reading:
     """Share of the CPU's cycles since the last sample that were not idle."""
     leds: int = 0
     """Bit n: ring LED n; 8 front, 9 body."""
+    strip: bytes = b""
+    """Red, green, blue of at most STRIP_PIXELS pixels in STRIP_COLUMNS, left to right, of the last line near the middle
+    of the picture that the firmware read: with noise, before the sensor's gains. Empty if it read none."""
+    infrared: list[int] | None = None
+    """Counts by which the emitters lower the eight infrared sensors; None while the ADC is off."""
     fault: str = ""
     """Why the robot's firmware stopped; empty while it runs."""
 
@@ -62,6 +78,9 @@ class Brain(Protocol):
 
     def lines(self) -> list[Line]:
         """What was said since the last call."""
+
+    def lights(self) -> list[Lights]:
+        """Changes of the LEDs since the last call."""
 
     def close(self) -> None:
         """Give back processes and memory."""
@@ -129,6 +148,10 @@ class ScriptedBrain:
 
     def lines(self) -> list[Line]:
         """A script says nothing."""
+        return []
+
+    def lights(self) -> list[Lights]:
+        """A script has no LEDs."""
         return []
 
     def close(self) -> None:

@@ -29,8 +29,8 @@ Report = Callable[[int, float], None]
 _queue: Any = None
 
 SELECTOR = {"A": 0, "B": 1}
-"""Position of the robots' switch for a controller: bit 0 chooses B, bit 3 would start the project's own firmware without
-the remote control (firmware/apps/clustering)."""
+"""Position of the robots' switch for a controller: bit 0 chooses B; bit 3 would start the project's own firmware
+without the remote control (firmware/apps/clustering)."""
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 import emu
 from arena import bodies
-from arena.brain import OK_AT_TCY, Line, Reading, extrapolated, switched_on
+from arena.brain import OK_AT_TCY, STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, extrapolated, switched_on
 from arena.scene import FCY, Scene
 from arena.vision import COLOURS, Eye
 from arena.world import STREAM_SENSORS, Poses, generator
 from emu.boards.epuck.board import Epuck
+from emu.boards.epuck.simple import LED_PINS
 
 WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
@@ -29,6 +30,10 @@ PROBE_TCY: Final = 147_456
 """Mean time between two looks at whether the CPU is idle, at random cycles: 10 ms, 90,000 looks in 15 minutes."""
 LINE_LIMIT: Final = 200
 """Bytes after which a line without an end is taken as one."""
+LIGHTS_LIMIT: Final = 100
+"""Changes of the LEDs kept per sample: a firmware may dim them by switching fast."""
+_STRIP_ROWS: Final = range(232, 249)
+"""Rows of the whole picture that count as its middle."""
 _NOISE: Final = 1 << 14
 """Values of pixel noise drawn once per robot; each line of pixels starts at a random one."""
 
@@ -60,6 +65,11 @@ class EmulatedBrain:
         self._start = 0
         window = max(round(WINDOW_S / (self._quantum / FCY)), 1)
         self._counts: deque[tuple[int, int]] = deque([(0, 0)], maxlen=window + 1)
+        self._lights: list[Lights] = []
+        self._leds = 0
+        for bit, pin in enumerate(LED_PINS.values()):
+            self.machine.peripherals.pins.watch(pin, partial(self._lit, 1 << bit), lazy=True)
+        self._strip: tuple[NDArray[np.intp], NDArray[np.uint8]] | None = None
         self._said: list[Line] = []
         self._text = bytearray()
         self._text_at = 0
@@ -112,6 +122,8 @@ class EmulatedBrain:
         first = int(self._rng.integers(_NOISE))
         noise = self._noise[first : first + 3 * len(columns)].reshape(-1, 3)
         pixels: NDArray[np.uint8] = np.clip(colours + noise, 0, 255).astype(np.uint8)
+        if y in _STRIP_ROWS:
+            self._strip = columns, pixels
         return pixels
 
     def _byte(self, byte: int, cycle: int) -> None:
@@ -121,25 +133,48 @@ class EmulatedBrain:
             self._text.clear()
         if byte not in b"\r\n":
             if not self._text:
-                self._text_at = cycle
+                self._text_at = self._on_at + cycle
             self._text.append(byte)
+
+    def _lit(self, led: int, cycle: int, changed: int, levels: int) -> None:
+        """Changes in one cycle are one."""
+        self._leds = self._leds | led if levels & changed else self._leds & ~led
+        if self._lights and self._lights[-1].cycle == self._on_at + cycle:
+            self._lights.pop()
+        if len(self._lights) < LIGHTS_LIMIT:
+            self._lights.append(Lights(self._on_at + cycle, self._leds))
 
     # -- what is recorded --------------------------------------------------------------------------------------------
 
     def reading(self) -> Reading:
         """As `Brain.reading`. `load` comes from looking at the CPU at random cycles."""
+        self.machine.peripherals.pins.flush()
         load = self._busy / self._probes if self._probes else 0.0
         self._busy = self._probes = 0
-        leds = sum(1 << bit for bit, lit in enumerate(self._board.leds.states()) if lit)
-        return Reading(-1, load, leds, self._fault)
+        strip = strip_of(*self._strip) if self._strip is not None else b""
+        reflections = self._board.ir.reflection.tolist() if self.machine.peek("ADCON1") & 0x8000 else None
+        return Reading(-1, load, self._leds, strip, reflections, self._fault)
 
     def lines(self) -> list[Line]:
         """As `Brain.lines`."""
         said, self._said = self._said, []
         return said
 
+    def lights(self) -> list[Lights]:
+        """As `Brain.lights`."""
+        changed, self._lights = self._lights, []
+        return changed
+
     def close(self) -> None:
         """Memory goes with the object."""
+
+
+def strip_of(columns: NDArray[np.intp], pixels: NDArray[np.uint8]) -> bytes:
+    """At most STRIP_PIXELS of the pixels of a line that lie in the middle of the picture, left to right."""
+    middle = np.flatnonzero((columns >= STRIP_COLUMNS.start) & (columns < STRIP_COLUMNS.stop))
+    order = middle[np.argsort(columns[middle], kind="stable")]
+    count = min(len(order), STRIP_PIXELS)
+    return pixels[order[np.arange(count) * len(order) // max(count, 1)]].tobytes()
 
 
 def infrared(scene: Scene, poses: Poses, robot: int) -> list[float]:

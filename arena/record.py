@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from arena.trial import Rows
 
 LOG: Final = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("text", pa.string())]))
+LIGHTS: Final = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("leds", pa.int16())]))
 MANIFEST: Final = "manifest.json"
 
 
@@ -62,8 +63,7 @@ def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
     """Write a trial. Raises RecordError, for example on a full disk; then no file is left."""
     arrays = {}
     for name, values in rows.columns.items():
-        kind = LOG if name == "log" else pa.int16() if name.endswith(("_seen", "_leds")) else pa.float64()
-        arrays[name] = pa.array(values, kind)
+        arrays[name] = pa.array(values, kind_of(name))
     table = pa.table(arrays).replace_schema_metadata({"arena": json.dumps(about, sort_keys=True)})
     part = path.with_name(path.name + ".part")
     try:
@@ -75,6 +75,13 @@ def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
         raise RecordError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
+def kind_of(column: str) -> pa.DataType:
+    """Type of a column: numbers by sample, but what robots said and showed as lists of events."""
+    kinds = {"log": LOG, "lights": LIGHTS, "seen": pa.int16(), "leds": pa.int16(), "strip": pa.binary(),
+             "infrared": pa.list_(pa.int16())}  # fmt: skip
+    return kinds.get(column.rsplit("_", 1)[-1], pa.float64())
+
+
 def read_trial(path: Path) -> Trial:
     """Read a trial. Raises RecordError for what is none."""
     try:
@@ -82,9 +89,14 @@ def read_trial(path: Path) -> Trial:
         about = json.loads((table.schema.metadata or {})[b"arena"])
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise RecordError(f"{path}: is no recorded trial: {error}") from None
-    names = table.column_names
-    columns = {name: table[name].to_pylist() if name == "log" else table[name].to_numpy() for name in names}
+    columns = {name: _values(table[name]) for name in table.column_names}
     return Trial(path, columns, about)
+
+
+def _values(column: Any) -> Any:
+    """Numbers as an array, anything else as a list."""
+    plain = pa.types.is_integer(column.type) or pa.types.is_floating(column.type)
+    return column.to_numpy() if plain else column.to_pylist()
 
 
 def trials_in(folder: Path) -> list[Trial]:

@@ -84,7 +84,7 @@ class _Recorder:
         row: dict[str, Any] = {"t": round(world.seconds, 6)}
         for index, (x, y) in enumerate(world.poses.objects):
             row[f"o{index}_x"], row[f"o{index}_y"] = round(x, 4), round(y, 4)
-        said = []
+        said, lit = [], []
         for index, ((x, y, heading), (left, right), brain) in enumerate(
             zip(world.poses.robots, wheels, self._brains, strict=True)
         ):
@@ -95,8 +95,11 @@ class _Recorder:
             row[f"r{index}_seen"] = reading.seen
             row[f"r{index}_load"] = round(reading.load, 4)
             row[f"r{index}_leds"] = reading.leds
+            row[f"r{index}_strip"] = reading.strip
+            row[f"r{index}_infrared"] = reading.infrared
             if reading.fault and index not in {robot for robot, _, _ in self.faults}:
                 self.faults.append((index, world.seconds, reading.fault))
             said += [{"robot": index, "cycle": line.cycle, "text": line.text} for line in brain.lines()]
-        row["log"] = said
+            lit += [{"robot": index, "cycle": change.cycle, "leds": change.leds} for change in brain.lights()]
+        row["log"], row["lights"] = said, lit
         self.rows.add(row)

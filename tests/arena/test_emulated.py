@@ -39,6 +39,11 @@ def test_a_robot_turns_as_its_controller_says_for_what_its_camera_sees(
         wheels = [brain.think(tick, poses) for tick in range(400)]
         mean = np.mean(wheels[-200:], axis=0)
         assert mean * 10 / 0.128 * 0.129 == pytest.approx(speeds, rel=0.03)
+        strip = np.frombuffer(brain.reading().strip, np.uint8).reshape(20, 3).astype(int)
+        red = strip[:, 0] - strip[:, 1] > 40
+        half = math.asin(5 / (240 - 200 - 3.3)) if place == (240.0, 150.0) else 0.0
+        assert red.sum() == pytest.approx(2 * 602 * math.tan(half) / 8, abs=1)
+        assert red.tolist() == sorted(red.tolist()[:10]) + sorted(red.tolist()[10:], reverse=True)
 
 
 def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering_image: Path, alone: Scene) -> None:
@@ -85,7 +90,7 @@ def test_the_remote_controls_ok_starts_all_robots_together(clustering_image: Pat
 
 
 def test_twins_start_alike(clustering_image: Path) -> None:
-    """Issue "Must show" 2: scripted and emulated robots of one seed within 5 mm 2 s after the OK and 30 mm after 5 s."""
+    """Issue "Must show" 2: scripted and emulated robots of one seed within 5 mm 2 s after OK and 30 mm after 5 s."""
     scene = load_scene("clustering")
     paths = []
     for scripted in (False, True):
@@ -132,6 +137,12 @@ def test_a_robot_whose_firmware_traps_stops_and_the_trial_goes_on(
     lines = [(line["robot"], line["text"]) for row in trial.columns["log"] for line in row]
     assert sorted(lines) == [(0, "hi"), (1, "hi")]
     assert trial.columns["r0_leds"][1] == 1
+    lit, dark = (change for row in trial.columns["lights"] for change in row if change["robot"] == 0)
+    assert (lit["leds"], dark["leds"]) == (1, 0)  # the trap resets the chip
+    assert 0 < lit["cycle"] - switched_on(1, 0) < 10_000
+    assert dark["cycle"] - lit["cycle"] == pytest.approx(FCY, abs=1000)
+    assert trial.columns["r0_strip"][1] == b""
+    assert trial.columns["r0_infrared"][1] is None
     assert trial.columns["r0_load"][1] > 0.9
     error = " ".join(capsys.readouterr().err.split())
     assert "robot 0 stopped" in error
