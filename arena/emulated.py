@@ -119,6 +119,9 @@ class EmulatedBrain:
         pose = extrapolated(self._before, self._pose, (cycle - self._start) / self._quantum)
         eye = Eye(self._scene, self._poses, self._robot, pose)
         colours = COLOURS[eye.classes(y, columns)].astype(np.int16)
+        if self._scene.camera.vignetting:
+            bright = eye.lens.vignetting(y, columns, self._scene.camera.vignetting)
+            colours = np.rint(colours * bright[:, None]).astype(np.int16)
         first = int(self._rng.integers(_NOISE))
         noise = self._noise[first : first + 3 * len(columns)].reshape(-1, 3)
         pixels: NDArray[np.uint8] = np.clip(colours + noise, 0, 255).astype(np.uint8)

@@ -62,11 +62,16 @@ class Objects:
 
 @dataclass(frozen=True, slots=True)
 class CameraSetting:
-    """The sensor in front. `false_*` are chances per frame and hold for scripted brains only."""
+    """The sensor in front; how it is mounted and its lens are explained in `lens.py`. `false_*` are chances per frame
+    and hold for scripted brains only."""
 
     sensor: str = "PO6030K"
     frame_tcy: int = 1_600_000
     range_cm: float = 150.0
+    pitch_deg: float = 0.0
+    mirrored: bool = False
+    distortion: float = 0.0
+    vignetting: float = 0.0
     pixel_noise: float = 3.0
     false_negative: float = 0.0
     false_positive: float = 0.0
@@ -196,6 +201,9 @@ def _checked(scene: Scene, path: str) -> Scene:
         "objects.floor_friction": (scene.objects.floor_friction, 0, 10),
         "camera.frame_tcy": (scene.camera.frame_tcy, 100_000, 100_000_000),
         "camera.range_cm": (scene.camera.range_cm, 1, math.inf),
+        "camera.pitch_deg": (scene.camera.pitch_deg, -20, 20),
+        "camera.distortion": (scene.camera.distortion, -1, 1),
+        "camera.vignetting": (scene.camera.vignetting, 0, 1),
         "camera.pixel_noise": (scene.camera.pixel_noise, 0, 255),
         "camera.false_negative": (scene.camera.false_negative, 0, 1),
         "camera.false_positive": (scene.camera.false_positive, 0, 1),

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena import bodies
+from arena.lens import lens_of
 from arena.scene import Scene
 from arena.world import Poses
 
@@ -44,6 +45,7 @@ class Eye:
         self._y = y + bodies.CAMERA_AHEAD * self._sin
         self._width, self._height = scene.arena.width_cm, scene.arena.height_cm
         self._range = scene.camera.range_cm
+        self.lens = lens_of(scene.camera)
         self.discs: Final[list[Disc]] = []
         self._collect(poses.objects, scene.objects.radius_cm, bodies.OBJECT_HEIGHT, OBJECT)
         others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
@@ -54,12 +56,13 @@ class Eye:
         """Keep what the picture's widest ray can touch within range."""
         cos, sin, own_x, own_y = self._cos, self._sin, self._x, self._y
         limit = self._range + radius
+        widest = self.lens.widest
         for x, y in places:
             dx, dy = x - own_x, y - own_y
             ahead = dx * cos + dy * sin
             if -radius < ahead < limit:
                 left = dy * cos - dx * sin
-                if abs(left) - 1.2 * radius < 0.54 * (ahead + radius):  # tan 28 deg, and the ray's slope to the rim
+                if abs(left) - 1.2 * radius < widest * (ahead + radius):  # 1.2: the ray's slope to the rim
                     self.discs.append((ahead, left, radius, height, kind))
 
     def hits(self, slope: float, discs: list[Disc] | None = None) -> list[tuple[float, float, int]]:
@@ -89,12 +92,13 @@ class Eye:
 
     def column(self, u: float, rows: tuple[int, ...], discs: list[Disc] | None = None) -> list[int]:
         """Classes of the pixels of one column in some rows."""
-        slope = slope_of(u)
-        hits = self.hits(slope, discs)
-        wall = -1.0
+        slope, wall = math.nan, -1.0
+        hits: list[tuple[float, float, int]] = []
         seen = []
-        for v in rows:
-            rise = (bodies.CENTRE_Y - v) / bodies.FOCAL_PIXELS
+        for ray, rise in self.lens.column(u, rows):
+            if ray != slope:
+                slope, wall = ray, -1.0
+                hits = self.hits(slope, discs)
             for depth, height, kind in hits:
                 z = bodies.CAMERA_HEIGHT + rise * depth
                 if z < 0:
@@ -110,9 +114,8 @@ class Eye:
                 seen.append(FLOOR if z < 0 else WALL if z <= bodies.WALL_HEIGHT else ABOVE)
         return seen
 
-    def within(self, u_low: float, u_high: float) -> list[Disc]:
-        """The discs that rays through columns u_low..u_high can meet: a quick, generous choice."""
-        right, left = slope_of(u_high), slope_of(u_low)
+    def within(self, right: float, left: float) -> list[Disc]:
+        """The discs that rays with slopes right..left can meet: a quick, generous choice."""
         return [
             disc
             for disc in self.discs
@@ -121,14 +124,13 @@ class Eye:
 
     def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp]:
         """Classes of the pixels of one row in some columns."""
-        slopes: NDArray[np.float64] = (bodies.CENTRE_X - columns.astype(np.float64)) / bodies.FOCAL_PIXELS
-        rise = (bodies.CENTRE_Y - v) / bodies.FOCAL_PIXELS
+        slopes, rise = self.lens.line(v, columns)
         a = 1 + slopes * slopes
         nearest = self._wall_depths(slopes)
         z = bodies.CAMERA_HEIGHT + rise * nearest
         seen = np.where(z < 0, FLOOR, np.where(z <= bodies.WALL_HEIGHT, WALL, ABOVE))
         blocked = np.full(len(slopes), math.inf)
-        for ahead, left, radius, height, kind in self.within(float(columns.min()), float(columns.max())):
+        for ahead, left, radius, height, kind in self.within(float(slopes.min()), float(slopes.max())):
             b = ahead + slopes * left
             root = b * b - a * (ahead * ahead + left * left - radius * radius)
             meets = (root > 0) & (b > 0)
@@ -150,14 +152,10 @@ class Eye:
         return np.maximum(np.minimum(to_x, to_y), _NEAREST)
 
 
-def slope_of(u: float) -> float:
-    """Left per ahead of the ray through column u (epuck.md §7.6)."""
-    return (bodies.CENTRE_X - u) / bodies.FOCAL_PIXELS
-
-
 # -- the sensor of the clustering firmware (openswarm-original.md §8, revision A) ------------------------------------
 
 WINDOW_COLUMNS: Final = tuple(240 + 8 * x for x in (6, 9, 12, 15))
+WINDOW_EDGES: Final = (WINDOW_COLUMNS[0], WINDOW_COLUMNS[-1])
 WINDOW_ROWS: Final = tuple(160 + 8 * y for y in (4, 6, 8, 10, 12, 14))
 """Its 24 pixels in the whole picture: every 8th pixel of the 160 x 160 in the middle."""
 VOTES: Final = 2
@@ -165,7 +163,8 @@ VOTES: Final = 2
 
 def sensor_of(eye: Eye) -> int:
     """OBJECT, ROBOT or NOTHING by the votes of 24 pixels with perfect colours."""
-    discs = eye.within(WINDOW_COLUMNS[0], WINDOW_COLUMNS[-1])
+    edges = [ray for u in WINDOW_EDGES for ray, _ in eye.lens.column(u, WINDOW_ROWS)]
+    discs = eye.within(min(edges), max(edges))
     if not discs:
         return NOTHING
     red = green = 0

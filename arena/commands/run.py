@@ -55,8 +55,10 @@ def changed(scene: Scene, settings: list[str], robots: int | None = None, object
     return scene.with_values(**values)
 
 
-def parsed(text: str) -> int | float | str:
-    """A number if it is one."""
+def parsed(text: str) -> bool | int | float | str:
+    """A number or a truth value if it is one."""
+    if text in ("true", "false"):
+        return text == "true"
     for kind in (int, float):
         try:
             return kind(text) if text != "inf" else text

@@ -8,6 +8,7 @@ import pytest
 
 from arena import bodies
 from arena.emulated import infrared
+from arena.lens import Lens
 from arena.scene import Scene, load_scene
 from arena.vision import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL, Eye, sensor_of
 from arena.world import Poses, World
@@ -45,6 +46,44 @@ def test_columns_show_bearings_by_the_pinhole_formula(scene: Scene) -> None:
         WALL, OBJECT, OBJECT, WALL]  # fmt: skip
 
 
+def test_a_pitched_camera_sees_everything_lower_by_its_angle(scene: Scene) -> None:
+    """epuck.md §7.6: up to 3 degrees of mounting error; on the axis a degree is 602 tan 1 deg = 10.5 rows."""
+    plain, pitched = (Eye(scene.with_values(camera__pitch_deg=a), one_object(100.0), 0) for a in (0.0, 1.0))
+    rows = tuple(range(180, 280))
+    first = [eye.column(320, rows).index(OBJECT) for eye in (plain, pitched)]
+    assert first[1] - first[0] == pytest.approx(602 * math.tan(math.pi / 180), abs=1)
+
+
+def test_a_mirrored_camera_sees_left_as_right_and_up_as_down(scene: Scene) -> None:
+    """experiment.md §5: the mirror is part of the sensitivity table."""
+    poses = one_object(60.0, bearing=0.2)
+    plain, mirrored = (Eye(scene.with_values(camera__mirrored=one), poses, 0) for one in (False, True))
+    for u in range(0, 640, 40):
+        for v in range(160, 320, 16):
+            assert plain.column(u, (v,)) == mirrored.column(639 - u, (479 - v,))
+    assert OBJECT in plain.column(200, (240,))
+
+
+def test_a_barrel_shows_the_same_angle_nearer_to_the_axis(scene: Scene) -> None:
+    """lens.py: what is at r (1 + k r^2) appears at r."""
+    bearing = 0.3
+    eye = Eye(scene.with_values(camera__distortion=0.2), one_object(95.0, bearing), 0)
+    columns = [u for u in range(640) if eye.column(u, (240,))[0] == OBJECT]
+    half = math.asin(bodies.OBJECT_RADIUS / 100.0)
+    for u, angle in ((columns[0], bearing + half), (columns[-1], bearing - half)):
+        r = (320 - u) / 602
+        assert r * (1 + 0.2 * r * r) == pytest.approx(math.tan(angle), abs=1.5 / 602)
+
+
+def test_corners_are_darker_by_the_share_asked_for(scene: Scene) -> None:
+    """epuck.md §7.6: up to 30 % in the corners, nothing on the axis."""
+    bright = Lens().vignetting(240, np.array([320, 0]), 0.3)
+    corner = Lens().vignetting(0, np.array([0]), 0.3)
+    assert bright[0] == 1.0
+    assert bright[1] == pytest.approx(1 - 0.3 * 0.64)
+    assert corner[0] == pytest.approx(0.7, abs=1e-9)
+
+
 def test_what_is_near_hides_what_is_far_but_not_what_is_taller(scene: Scene) -> None:
     """A robot of 55 mm before an object of 100 mm: the object shows above it, the room above the wall."""
     poses = Poses([ROBOT_AT, (LENS_X + 50, 150, 0.0)], [(LENS_X + 80, 150)])
@@ -52,9 +91,18 @@ def test_what_is_near_hides_what_is_far_but_not_what_is_taller(scene: Scene) -> 
     assert Eye(scene, poses, 0).column(320, rows) == [ABOVE, OBJECT, OBJECT, ROBOT, ROBOT, FLOOR]
 
 
-def test_a_row_at_once_is_the_same_as_column_by_column() -> None:
-    """Two ways to the same answer."""
-    scene = load_scene("clustering")
+LENSES = [
+    {},
+    {"camera__mirrored": True},
+    {"camera__pitch_deg": 2.0, "camera__distortion": 0.1},
+    {"camera__pitch_deg": -3.0, "camera__mirrored": True},
+]
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_a_row_at_once_is_the_same_as_column_by_column(lens: dict[str, object]) -> None:
+    """Two ways to the same answer, for every lens."""
+    scene = load_scene("clustering").with_values(**lens)
     world = World(scene, 2)
     columns = np.arange(0, 640, 7)
     kinds = set()
