@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from emu.boards.epuck.analog import RESPONSE
+from emu.boards.epuck.analog import RESPONSE, reflection_at
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.pixels import decode
 from emu.loader import load_image
@@ -280,20 +280,22 @@ def test_the_self_test_finds_every_device(image: Build) -> None:
 
 
 def test_distance_follows_the_reference_curve(image: Build) -> None:
-    """Issue 6, Must show 4; epuck.md §5, column OpenSwarm: 0-10 cm through emitter, converter and driver. Noise is 3 %
-    of the reflection or 5 counts, which is 10 mm where the curve is flat."""
+    """Issue 6, Must show 4; epuck.md §5, column OpenSwarm, log-linear between its points: every millimetre of 0-10 cm
+    through emitter, converter and driver, within 1 count (the converter rounds dark and lit) and 1 mm."""
     machine = robot(image("selftest"))
     machine.run(cycles=FCY // 10)
     reflection, distance = machine.address_of("reflection"), machine.address_of("millimetres")
-    for mm, counts in RESPONSE:
+    for first in range(0, 104, 8):  # eight distances at a time, one per sensor
         for sensor in range(8):
-            machine.board.ir.set_distance(sensor, mm)
-        machine.run(cycles=FCY // 20)
+            machine.board.ir.set_distance(sensor, first + sensor)
+        machine.run(cycles=FCY // 30)
         for sensor in range(8):
-            seen = machine.peek(reflection + 2 * sensor)
-            assert seen == pytest.approx(counts, abs=max(40, 0.2 * counts)), (mm, sensor)
+            mm = first + sensor
+            assert machine.peek(reflection + 2 * sensor) == pytest.approx(reflection_at(mm), abs=1), (mm, sensor)
             found = machine.record.bytes[distance + sensor]
-            assert (found == 255 and mm >= 90) or abs(found - mm) <= 5 + mm / 4, (mm, sensor, found)
+            assert abs(found - mm) <= 1 or (found == 255 and mm >= 100), (mm, sensor, found)
+    for mm, counts in RESPONSE:
+        assert reflection_at(mm) == pytest.approx(counts)
 
 
 def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
@@ -306,7 +308,7 @@ def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
             machine.board.ir.set_ambient(sensor, ambient)
         machine.run(cycles=FCY // 10)
         at = machine.address_of("reflection")
-        assert all(abs(machine.peek(at + 2 * sensor) - 857) < 150 for sensor in range(8)), ambient
+        assert all(abs(machine.peek(at + 2 * sensor) - 857) <= 1 for sensor in range(8)), ambient
 
 
 # -- engines --

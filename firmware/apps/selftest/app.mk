@@ -1,3 +1,3 @@
-DEVICES := camera i2c remote analog
+DEVICES := camera i2c remote analog led bluetooth
 # snprintf needs about 110 bytes of a thread's stack, the interrupts another 62.
 override DEFINES += -DSYS_DEFAULT_STACK=384

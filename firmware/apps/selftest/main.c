@@ -1,7 +1,9 @@
 /* Asks every device and reports on UART1. README.md. */
 #include <analog.h>
+#include <bluetooth.h>
 #include <camera.h>
 #include <i2c.h>
+#include <led.h>
 #include <openswarm.h>
 #include <openswarm_io.h>
 #include <remote.h>
@@ -54,10 +56,13 @@ static void report_i2c(void)
 
 static void light_leds(void)
 {
-    for (uint8 led = 0; led < SYS_LEDS; led++) {
-        Sys_Set_LED(led, true);
+    sys_led_order order;
+    for (order.led = 0; order.led < SYS_LEDS; order.led++) {
+        order.action = SYS_LED_ON;
+        Sys_Send_Event(SYS_IO_LED, &order, sizeof order);
         Sys_Sleep(LED_MS);
-        Sys_Set_LED(led, false);
+        order.action = SYS_LED_OFF;
+        Sys_Send_Event(SYS_IO_LED, &order, sizeof order);
     }
     say("leds done\r\n");
 }
@@ -70,6 +75,16 @@ static void turn_wheels(void)
     Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, 0);
     Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, 0);
     say("motors done\r\n");
+}
+
+/* Asked over Bluetooth, beside the commands of its driver: N proximity, A accelerometer and microphones. */
+static void answer(const char *line)
+{
+    if (line[0] == 'N') {
+        report_proximity();
+    } else if (line[0] == 'A') {
+        report_rest();
+    }
 }
 
 static void test(void)
@@ -85,6 +100,12 @@ static void test(void)
     light_leds();
     turn_wheels();
     say("end\r\n");
+    for (;;) {
+        sys_event_data *asked = Sys_Wait_for_Event(SYS_BLUETOOTH_RECEIVED);
+        if (asked != NULL) {
+            answer(asked->payload);
+        }
+    }
 }
 
 static bool tell(uint16 pid, uint16 event, sys_event_data *data)
@@ -97,7 +118,6 @@ static bool tell(uint16 pid, uint16 event, sys_event_data *data)
         last = data->value;
         const char *name = colours[last & 7u];
         Sys_Write_UART1(name, (uint16)strlen(name));
-        Sys_Write_UART1("\r\n", 2);
     }
     return true;
 }
@@ -118,6 +138,8 @@ int main(void)
     Sys_Start_Remote();
     Sys_Start_I2C();
     Sys_Start_Analog();
+    Sys_Start_LEDs();
+    Sys_Start_Bluetooth();
     Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, tell, NULL);
     Sys_Subscribe_to_Event(SYS_IO_REMOTECONTROL, 0, tell_key, NULL);
     Sys_Start_Process(test);

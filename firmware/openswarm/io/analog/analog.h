@@ -1,13 +1,17 @@
-/* Everything behind the analog converter: proximity, accelerometer, microphones. */
+/* Everything behind the analog converter: proximity, accelerometer, microphones. Each has a pre-processor between what the
+ * converter measured and the event, to be exchanged at run time; NULL restores the default. */
 #ifndef ANALOG_H
 #define ANALOG_H
 
 #include "openswarm.h"
 
 enum {
-    SYS_IO_PROXIMITY = 0x11, /* [uint8 mm of sensors 0-7, SYS_OUT_OF_RANGE = nothing near], every 50 ms */
+    SYS_IO_PROXIMITY = 0x11,    /* [uint8 mm of sensors 0-7, SYS_OUT_OF_RANGE = nothing near], every 50 ms */
+    SYS_IO_ACCELERATION = 0x12, /* [sys_acceleration], every 50 ms */
+    SYS_IO_SOUND = 0x13,        /* [uint16 loudness of microphones 0-2], every 50 ms */
     SYS_PROXIMITY_SENSORS = 8,
     SYS_MICROPHONES = 3,
+    SYS_ANALOG_SCANS = 64, /* in 50 ms */
     SYS_OUT_OF_RANGE = 0xFF
 };
 
@@ -18,13 +22,24 @@ typedef struct {
 /* Turns a reflection, ambient light already taken off, into mm 0-100 or SYS_OUT_OF_RANGE. ISR context. */
 typedef uint8 (*sys_proximity_processor)(uint8 sensor, uint16 reflection);
 uint8 Sys_Default_ProximityProcessor(uint8 sensor, uint16 reflection);
-sys_proximity_processor Sys_Set_ProximityProcessor(sys_proximity_processor processor); /* MTHI; NULL: default */
+sys_proximity_processor Sys_Set_ProximityProcessor(sys_proximity_processor processor); /* MTHI */
+
+/* Sees the mean of SYS_ANALOG_SCANS measurements; may change it; true: it becomes the payload of SYS_IO_ACCELERATION. ISR
+ * context. The default passes every one on. */
+typedef bool (*sys_acceleration_processor)(sys_acceleration *mean);
+sys_acceleration_processor Sys_Set_AccelerationProcessor(sys_acceleration_processor processor); /* MTHI */
+
+/* Sees each sample of a microphone, around 0, and the value of that microphone in the next event so far, 0 to begin with;
+ * returns the new one. ISR context, 3,840 times a second. */
+typedef uint16 (*sys_sound_processor)(uint8 microphone, sint16 sample, uint16 so_far);
+uint16 Sys_Default_SoundProcessor(uint8 microphone, sint16 sample, uint16 so_far); /* the largest amplitude */
+sys_sound_processor Sys_Set_SoundProcessor(sys_sound_processor processor);         /* MTHI */
 
 /* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_Analog(void);
 
 /* MTHI | no | 10 | 4.  sensor 0-7. Counts of the 12-bit converter; the two of a pair are measured every 6.25 ms. */
-uint16 Sys_Get_Reflection(uint8 sensor); /* larger is nearer */
+uint16 Sys_Get_Reflection(uint8 sensor);   /* larger is nearer */
 uint16 Sys_Get_AmbientLight(uint8 sensor); /* smaller is brighter */
 sys_acceleration Sys_Get_Acceleration(void);
 sint16 Sys_Get_Sound(uint8 microphone); /* 0-2: right, left, back; around 0; 1,280 values/s */

@@ -1,0 +1,26 @@
+/* LEDs by event: SYS_IO_LED. Sys_Set_LED and Sys_Toggle_LED (openswarm_io.h) stay the direct way. */
+#ifndef LED_H
+#define LED_H
+
+#include "openswarm.h"
+
+enum {
+    SYS_IO_LED = 0x14, /* [sys_led_order] request, by anyone */
+    SYS_LED_ALL = 0xFF /* as number: all ten */
+};
+
+typedef enum { SYS_LED_OFF, SYS_LED_ON, SYS_LED_TOGGLE } sys_led_action;
+
+typedef struct {
+    uint8 led;    /* as in openswarm_io.h, or SYS_LED_ALL */
+    uint8 action; /* a sys_led_action */
+} sys_led_order;
+
+/* Sees an order before it is carried out; may change it; false: dropped. Handler context. */
+typedef bool (*sys_led_processor)(sys_led_order *order);
+sys_led_processor Sys_Set_LEDProcessor(sys_led_processor processor); /* MTH; NULL: orders as they are */
+
+/* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
+bool Sys_Start_LEDs(void);
+
+#endif
