@@ -62,7 +62,7 @@ class Reading:
     """Red, green, blue of at most STRIP_PIXELS pixels in STRIP_COLUMNS, left to right, of the last line near the middle
     of the picture that the firmware read: with noise, before the sensor's gains. Empty if it read none."""
     infrared: list[int] | None = None
-    """Counts by which the emitters lower the eight infrared sensors; None while the ADC is off."""
+    """Counts by which the own emitters lower the eight infrared sensors; None if the firmware never converted one."""
     fault: str = ""
     """Why the robot's firmware stopped; empty while it runs."""
 

@@ -78,9 +78,11 @@ def make_brains(plan: Plan, seed: int) -> list[Brain]:
     if plan.image is None:
         return [ScriptedBrain(plan.scene, seed, robot, plan.controller) for robot in robots]
     from arena.emulated import EmulatedBrain  # the emulator is loaded by those who need it
+    from arena.infrared import Ether
 
     selector = SELECTOR[plan.controller]
-    return [EmulatedBrain(plan.scene, seed, robot, plan.image, selector) for robot in robots]
+    ether = Ether(plan.scene.robots.count, plan.scene.clock.quantum_tcy)
+    return [EmulatedBrain(plan.scene, seed, robot, plan.image, selector, ether) for robot in robots]
 
 
 def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None) -> Done:

@@ -6,7 +6,6 @@ UART1 (Bluetooth). Poses are extrapolated within the quantum to the cycle in whi
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from functools import partial
 from pathlib import Path
@@ -18,11 +17,12 @@ from numpy.typing import NDArray
 import emu
 from arena import bodies
 from arena.brain import OK_AT_TCY, STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, extrapolated, switched_on
-from arena.scene import FCY, Scene
+from arena.infrared import Ether, Ring
+from arena.scene import FCY, BatterySetting, Scene
 from arena.vision import COLOURS, Eye
 from arena.world import STREAM_SENSORS, Poses, generator
 from emu.boards.epuck.board import Epuck
-from emu.boards.epuck.simple import LED_PINS
+from emu.boards.epuck.simple import LED_PINS, Battery
 
 WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
@@ -32,6 +32,8 @@ LINE_LIMIT: Final = 200
 """Bytes after which a line without an end is taken as one."""
 LIGHTS_LIMIT: Final = 100
 """Changes of the LEDs kept per sample: a firmware may dim them by switching fast."""
+FULL_VOLTS: Final = 4.2
+"""epuck.md §6."""
 _STRIP_ROWS: Final = range(232, 249)
 """Rows of the whole picture that count as its middle."""
 _NOISE: Final = 1 << 14
@@ -39,12 +41,15 @@ _NOISE: Final = 1 << 14
 
 
 class EmulatedBrain:
-    """A machine with `image` (ELF or HEX), switched on at its own moment; `selector` is the switch's position.
+    """A machine with `image` (ELF or HEX), switched on at its own moment; `selector` is the switch's position, `ether`
+    what the robots of a trial share to see each other's infrared emitters.
 
     Raises emu.LoadError for an unusable image.
     """
 
-    def __init__(self, scene: Scene, seed: int, robot: int, image: str | Path, selector: int = 0) -> None:
+    def __init__(
+        self, scene: Scene, seed: int, robot: int, image: str | Path, selector: int = 0, ether: Ether | None = None
+    ) -> None:
         self._scene = scene
         self._robot = robot
         self._quantum = scene.clock.quantum_tcy
@@ -59,6 +64,8 @@ class EmulatedBrain:
         self._board.camera.sample(self._pixels)
         self._board.remote.press("ok", cycle=OK_AT_TCY - self._on_at)
         self.machine.uart[1].on_byte = self._byte
+        ether = ether or Ether(scene.robots.count, self._quantum)
+        self._ring = Ring(scene, self._board, ether, robot, self._on_at)
         self._poses = Poses([], [])
         self._pose = (0.0, 0.0, 0.0)
         self._before = self._pose
@@ -102,9 +109,7 @@ class EmulatedBrain:
         self._before = self._pose if self._poses.robots else pose
         self._poses, self._pose = poses, pose
         self._start = tick * self._quantum - self._on_at
-        if self.machine.peek("ADCON1") & 0x8000:
-            self._board.inputs.distance[:] = infrared(self._scene, poses, self._robot)
-            self._board.inputs.apply()
+        self._ring.move(poses)
 
     def _speeds(self) -> tuple[float, float]:
         motors = self._board.motors
@@ -152,11 +157,11 @@ class EmulatedBrain:
     def reading(self) -> Reading:
         """As `Brain.reading`. `load` comes from looking at the CPU at random cycles."""
         self.machine.peripherals.pins.flush()
+        self._board.battery.volts = volts_after(self._scene.battery, self.machine.cycle / FCY)
         load = self._busy / self._probes if self._probes else 0.0
         self._busy = self._probes = 0
         strip = strip_of(*self._strip) if self._strip is not None else b""
-        reflections = self._board.ir.reflection.tolist() if self.machine.peek("ADCON1") & 0x8000 else None
-        return Reading(-1, load, self._leds, strip, reflections, self._fault)
+        return Reading(-1, load, self._leds, strip, self._ring.readings, self._fault)
 
     def lines(self) -> list[Line]:
         """As `Brain.lines`."""
@@ -172,41 +177,14 @@ class EmulatedBrain:
         """Memory goes with the object."""
 
 
+def volts_after(battery: BatterySetting, seconds: float) -> float:
+    """Voltage after so long, never under 3.0 V, where the robot's own protection would end it."""
+    return max(battery.volts - (FULL_VOLTS - Battery.LOW_VOLTS) * seconds / 3600 / battery.hours, 3.0)
+
+
 def strip_of(columns: NDArray[np.intp], pixels: NDArray[np.uint8]) -> bytes:
     """At most STRIP_PIXELS of the pixels of a line that lie in the middle of the picture, left to right."""
     middle = np.flatnonzero((columns >= STRIP_COLUMNS.start) & (columns < STRIP_COLUMNS.stop))
     order = middle[np.argsort(columns[middle], kind="stable")]
     count = min(len(order), STRIP_PIXELS)
     return pixels[order[np.arange(count) * len(order) // max(count, 1)]].tobytes()
-
-
-def infrared(scene: Scene, poses: Poses, robot: int) -> list[float]:
-    """mm from each infrared sensor to what its axis meets: wall, object or robot; inf beyond the sensors' range.
-
-    One ray per sensor from the body's edge; reflectivity and angle of the surface are left at a white wall's.
-    """
-    x, y, heading = poses.robots[robot]
-    discs = [(ox - x, oy - y, scene.objects.radius_cm) for ox, oy in poses.objects]
-    discs += [(one[0] - x, one[1] - y, bodies.ROBOT_RADIUS) for i, one in enumerate(poses.robots) if i != robot]
-    reach = bodies.ROBOT_RADIUS + bodies.IR_RANGE
-    near = [(dx, dy, r) for dx, dy, r in discs if dx * dx + dy * dy < (reach + r) ** 2]
-    found = []
-    for bearing in bodies.IR_BEARINGS_DEG:
-        angle = heading - math.radians(bearing)
-        east, north = math.cos(angle), math.sin(angle)
-        distance = min(_to_wall(x, east, scene.arena.width_cm), _to_wall(y, north, scene.arena.height_cm))
-        for dx, dy, r in near:
-            along = dx * east + dy * north
-            root = r * r - (dx * dx + dy * dy - along * along)
-            if root > 0 and along > 0:
-                distance = min(distance, along - math.sqrt(root))
-        gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
-        found.append(10 * gap if gap <= bodies.IR_RANGE else math.inf)
-    return found
-
-
-def _to_wall(at: float, direction: float, size: float) -> float:
-    """Along a ray to the walls at 0 and `size` of one axis."""
-    if direction == 0:
-        return math.inf
-    return ((size if direction > 0 else 0.0) - at) / direction

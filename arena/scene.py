@@ -78,6 +78,34 @@ class CameraSetting:
 
 
 @dataclass(frozen=True, slots=True)
+class InfraredSetting:
+    """Reflection of surfaces as a share of white paper's. UNVERIFIED but for white walls; black is 0.1 to 0.3."""
+
+    wall_share: float = 1.0
+    object_share: float = 0.8
+    robot_share: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """Raw counts of the infrared sensors in the dark of the room (falling with light), and what a lamp takes off at 1 m
+    from a sensor that faces it; 0 = no lamp."""
+
+    ambient_counts: int = 3800
+    lamp_x_cm: float = 0.0
+    lamp_y_cm: float = 0.0
+    lamp_counts: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BatterySetting:
+    """Voltage at the trial's start, and hours until it has fallen in a line from full (4.2 V) to low (3.4 V)."""
+
+    volts: float = 4.0
+    hours: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
 class Clock:
     """Lock-step of world and brains, another one when all brains are scripted, and how often rows are written."""
 
@@ -102,6 +130,9 @@ class Scene:
     robots: Robots = Robots()
     objects: Objects = Objects()
     camera: CameraSetting = CameraSetting()
+    infrared: InfraredSetting = InfraredSetting()
+    light: Light = Light()
+    battery: BatterySetting = BatterySetting()
     clock: Clock = Clock()
 
     def with_values(self, **values: Any) -> Scene:
@@ -122,6 +153,9 @@ _SECTIONS: Final[Mapping[str, type[Any]]] = {
     "robots": Robots,
     "objects": Objects,
     "camera": CameraSetting,
+    "infrared": InfraredSetting,
+    "light": Light,
+    "battery": BatterySetting,
     "clock": Clock,
 }
 
@@ -207,6 +241,13 @@ def _checked(scene: Scene, path: str) -> Scene:
         "camera.pixel_noise": (scene.camera.pixel_noise, 0, 255),
         "camera.false_negative": (scene.camera.false_negative, 0, 1),
         "camera.false_positive": (scene.camera.false_positive, 0, 1),
+        "infrared.wall_share": (scene.infrared.wall_share, 0, 1),
+        "infrared.object_share": (scene.infrared.object_share, 0, 1),
+        "infrared.robot_share": (scene.infrared.robot_share, 0, 1),
+        "light.ambient_counts": (scene.light.ambient_counts, 0, 4095),
+        "light.lamp_counts": (scene.light.lamp_counts, 0, 1_000_000),
+        "battery.volts": (scene.battery.volts, 3.0, 4.2),
+        "battery.hours": (scene.battery.hours, 0.01, 1000),
         "clock.quantum_ms": (scene.clock.quantum_ms, 0.1, 20),
         "clock.scripted_quantum_ms": (scene.clock.scripted_quantum_ms, 0.1, 20),
         "clock.sample_s": (scene.clock.sample_s, 0.02, 60),

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from arena import bodies
-from arena.emulated import infrared
 from arena.lens import Lens
 from arena.scene import Scene, load_scene
 from arena.vision import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL, Eye, sensor_of
@@ -149,12 +148,3 @@ def test_an_object_before_a_robot_wins_the_vote(scene: Scene) -> None:
     """openswarm-original.md §8: red is asked first."""
     poses = Poses([ROBOT_AT, (LENS_X + 40, 152, 0.0)], [(LENS_X + 60, 146)])
     assert sensor_of(Eye(scene, poses, 0)) == OBJECT
-
-
-def test_infrared_rays_measure_from_the_body_to_walls_and_discs(scene: Scene) -> None:
-    """epuck.md §5: bearings clockwise from the front, mm; nothing beyond the response table."""
-    poses = Poses([(8.7, 150.0, math.pi / 2)], [(17.5, 150.0)])
-    distances = infrared(scene, poses, 0)
-    assert distances[2] == pytest.approx(10 * (8.8 - 3.7 - 5.0))  # sensor 2 looks right, where the object is
-    assert distances[5] == pytest.approx(10 * (8.7 - 3.7))  # sensor 5 looks left, to the wall
-    assert distances[0] == distances[7] == math.inf

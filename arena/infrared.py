@@ -1,0 +1,211 @@
+"""The infrared ring in the world: own reflections, room light, a lamp, and the emitters of other robots (epuck.md §5).
+
+Nothing is computed before the firmware converts one of the eight channels, and then once per quantum. Light of other
+robots arrives one quantum late, so that no robot depends on which of them has lived first.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Final, NamedTuple
+
+from arena import bodies
+from arena.scene import Scene
+from arena.world import Poses
+from emu.boards.epuck.analog import PULSE_PINS, SENSORS, reflection_at
+from emu.boards.epuck.board import Epuck
+
+FIRST_CHANNEL: Final = 8
+"""AN8..AN15 (epuck.md §2)."""
+SIGNAL_RANGE: Final = 25.0
+"""cm at which another robot's emitter is still heard (epuck.md §5, UNVERIFIED)."""
+SIGNAL_COUNTS: Final = 53.0
+"""Counts there, both facing each other, growing as 1 / d^2: the weakest reflection of the response table. UNVERIFIED"""
+SATURATION: Final = 3788.0
+"""Counts no light exceeds: the table's first entry (epuck.md §5)."""
+LAMP_CM: Final = 100.0
+"""Distance at which `light.lamp_counts` holds."""
+_KEPT: Final = 256
+
+
+class Surface(NamedTuple):
+    """What a sensor's axis meets: mm from the sensor, and reflection as a share of a white perpendicular surface's."""
+
+    millimetres: float
+    share: float
+
+
+@dataclass
+class Ether:
+    """What all robots' emitters do: per robot the trial's cycles at which its pulse lines changed, and to what."""
+
+    robots: int
+    quantum: int
+    _cycles: list[list[int]] = field(init=False)
+    _lines: list[list[int]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._cycles = [[] for _ in range(self.robots)]
+        self._lines = [[0] for _ in range(self.robots)]
+
+    def switch(self, robot: int, cycle: int, line: int, lit: bool) -> None:
+        """A pulse line of a robot is switched."""
+        cycles, lines = self._cycles[robot], self._lines[robot]
+        state = lines[-1] | 1 << line if lit else lines[-1] & ~(1 << line)
+        if len(cycles) > _KEPT and cycles[_KEPT // 2] < cycle - 4 * self.quantum:
+            del cycles[: _KEPT // 2], lines[: _KEPT // 2]
+        cycles.append(cycle)
+        lines.append(state)
+
+    def seen(self, robot: int, cycle: int) -> int:
+        """Bit n: others see pulse line n of a robot lit in a cycle of the trial. That is how it was a quantum ago."""
+        return self._lines[robot][bisect_right(self._cycles[robot], cycle - self.quantum)]
+
+
+class Ring:
+    """The eight sensors of one robot, put between its board and the world. Cycles of the board are `on_at` behind."""
+
+    def __init__(self, scene: Scene, board: Epuck, ether: Ether, robot: int, on_at: int) -> None:
+        self._scene = scene
+        self._board = board
+        self._ether = ether
+        self._robot = robot
+        self._on_at = on_at
+        self._poses = Poses([], [])
+        self._is_stale = True
+        self._is_read = False
+        self._heard: list[list[tuple[int, int, float]]] = [[] for _ in range(SENSORS)]
+        for line, pin in enumerate(PULSE_PINS):
+            board.chip.pins.watch(pin, partial(self._switched, line))
+        for sensor in range(SENSORS):
+            source = board.chip.adc.source[FIRST_CHANNEL + sensor]
+            assert source is not None
+            board.chip.adc.source[FIRST_CHANNEL + sensor] = partial(self._level, sensor, source)
+
+    def move(self, poses: Poses) -> None:
+        """A quantum begins. What was sampled before it is made final first."""
+        if self._is_read:
+            self._board.chip.adc.catch_up(self._board.chip.adc.now)
+        self._poses = poses
+        self._is_stale = True
+
+    @property
+    def readings(self) -> list[int] | None:
+        """Counts by which the own emitters lower the sensors when lit; None if none was ever converted."""
+        return list(self._board.ir.reflection) if self._is_read else None
+
+    def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
+        self._ether.switch(self._robot, self._on_at + cycle, line, bool(levels & changed))
+
+    def _level(self, sensor: int, source: Callable[[int], int], cycle: int) -> int:
+        if self._is_stale:
+            self._sense()
+        level = source(cycle)
+        light = 0.0
+        for other, line, counts in self._heard[sensor]:
+            if self._ether.seen(other, self._on_at + cycle) >> line & 1:
+                light += counts
+        return max(level - (round(min(light, SATURATION)) << 4), 0)
+
+    def _sense(self) -> None:
+        self._is_stale, self._is_read = False, True
+        ir = self._board.ir
+        for sensor, (distance, share) in enumerate(surfaces(self._scene, self._poses, self._robot)):
+            ir.reflection[sensor] = round(reflection_at(distance) * share)
+        for sensor, counts in enumerate(ambient(self._scene, self._poses.robots[self._robot])):
+            ir.ambient[sensor] = counts
+        self._heard = signals(self._scene, self._poses, self._robot)
+
+
+def _axes(pose: tuple[float, float, float]) -> list[tuple[float, float]]:
+    """Unit vectors of the sensors of a robot, which are also its emitters'."""
+    angles = [pose[2] - math.radians(bearing) for bearing in bodies.IR_BEARINGS_DEG]
+    return [(math.cos(angle), math.sin(angle)) for angle in angles]
+
+
+def surfaces(scene: Scene, poses: Poses, robot: int) -> list[Surface]:
+    """What each sensor's axis meets from the body's edge: wall, object or robot, beyond IR_RANGE nothing (inf mm). A
+    surface that stands askew reflects by the cosine (Lambert, UNVERIFIED)."""
+    x, y, _ = poses.robots[robot]
+    ring = scene.infrared
+    discs = [(ox - x, oy - y, scene.objects.radius_cm, ring.object_share) for ox, oy in poses.objects]
+    discs += [(one[0] - x, one[1] - y, bodies.ROBOT_RADIUS, ring.robot_share)
+              for i, one in enumerate(poses.robots) if i != robot]  # fmt: skip
+    reach = bodies.ROBOT_RADIUS + bodies.IR_RANGE
+    near = [(dx, dy, r, share) for dx, dy, r, share in discs if dx * dx + dy * dy < (reach + r) ** 2]
+    found = []
+    for east, north in _axes(poses.robots[robot]):
+        to_x, to_y = _to_wall(x, east, scene.arena.width_cm), _to_wall(y, north, scene.arena.height_cm)
+        distance, share = (to_x, abs(east)) if to_x < to_y else (to_y, abs(north))
+        share *= ring.wall_share
+        for dx, dy, r, white in near:
+            along = dx * east + dy * north
+            root = r * r - (dx * dx + dy * dy - along * along)
+            if root > 0 and along > 0 and along - math.sqrt(root) < distance:
+                distance, share = along - math.sqrt(root), white * math.sqrt(root) / r
+        gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
+        found.append(Surface(10 * gap, share) if gap <= bodies.IR_RANGE else Surface(math.inf, 0.0))
+    return found
+
+
+def _to_wall(at: float, direction: float, size: float) -> float:
+    """Along a ray to the walls at 0 and `size` of one axis."""
+    if direction == 0:
+        return math.inf
+    return ((size if direction > 0 else 0.0) - at) / direction
+
+
+def ambient(scene: Scene, pose: tuple[float, float, float]) -> list[int]:
+    """Raw counts of the sensors with all emitters off: the room's, lowered by the lamp (high above the arena, without
+    shadows) as 1 / d^2 and by the cosine of the angle to it."""
+    light = scene.light
+    if not light.lamp_counts:
+        return [light.ambient_counts] * SENSORS
+    dx, dy = light.lamp_x_cm - pose[0], light.lamp_y_cm - pose[1]
+    distance = max(math.hypot(dx, dy), bodies.ROBOT_RADIUS)
+    full = light.lamp_counts * (LAMP_CM / distance) ** 2
+    facing = [max((dx * east + dy * north) / distance, 0.0) for east, north in _axes(pose)]
+    return [round(max(light.ambient_counts - full * one, 0.0)) for one in facing]
+
+
+def signals(scene: Scene, poses: Poses, robot: int) -> list[list[tuple[int, int, float]]]:
+    """For each sensor the emitters of other robots it sees: (robot, pulse line, counts when lit). Bodies between two
+    robots hide them from each other."""
+    x, y, _ = poses.robots[robot]
+    heard: list[list[tuple[int, int, float]]] = [[] for _ in range(SENSORS)]
+    axes = _axes(poses.robots[robot])
+    for other, pose in enumerate(poses.robots):
+        dx, dy = pose[0] - x, pose[1] - y
+        apart = math.hypot(dx, dy)
+        gap = max(apart - 2 * bodies.ROBOT_RADIUS, 1.0)
+        if other == robot or gap > SIGNAL_RANGE or _is_hidden(scene, poses, robot, other):
+            continue
+        strength = SIGNAL_COUNTS * (SIGNAL_RANGE / gap) ** 2
+        sent = [max(-(dx * east + dy * north) / apart, 0.0) for east, north in _axes(pose)]
+        for sensor, (east, north) in enumerate(axes):
+            caught = max((dx * east + dy * north) / apart, 0.0)
+            for emitter, share in enumerate(sent):
+                counts = min(strength * caught * share, SATURATION)
+                if counts >= 1:
+                    heard[sensor].append((other, emitter % len(PULSE_PINS), counts))
+    return heard
+
+
+def _is_hidden(scene: Scene, poses: Poses, one: int, other: int) -> bool:
+    """Whether an object or a third robot stands on the line between two robots' centres."""
+    (x, y, _), (to_x, to_y, _) = poses.robots[one], poses.robots[other]
+    dx, dy = to_x - x, to_y - y
+    apart2 = dx * dx + dy * dy
+    discs = [(ox, oy, scene.objects.radius_cm) for ox, oy in poses.objects]
+    discs += [
+        (third[0], third[1], bodies.ROBOT_RADIUS) for i, third in enumerate(poses.robots) if i not in (one, other)
+    ]
+    for ox, oy, radius in discs:
+        along = ((ox - x) * dx + (oy - y) * dy) / apart2
+        if 0 < along < 1 and math.hypot(x + along * dx - ox, y + along * dy - oy) < radius:
+            return True
+    return False
