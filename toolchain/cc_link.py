@@ -29,7 +29,7 @@ FORMAT_PARTS = {
     "___format_double": re.compile(_FLAGS + rb"L?[fFeEgG]"),
     "___format_wide": re.compile(_FLAGS + rb"(?:ll|j)[diouxX]"),
 }
-FORMATTERS = re.compile(r"_v?s?n?printf")
+FORMATTERS = re.compile(r"_v?[fs]?n?printf")
 
 
 @dataclass

@@ -26,6 +26,8 @@ C compiler, assembler and linker for the dsPIC30F6014A, used like gcc.
   -ffreestanding        no assumptions about library functions; main need not return int
   -fsingle-precision-constant   unsuffixed floating constants are float
   -fstack-check         functions with a frame above 8 bytes probe SPLIM on entry
+  -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000), at the place that does it
+  -finstrument-functions  call __cyg_profile_func_enter and _exit
   -fxc16-attributes     accept XC16's spelling __attribute__((interrupt, no_auto_psv))
   -I -D -U -include -isystem -iquote -std= -W... -w -pedantic   as in gcc
   -MD -MMD -MF -MT -MQ -MP -M -MM                               dependency files, as in gcc
@@ -57,11 +59,12 @@ CLANG_FLAGS = {
     "-fno-signed-zeros", "-ffinite-math-only", "-fstrict-flex-arrays", "-fdollars-in-identifiers",
     "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
     "-fno-strict-overflow", "-fstrict-overflow", "-ffp-contract=off", "-ffp-contract=on", "-ffp-contract=fast",
-    "-dM", "-dD", "-dI",
+    "-dM", "-dD", "-dI", "-finstrument-functions",
 }  # fmt: skip
 CLANG_PREFIXES = (
     "-std=", "-W", "-I", "-D", "-U", "-fno-builtin-", "-fmessage-length=", "-ferror-limit=", "-fmacro-prefix-map=",
     "-ffile-prefix-map=", "-fdebug-prefix-map=", "-ftemplate-", "-fconstexpr-", "-fbracket-depth=", "-fpack-struct=",
+    "-fsanitize=", "-fno-sanitize=",
 )  # fmt: skip
 IGNORED_FLAGS = {
     "-pipe", "-fno-short-double", "-ffunction-sections", "-fdata-sections", "-fno-function-sections",

@@ -83,7 +83,7 @@ def _preprocess(options: CcOptions) -> None:
 
 def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     """Unoptimised IR of every input that has any; all C files are compiled before an error ends the run."""
-    from toolchain.clang import ir_job, run_jobs
+    from toolchain.clang import ir_job, repaired, run_jobs
     from toolchain.whole_program import is_bitcode
 
     sources = [item for item in options.inputs if item.language in IR_SOURCES]
@@ -93,7 +93,7 @@ def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     modules: dict[Input, bytes] = {}
     for item in options.inputs:
         if item in targets:
-            modules[item] = targets[item].read_bytes()
+            modules[item] = repaired(targets[item].read_bytes())
         elif item.language in ("ir", "object"):
             content = read_bytes(item.path)
             if item.language == "ir" or is_bitcode(content):

@@ -58,7 +58,8 @@ def run(image: Path, cycles: int = 30_000_000, engine: str = "auto") -> Ran:
     if stop.reason == "halt":
         return Ran(machine.w[0], "", bytes(said), stop.cycle)
     why = f"{stop.reason} at {stop.pc:#x} {stop.detail}".strip()
-    if stop.reason == "breakpoint":
+    where = machine.image.symbols.code(stop.pc) if machine.image is not None else None
+    if stop.reason == "breakpoint" and where is not None and where[0].name == "__DefaultInterrupt":
         flags = machine.peek("INTCON1")
         traps = [name for bit, name in INTCON1_TRAPS.items() if flags >> bit & 1]
         why = f"trap: {', '.join(traps) or 'unexpected interrupt'}"

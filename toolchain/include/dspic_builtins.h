@@ -12,6 +12,22 @@
 /* There is no cache; the front end's own version of this builtin does not fit a 16-bit int. */
 #define __builtin_prefetch(address, ...) ((void)(address))
 
+/* Names that GCC has and the front end lacks. */
+#define __builtin_isinff(x) __builtin_isinf(x)
+#define __builtin_isinfl(x) __builtin_isinf(x)
+#define __builtin_isnanf(x) __builtin_isnan(x)
+#define __builtin_isnanl(x) __builtin_isnan(x)
+#define __builtin_imaxabs(x) __builtin_llabs(x)
+_Noreturn void __dspic_exit(int status) __asm__("exit");
+#define __builtin_exit __dspic_exit
+
+/* GCC's buffer is five words, ours ten: it holds the address of ours, which lives as long as the function does. */
+int __dspic_setjmp(unsigned int *environment) __asm__("setjmp") __attribute__((__returns_twice__));
+_Noreturn void __dspic_longjmp(unsigned int *environment, int value) __asm__("longjmp");
+#define __builtin_setjmp(buffer) \
+  __dspic_setjmp(*(unsigned int **)(buffer) = (unsigned int *)__builtin_alloca(20))
+#define __builtin_longjmp(buffer, value) __dspic_longjmp(*(unsigned int **)(buffer), value)
+
 /* One unlocked byte write: two keys and the value in consecutive byte moves (dspic30f6014a.md §3). */
 #define __dspic_unlocked_write(address, key1, key2, value)                          \
   __asm__ volatile("mov.b %0,[%3]\n\tmov.b %1,[%3]\n\tmov.b %2,[%3]" ::"r"(key1),   \

@@ -3,7 +3,9 @@
 
         .section .text._memcpy,code
         .global _memcpy
+        .global ___memcpy_upwards       ; for memmove, whatever memcpy a program brings
 _memcpy:
+___memcpy_upwards:
         mov     w0,w3
         ior     w0,w1,w4
         btsc    w4,#0
@@ -26,7 +28,7 @@ _memcpy:
         .global _memmove
 _memmove:
         cp      w0,w1
-        bra     leu,_memcpy             ; copying upwards is safe
+        bra     leu,___memcpy_upwards   ; copying upwards is safe
         add     w1,w2,w1
         add     w0,w2,w3
         ior     w1,w3,w4
