@@ -59,6 +59,22 @@ def largest_share(places: Places, reach_cm: float) -> float:
     return max(labels.count(one) for one in set(labels)) / len(labels)
 
 
+def largest_shares(places: NDArray[np.float64], reach_cm: float) -> NDArray[np.float64]:
+    """`largest_share` at every sample at once: `places` is samples x objects x 2. Who reaches whom over any number of
+    others is the adjacency matrix squared until every path of n - 1 steps is in it."""
+    samples, count, _ = places.shape
+    if not count:
+        return np.zeros(samples)
+    away = places[:, :, None, :] - places[:, None, :, :]
+    reached = ((away**2).sum(axis=3) < reach_cm**2).astype(np.float32)
+    steps = 1
+    while steps < count - 1:
+        reached = (reached @ reached > 0).astype(np.float32)
+        steps *= 2
+    shares: NDArray[np.float64] = reached.sum(axis=2).max(axis=1).astype(np.float64) / count
+    return shares
+
+
 def time_to(times: NDArray[np.float64], shares: NDArray[np.float64], share: float) -> float:
     """First time at which the largest share is at least `share`; nan if never."""
     reached = np.flatnonzero(shares >= share - 1e-9)
@@ -95,7 +111,7 @@ def course(times: NDArray[np.float64], places: NDArray[np.float64], radius_cm: f
     wide, narrow = reach_of("4r", radius_cm), reach_of("12cm", radius_cm)
     return Course(
         times,
-        np.array([largest_share(one, wide) for one in places]),
-        np.array([largest_share(one, narrow) for one in places]),
+        largest_shares(places, wide),
+        largest_shares(places, narrow),
         np.array([compactness(one, radius_cm) for one in places]),
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arena.metrics import clusters, compactness, course, largest_share, reach_of, time_to
+from arena.metrics import clusters, compactness, course, largest_share, largest_shares, reach_of, time_to
 from arena.statistics import bootstrap_band, equivalence, signed_rank_p, student_cdf, student_quantile
 
 R = 5.0
@@ -86,3 +86,14 @@ def test_bootstrap_bands_hold_the_mean() -> None:
     assert (low < values.mean(axis=0)).all()
     assert (values.mean(axis=0) < high).all()
     assert (bootstrap_band(values)[0] == low).all()
+
+
+def test_shares_of_all_samples_at_once_are_those_one_by_one() -> None:
+    """Chains of up to all objects, scattered ones, one, none."""
+    rng = np.random.default_rng(3)
+    scattered = rng.uniform(0, 150, (200, 20, 2))
+    chain = np.stack([np.column_stack([19.0 * rng.permutation(20), np.zeros(20)]) for _ in range(5)])
+    for places in (scattered, chain, scattered[:, :1], scattered[:, :2]):
+        assert largest_shares(places, 20.0).tolist() == [largest_share(one, 20.0) for one in places]
+    assert largest_shares(chain, 20.0).tolist() == [1.0] * 5
+    assert largest_shares(np.zeros((3, 0, 2)), 20.0).tolist() == [0.0] * 3
