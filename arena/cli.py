@@ -1,4 +1,4 @@
-"""The command line: `python -m arena run | compare | plot | replay | sweep | scenes`.
+"""The command line: `python -m arena run | compare | plot | report | replay | sweep | scenes`.
 
 Exit status: 0 done; 1 a robot's firmware stopped in a trial; 2 bad input; 130 interrupted (finished trials are kept).
 """
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 import emu
-from arena.commands import compare, plot, replay, run, sweep
+from arena.commands import compare, plot, replay, report, run, sweep
 from arena.record import RecordError
 from arena.scene import SceneError, load_scene, scenes
 
@@ -20,6 +20,7 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
     "sweep": (sweep.parser, sweep.run),
     "compare": (compare.parser, compare.run),
     "plot": (plot.parser, plot.run),
+    "report": (report.parser, report.run),
     "replay": (replay.parser, replay.run),
 }
 

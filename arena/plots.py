@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,8 +22,8 @@ Runs = Mapping[str, list[Trial]]
 SNAPSHOTS_S: Final = (0.0, 600.0)
 
 
-def draw_all(runs: Runs, folder: Path, form: str) -> list[Path]:
-    """All figures of some runs into `folder`; the files written."""
+def draw_all(runs: Runs, folder: Path, form: str, prefix: str = "", names: Sequence[str] | None = None) -> list[Path]:
+    """The figures of some runs, or those in `names`, into `folder`; the files written."""
     matplotlib.use("Agg")
     figures: dict[str, Callable[[Runs], Figure]] = {
         "figure4-snapshots": snapshots,
@@ -33,7 +33,9 @@ def draw_all(runs: Runs, folder: Path, form: str) -> list[Path]:
     }
     paths = []
     for name, draw in figures.items():
-        path = folder / f"{name}.{form}"
+        if names is not None and name not in names:
+            continue
+        path = folder / f"{prefix}{name}.{form}"
         draw(runs).savefig(path, dpi=120, metadata=None if form != "svg" else {"Date": None})
         paths.append(path)
     return paths

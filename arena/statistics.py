@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +95,14 @@ def signed_rank_p(one: Values, other: Values) -> float:
     variance = float((ranks**2).sum()) / 4
     z = max(abs(positive - total / 2) - 0.5, 0.0) / math.sqrt(variance)
     return math.erfc(z / math.sqrt(2))
+
+
+def pairs_needed(deviation: float, margin: float, power: float = 0.8) -> int:
+    """Pairs with which two equal means are found equivalent with probability `power`, by the normal distribution:
+    ((z(95 %) + z((1 + power) / 2)) * deviation / margin)^2, at least 2."""
+    normal = NormalDist()
+    z = normal.inv_cdf(0.95) + normal.inv_cdf((1 + power) / 2)
+    return max(math.ceil((z * deviation / margin) ** 2), 2)
 
 
 def bootstrap_band(courses: Values, *, share: float = 0.95, draws: int = 1000, seed: int = 0) -> tuple[Values, Values]:

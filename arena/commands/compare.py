@@ -17,6 +17,8 @@ from arena.statistics import Values, equivalence, signed_rank_p
 PUBLISHED = "86.5 % after 600 s: ten trials with real robots, reported for ref. [10], not for either run here"
 NEAR_S = 0.05
 """A sample this near to the time asked for is at that time: quanta do not divide a second."""
+APART_S = (2.0, 5.0, 10.0)
+"""When robots of the same seed are compared."""
 MARGIN_SHARE = 0.10
 """10 points (experiment.md §5); for the other measures 10 % of the second run's mean."""
 
@@ -72,13 +74,36 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
         result = equivalence(x, y, margin if margin is not None else 0.1 * float(abs(y.mean())) or 1e-9)
         rows.append({"measure": name, "first": _spread(x), "second": _spread(y), **asdict(result),
                      "equivalent": result.equivalent, "wilcoxon_p": signed_rank_p(x, y)})  # fmt: skip
-    loads = [_load([trial for trial, _ in runs.values()]) for runs in (ones, others)]
-    return {"seeds": seeds, "at": at, "measures": rows, "cpu_load": loads, "published": PUBLISHED}
+    loads = [mean_load([trial for trial, _ in runs.values()]) for runs in (ones, others)]
+    return {
+        "seeds": seeds,
+        "at": at,
+        "measures": rows,
+        "cpu_load": loads,
+        "apart": _apart(pairs),
+        "published": PUBLISHED,
+    }
 
 
-def _load(trials: list[Trial]) -> float:
-    """Mean CPU load over robots, trials and time."""
+def _apart(pairs: list[Any]) -> list[dict[str, float]]:
+    """Distance in cm between a robot and its twin in the trial of the same seed, over robots and seeds."""
+    found = []
+    for seconds in APART_S:
+        gaps: list[float] = []
+        for (one, course_one), (other, _) in pairs:
+            sample = int(np.searchsorted(course_one.times, seconds - NEAR_S))
+            if sample < min(len(one.robots), len(other.robots)) and one.robots.shape == other.robots.shape:
+                gaps += np.hypot(*(one.robots[sample] - other.robots[sample]).T).tolist()
+        if gaps:
+            found.append({"seconds": seconds, "median_cm": float(np.median(gaps)), "max_cm": max(gaps)})
+    return found
+
+
+def mean_load(trials: list[Trial]) -> float:
+    """CPU load averaged over robots, trials and time; 0 without robots."""
     robots = range(trials[0].about["scene"]["robots"]["count"])
+    if not robots:
+        return 0.0
     return float(np.mean([trial.columns[f"r{robot}_load"][1:].mean() for trial in trials for robot in robots]))
 
 
@@ -101,5 +126,8 @@ def run(options: argparse.Namespace) -> int:
               f"    X - Y {row['mean']:+.3f}, 90 % interval {row['low']:+.3f} to {row['high']:+.3f}, "
               f"margin {row['margin']:.3f}: {verdict} ({chance})")  # fmt: skip
     print(f"CPU load: X {result['cpu_load'][0]:.1%}, Y {result['cpu_load'][1]:.1%} (0 for scripted brains)")
+    for one in result["apart"]:
+        print(f"robots of the same seed after {one['seconds']:g} s: {one['median_cm']:.2f} cm apart (median), "
+              f"at most {one['max_cm']:.2f} cm")  # fmt: skip
     print(f"Published: {result['published']}")
     return 0

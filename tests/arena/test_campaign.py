@@ -7,6 +7,7 @@ import pytest
 
 from arena.cli import main
 from arena.record import RecordError, read_trial, trials_in, write_trial
+from arena.report import BEGIN, END
 from arena.trial import Rows
 
 SHORT = ["--brain", "scripted", "--minutes", "0.1", "--controller", "A"]
@@ -142,6 +143,48 @@ def test_compare_finds_a_run_equivalent_to_itself(tmp_path: Path, capsys: pytest
     assert all(row["equivalent"] and row["mean"] == 0 and row["wilcoxon_p"] == 1 for row in result["measures"])
     assert main(["compare", str(tmp_path), str(tmp_path)]) == 2  # trials of 6 s have no share at 600 s
     assert "less than --at 600" in capsys.readouterr().err
+
+
+def test_compare_tells_how_far_robots_of_one_seed_are_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Twins: the same run is 0 cm from itself, another quantum is not."""
+    run("--trials", 2, "--jobs", 1, "--out", tmp_path / "a")
+    run("--trials", 2, "--jobs", 1, "--set", "clock.scripted_quantum_ms=2", "--out", tmp_path / "b")
+    apart = []
+    for other in ("a", "b"):
+        capsys.readouterr()
+        assert main(["compare", str(tmp_path / "a"), str(tmp_path / other), "--at", "5", "--json"]) == 0
+        apart.append(json.loads(capsys.readouterr().out)["apart"])
+    assert [one["seconds"] for one in apart[0]] == [2.0, 5.0]  # trials last 6 s
+    assert [one["max_cm"] for one in apart[0]] == [0.0, 0.0]
+    assert 0 < apart[1][1]["median_cm"] <= apart[1][1]["max_cm"] < 5
+
+
+def test_report_writes_tables_and_figures_into_a_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Between the two marks; again gives the same; without marks the document is left alone."""
+    document = tmp_path / "docs" / "page.md"
+    document.parent.mkdir()
+    document.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
+    for name, quantum in (("one", 10), ("two", 5)):
+        setting = f"clock.scripted_quantum_ms={quantum}"
+        assert run("--trials", 3, "--jobs", 1, "--set", setting, "--out", tmp_path / name) == 0
+    command = ["report", str(tmp_path / "one"), str(tmp_path / "two"), "--at", "5", "--document", str(document),
+               "--figures", str(tmp_path / "docs" / "figures")]  # fmt: skip
+    assert main(command) == 0
+    text = document.read_text()
+    assert text.startswith("before\n")
+    assert text.endswith(f"{END}\nafter\n")
+    assert "old" not in text
+    assert "### Controller A" in text
+    assert "| one | 3 |" in text
+    assert "| one - two, 3 | share at 5 s |" in text
+    assert "(figures/A-figure5-clustering.png)" in text
+    assert (tmp_path / "docs" / "figures" / "A-figure4-snapshots.png").stat().st_size > 5000
+    assert main(command) == 0
+    assert document.read_text() == text
+    document.write_text("no marks")
+    assert main(command) == 2
+    assert "has no place for results" in capsys.readouterr().err
+    assert document.read_text() == "no marks"
 
 
 def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

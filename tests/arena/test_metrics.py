@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from arena.metrics import clusters, compactness, course, largest_share, largest_shares, reach_of, time_to
-from arena.statistics import bootstrap_band, equivalence, signed_rank_p, student_cdf, student_quantile
+from arena.statistics import bootstrap_band, equivalence, pairs_needed, signed_rank_p, student_cdf, student_quantile
 
 R = 5.0
 
@@ -97,3 +97,10 @@ def test_shares_of_all_samples_at_once_are_those_one_by_one() -> None:
         assert largest_shares(places, 20.0).tolist() == [largest_share(one, 20.0) for one in places]
     assert largest_shares(chain, 20.0).tolist() == [1.0] * 5
     assert largest_shares(np.zeros((3, 0, 2)), 20.0).tolist() == [0.0] * 3
+
+
+def test_the_pairs_needed_are_those_of_the_plan() -> None:
+    """experiment.md §5: at a standard deviation of 0.25 about 107 trials per arm, at 0.06 seven (independent arms)."""
+    assert pairs_needed(0.25 * 2**0.5, 0.1) == pytest.approx(107, abs=1)
+    assert pairs_needed(0.06 * 2**0.5, 0.1) == 7
+    assert pairs_needed(0.0, 0.1) == 2

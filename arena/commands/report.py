@@ -1,0 +1,59 @@
+"""`arena report FOLDER...`: tables and figures of some runs, into a document if one is named."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from arena import plots
+from arena.record import MANIFEST, RecordError, trials_in, write_text
+from arena.report import by_controller, report, with_results
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options of the command."""
+    made = argparse.ArgumentParser(
+        description="write tables and figures of some runs as Markdown, by controller",
+        epilog="example: arena report results/openswarm-A results/bare-A results/openswarm-B results/bare-B "
+        "--document docs/experiment.md --figures docs/figures",
+    )
+    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
+    made.add_argument("--document", type=Path, metavar="FILE", help="replace its results; default: standard output")
+    made.add_argument("--at", type=float, default=600.0, metavar="S", help="time of the share (default 600 s)")
+    made.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures 4 and 5 and the CPU load here")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Raises RecordError, ValueError, OSError."""
+    runs = {folder.name: trials_in(folder) for folder in options.runs}
+    if len(runs) < len(options.runs):
+        raise ValueError("two of the folders have the same name; tables need different ones")
+    home = options.document.parent if options.document is not None else Path()
+    figures: dict[str, list[str]] = {}
+    if options.figures is not None:
+        options.figures.mkdir(parents=True, exist_ok=True)
+        for controller, group in by_controller(runs).items():
+            names = ["figure4-snapshots", "figure5-clustering", "cpu-load"]
+            paths = plots.draw_all(group, options.figures, "png", prefix=f"{controller}-", names=names)
+            figures[controller] = [Path(os.path.relpath(path, home)).as_posix() for path in paths]
+    text = report(runs, figures, {folder.name: _host_s(folder) for folder in options.runs}, options.at)
+    if options.document is None:
+        print(text, end="")
+        return 0
+    write_text(options.document, with_results(options.document.read_text(encoding="utf-8"), text))
+    print(options.document)
+    return 0
+
+
+def _host_s(folder: Path) -> float:
+    """Seconds a trial took on average; nan if nobody noted it."""
+    try:
+        noted = json.loads((folder / MANIFEST).read_text())["host"]
+    except (OSError, ValueError, KeyError) as error:
+        raise RecordError(f"{folder / MANIFEST}: {error}") from None
+    return float(np.mean([one["host_s"] for one in noted])) if noted else float("nan")
