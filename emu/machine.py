@@ -164,7 +164,9 @@ class Machine:
         stop = None
         while stop is None and state.cycle < cycle:
             try:
-                if not sequencer.boundary(cycle):
+                if engine.natively(cycle):
+                    pass
+                elif not sequencer.boundary(cycle):
                     stop = self.stopped("halt")
                 elif state.cycle >= cycle or self._interrupt:
                     break

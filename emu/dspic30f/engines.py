@@ -20,6 +20,10 @@ class Engine(Protocol):
         """Run at least one instruction, from PC on, as long as no boundary has work, no hooked PC is reached and the
         cycle is below `limit`. Raises DeviceReset and Breakpoint as `Sequencer.execute` does."""
 
+    def natively(self, limit: int) -> bool:
+        """Boundaries and instructions without Python, as far as possible. False: the boundary at PC is yet to be done,
+        or to be done again."""
+
     def forget(self) -> None:
         """Hooks have changed: whatever was prepared for them is stale."""
 
@@ -35,6 +39,10 @@ class PlainEngine:
     def run(self, limit: int) -> None:
         """One instruction."""
         self._sequencer.execute()
+
+    def natively(self, limit: int) -> bool:
+        """Nothing is native."""
+        return False
 
     def forget(self) -> None:
         """Nothing is prepared."""

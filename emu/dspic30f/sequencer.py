@@ -280,6 +280,11 @@ class Sequencer:
         self.events.kick()
         return second if self._exception_at(second) else second + 1
 
+    def after_retfie(self) -> None:
+        """A RETFIE was run elsewhere up to its second cycle: add the third unless an exception is entered instead."""
+        if not self._exception_at(self.state.cycle - 1):
+            self.state.cycle += 1
+
     def _exception_at(self, last: int) -> bool:
         """Whether an exception could be entered after cycle `last`; if so the boundary there will look."""
         if self.events.deadline > last:

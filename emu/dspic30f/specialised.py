@@ -101,6 +101,10 @@ class SpecialisedEngine:
             if cycle >= limit or u64[deadline_at] < cycle or (hooks and u32[pc_at] in hooks):
                 return
 
+    def natively(self, limit: int) -> bool:
+        """Nothing is native."""
+        return False
+
     def forget(self) -> None:
         """Hooks have changed: write everything anew."""
         self._places = places_of(self._core)

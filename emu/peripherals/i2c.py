@@ -104,6 +104,10 @@ class I2c(Peripheral):
         """The bus clocks nothing else inside the chip."""
         return NEVER
 
+    def stands_until(self, cycle: int) -> int:
+        """Between operations nothing moves."""
+        return NEVER if self._operation.value == _NONE or self._stalled.value else cycle
+
     def restored(self) -> None:
         """The pins carry the waveform while the module is on."""
         if self.con["I2CEN"]:
@@ -144,8 +148,12 @@ class I2c(Peripheral):
             self._port.disown(lines)
         self.restored()
 
+    def _disturb(self) -> None:
+        self.kit.pins.disturb(self.wire.port)
+
     def _abort(self) -> None:
         self._operation.value = _NONE
+        self._disturb()
         self._owns.value = self._stalled.value = 0
         self._begun.value = NEVER
         self.events.cancel(self._step)
@@ -167,6 +175,7 @@ class I2c(Peripheral):
     def _begin(self, operation: int) -> None:
         """Start an operation in the next cycle; a line that something holds low may end it at once."""
         lines = self.wire
+        self._disturb()
         self._operation.value = operation
         self._half_bit.value = self.brg.value + 1
         self._collides.value = 0
@@ -240,6 +249,7 @@ class I2c(Peripheral):
 
     def _finish(self, operation: int, due: int) -> None:
         self._operation.value = _NONE
+        self._disturb()
         if operation in _BITS:
             self.con[_BITS[operation]] = 0
         if operation in (_START, _RESTART):
@@ -295,6 +305,7 @@ class I2c(Peripheral):
         """SCL is free again: an operation that waited for it goes on."""
         if levels & self.wire.scl and self._stalled.value:
             self._stalled.value = 0
+            self._disturb()
             self._run(cycle + 1)
 
     def _log_edges(self) -> None:

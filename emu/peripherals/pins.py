@@ -43,6 +43,10 @@ class Waveform(Protocol):
     def nth_rise(self, mask: int, after: int, count: int) -> int:
         """Cycle of the `count`-th rising edge (1 = next) of the pin in `mask` behind cycle `after`, or NEVER."""
 
+    def stands_until(self, cycle: int) -> int:
+        """First cycle behind `cycle` in which `bits` may differ from those in `cycle`, if nobody calls
+        `Pins.disturb`; `cycle` itself if nothing is promised."""
+
 
 def parse_pin(name: str) -> tuple[int, int]:
     """("RC14") -> (port index, bit mask). Raises ValueError for anything that is not a pin name."""
@@ -81,6 +85,10 @@ class Pins:
         """Pins whose changes may wait in `ring`."""
         self.waving: Final = words("waving")
         """Pins whose levels an attached waveform supplies."""
+        self.standing: Final = words("standing")
+        """Levels of the waving pins that hold before the cycle in `stands_until`, so that native code can read them."""
+        first = record.reserve("pins.stands_until", "Q", len(PORTS)).index
+        self.stands_until: Final = record.u64[first : first + len(PORTS)]
         self._told: Final = words("told")
         """Levels the lazy watchers know."""
         ring = record.reserve("pins.ring", "Q", RING).index
@@ -153,14 +161,21 @@ class Pins:
         """Let a function of the cycle supply the levels of the pins in `mask`; edge watchers do not hear of them."""
         if all(entry[1] is not waveform for entry in self._waveforms[port]):
             self._waveforms[port].append((mask, waveform))
-            self.waving[port] |= mask
+            self._wave(port)
 
     def detach(self, port: int, waveform: Waveform) -> None:
         """Undo `attach`."""
         self._waveforms[port] = [entry for entry in self._waveforms[port] if entry[1] is not waveform]
-        self.waving[port] = 0
+        self._wave(port)
+
+    def _wave(self, port: int) -> None:
+        """The set of waving pins of `port` follows the list; after a restore the record has it already."""
+        waving = 0
         for mask, _waveform in self._waveforms[port]:
-            self.waving[port] |= mask
+            waving |= mask
+        if waving != self.waving[port]:
+            self.waving[port] = waving
+            self.disturb(port)
 
     def waveform(self, port: int, mask: int) -> Waveform | None:
         """The waveform on the pins in `mask`, if one is attached."""
@@ -175,8 +190,14 @@ class Pins:
         for before, _ in self._on_waveform:
             before(cycle)
         change()
+        for port in range(len(PORTS)):
+            self.disturb(port)
         for _, after in self._on_waveform:
             after()
+
+    def disturb(self, port: int) -> None:
+        """A waveform on `port` has got a new future, or what it depends on has changed: forget what it promised."""
+        self.stands_until[port] = 0
 
     def set(self, name: str, level: int, cycle: int | None = None) -> None:
         """The outside drives one pin with `level` (0 or 1) from `cycle` on (default: now)."""
@@ -212,8 +233,14 @@ class Pins:
 
     def read_port(self, port: int, cycle: int) -> int:
         """What an instruction reads from PORT in `cycle`: outputs show one cycle late (§6)."""
-        stored = self.before if cycle <= self.changed[port] else self.level
-        return self._with_waveforms(port, cycle, stored[port])
+        level = (self.before if cycle <= self.changed[port] else self.level)[port]
+        waving = self.waving[port]
+        if not waving:
+            return level
+        if cycle >= self.stands_until[port]:
+            self.standing[port] = self._with_waveforms(port, cycle, 0)
+            self.stands_until[port] = min(wave.stands_until(cycle) for _, wave in self._waveforms[port])
+        return level & ~waving | self.standing[port]
 
     def apply(self, port: int, cycle: int, by_chip: bool = False) -> None:
         """Recompute a port's levels after any of the arrays changed; they hold from `cycle` on."""
@@ -228,6 +255,7 @@ class Pins:
         if not changed:
             return
         self.level[port] = level
+        self.disturb(port)
         if self._edges is not None:
             self._edges.append((cycle, port, level))
         if self._lazy_watchers[port]:

@@ -161,6 +161,10 @@ class Spi(Peripheral):
         """SCK clocks nothing else inside the chip."""
         return NEVER
 
+    def stands_until(self, cycle: int) -> int:
+        """Nothing is promised: idle levels follow control bits that are plain storage."""
+        return cycle
+
     def restored(self) -> None:
         """SCK (as master) and SDO carry the waveform while the module is on."""
         port = self._pins["sck"][0]

@@ -30,6 +30,10 @@ class TxPin:
         """Edges of TX clock nothing inside the chip."""
         return NEVER
 
+    def stands_until(self, cycle: int) -> int:
+        """Firmware does not read its own TX pin often: nothing is promised."""
+        return cycle
+
     def log_frame(self, start: int, bits: int, length: int, bit: int) -> None:
         """Write a frame's edges to the log of the pins, if one is kept: `length` levels of `bit` Tcy from `start`."""
         edges = self._pins.edges

@@ -186,6 +186,10 @@ class Camera(Part, I2cDevice):
             return 0
         return self._line[(cycle - self._line_from.value) // self._byte.value] << 8
 
+    def stands_until(self, cycle: int) -> int:
+        """Between lines the next one; the bytes of a line are in the record."""
+        return cycle if self._line_from.value <= cycle < self._line_to.value else self.scan.next_line(cycle)
+
     def rises(self, mask: int, after: int, until: int) -> int:
         """The data lines clock nothing inside the chip."""
         return 0

@@ -132,6 +132,35 @@ class Scan:
         """Cycle of the `count`-th rising edge behind `after`, or NEVER."""
         return self.edge_cycle(mask, self.edges(mask, after) + count)
 
+    def stands_until(self, cycle: int) -> int:
+        """The next edge of a sync line; nothing is promised while PCLK runs."""
+        course = self.course
+        frame, offset = self.place(cycle)
+        if not self.running:
+            return NEVER
+        if frame < 0:
+            return self.start
+        line, behind = divmod(offset - course.first_href, course.line_tcy)
+        if 0 <= line < course.lines and behind < course.line_bytes * course.byte_tcy:
+            return cycle
+        edges = (course.vsync_rise, course.vsync_fall, self._next_line(offset), course.frame_tcy)
+        return cycle + min(edge for edge in edges if edge > offset) - offset
+
+    def _next_line(self, offset: int) -> int:
+        """Offset in the frame of the first HREF behind `offset`, or the end of the frame."""
+        course = self.course
+        line = max((offset - course.first_href) // course.line_tcy + 1, 0)
+        return course.first_href + line * course.line_tcy if line < course.lines else course.frame_tcy
+
+    def next_line(self, cycle: int) -> int:
+        """Cycle from which `line_at` may name a line again, for a `cycle` between lines; NEVER in reset."""
+        course = self.course
+        half = course.byte_tcy // 2
+        frame, offset = self.place(cycle + half)
+        if not self.running:
+            return NEVER
+        return self.start - half if frame < 0 else cycle + self._next_line(offset) - offset
+
     def edges(self, mask: int, cycle: int) -> int:
         """Rising edges of one sync line since the start, up to and with `cycle`."""
         course = self.course

@@ -24,9 +24,9 @@ Y_RAM: Final = 0x1800
 W_END: Final = 0x20  # W0..W15 are data addresses 0x00..0x1F, isa.md §2.2
 STACK_POINTER: Final = 15
 
-NEXT, INTERPRET, DEADLINE, SERVICE, MISS = range(5)
+NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE = range(6)
 """Why native code came back: go on at PC; interpret the instruction at PC; the block at PC reaches the deadline;
-look at events and interrupts before PC; no native code at PC."""
+look at events and interrupts before PC; no native code at PC; a RETFIE has run for two cycles."""
 
 Access = Literal["plain", "slow", "irq", "flags", "sr"]
 """How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;

@@ -160,6 +160,8 @@ class PortPlaces:
     lazy: int
     before: int
     waving: int
+    standing: int
+    stands_until: int
     changed: int
     ring: int
     ring_count: int
@@ -196,19 +198,24 @@ class Latch:
         late = b.now <= _load(b, p.changed, 64)
         levels = b.select(late, _load(b, p.before, 16), _load(b, p.level, 16))
         waving = _load(b, p.waving, 16)
+        stands = b.e.let(f"icmp ult i64 {wide(b.now)}, {_load(b, p.stands_until, 64).text}", bit=True)
         if self.bus is None:
-            b.guard(waving == 0)
-            return levels
-        return self._with_pixels(b, levels, waving, self.bus)
+            b.guard(stands | (waving == 0))
+        else:
+            shown, on_line = self._pixels(b, levels, self.bus)
+            b.guard(stands | (on_line & ((waving & (0xFFFF & ~self.bus.mask)) == 0)) | (waving == 0))
+        levels = (levels & (waving ^ 0xFFFF)) | (_load(b, p.standing, 16) & waving)
+        return levels if self.bus is None else b.select(on_line & (stands ^ 1) & (waving != 0), shown, levels)
 
-    def _with_pixels(self, b: LlvmBuilder, levels: Number, waving: Value, bus: PixelBus) -> Number:
+    def _pixels(self, b: LlvmBuilder, levels: Number, bus: PixelBus) -> tuple[Number, Number]:
+        """The port with the byte that is on the bus, and whether one is."""
         first, end = _load(b, bus.line_from, 64), _load(b, bus.line_to, 64)
         on_line = (b.now >= first) & (b.now < end)
-        b.guard(on_line & ((waving & (0xFFFF & ~bus.mask)) == 0))
         width = _load(b, bus.byte_tcy, bus.byte_tcy_bits)
-        index = _divide(b, "udiv", b.now - first, b.select(width == 0, 1, width))
+        passed = b.select(on_line, b.now - first, 0)
+        index = _divide(b, "udiv", passed, b.select(width == 0, 1, width))
         pixel = b.e.load(pointer(b.e, index + bus.line), 8)
-        return (levels & (0xFFFF & ~bus.mask)) | (pixel << bus.shift)
+        return (levels & (0xFFFF & ~bus.mask)) | (pixel << bus.shift), on_line
 
     def write(self, b: LlvmBuilder, value: Number, lanes: int) -> bool:
         """New levels from the next cycle on."""
@@ -310,7 +317,7 @@ def _ports(core: Core, registers: dict[int, NativeRegister]) -> None:
         places = PortPlaces(
             number, lat.address, sfrs[f"PORT{letter}"].address, fields[f"port{letter}.owned"].offset,
             word("output"), word("level"), word("drive"), word("analog"), word("eager"), word("lazy"), word("before"),
-            word("waving"),
+            word("waving"), word("standing"), fields["pins.stands_until"].offset + 8 * number,
             fields["pins.changed"].offset + 8 * number, fields["pins.ring"].offset, fields["pins.ring_count"].offset,
             fields["pins.ring"].count, lat.writable)
         registers[lat.address] = Latch(places, is_port=False)

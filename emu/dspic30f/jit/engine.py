@@ -19,11 +19,11 @@ from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, W_END, Access, Surroundings
+from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, RETFIE, SERVICE, W_END, Access, Surroundings
 from emu.dspic30f.jit.compiler import shared_compiler
 from emu.dspic30f.jit.devices import NativeRegister, native_registers
 from emu.dspic30f.jit.region import discover
-from emu.dspic30f.jit.runtime import BLOCKS, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
+from emu.dspic30f.jit.runtime import BLOCKS, BOUNDARY, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import Translator
 from emu.dspic30f.state import DA, NOT_REPEATING
@@ -132,7 +132,9 @@ class JitEngine:
         start = state.cycle
         why = self._native(self._core.record.address, self._env_address)
         self.counts.runs += 1
-        if self._hooks and state.pc in self._hooks:  # the machine calls hooks, once per arrival
+        if why == RETFIE:
+            sequencer.after_retfie()
+        elif self._hooks and state.pc in self._hooks:  # the machine calls hooks, once per arrival
             if state.cycle == start:
                 sequencer.execute()
         elif why == INTERPRET:
@@ -142,6 +144,28 @@ class JitEngine:
             cycle = state.cycle
             if cycle == start or (cycle < limit and self._core.events.deadline >= cycle):
                 self._miss(limit)
+
+    def natively(self, limit: int) -> bool:
+        """As `Engine.natively`."""
+        state = self._state
+        if self._dispatch is None or state.edt:
+            return False
+        self._select()
+        env = self._env
+        env[LIMIT] = min(limit, state.cycle + NATIVE_CYCLES)
+        env[BOUNDARY] = 1
+        start = state.cycle
+        why = self._native(self._core.record.address, self._env_address)
+        env[BOUNDARY] = 0
+        self.counts.runs += 1
+        if why == INTERPRET and not (self._hooks and state.pc in self._hooks):
+            self.counts.interpreted += 1
+            self._interpret()
+            return True
+        if why == RETFIE:
+            self._core.sequencer.after_retfie()
+            return True
+        return state.cycle >= limit or (why != SERVICE and state.cycle != start)
 
     def measure_time(self) -> None:
         """Note from now on where host time goes (`emu run --stats`); costs a little itself."""

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT, SERVICE
+from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT, RETFIE, SERVICE
 from emu.dspic30f.jit.service import DONE, Boundary, service_text
 
-LIMIT, BLOCKS, STEPS, ENTERED = range(4)
+LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
-steps; interrupts entered so far."""
+steps; interrupts entered so far; whether to begin with the boundary before PC."""
 ENV_WORDS: Final = 8
 
 DISPATCH: Final = """
@@ -26,7 +26,10 @@ first:
   %steps_place = getelementptr i64, ptr %env, i64 {steps}
   %blocks = load ptr, ptr %blocks_place
   %steps = load ptr, ptr %steps_place
-  br label %loop
+  %begin_place = getelementptr i64, ptr %env, i64 {begin}
+  %begin = load i64, ptr %begin_place
+  %inside = icmp eq i64 %begin, 0
+  br i1 %inside, label %loop, label %serve
 loop:
   %pc = load i32, ptr %pc_place
   %known = icmp ult i32 %pc, {flash_end}
@@ -46,7 +49,8 @@ call:
   %why = call i64 %code(ptr %rec, ptr %env)
   switch i64 %why, label %back [ i64 {next}, label %loop
                                  i64 {service}, label %serve
-                                 i64 {deadline}, label %again ]
+                                 i64 {deadline}, label %again
+                                 i64 {retfie}, label %returned ]
 again:
   %pc2 = load i32, ptr %pc_place
   %half2 = lshr i32 %pc2, 1
@@ -61,7 +65,29 @@ single:
 step:
   %why2 = call i64 %code2(ptr %rec, ptr %env)
   switch i64 %why2, label %back2 [ i64 {next}, label %loop
-                                   i64 {service}, label %serve ]
+                                   i64 {service}, label %serve
+                                   i64 {retfie}, label %returned ]
+returned:
+  %limit3 = load i64, ptr %env
+  %entered3 = getelementptr i64, ptr %env, i64 {entered}
+  %count3 = load i64, ptr %entered3
+  %rest3 = call i64 @service(ptr %rec, i64 %limit3, ptr %entered3)
+  %done3 = icmp eq i64 %rest3, {done}
+  %count4 = load i64, ptr %entered3
+  %refused = icmp eq i64 %count3, %count4
+  br i1 %refused, label %third, label %accepted
+accepted:
+  br i1 %done3, label %loop, label %boundary
+third:
+  br i1 %done3, label %last, label %unsure
+unsure:
+  ret i64 {retfie}
+last:
+  %cycle_place = getelementptr i8, ptr %rec, i64 {cycle}
+  %cycle3 = load i64, ptr %cycle_place
+  %cycle4 = add i64 %cycle3, 1
+  store i64 %cycle4, ptr %cycle_place
+  br label %loop
 serve:
   %limit = load i64, ptr %env
   %entered = getelementptr i64, ptr %env, i64 {entered}
@@ -85,5 +111,5 @@ def dispatch_text(boundary: Boundary, flash_end: int) -> str:
     """The dispatch loop, with what it does at boundaries; flash ends at `flash_end` (PC units)."""
     return service_text(boundary) + DISPATCH.format(
         pc=boundary.offset["cpu.pc"], repeat=boundary.offset["cpu.repeat"], flash_end=flash_end,
-        blocks=BLOCKS, steps=STEPS, entered=ENTERED,
-        next=NEXT, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE)
+        cycle=boundary.offset["cpu.cycle"], blocks=BLOCKS, steps=STEPS, entered=ENTERED, begin=BOUNDARY,
+        next=NEXT, retfie=RETFIE, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE)

@@ -105,12 +105,17 @@ def _head(b: Boundary) -> str:
               "p.corcon": o["CORCON"], "p.pc": o["cpu.pc"], "p.disi": o["cpu.disi_end"], "p.sp": o["WREG15"],
               "p.splim": o["SPLIM"], "p.armed": o["cpu.limit_armed"], "p.stall": o["cpu.stall"],
               "p.inttreg": o["INTTREG"], "p.repeat": o["cpu.repeat"],
+              "p.slip": o["cpu.slip_cycle"],
               "p.mode": o["cpu.mode"], "p.slept": o["cpu.slept"], "p.power": o["wdt.mode"], "p.flash": o["flash"]}
     return "\n".join([
         "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {", "first:",
         *(_at(name, offset) for name, offset in places.items()),
         f"""  %hold = load i64, ptr %p.hold
-  %held = icmp ne i64 %hold, 0
+  %waits = icmp ne i64 %hold, 0
+  %slip = load i64, ptr %p.slip
+  %now = load i64, ptr %p.cycle
+  %slips = icmp eq i64 %slip, %now
+  %held = or i1 %waits, %slips
   br i1 %held, label %python, label %again
 python:
   store i64 0, ptr %p.deadline

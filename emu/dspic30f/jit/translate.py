@@ -16,6 +16,7 @@ from emu.dspic30f.jit.builder import (
     INTERPRET,
     MISS,
     NEXT,
+    RETFIE,
     SERVICE,
     LlvmBuilder,
     NeedsInterpreter,
@@ -57,6 +58,7 @@ class Translator:
         self._labels: dict[int, str] = {}
         self._todo: list[int] = []
         self._exits: dict[tuple[int, int], str] = {}
+        self._requested: Value
 
     def text(self) -> str:
         """The module."""
@@ -266,7 +268,21 @@ class Translator:
         if isinstance(flow, Return) and flow.kind == "retfie":
             repeats = (flow.srl & RA) != 0
             self.e.store(pointer(e, self.around.offset["cpu.repeat"]), self.b.select(repeats, FIRST, NOT_REPEATING), 16)
+            self._leave_if_requested(flow)
         self.v.leave(flow.target & PC_MASK, NEXT)
+
+    def _leave_if_requested(self, flow: Return) -> None:
+        """RETFIE with something requested ends after two cycles if that is accepted: the boundary decides."""
+        e = self.e
+        some, none = e.fresh("some"), e.fresh("none")
+        e.end(f"br i1 {self._requested.text}, label %{some}, label %{none}")
+        e.start(some)
+        e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
+        cycle = self.v.get("cycle")
+        self.v.set("cycle", cycle - 1)
+        self.v.leave(flow.target & PC_MASK, RETFIE)
+        e.start(none)
+        self.v.new_block()
 
     # -- Idle -------------------------------------------------------------------------------------------------------
     def _check_idle(self) -> None:
@@ -311,11 +327,12 @@ class Translator:
         e.end(f"br label %{self.exit(next_pc, SERVICE)}")
 
     def _check_retfie(self, flow: Return) -> None:
-        """Native RETFIE: no trap level involved, nothing else requested (isa.md §14.3)."""
+        """Native RETFIE: no trap level involved (isa.md §14.3)."""
         b, e = self.b, self.e
         corcon = e.load(pointer(e, self.around.offset["CORCON"]), 16)
         traps = e.load(pointer(e, self.around.offset["INTCON1"]), 16) & self.around.trap_flags
         plain = (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
-        b.guard(plain & (self._requests() ^ 1))
+        b.guard(plain)
+        self._requested = self._requests()
         sr = b._sr_word()
         b.pending.sr = (sr & 0xFF00) | (flow.srl & 0xFF)
