@@ -1,4 +1,4 @@
-"""The command line: `python -m arena run | compare | plot | report | replay | sweep | scenes`.
+"""The command line: `python -m arena run | sweep | sensitivity | compare | plot | report | replay | scenes`.
 
 Exit status: 0 done; 1 a robot's firmware stopped in a trial; 2 bad input; 130 interrupted (finished trials are kept).
 """
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 import emu
-from arena.commands import compare, plot, replay, report, run, sweep
+from arena.commands import compare, plot, replay, report, run, sensitivity, sweep
 from arena.record import RecordError
 from arena.scene import SceneError, load_scene, scenes
 
@@ -18,6 +18,7 @@ FAULT, BAD_INPUT, INTERRUPTED = 1, 2, 130
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),
     "sweep": (sweep.parser, sweep.run),
+    "sensitivity": (sensitivity.parser, sensitivity.run),
     "compare": (compare.parser, compare.run),
     "plot": (plot.parser, plot.run),
     "report": (report.parser, report.run),

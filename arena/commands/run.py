@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
     plan = Plan(scene, name, options.controller, image, options.trials, 60 * options.minutes, options.seed)
     folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"
     missing = open_folder(plan, folder, sys.argv)
-    faults = _with_progress(plan, folder, missing, options.jobs)
+    faults = with_progress(plan, folder, missing, options.jobs)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
     results = [summary(trial) for trial in trials_in(folder) if trial.path.name in wanted]
     if options.json:
@@ -109,7 +109,7 @@ def summary(trial: Trial) -> dict[str, Any]:
     }
 
 
-def _with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int) -> bool:
+def with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int) -> bool:
     """Run what is missing; true if a robot stopped."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"),

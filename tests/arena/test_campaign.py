@@ -203,3 +203,19 @@ def test_plot_draws_the_figures(tmp_path: Path) -> None:
     assert main(["plot", str(tmp_path / "run"), "--out", str(tmp_path / "figures")]) == 0
     names = {path.name for path in (tmp_path / "figures").iterdir() if path.stat().st_size > 5000}
     assert names == {"figure4-snapshots.png", "figure5-clustering.png", "trajectories.png", "cpu-load.png"}
+
+
+def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """experiment.md §5: one row per variant, one column per controller; finished trials are kept."""
+    command = ["sensitivity", "clustering", "--trials", "2", "--minutes", "0.05", "--jobs", "1", "--only", "axle",
+               "--only", "mirrored", "--out", str(tmp_path / "runs"), "--save", str(tmp_path / "table.md")]  # fmt: skip
+    assert main(command) == 0
+    text = capsys.readouterr().out
+    assert text == (tmp_path / "table.md").read_text()
+    rows = [line for line in text.splitlines() if "±" in line]
+    assert [row.split(" | ")[0] for row in rows[1:]] == ["| axle 53 mm", "| mirrored picture"]
+    trial = read_trial(tmp_path / "runs" / "axle-53-mm-B" / "trial-0002.parquet")
+    assert trial.about["scene"]["robots"]["axle_cm"] == 5.3
+    assert trial.about["controller"] == "B"
+    assert main([*command[:-4], "--controllers", "AC"]) == 2
+    assert "expected some of AB" in capsys.readouterr().err

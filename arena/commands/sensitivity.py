@@ -1,0 +1,109 @@
+"""`arena sensitivity SCENE`: one scene value after the other away from the registered one, with scripted brains
+(experiment.md §5)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from arena.campaign import Plan, open_folder
+from arena.commands.compare import courses
+from arena.commands.run import changed, with_progress
+from arena.controllers import CONTROLLERS
+from arena.record import trials_in, write_text
+from arena.scene import load_scene, scripted
+
+VARIANTS: Final = {
+    "as registered": [],
+    "4.33 frames/s (PO3030K)": ["camera.frame_tcy=3408000"],
+    "18.4 frames/s": ["camera.frame_tcy=800000"],
+    "range 100 cm": ["camera.range_cm=100"],
+    "range unlimited": ["camera.range_cm=inf"],
+    "thrust 1.5 N": ["robots.thrust_n=1.5"],
+    "no slip (Enki's drive)": ["robots.thrust_n=inf"],
+    "wheel noise 0": ["robots.wheel_noise=0"],
+    "wheel noise 10 %": ["robots.wheel_noise=0.1"],
+    "axle 53 mm": ["robots.axle_cm=5.3"],
+    "floor friction 0.25": ["objects.floor_friction=0.25"],
+    "floor friction 0.8": ["objects.floor_friction=0.8"],
+    "mirrored picture": ["camera.mirrored=true"],
+    "pitch -0.38 degrees": ["camera.pitch_deg=-0.38"],
+    "pitch -3 degrees": ["camera.pitch_deg=-3"],
+    "pitch +3 degrees": ["camera.pitch_deg=3"],
+    "misses 10 % of frames": ["camera.false_negative=0.1"],
+    "invents objects in 10 %": ["camera.false_positive=0.1"],
+}
+"""Ranges of docs/experiment.md §2. At -0.38 degrees, four rows, the window's second row shows robots to 135 cm."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options of the command."""
+    made = argparse.ArgumentParser(
+        description="vary one value at a time with scripted brains and print the share in the largest cluster",
+        epilog="example: arena sensitivity clustering --trials 10 --minutes 10 --save results/sensitivity.md",
+    )
+    made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
+    made.add_argument("--controllers", default="AB", help="default AB")
+    made.add_argument("--trials", type=int, default=10, metavar="N")
+    made.add_argument("--minutes", type=float, default=10.0, metavar="M")
+    made.add_argument("--seed", type=int, default=1)
+    made.add_argument("--only", action="append", metavar="TEXT", help="only variants whose name contains this")
+    made.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N")
+    made.add_argument("--out", type=Path, default=Path("results/sensitivity"), metavar="FOLDER")
+    made.add_argument("--save", type=Path, metavar="FILE", help="write the table as Markdown too")
+    made.add_argument("--json", action="store_true")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Raises SceneError, RecordError, ValueError."""
+    if options.trials < 1 or not options.minutes > 0:
+        raise ValueError("--trials and --minutes must be positive")
+    if not options.controllers or set(options.controllers) - set(CONTROLLERS):
+        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(CONTROLLERS)}")
+    wanted = [name for name in VARIANTS if not options.only or any(text in name for text in options.only)]
+    if not wanted:
+        raise ValueError(f"--only {options.only}: no such variant; known: {'; '.join(VARIANTS)}")
+    rows: list[dict[str, Any]] = []
+    for name in wanted:
+        row: dict[str, Any] = {"variant": name}
+        for controller in options.controllers:
+            row[controller] = _shares(options, name, controller)
+        rows.append(row)
+    text = _markdown(rows, options)
+    if options.save is not None:
+        write_text(options.save, text)
+    print(json.dumps({"sensitivity": rows}) if options.json else text, end="" if not options.json else "\n")
+    return 0
+
+
+def _shares(options: argparse.Namespace, name: str, controller: str) -> list[float]:
+    """Share in the largest cluster at the end of each trial."""
+    scene = scripted(changed(load_scene(options.scene), VARIANTS[name]))
+    plan = Plan(scene, "scripted", controller, None, options.trials, 60 * options.minutes, options.seed)
+    folder = options.out / f"{re.sub('[^a-z0-9.+-]+', '-', name.lower()).strip('-')}-{controller}"
+    with_progress(plan, folder, open_folder(plan, folder, sys.argv), options.jobs)
+    trials = [trial for trial in trials_in(folder) if trial.about["seed"] < options.seed + options.trials]
+    return [float(one.share[-1]) for _, one in courses(trials).values()]
+
+
+def _markdown(rows: list[dict[str, Any]], options: argparse.Namespace) -> str:
+    lines = [
+        f"Share in the largest cluster after {60 * options.minutes:g} s, mean ± sd of n = {options.trials} (seeds "
+        f"{options.seed} to {options.seed + options.trials - 1}), scripted brains:",
+        "",
+        f"| variant | {' | '.join(options.controllers)} |",
+        f"|---|{'---|' * len(options.controllers)}",
+    ]
+    for row in rows:
+        cells = [f"{np.mean(row[c]):.2f} ± {np.std(row[c], ddof=1 if len(row[c]) > 1 else 0):.2f}"
+                 for c in options.controllers]  # fmt: skip
+        lines.append(f"| {row['variant']} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
