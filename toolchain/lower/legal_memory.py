@@ -93,10 +93,10 @@ class MemoryLegalizer(LegalizerBase):
 
     def load(self, i: Instr) -> Value | list[Value]:
         p = self.use(i.args[0])
-        if i.type.kind in AGGREGATES:
-            return self.load_aggregate(i, p)
         align = i.extra.get("align", 2)
         assert isinstance(align, int)
+        if i.type.kind in AGGREGATES:
+            return self.load_aggregate(i.type, p, align, i.volatile)
         self.guard(i)
         t = legal_type(i.type)
         value = self.load_bits(t, store_size(i.type), p, self.even(p, align), i.volatile)
@@ -120,13 +120,13 @@ class MemoryLegalizer(LegalizerBase):
 
     def store(self, i: Instr) -> None:
         v, p = i.args[0], self.use(i.args[1])
+        align = i.extra.get("align", 2)
+        assert isinstance(align, int)
         if v.type.kind in AGGREGATES:
-            self.store_aggregate(v, p, i.volatile)
+            self.store_aggregate(v, p, align, i.volatile)
             return
         if isinstance(v, Undef) and not i.volatile:
             return
-        align = i.extra.get("align", 2)
-        assert isinstance(align, int)
         self.guard(i)
         value = self.b.cast("zext", self.use(v), I8) if v.type.bits == 1 else self.zero_extended(v)
         self.store_bits(value, store_size(v.type), p, self.even(p, align), i.volatile)
@@ -151,17 +151,18 @@ class MemoryLegalizer(LegalizerBase):
     def disi(self, cycles: int) -> None:
         self.b.emit("builtin", VOID, [const(I16, cycles)], name="__builtin_disi")
 
-    def load_aggregate(self, i: Instr, p: Value) -> list[Value]:
+    def load_aggregate(self, whole: Type, p: Value, align: int, volatile: bool) -> list[Value]:
         out = []
-        for t, at in leaves_of(i.type):
+        for t, at in leaves_of(whole):
             q = self.b.add(p, at)
-            out.append(self.load_bits(legal_type(t), store_size(t), q, self.even(q, 2), i.volatile))
+            even = self.even(q, 1 if at & 1 else align)
+            out.append(self.load_bits(legal_type(t), store_size(t), q, even, volatile))
         return out
 
-    def store_aggregate(self, v: Value, p: Value, volatile: bool) -> None:
+    def store_aggregate(self, v: Value, p: Value, align: int, volatile: bool) -> None:
         for (t, at), part in zip(leaves_of(v.type), self.fields(v), strict=True):
             q = self.b.add(p, at)
-            self.store_bits(part, store_size(t), q, self.even(q, 2), volatile)
+            self.store_bits(part, store_size(t), q, self.even(q, 1 if at & 1 else align), volatile)
 
     def va_arg(self, i: Instr) -> Value:
         """Step the pointer down by the rounded size, then read (abi-elf.md §2.4)."""

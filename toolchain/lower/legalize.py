@@ -44,17 +44,24 @@ LIBGCC_MODE = {32: "si", 64: "di", 128: "ti"}
 class Legalizer(MemoryLegalizer):
     """Arithmetic, control flow and calls; the table of handlers."""
 
+    result_at: Arg | None = None  # where a result goes that registers cannot hold
+
     # -- entry --------------------------------------------------------------------------------------------------------
 
     def run(self) -> None:
         """Rewrite the function in place."""
         f = self.function
         old_args, f.args = f.args, []
+        if vectors.is_wide(f.ret):
+            self.result_at = Arg(I16, "result", 0, {})
+            f.args.append(self.result_at)
+            f.ret = VOID
         for a in old_args:
-            passed = [vectors.packed_type(a.type)] if a.type.kind == "vector" else [t for t, _ in leaves_of(a.type)]
+            packed = a.type.kind == "vector" and not vectors.is_wide(a.type)
+            passed = [vectors.packed_type(a.type)] if packed else [t for t, _ in leaves_of(a.type)]
             leaves = [Arg(legal_type(t), a.name, a.index, a.attrs) for t in passed]
             f.args += leaves
-            if a.type.kind in ("struct", "array"):
+            if a.type.kind in AGGREGATES and not packed:
                 self.parts[id(a)] = list(leaves)
             else:
                 self.values[id(a)] = leaves[0]
@@ -64,7 +71,7 @@ class Legalizer(MemoryLegalizer):
             if entry:
                 entry = False
                 for a in old_args:
-                    if a.type.kind == "vector":
+                    if a.type.kind == "vector" and id(a) in self.values:
                         self.parts[id(a)] = vectors.unpack(self, self.values.pop(id(a)), a.type)
                     elif id(a) in self.values:
                         self.values[id(a)] = self.argument(a)
@@ -262,6 +269,10 @@ class Legalizer(MemoryLegalizer):
         self.jump("indirectbr", [self.use(i.args[0])], i.blocks)
 
     def ret(self, i: Instr) -> None:
+        if self.result_at is not None:
+            self.store_aggregate(i.args[0], self.result_at, 2, False)
+            self.jump("ret", [], [])
+            return
         values = [v for a in i.args for v in self.passed(a)]
         if sum(max(1, v.type.bits // 16) for v in values) > ARGUMENT_REGISTERS:
             raise UnsupportedError(f"returning {i.args[0].type} in registers")
@@ -294,6 +305,8 @@ class Legalizer(MemoryLegalizer):
             parts = self.passed(a)
             args += parts
             attrs += [attr] * len(parts)
+        if vectors.is_wide(i.type):
+            return vectors.call(self, i, args, attrs)
         leaves = [legal_type(t) for t, _ in leaves_of(i.type)] if i.type.kind in ("struct", "array") else []
         result = vectors.packed_type(i.type) if i.type.kind == "vector" else legal_type(i.type)
         new = self.b.emit("call", leaves[0] if leaves else result, [*args, self.use(callee)])
@@ -307,7 +320,7 @@ class Legalizer(MemoryLegalizer):
 
     def passed(self, a: Value) -> list[Value]:
         """The values an argument or result travels as."""
-        if a.type.kind == "vector":
+        if a.type.kind == "vector" and not vectors.is_wide(a.type):
             return [vectors.pack(self, a)]
         return self.fields(a) if a.type.kind in AGGREGATES else [self.use(a)]
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..ir.model import ConstInt, Instr, Type, Undef, UnsupportedError, Value, int_type
+from ..ir.model import I16, VOID, ConstInt, Instr, Type, Undef, UnsupportedError, Value, int_type, size_of
+from ..target import ARGUMENT_REGISTERS
 from .build import const, legal_type
 from .lanes import Lane
 
@@ -93,10 +94,42 @@ def shufflevector(lz: Legalizer, i: Instr) -> list[Value]:
 
 
 def bitcast(lz: Legalizer, i: Instr) -> Value | list[Value]:
-    """Vector to integer, integer to vector, or between vectors: through one wide integer, first lane lowest."""
+    """Vector to integer, integer to vector, or between vectors: bit by bit, first lane lowest."""
     source = i.args[0]
+    if source.type.kind == "vector" and i.type.kind == "vector":
+        return _regroup(lz, lz.fields(source), source.type, i.type)
     whole = lz.use(source) if source.type.kind != "vector" else pack(lz, source)
     return whole if i.type.kind != "vector" else unpack(lz, whole, i.type)
+
+
+def _regroup(lz: Legalizer, parts: list[Value], old: Type, new: Type) -> list[Value]:
+    """Lanes of another width from the same bits."""
+    have, want = old.elems[0].bits, new.elems[0].bits
+    lane = legal_type(new.elems[0])
+    if have == want:
+        return parts
+    if have % want == 0:
+        return [lz.b.cast("trunc", lz.b.shift("lshr", v, at), lane) for v in parts for at in range(0, have, want)]
+    if want % have:
+        whole = _joined(lz, parts, have, packed_type(old))
+        return unpack(lz, whole, new)
+    step = want // have
+    return [_joined(lz, parts[k : k + step], have, lane) for k in range(0, len(parts), step)]
+
+
+def is_wide(t: Type) -> bool:
+    """Vectors of more than eight words, which is what the argument registers hold, travel through memory."""
+    return t.kind == "vector" and size_of(t) > 2 * ARGUMENT_REGISTERS
+
+
+def call(lz: Legalizer, i: Instr, args: list[Value], attrs: list[object]) -> list[Value]:
+    """A call whose result is wide: the address of a slot goes first, as for a struct (abi-elf.md §2.2 rule 7)."""
+    slot = Instr("slot", I16, [])
+    slot.extra["size"] = size_of(i.type)
+    lz.blocks[0].instrs.insert(0, slot)
+    new = lz.b.emit("call", VOID, [slot, *args, lz.use(i.args[-1])])
+    new.extra = {"attrs": [{}, *attrs], "vararg": i.extra["vararg"], "fixed": i.extra["fixed"], "tail": None}
+    return lz.load_aggregate(i.type, slot, 2, False)
 
 
 def packed_type(t: Type) -> Type:
@@ -115,10 +148,12 @@ def unpack(lz: Legalizer, whole: Value, t: Type) -> list[Value]:
 
 def pack(lz: Legalizer, v: Value) -> Value:
     """A vector as one integer, first lane lowest."""
-    lane = v.type.elems[0]
-    t = packed_type(v.type)
+    return _joined(lz, lz.fields(v), v.type.elems[0].bits, packed_type(v.type))
+
+
+def _joined(lz: Legalizer, parts: list[Value], bits: int, t: Type) -> Value:
     whole: Value = const(t, 0)
-    for k, part in enumerate(lz.fields(v)):
-        wide = lz.b.shift("shl", lz.b.cast("zext", part, t), k * lane.bits) if t.bits > part.type.bits else part
+    for k, part in enumerate(parts):
+        wide = lz.b.shift("shl", lz.b.cast("zext", part, t), k * bits) if t.bits > part.type.bits else part
         whole = lz.b.binary("or", whole, wide)
     return whole
