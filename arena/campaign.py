@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from arena.brain import Brain, ScriptedBrain
+from arena.live import LiveFile, live_path
 from arena.record import MANIFEST, RecordError, write_json, write_trial
 from arena.scene import Scene
 from arena.trial import run_trial
@@ -89,15 +90,20 @@ def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None)
     """Run trial `number` (from 1) and write its file. Raises SceneError, RecordError, emu.LoadError."""
     start = time.perf_counter()
     seed = plan.seed + number - 1
+    about = plan.key() | {"seed": seed, "faults": []}
     brains = make_brains(plan, seed)
+    live = LiveFile(live_path(folder, number), about) if plan.image is not None else None
     try:
         progress = None if report is None else (lambda seconds: report(number, seconds))
-        result = run_trial(plan.scene, seed, brains, plan.seconds, progress)
+        on_row = live.write if live is not None else None
+        result = run_trial(plan.scene, seed, brains, plan.seconds, progress, on_row=on_row)
+        about["faults"] = [list(fault) for fault in result.faults]
+        write_trial(trial_path(folder, number), result.rows, about)
     finally:
         for brain in brains:
             brain.close()
-    about = plan.key() | {"seed": seed, "faults": [list(fault) for fault in result.faults]}
-    write_trial(trial_path(folder, number), result.rows, about)
+        if live is not None:
+            live.close()
     return Done(number, time.perf_counter() - start, result.faults)
 
 

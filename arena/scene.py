@@ -185,6 +185,11 @@ def load_scene(name: str) -> Scene:
     return _checked(_scene(str(path), data), str(path))
 
 
+def scene_of(values: dict[str, Any]) -> Scene:
+    """The scene a record was made in, from its metadata. Raises SceneError for one this version cannot build."""
+    return _checked(_scene("the record", values), "the record")
+
+
 def _scene(path: str, data: dict[str, Any]) -> Scene:
     values: dict[str, Any] = {}
     for key, value in data.items():

@@ -44,15 +44,17 @@ def run_trial(
     seconds: float,
     progress: Callable[[float], None] | None = None,
     world: World | None = None,
+    on_row: Callable[[dict[str, Any]], None] | None = None,
 ) -> Result:
-    """Let `brains` live in a new world for `seconds`. `progress(seconds)` is called once per simulated second.
+    """Let `brains` live in a new world for `seconds`. `progress(seconds)` is called once per simulated second,
+    `on_row(row)` for every sample.
 
     A robot whose firmware stops stands still; the others go on. Raises SceneError if there is no room.
     """
     world = world or World(scene, seed)
     quanta = math.ceil(seconds / world.dt - 0.5)
     per_second = max(round(1 / world.dt), 1)
-    recorder = _Recorder(world, brains)
+    recorder = _Recorder(world, brains, on_row)
     wheels: list[tuple[float, float]] = [STOPPED] * len(brains)
     recorder.sample(wheels)
     samples = 1
@@ -72,7 +74,8 @@ def run_trial(
 class _Recorder:
     """Turns the present state into one row."""
 
-    def __init__(self, world: World, brains: Sequence[Brain]) -> None:
+    def __init__(self, world: World, brains: Sequence[Brain], on_row: Callable[[dict[str, Any]], None] | None) -> None:
+        self._on_row = on_row
         self._world = world
         self._brains = brains
         self.rows = Rows()
@@ -103,3 +106,5 @@ class _Recorder:
             lit += [{"robot": index, "cycle": change.cycle, "leds": change.leds} for change in brain.lights()]
         row["log"], row["lights"] = said, lit
         self.rows.add(row)
+        if self._on_row is not None:
+            self._on_row(row)

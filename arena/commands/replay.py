@@ -1,10 +1,16 @@
-"""`arena replay TRIAL`: a page that plays a trial, without a server."""
+"""`arena replay TRIAL`: a page that plays a trial without a server, a film, or a page that follows a running trial."""
 
 from __future__ import annotations
 
 import argparse
+import json
+from functools import partial
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
+from arena.live import Follower
+from arena.movie import write_movie
 from arena.page import page
 from arena.record import RecordError, read_trial, write_text
 
@@ -12,19 +18,73 @@ from arena.record import RecordError, read_trial, write_text
 def parser() -> argparse.ArgumentParser:
     """Options of the command."""
     made = argparse.ArgumentParser(
-        description="make an HTML page that plays a trial",
-        epilog="example: arena replay results/clustering-scripted-A/trial-0001.parquet --out trial.html",
+        description="make an HTML page that plays a trial, or a film of it, or follow a running one",
+        epilog="examples: arena replay results/clustering-scripted-A/trial-0001.parquet --out trial.html\n"
+        "          arena replay results/clustering-scripted-A/trial-0001.parquet --export trial.gif --speed 60\n"
+        "          arena replay results/clustering-openswarm-A --live",
     )
-    made.add_argument("trial", type=Path, metavar="TRIAL", help="a trial-NNNN.parquet")
+    made.add_argument("trial", type=Path, metavar="TRIAL", help="a trial-NNNN.parquet; with --live the run's folder")
     made.add_argument("--out", type=Path, metavar="FILE", help="default: the trial's name with .html")
+    made.add_argument("--export", type=Path, metavar="FILE", help="write a film instead: .gif, or .mp4 with ffmpeg")
+    made.add_argument("--speed", type=float, default=30.0, metavar="X", help="of a film, times real time (default 30)")
+    made.add_argument("--seconds", type=float, metavar="S", help="of a film, simulated time (default: the whole trial)")
+    made.add_argument("--live", action="store_true", help="serve a page that follows a trial of a run that goes on")
+    made.add_argument("--number", type=int, metavar="N", help="with --live: the trial (default: the newest)")
+    made.add_argument("--port", type=int, default=8765, metavar="P", help="with --live (default 8765, 0 = any)")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the page and name it. Raises RecordError."""
+    """Write the page or film and name it. Raises RecordError, ValueError, OSError."""
+    if options.live:
+        with server(Follower(options.trial, options.number), options.port) as serving:
+            print(f"http://127.0.0.1:{serving.server_port}/ (Ctrl-C ends)", flush=True)
+            serving.serve_forever()
+        return 0
     if not options.trial.is_file():
         raise RecordError(f"{options.trial}: no such file; expected a trial-NNNN.parquet")
+    trial = read_trial(options.trial)
+    if options.export is not None:
+        write_movie(trial, options.export, options.speed, options.seconds)
+        print(options.export)
+        return 0
     out = options.out or options.trial.with_suffix(".html")
-    write_text(out, page(read_trial(options.trial)))
+    write_text(out, page(trial))
     print(out)
     return 0
+
+
+def server(follower: Follower, port: int) -> ThreadingHTTPServer:
+    """A server for this machine alone: `/` is the page, `/more?from=N` the samples from N on."""
+    return ThreadingHTTPServer(("127.0.0.1", port), partial(_Answer, follower))
+
+
+class _Answer(BaseHTTPRequestHandler):
+    def __init__(self, follower: Follower, *arguments: object) -> None:
+        self._follower = follower
+        super().__init__(*arguments)  # type: ignore[arg-type]
+
+    def do_GET(self) -> None:
+        """One request; what cannot be answered is 404, a record that cannot be read 503."""
+        place = urlsplit(self.path)
+        first = parse_qs(place.query).get("from", ["0"])[0]
+        try:
+            if place.path == "/":
+                self._send(200, "text/html; charset=utf-8", self._follower.page())
+            elif place.path == "/more" and first.isdecimal():
+                self._send(200, "application/json", json.dumps(self._follower.more(int(first))))
+            else:
+                self._send(404, "text/plain", "there are / and /more?from=N")
+        except RecordError as error:
+            self._send(503, "text/plain", str(error))
+
+    def _send(self, status: int, kind: str, text: str) -> None:
+        body = text.encode()
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, form: str, *arguments: object) -> None:
+        """Quiet."""

@@ -1,0 +1,117 @@
+"""Films of trials: GIF from Pillow alone, MP4 by ffmpeg."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from arena import movie
+from arena.cli import main
+from arena.movie import SCALE, frames
+from arena.record import read_trial
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight seconds of two robots."""
+    out = tmp_path_factory.mktemp("run")
+    arguments = ["--brain", "scripted", "--trials", "1", "--minutes", "0.1333", "--robots", "2", "--jobs", "1"]
+    assert main(["run", "clustering", *arguments, "--out", str(out)]) == 0
+    return out / "trial-0001.parquet"
+
+
+def test_a_gif_has_a_frame_for_every_time_it_shows(trial: Path, tmp_path: Path) -> None:
+    """8 s at 4 x real time and 12.5 frames per second: 25 frames of 80 ms, and the first."""
+    out = tmp_path / "trial.gif"
+    assert main(["replay", str(trial), "--export", str(out), "--speed", "4"]) == 0
+    with Image.open(out) as film:
+        durations = []
+        for frame in range(film.n_frames):
+            film.seek(frame)
+            durations.append(film.info["duration"])
+        assert sum(durations) in (25 * 80, 26 * 80)
+        assert len(durations) >= 17  # one per sample; equal frames are one of twice the time
+        assert film.size[0] == round(400 * SCALE)
+    assert [path.name for path in tmp_path.iterdir()] == ["trial.gif"]
+
+
+def test_frames_show_the_objects_where_the_record_has_them(trial: Path) -> None:
+    """A disc of an object's or cluster's colour at its place; the wheel's place is white before and after."""
+    record = read_trial(trial)
+    (first, last) = frames(record, [0.0, 8.0])
+    for picture, sample in ((first, 0), (last, -1)):
+        for x, y in record.objects[sample]:
+            assert picture.getpixel((x * SCALE, 300 * SCALE - y * SCALE)) != (255, 255, 255)
+    x, y = record.robots[-1][0]
+    assert last.getpixel((x * SCALE, 300 * SCALE - y * SCALE)) != (255, 255, 255)
+    assert first.tobytes() != last.tobytes()
+
+
+def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
+    """Decoded again by the same ffmpeg: as many frames, the same size."""
+    try:
+        encoder = movie._ffmpeg()
+    except ValueError as error:
+        pytest.skip(str(error))
+    out = tmp_path / "trial.mp4"
+    assert main(["replay", str(trial), "--export", str(out), "--speed", "4", "--seconds", "4"]) == 0
+    command = [encoder, "-i", str(out), "-f", "rawvideo", "-pix_fmt", "rgb24", "-loglevel", "error", "-"]
+    raw = subprocess.run(command, capture_output=True, timeout=120, check=True).stdout
+    size = next(frames(read_trial(trial), [0.0])).size
+    assert len(raw) == 13 * size[0] * size[1] * 3
+
+
+def test_without_ffmpeg_an_mp4_is_refused_with_what_to_install(
+    trial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit status 2; a GIF needs nothing."""
+    monkeypatch.setattr(movie.shutil, "which", lambda _name: None)
+    monkeypatch.setitem(movie.__dict__, "importlib", _NothingInstalled())
+    assert main(["replay", str(trial), "--export", str(tmp_path / "a.mp4")]) == 2
+    assert "an .mp4 needs ffmpeg" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+class _NothingInstalled:
+    @staticmethod
+    def import_module(name: str) -> object:
+        raise ImportError(name)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--export", "film.avi"], "a film is a .gif or a .mp4"),
+        (["--export", "film.gif", "--speed", "0"], "--speed must be positive"),
+        (["--export", "film.gif", "--speed", "1e-4"], "the limit is 20000"),
+        (["--export", "nowhere/film.gif"], "cannot be written"),
+    ],
+)
+def test_films_that_cannot_be_are_explained(
+    trial: Path,
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Exit status 2, nothing left behind."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["replay", str(trial), *arguments]) == 2
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_reported_and_leaves_no_half_film(
+    trial: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """/dev/full answers every write with ENOSPC."""
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    (tmp_path / "film.part.gif").symlink_to("/dev/full")
+    assert main(["replay", str(trial), "--export", str(tmp_path / "film.gif")]) == 2
+    assert "film.gif: cannot be written: No space left" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
