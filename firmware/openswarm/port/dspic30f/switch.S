@@ -171,17 +171,16 @@ resume_dsp:
         goto    w1
 
 ; ---- void hal_idle(const volatile uint16_t *pending): kernel stack, IPL 1 -------------------------------------------
-; At IPL 7 an interrupt ends PWRSAV without being taken, so none slips in between the test and the sleep.
+; At IPL 5 an interrupt that may send ends PWRSAV without being taken, so none slips in between the test and the sleep.
+; The camera's, at IPL 6, is never late for that; what it sets for IPL 4 ends PWRSAV too.
 _hal_idle:
         bclr    IEC0, #T2IE             ; no slice while nothing runs
-        bset    SR, #6
         bset    SR, #7
         nop
         cp0.b   [w0]
         bra     nz, 1f
         pwrsav  #1
 1:      bclr    SR, #7
-        bclr    SR, #6
         bset    IEC0, #T2IE
         return
 
