@@ -1,0 +1,113 @@
+"""The camera's HREF on every cycle of a round of kernel calls (issue 6, Must show 1; kernel.md §4).
+
+A round of tests/firmware/target/sights makes every call of the kernel and its devices while tick, slices, stepper,
+UARTs, converter, I2C and remote control interrupt. `sweep` goes through it instruction by instruction and, from a copy
+of each state, lets HREF rise on each cycle that instruction takes; the line must come out right to the byte.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from emu.boards.epuck.board import Epuck
+from emu.boards.epuck.pixels import decode
+from emu.loader import load_image
+from emu.machine import Machine
+
+FCY = 14_745_600
+AHEAD = 12
+"""Tcy from the state that is copied to the first edge: the camera is told of edges to come only."""
+LINE = 40
+LINE_BYTES = 40
+LINE_TCY = AHEAD + 760
+"""Until the capture's interrupt is over: 10 + 20 x 32 + some 20 Tcy and its latency."""
+LONGEST_STEP = 64
+"""A longer step is a sleep; its cycles are alike, so every IDLE_STRIDE-th is tried behind the first LONGEST_STEP."""
+IDLE_STRIDE = 61
+
+
+def start(path: Path, picture: np.ndarray, ipl_slip: int = 0) -> Machine:
+    """The sights firmware at the beginning of a round, camera programmed,, interp engine."""
+    image = load_image(path)
+    machine = Machine(image.chip, engine="interp", ipl_slip=ipl_slip, board=partial(Epuck, selector=3))
+    machine.load(image)
+    machine.board.camera.show(picture)
+    begin = place(machine, "round_begin")
+    for _ in range(4):
+        assert machine.run(cycles=FCY, until=begin).reason == "until"
+        machine.step()
+        for timer in ("T4CON", "T5CON"):  # no more frames: the test says which line is captured; an order for the next
+            machine.write(timer, 0x0002)  # frame that is under way comes within the round that follows
+    assert machine.peek("failures") == 0
+    return machine
+
+
+def place(machine: Machine, symbol: str) -> int:
+    """Program address of a C function."""
+    assert machine.image is not None
+    found = machine.image.symbols.find("_" + symbol)
+    assert found is not None, symbol
+    return found.address
+
+
+def expected_line(picture: np.ndarray) -> np.ndarray:
+    """The pixels of window line LINE: every eighth, in RGB565 (epuck.md §7.5)."""
+    row = 4 * LINE  # every fourth row of the sensor is sent
+    return picture[row, 240:400:8] & np.array([0xF8, 0xFC, 0xF8], np.uint8)
+
+
+def capture_at(machine: Machine, state: bytes, offset: int, masked: int = 0) -> np.ndarray:
+    """Pixels of the line whose HREF rises `AHEAD + offset` Tcy after `state`; `masked`: nothing may interrupt so long
+    behind HREF (to see that this spoils a line)."""
+    machine.restore(state)
+    machine.board.camera.align(machine.cycle + AHEAD + offset, LINE)
+    frame = machine.address_of("frame")
+    machine.record.bytes[frame : frame + LINE_BYTES] = bytes(LINE_BYTES)
+    machine.poke("camera_next_byte", frame)
+    machine.poke("camera_lines_left", 20)
+    machine.write("T4CON", 0x0002)
+    machine.write("PR4", 1)
+    machine.write("TMR4", 0)
+    machine.poke("IFS1", machine.peek("IFS1") & ~(1 << 5))
+    machine.write("T4CON", 0x8002)  # the next HREF triggers
+    if masked:
+        machine.write("DISICNT", AHEAD + offset + masked)
+    machine.run(cycles=offset + LINE_TCY)
+    return decode(bytes(machine.record.bytes[frame : frame + LINE_BYTES]), "rgb565")
+
+
+def offsets(step: int) -> Iterator[int]:
+    """Cycles of an instruction, or of a sleep, to be tried."""
+    yield from range(min(step, LONGEST_STEP))
+    yield from range(LONGEST_STEP, step, IDLE_STRIDE)
+
+
+def sweep(machine: Machine, picture: np.ndarray, stride: int, phase: int = 0) -> int:
+    """Try every `stride`-th cycle of a round, beginning with `phase`; returns how many. Fails with the cycle, program
+    address and pixels of the first line that is wrong."""
+    expected = expected_line(picture)
+    end = place(machine, "round_end")
+    cycle_number = tried = 0
+    while machine.pc != end:
+        chosen = -(cycle_number - phase) % stride < 2 * LONGEST_STEP  # more offsets than any step has
+        here, pc, before = machine.snapshot() if chosen else b"", machine.pc, machine.cycle
+        machine.step()
+        wanted = []
+        for offset in offsets(machine.cycle - before):
+            if cycle_number % stride == phase:
+                wanted.append(offset)
+            cycle_number += 1
+        if not wanted:
+            continue
+        after = machine.snapshot()
+        for offset in wanted if chosen else ():
+            seen = capture_at(machine, here, offset)
+            assert np.array_equal(seen, expected), f"pc {pc:#08x}, cycle {before}, HREF + {offset}:\n{seen}"
+            tried += 1
+        machine.restore(after)
+    assert machine.peek("failures") == 0
+    return tried
