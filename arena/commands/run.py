@@ -35,6 +35,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
     made.add_argument("--seed", type=int, default=1, help="of the first trial, then counted on (default 1)")
     made.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="worker processes")
+    made.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
+    )
     made.add_argument("--out", type=Path, metavar="FOLDER", help="default results/SCENE-BRAIN-CONTROLLER")
     made.add_argument("--json", action="store_true", help="results as JSON on standard output")
     return made
@@ -79,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     plan = Plan(scene, name, options.controller, image, options.trials, 60 * options.minutes, options.seed)
     folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"
     missing = open_folder(plan, folder, sys.argv)
-    faults = with_progress(plan, folder, missing, options.jobs)
+    faults = with_progress(plan, folder, missing, options.jobs, options.scheduler)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
     results = [summary(trial) for trial in trials_in(folder) if trial.path.name in wanted]
     if options.json:
@@ -109,8 +112,8 @@ def summary(trial: Trial) -> dict[str, Any]:
     }
 
 
-def with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int) -> bool:
-    """Run what is missing; true if a robot stopped."""
+def with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None) -> bool:
+    """Run what is missing, on workers here or on those of a Dask scheduler; true if a robot stopped."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"),
                TimeRemainingColumn())  # fmt: skip
@@ -136,5 +139,10 @@ def with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int) -> bo
                 stopped = True
                 console.print(f"trial {one.trial}: robot {robot} stopped at {seconds:.1f} s: {why}", markup=False)
 
-        run_all(plan, folder, missing, jobs, report, done)
+        if scheduler is not None and missing:
+            from arena.cluster import run_on
+
+            run_on(scheduler, plan, folder, missing, report, done)
+        else:
+            run_all(plan, folder, missing, jobs, report, done)
     return stopped
