@@ -36,6 +36,7 @@ FULL_VOLTS: Final = 4.2
 """epuck.md §6."""
 _STRIP_ROWS: Final = range(232, 249)
 """Rows of the whole picture that count as its middle."""
+_COLOURS: Final = COLOURS.astype(np.int16)
 _NOISE: Final = 1 << 14
 """Values of pixel noise drawn once per robot; each line of pixels starts at a random one."""
 
@@ -123,13 +124,13 @@ class EmulatedBrain:
     def _pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
         pose = extrapolated(self._before, self._pose, (cycle - self._start) / self._quantum)
         eye = Eye(self._scene, self._poses, self._robot, pose)
-        colours = COLOURS[eye.classes(y, columns)].astype(np.int16)
+        colours = _COLOURS[eye.classes(y, columns)]
         if self._scene.camera.vignetting:
             bright = eye.lens.vignetting(y, columns, self._scene.camera.vignetting)
             colours = np.rint(colours * bright[:, None]).astype(np.int16)
         first = int(self._rng.integers(_NOISE))
         noise = self._noise[first : first + 3 * len(columns)].reshape(-1, 3)
-        pixels: NDArray[np.uint8] = np.clip(colours + noise, 0, 255).astype(np.uint8)
+        pixels: NDArray[np.uint8] = np.minimum(np.maximum(colours + noise, 0), 255).astype(np.uint8)
         if y in _STRIP_ROWS:
             self._strip = columns, pixels
         return pixels

@@ -9,7 +9,7 @@ column: two ways to the same answer, compared in the tests. Lengths cm; rows and
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,32 +124,38 @@ class Eye:
 
     def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp]:
         """Classes of the pixels of one row in some columns."""
-        slopes, rise = self.lens.line(v, columns)
-        a = 1 + slopes * slopes
-        nearest = self._wall_depths(slopes)
-        z = bodies.CAMERA_HEIGHT + rise * nearest
-        seen = np.where(z < 0, FLOOR, np.where(z <= bodies.WALL_HEIGHT, WALL, ABOVE))
-        blocked = np.full(len(slopes), math.inf)
-        for ahead, left, radius, height, kind in self.within(float(slopes.min()), float(slopes.max())):
+        rays = self.lens.row(v, columns)
+        slopes, rise, a = rays.left, rays.up, rays.length2
+        near = np.minimum(self._wall_closeness(rays.basis), 1 / _NEAREST)
+        seen = np.where(rise < -bodies.CAMERA_HEIGHT * near, FLOOR, WALL)
+        seen[rise > (bodies.WALL_HEIGHT - bodies.CAMERA_HEIGHT) * near] = ABOVE
+        blocked: Any = math.inf
+        for ahead, left, radius, height, kind in self.within(rays.right_most, rays.left_most):
             b = ahead + slopes * left
             root = b * b - a * (ahead * ahead + left * left - radius * radius)
-            meets = (root > 0) & (b > 0)
-            depth = np.maximum((b - np.sqrt(np.where(meets, root, 0.0))) / a, _NEAREST)
+            meets = root > 0
+            depth = np.maximum((b - np.sqrt(np.maximum(root, 0.0))) / a, _NEAREST)
             z = bodies.CAMERA_HEIGHT + rise * depth
-            shows = meets & (depth * np.sqrt(a) <= self._range) & (z <= height) & (depth < blocked)
+            shows = meets & (b > 0) & (depth * rays.length <= self._range) & (z <= height) & (depth < blocked)
             seen[shows] = np.where(z < 0, FLOOR, kind)[shows]
-            blocked[shows] = depth[shows]
+            blocked = np.where(shows, depth, blocked)
         return seen
 
-    def _wall_depths(self, slopes: NDArray[np.float64]) -> NDArray[np.float64]:
-        east = self._cos - slopes * self._sin
-        north = self._sin + slopes * self._cos
-        with np.errstate(divide="ignore", invalid="ignore"):
-            to_x = np.where(east > 0, (self._width - self._x) / east, -self._x / east)
-            to_y = np.where(north > 0, (self._height - self._y) / north, -self._y / north)
-        to_x[east == 0] = math.inf
-        to_y[north == 0] = math.inf
-        return np.maximum(np.minimum(to_x, to_y), _NEAREST)
+    def _wall_closeness(self, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+        """1 / depth at which rays meet a wall: of the four, that with the largest; it is linear in the slope."""
+        cos, sin = self._cos, self._sin
+        right, top = 1 / max(self._width - self._x, _NEAREST), 1 / max(self._height - self._y, _NEAREST)
+        lower, bottom = -1 / max(self._x, _NEAREST), -1 / max(self._y, _NEAREST)
+        walls = np.array(
+            [
+                (cos * right, -sin * right),
+                (cos * lower, -sin * lower),
+                (sin * top, cos * top),
+                (sin * bottom, cos * bottom),
+            ]
+        )
+        closeness: NDArray[np.float64] = (walls @ basis).max(axis=0)
+        return closeness
 
 
 # -- the sensor of the clustering firmware (openswarm-original.md §8, revision A) ------------------------------------

@@ -237,10 +237,13 @@ class Pins:
         waving = self.waving[port]
         if not waving:
             return level
-        if cycle >= self.stands_until[port]:
-            self.standing[port] = self._with_waveforms(port, cycle, 0)
-            self.stands_until[port] = min(wave.stands_until(cycle) for _, wave in self._waveforms[port])
-        return level & ~waving | self.standing[port]
+        if cycle < self.stands_until[port]:
+            return level & ~waving | self.standing[port]
+        waved = self._with_waveforms(port, cycle, 0)
+        until = min(wave.stands_until(cycle) for _, wave in self._waveforms[port])
+        if until > cycle:
+            self.standing[port], self.stands_until[port] = waved, until
+        return level & ~waving | waved
 
     def apply(self, port: int, cycle: int, by_chip: bool = False) -> None:
         """Recompute a port's levels after any of the arrays changed; they hold from `cycle` on."""

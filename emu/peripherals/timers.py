@@ -30,6 +30,10 @@ class Timer(Counter):
         self._hold: Register | None = None
         self.period: Final = self.cell("period", "Q")
         """Tcy from one match to the next; 0 if the event is not simply periodic."""
+        self.clear_from: Final = self.moment("clear_from")
+        self.clear_until: Final = self.moment("clear_until")
+        self.clear_due: Final = self.moment("clear_due", NEVER)
+        """On a described clock: when the match comes if TMR is cleared in clear_from <= cycle < clear_until."""
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []
@@ -51,6 +55,7 @@ class Timer(Counter):
 
     def _plan(self, rewritten: bool = False) -> None:
         """Publish tick and period, and post the next match behind the current cycle."""
+        self.clear_until.value = 0
         source = self._source.value
         simple = source == TCY and not self.is_taken
         if simple:  # an empty prescaler lets native code compute the count from base and tick alone
@@ -100,6 +105,11 @@ class Timer(Counter):
         if self.period.value and lanes == 0xFFFF:
             self._replan_simply(0, new)
             return
+        if self._clears_as_foretold(new, lanes):
+            self.base.value = self.now + 1
+            self._before.value = self._phase.value = 0
+            self.events.set(self._match, self.clear_due.value)
+            return
         if self.is_taken:
             assert self.low is not None
             self.low.high_written(new, lanes)
@@ -115,6 +125,22 @@ class Timer(Counter):
         self._phase.value = 0
         self.base.value = self.now + 1
         self._plan(rewritten=True)
+
+    def _clears_as_foretold(self, new: int, lanes: int) -> bool:
+        """Whether `clear_due` answers this write. Native code asks the same (devices.py)."""
+        within = self.clear_from.value <= self.now < self.clear_until.value
+        return within and new == 0 and lanes == 0xFFFF and self.events.due(self._match) != self.now + 1
+
+    def _foretell(self, due: int) -> None:
+        """After a match on a described clock: firmware that counts lines clears TMR now."""
+        self.clear_until.value = 0
+        waveform = self.kit.pins.waveform(self._port, self._pin)
+        if waveform is None or self.is_wide or not self.limit or self._on_change:
+            return
+        edge = waveform.nth_rise(self._pin, due, self.limit * self._prescale)
+        self.clear_from.value = due
+        self.clear_until.value = waveform.nth_rise(self._pin, due, 1)
+        self.clear_due.value = NEVER if edge == NEVER else edge + 2
 
     def _replan_simply(self, old_limit: int, written: int | None) -> None:
         """PR or (`written`) TMR of a plain periodic timer changed: the same as below, without the rare cases."""
@@ -277,6 +303,8 @@ class Timer(Counter):
         source = self._source.value
         if source in (TCY, WAVE):
             self._post(due - 1)
+        if source == WAVE:
+            self._foretell(due)
         if self.tick.value and self.limit and not self._is_gated and not self._on_match:
             self.period.value = (self.limit + 1) * self.tick.value
 
@@ -296,6 +324,7 @@ class Timer(Counter):
 
     def freeze(self, cycle: int, mode: int) -> None:
         """Count what came before, so that only the remainder waits."""
+        self.clear_until.value = 0
         self._fold(max(cycle, self.base.value), self._prescale, self.limit)
         super().freeze(cycle, mode)
 

@@ -56,6 +56,11 @@ class TimerPlaces:
     period: int
     due: int
     deadline: int
+    before: int
+    phase: int
+    clear_from: int
+    clear_until: int
+    clear_due: int
     planners: tuple[int, ...]
     """Control registers of the devices that plan by this timer: while all are 0, nobody need be told of changes."""
 
@@ -80,12 +85,41 @@ class Count:
         t = self.timer
         if lanes != 0xFFFF:
             return False
+        if isinstance(value, int) and value == 0:
+            self._clear(b)
+            return True
         _guard_alone(b, t)
         tick, limit = _load(b, t.tick, 32), _load(b, t.pr, 16)
         b.guard((_load(b, t.period, 64) != 0) & (limit != 0))
         due = _load(b, t.due, 64)
         _replan(b, t, tick, limit, value & 0xFFFF, b.now + 1, due == b.now + 1)
         return True
+
+    def _clear(self, b: LlvmBuilder) -> None:
+        """Either a plain periodic timer, or one whose device has foretold what clearing leads to."""
+        t = self.timer
+        _guard_alone(b, t)
+        tick, limit, period = _load(b, t.tick, 32), _load(b, t.pr, 16), _load(b, t.period, 64)
+        plain = (period != 0) & (limit != 0)
+        due = _load(b, t.due, 64)
+        until = _load(b, t.clear_until, 64)
+        early = b.e.let(f"icmp ult i64 {wide(b.now)}, {until.text}", bit=True)
+        foretold = early & (_load(b, t.clear_from, 64) <= b.now) & (due != b.now + 1)
+        b.guard(plain | foretold)
+        stands = plain & (due == b.now + 1)
+        next_due = b.select(foretold, _load(b, t.clear_due, 64), b.now + 1 + limit * tick + 1)
+        next_due = b.select(stands, due, next_due)
+
+        def commit() -> None:
+            _store(b, t.tmr, 0, 16)
+            _store(b, t.base, b.now + 1, 64)
+            _store(b, t.before, b.select(foretold, 0, _load(b, t.before, 32)), 32)
+            _store(b, t.phase, b.select(foretold, 0, _load(b, t.phase, 16)), 16)
+            _store(b, t.period, b.select(foretold | stands, 0, (limit + 1) * tick), 64)
+            _post(b, t, next_due)
+
+        b.pending.stores.append(commit)
+        b.pending.replanned = True
 
 
 @dataclass(frozen=True)
@@ -136,12 +170,16 @@ def _replan(
         _store(b, t.tmr, start, 16)
         _store(b, t.base, base, 64)
         _store(b, t.period, b.select(stands, 0, (limit + 1) * tick), 64)
-        _store(b, t.due, due, 64)
-        deadline = _load(b, t.deadline, 64)
-        _store(b, t.deadline, b.e.let(f"call i64 @llvm.umin.i64(i64 {wide(deadline)}, i64 {wide(due)})"), 64)
+        _post(b, t, due)
 
     b.pending.stores.append(commit)
     b.pending.replanned = True
+
+
+def _post(b: LlvmBuilder, t: TimerPlaces, due: Number) -> None:
+    _store(b, t.due, due, 64)
+    deadline = _load(b, t.deadline, 64)
+    _store(b, t.deadline, b.e.let(f"call i64 @llvm.umin.i64(i64 {wide(deadline)}, i64 {wide(due)})"), 64)
 
 
 @dataclass(frozen=True)
@@ -299,6 +337,8 @@ def _timers(core: Core, registers: dict[int, NativeRegister]) -> None:
             sfrs[f"TMR{n}"].address, sfrs[f"PR{n}"].address, con.address, wide_bit, fields[f"t{n}.base"].offset,
             fields[f"t{n}.tick"].offset, fields[f"t{n}.period"].offset,
             fields["events.due"].offset + 8 * names.index(f"t{n}.match"), fields["events.deadline"].offset,
+            fields[f"t{n}.before"].offset, fields[f"t{n}.phase"].offset, fields[f"t{n}.clear_from"].offset,
+            fields[f"t{n}.clear_until"].offset, fields[f"t{n}.clear_due"].offset,
             planners if n in TIME_BASES else ())
         registers[places.tmr] = Count(places)
         registers[places.pr] = Period(places)

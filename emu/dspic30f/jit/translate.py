@@ -206,8 +206,10 @@ class Translator:
             self._check_retfie(flow)
         if isinstance(flow, Skip) and step.target is None:
             raise NeedsInterpreter
-        if self.exact and (b.pending.touches_sfr or isinstance(flow, Return)):  # an event within it would matter
-            b.guard(self.fits(row.cycles + 1))
+        if self.exact and b.pending.touches_sfr:  # an event up to the access would matter
+            b.guard(self.fits(row.cycles + stall))
+        elif self.exact and isinstance(flow, Return):  # one up to the second cycle would end it there
+            b.guard(self.fits(2 + stall))
         b.commit()
         cycles: Number = row.cycles + stall
         if b.pending.psv:
