@@ -1,4 +1,4 @@
-"""The command line: `python -m arena run | sweep | sensitivity | compare | plot | report | replay | scenes`.
+"""The command line: `python -m arena run | sweep | sensitivity | reaction | compare | plot | report | replay | scenes`.
 
 Exit status: 0 done; 1 a robot's firmware stopped in a trial; 2 bad input; 130 interrupted (finished trials are kept).
 """
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 import emu
-from arena.commands import compare, plot, replay, report, run, sensitivity, sweep
+from arena.commands import compare, plot, reaction, replay, report, run, sensitivity, sweep
 from arena.record import RecordError
 from arena.scene import SceneError, load_scene, scenes
 
@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
     "compare": (compare.parser, compare.run),
     "plot": (plot.parser, plot.run),
     "report": (report.parser, report.run),
+    "reaction": (reaction.parser, reaction.run),
     "replay": (replay.parser, replay.run),
 }
 

@@ -1,20 +1,24 @@
 """Robots with firmware in the world (docs/experiment.md)."""
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import emu
 from arena.brain import FIRST_LOOK_TCY, LATENCY_TCY, OK_AT_TCY, OK_DECODED_TCY, ScriptedBrain, switched_on
 from arena.campaign import SELECTOR
 from arena.cli import main
+from arena.commands.reaction import SPEED_WORDS, Show, reaction
 from arena.emulated import EmulatedBrain
 from arena.record import read_trial
 from arena.scene import FCY, Scene, load_scene
 from arena.trial import run_trial
 from arena.vision import WINDOW_ROWS
 from arena.world import World
+from emu.boards.epuck.board import Epuck
 
 AT_ONCE = 8
 """Selector bit with which the project's firmware does not wait for the remote control."""
@@ -157,3 +161,36 @@ def test_emulated_trials_are_the_same_for_one_and_two_workers(talking_image: Pat
     one, two = ({p.name: p.read_bytes() for p in (tmp_path / n).glob("*.parquet")} for n in "12")
     assert len(one) == 2
     assert one == two
+
+
+def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) -> None:
+    """experiment.md §4: what an independent look at the wheel's word finds for 5 frames, to the 5 us it polls at."""
+    found = reaction(clustering_image, SPEED_WORDS["openswarm"], 0, 10, 1)
+    assert found["frames_missed"] == 0
+    assert found["changes"] in (9, 10)
+    assert 50 < found["min_us"] <= found["median_us"] <= found["p99_us"] <= found["max_us"] < 1000
+
+    show = Show(1)
+    machine = emu.load(clustering_image, board=partial(Epuck, camera="PO6030K", selector=0, seed=1))
+    machine.board.remote.press("ok", cycle=OK_AT_TCY)
+    machine.board.camera.sample(show.pixels)
+    machine.run_until(2 * OK_AT_TCY)
+    waits, before = [], machine.peek("stepper_left")
+    while len(waits) < 5:
+        machine.run_until(machine.cycle + 10)
+        if machine.peek("stepper_left") != before:
+            before = machine.peek("stepper_left")
+            waits.append((machine.cycle - show.lines[-1]) / FCY * 1e6)
+    assert found["min_us"] - 6 <= min(waits) <= max(waits) <= found["max_us"] + 6
+
+
+def test_firmware_without_the_word_or_without_wheels_is_refused(
+    talking_image: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit status 2: which word, or that the firmware stopped."""
+    assert main(["reaction", "--brain", str(talking_image)]) == 2
+    assert "--word names the word" in capsys.readouterr().err
+    assert main(["reaction", "--brain", str(talking_image), "--word", "nothing"]) == 2
+    assert "no word 'nothing' to watch" in capsys.readouterr().err
+    assert main(["reaction", "--brain", str(talking_image), "--word", "PORTD"]) == 2
+    assert "the firmware stopped: fault" in capsys.readouterr().err

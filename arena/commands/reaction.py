@@ -1,0 +1,141 @@
+"""`arena reaction`: how long firmware takes from a frame to the wheels, and frames it misses (experiment.md §4)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import emu
+from arena.brain import OK_AT_TCY
+from arena.controllers import CONTROLLERS
+from arena.firmware import image_for
+from arena.scene import FCY
+from arena.vision import COLOURS, NOTHING, OBJECT, ROBOT
+from emu.boards.epuck.board import Epuck
+
+SPEED_WORDS: Final = {"openswarm": "stepper_left", "bare": "left.0"}
+"""The word in which the project's own applications keep how fast the left wheel is to turn; the compiler keeps a
+structure nobody points to in pieces."""
+POLL_TCY: Final = 74
+"""How often it is looked at: 5 us."""
+FRAME_TCY: Final = 1000
+"""How often it is looked whether the last line of a frame has come: less than its capture takes."""
+_ROWS: Final = 480
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options of the command."""
+    made = argparse.ArgumentParser(
+        description="measure the time from the last line of a frame to the new wheel speed, and missed frames",
+        epilog="example: arena reaction --brain openswarm --brain bare --frames 300",
+    )
+    made.add_argument("--brain", action="append", help="openswarm, bare, or an ELF file (default both of ours)")
+    made.add_argument("--word", metavar="SYMBOL", help="of other firmware: the word that holds the left wheel's speed")
+    made.add_argument("--controller", default="A", choices=sorted(CONTROLLERS))
+    made.add_argument("--frames", type=int, default=300, metavar="N")
+    made.add_argument("--seed", type=int, default=1)
+    made.add_argument("--json", action="store_true")
+    return made
+
+
+class Show:
+    """A picture that changes before every frame: all object, all robot or all wall, never twice the same."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._last_row = _ROWS
+        self.kind = NOTHING
+        self.frames = 0
+        """Frames of which a line was read."""
+        self.lines: list[int] = []
+        """Cycles at which HREF rose for the lines read of the present frame."""
+
+    def pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
+        """As `Camera.sample` wants it."""
+        if y <= self._last_row:
+            others = [kind for kind in (NOTHING, OBJECT, ROBOT) if kind != self.kind]
+            self.kind = others[int(self._rng.integers(2))]
+            self.frames += 1
+            self.lines = []
+        self._last_row = y
+        self.lines.append(cycle)
+        return np.tile(COLOURS[self.kind], (len(columns), 1))
+
+
+def reaction(image: Path, word: str, selector: int, frames: int, seed: int) -> dict[str, Any]:
+    """Latencies in us from the rise of the last line's HREF to the change of `word`; frames read and missed.
+
+    Raises emu.LoadError for an unusable image, ValueError if it has no such word or never moves.
+    """
+    machine = emu.load(image, board=partial(Epuck, camera="PO6030K", selector=selector, seed=seed))
+    machine.board.remote.press("ok", cycle=OK_AT_TCY)
+    show = Show(seed)
+    machine.board.camera.sample(show.pixels)
+    try:
+        machine.peek(word)
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{image}: no word {word!r} to watch: {error}") from None
+    _run(machine, 2 * OK_AT_TCY)
+    frame_tcy = machine.board.camera.scan.course.frame_tcy
+    begin, first = machine.cycle, show.frames
+    waits: list[float] = []
+    end = begin + frames * frame_tcy
+    lines = 0
+    while machine.cycle < end:
+        frame = show.frames
+        while machine.cycle < end and (show.frames == frame or len(show.lines) < lines):
+            _run(machine, machine.cycle + FRAME_TCY)
+        before = machine.peek(word)
+        while machine.cycle < end and machine.peek(word) == before:
+            _run(machine, machine.cycle + POLL_TCY)
+        if machine.cycle < end:
+            waits.append((machine.cycle - show.lines[-1]) / FCY * 1e6)
+            lines = len(show.lines)
+    if not waits:
+        raise ValueError(f"{image}: {word} never changes")
+    sent = (machine.cycle - begin) // frame_tcy
+    times = np.array(waits)
+    return {
+        "changes": len(waits),
+        "median_us": float(np.median(times)),
+        "p99_us": float(np.quantile(times, 0.99)),
+        "max_us": float(times.max()),
+        "min_us": float(times.min()),
+        "frames_sent": sent,
+        "frames_missed": max(sent - (show.frames - first), 0),
+    }
+
+
+def _run(machine: emu.Machine, cycle: int) -> None:
+    stop = machine.run_until(cycle)
+    if stop is not None:
+        raise ValueError(f"the firmware stopped: {stop.reason} at {stop.pc:#08x}: {stop.detail}")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Raises ValueError, LoadError."""
+    if options.frames < 1:
+        raise ValueError("--frames must be positive")
+    selector = 0 if options.controller == "A" else 1
+    results = {}
+    for brain in options.brain or list(SPEED_WORDS):
+        image, word = image_for(brain), options.word or SPEED_WORDS.get(brain)
+        if image is None:
+            raise ValueError(f"--brain {brain} has no firmware")
+        if word is None:
+            raise ValueError(f"--brain {brain}: --word names the word that holds the left wheel's speed")
+        results[Path(brain).stem] = reaction(image, word, selector, options.frames, options.seed)
+    if options.json:
+        print(json.dumps(results))
+        return 0
+    print("| | changes | median | 99 % | least | most | frames missed |\n|---|---|---|---|---|---|---|")
+    for name, one in results.items():
+        times = " | ".join(f"{one[key]:.0f} µs" for key in ("median_us", "p99_us", "min_us", "max_us"))
+        print(f"| {name} | {one['changes']} | {times} | {one['frames_missed']} of {one['frames_sent']} |")
+    return 0
