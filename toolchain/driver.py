@@ -40,6 +40,9 @@ def main(argv: list[str]) -> int:
                 _run(options, Path(scratch))
     except CompileError:
         return EXIT_C_ERRORS
+    except RecursionError:
+        print("error: types or expressions are nested too deeply", file=sys.stderr)
+        return EXIT_BAD_INPUT
     except ToolError as error:
         for finding in error.findings:
             print(finding if "error:" in finding else f"error: {finding}", file=sys.stderr)

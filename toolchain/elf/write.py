@@ -7,6 +7,7 @@ import struct
 from emu.elffacts import EXT_ATTR_PREFIX, OCTETS_PER_UNIT, SectionFlag
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Section, Symbol
+from toolchain.errors import ToolError
 
 
 class _Strings:
@@ -44,7 +45,9 @@ class _Writer:
         self, name: str, kind: int, flags: int, address: int, offset: int, size: int,
         *, link: int = 0, info: int = 0, align: int = 1, entry_size: int = 0,
     ) -> int:  # fmt: skip
-        """Add one section header, return its index."""
+        """Add one section header, return its index. Raises ToolError when there are more than ELF can number."""
+        if len(self.headers) >= c.SHN_LORESERVE:
+            raise ToolError(f"more than {c.SHN_LORESERVE - 1} sections: an ELF file cannot number them")
         self.headers.append(
             struct.pack(
                 "<10I",

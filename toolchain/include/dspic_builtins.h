@@ -21,6 +21,9 @@
 _Noreturn void __dspic_exit(int status) __asm__("exit");
 #define __builtin_exit __dspic_exit
 
+int __dspic_puts(const char *text) __asm__("puts");
+#define __builtin_puts __dspic_puts
+
 /* GCC's buffer is five words, ours ten: it holds the address of ours, which lives as long as the function does. */
 int __dspic_setjmp(unsigned int *environment) __asm__("setjmp") __attribute__((__returns_twice__));
 _Noreturn void __dspic_longjmp(unsigned int *environment, int value) __asm__("longjmp");

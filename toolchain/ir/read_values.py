@@ -272,10 +272,12 @@ def _narrow(bits64: int) -> int:
 def _fold_gep(c: Cursor, source: Type, args: list[Value]) -> Value:
     """Constant getelementptr: base plus a number of bytes."""
     base, offset, t = args[0], 0, source
+    symbolic: list[Value] = []
     for k, index in enumerate(args[1:]):
         if not isinstance(index, ConstInt):
-            raise c.error("constant getelementptr with a symbolic index")
-        if k == 0:
+            t = t.elems[0] if k else t
+            symbolic.append(ConstExpr(PTR, "mul", [index, ConstInt(PTR, size_of(t))]) if size_of(t) != 1 else index)
+        elif k == 0:
             offset += index.signed * size_of(t)
         elif t.kind == "struct":
             offset += struct_offsets(t)[index.value]
@@ -284,10 +286,14 @@ def _fold_gep(c: Cursor, source: Type, args: list[Value]) -> Value:
             t = t.elems[0]
             offset += index.signed * size_of(t)
     if isinstance(base, GlobalRef):
-        return GlobalRef(base.name, base.offset + offset)
-    if isinstance(base, ConstInt):
-        return ConstInt(PTR, base.value + offset)
-    return ConstExpr(PTR, "add", [base, ConstInt(PTR, offset)])
+        base = GlobalRef(base.name, base.offset + offset)
+    elif isinstance(base, ConstInt):
+        base = ConstInt(PTR, base.value + offset)
+    else:
+        base = ConstExpr(PTR, "add", [base, ConstInt(PTR, offset)])
+    for term in symbolic:
+        base = ConstExpr(PTR, "add", [base, term])
+    return base
 
 
 def _fold_cast(op: str, a: Value, t: Type) -> Value:

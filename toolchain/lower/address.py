@@ -58,14 +58,15 @@ class AddressSelector(ValueSelector):
             if base.name not in self.module.functions:
                 near = is_near(self.module, base.name)
                 constant = self._constant_global(base.name)
-                if near or (not byte and not constant):
+                odd = not byte and offset & 1  # a trap when it runs, but not an instruction that exists
+                if (near and not odd) or (not byte and not constant and not odd):
                     return File(self.address_expr(ref), near)
             r = self.temp()
             self.emit("mov", Imm(self.address_expr(ref)), r)
             return Mem("ind", r)
         if isinstance(base, ConstInt):
             at = base.value + offset & 0xFFFF
-            if at < 0x2000 or (not byte and not at & 1):
+            if (byte and at < 0x2000) or (not byte and not at & 1):
                 return File(f"0x{at:04X}", at < 0x2000)
             r = self.temp()
             self.load_imm(at, r)

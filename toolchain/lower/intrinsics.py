@@ -6,18 +6,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..ir.model import I1, I8, I16, I32, VOID, ConstInt, GlobalRef, Instr, UnsupportedError, Value, int_type
+from . import mathlib
 from .build import const, legal_type
 
 if TYPE_CHECKING:
     from .legalize import Legalizer
 
 Result = Value | list[Value] | None
-INLINE_COPY_BYTES = 2 * 0x4000  # REPEAT counts 14 bits (isa.md §5.7)
-LIBM = {
-    "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "exp2", "log", "log2",
-    "log10", "pow", "floor", "ceil", "trunc", "rint", "nearbyint", "round", "roundeven", "fma", "ldexp",
-}  # fmt: skip
-RENAMED = {"minnum": "fmin", "maxnum": "fmax", "minimumnum": "fmin", "maximumnum": "fmax"}
+INLINE_COPY_UNITS = 0x4000  # REPEAT counts 14 bits (isa.md §5.7)
 
 
 def expand(lz: Legalizer, i: Instr, name: str) -> Result:
@@ -26,12 +22,7 @@ def expand(lz: Legalizer, i: Instr, name: str) -> Result:
     for prefix, handler in FAMILIES:
         if base == prefix or base.startswith(prefix + "."):
             return handler(lz, i, base)
-    stem = base.split(".")[0]
-    if stem in LIBM or stem in RENAMED:
-        args = [lz.use(a) for a in i.args[:-1]]
-        suffix = "f" if i.type.bits == 32 else ""
-        return lz.b.call(RENAMED.get(stem, stem) + suffix, legal_type(i.type), args)
-    raise UnsupportedError(f"intrinsic {name}")
+    return mathlib.expand(lz, i, base)
 
 
 def _nothing(lz: Legalizer, i: Instr, name: str) -> Result:
@@ -212,24 +203,25 @@ def _memory(lz: Legalizer, i: Instr, name: str) -> Result:
     assert isinstance(attrs, list)
     if isinstance(size, ConstInt) and size.value == 0:
         return None
-    inline = isinstance(size, ConstInt) and size.value < INLINE_COPY_BYTES
+    even = lz.even(dst, attrs[0].get("align", 1))
+    if kind != "memset":
+        even = even and lz.even(src, attrs[1].get("align", 1))
+    unit = 2 if even and isinstance(size, ConstInt) and not size.value & 1 else 1
+    inline = isinstance(size, ConstInt) and size.value // unit <= INLINE_COPY_UNITS
     if kind == "memset":
         value = lz.b.cast("trunc", src, I8)
         if inline and isinstance(size, ConstInt):
-            _fill(lz, dst, value, size.value, lz.even(dst, attrs[0].get("align", 1)))
+            _fill(lz, dst, value, size.value, unit)
         else:
             lz.b.call("memset", I16, [dst, lz.b.cast("zext", value, I16), size])
     elif inline and kind == "memcpy" and isinstance(size, ConstInt):
-        even = lz.even(dst, attrs[0].get("align", 1)) and lz.even(src, attrs[1].get("align", 1))
-        unit = 2 if even and not size.value & 1 else 1
         lz.b.emit("blockcopy", VOID, [dst, src], count=size.value // unit, unit=unit)
     else:
         lz.b.call(kind if kind == "memcpy" else "memmove", I16, [dst, src, size])
     return None
 
 
-def _fill(lz: Legalizer, dst: Value, value: Value, size: int, even: bool) -> None:
-    unit = 2 if even and not size & 1 else 1
+def _fill(lz: Legalizer, dst: Value, value: Value, size: int, unit: int) -> None:
     if unit == 2:
         value = (
             const(I16, value.value * 0x101)
@@ -361,7 +353,7 @@ def _powi(lz: Legalizer, i: Instr, name: str) -> Result:
 
 FAMILIES: list[tuple[str, Callable[[Legalizer, Instr, str], Result]]] = [
     *((n, _nothing) for n in ("lifetime.start", "lifetime.end", "assume", "prefetch", "donothing", "va_end",
-      "invariant",
+      "invariant", "clear_cache",
                               "sideeffect", "experimental.noalias.scope.decl", "pseudoprobe", "fake.use")),
     *((n, _first) for n in ("expect", "annotation", "ptr.annotation", "launder.invariant.group", "ssa.copy",
                             "strip.invariant.group", "threadlocal.address", "preserve.array.access.index",

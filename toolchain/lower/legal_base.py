@@ -25,6 +25,7 @@ from ..ir.model import (
     size_of,
     struct_offsets,
 )
+from . import vectors
 from .build import Builder, const, legal_type
 from .lanes import Lane
 
@@ -126,6 +127,10 @@ class LegalizerBase:
             return [
                 self.use(x) if x.type.bits else y for x in v.elems for y in ([x] if x.type.bits else self.fields(x))
             ]
+        if isinstance(v, ConstExpr) and v.op == "bitcast" and v.type.kind == "vector":
+            lanes = vectors.bitcast(self, Instr("bitcast", v.type, v.args))
+            assert isinstance(lanes, list)
+            return lanes
         raise UnsupportedError(f"aggregate operand of type {v.type}")
 
     def extractvalue(self, i: Instr) -> Value | list[Value]:

@@ -71,6 +71,13 @@ class MemoryLegalizer(LegalizerBase):
         total = self.b.add(self.b.binary("mul", count, const(I16, size)), slack)
         return self.aligned(self.b.emit("dynalloca", I16, [total]), slack)
 
+    def frame_slot(self, size: int) -> Instr:
+        """Address of fresh bytes in the frame, wherever the code stands."""
+        slot = Instr("slot", I16, [])
+        slot.extra["size"] = size
+        self.blocks[0].instrs.insert(0, slot)
+        return slot
+
     def aligned(self, p: Value, align: int) -> Value:
         """The next multiple of `align` (0: as is); the stack itself is aligned to 2 only."""
         return self.b.binary("and", self.b.add(p, align - 1), const(I16, -align)) if align else p

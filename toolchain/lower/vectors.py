@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..ir.model import I16, VOID, ConstInt, Instr, Type, Undef, UnsupportedError, Value, int_type, size_of
+from ..ir.model import VOID, ConstInt, Instr, Type, Undef, UnsupportedError, Value, int_type, size_of
 from ..target import ARGUMENT_REGISTERS
 from .build import const, legal_type
 from .lanes import Lane
 
 if TYPE_CHECKING:
+    from .legal_base import LegalizerBase
     from .legalize import Legalizer
 
 OWN = frozenset(
@@ -93,7 +94,7 @@ def shufflevector(lz: Legalizer, i: Instr) -> list[Value]:
     return out
 
 
-def bitcast(lz: Legalizer, i: Instr) -> Value | list[Value]:
+def bitcast(lz: LegalizerBase, i: Instr) -> Value | list[Value]:
     """Vector to integer, integer to vector, or between vectors: bit by bit, first lane lowest."""
     source = i.args[0]
     if source.type.kind == "vector" and i.type.kind == "vector":
@@ -102,7 +103,7 @@ def bitcast(lz: Legalizer, i: Instr) -> Value | list[Value]:
     return whole if i.type.kind != "vector" else unpack(lz, whole, i.type)
 
 
-def _regroup(lz: Legalizer, parts: list[Value], old: Type, new: Type) -> list[Value]:
+def _regroup(lz: LegalizerBase, parts: list[Value], old: Type, new: Type) -> list[Value]:
     """Lanes of another width from the same bits."""
     have, want = old.elems[0].bits, new.elems[0].bits
     lane = legal_type(new.elems[0])
@@ -124,9 +125,7 @@ def is_wide(t: Type) -> bool:
 
 def call(lz: Legalizer, i: Instr, args: list[Value], attrs: list[object]) -> list[Value]:
     """A call whose result is wide: the address of a slot goes first, as for a struct (abi-elf.md §2.2 rule 7)."""
-    slot = Instr("slot", I16, [])
-    slot.extra["size"] = size_of(i.type)
-    lz.blocks[0].instrs.insert(0, slot)
+    slot = lz.frame_slot(size_of(i.type))
     new = lz.b.emit("call", VOID, [slot, *args, lz.use(i.args[-1])])
     new.extra = {"attrs": [{}, *attrs], "vararg": i.extra["vararg"], "fixed": i.extra["fixed"], "tail": None}
     return lz.load_aggregate(i.type, slot, 2, False)
@@ -140,18 +139,18 @@ def packed_type(t: Type) -> Type:
     return legal_type(int_type(bits))
 
 
-def unpack(lz: Legalizer, whole: Value, t: Type) -> list[Value]:
+def unpack(lz: LegalizerBase, whole: Value, t: Type) -> list[Value]:
     """Lanes of a vector held in one integer."""
     lane = t.elems[0]
     return [lz.b.cast("trunc", lz.b.shift("lshr", whole, k * lane.bits), legal_type(lane)) for k in range(t.count)]
 
 
-def pack(lz: Legalizer, v: Value) -> Value:
+def pack(lz: LegalizerBase, v: Value) -> Value:
     """A vector as one integer, first lane lowest."""
     return _joined(lz, lz.fields(v), v.type.elems[0].bits, packed_type(v.type))
 
 
-def _joined(lz: Legalizer, parts: list[Value], bits: int, t: Type) -> Value:
+def _joined(lz: LegalizerBase, parts: list[Value], bits: int, t: Type) -> Value:
     whole: Value = const(t, 0)
     for k, part in enumerate(parts):
         wide = lz.b.shift("shl", lz.b.cast("zext", part, t), k * bits) if t.bits > part.type.bits else part
