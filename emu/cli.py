@@ -20,6 +20,7 @@ COMMANDS: Final = {
     "disasm": "print a firmware image as assembly with symbols and source lines",
     "info": "print sections, memory use, vectors and configuration words",
     "footprint": "print what a firmware image costs in ROM and RAM; fit the kernel's memory equation",
+    "profile": "print the CPU load by function and interrupt level in percent, from exact cycles",
     "cycles": "measure the kernel's operations in exact cycles; check them against a baseline",
 }
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from emu.boards.picture import write_picture
+from emu.cli import main
 from emu.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.sights import capture_at, expected_line, start, sweep
@@ -28,6 +32,26 @@ def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
     state, expected = machine.snapshot(), expected_line(noise())
     assert np.array_equal(capture_at(machine, state, 0), expected)
     assert not np.array_equal(capture_at(machine, state, 0, masked=8), expected)
+
+
+def test_cpu_load_of_capture_and_classification_is_printed(image: Build, capsys, tmp_path) -> None:
+    """Issue 6, Must show 1: in percent, from exact cycles. A frame of 1,600,000 Tcy is 20 lines of some 658 Tcy and VSYNC's
+    interrupt; the scene that costs the classifier most is the one without red: all 24 pixels are looked at."""
+    white = tmp_path / "white.png"
+    write_picture(str(white), plain(SCENES["nothing"]), 1)
+    groups = ["--group", "capture=__T[45]Interrupt", "--group", "classification=*/line_of_sight.c"]
+    command = ["profile", str(image("clustering")), "--selector", "8", "--camera", str(white), *groups]
+    assert main([*command, "--skip", "0.5", "--seconds", "0.1085069445", "--json"]) == 0  # one frame
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["cycles"] == pytest.approx(FRAME_TCY, abs=2)
+    assert facts["idle"]["cycles"] + sum(part["cycles"] for part in facts["files"].values()) == facts["cycles"]
+    assert sum(part["cycles"] for part in facts["levels"].values()) == facts["busy"]["cycles"]
+    capture, classification = facts["groups"]["capture"], facts["groups"]["classification"]
+    assert 20 * 658 <= capture["cycles"] <= 20 * (658 + 10) + 20
+    assert capture["percent"] == pytest.approx(0.83, abs=0.01)
+    assert 24 * 20 <= classification["cycles"] <= 24 * 120
+    assert main([*command[:2], "--seconds", "0.01", "--group", "x=nothing_like_it"]) == 2
+    assert "nothing_like_it" in capsys.readouterr().err
 
 
 # -- line of sight -----------------------------------------------------------------------------------------------------

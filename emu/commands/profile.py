@@ -1,0 +1,112 @@
+"""`emu profile`: CPU load in percent from exact cycles, by function, interrupt level and named group."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from fractions import Fraction
+from typing import Any, Final
+
+from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
+from emu.commands.board_options import add_board_options, board_of, set_up
+from emu.faults import fault_of
+from emu.loader import load_image
+from emu.profile import Profile, Profiler
+
+DESCRIPTION: Final = """\
+Run a firmware image and print what share of the CPU each function and interrupt level takes.
+
+Every cycle is counted, none is sampled: the shares and the idle time add up to 100 %. Entering an interrupt counts for
+its handler. --group adds up code by function or source file (shell patterns) under a name of yours; inlined code keeps
+its file:
+
+    --group "capture=__T[45]Interrupt" --group "vision=*/line_of_sight.c"
+
+Exit status: 0 done, 1 firmware fault (what was counted is printed), 2 bad input."""
+
+
+def parser() -> Parser:
+    example = "emu profile firmware.elf --selector 8 --camera room.png --skip 1 --seconds 2 --group 'capture=__T[45]*'"
+    made = Parser("profile", DESCRIPTION, example)
+    made.add_argument("image", metavar="IMAGE", help="ELF executable")
+    made.add_argument(
+        "--skip", metavar="S", type=seconds, default=Fraction(0), help="simulated time before (default 0)"
+    )
+    made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
+    made.add_argument("--group", metavar="NAME=PATTERN,...", action="append", default=[], type=_group, help="see above")
+    made.add_argument("--top", metavar="N", type=int, default=20, help="functions to print (default 20; 0: all)")
+    made.add_argument("--json", action="store_true", help="print one JSON object: cycles and percent")
+    add_board_options(made)
+    return made
+
+
+def _group(text: str) -> tuple[str, list[str]]:
+    name, _, patterns = text.partition("=")
+    if not name or not patterns:
+        raise argparse.ArgumentTypeError(f"expected NAME=PATTERN,PATTERN..., not {text!r}")
+    return name, patterns.split(",")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says."""
+    from emu.machine import Machine
+
+    image = load_image(options.image)
+    machine = Machine(image.chip, board=board_of(options))
+    machine.load(image)
+    set_up(machine, options)
+    fcy = Fraction(machine.peripherals.fcy)
+    if options.skip:
+        machine.run_until(int(options.skip * fcy))
+    profile = Profiler(machine, image).run(machine.cycle + max(1, int(options.seconds * fcy)))
+    _check_groups(profile, options.group)
+    fault = fault_of(machine, image, profile.stop) if profile.stop is not None else None
+    if options.json:
+        print(json.dumps(_facts(profile, options.group), indent=2))
+    else:
+        _print(profile, options)
+    return EXIT_FAULT if fault is not None else EXIT_OK
+
+
+def _check_groups(profile: Profile, groups: list[tuple[str, list[str]]]) -> None:
+    """A pattern that fits nothing is a misspelling more often than a function that did not run."""
+    for name, patterns in groups:
+        for pattern in patterns:
+            if not profile.matched(pattern):
+                raise CommandError(f"--group {name}: nothing that ran has a function or file like {pattern!r}")
+
+
+def _percent(profile: Profile, cycles: int) -> float:
+    return 100 * cycles / profile.cycles if profile.cycles else 0.0
+
+
+def _facts(profile: Profile, groups: list[tuple[str, list[str]]]) -> dict[str, Any]:
+    def share(cycles: int) -> dict[str, Any]:
+        return {"cycles": cycles, "percent": _percent(profile, cycles)}
+
+    return {
+        "cycles": profile.cycles,
+        "idle": share(profile.idle),
+        "busy": share(profile.busy),
+        "groups": {name: share(profile.group(patterns)) for name, patterns in groups},
+        "levels": {str(level): share(cycles) for level, cycles in sorted(profile.levels.items())},
+        "files": {name: share(cycles) for name, cycles in profile.files.most_common()},
+        "functions": {name: share(cycles) for name, cycles in profile.functions.most_common()},
+    }
+
+
+def _print(profile: Profile, options: argparse.Namespace) -> None:
+    def line(name: str, cycles: int) -> None:
+        print(f"{name:32} {cycles:14,} cycles {_percent(profile, cycles):9.4f} %")
+
+    line("all", profile.cycles)
+    line("idle", profile.idle)
+    line("busy", profile.busy)
+    for name, patterns in options.group:
+        line(name, profile.group(patterns))
+    print()
+    for level, cycles in sorted(profile.levels.items()):
+        line(f"level {level}", cycles)
+    print()
+    for name, cycles in profile.functions.most_common(options.top or None):
+        line(name, cycles)
