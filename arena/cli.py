@@ -6,6 +6,7 @@ Exit status: 0 done; 1 a robot's firmware stopped in a trial; 2 bad input; 130 i
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 
@@ -45,8 +46,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "scenes":
             for name in scenes():
                 print(f"{name:20} {load_scene(name).description}")
-            return 0
-        return COMMANDS[options.command][1](options)
+            status = 0
+        else:
+            status = COMMANDS[options.command][1](options)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
+        return 0
     except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
         print(f"arena: {error}", file=sys.stderr)
         return BAD_INPUT

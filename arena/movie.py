@@ -18,7 +18,7 @@ from PIL import Image, ImageDraw
 from arena import bodies
 from arena.brain import STRIP_PIXELS
 from arena.page import samples_of
-from arena.record import RecordError, Trial
+from arena.record import RecordError, Trial, reason_of
 
 SCALE: Final = 1.6
 """Pixels per cm."""
@@ -54,7 +54,7 @@ def write_movie(trial: Trial, path: Path, speed: float, seconds: float | None = 
             _mp4(pictures, part)
         os.replace(part, path)
     except OSError as error:
-        raise RecordError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None
     finally:
         with suppress(OSError):
             part.unlink()

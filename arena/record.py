@@ -72,7 +72,12 @@ def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
     except OSError as error:
         with suppress(OSError):
             part.unlink()
-        raise RecordError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None
+
+
+def reason_of(error: OSError) -> str:
+    """The system's words; libraries add theirs."""
+    return os.strerror(error.errno) if error.errno else str(error)
 
 
 def kind_of(column: str) -> pa.DataType:
@@ -128,4 +133,4 @@ def write_bytes(path: Path, data: bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             part.unlink()
-        raise RecordError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from arena import plots
-from arena.record import trials_in
+from arena import film, plots
+from arena.record import Trial, trials_in
 
 
 def parser() -> argparse.ArgumentParser:
@@ -17,6 +17,8 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
     made.add_argument("--out", type=Path, default=Path("figures"), metavar="FOLDER")
+    made.add_argument("--film", type=int, metavar="ROBOT", help="draw what one robot of the first trial saw and did, "
+                      "and print it as a log, instead")  # fmt: skip
     made.add_argument("--format", default="png", choices=("png", "svg", "pdf"))
     return made
 
@@ -25,6 +27,20 @@ def run(options: argparse.Namespace) -> int:
     """Write the figures and name them. Raises RecordError, OSError."""
     runs = {folder.name: trials_in(folder) for folder in options.runs}
     options.out.mkdir(parents=True, exist_ok=True)
+    if options.film is not None:
+        return _film(runs, options)
     for path in plots.draw_all(runs, options.out, options.format):
+        print(path)
+    return 0
+
+
+def _film(runs: dict[str, list[Trial]], options: argparse.Namespace) -> int:
+    for name, trials in runs.items():
+        robots = int(trials[0].about["scene"]["robots"]["count"])
+        if not 0 <= options.film < robots:
+            raise ValueError(f"--film {options.film}: {name} has robots 0 to {robots - 1}")
+        path = options.out / f"{name}-film.{options.format}"
+        film.film(trials[0], options.film).savefig(path, dpi=100)
+        print("\n".join(film.log(trials[0], options.film)))
         print(path)
     return 0

@@ -1,6 +1,10 @@
 """The command line: same bytes for any number of workers, resuming, bad input (docs/experiment.md)."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -219,3 +223,73 @@ def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.Cap
     assert trial.about["controller"] == "B"
     assert main([*command[:-4], "--controllers", "AC"]) == 2
     assert "expected some of AB" in capsys.readouterr().err
+
+
+def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Issue "Must show" 7: the second of three trials cannot be written; with room again the run goes on."""
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    part = tmp_path / "trial-0002.parquet.part"
+    part.symlink_to("/dev/full")
+    assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 2
+    assert "trial-0002.parquet: cannot be written: No space left" in " ".join(capsys.readouterr().err.split())
+    assert list(contents(tmp_path)) == ["trial-0001.parquet"]
+    assert not part.is_symlink()
+    assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 0
+    assert len(contents(tmp_path)) == 3
+
+
+@pytest.mark.parametrize("arguments", [["scenes"], ["sensitivity", "--help"], ["run", "--help"]])
+def test_a_reader_that_goes_away_is_no_failure(arguments: list[str]) -> None:
+    """As in `arena scenes | head -0`: no traceback, no message, exit status 0."""
+    command = [sys.executable, "-c", "import time; time.sleep(1); from arena.cli import main; import sys;"
+               f"sys.exit(main({arguments!r}))"]  # fmt: skip
+    root = Path(__file__).resolve().parents[2]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        said = process.stderr.read()
+    assert (process.returncode, said) == (0, b"")
+
+
+def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_path: Path) -> None:
+    """Issue "Must show" 5: SIGINT while trials run; the same command goes on and gives the bytes of one go."""
+    command = ["run", "clustering", "--brain", "scripted", "--trials", "3", "--minutes", "1"]
+    arguments = [*command, "--jobs", "1", "--out", str(tmp_path / "a")]
+    code = f"import sys; from arena.cli import main; sys.exit(main({arguments!r}))"
+    root = Path(__file__).resolve().parents[2]
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE, cwd=root) as process:
+        assert process.stderr is not None
+        deadline = time.monotonic() + 60
+        while not (tmp_path / "a" / "trial-0001.parquet").exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        said = process.stderr.read().decode()
+    assert process.returncode == 130
+    assert "finished trials are kept" in said
+    assert 1 <= len(contents(tmp_path / "a")) < 3
+    stamp = (tmp_path / "a" / "trial-0001.parquet").stat().st_mtime_ns
+    for name in "ab":
+        assert main([*command, "--jobs", "2", "--out", str(tmp_path / name)]) == 0
+    assert contents(tmp_path / "a") == contents(tmp_path / "b")
+    assert (tmp_path / "a" / "trial-0001.parquet").stat().st_mtime_ns == stamp
+
+
+def test_a_film_of_one_robot_is_drawn_and_logged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Issue "Must show" 1, the picture: changes of the wheels in time, and only robots there are."""
+    run("--trials", 1, "--jobs", 1, "--set", "clock.sample_s=0.1", "--out", tmp_path / "run")
+    capsys.readouterr()
+    assert main(["plot", str(tmp_path / "run"), "--film", "0", "--out", str(tmp_path)]) == 0
+    *lines, name = capsys.readouterr().out.splitlines()
+    assert Path(name).stat().st_size > 5000
+    assert "wheels    0    0 mm/s" in lines[0]
+    assert len(lines) > 2
+    times = [float(line.split()[0]) for line in lines]
+    assert times == sorted(times)
+    assert times[1] > 1.0  # the remote control's OK
+    assert main(["plot", str(tmp_path / "run"), "--film", "5", "--out", str(tmp_path)]) == 2
+    assert "has robots 0 to 4" in capsys.readouterr().err
