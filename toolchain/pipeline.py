@@ -33,7 +33,7 @@ from .lower import (
 from .lower.debuginfo import DebugInfo
 from .lower.dwarf import DwarfWriter, FunctionInfo
 from .lower.mir import MFunction
-from .lower.names import symbol
+from .lower.names import block_label, symbol
 from .lower.variables import Ranges
 
 
@@ -274,6 +274,8 @@ class ModuleCompiler:
         ranges = Ranges(str(self.serial))
         emitter = emit.Emitter(c.m, str(self.serial), False)
         self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges)
+        gone = c.taken - {b.name for b in c.m.blocks}  # nothing jumps there, but their addresses are still values
+        self.lines += [f"{block_label(f.name, block)}:" for block in sorted(gone)]
         self.lines.append(f"\t.size {name},.-{name}")
         if rows is not None and f.dbg is not None:
             end = f".Lend{self.serial}"
