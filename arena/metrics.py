@@ -98,6 +98,11 @@ class Course:
         """A value at the last sample not after `seconds`, give or take half of the longest quantum."""
         return float(values[max(int(np.searchsorted(self.times, seconds + HALF_QUANTUM_S)) - 1, 0)])
 
+    def until(self, seconds: float) -> Course:
+        """The same up to `seconds`."""
+        count = int(np.searchsorted(self.times, seconds + HALF_QUANTUM_S))
+        return Course(self.times[:count], self.share[:count], self.share_12cm[:count], self.compactness[:count])
+
     @property
     def area(self) -> float:
         """Mean of the compactness over the trial's time: the area under u(t) divided by its length."""

@@ -60,7 +60,7 @@ def _runs_table(group: Mapping[str, list[Trial]], host_s: Mapping[str, float], a
         shares = [
             _spread([one.at(at, one.share) for one in done]),
             _spread([one.at(at, one.share_12cm) for one in done]),
-            _spread([float(one.share[-1]) for one in done]),
+            f"{_spread([float(one.share[-1]) for one in done])} at {min(one.times[-1] for one in done):.0f} s",
             _spread([one.area for one in done]),
         ]
         times = [time_to(one.times, one.share, 0.8) for one in done]

@@ -46,7 +46,8 @@ def courses(trials: list[Trial]) -> dict[int, tuple[Trial, Course]]:
 
 
 def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, Any]:
-    """All measures. Raises ValueError for fewer than two seeds in common or trials shorter than `at`."""
+    """All measures, over the time of the shortest trial. Raises ValueError for fewer than two seeds in common or trials
+    shorter than `at`."""
     ones, others = courses(first), courses(second)
     seeds = sorted(set(ones) & set(others))
     if len(seeds) < 2:
@@ -54,7 +55,7 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
     end = min(one.times[-1] for _, one in [*ones.values(), *others.values()])
     if end < at - NEAR_S:
         raise ValueError(f"the shortest trial lasts {end:g} s, less than --at {at:g}")
-    pairs = [(ones[seed], others[seed]) for seed in seeds]
+    pairs = [tuple((trial, one.until(end)) for trial, one in (ones[seed], others[seed])) for seed in seeds]
 
     def both(value: Any) -> tuple[Values, Values]:
         return (np.array([value(*one) for one, _ in pairs]), np.array([value(*other) for _, other in pairs]))
@@ -67,7 +68,7 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
         f"share at {at:g} s": (both(lambda _t, one: one.at(at, one.share)), MARGIN_SHARE),
         f"share at {at:g} s, 12 cm rule": (both(lambda _t, one: one.at(at, one.share_12cm)), MARGIN_SHARE),
         "mean compactness": (both(lambda _t, one: one.area), None),
-        "time to 80 % (s, end of trial if never)": (both(until_80), None),
+        "time to 80 % (s, the end if never)": (both(until_80), None),
     }
     rows = []
     for name, ((x, y), margin) in measures.items():

@@ -104,3 +104,12 @@ def test_the_pairs_needed_are_those_of_the_plan() -> None:
     assert pairs_needed(0.25 * 2**0.5, 0.1) == pytest.approx(107, abs=1)
     assert pairs_needed(0.06 * 2**0.5, 0.1) == 7
     assert pairs_needed(0.0, 0.1) == 2
+
+
+def test_a_course_can_be_cut() -> None:
+    """Runs of unequal length are compared over the time they have in common."""
+    places = np.array([[(0, 0), (100, 0)], [(0, 0), (60, 0)], [(0, 0), (10, 0)]], float)
+    done = course(np.array([0.0, 1.001, 2.0]), places, R)
+    assert done.until(1.0).times.tolist() == [0.0, 1.001]
+    assert done.until(1.0).share.tolist() == [0.5, 0.5]
+    assert done.until(9.0).area == done.area
