@@ -113,9 +113,9 @@ class EmulatedBrain:
         self._ring.move(poses)
 
     def _speeds(self) -> tuple[float, float]:
-        motors = self._board.motors
-        self._counts.append((motors.left.steps, motors.right.steps))
-        (left0, right0), (left, right) = self._counts[0], self._counts[-1]
+        left, right = self._board.motors.steps()
+        self._counts.append((left, right))
+        left0, right0 = self._counts[0]
         rate = bodies.CM_PER_STEP * FCY / (self._quantum * (len(self._counts) - 1))
         return (left - left0) * rate, (right - right0) * rate
 

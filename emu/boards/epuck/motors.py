@@ -135,3 +135,7 @@ class Motors:
     def __init__(self, chip: Peripherals) -> None:
         self.left: Final = Stepper("motor.left", chip, 0, -1)
         self.right: Final = Stepper("motor.right", chip, 4, 1)
+
+    def steps(self) -> tuple[int, int]:
+        """Steps of both made so far (left, right)."""
+        return self.left.steps, self.right.steps

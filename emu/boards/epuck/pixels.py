@@ -69,10 +69,13 @@ def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image[rows][:, columns, :3], dtype=np.uint8)
 
 
+_RGB565_LOST: Final = np.array([3, 2, 3], dtype=np.int32)
+_RGB565_PLACE: Final = np.array([1 << 11, 1 << 5, 1], dtype=np.int32)
+
+
 def _rgb565(pixels: NDArray[np.int32]) -> bytes:
     """High byte first: R4..R0 G5..G3, G2..G0 B4..B0 (§7.4)."""
-    red, green, blue = pixels[:, 0], pixels[:, 1], pixels[:, 2]
-    return ((red >> 3) << 11 | (green >> 2) << 5 | blue >> 3).astype(">u2").tobytes()
+    return ((pixels >> _RGB565_LOST) @ _RGB565_PLACE).astype(">u2").tobytes()
 
 
 def _from_rgb565(data: NDArray[np.uint8]) -> Pixels:

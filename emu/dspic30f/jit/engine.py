@@ -26,7 +26,7 @@ from emu.dspic30f.jit.region import discover
 from emu.dspic30f.jit.runtime import BLOCKS, BOUNDARY, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import Translator
-from emu.dspic30f.state import DA, NOT_REPEATING
+from emu.dspic30f.state import DA, NOT_REPEATING, RUN
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM effort for blocks and for single-step code."""
@@ -154,8 +154,13 @@ class JitEngine:
         env = self._env
         env[LIMIT] = min(limit, state.cycle + NATIVE_CYCLES)
         env[BOUNDARY] = 1
-        start = state.cycle
+        start = before = state.cycle
         why = self._native(self._core.record.address, self._env_address)
+        while why == SERVICE and before != state.cycle < limit:  # most often some device's event is due
+            before = state.cycle
+            self._core.events.fire_until(before if state.mode != RUN else before - 1)
+            why = self._native(self._core.record.address, self._env_address)
+            self.counts.runs += 1
         env[BOUNDARY] = 0
         self.counts.runs += 1
         if why == INTERPRET and not (self._hooks and state.pc in self._hooks):
