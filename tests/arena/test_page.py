@@ -5,11 +5,13 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from arena.cli import main
+from arena.page import page
 from arena.record import read_trial
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -56,8 +58,6 @@ def test_the_page_holds_the_file_and_loads_nothing_from_elsewhere(trial: Path) -
 
 def test_text_from_robots_cannot_end_the_page(trial: Path) -> None:
     """A firmware may say anything."""
-    from arena.page import page
-
     record = read_trial(trial)
     record.columns["log"][0] = [{"robot": 0, "cycle": 1, "text": "</script><b>"}]
     assert page(record).count("</script>") == 2
@@ -67,15 +67,7 @@ def test_text_from_robots_cannot_end_the_page(trial: Path) -> None:
 def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Path) -> None:
     """Issue "Must show" 6."""
     main(["replay", str(trial)])
-    page = trial.with_suffix(".html")
-    probed = tmp_path / "probed.html"
-    probed.write_text(page.read_text().replace("</html>", PROBE % SAMPLE))
-    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
-               "--virtual-time-budget=4000", "--dump-dom", probed.as_uri()]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    match = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.S)
-    assert match is not None, done.stderr[-2000:]
-    found = json.loads(match.group(1).replace("&amp;", "&"))
+    found = browsed(trial.with_suffix(".html").read_text().replace("</html>", PROBE % SAMPLE), tmp_path)
     record = read_trial(trial)
     assert (found["before"], found["samples"]) == (0, len(record.times))
     assert found["scrubbed"] == SAMPLE
@@ -87,3 +79,47 @@ def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Pat
     assert found["playing"] == "Pause"
     assert found["after"] == len(record.times) - 1
     assert found["end"] == "Play"
+
+
+SHOWN = """<pre id="result"></pre><script>
+show(%d);
+const at = (c, x, y) => [...c.getImageData(Math.round(x), Math.round(y), 1, 1).data].slice(0, 3);
+const r = d.robots[0], a = r.heading[sample], ahead = d.robotRadius + 1.5;
+document.getElementById("result").textContent = JSON.stringify({
+  log: document.getElementById("log").textContent,
+  strip: [0, 10, 19].map(p => at(h, 20 + p * STRIP_PIXEL + 5, 7)),
+  front: at(g, X(r.x[sample] + ahead * Math.cos(a)), Y(r.y[sample] + ahead * Math.sin(a))),
+  later: lit(0), seen: d.robots.map(r => r.seen[sample])});
+</script></html>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Path) -> None:
+    """A robot blinks its front LED within a sample and says a line; its camera's line has three colours."""
+    record = read_trial(trial)
+    record.columns["log"][SAMPLE] = [{"robot": 0, "cycle": 49_152_000, "text": "hello"}]
+    record.columns["lights"][SAMPLE] = [{"robot": 0, "cycle": 49_152_001, "leds": 256},
+                                        {"robot": 0, "cycle": 49_153_000, "leds": 0}]  # fmt: skip
+    record.columns["r0_strip"][SAMPLE] = bytes([90, 14, 14] * 10 + [10, 48, 14] * 5 + [112, 100, 100] * 5)
+    record.columns["r0_seen"] = np.full(len(record.times), -1)
+    found = browsed(page(record).replace("</html>", SHOWN % SAMPLE), tmp_path)
+    assert found["strip"] == [[90, 14, 14], [10, 48, 14], [112, 100, 100]]
+    assert found["later"] == 256
+    assert found["front"] == pytest.approx([255, 187, 0], abs=20)  # the disc's edge is smoothed
+    lines = found["log"].splitlines()
+    assert lines[0].endswith("robot 0  LEDs off")
+    assert lines[1].endswith("robot 0  LEDs front")
+    assert lines[2] == "3.333 s  robot 0  hello"
+    assert found["seen"][0] in (0, 1, 2)  # shown what stands before it
+
+
+def browsed(text: str, folder: Path) -> Any:
+    """What a page that ends in a probe found out."""
+    path = folder / "probed.html"
+    path.write_text(text)
+    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}",
+               "--virtual-time-budget=4000", "--dump-dom", path.as_uri()]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    match = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.S)
+    assert match is not None, done.stderr[-2000:]
+    return json.loads(match.group(1).replace("&amp;", "&"))
