@@ -62,6 +62,7 @@ class EmulatedBrain:
         self.machine = emu.load(image, board=board)
         self._board: Epuck = self.machine.board
         assert self._board.camera is not None
+        self._board.camera.lamp = scene.light.brightness
         self._board.camera.sample(self._pixels)
         self._board.remote.press("ok", cycle=OK_AT_TCY - self._on_at)
         self.machine.uart[1].on_byte = self._byte

@@ -88,9 +88,10 @@ class InfraredSetting:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """Raw counts of the infrared sensors in the dark of the room (falling with light), and what a lamp takes off at 1 m
-    from a sensor that faces it; 0 = no lamp."""
+    """`brightness` of the scene for cameras, 1 = as their colours say. For infrared sensors: raw counts in the room
+    (falling with light), and what a lamp takes off at 1 m from a sensor that faces it; 0 = no lamp."""
 
+    brightness: float = 1.0
     ambient_counts: int = 3800
     lamp_x_cm: float = 0.0
     lamp_y_cm: float = 0.0
@@ -249,6 +250,7 @@ def _checked(scene: Scene, path: str) -> Scene:
         "infrared.wall_share": (scene.infrared.wall_share, 0, 1),
         "infrared.object_share": (scene.infrared.object_share, 0, 1),
         "infrared.robot_share": (scene.infrared.robot_share, 0, 1),
+        "light.brightness": (scene.light.brightness, 0, 100),
         "light.ambient_counts": (scene.light.ambient_counts, 0, 4095),
         "light.lamp_counts": (scene.light.lamp_counts, 0, 1_000_000),
         "battery.volts": (scene.battery.volts, 3.0, 4.2),

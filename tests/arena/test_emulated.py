@@ -153,14 +153,28 @@ def test_a_robot_whose_firmware_traps_stops_and_the_trial_goes_on(
     assert "robot 1 stopped" in error
 
 
-def test_emulated_trials_are_the_same_for_one_and_two_workers(talking_image: Path, tmp_path: Path) -> None:
-    """Issue "Must show" 5, with firmware."""
-    for jobs in (1, 2):
-        main(["run", "clustering", "--brain", str(talking_image), "--robots", "1", "--trials", "2", "--minutes", "0.02",
-              "--jobs", str(jobs), "--out", str(tmp_path / str(jobs))])  # fmt: skip
-    one, two = ({p.name: p.read_bytes() for p in (tmp_path / n).glob("*.parquet")} for n in "12")
-    assert len(one) == 2
-    assert one == two
+@pytest.mark.parametrize(("image", "seconds"), [("talking_image", 1.2), ("clustering_image", 3.0)])
+def test_emulated_trials_are_the_same_for_one_and_two_workers(
+    image: str, seconds: float, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """Issue "Must show" 5, with firmware: files of one worker, of two, and of a second run."""
+    for name, jobs in (("1", 1), ("2", 2), ("again", 1)):
+        main(["run", "clustering", "--brain", str(request.getfixturevalue(image)), "--robots", "2", "--trials", "2",
+              "--minutes", str(seconds / 60), "--jobs", str(jobs), "--out", str(tmp_path / name)])  # fmt: skip
+    files = [{p.name: p.read_bytes() for p in (tmp_path / name).glob("*.parquet")} for name in ("1", "2", "again")]
+    assert len(files[0]) == 2
+    assert files[0] == files[1] == files[2]
+
+
+def test_the_scenes_light_reaches_the_camera(talking_image: Path, alone: Scene) -> None:
+    """Half the light, half the values, before the sensor's automatic exposure has followed (epuck.md §7.6)."""
+    pictures = []
+    for brightness in (1.0, 0.5):
+        brain = EmulatedBrain(alone.with_values(light__brightness=brightness), 1, 0, talking_image)
+        brain._look_around(0, World.of(alone, 1, [(200, 150, 0.0)], []).poses)
+        pictures.append(brain.machine.board.camera.frame(cycle=0).astype(int))
+    lit, dim = (picture[:, :, 0].mean() for picture in pictures)
+    assert dim == pytest.approx(lit / 2, rel=0.1)
 
 
 def test_reaction_finds_the_latency_and_no_missed_frame(clustering_image: Path) -> None:
