@@ -1,9 +1,9 @@
 """Why a run ended badly, in words: resets the core asked for, and traps or interrupts nobody handles.
 
 What enters: a machine that stopped, its image. What leaves: a `Fault`, or None when the firmware simply ended. A trap
-that is handled is none, unless the firmware never comes back from it but goes to sleep inside.
-An unhandled exception is seen as its vector's handler being a debugger word: both XC16's linker and ours put one into
-vectors without a function (abi-elf.md §3.3).
+that is handled is none, unless the firmware never comes back from it but goes to sleep inside; a kernel that stops
+itself is one. An unhandled exception is seen as its vector's handler being a debugger word: both XC16's linker and ours
+put one into vectors without a function (abi-elf.md §3.3).
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ VECNUM: Final = 0x3F
 """Field of INTTREG: slot of the exception entered last (isa.md §14.4)."""
 RETURN_BYTES: Final = 4
 """What an exception pushes (isa.md §14.2)."""
+STOP_FUNCTION: Final = "_hal_stop"
+"""Where OpenSwarm goes to sleep after a failed assertion or a fatal trap (firmware/openswarm/hal/hal_cpu.h)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,10 @@ def fault_of(machine: Machine, image: Image, stop: Stop) -> Fault | None:
     if machine.is_asleep and machine.peek("CORCON") & IPL3:
         name = machine.chip.vectors[machine.peek("INTTREG") & VECNUM].name
         return Fault(f"{name} trap, in whose handler the firmware went to sleep,", stop.pc, stop.cycle)
+    if stop.reason == "halt":
+        inside = image.symbols.code(stop.pc)
+        if inside is not None and inside[0].name == STOP_FUNCTION:
+            return Fault("the kernel stopped the system; UART1 said why", stop.pc, stop.cycle)
     if stop.reason != "breakpoint":
         return None
     vectors = [vector for vector in image.chip.vectors if stop.pc in (image.word(vector.ivt), image.word(vector.aivt))]

@@ -78,12 +78,14 @@ def _program_pieces(image: Image, section: Section) -> list[Piece]:
     kind = {"code": "code", "psv": "const"}.get(section.kind, "table")
     words: Counter[tuple[str, str]] = Counter()
     for symbol, start, end in _cuts(image, section, space):
-        name = symbol.name if symbol else section.name
+        named = start + symbol.size if symbol and symbol.size and kind == "const" else end
         shift = section.load_address - section.address
         first = start + start % 2  # constants may begin at odd addresses: a word belongs to whose byte comes first
         for address in range(first + shift, end + shift, 2):
             line = image.lines.find(address) if kind == "code" else None
-            words[name, line.file if line else image.lines.files.get(start, UNKNOWN)] += 1
+            is_named = symbol is not None and address - shift < named  # behind it: strings, which have no symbol
+            file = line.file if line else image.lines.files.get(start, UNKNOWN) if is_named else UNKNOWN
+            words[symbol.name if symbol and is_named else section.name, file] += 1
     if section.name in START_UP_SECTIONS or section.name in (".ivt", ".aivt"):
         kind = "table"
     return [Piece(name, module, kind, BYTES_PER_WORD * count, 0) for (name, module), count in words.items()]

@@ -48,6 +48,8 @@ def run(options: argparse.Namespace) -> int:
     if equation is not None:
         facts["equation"] = equation
         numbers |= {f"{name} of the memory equation": Number(ceil(equation[name])) for name in "ABCDE"}
+        for owner, words in (("kernel", "of the kernel alone"), ("devices", "of kernel and devices")):
+            numbers |= {f"{key} {words}": Number(equation["sizes"][owner][name]) for key, name in _SIZES}
     if options.update:
         save(options.update, numbers)
     if options.json:
@@ -64,6 +66,7 @@ def _places(facts: dict[str, Any], size: str) -> dict[str, int]:
     return {short(name): sizes[size] for name, sizes in sorted(facts["modules"].items()) if sizes[size]}
 
 
+_SIZES = (("ROM", "rom"), ("A", "A"))
 _KEPT = (
     ("ROM without vectors, start-up code and printf", "without_start_up_and_printf", "rom"),
     ("RAM without start-up code and printf", "without_start_up_and_printf", "ram"),
@@ -84,6 +87,7 @@ def _equation(image: Image) -> dict[str, Any] | None:
     return {
         **{name: float(value) for name, value in equation.coefficients.items()},
         "constant": equation.constant,
+        "sizes": equation.sizes,
         "heap_capacity": equation.heap,
         "largest_residual": float(equation.residual),
         "cases": [asdict(case) for case in equation.cases],
@@ -92,8 +96,9 @@ def _equation(image: Image) -> dict[str, Any] | None:
 
 def equation_text(equation: dict[str, Any]) -> str:
     """The equation beside the paper's and the original's."""
-    from emu.openswarm.memory import ORIGINAL, PAPER
+    from emu.openswarm.memory import ORIGINAL, ORIGINAL_ROM, PAPER, PAPER_ROM
 
+    alone, whole = equation["sizes"]["kernel"], equation["sizes"]["devices"]
     ours = {name: equation[name] for name in "ABCDE"}
     lines = [
         "RAM = A + B n + C m + D s + sum over pending messages of (E + d), in bytes;"
@@ -102,18 +107,26 @@ def equation_text(equation: dict[str, Any]) -> str:
         else f"RAM = A + B n + ..., largest difference to a measurement {equation['largest_residual']:g} bytes",
         "n threads (128 bytes of stack), m events, s subscriptions, d bytes of payload, rounded up to words",
         "",
-        f"{'':24} {'A':>7} {'B':>6} {'C':>6} {'D':>6} {'E':>6}",
+        f"{'':34} {'A':>7} {'B':>6} {'C':>6} {'D':>6} {'E':>6} {'ROM':>8}",
     ]
-    for name, row in (("this kernel", ours), ("paper, Eq. (1)", PAPER), ("original, as measured", ORIGINAL)):
+    for name, row, rom in (
+        ("this kernel alone", ours | {"A": alone["A"]}, alone["rom"]),
+        ("with motors, UARTs, LEDs, selector", ours, whole["rom"]),
+        ("paper, Eq. (1)", PAPER, PAPER_ROM),
+        ("original, as measured, alone", ORIGINAL, ORIGINAL_ROM["kernel"]),
+        ("with motors, UART, remote control", ORIGINAL, ORIGINAL_ROM["devices"]),
+    ):
         cells = " ".join(
             f"{row[key]:{7 if key == 'A' else 6}g}" if key in row else f"{'-':>{7 if key == 'A' else 6}}"
             for key in "ABCDE"
         )
-        lines.append(f"{name:24} {cells}")
+        lines.append(f"{name:34} {cells} {rom:8,}")
     one_message = ours["C"] + ours["E"]
     lines += [
         "",
-        f"with one pending message per event and s = 0: {ours['A']:g} + {ours['B']:g} n + {one_message:g} m + sum d",
+        "with one pending message per event and s = 0:"
+        f" {alone['A']} (with devices {whole['A']}) + {ours['B']:g} n + {one_message:g} m + sum d",
+        "ROM: code, constants, library code and slots for function pointers; no vectors, no start-up code",
         "A consists of",
         *(f"  {size:6,} {name}" for name, size in equation["constant"].items()),
         f"not in A: heap of {equation['heap_capacity']:,} bytes, from which all the rest is taken",

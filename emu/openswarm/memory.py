@@ -14,6 +14,7 @@ from typing import Final
 
 from emu.footprint import pieces
 from emu.image import Image
+from emu.openswarm.shares import DEVICES, KERNEL, shares
 from emu.openswarm.target import WORD, MeasureError, Target
 
 APPLICATION: Final = "footprint_wanted"
@@ -24,8 +25,19 @@ PAPER: Final = {"A": 1142, "B": 146, "C": 6}
 ORIGINAL: Final = {"B": 228, "C": 12, "D": 24, "E": 26}
 """What the original's allocator really takes: 28 bytes per pending message of 2 (openswarm-original.md §4.6)."""
 
-_APPLICATION: Final = ("_footprint_wanted", "_footprint_now", "_pids")
+PAPER_ROM: Final = 12 * 1024
+"""With motors, UART and remote control (openswarm-original.md §1)."""
+ORIGINAL_ROM: Final = {"kernel": 9072, "devices": 12288}
+"""Decoded from the authors' own image (openswarm-original.md §1)."""
+
+_APPLICATION: Final = ("_footprint_wanted", "_footprint_now", "_pids", "_any")
 """Variables of the application itself, which are no cost of the kernel."""
+OF_DEVICES: Final = ("device", "UART")
+"""Words by which parts of A are told that the kernel alone would not have."""
+KERNEL_EVENTS: Final = (0x01, 0x07)
+"""Events Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
+EVENT: Final = 6
+"""Bytes of a registered event (kernel.h)."""
 _RESULT_WORDS: Final = 6
 _LONGEST_LIST: Final = 4096
 
@@ -64,6 +76,8 @@ class Equation:
     coefficients: dict[str, Fraction]
     constant: dict[str, int]
     """What A consists of, in bytes."""
+    sizes: dict[str, dict[str, int]]
+    """ROM and A of the kernel alone and of the kernel with its devices, in bytes."""
     heap: int
     """Capacity of the heap, which is no part of A."""
     residual: Fraction
@@ -95,13 +109,20 @@ class Heap:
         """Bytes handed out."""
         return self.capacity - self.free()
 
-    def _list(self, block: int) -> Iterator[int]:
-        """Addresses along a list linked by its first words."""
+    def events(self) -> Iterator[int]:
+        """Identifiers of all registered events."""
+        target = self._target
+        for bucket in range(target.address("events"), target.address("events") + target.size("events"), WORD):
+            for event in self._list(target.word(bucket), WORD):
+                yield target.word(event)
+
+    def _list(self, block: int, link: int = 0) -> Iterator[int]:
+        """Addresses along a list whose elements are linked at offset `link`."""
         for _ in range(_LONGEST_LIST):
             if not block:
                 return
             yield block
-            block = self._target.word(block)
+            block = self._target.word(block + link)
         raise MeasureError("a free list of the kernel's heap does not end")
 
 
@@ -115,7 +136,8 @@ def measure(image: Image, engine: str = "interp") -> Equation:
     for case in cases:
         if case.taken != case.counted or case.left:
             raise MeasureError(f"{case}: memory seen, counted by the allocator and given back do not agree")
-    return _fit(cases, _constant(target, heap, empty), heap.capacity)
+    own = EVENT * sum(1 for number in heap.events() if number in KERNEL_EVENTS)
+    return _fit(cases, _constant(target, heap, empty, own), _roms(image), heap.capacity)
 
 
 def loads() -> Iterator[Load]:
@@ -142,15 +164,25 @@ def _case(target: Target, heap: Heap, load: Load, empty: int) -> Case:
     return Case(load, taken, counted, heap.taken() - empty)
 
 
-def _constant(target: Target, heap: Heap, empty: int) -> dict[str, int]:
+def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int]:
     """The parts of A: RAM that is there before the first thread, heap capacity and the application's own left out."""
-    parts = {"kernel stack": target.size("os_memory") - heap.capacity, "taken from the heap by Sys_Init_Kernel": empty}
+    parts = {
+        "kernel stack": target.size("os_memory") - heap.capacity,
+        "kernel events": own,
+        "device events and subscriptions": empty - own,
+    }
     for piece in pieces(target.image):
         if piece.name in ("_os_memory", *_APPLICATION) or "apps/" in piece.module:
             continue
         part = "UART rings and state" if piece.name == "_channels" else _part_of(piece.module)
         parts[part] = parts.get(part, 0) + piece.ram
     return {name: size for name, size in parts.items() if size}
+
+
+def _roms(image: Image) -> dict[str, int]:
+    """ROM of the kernel alone and with its devices."""
+    owned = shares(image)
+    return {KERNEL: owned[KERNEL].rom, DEVICES: owned[KERNEL].rom + owned[DEVICES].rom}
 
 
 def _part_of(module: str) -> str:
@@ -160,7 +192,7 @@ def _part_of(module: str) -> str:
     return next((part for folder, part in folders.items() if folder in f"/{module}"), "library variables, padding")
 
 
-def _fit(cases: list[Case], parts: dict[str, int], capacity: int) -> Equation:
+def _fit(cases: list[Case], parts: dict[str, int], roms: dict[str, int], capacity: int) -> Equation:
     """Slopes from single-parameter loads; the residual is taken over all of them."""
     by_load = {case.load: case.taken for case in cases}
 
@@ -181,4 +213,9 @@ def _fit(cases: list[Case], parts: dict[str, int], capacity: int) -> Equation:
         for case in cases
     )
     coefficients = {"A": sum(parts.values()) + constant, "B": b, "C": c, "D": d, "E": e}
-    return Equation(coefficients, parts, capacity, residual, cases)
+    alone = sum(size for name, size in parts.items() if not any(word in name for word in OF_DEVICES)) + int(constant)
+    sizes = {
+        KERNEL: {"rom": roms[KERNEL], "A": alone},
+        DEVICES: {"rom": roms[DEVICES], "A": int(coefficients["A"])},
+    }
+    return Equation(coefficients, parts, sizes, capacity, residual, cases)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from emu.cli import main
 from tests.firmware.conftest import FIRMWARE, Build, run_make
 from tests.firmware.test_on_target import FCY, load
 
@@ -87,6 +88,26 @@ def test_stress_neither_leaks_nor_traps(image: Build) -> None:
     assert len(heaps) == 1, "reported after each take-down"
     assert "in thread" not in text
     assert all(int(n) >= 64 for n in re.findall(r"kernel stack left (\d+)", text))
+
+
+# ---- Faults ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_failed_assertion_is_a_firmware_fault(image: Build, tmp_path: Path, capfd) -> None:
+    """Issue 4, assertions with file and line: UART1 says where, `emu run` ends with status 1."""
+    (tmp_path / "wrong").mkdir()
+    (tmp_path / "wrong" / "main.c").write_text("""#include <openswarm.h>
+int main(void) {
+    Sys_Init_Kernel();
+    SYS_ASSERT(Sys_Get_ProcessID() == 0);
+    SYS_ASSERT(Sys_Get_ProcessID() == 7);
+    return 0;
+}
+""")
+    assert main(["run", str(image("wrong", tmp_path)), "--seconds", "1"]) == 1
+    said = capfd.readouterr()
+    assert re.search(r"main\.c:5 in thread 0", said.out)
+    assert "firmware fault: the kernel stopped the system" in said.err
 
 
 # ---- On a host -----------------------------------------------------------------------------------------------------

@@ -103,7 +103,7 @@ def test_the_remote_control_starts_and_stops(image: Build, program: str) -> None
 def test_the_bare_program_has_nothing_of_the_kernel(image: Build) -> None:
     """experiment.md §4: its map contains no kernel object."""
     symbols = load_image(image("clustering-bare")).symbols
-    for name in ("_Sys_Init_Kernel", "_Sys_Send_Event", "_os_memory", "_os_running", "_hal_switch"):
+    for name in ("_Sys_Init_Kernel", "_Sys_Send_Event", "_os_memory", "_os_running", "_hal_yield"):
         assert symbols.find(name) is None, name
     assert symbols.find("_line_of_sight") is not None or symbols.find("_camera_capture_next") is not None
 

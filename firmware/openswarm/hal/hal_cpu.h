@@ -16,7 +16,7 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
 #include "hal_port.h"
 /* hal_port.h defines:
  *   HAL_USED, HAL_NORETURN        attributes: referenced from assembly only; does not return
- *   HAL_UNLIKELY(condition)       a hint for the order of branches
+ *   HAL_LIKELY(condition)         a hint for the order of branches
  *   HAL_INLINE, HAL_OUTLINE       attributes: always, never copied into the caller
  *   hal_lock_state                opaque level
  *   hal_limit                     type of a stack limit
@@ -25,7 +25,6 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   HAL_ALLOCATION_FAILS()        false; a test port may say true to make the next allocation fail
  * and declares or defines inline:
  *   hal_lock_state hal_lock_slice(void);      at least level slice; nests; any context
- *   void hal_enter_slice(void);               from thread level, which the caller has checked, to level slice
  *   hal_lock_state hal_lock_devices(void);    at least level device; nests; any context; held for <= 40 Tcy
  *   void hal_unlock(hal_lock_state before);   restore, never lower than before; takes what became due meanwhile
  *   bool hal_in_thread(void);                 level is below slice: a thread outside critical sections
@@ -46,10 +45,11 @@ void hal_start(void);
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg);
 /* The thread is gone and not running; release what hal_stack_init took beside the block. */
 void hal_stack_release(sys_pcb *process);
-/* Thread at level slice: save it, run pick() on the kernel stack and resume what it returns. Comes back when the caller
- * is resumed, at thread level. */
-void hal_switch(hal_pick pick);
-/* As hal_switch, but the caller's context is given up. */
+/* Save the calling thread, run os_slice_end() or os_schedule() on the kernel stack at level slice and resume the thread
+ * it returns. Both come back when the caller is resumed, at thread level. */
+void hal_yield(void); /* called at thread level */
+void hal_block(void); /* called at level slice */
+/* The caller's context is given up: resume what pick() returns. Called at level slice. */
 HAL_NORETURN void hal_abandon(hal_pick pick);
 
 /* Kernel stack, slice level: sleep until an interrupt, unless the low byte of *pending is set. Test and sleep are
@@ -57,7 +57,7 @@ HAL_NORETURN void hal_abandon(hal_pick pick);
  * taken. */
 void hal_idle(const volatile uint16_t *pending);
 
-/* Mask everything and stop for ever. */
+/* After a fault: mask everything and stop for ever. An emulator knows the end of a run by the name of this function. */
 HAL_NORETURN void hal_stop(void);
 
 #endif

@@ -40,17 +40,15 @@ bool Sys_Connect_Motors(uint16 event)
 
 sys_motor_processor Sys_Set_MotorProcessor(sys_motor_processor wanted)
 {
-    hal_lock_state lock = os_lock_slice();
+    Sys_Start_CriticalSection();
     sys_motor_processor before = processor;
     processor = wanted != NULL ? wanted : Sys_Default_MotorProcessor;
-    hal_unlock(lock);
+    Sys_End_CriticalSection();
     return before;
 }
 
 void motors_init(void)
 {
-    speeds.left = 0;
-    speeds.right = 0;
     processor = Sys_Default_MotorProcessor;
     hal_motors_init();
     (void)Sys_Register_Event(SYS_LEFTMOTOR_SPEED);

@@ -22,15 +22,14 @@ typedef struct {
     sys_uart_statistics statistics;
 } channel;
 
-typedef struct {
-    uint16 send, received, ready;
-} uart_events;
-
 static channel channels[SYS_UARTS];
-static const uart_events events[SYS_UARTS] = {
-    {SYS_SEND_UART1, SYS_UART1_RECEIVED, SYS_UART1_READY},
-    {SYS_SEND_UART2, SYS_UART2_RECEIVED, SYS_UART2_READY},
-};
+
+enum { PER_UART = SYS_UART2_RECEIVED - SYS_UART1_RECEIVED };
+
+static uint16 event_of(uint8 uart, uint16 of_uart1)
+{
+    return (uint16)(of_uart1 + uart * PER_UART);
+}
 
 /* ---- Sending ---------------------------------------------------------------------------------------------------- */
 
@@ -50,10 +49,9 @@ static bool put(uint8 byte)
 static bool write_message(uint8 uart, const void *message, uint16 size)
 {
     channel *c = &channels[uart];
-    if (hal_in_isr()) {
-        return os_refuse();
+    if (os_enter() != SYS_OK) {
+        return false;
     }
-    hal_lock_state lock = os_lock_slice();
     writing = c;
     writing_head = c->head;
     bool fits = c->encode(message, size, put);
@@ -68,8 +66,7 @@ static bool write_message(uint8 uart, const void *message, uint16 size)
     if (!fits) {
         os_count(&c->statistics.tx_refused);
     }
-    hal_unlock(lock);
-    return fits || os_fail(SYS_ERROR_BUSY);
+    return os_leave(fits ? SYS_OK : SYS_ERROR_BUSY);
 }
 
 sint16 uart_next_byte(uint8 uart)
@@ -78,7 +75,7 @@ sint16 uart_next_byte(uint8 uart)
     uint8 waiting = (uint8)(c->head - c->tail);
     if (c->wants_ready && waiting <= SYS_UART_TX / 2) {
         c->wants_ready = false;
-        (void)Sys_Send_IntEvent(events[uart].ready, (uint16)(SYS_UART_TX - waiting));
+        (void)Sys_Send_IntEvent(event_of(uart, SYS_UART1_READY), (uint16)(SYS_UART_TX - waiting));
     }
     if (waiting == 0) {
         return -1;
@@ -119,7 +116,7 @@ bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put_byte)
 
 static void pass_on(uint8 uart, const uint8 *bytes, uint16 size)
 {
-    if (!Sys_Send_Event(events[uart].received, bytes, size)) {
+    if (!Sys_Send_Event(event_of(uart, SYS_UART1_RECEIVED), bytes, size)) {
         os_count(&channels[uart].statistics.rx_lost);
     }
 }
@@ -169,10 +166,10 @@ void uart_tick(void)
 
 sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor wanted)
 {
-    hal_lock_state lock = os_lock_slice();
+    Sys_Start_CriticalSection();
     sys_tx_processor before = channels[uart].encode;
     channels[uart].encode = wanted != NULL ? wanted : Sys_Raw_Tx;
-    hal_unlock(lock);
+    Sys_End_CriticalSection();
     return before;
 }
 
@@ -204,10 +201,11 @@ void uart_init(uint8 uart)
     c->encode = Sys_Raw_Tx;
     c->decode = Sys_Chunk_Rx;
     hal_uart_init(uart);
-    (void)Sys_Register_Event(events[uart].send);
-    (void)Sys_Register_Event(events[uart].received);
-    (void)Sys_Register_Event(events[uart].ready);
-    (void)Sys_Subscribe_to_Event(events[uart].send, 0, on_send, NULL);
+    uint16 send = uart == SYS_UART1 ? SYS_SEND_UART1 : SYS_SEND_UART2;
+    (void)Sys_Register_Event(send);
+    (void)Sys_Register_Event(event_of(uart, SYS_UART1_RECEIVED));
+    (void)Sys_Register_Event(event_of(uart, SYS_UART1_READY));
+    (void)Sys_Subscribe_to_Event(send, 0, on_send, NULL);
 }
 
 void uart_start(uint8 uart)

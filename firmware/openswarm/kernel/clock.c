@@ -1,39 +1,35 @@
 /* System time, the 1 ms event and everything that waits for a moment.
  *
  * os_clock_tick compares one alarm per tick; the threads behind it are looked at only when it rings, on the kernel
- * stack. Moments are low words of the system time, ordered by their distance from base, the time of the last look. */
+ * stack. Moments are low words of the system time, ordered by their distance from base, the time of the last look. An
+ * alarm that is not behind base rings a whole wrap later, in vain. */
 #include "kernel.h"
 
-static volatile uint32 now_ms;
+static volatile uint16 now_ms, wraps; /* low and high word of the system time */
 static uint16 base;
 static uint16 alarm;
-static bool alarm_set;
-
-void clock_init(void)
-{
-    now_ms = 0;
-    base = 0;
-    alarm_set = false;
-}
 
 uint32 Sys_Get_SystemTime(void)
 {
     hal_lock_state lock = hal_lock_devices();
-    uint32 now = now_ms;
+    uint32 now = (uint32)wraps << 16 | now_ms;
     hal_unlock(lock);
     return now;
 }
 
 uint16 clock_now(void)
 {
-    return (uint16)now_ms;
+    return now_ms;
 }
 
 void os_clock_tick(void)
 {
-    uint16 now = (uint16)++now_ms;
-    if (alarm_set && now == alarm) {
-        alarm_set = false;
+    uint16 now = (uint16)(now_ms + 1u);
+    now_ms = now;
+    if (now == 0) {
+        wraps++;
+    }
+    if (now == alarm) {
         os_pending |= OS_ALARM;
         if (os_eager) {
             hal_slice_force();
@@ -43,14 +39,13 @@ void os_clock_tick(void)
     board_tick();
 }
 
-static void set_alarm(uint16 moment)
+static HAL_OUTLINE void set_alarm(uint16 moment)
 {
+    uint16 distance = (uint16)(moment - base); /* at least 1 */
     hal_lock_state lock = hal_lock_devices();
-    if (!alarm_set || (uint16)(moment - base) < (uint16)(alarm - base)) {
+    if ((uint16)(distance - 1u) < (uint16)(alarm - base - 1u)) {
         alarm = moment;
-        alarm_set = true;
-        if ((uint16)((uint16)now_ms - base) >= (uint16)(moment - base)) { /* the tick overtook the caller */
-            alarm_set = false;
+        if ((uint16)(now_ms - base) >= distance) { /* the tick overtook the caller */
             os_pending |= OS_ALARM;
         }
     }
@@ -70,10 +65,7 @@ void clock_wake_due(void)
             continue;
         }
         if ((uint16)(p->wake - now + elapsed) <= elapsed) {
-            if (p->awaited != NULL) {
-                p->wait.result = NULL;
-            }
-            process_make_ready(p);
+            process_wake(p, NULL);
         } else {
             set_alarm(p->wake);
         }

@@ -5,10 +5,12 @@ sys_statistics os_statistics;
 
 static volatile uint16 last_error;
 
-/* Losses of the first SYS_LOSS_COUNTERS events that lost something; further ones share the entry before. */
-static struct {
+/* Losses of the first SYS_LOSS_COUNTERS events that lost something; entry 0 counts those of all others. */
+typedef struct {
     uint16 event, count;
-} losses[SYS_LOSS_COUNTERS + 1];
+} loss;
+
+static loss losses[SYS_LOSS_COUNTERS + 1];
 
 bool os_fail(sys_error error)
 {
@@ -19,53 +21,62 @@ bool os_fail(sys_error error)
 void os_count(uint16 *counter)
 {
     hal_lock_state lock = hal_lock_devices();
-    if (*counter != 0xFFFFu) {
-        ++*counter;
+    uint16 more = (uint16)(*counter + 1u);
+    if (more != 0) {
+        *counter = more;
     }
     hal_unlock(lock);
 }
 
-bool os_refuse(void)
+sys_error os_refuse(void)
 {
     os_count(&os_statistics.refused);
-    return os_fail(SYS_ERROR_CONTEXT);
+    (void)os_fail(SYS_ERROR_CONTEXT);
+    return SYS_ERROR_CONTEXT;
 }
 
 void event_lost(uint16 id)
 {
-    bool counted = false;
+    loss *entry = losses + SYS_LOSS_COUNTERS + 1;
+    bool counted;
     os_count(&os_statistics.events_lost);
-    for (uint16 i = 1; i <= SYS_LOSS_COUNTERS && !counted; i++) {
+    do {
+        entry--;
         hal_lock_state lock = hal_lock_devices();
-        counted = losses[i].count == 0 || losses[i].event == id;
+        counted = entry == losses || entry->count == 0 || entry->event == id;
         if (counted) {
-            losses[i].event = id;
-            losses[i].count = (uint16)(losses[i].count + (losses[i].count != 0xFFFFu));
+            uint16 more = (uint16)(entry->count + 1u);
+            entry->event = id;
+            if (more != 0) {
+                entry->count = more;
+            }
         }
         hal_unlock(lock);
+    } while (!counted);
+}
+
+/* The entry of an event, or the first. */
+static loss *entry_of(uint16 id)
+{
+    loss *entry = losses + SYS_LOSS_COUNTERS;
+    while (entry != losses && (entry->count == 0 || entry->event != id)) {
+        entry--;
     }
-    if (!counted) {
-        os_count(&losses[0].count);
-    }
+    return entry;
 }
 
 void event_forget_losses(uint16 id)
 {
-    for (uint16 i = 1; i <= SYS_LOSS_COUNTERS; i++) {
-        if (losses[i].event == id) {
-            losses[i].count = 0;
-        }
+    loss *entry = entry_of(id);
+    if (entry != losses) {
+        entry->count = 0;
     }
 }
 
 uint16 Sys_Get_LostEvents(uint16 id)
 {
-    for (uint16 i = 1; i <= SYS_LOSS_COUNTERS; i++) {
-        if (losses[i].count != 0 && losses[i].event == id) {
-            return losses[i].count;
-        }
-    }
-    return id == 0 ? losses[0].count : 0;
+    const loss *entry = entry_of(id);
+    return entry != losses || id == 0 ? entry->count : 0;
 }
 
 uint16 Sys_Get_LastError(void)

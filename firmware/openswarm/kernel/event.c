@@ -17,13 +17,7 @@ static subscription *next_subscriber;        /* the delivery's place in the list
 
 void event_init(void)
 {
-    for (uint16 i = 0; i < BUCKETS; i++) {
-        events[i] = NULL;
-    }
-    queue = NULL;
     queue_end = &queue;
-    undelivered = NULL;
-    next_subscriber = NULL;
 }
 
 /* ---- Registration ------------------------------------------------------------------------------------------- */
@@ -47,48 +41,46 @@ event *event_find(uint16 id)
     return find_from(events[id % BUCKETS], id);
 }
 
-static HAL_OUTLINE bool event_awaited(const event *e)
+static HAL_OUTLINE const sys_pcb *first_waiter(const event *e)
 {
-    for (const sys_pcb *p = os_blocked; p != NULL; p = p->next) {
-        if (p->awaited == e) {
-            return true;
-        }
+    const sys_pcb *p = os_blocked;
+    while (p != NULL && p->awaited != e) {
+        p = p->next;
     }
-    return false;
+    return p;
 }
 
 bool Sys_IsEventRegistered(uint16 id)
 {
-    hal_lock_state lock = os_lock_slice();
+    Sys_Start_CriticalSection();
     bool found = event_find(id) != NULL;
-    hal_unlock(lock);
+    Sys_End_CriticalSection();
     return found;
 }
 
 bool Sys_Register_Event(uint16 id)
 {
-    if (hal_in_isr()) {
-        return os_refuse();
+    sys_error error = SYS_OK;
+    if (os_enter() != SYS_OK) {
+        return false;
     }
-    hal_lock_state lock = os_lock_slice();
-    event *e = event_find(id);
-    if (e == NULL) {
-        e = heap_take(sizeof *e);
+    if (event_find(id) == NULL) {
+        event **first = &events[id % BUCKETS];
+        event *e = heap_take(sizeof *e);
         if (e != NULL) {
             e->id = id;
-            e->next = events[id % BUCKETS]; /* the application's events are found before the system's */
+            e->next = *first; /* the application's events are found before the system's */
             e->subscribers = NULL;
             hal_barrier();
-            events[id % BUCKETS] = e;
+            *first = e;
         } else {
-            os_fail(SYS_ERROR_MEMORY);
+            error = SYS_ERROR_MEMORY;
         }
     }
-    hal_unlock(lock);
-    return e != NULL;
+    return os_leave(error);
 }
 
-static void unlink_subscription(subscription **link)
+static HAL_OUTLINE void unlink_subscription(subscription **link)
 {
     subscription *s = *link;
     if (next_subscriber == s) {
@@ -105,16 +97,15 @@ static void wake_waiters_of(const event *e)
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
         if (p->awaited == e) {
+            process_wake(p, NULL);
             p->awaited = NULL;
-            p->wait.result = NULL;
-            process_make_ready(p);
         }
     }
 }
 
-static void disown_messages(message *first, const event *e)
+static HAL_OUTLINE void disown_messages(message *m, const event *e)
 {
-    for (message *m = first; m != NULL; m = m->queued.next) {
+    for (; m != NULL; m = m->queued.next) {
         if (m->queued.event == e) {
             m->queued.event = NULL;
         }
@@ -123,46 +114,46 @@ static void disown_messages(message *first, const event *e)
 
 bool Sys_Unregister_Event(uint16 id)
 {
-    if (hal_in_isr()) {
-        return os_refuse();
+    if (os_enter() != SYS_OK) {
+        return false;
     }
-    hal_lock_state lock = os_lock_slice();
     event **link = &events[id % BUCKETS];
     while (*link != NULL && (*link)->id != id) {
         link = &(*link)->next;
     }
     event *e = *link;
-    if (e != NULL) {
-        *link = e->next; /* from here on ISRs queue nothing for it */
-        hal_barrier();
-        while (e->subscribers != NULL) {
-            unlink_subscription(&e->subscribers);
-        }
-        wake_waiters_of(e);
-        disown_messages(queue, e);
-        disown_messages(undelivered, e);
-        event_forget_losses(id);
-        heap_give(e, sizeof *e);
+    if (e == NULL) {
+        return os_leave(SYS_ERROR_EVENT);
     }
-    hal_unlock(lock);
-    return e != NULL || os_fail(SYS_ERROR_EVENT);
+    *link = e->next; /* from here on ISRs queue nothing for it */
+    hal_barrier();
+    while (e->subscribers != NULL) {
+        unlink_subscription(&e->subscribers);
+    }
+    wake_waiters_of(e);
+    disown_messages(queue, e);
+    disown_messages(undelivered, e);
+    event_forget_losses(id);
+    heap_give(e, sizeof *e);
+    return os_leave(SYS_OK);
 }
 
 /* ---- Subscription ------------------------------------------------------------------------------------------- */
 
-/* Slice locked. Finds or adds the subscription; the two failures are told apart by their error. */
-static bool subscribe(event *e, uint16 pid, sys_handler handler, sys_condition condition)
+/* Slice locked. Finds or adds the subscription. */
+static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condition condition)
 {
-    subscription **link = &e->subscribers;
-    for (; *link != NULL; link = &(*link)->next) {
-        if ((*link)->pid == pid && (*link)->handler == handler) {
-            (*link)->condition = condition;
-            return true;
-        }
+    subscription *s, **link = &e->subscribers;
+    while ((s = *link) != NULL && (s->pid != pid || s->handler != handler)) {
+        link = &s->next;
     }
-    subscription *s = heap_take(sizeof *s);
+    if (s != NULL) {
+        s->condition = condition;
+        return SYS_OK;
+    }
+    s = heap_take(sizeof *s);
     if (s == NULL) {
-        return os_fail(SYS_ERROR_MEMORY);
+        return SYS_ERROR_MEMORY;
     }
     s->next = NULL;
     s->handler = handler;
@@ -170,24 +161,22 @@ static bool subscribe(event *e, uint16 pid, sys_handler handler, sys_condition c
     s->pid = pid;
     hal_barrier();
     *link = s;
-    return true;
+    return SYS_OK;
 }
 
 bool Sys_Subscribe_to_Event(uint16 id, uint16 pid, sys_handler handler, sys_condition condition)
 {
-    if (hal_in_isr()) {
-        return os_refuse();
+    sys_error error = SYS_ERROR_ARGUMENT;
+    if (os_enter() != SYS_OK) {
+        return false;
     }
-    if (handler == NULL) {
-        return os_fail(SYS_ERROR_ARGUMENT);
-    }
-    hal_lock_state lock = os_lock_slice();
-    event *e = event_find(id);
-    bool done = e == NULL                     ? os_fail(SYS_ERROR_EVENT)
-                : process_find(pid) == NULL ? os_fail(SYS_ERROR_PROCESS)
+    if (handler != NULL) {
+        event *e = event_find(id);
+        error = e == NULL                   ? SYS_ERROR_EVENT
+                : process_find(pid) == NULL ? SYS_ERROR_PROCESS
                                             : subscribe(e, pid, handler, condition);
-    hal_unlock(lock);
-    return done;
+    }
+    return os_leave(error);
 }
 
 /* Slice locked. handler NULL = every handler of the thread. */
@@ -208,14 +197,12 @@ static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
 
 bool Sys_Unsubscribe_Handler(uint16 id, uint16 pid, sys_handler handler)
 {
-    if (hal_in_isr()) {
-        return os_refuse();
+    if (os_enter() != SYS_OK) {
+        return false;
     }
-    hal_lock_state lock = os_lock_slice();
     event *e = event_find(id);
-    bool done = e != NULL ? unsubscribe(e, pid, handler) : os_fail(SYS_ERROR_EVENT);
-    hal_unlock(lock);
-    return done;
+    bool done = e != NULL && unsubscribe(e, pid, handler);
+    return os_leave(e != NULL ? SYS_OK : SYS_ERROR_EVENT) && done;
 }
 
 bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)
@@ -225,8 +212,8 @@ bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)
 
 void event_drop_subscriptions(uint16 pid)
 {
-    for (uint16 i = 0; i < BUCKETS; i++) {
-        for (event *e = events[i]; e != NULL; e = e->next) {
+    for (event **bucket = events; bucket != events + BUCKETS; bucket++) {
+        for (event *e = *bucket; e != NULL; e = e->next) {
             (void)unsubscribe(e, pid, NULL);
         }
     }
@@ -269,17 +256,17 @@ static HAL_INLINE void copy(void *to, const void *from, uint16 size)
 bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
 {
     sys_error error = SYS_OK;
-    if (HAL_UNLIKELY(size > SYS_SMALL_PAYLOAD) && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) {
+    if (size > SYS_SMALL_PAYLOAD && (size > SYS_MAXIMUM_PAYLOAD || hal_in_isr())) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
-    if (HAL_UNLIKELY(data == NULL) && size != 0) {
+    if (data == NULL && size != 0) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
     hal_lock_state lock = hal_lock_slice();
     event *e = find(id);
     if (e == NULL) {
         error = SYS_ERROR_EVENT;
-    } else if (e->subscribers != NULL || event_awaited(e)) {
+    } else if (e->subscribers != NULL || first_waiter(e) != NULL) {
         message *m = heap_take((uint16)(sizeof *m + size));
         if (m != NULL) {
             m->queued.event = e;
@@ -303,14 +290,8 @@ bool Sys_Send_IntEvent(uint16 id, uint16 value)
 
 static uint16 value_of(const message *m, uint16 size)
 {
-    const uint8 *payload = PAYLOAD(m);
-    uint16 value = 0;
-    if (size >= sizeof value) {
-        memcpy(&value, payload, sizeof value);
-    } else if (size == 1) {
-        value = payload[0];
-    }
-    return value;
+    const void *payload = PAYLOAD(m);
+    return size >= sizeof(any_word) ? *(const any_word *)payload : size != 0 ? *(const uint8 *)payload : 0;
 }
 
 static void run_handlers(event *e, sys_event_data *data)
@@ -323,10 +304,7 @@ static void run_handlers(event *e, sys_event_data *data)
         uint16 pid = s->pid;
         next_subscriber = s->next;
         if ((s->condition == NULL || s->condition(data)) && !handler(pid, id, data)) {
-            event *still = event_find(id);
-            if (still != NULL) {
-                (void)unsubscribe(still, pid, handler);
-            }
+            (void)Sys_Unsubscribe_Handler(id, pid, handler);
         }
     }
 }
@@ -334,14 +312,21 @@ static void run_handlers(event *e, sys_event_data *data)
 static bool wake_waiters(const event *e, message *m)
 {
     bool kept = false;
-    for (sys_pcb *p = process_scan_blocked(); p != NULL; p = process_scan_next()) {
-        if (p->awaited != e || (p->wait.condition != NULL && !p->wait.condition(&m->data))) {
-            continue;
+    sys_pcb *p;
+    process_scan = &os_blocked;
+    while ((p = *process_scan) != NULL) {
+        bool meant = p->awaited == e;
+        if (meant && p->wait.condition != NULL) {
+            meant = p->wait.condition(&m->data);
+            if (*process_scan != p) { /* the condition killed its own thread */
+                continue;
+            }
         }
-        if (process_scan_holds(p)) { /* the condition may have killed its own thread */
-            p->wait.result = m;
-            process_make_ready(p);
+        if (meant) {
+            process_wake(p, m);
             kept = true;
+        } else {
+            process_scan = &p->next;
         }
     }
     return kept;
@@ -386,19 +371,15 @@ static bool holds(const sys_pcb *p, const message *m)
     return !((p->status & OS_OFF_RING) && p->awaited != NULL) && p->wait.result == m;
 }
 
-void event_release(message *m)
+void event_release_result(sys_pcb *process)
 {
-    const sys_pcb *p;
-    if (os_ring != NULL) {
-        p = os_ring;
-        do {
-            if (holds(p, m)) {
-                return;
-            }
-            p = p->next;
-        } while (p != os_ring);
+    message *m = process->wait.result;
+    const sys_pcb *p = NULL;
+    process->wait.result = NULL;
+    if (m == NULL) {
+        return;
     }
-    for (p = os_blocked; p != NULL; p = p->next) {
+    while ((p = process_next(p)) != NULL) {
         if (holds(p, m)) {
             return;
         }
@@ -406,38 +387,25 @@ void event_release(message *m)
     heap_give(m, (uint16)(sizeof *m + m->data.size));
 }
 
-static void release_own_result(sys_pcb *self)
-{
-    message *m = self->wait.result;
-    self->wait.result = NULL;
-    if (m != NULL) {
-        event_release(m);
-    }
-}
-
 sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 id, sys_condition condition, uint16 ms)
 {
     sys_pcb *self = os_running;
-    if (!hal_in_thread()) {
-        os_refuse();
+    if (os_enter_blocking() != SYS_OK) {
         return NULL;
     }
-    hal_lock_state lock = os_lock_slice();
-    release_own_result(self);
+    event_release_result(self);
     event *e = event_find(id);
     if (e == NULL) {
-        os_fail(SYS_ERROR_EVENT);
-        hal_unlock(lock);
+        (void)os_leave(SYS_ERROR_EVENT);
         return NULL;
     }
     self->wait.condition = condition;
     process_block(e, ms);
     message *m = self->wait.result;
     if (m == NULL) {
-        os_fail(self->awaited == NULL ? SYS_ERROR_EVENT : SYS_OK);
-        return NULL;
+        (void)os_fail(self->awaited == NULL ? SYS_ERROR_EVENT : SYS_OK);
     }
-    return &m->data;
+    return (sys_event_data *)m; /* the first member of the union, or NULL */
 }
 
 sys_event_data *Sys_Wait_for_Condition(uint16 id, sys_condition condition)
@@ -455,11 +423,11 @@ void Sys_Clear_EventData(sys_event_data **data)
     if (data == NULL || *data == NULL) {
         return;
     }
-    hal_lock_state lock = os_lock_slice();
+    Sys_Start_CriticalSection();
     message *m = os_running->wait.result;
     if (m != NULL && *data == &m->data && !os_delivering) {
-        release_own_result(os_running);
+        event_release_result(os_running);
     }
-    hal_unlock(lock);
+    Sys_End_CriticalSection();
     *data = NULL;
 }

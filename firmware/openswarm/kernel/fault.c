@@ -1,29 +1,25 @@
 /* What stops a thread or the system: stack overflow, traps, failed assertions. The motors stop first. */
 #include "kernel.h"
 
-#include <string.h>
+enum { DIGITS = 6 }; /* of a 16-bit number, and room for the end mark */
 
-/* Most significant digit first, leading zeros left out. */
-static char *put_number(char *to, uint16 number, uint16 radix)
+/* Writes a number in front of end; returns its begin. */
+static HAL_OUTLINE char *put_number(char *end, uint16 number, uint16 radix)
 {
-    uint16 weight = 1;
-    while (number / weight >= radix) {
-        weight = (uint16)(weight * radix);
-    }
-    for (; weight != 0; weight /= radix) {
-        uint8 digit = (uint8)(number / weight);
-        *to++ = (char)(digit < 10 ? '0' + digit : 'a' - 10 + digit);
-        number %= weight;
-    }
-    return to;
+    do {
+        uint16 digit = number % radix;
+        number /= radix;
+        *--end = (char)(digit < 10 ? '0' + digit : 'a' - 10 + digit);
+    } while (number != 0);
+    return end;
 }
 
 static HAL_OUTLINE void report_number(const char *before, uint16 number, uint16 radix)
 {
-    char text[6];
-    *put_number(text, number, radix) = '\0';
+    char text[DIGITS];
+    text[DIGITS - 1] = '\0';
     board_report(before);
-    board_report(text);
+    board_report(put_number(text + DIGITS - 1, number, radix));
 }
 
 static HAL_NORETURN void stop(void)
@@ -33,10 +29,11 @@ static HAL_NORETURN void stop(void)
     hal_stop();
 }
 
-/* "address trap at 0x0:1234 in thread 1". Called by the port, on a stack of its own choice, with everything masked. */
+/* "address trap at 0x0:1234 in thread 1"; "stack" is that of the kernel, or of main in thread 0. Called by the port, on a
+ * stack of its own choice, with everything masked. */
 void os_trap(uint16 cause, uint16 pc, uint16 pc_high)
 {
-    static const char names[6][14] = {"oscillator", "address", "math", "interrupt", "kernel stack", "main stack"};
+    static const char names[5][11] = {"oscillator", "address", "math", "interrupt", "stack"};
     board_failsafe();
     board_report(names[cause]);
     report_number(" trap at 0x", pc_high, 16);
@@ -58,18 +55,19 @@ void Sys_Assertion_Failed(const char *file, uint16 line)
 sys_pcb *os_overflow(void)
 {
     static const char text[] = "stack overflow: thread ";
-    char line[sizeof text + 6];
+    char number[DIGITS + 1];
+    char *end = number + sizeof number;
     uint16 pid = os_running->pid;
     board_failsafe();
     os_count(&os_statistics.overflows);
     if (pid == 0) {
-        os_trap(OS_MAIN_OVERFLOW, 0, 0);
+        os_trap(OS_STACK, 0, 0);
     }
-    memcpy(line, text, sizeof text - 1);
-    char *end = put_number(line + sizeof text - 1, pid, 10);
-    *end++ = '\r';
-    *end++ = '\n';
-    (void)Sys_Send_Event(SYS_SEND_UART1, line, (uint16)(end - line));
+    *--end = '\n';
+    *--end = '\r';
+    end = put_number(end, pid, 10);
+    (void)Sys_Send_Event(SYS_SEND_UART1, text, sizeof text - 1);
+    (void)Sys_Send_Event(SYS_SEND_UART1, end, (uint16)(number + sizeof number - end));
     (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
     return process_end_running();
 }

@@ -1,10 +1,9 @@
-/* Start-up: a list of what becomes ready, in order. */
+/* Start-up: a list of what becomes ready, in order. Once per reset: variables begin as zeros. */
 #include "kernel.h"
 
 void Sys_Init_Kernel(void)
 {
     heap_init();
-    clock_init();
     event_init();
     process_init(); /* the caller becomes PID 0; no interrupt is enabled */
     (void)Sys_Register_Event(SYS_EVENT_TERMINATION);

@@ -72,6 +72,11 @@ typedef struct {
     uint16 period, deadline, release, due;
 } periodic;
 
+static inline periodic *process_periodic(const sys_pcb *process) /* of a SYS_PERIODIC thread */
+{
+    return (periodic *)(void *)process->block;
+}
+
 /* os_pending: why the next thread of the ring cannot simply run. The low byte, OS_WORK, must be worked off and keeps
  * the kernel from idling; the high byte says that a scheduler chooses. One word, so that a slice end tests it once. */
 enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
@@ -82,7 +87,7 @@ extern sys_pcb os_system;     /* PID 0 */
 extern sys_pcb *os_ring;      /* ring member before the running one (or before the next, if it blocked); NULL = empty */
 extern sys_pcb *os_blocked;   /* in order of blocking */
 extern bool os_eager;         /* a message ends the slice */
-extern bool os_delivering;    /* handlers, conditions and wake-ups are at work on the kernel stack */
+extern volatile uint16 os_delivering; /* handlers, conditions and wake-ups are at work on the kernel stack */
 extern sys_statistics os_statistics;
 
 /* memory.c: one array, so that the kernel stack lies below the heap and with it below every thread stack */
@@ -92,9 +97,8 @@ typedef union {
 } os_memory_space;
 extern os_memory_space os_memory;
 void heap_init(void);
-void *heap_take(uint16 size);            /* NULL: none left. Sizes above HEAP_CLASSES * HEAP_STEP: not in an ISR */
-void heap_give(void *block, uint16 size); /* the size it was taken with */
-
+void *heap_take(uint16 size);             /* NULL: none left. Sizes above HEAP_CLASSES * HEAP_STEP: not in an ISR */
+void heap_give(void *block, uint16 size); /* the size it was taken with; not in an ISR */
 void heap_note_peak(void);
 
 /* stack.c */
@@ -105,32 +109,32 @@ bool kernel_stack_is_intact(void); /* its last byte was never written; asserted 
 void event_init(void);
 void event_deliver_queued(void);           /* kernel stack: all messages queued when it began */
 void event_drop_subscriptions(uint16 pid);
-void event_release(message *result);       /* frees a wait result nobody else holds */
-event *event_find(uint16 id);              /* any context */
+void event_release_result(sys_pcb *process); /* it gives up its wait result; the last holder frees it */
+event *event_find(uint16 id);                /* any context */
 
 /* process.c */
 void process_init(void);
-sys_pcb *process_find(uint16 pid);             /* any live thread; slice locked */
-void process_make_ready(sys_pcb *process);     /* from the blocked list to the end of the ring */
-void process_block(event *awaited, uint16 ms); /* the running thread; comes back at thread level */
-sys_pcb *process_end_running(void);            /* kernel stack: buries the running thread, picks the next */
-periodic *process_periodic(const sys_pcb *process);
+sys_pcb *process_find(uint16 pid);               /* any live thread; slice locked */
+sys_pcb *process_next(const sys_pcb *process);   /* a walk over all live threads, NULL to NULL; slice locked */
+void process_wake(sys_pcb *process, message *m); /* from the blocked list to the end of the ring; m, if it waits for one */
+void process_block(event *awaited, uint16 ms);   /* the running thread, after os_enter_blocking() */
+sys_pcb *process_end_running(void);              /* kernel stack: buries the running thread, picks the next */
 HAL_NORETURN HAL_USED void os_thread_returned(void);
 
-/* A walk over the blocked list during which any of its threads may be woken or killed; one at a time. */
-sys_pcb *process_scan_blocked(void);
-sys_pcb *process_scan_next(void);
-bool process_scan_holds(const sys_pcb *process); /* still blocked */
+/* The link at which a walk over the blocked list stands, during which threads may be woken and killed; one at a time. */
+extern sys_pcb **process_scan;
 
-/* hal_lock_slice() as a call; inlined only where speed counts */
-HAL_OUTLINE hal_lock_state os_lock_slice(void);
+/* Most calls begin with one of these, and unless they are refused end with os_leave(): the slice is locked in between,
+ * as in a critical section. */
+HAL_OUTLINE sys_error os_enter(void);          /* not from ISRs */
+HAL_OUTLINE sys_error os_enter_blocking(void); /* from threads only; process_block() unlocks as well */
+HAL_OUTLINE bool os_leave(sys_error error);    /* true, or false and the last error */
 
 /* scheduler.c: the two ways into the kernel stack; both pick the next thread */
-HAL_USED sys_pcb *os_slice_end(void); /* the running thread stays ready */
-HAL_USED sys_pcb *os_schedule(void);  /* it does not */
+HAL_USED sys_pcb *os_slice_end(sys_pcb *running); /* the running thread stays ready */
+HAL_USED sys_pcb *os_schedule(void);              /* it does not */
 
 /* clock.c */
-void clock_init(void);
 void clock_set_wake(sys_pcb *process, uint16 ms); /* process is on the blocked list; slice locked */
 void clock_wake_due(void);
 uint16 clock_now(void);  /* low word; any context */
@@ -138,14 +142,14 @@ HAL_USED void os_clock_tick(void); /* ISR, every 1 ms */
 
 /* error.c */
 bool os_fail(sys_error error); /* sets the last error, returns false */
-bool os_refuse(void);          /* as os_fail(SYS_ERROR_CONTEXT), counted */
+sys_error os_refuse(void);     /* sets, counts and returns SYS_ERROR_CONTEXT */
 void os_count(uint16 *counter); /* saturating */
 void event_lost(uint16 id);
 void event_forget_losses(uint16 id);
 
 /* fault.c */
 HAL_USED sys_pcb *os_overflow(void); /* kernel stack: the running thread hit its stack limit; picks the next */
-enum { OS_MAIN_OVERFLOW = 5 };
+enum { OS_STACK = 4 };
 HAL_NORETURN HAL_USED void os_trap(uint16 cause, uint16 pc, uint16 pc_high);
 
 #endif

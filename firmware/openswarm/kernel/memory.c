@@ -18,15 +18,11 @@ struct block { /* what a free block holds */
 os_memory_space os_memory;
 
 static block *small[HEAP_CLASSES];
-static block *large;
+static block large; /* in front of the lowest large block */
 static uint8 *brk, *top;
 
 void heap_init(void)
 {
-    for (uint16 i = 0; i < HEAP_CLASSES; i++) {
-        small[i] = NULL;
-    }
-    large = NULL;
     stack_paint(os_memory.bytes, SYS_KERNEL_STACK);
     brk = os_memory.bytes + SYS_KERNEL_STACK;
     top = END;
@@ -47,202 +43,172 @@ static block **list_of(uint16 size)
 /* The peak is the largest extent; it is noted before the extent shrinks and when somebody asks, not on each taking. */
 void heap_note_peak(void)
 {
-    uint16 extent = (uint16)(brk - os_memory.bytes - SYS_KERNEL_STACK + (END - top));
+    uint16 extent = (uint16)(SYS_HEAP - (top - brk));
     if (extent > os_statistics.heap_peak) {
         os_statistics.heap_peak = extent;
     }
 }
 
+static bool is_small(uint16 size)
+{
+    return size <= HEAP_CLASSES * HEAP_STEP;
+}
+
 /* Devices locked. */
-static void push_small(void *freed, uint16 size)
+static HAL_INLINE void push_small(void *freed, uint16 size)
 {
     block *b = freed;
     b->next = *list_of(size);
     *list_of(size) = b;
 }
 
-/* From the list of the size, or from the untouched memory between small and large blocks. */
-static HAL_INLINE void *take_small(uint16 size)
+/* From a larger free block. At most HEAP_CLASSES short locks. */
+static void *split_small(uint16 size)
 {
-    block **list = list_of(size);
+    block *b = NULL;
+    for (uint16 rest = HEAP_STEP; b == NULL && is_small((uint16)(size + rest)); rest += HEAP_STEP) {
+        block **list = list_of((uint16)(size + rest));
+        hal_lock_state lock = hal_lock_devices();
+        b = *list;
+        if (b != NULL) {
+            *list = b->next;
+            push_small((uint8 *)b + size, rest);
+            os_statistics.heap_used += size;
+        }
+        hal_unlock(lock);
+    }
+    return b;
+}
+
+/* When memory is short, brk moves down over the free small blocks that touch it, so that memory once used for one size
+ * serves another. ISRs never give, so a list may be taken apart while they find it empty. At most f rounds for f free
+ * small blocks; NULL: brk did not move. */
+static HAL_OUTLINE uint8 *shrink_small(void)
+{
+    uint8 *lowest = NULL;
+    uint16 size = 0;
+    heap_note_peak();
+    while (is_small(size += HEAP_STEP)) {
+        uint16 from = size;
+        block *next;
+        hal_lock_state lock = hal_lock_devices();
+        block *b = *list_of(from);
+        *list_of(from) = NULL;
+        hal_unlock(lock);
+        for (; b != NULL; b = next) {
+            next = b->next;
+            lock = hal_lock_devices();
+            if ((uint8 *)b + from == brk) {
+                brk = (uint8 *)b;
+                lowest = brk;
+                size = 0; /* look at all again */
+            } else {
+                push_small(b, from);
+            }
+            hal_unlock(lock);
+        }
+    }
+    return lowest;
+}
+
+/* Large blocks are cut at their end, or taken whole. */
+static void *take_listed(uint16 size)
+{
+    block *b, *before = &large;
+    for (; (b = before->next) != NULL; before = b) {
+        if (b->size == size) {
+            before->next = b->next;
+        } else if (b->size < size + sizeof *b) {
+            continue;
+        }
+        b->size -= size;
+        return (uint8 *)b + b->size;
+    }
+    return NULL;
+}
+
+static void *take_large(uint16 size)
+{
+    void *b = take_listed(size);
     hal_lock_state lock = hal_lock_devices();
-    block *b = *list;
-    if (b != NULL) {
-        *list = b->next;
+    if (b != NULL || (uint16)(top - brk) >= size) {
         os_statistics.heap_used += size;
-    } else if ((uint16)(top - brk) >= size) {
-        b = (block *)(void *)brk;
-        brk += size;
-        os_statistics.heap_used += size;
+        if (b == NULL) {
+            top -= size;
+            b = top;
+        }
     }
     hal_unlock(lock);
     return b;
 }
 
-/* Nothing of this size is left and nothing is untouched: cut a larger free block. At most HEAP_CLASSES short locks. */
-static void *split_small(uint16 size)
+static HAL_OUTLINE void join_next(block *b)
 {
-    for (uint16 bigger = (uint16)(size + HEAP_STEP); bigger <= HEAP_CLASSES * HEAP_STEP; bigger += HEAP_STEP) {
-        hal_lock_state lock = hal_lock_devices();
-        block *b = *list_of(bigger);
-        if (b != NULL) {
-            *list_of(bigger) = b->next;
-            push_small((uint8 *)b + size, (uint16)(bigger - size));
-            os_statistics.heap_used += size;
-        }
-        hal_unlock(lock);
-        if (b != NULL) {
-            return b;
-        }
-    }
-    return NULL;
-}
-
-/* Takes the block that ends at brk out of the list of its size, if it is there. ISRs never give, so the list may be
- * taken apart while they find it empty. */
-static block *unlink_last(uint16 size)
-{
-    hal_lock_state lock = hal_lock_devices();
-    block *first = *list_of(size);
-    *list_of(size) = NULL;
-    hal_unlock(lock);
-    block **link = &first;
-    while (*link != NULL && (uint8 *)*link + size != brk) {
-        link = &(*link)->next;
-    }
-    block *last = *link;
-    if (last != NULL) {
-        *link = last->next;
-    }
-    *list_of(size) = first;
-    return last;
-}
-
-/* Slow path when memory is short: moves brk down over every free block that touches it, so that memory once used for
- * one size serves another. At most f * f / 2 steps for f free small blocks; slice locked. */
-static void shrink_small(void)
-{
-    uint16 size = HEAP_STEP;
-    heap_note_peak();
-    while (size <= HEAP_CLASSES * HEAP_STEP) {
-        block *last = unlink_last(size);
-        if (last == NULL) {
-            size = (uint16)(size + HEAP_STEP);
-            continue;
-        }
-        hal_lock_state lock = hal_lock_devices();
-        if ((uint8 *)last + size == brk) {
-            brk = (uint8 *)last;
-        } else { /* an ISR has moved it meanwhile */
-            push_small(last, size);
-        }
-        hal_unlock(lock);
-        size = HEAP_STEP;
-    }
-}
-
-static bool lower_top(uint16 size)
-{
-    hal_lock_state lock = hal_lock_devices();
-    bool fits = (uint16)(top - brk) >= size;
-    if (fits) {
-        top -= size;
-    }
-    hal_unlock(lock);
-    return fits;
-}
-
-static void *take_large(uint16 size)
-{
-    for (block **link = &large; *link != NULL; link = &(*link)->next) {
-        block *b = *link;
-        if (b->size == size) {
-            *link = b->next;
-            return b;
-        }
-        if (b->size >= size + sizeof(block)) {
-            b->size -= size;
-            return (uint8 *)b + b->size;
-        }
-    }
-    if (!lower_top(size)) {
-        shrink_small();
-        if (!lower_top(size)) {
-            return NULL;
-        }
-    }
-    return top;
-}
-
-static void give_large(uint8 *freed, uint16 size)
-{
-    block *b = (block *)freed;
-    block **link = &large;
-    block *below = NULL;
-    while (*link != NULL && (uint8 *)*link < freed) {
-        below = *link;
-        link = &below->next;
-    }
-    b->size = size;
-    b->next = *link;
-    *link = b;
-    if (b->next != NULL && freed + size == (uint8 *)b->next) {
+    if ((uint8 *)b + b->size == (uint8 *)b->next) {
         b->size += b->next->size;
         b->next = b->next->next;
     }
-    if (below != NULL && (uint8 *)below + below->size == freed) {
-        below->size += b->size;
-        below->next = b->next;
+}
+
+static void give_large(block *freed, uint16 size)
+{
+    block *below = &large;
+    while (below->next != NULL && below->next < freed) {
+        below = below->next;
     }
-    if ((uint8 *)large == top) {
-        uint16 lowest = large->size;
+    freed->size = size;
+    freed->next = below->next;
+    below->next = freed;
+    join_next(freed);
+    join_next(below);
+    if ((uint8 *)large.next == top) {
         heap_note_peak();
-        large = large->next;
-        hal_lock_state lock = hal_lock_devices();
-        top += lowest;
-        hal_unlock(lock);
+        top += large.next->size; /* one store, read by ISRs */
+        large.next = large.next->next;
     }
 }
 
 static HAL_OUTLINE void *take_slowly(uint16 size)
 {
-    void *taken;
-    if (size > HEAP_CLASSES * HEAP_STEP) {
-        taken = hal_in_isr() ? NULL : take_large(size);
-        if (taken != NULL) {
-            hal_lock_state lock = hal_lock_devices();
-            os_statistics.heap_used += size;
-            hal_unlock(lock);
-        }
-        return taken;
-    }
-    taken = split_small(size);
-    if (taken == NULL && !hal_in_isr()) {
-        shrink_small();
-        taken = take_small(size);
+    void *taken = is_small(size) ? split_small(size) : take_large(size);
+    if (taken == NULL && !hal_in_isr() && shrink_small() != NULL) {
+        taken = heap_take(size); /* not deeper: brk is as low as it goes */
     }
     return taken;
 }
 
 void *heap_take(uint16 size)
 {
+    void *taken = NULL;
     if (HAL_ALLOCATION_FAILS()) {
         return NULL;
     }
     size = round_up(size);
-    void *taken = size <= HEAP_CLASSES * HEAP_STEP ? take_small(size) : NULL;
+    if (is_small(size)) { /* from its list, or from the untouched memory */
+        block **list = list_of(size);
+        hal_lock_state lock = hal_lock_devices();
+        taken = *list;
+        if (taken != NULL) {
+            *list = (*list)->next;
+            os_statistics.heap_used += size;
+        } else if ((uint16)(top - brk) >= size) {
+            taken = brk;
+            brk += size;
+            os_statistics.heap_used += size;
+        }
+        hal_unlock(lock);
+    }
     return taken != NULL ? taken : take_slowly(size);
 }
 
 void heap_give(void *freed, uint16 size)
 {
     size = round_up(size);
-    bool is_large = size > HEAP_CLASSES * HEAP_STEP;
-    if (is_large) {
+    if (!is_small(size)) {
         give_large(freed, size);
     }
     hal_lock_state lock = hal_lock_devices();
-    if (!is_large) {
+    if (is_small(size)) {
         push_small(freed, size);
     }
     os_statistics.heap_used -= size;

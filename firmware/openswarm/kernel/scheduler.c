@@ -3,12 +3,7 @@
 
 volatile uint16 os_pending;
 bool os_eager;
-bool os_delivering;
-
-hal_lock_state os_lock_slice(void)
-{
-    return hal_lock_slice();
-}
+volatile uint16 os_delivering;
 
 static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
 
@@ -16,20 +11,21 @@ static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
 
 static void work(void)
 {
-    uint16 todo = os_pending;
-    os_delivering = true;
+    os_delivering = 1;
     event_deliver_queued();
-    if (todo & OS_ALARM) {
+    if (os_pending & OS_ALARM) {
         hal_lock_state lock = hal_lock_devices();
         os_pending &= (uint16)~OS_ALARM;
         hal_unlock(lock);
         clock_wake_due();
     }
-    os_delivering = false;
-    SYS_ASSERT(kernel_stack_is_intact());
+    os_delivering = 0;
+    if (!kernel_stack_is_intact()) {
+        os_trap(OS_STACK, 0, 0);
+    }
 }
 
-static sys_pcb *dispatch(sys_pcb *next)
+static HAL_INLINE sys_pcb *dispatch(sys_pcb *next)
 {
     os_running = next;
     hal_slice_restart(); /* handlers are over: the whole slice belongs to next */
@@ -55,37 +51,33 @@ sys_pcb *os_schedule(void)
     return dispatch(os_ring->next);
 }
 
-sys_pcb *os_slice_end(void)
+sys_pcb *os_slice_end(sys_pcb *running)
 {
-    sys_pcb *ended = os_running; /* that is os_ring->next: the ring turns by one */
-    os_ring = ended;
-    if (HAL_UNLIKELY(os_pending != 0)) {
-        return os_schedule();
+    os_ring = running; /* it was os_ring->next: the ring turns by one */
+    if (HAL_LIKELY(os_pending == 0)) {
+        return dispatch(running->next);
     }
-    return dispatch(ended->next);
+    return os_schedule();
 }
 
 void Sys_Yield(void)
 {
-    if (HAL_UNLIKELY(!hal_in_thread())) {
-        os_refuse();
-        return;
+    if (HAL_LIKELY(hal_in_thread())) {
+        hal_yield();
+    } else {
+        (void)os_refuse();
     }
-    hal_enter_slice();
-    hal_switch(os_slice_end);
 }
 
 void Sys_Set_Scheduler(const sys_scheduler *scheduler)
 {
-    hal_lock_state lock = os_lock_slice();
+    hal_lock_state lock = hal_lock_devices();
     pick_thread = scheduler->pick;
     os_eager = scheduler->eager;
-    hal_lock_state device_lock = hal_lock_devices();
-    os_pending &= (uint16)~OS_CHOICE;
-    if (pick_thread != NULL) {
-        os_pending |= OS_CHOICE;
+    os_pending |= OS_CHOICE;
+    if (pick_thread == NULL) {
+        os_pending &= (uint16)~OS_CHOICE;
     }
-    hal_unlock(device_lock);
     hal_unlock(lock);
 }
 
@@ -137,8 +129,8 @@ static sys_pcb *earliest_deadline(sys_pcb *first)
     const periodic *earliest = NULL;
     sys_pcb *p = first;
     do {
-        const periodic *timing = process_periodic(p);
-        if (timing != NULL) {
+        if (p->status & SYS_PERIODIC) {
+            const periodic *timing = process_periodic(p);
             if (is_late(timing, now) && !(p->status & OS_MISSED)) {
                 report_miss(p);
             }
@@ -156,13 +148,12 @@ bool Sys_Wait_for_Period(void)
 {
     sys_pcb *self = os_running;
     periodic *timing = process_periodic(self);
-    if (!hal_in_thread()) {
-        return os_refuse();
+    if (os_enter_blocking() != SYS_OK) {
+        return false;
     }
-    if (timing == NULL) {
-        return os_fail(SYS_ERROR_PROCESS);
+    if (!(self->status & SYS_PERIODIC)) {
+        return os_leave(SYS_ERROR_PROCESS);
     }
-    hal_lock_state lock = os_lock_slice();
     uint16 now = clock_now();
     bool met = !is_late(timing, now);
     if (!met && !(self->status & OS_MISSED)) {
@@ -175,7 +166,7 @@ bool Sys_Wait_for_Period(void)
     if ((sint16)ahead > 0) {
         process_block(NULL, ahead);
     } else {
-        hal_unlock(lock); /* overrun: the next job is already released */
+        (void)os_leave(SYS_OK); /* overrun: the next job is already released */
         Sys_Yield();
     }
     return met;

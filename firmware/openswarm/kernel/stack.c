@@ -14,30 +14,32 @@ void stack_paint(uint8 *stack, uint16 bytes)
 
 static uint16 unused(const uint8 *stack, uint16 bytes)
 {
-    uint16 n = 0;
 #ifdef HAL_STACK_GROWS_DOWN
-    while (n < bytes && stack[n] == PAINT) {
-        n++;
+    const uint8 *p = stack;
+    while (p != stack + bytes && *p == PAINT) {
+        p++;
     }
+    return (uint16)(p - stack);
 #else
-    while (n < bytes && stack[bytes - 1u - n] == PAINT) {
-        n++;
+    const uint8 *p = stack + bytes;
+    while (p != stack && p[-1] == PAINT) {
+        p--;
     }
+    return (uint16)(stack + bytes - p);
 #endif
-    return n;
 }
 
 /* The guard at the end of a thread's stack is not the thread's to use. */
 uint16 Sys_Get_UnusedStack(uint16 pid)
 {
     uint16 bytes = 0;
-    hal_lock_state lock = os_lock_slice();
+    Sys_Start_CriticalSection();
     const sys_pcb *p = process_find(pid);
     if (p != NULL && p->block != NULL) {
         const uint8 *stack = p->block + ((p->status & SYS_PERIODIC) ? sizeof(periodic) : 0);
         bytes = unused(stack, (uint16)((const uint8 *)p - stack - HAL_STACK_GUARD));
     }
-    hal_unlock(lock);
+    Sys_End_CriticalSection();
     return bytes;
 }
 

@@ -2,7 +2,12 @@
 #include "io.h"
 #include "pins.h"
 
-static const uint16 ring[SYS_LED_RING] = PIN_LED_RING;
+static const uint16 pins[SYS_LEDS] = {PIN_LED_RING, PIN_BODY_LED, PIN_FRONT_LED};
+
+static volatile unsigned int *latch_of(uint8 led)
+{
+    return led < SYS_LED_RING ? &LATA : &LATC;
+}
 
 void hal_led_init(void)
 {
@@ -10,21 +15,13 @@ void hal_led_init(void)
 
 void hal_led_set(uint8_t led, bool on)
 {
-    volatile unsigned int *latch = led < SYS_LED_RING ? &LATA : &LATC;
-    uint16 pin = led < SYS_LED_RING ? ring[led] : led == SYS_LED_BODY ? PIN_BODY_LED : PIN_FRONT_LED;
-    if (on) {
-        *latch |= pin;
-    } else {
-        *latch &= (uint16)~pin;
-    }
+    uint16 lit = *latch_of(led) | pins[led];
+    *latch_of(led) = on ? lit : lit ^ pins[led];
 }
 
 bool hal_led_get(uint8_t led)
 {
-    if (led < SYS_LED_RING) {
-        return (LATA & ring[led]) != 0;
-    }
-    return (LATC & (led == SYS_LED_BODY ? PIN_BODY_LED : PIN_FRONT_LED)) != 0;
+    return (*latch_of(led) & pins[led]) != 0;
 }
 
 void hal_selector_init(void)

@@ -5,7 +5,7 @@
 #include <p30F6014A.h>
 
 /* Ring LEDs 0-7, clockwise from the front, are RA6 RA7 RA9 RA12 RA10 RA13 RA14 RA15. */
-#define PIN_LED_RING {1u << 6, 1u << 7, 1u << 9, 1u << 12, 1u << 10, 1u << 13, 1u << 14, 1u << 15}
+#define PIN_LED_RING 1u << 6, 1u << 7, 1u << 9, 1u << 12, 1u << 10, 1u << 13, 1u << 14, 1u << 15
 #define PIN_LED_RING_ALL 0xF6C0u
 #define PIN_FRONT_LED 0x0002u  /* RC1 */
 #define PIN_BODY_LED 0x0004u   /* RC2 */

@@ -17,27 +17,26 @@ typedef struct {
     uint16 mode, status, transmit, receive, baud;
 } registers;
 
-#define REGISTERS(uart) ((volatile registers *)((uart) == SYS_UART1 ? &U1MODE : &U2MODE))
+static HAL_OUTLINE volatile registers *registers_of(uint8 uart)
+{
+    return (volatile registers *)(uart == SYS_UART1 ? &U1MODE : &U2MODE);
+}
 
 void hal_uart_init(uint8_t uart)
 {
-    volatile registers *r = REGISTERS(uart);
+    volatile registers *r = registers_of(uart);
     r->baud = BAUD_DIVISOR;
     r->mode = ENABLE;
     r->status = TRANSMIT;
 }
 
+/* Priorities are 4 after a reset (dspic30f6014a.md §5). */
 void hal_uart_start(uint8_t uart)
 {
     if (uart == SYS_UART1) {
-        IPC2bits.U1RXIP = 4;
-        IPC2bits.U1TXIP = 4;
-        IFS0bits.U1RXIF = 0;
         IEC0bits.U1RXIE = 1;
+        hal_barrier(); /* smaller than one path with two sets of addresses */
     } else {
-        IPC6bits.U2RXIP = 4;
-        IPC6bits.U2TXIP = 4;
-        IFS1bits.U2RXIF = 0;
         IEC1bits.U2RXIE = 1;
     }
 }
@@ -46,33 +45,32 @@ void hal_uart_start(uint8_t uart)
 void hal_uart_transmit(uint8_t uart)
 {
     if (uart == SYS_UART1) {
-        if (!IEC0bits.U1TXIE) {
-            IFS0bits.U1TXIF = 1;
-            IEC0bits.U1TXIE = 1;
-        }
-    } else if (!IEC1bits.U2TXIE) {
+        IFS0bits.U1TXIF = 1;
+        IEC0bits.U1TXIE = 1;
+        hal_barrier();
+    } else {
         IFS1bits.U2TXIF = 1;
         IEC1bits.U2TXIE = 1;
     }
 }
 
-/* Fills the FIFO; true: nothing was left to send. */
-static bool fill(uint8 uart)
+/* Fills the FIFO; 1: nothing was left to send. */
+static HAL_OUTLINE uint16 fill(uint8 uart)
 {
-    volatile registers *r = REGISTERS(uart);
+    volatile registers *r = registers_of(uart);
     while (!(r->status & FIFO_FULL)) {
         sint16 byte = uart_next_byte(uart);
         if (byte < 0) {
-            return true;
+            return 1;
         }
         r->transmit = (uint16)byte;
     }
-    return false;
+    return 0;
 }
 
-static void empty(uint8 uart)
+static HAL_OUTLINE void empty(uint8 uart)
 {
-    volatile registers *r = REGISTERS(uart);
+    volatile registers *r = registers_of(uart);
     uint16 status;
     while ((status = r->status) & HAS_BYTE) {
         uint8 byte = (uint8)r->receive;
@@ -88,30 +86,27 @@ static void empty(uint8 uart)
     }
 }
 
-HAL_USED void uart1_transmit_isr(void)
+/* All four interrupts; one that comes meanwhile is served in the same round. */
+HAL_USED void uart_isr(void)
 {
-    IFS0bits.U1TXIF = 0;
-    if (fill(SYS_UART1)) {
-        IEC0bits.U1TXIE = 0;
+    if (IFS0bits.U1RXIF) {
+        IFS0bits.U1RXIF = 0;
+        empty(SYS_UART1);
     }
-}
-
-HAL_USED void uart2_transmit_isr(void)
-{
-    IFS1bits.U2TXIF = 0;
-    if (fill(SYS_UART2)) {
-        IEC1bits.U2TXIE = 0;
+    if (IFS1bits.U2RXIF) {
+        IFS1bits.U2RXIF = 0;
+        empty(SYS_UART2);
     }
-}
-
-HAL_USED void uart1_receive_isr(void)
-{
-    IFS0bits.U1RXIF = 0;
-    empty(SYS_UART1);
-}
-
-HAL_USED void uart2_receive_isr(void)
-{
-    IFS1bits.U2RXIF = 0;
-    empty(SYS_UART2);
+    if (IEC0bits.U1TXIE && IFS0bits.U1TXIF) {
+        IFS0bits.U1TXIF = 0;
+        if (fill(SYS_UART1) != 0) {
+            IEC0bits.U1TXIE = 0;
+        }
+    }
+    if (IEC1bits.U2TXIE && IFS1bits.U2TXIF) {
+        IFS1bits.U2TXIF = 0;
+        if (fill(SYS_UART2) != 0) {
+            IEC1bits.U2TXIE = 0;
+        }
+    }
 }

@@ -55,10 +55,10 @@ bool Sys_Start_Camera(void)
 
 sys_camera_processor Sys_Set_CameraProcessor(sys_camera_processor wanted)
 {
-    hal_lock_state lock = os_lock_slice();
+    Sys_Start_CriticalSection();
     sys_camera_processor before = processor;
     processor = wanted != NULL ? wanted : Sys_LineOfSight_Processor;
-    hal_unlock(lock);
+    Sys_End_CriticalSection();
     return before;
 }
 

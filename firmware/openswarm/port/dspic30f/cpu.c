@@ -7,21 +7,18 @@ enum { SLICE_PERIOD = 18432 /* counts of 8 Tcy: 10 ms */ };
 
 /* What switch.S assumes. */
 #define ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
-ASSUME(sp_is_first, offsetof(sys_pcb, sp) == 0);
-ASSUME(limit_is_second, offsetof(sys_pcb, limit) == 2);
-ASSUME(status_is_fifth, offsetof(sys_pcb, status) == 8);
-ASSUME(pcb_is_18_bytes, sizeof(sys_pcb) == 18);
-ASSUME(dsp_is_bit_4, SYS_DSP == 1 << 4 && SYS_READY == 1);
+ASSUME(pcb_begins_so, offsetof(sys_pcb, sp) == 0 && offsetof(sys_pcb, limit) == 2 && offsetof(sys_pcb, status) == 8);
+ASSUME(sizes_and_bits, sizeof(sys_pcb) == 18 && SYS_DSP == 1 << 4 && SYS_READY == 1);
 ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
 
 extern void os_resume_yielded(void), os_thread_start(void);
-static uint8 clock_phase;
+static uint16 clock_phase;
 
 HAL_USED void cpu_clock_isr(void)
 {
     IFS0bits.T1IF = 0;
     PR1 = clock_period[clock_phase] - 1u; /* of the period that has just begun */
-    clock_phase = (uint8)(clock_phase == 4 ? 0 : clock_phase + 1);
+    clock_phase = clock_phase == 4 ? 0 : clock_phase + 1u;
     os_clock_tick();
 }
 
@@ -36,8 +33,7 @@ void hal_start(void)
     PR1 = 14745u - 1u;
     TMR1 = 0;
     PR2 = SLICE_PERIOD - 1u;
-    IPC0bits.T1IP = 4;
-    IPC1bits.T2IP = 1;
+    IPC1bits.T2IP = 1; /* T1's is 4 after a reset (dspic30f6014a.md §5) */
     IFS0bits.T1IF = 0;
     IEC0bits.T1IE = 1;
     IEC0bits.T2IE = 1;
@@ -67,7 +63,7 @@ void hal_stack_release(sys_pcb *process)
     (void)process;
 }
 
-void hal_stop(void)
+HAL_OUTLINE void hal_stop(void)
 {
     CPU_SRL |= CPU_IPL;
     IEC0 = IEC1 = IEC2 = INTCON1 = 0; /* nothing wakes the CPU again: the robot rests, an emulated run ends */

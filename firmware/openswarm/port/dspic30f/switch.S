@@ -8,18 +8,29 @@
 ; thread's SPLIM, which stays set, never trips there.
 #include "hal_limits.h"
 
-        .equ    PCB_SP, 0               ; offsets in sys_pcb and bits of its status, checked by cpu.c
-        .equ    PCB_LIMIT, 2
+        .equ    PCB_LIMIT, 2            ; offsets in sys_pcb (0: sp) and bits of its status, checked by cpu.c
         .equ    PCB_STATUS, 8
         .equ    STATUS_READY, 0
         .equ    STATUS_DSP, 4
-        .equ    T2IE, 6                 ; bits of IEC0, INTCON1 and CORCON (dspic30f6014a.md §5, isa.md §2.4)
-        .equ    STKERR, 2
+        .equ    STKERR, 2               ; bits of INTCON1, CORCON and IEC0 (dspic30f6014a.md §5, isa.md §2.4)
         .equ    IPL3, 3
+        .equ    T2IE, 6
 
-        .global __T2Interrupt, _hal_switch, _hal_abandon, _os_resume_yielded, _os_thread_start
+        .global __T2Interrupt, _hal_yield, _hal_block, _hal_abandon, _os_resume_yielded, _os_thread_start
         .global _hal_idle, __StackError, os_isr_exit
         .text
+
+; The running thread's frame is complete: store its stack pointer and move to the kernel stack. W0 = the thread.
+        .macro  leave_thread resume
+        mov     _os_running, w0
+        mov     #handle(\resume), w2
+        mov     [w0+PCB_STATUS], w3
+        btsc    w3, #STATUS_DSP
+        rcall   save_dsp
+        push    w2
+        mov     w15, [w0]               ; sp
+        mov     #_os_memory, w15
+        .endm
 
 ; ---- Preemption: 10 ms timer, IPL 1 -----------------------------------------------------------------------------
 __T2Interrupt:
@@ -35,14 +46,7 @@ __T2Interrupt:
         push    RCOUNT
         push    TBLPAG
         push    PSVPAG
-        mov     _os_running, w1
-        mov     #handle(resume_preempted), w2
-        mov     [w1+PCB_STATUS], w3
-        btsc    w3, #STATUS_DSP
-        rcall   save_dsp
-        push    w2
-        mov     w15, [w1]               ; PCB_SP
-        mov     #_os_memory, w15
+        leave_thread resume_preempted
         bclr    SR, #7                  ; IPL 1, on the kernel stack
         rcall   _os_slice_end
         bra     resume
@@ -61,24 +65,27 @@ resume_preempted:
         pop.d   w0
         retfie
 
-; ---- void hal_switch(hal_pick): thread stack, IPL 1 ----------------------------------------------------------------
-_hal_switch:
-        push.d  w8
-        push.d  w10
-        push.d  w12
-        push    w14
-        mov     _os_running, w1
-        mov     #handle(resume_yielded), w2
-        mov     [w1+PCB_STATUS], w3
-        btsc    w3, #STATUS_DSP
-        rcall   save_dsp
-        push    w2
-        mov     w15, [w1]               ; PCB_SP
-
 ; ---- void hal_abandon(hal_pick): any stack, IPL 1 ------------------------------------------------------------------
 _hal_abandon:
         mov     #_os_memory, w15
         call    w0
+        bra     resume
+
+; ---- void hal_block(void): thread stack, IPL 1 ---------------------------------------------------------------------
+_hal_block:
+        mov     #handle(_os_schedule), w1
+        bra     1f
+
+; ---- void hal_yield(void): thread stack, IPL 0 ---------------------------------------------------------------------
+_hal_yield:
+        bset    SR, #5                  ; IPL 1; an interrupt that slips in finds nothing half-done
+        mov     #handle(_os_slice_end), w1
+1:      push.d  w8
+        push.d  w10
+        push.d  w12
+        push    w14
+        leave_thread _os_resume_yielded
+        call    w1
 
 ; ---- W0 = thread to resume; kernel stack, IPL 1 ------------------------------------------------------------------
 resume:
@@ -90,7 +97,6 @@ resume:
         goto    w1
 
 _os_resume_yielded:
-resume_yielded:
         pop     w14
         pop.d   w12
         pop.d   w10

@@ -51,11 +51,6 @@ hal_lock_state hal_lock_slice(void)
     return raise_to(SLICE);
 }
 
-void hal_enter_slice(void)
-{
-    level = SLICE;
-}
-
 hal_lock_state hal_lock_devices(void)
 {
     return raise_to(DEVICE);
@@ -87,8 +82,7 @@ static void take_interrupts(void)
             take_devices();
             level = before;
         } else {
-            level = SLICE;
-            hal_switch(os_slice_end);
+            hal_yield();
         }
     }
 }
@@ -205,12 +199,28 @@ void hal_stack_release(sys_pcb *process)
     free(c);
 }
 
-void hal_switch(hal_pick pick)
+static sys_pcb *end_slice(void)
+{
+    return os_slice_end(os_running);
+}
+
+static void save_and(hal_pick pick)
 {
     context *self = os_running->sp;
     kernel_pick = pick;
     fiber_switch(self->fiber, kernel);
     hal_unlock(THREAD);
+}
+
+void hal_yield(void)
+{
+    level = SLICE;
+    save_and(end_slice);
+}
+
+void hal_block(void)
+{
+    save_and(os_schedule);
 }
 
 void hal_abandon(hal_pick pick)

@@ -41,11 +41,6 @@ hal_lock_state hal_lock_slice(void)
     return raise_to(SLICE);
 }
 
-void hal_enter_slice(void)
-{
-    level = SLICE;
-}
-
 hal_lock_state hal_lock_devices(void)
 {
     return raise_to(DEVICE);
@@ -72,8 +67,7 @@ void hal_unlock(hal_lock_state before)
         clock_interrupt();
     }
     if (slice_due) { /* replace: the slice timer's ISR saves the thread's registers and does the same */
-        level = SLICE;
-        hal_switch(os_slice_end);
+        hal_yield();
     }
 }
 
@@ -172,12 +166,28 @@ void hal_stack_release(sys_pcb *process)
     free(c);
 }
 
-void hal_switch(hal_pick pick)
+static sys_pcb *end_slice(void)
+{
+    return os_slice_end(os_running);
+}
+
+static void save_and(hal_pick pick)
 {
     context *self = os_running->sp;
     kernel_pick = pick;
     swapcontext(&self->registers, &kernel);
     level = THREAD;
+}
+
+void hal_yield(void)
+{
+    level = SLICE;
+    save_and(end_slice);
+}
+
+void hal_block(void)
+{
+    save_and(os_schedule);
 }
 
 void hal_abandon(hal_pick pick)

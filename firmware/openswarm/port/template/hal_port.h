@@ -4,7 +4,7 @@
 
 #define HAL_USED /* your compiler's "referenced from assembly only" */
 #define HAL_NORETURN __attribute__((noreturn))
-#define HAL_UNLIKELY(condition) __builtin_expect(condition, 0)
+#define HAL_LIKELY(condition) __builtin_expect(condition, 1)
 #define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
 #define HAL_OUTLINE __attribute__((noinline))            /* cold */
 #define HAL_ALLOCATION_FAILS() false
@@ -13,7 +13,6 @@ typedef int hal_lock_state; /* replace: whatever restores your interrupt mask */
 typedef void *hal_limit;    /* replace: stack limit register, or any type if there is none */
 
 hal_lock_state hal_lock_slice(void);
-void hal_enter_slice(void);
 hal_lock_state hal_lock_devices(void);
 void hal_unlock(hal_lock_state before);
 bool hal_in_thread(void);
