@@ -7,8 +7,8 @@ steps is only the wheel speeds given to it. The same calls give the same numbers
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+import struct
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -24,6 +24,7 @@ ITERATIONS: Final = 20
 """Of the constraint solver (epuck.md §4)."""
 WALL_THICKNESS: Final = 20.0
 """Half thickness of the walls' segments in cm: nothing tunnels through."""
+_POSE, _PLACE = struct.Struct("3d"), struct.Struct("2d")
 STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START = range(4)
 """Independent generators of a trial: `generator(seed, stream, robot)`."""
 
@@ -33,12 +34,25 @@ def generator(seed: int, stream: int, robot: int = 0) -> np.random.Generator:
     return np.random.default_rng([seed, stream, robot])
 
 
-@dataclass(frozen=True, slots=True)
 class Poses:
-    """Where everything is. Robots: x, y, heading; objects: x, y. cm and rad."""
+    """Where everything is, never changed. Robots: x, y, heading; objects: x, y. cm and rad."""
 
-    robots: list[tuple[float, float, float]]
-    objects: list[tuple[float, float]]
+    __slots__ = ("_objects", "robots")
+
+    def __init__(
+        self,
+        robots: list[tuple[float, float, float]],
+        objects: list[tuple[float, float]] | Callable[[], list[tuple[float, float]]],
+    ) -> None:
+        self.robots: Final = robots
+        self._objects = objects
+
+    @property
+    def objects(self) -> list[tuple[float, float]]:
+        """Made when first asked for: most quanta end before anybody looks."""
+        if not isinstance(self._objects, list):
+            self._objects = self._objects()
+        return self._objects
 
 
 class World:
@@ -83,7 +97,7 @@ class World:
         self._noise = [(1.0, 1.0)] * len(robots)
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
         self._buffer = pymunk.batch.Buffer()
-        self._order = self._find_order()
+        self._robot_places, self._object_places = self._find_places()
         self.poses = self._read()
 
     # -- building ----------------------------------------------------------------------------------------------------
@@ -167,21 +181,23 @@ class World:
             left, right = rng.uniform(1 - share, 1 + share, 2).tolist()
             self._noise[index] = left, right
 
-    def _find_order(self) -> list[int]:
-        """Where robots and objects are in pymunk's list of all bodies, which stays as it is while none is removed."""
+    def _find_places(self) -> tuple[list[int], list[int]]:
+        """Where the poses of robots and objects are in the bytes of pymunk's list of all bodies, which stays as it is
+        while none is removed."""
         self._buffer.clear()
         pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._buffer)
         found = np.frombuffer(self._buffer.int_buf(), dtype=np.int64).tolist()
-        return [found.index(body.id) for body in [*self.robots, *self.objects]]
+        robots, objects = ([_POSE.size * found.index(body.id) for body in some] for some in (self.robots, self.objects))
+        return robots, objects
 
     def _read(self) -> Poses:
         """All poses in one call: asking body by body costs more than the physics."""
         self._buffer.clear()
         fields = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
         pymunk.batch.get_space_bodies(self.space, fields, self._buffer)
-        values = np.frombuffer(self._buffer.float_buf(), dtype=np.float64).reshape(-1, 3)[self._order].tolist()
-        robots = [(x, y, heading) for x, y, heading in values[: len(self.robots)]]
-        return Poses(robots, [(x, y) for x, y, _ in values[len(self.robots) :]])
+        values = bytes(self._buffer.float_buf())
+        return Poses([_POSE.unpack_from(values, place) for place in self._robot_places],
+                     lambda: [_PLACE.unpack_from(values, place) for place in self._object_places])  # fmt: skip
 
     @property
     def seconds(self) -> float:
