@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from emu.peripherals.kit import Cell
@@ -18,6 +19,8 @@ class Noise:
     def __init__(self, record: Record, seed: int = 0) -> None:
         self._seed: Final = Cell(record, "noise.seed", "Q", seed & _ONES)
         self._strength: Final = Cell(record, "noise.strength", "Q")
+        self.on_change: Final[list[Callable[[], None]]] = []
+        """Called before another strength begins to hold and once it does, by those who foretell levels."""
 
     @property
     def strength(self) -> float:
@@ -26,7 +29,11 @@ class Noise:
 
     @strength.setter
     def strength(self, strength: float) -> None:
+        for told in self.on_change:
+            told()
         self._strength.value = round(strength * _SCALE_ONE)
+        for told in self.on_change:
+            told()
 
     def at(self, channel: int, cycle: int, deviation: float) -> float:
         """Noise of standard deviation `deviation` on a channel in a cycle."""

@@ -7,14 +7,13 @@ ratiometric: 0..65535 of AVDD, so a level of `code << 4` converts to `code`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
 from emu.chips.chip import AdcSite
 from emu.device import Register
 from emu.events import NEVER
+from emu.peripherals.adccourse import FOREVER, Course, Inputs, Published
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import SLEEP, Kit, Peripheral
 from emu.peripherals.pins import parse_pin
@@ -22,9 +21,6 @@ from emu.peripherals.timers import Timer
 
 FULL_SCALE: Final = 0x10000
 """AVDD in units of analog level."""
-_CONVERSION_TAD: Final = 14
-FOREVER: Final = 1 << 62
-"""A cycle that never comes, as a number native code can compare with its sign."""
 _COURSES: Final = 64
 """Register settings remembered; firmware has a handful."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
@@ -34,36 +30,6 @@ _OFF, _WAITING, _SAMPLING, _CONVERTING = range(4)
 
 _MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
 """SSRC: what ends sampling (§13)."""
-
-AnalogSource = Callable[[int], int]
-"""Analog level 0..65535 as a function of the cycle."""
-
-
-@dataclass(frozen=True, slots=True)
-class Course:
-    """What the control registers ask for; times in half Tcy."""
-
-    tad: int
-    sampling: int
-    """From the start of sampling to the conversion; NEVER if something else ends it."""
-    again: bool
-    """ASAM: sampling follows every conversion."""
-    scanned: tuple[int, ...]
-    """Channels of multiplexer A in turn; empty without scan."""
-    inputs: tuple[tuple[int, int], tuple[int, int]]
-    """(positive channel, CH0N) of multiplexers A and B."""
-    alternates: bool
-    results: int
-    """Conversions per interrupt."""
-    in_halves: bool
-    form: int
-    references: int
-    """VCFG."""
-
-    @property
-    def conversion(self) -> int:
-        """From the end of sampling to the result."""
-        return _CONVERSION_TAD * self.tad
 
 
 class Adc(Peripheral):
@@ -87,10 +53,11 @@ class Adc(Peripheral):
             register.written_by(partial(self._setting_written, register))
         self.pcfg.written_by(lambda _old, _new, _lanes: self._route(self.now + 1))
         self._port: Final = parse_pin(site.pins[0])[0]
-        self.input: Final = self.array("input", "H", len(site.pins))
+        self.source: Final = Inputs(self, len(site.pins))
+        """By channel a function of the cycle that replaces its level; call `catch_up` before it changes its course."""
+        self.input: Final = self.source.level
         """Analog level of each channel; change it through `set_input`."""
-        self.source: Final[list[AnalogSource | None]] = [None] * len(site.pins)
-        """A function of the cycle that replaces a channel's level; call `catch_up` before it changes its course."""
+        self._published: Final = Published(self, len(site.pins))
         self._vref_high: Final = self.cell("vref_high", "I", FULL_SCALE)
         self._vref_low: Final = self.cell("vref_low", "I", 0)
         self._state: Final = self.cell("state", "B")
@@ -124,10 +91,6 @@ class Adc(Peripheral):
         """Levels on VREF- and VREF+ (0..65536 of AVDD), used when VCFG selects them."""
         self.catch_up(self.now)
         self._vref_low.value, self._vref_high.value = low, high
-
-    def _level(self, channel: int, cycle: int) -> int:
-        source = self.source[channel]
-        return source(cycle) if source is not None else self.input[channel]
 
     def _course(self) -> Course:
         """The present course, remembered by the contents of the registers."""
@@ -173,9 +136,9 @@ class Adc(Peripheral):
             self._scan.value = (place + 1) % len(course.scanned)
         if course.alternates or use_b:
             self._use_b.value = course.alternates and not use_b
-        zero = self._level(1, cycle) if negative else low
+        zero = self.source.at(1, cycle) if negative else low
         span = max(high - low, 1)
-        return min(max((self._level(channel, cycle) - zero) * 4096 // span, 0), 4095)
+        return min(max((self.source.at(channel, cycle) - zero) * 4096 // span, 0), 4095)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
@@ -244,6 +207,7 @@ class Adc(Peripheral):
     def _plan(self) -> None:
         """Post the next interrupt, or the end of the state if what follows depends on somebody else."""
         course, state = self._course(), self._state.value
+        self._published.tell(course, changes_by_itself=bool(self.con3["ADRC"]))
         duration = self._duration(course, state)
         if duration == NEVER:
             self.events.cancel(self._step)
@@ -353,6 +317,7 @@ class Adc(Peripheral):
         self._stands.value = FOREVER
         self._route(self.now)
         self.restored()
+        self._plan()
 
     def stops_in(self, mode: int) -> bool:
         """With its own RC oscillator it runs in Sleep."""

@@ -35,7 +35,7 @@ def test_a_capture_that_comes_late_spoils_the_line(image: Build) -> None:
 
 
 def test_cpu_load_of_capture_and_classification_is_printed(image: Build, capsys, tmp_path) -> None:
-    """Issue 6, Must show 1: in percent, from exact cycles. A frame of 1,600,000 Tcy is 20 lines of some 658 Tcy and VSYNC's
+    """Issue 6, Must show 1: in percent, from exact cycles. A frame of 1,600,000 Tcy is 20 lines of some 658 and VSYNC's
     interrupt; the scene that costs the classifier most is the one without red: all 24 pixels are looked at."""
     white = tmp_path / "white.png"
     write_picture(str(white), plain(SCENES["nothing"]), 1)

@@ -19,6 +19,8 @@ PULSE_PINS: Final = ("RF7", "RF8", "RG0", "RG1")
 """Line n lights the emitters of sensors n and n + 4 (epuck.md §2)."""
 TAU_SECONDS: Final = 60e-6
 """Time constant of the receiver behind its emitter (epuck.md §10)."""
+SETTLED_TCY: Final = round(9.2 * TAU_SECONDS * 30e6)
+"""Time after which less than half a count is missing of the largest reflection, at the fastest clock (chip §3)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
 
 NOISE_COUNTS, NOISE_SHARE = 5.0, 0.03
@@ -59,11 +61,14 @@ class Infrared(Part):
         self._since: Final = self.array("since", "Q", len(PULSE_PINS))
         self._from: Final = self.array("from", "H", len(PULSE_PINS))
         """Settled share at the last switch, in 1/65535."""
+        self._sources: Final = [partial(self._level, sensor) for sensor in range(SENSORS)]
         for sensor in range(SENSORS):
             self.ambient[sensor] = AMBIENT
-            chip.adc.source[_FIRST_CHANNEL + sensor] = partial(self._level, sensor)
+            chip.adc.source[_FIRST_CHANNEL + sensor] = self._sources[sensor]
         for line, pin in enumerate(PULSE_PINS):
             self.pins.watch(pin, partial(self._switched, line))
+            self._foretell(line)
+        noise.on_change.append(self._foretell_all)
 
     def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
         """Put a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
@@ -74,11 +79,13 @@ class Infrared(Part):
         self.chip.adc.catch_up(self.now)
         for sensor, millimetres, share in surfaces:
             self.reflection[sensor] = round(reflection_at(millimetres) * share)
+        self._foretell_all()
 
     def set_ambient(self, sensor: int, counts: int) -> None:
         """Ambient light at a sensor as raw counts 0..4095 (dark is high)."""
         self.chip.adc.catch_up(self.now)
         self.ambient[sensor] = counts
+        self._foretell(sensor % len(PULSE_PINS))
 
     def is_lit(self, sensor: int) -> bool:
         """Whether the emitter of a sensor is on: other robots may see it."""
@@ -101,6 +108,19 @@ class Infrared(Part):
         self._from[line] = round(share * 0xFFFF)
         self._since[line] = cycle
         self._lit[line] = bool(levels & changed)
+        self._foretell(line)
+
+    def _foretell_all(self) -> None:
+        self.chip.adc.catch_up(self.now)
+        for line in range(len(PULSE_PINS)):
+            self._foretell(line)
+
+    def _foretell(self, line: int) -> None:
+        """Tell the converter what the receivers of a line will show once they have settled: without noise a number."""
+        for sensor in (line, line + len(PULSE_PINS)):
+            raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
+            level = None if self._noise.strength else min(max(raw, 0), 4095) << 4
+            self.chip.adc.source.foretell(_FIRST_CHANNEL + sensor, self._sources[sensor], level, self._since[line] + SETTLED_TCY)
 
     def _level(self, sensor: int, cycle: int) -> int:
         lowered = self.reflection[sensor] * self._share(sensor % len(PULSE_PINS), cycle)
@@ -138,14 +158,25 @@ class Microphones(Part):
     def __init__(self, chip: Peripherals, noise: Noise) -> None:
         super().__init__("microphones", chip)
         self._noise: Final = noise
+        self._quiet: Final = [partial(self._level, self._FIRST + microphone, None) for microphone in range(3)]
         for microphone in range(3):
             self.play(microphone, None)
+        noise.on_change.append(self._foretell)
 
     def play(self, microphone: int, sound: Callable[[int], float] | None) -> None:
         """Let `sound(cycle)` (in counts around 0) reach microphone 0..2 (right, left, back), or None for silence."""
         self.chip.adc.catch_up(self.now)
         channel = self._FIRST + microphone
-        self.chip.adc.source[channel] = partial(self._level, channel, sound)
+        loud = partial(self._level, channel, sound)
+        self.chip.adc.source[channel] = self._quiet[microphone] if sound is None else loud
+        self._foretell()
+
+    def _foretell(self) -> None:
+        """Silence without noise is a number."""
+        self.chip.adc.catch_up(self.now)
+        for microphone, quiet in enumerate(self._quiet):
+            level = None if self._noise.strength else self.ZERO << 4
+            self.chip.adc.source.foretell(self._FIRST + microphone, quiet, level)
 
     def _level(self, channel: int, sound: Callable[[int], float] | None, cycle: int) -> int:
         heard = self.ZERO + self._noise.at(channel, cycle, self.DEVIATION) + (sound(cycle) if sound is not None else 0)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
 from emu.dspic30f.core import Core
+from emu.dspic30f.jit.converter import Switch, converter_of
 from emu.dspic30f.jit.values import Number, Value, wide
 from emu.dspic30f.jit.variables import pointer
 
@@ -321,6 +322,9 @@ def native_registers(core: Core) -> dict[int, NativeRegister]:
         until, sfrs = core.record.fields["adc.stands_until"].offset, core.chip.sfrs
         for name in ("ADCON1", "ADCON2", *(f"ADCBUF{index:X}" for index in range(16))):
             registers[sfrs[name].address] = Standing(sfrs[name].address, until)
+    converter = converter_of(core)
+    if converter is not None:
+        registers[converter.con1] = Switch(converter)
     return registers
 
 

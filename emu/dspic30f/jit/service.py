@@ -13,6 +13,7 @@ from typing import Final
 
 from emu.dspic30f.core import Core
 from emu.dspic30f.interrupts import ALTIVT, UNMASKABLE
+from emu.dspic30f.jit.converter import ConverterPlaces, converter_of, event_text
 from emu.dspic30f.power import STIR
 from emu.dspic30f.registers import NSTDIS
 from emu.dspic30f.state import IDLE, IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA, RUN
@@ -52,6 +53,7 @@ class Boundary:
     trap_flags: int
     sources: tuple[tuple[int, int, int, int, int, int], ...]
     """Per flag word and bit: address and shift of the priority, offset of the rise, IVT, AIVT, vector number."""
+    converter: ConverterPlaces | None = None
 
 
 def boundary_of(core: Core, offset: Mapping[str, int]) -> Boundary:
@@ -78,7 +80,7 @@ def boundary_of(core: Core, offset: Mapping[str, int]) -> Boundary:
             flags, bit, rise = rises[site.irq]
             matches.append(Match(names.index(f"{name}.match"), offset[f"{name}.period"], flags, bit, rise))
     return Boundary(offset, len(names), names.index("cpu.look"), tuple(matches), tuple(words), core.traps.flags,
-                    tuple(sources))
+                    tuple(sources), converter_of(core))
 
 
 def service_text(b: Boundary) -> str:
@@ -186,7 +188,8 @@ settled:
 choose:
   %p.who = getelementptr i64, ptr %p.due, i64 %who1
   switch i64 %who1, label %python [ i64 {b.look}, label %look"""]
-    lines[0] += "".join(f" i64 {m.slot}, label %t{m.slot}" for m in b.matches) + " ]"
+    slots = [m.slot for m in b.matches] + ([b.converter.slot] if b.converter is not None else [])
+    lines[0] += "".join(f" i64 {slot}, label %t{slot}" for slot in slots) + " ]"
     lines.append("look:\n  store i64 -1, ptr %p.who\n  br label %fire")
     for m in b.matches:
         n = f"t{m.slot}"
@@ -205,6 +208,8 @@ choose:
 {n}.rise:
   store i64 %least1, ptr %{n}.ps
   br label %fire"""]
+    if b.converter is not None:
+        lines.append(event_text(b.converter))
     return "\n".join(lines)
 
 

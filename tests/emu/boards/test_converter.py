@@ -1,0 +1,73 @@
+"""The analog converter under native code: the same record as in the interpreter, in any setting and at any stop."""
+
+from __future__ import annotations
+
+import random
+from functools import partial
+
+import pytest
+
+from emu.boards.epuck.board import Epuck
+from emu.loader import load_image
+from emu.machine import Machine
+
+SETTLED = 3_000
+"""Tcy until the program has read its variables."""
+
+
+def machine_with(image, engine: str, settings: dict[str, int]) -> Machine:
+    machine = Machine(image.chip, engine=engine, board=partial(Epuck, seed=5))
+    if engine == "jit":
+        machine.runner.threshold, machine.runner.wait = 1, True
+    machine.load(image)
+    machine.run(until=image.symbols.find("main").address, cycles=SETTLED)
+    for name, value in settings.items():
+        machine.poke(name, value)
+    return machine
+
+
+def random_settings(generator: random.Random) -> dict[str, int]:
+    """Mostly plain scans as programs use them, sometimes anything at all."""
+    if generator.random() < 0.25:
+        con1, con2 = generator.randrange(0x10000) & 0x03E6, generator.randrange(0x10000) & 0xE43F
+    else:
+        con1, con2 = 0x00E4, 0x0400 | generator.randrange(16) << 2
+    return {
+        "con1": con1,
+        "con2": con2,
+        "con3": generator.choice((0, 1, 2, 5, 31)) << 8 | generator.choice((3, 10, 19, 23, 39, 63)),
+        "chs": generator.choice((0, 2, 9, 0x0907)),
+        "cssl": generator.choice((0x001C, 0x111C, 0x00FC, 0x8000, 0xFFFF, 0, generator.randrange(0x10000))),
+        "ways": generator.randrange(32),
+    }
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_engines_agree_in_any_setting(program, seed):
+    """Design §4.3: odd half Tcy, channel lists that do not divide the round, emitters that settle, levels that change
+    between runs, ADCON1 read while it works, Idle."""
+    generator = random.Random(seed)
+    image, settings = load_image(program("convert.c")), random_settings(generator)
+    one, other = (machine_with(image, engine, settings) for engine in ("interp", "jit"))
+    for number in range(12):
+        cycles = generator.randrange(1, 6_000)
+        for machine in (one, other):
+            machine.run(cycles=cycles)
+            if number % 4 == 3:
+                machine.board.ir.set_distance(number % 8, 10 * number)
+                machine.board.noise.strength = float(number == 7)
+        assert one.cycle == other.cycle
+        first, second = one.snapshot(), other.snapshot()
+        name = one.record.field_at
+        assert [name(place) for place in range(len(first)) if first[place] != second[place]] == [], settings
+
+
+def test_a_scan_at_the_vendors_rate_needs_no_python(program):
+    """epuck.md §5: three microphones, 450 Tcy a scan, ADON cleared and set in each interrupt."""
+    machine = machine_with(load_image(program("convert.c")), "jit", {"con2": 0x0408, "con3": 0x0113, "ways": 19})
+    machine.run(cycles=100_000)
+    before, rounds = machine.runner.counts.interpreted, machine.peek("rounds")
+    machine.run(cycles=500_000)
+    assert machine.peek("rounds") - rounds > 900
+    assert machine.runner.counts.interpreted - before < 10
+    assert [machine.peek(machine.address_of("seen") + 2 * i) for i in range(2)] == [2048, 2048]
