@@ -19,6 +19,7 @@ from arena import bodies
 from arena.brain import STRIP_PIXELS
 from arena.page import samples_of
 from arena.record import RecordError, Trial, reason_of
+from arena.vision import COLOURS
 
 SCALE: Final = 1.6
 """Pixels per cm."""
@@ -112,10 +113,21 @@ def _strip(draw: ImageDraw.ImageDraw, number: int, robot: dict[str, Any], sample
     draw.text((30 + STRIP_PIXELS * _PIXEL, y), " ".join(lit), fill=_INK)
 
 
+def _palette() -> list[tuple[int, int, int]]:
+    """Every colour that is drawn, those that the things in the arena have for a camera, and ramps between them for
+    noise and smoothed edges: all frames have the same colours."""
+    drawn = [_INK, _PAPER, _PALE, *_SEEN, *_CLUSTERS, *(tuple(map(int, colour)) for colour in COLOURS)]
+    ramps = [(grey, grey, grey) for grey in range(0, 256, 8)]
+    ramps += [(level, level // 6, level // 6) for level in range(8, 256, 8)]
+    ramps += [(level // 5, level, level // 4) for level in range(8, 160, 8)]
+    return [(red, green, blue) for red, green, blue in (*drawn, *ramps)]
+
+
 def _gif(pictures: Iterator[Image.Image], part: Path) -> None:
-    first = next(pictures).quantize(64)
-    rest = (picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures)
-    first.save(part, save_all=True, append_images=rest, duration=round(1000 / FRAMES_PER_S), loop=0)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([value for colour in _palette() for value in colour])
+    coloured = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
+    next(coloured).save(part, save_all=True, append_images=coloured, duration=round(1000 / FRAMES_PER_S), loop=0)
 
 
 def _mp4(pictures: Iterator[Image.Image], part: Path) -> None:

@@ -50,6 +50,21 @@ def test_frames_show_the_objects_where_the_record_has_them(trial: Path) -> None:
     assert first.tobytes() != last.tobytes()
 
 
+def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> None:
+    """They come up only when objects meet, long after the first frame."""
+    record = read_trial(trial)
+    for axis, away in (("x", 10.0), ("y", 0.0)):
+        met = record.columns[f"o0_{axis}"] + away
+        met[0] = record.columns[f"o1_{axis}"][0]
+        record.columns[f"o1_{axis}"] = met
+    movie.write_movie(record, tmp_path / "met.gif", 4.0)
+    with Image.open(tmp_path / "met.gif") as film:
+        film.seek(film.n_frames - 1)
+        x, y = record.objects[-1][1]
+        shown = film.convert("RGB").getpixel((x * SCALE, 300 * SCALE - y * SCALE))
+    assert shown in movie._CLUSTERS
+
+
 def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
     """Decoded again by the same ffmpeg: as many frames, the same size."""
     try:
