@@ -120,7 +120,9 @@ class Infrared(Part):
         for sensor in (line, line + len(PULSE_PINS)):
             raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
             level = None if self._noise.strength else min(max(raw, 0), 4095) << 4
-            self.chip.adc.source.foretell(_FIRST_CHANNEL + sensor, self._sources[sensor], level, self._since[line] + SETTLED_TCY)
+            self.chip.adc.source.foretell(
+                _FIRST_CHANNEL + sensor, self._sources[sensor], level, self._since[line] + SETTLED_TCY
+            )
 
     def _level(self, sensor: int, cycle: int) -> int:
         lowered = self.reflection[sensor] * self._share(sensor % len(PULSE_PINS), cycle)

@@ -263,6 +263,38 @@ def test_odd_brg_values_round_each_edge_down(rig):
     assert wait(rig) == 11 + 45
 
 
+@pytest.mark.parametrize("brg", [1, 2, 3, 4, 13, 72, 73, 149, 150, 367, 510, 511])
+def test_clock_pulses_last_exactly_brg_plus_one_tcy(rig, brg):
+    """§11: on the SCL pin, for nine bits: the n-th falls n (BRG + 1) Tcy behind the beginning, and rises half a bit
+    earlier, rounded down. Issue 6, Must show 3: bus frequency exact."""
+    rig.write("I2CBRG", brg)
+    rig.write("I2CCON", BASE)
+    rig.at(5).write("I2CCON", BASE | SEN)
+    wait(rig)
+    start = rig.events.now + 1
+    rig.write("I2CTRN", 0x5A)
+    rises, falls, level = [], [], 0
+    for cycle in range(start, start + 9 * (brg + 1) + 1):
+        before, level = level, rig.at(cycle).dev.pins.get("RG2")
+        if level != before:
+            (rises if level else falls).append(cycle)
+    assert falls == [start + n * (brg + 1) for n in range(1, 10)]
+    assert rises == [start + (2 * n + 1) * (brg + 1) // 2 for n in range(9)]
+
+
+def test_every_setting_sends_a_byte_in_nine_bits(rig):
+    """§11: all 512 values of BRG, to the Tcy."""
+    for brg in range(512):
+        rig.write("I2CBRG", brg)
+        rig.write("I2CCON", BASE)
+        rig.at(rig.events.now + 1).write("I2CTRN", 0)
+        start = rig.events.now + 1
+        assert not rig.at(start + 9 * (brg + 1) - 1).flag("MI2CIF"), brg
+        assert rig.at(start + 9 * (brg + 1)).flag("MI2CIF"), brg
+        rig.clear_flags()
+        rig.write("I2CCON", 0)
+
+
 def test_waveform_shows_clock_and_data_of_a_byte(bus):
     """§11: MSB first, data stable while SCL is high."""
     step(bus, SEN)
