@@ -173,6 +173,13 @@ def _push_struct(s: Selector, v: Value, t: Type) -> None:
         s.copy(s.reg(v), source)
         s.emit("repmov", Imm(words - 1), source, SP)
         return
+    if words >= BLOCK_PUSH_WORDS:  # bytes: W15 itself must stay even
+        source, dest = s.temp(), s.temp()
+        s.copy(s.reg(v), source)
+        s.emit("mov", SP, dest)
+        s.emit("spadd", Imm(2 * words))
+        s.emit("repmov", Imm(size_of(t) - 1), source, dest, byte=True)
+        return
     for r in _struct_words(s, v, t):
         s.emit("mov", r, Mem("++", SP))
 
