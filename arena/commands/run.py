@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from arena.campaign import Done, Plan, note_host_time, open_folder, run_all
 from arena.controllers import CONTROLLERS
 from arena.firmware import image_for
 from arena.metrics import course, time_to
-from arena.record import Trial, trials_in
+from arena.record import Trial, trials_in, write_bytes
 from arena.scene import Scene, load_scene, scripted
 
 EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/os-A"
@@ -82,6 +83,10 @@ def run(options: argparse.Namespace) -> int:
     plan = Plan(scene, name, options.controller, image, options.trials, 60 * options.minutes, options.seed)
     folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"
     missing = open_folder(plan, folder, sys.argv)
+    if image is not None:  # kept beside the results; the one it came from may be built anew meanwhile
+        kept = folder / f"firmware{image.suffix}"
+        write_bytes(kept, image.read_bytes())
+        plan = replace(plan, image=kept)
     faults = with_progress(plan, folder, missing, options.jobs, options.scheduler)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
     results = [summary(trial) for trial in trials_in(folder) if trial.path.name in wanted]

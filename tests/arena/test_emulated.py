@@ -132,6 +132,7 @@ def test_a_robot_whose_firmware_traps_stops_and_the_trial_goes_on(
     status = main(["run", "clustering", "--brain", str(talking_image), "--robots", "2", "--trials", "1", "--minutes",
                    "0.05", "--jobs", "1", "--out", str(out)])  # fmt: skip
     assert status == 1
+    assert (out / "firmware.elf").read_bytes() == talking_image.read_bytes()  # what ran is kept
     trial = read_trial(out / "trial-0001.parquet")
     assert trial.times[-1] == pytest.approx(3.0, abs=0.01)
     assert [fault[0] for fault in trial.about["faults"]] == [0, 1]
