@@ -22,6 +22,7 @@ from emu.dspic30f.jit.builder import (
     NeedsInterpreter,
     Surroundings,
 )
+from emu.dspic30f.jit.polling import empty_loops
 from emu.dspic30f.jit.region import Region, Step
 from emu.dspic30f.jit.repeat import Repeats
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
@@ -59,6 +60,8 @@ class Translator:
         self._todo: list[int] = []
         self._exits: dict[tuple[int, int], str] = {}
         self._requested: Value
+        self._polling: Final = {} if exact else empty_loops(region, around, context)
+        self._heads: Final = {loop.head for loop in self._polling.values()}
 
     def text(self) -> str:
         """The module."""
@@ -80,6 +83,9 @@ class Translator:
         if not self.exact:
             head.line("%x.reason = alloca i64")
             head.line(f"store i64 {MISS}, ptr %x.reason")
+        for pc in sorted(self._heads):
+            head.line(f"%passed.{pc:x} = alloca i1")
+            head.line(f"store i1 false, ptr %passed.{pc:x}")
         self._deadline(head)
         head.end(f"switch i64 {here.text}, label %exit [ {entries} ]")
         tail = Emitter(head.last_name)
@@ -129,6 +135,20 @@ class Translator:
         hand_over = self.exact and pc in self.region.leaders
         self.e.end(f"br label %{self.exit(pc, NEXT) if hand_over else self._label(pc)}")
 
+    def _jump_back(self, back: int, pc: int) -> None:
+        """Go on at `pc`. From the end of an empty loop that has been run once, skip the iterations before the last one
+        that ends before the deadline."""
+        loop = self._polling.get(back)
+        if loop is not None:
+            e = self.e
+            passed = e.let(f"load i1, ptr %passed.{loop.head:x}", bit=True)
+            cycle = self.v.get("cycle")
+            left = e.let(f"sub i64 %stop, {cycle.text}")
+            whole = e.let(f"sdiv i64 {left.text}, {loop.cycles}") - 1
+            some = passed & (whole > 0)
+            self.v.set("cycle", cycle + self.b.select(some, whole, 0) * loop.cycles)
+        self.jump(pc)
+
     # -- blocks -----------------------------------------------------------------------------------------------------
     def _cost(self, pc: int) -> int:
         """Upper bound of the cycles of the block at `pc`, without REPEATs (they make their own check)."""
@@ -156,6 +176,8 @@ class Translator:
         late = self.exit(start, SERVICE if self.exact else DEADLINE)
         e.end(f"br i1 {fits.text}, label %{go}, label %{late}, !prof !0")
         e.start(go)
+        if start in self._heads:
+            e.line(f"store i1 true, ptr %passed.{start:x}")
         if start == self.around.do_end:
             again = e.fresh("again")
             left = e.load(pointer(e, self.around.offset["DCOUNT"]), 16)
@@ -255,7 +277,7 @@ class Translator:
             self.v.new_block()
             extra = 1 if isinstance(flow, Branch) else (step.target - step.next_pc) // 2
             self.v.set("cycle", self.v.get("cycle") + extra)
-            self.jump(step.target)
+            self._jump_back(step.pc, step.target)
             e.start(other)
             self.jump(step.next_pc)
             return
@@ -265,7 +287,7 @@ class Translator:
             self._idle(step.next_pc)
             return
         if isinstance(flow.target, int):
-            self.jump(flow.target)
+            self._jump_back(step.pc, flow.target)
             return
         if isinstance(flow, Return) and flow.kind == "retfie":
             repeats = (flow.srl & RA) != 0

@@ -1,0 +1,106 @@
+"""Polling loops whose iterations are skipped: found where they are empty, and equal to those that are run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from random_firmware import Firmware, difference, literal, load, to_sfr, words_of
+from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
+
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.interp import context_of
+from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.jit.builder import Surroundings
+from emu.dspic30f.jit.devices import native_registers
+from emu.dspic30f.jit.engine import access_kinds, offsets
+from emu.dspic30f.jit.polling import empty_loops
+from emu.dspic30f.jit.region import discover
+from emu.machine import Machine
+
+IFS0, TMR1 = (DSPIC30F6014A.sfrs[name].address for name in ("IFS0", "TMR1"))
+FLAG = 0x900
+
+EMPTY = {
+    "wait for an interrupt flag": words_of("BTSS{.B} f, #bit4", f=IFS0, b=3) + words_of("BRA Expr", n=-2),
+    "wait for a variable": words_of("MOV{.W} f, Wnd", f=FLAG, d=4) + words_of("CP0{.B} Ws", B=0, s=4, p=0)
+    + words_of("BRA Z, Expr", n=-3),
+    "wait for an interrupt for ever": words_of("BRA Expr", n=-1),
+}
+BUSY = {
+    "a countdown": words_of("DEC{.B} Ws, Wd", B=0, s=4, p=0, d=4, q=0) + words_of("BRA NZ, Expr", n=-2),
+    "a look at the time": words_of("MOV{.W} f, Wnd", f=TMR1, d=4) + words_of("CP0{.B} Ws", B=0, s=4, p=0)
+    + words_of("BRA NZ, Expr", n=-3),
+    "a store": words_of("MOV{.W} Wns, f", s=5, f=FLAG) + words_of("BTSS{.B} f, #bit4", f=IFS0, b=3)
+    + words_of("BRA Expr", n=-3),
+}
+START = 0x200
+
+
+def polling_firmware(loop: list[int]) -> Firmware:
+    """T1 matches every 97 Tcy; its handler changes FLAG from 0 to 1 and back. Behind the loop W1 counts."""
+    firmware = Firmware(0)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    firmware.put(0x1A, [0x1000])
+    at = 0x100
+    for register in range(16):
+        at = firmware.put(at, literal(0xA00 if register == 15 else 7, register))
+    at = firmware.put(at, literal(0, 0) + words_of("MOV{.W} Wns, f", s=0, f=FLAG))
+    enabled = 0 if loop == EMPTY["wait for an interrupt flag"] else 8
+    for sfr, value in (("PR1", 96), ("IEC0", enabled), ("T1CON", 0x8000)):
+        at = firmware.put(at, to_sfr(sfr, value))
+    firmware.put(at, words_of("GOTO Expr", n=START))
+    at = firmware.put(START, loop)
+    at = firmware.put(at, words_of("BCLR{.B} f, #bit4", f=IFS0, b=3))
+    at = firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=1, p=0, d=1, q=0))
+    firmware.put(at, words_of("GOTO Expr", n=START))
+    handler = words_of("BCLR{.B} f, #bit4", f=IFS0, b=3) + words_of("BTG{.B} f, #bit4", f=FLAG, b=0)
+    firmware.put(0x1000, handler + words_of("RETFIE"))
+    return firmware
+
+
+def loops_of(words: list[int]) -> int:
+    """How many empty loops a program of these words has."""
+    machine = Machine(engine="plain")
+    load(machine, polling_firmware(words))
+
+    def fetch(pc: int) -> Insn | None:
+        flash = machine.program.flash
+        return decode_for_execution(flash[pc >> 1], flash[(pc >> 1) + 1])
+
+    reads, writes = access_kinds(machine.core)
+    around = Surroundings(offsets(machine.core), reads, writes, 0xFFFF, False, 0x10000, (), 0, (), 0, 0, 0,
+                          native_registers(machine.core))
+    return len(empty_loops(discover(START, fetch), around, context_of(0x20, 0, 0, 0)))
+
+
+@pytest.mark.parametrize("words", EMPTY.values(), ids=EMPTY)
+def test_a_loop_that_only_waits_is_empty(words: list[int]) -> None:
+    """Design §4.3: no store, no read that time changes, nothing computed from an iteration's own results."""
+    assert loops_of(words) == 1
+
+
+@pytest.mark.parametrize("words", BUSY.values(), ids=BUSY)
+def test_a_loop_that_does_something_is_not(words: list[int]) -> None:
+    """The same from the other side."""
+    assert loops_of(words) == 0
+
+
+@pytest.mark.parametrize("words", (EMPTY | BUSY).values(), ids=EMPTY | BUSY)
+def test_skipped_iterations_leave_what_run_ones_leave(words: list[int]) -> None:
+    """The whole record at stops in every phase of the loop and of the interrupt."""
+    plain, native = pair(polling_firmware(words))
+    for length in (*range(1, 120), 997, 5003):
+        assert plain.run(length) == native.run(length)
+        assert not difference(plain, native)
+
+
+def test_a_loop_that_is_entered_behind_its_head_is_run() -> None:
+    """What stands in registers then is not what an iteration leaves."""
+    skip_in = words_of("BRA Expr", n=1)  # enters at the comparison
+    assert loops_of(skip_in + EMPTY["wait for a variable"]) == 0
