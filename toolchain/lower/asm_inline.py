@@ -95,7 +95,7 @@ class AsmBuilder:
                 self.tied(c, inputs.pop(0))
             else:
                 self.input(c, inputs.pop(0))
-        if early:
+        if early or clobbers:  # a clobbered register may be written before the inputs have been read
             self.late = [k for k, r in enumerate(self.roles) if r in "sS"]
         mi = MI("asm", *self.operands, line=self.s.line)
         mi.info = OpInfo("".join(self.roles), "cznv", words=max(1, self.asm.text.count("\n") + 1))

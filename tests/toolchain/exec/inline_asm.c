@@ -16,6 +16,12 @@ TEST(clobbered_registers_are_kept_out, "GNU C")
     __asm__ volatile("clr w0\n\tclr w1\n\tclr w2\n\tclr w3\n\tclr w4\n\tclr w5\n\tclr w6\n\tclr w7" : : : OS_W0, OS_W1, OS_W2, OS_W3, OS_W4, OS_W5, OS_W6, OS_W7);
     CHECK(a == 1 && b == 2 && c == 3 && d == 4);
 }
+TEST(inputs_stay_out_of_clobbered_registers, "GNU C")
+{
+    int a = I(21), b = I(4), sum = 0;
+    __asm__ volatile("clr w0\n\tclr w1\n\tadd %1,%2,w0\n\tadd w0,w1,%0" : "=r"(sum) : "r"(a), "r"(b) : OS_W0, OS_W1);
+    CHECK(sum == 25);
+}
 TEST(clobbered_saved_registers_are_saved, "GNU C")
 {
     int a = I(1);
