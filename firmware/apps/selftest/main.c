@@ -1,5 +1,6 @@
 /* Asks every device and reports on UART1. README.md. */
 #include <analog.h>
+#include <battery.h>
 #include <bluetooth.h>
 #include <camera.h>
 #include <i2c.h>
@@ -77,13 +78,22 @@ static void turn_wheels(void)
     say("motors done\r\n");
 }
 
-/* Asked over Bluetooth, beside the commands of its driver: N proximity, A accelerometer and microphones. */
+static void report_uart(void)
+{
+    const sys_uart_statistics *s = Sys_Get_UARTStatistics(SYS_UART1);
+    report("uart", (sint16)s->tx_refused, (sint16)s->rx_lost, (sint16)s->rx_damaged, true);
+}
+
+/* Asked over Bluetooth, beside the commands of its driver: N proximity, A accelerometer and microphones, U what the UART
+ * lost. */
 static void answer(const char *line)
 {
     if (line[0] == 'N') {
         report_proximity();
     } else if (line[0] == 'A') {
         report_rest();
+    } else if (line[0] == 'U') {
+        report_uart();
     }
 }
 
@@ -91,6 +101,7 @@ static void test(void)
 {
     say("selftest\r\n");
     report("selector", Sys_Get_Selector(), 0, 0, true);
+    say(Sys_Is_BatteryLow() ? "battery low\r\n" : "battery ok\r\n");
     char line[LINE];
     snprintf(line, sizeof line, "camera %04x%s\r\n", Sys_Get_CameraType(), camera ? "" : " FAIL");
     say(line);

@@ -1,0 +1,9 @@
+/* Battery (battery.h). */
+#include "battery.h"
+
+#include "hal_battery.h"
+
+bool Sys_Is_BatteryLow(void)
+{
+    return hal_battery_is_low();
+}

@@ -1,0 +1,10 @@
+/* Battery: the comparator that goes low below 3.4 V (epuck.md §2). */
+#ifndef BATTERY_H
+#define BATTERY_H
+
+#include "openswarm.h"
+
+/* MTHI | no | 8 | 4.  True: below 3.4 V; what moves should stop soon. */
+bool Sys_Is_BatteryLow(void);
+
+#endif

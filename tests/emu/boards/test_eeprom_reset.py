@@ -1,0 +1,56 @@
+"""A program's EEPROM write cut off by a reset (dspic30f6014a.md §16; issue 6, Must show 8)."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu.boards.epuck.board import Epuck
+from emu.loader import load_image
+from emu.machine import Machine
+
+LAST_WORD = 0x7FFFFE
+BUSY_TCY = 29_491
+"""2 ms."""
+
+
+@pytest.fixture(params=["interp", "auto"])
+def machine(request, program) -> Machine:
+    image = load_image(program("eeprom.c"))
+    made = Machine(image.chip, engine=request.param, board=Epuck)
+    made.load(image)
+    return made
+
+
+def run_until_led(machine: Machine, pin: str) -> None:
+    for _ in range(1000):
+        machine.run(cycles=100)
+        if machine.pins.get(pin):
+            return
+    raise AssertionError(f"{pin} never rose")
+
+
+def test_an_undisturbed_write_takes_two_times_two_milliseconds(machine):
+    """§16: erase and program 2 ms each; the CPU runs meanwhile and sees WR."""
+    machine.run(cycles=2 * BUSY_TCY + 2_000)
+    assert machine.peek("done") == machine.program.word(LAST_WORD) == 1
+    assert (machine.peek("found"), machine.peek("errors")) == (0xFFFF, 0)
+    machine.reset("EXTR")
+    machine.run(cycles=2 * BUSY_TCY + 2_000)
+    assert (machine.peek("found"), machine.peek("done"), machine.peek("errors")) == (1, 2, 0)
+
+
+@pytest.mark.parametrize(("pin", "left"), [("RA6", 0xFFFF), ("RA7", 0xFFFF)])
+@pytest.mark.parametrize("cause", ["EXTR", "WDTO"])
+def test_a_reset_in_the_middle_is_told_by_wrerr_and_hangs_nothing(machine, pin, left, cause):
+    """§16: WRERR = 1 if an operation is cut by reset. A word cut while erased or programmed reads as erased; the
+    program starts over and the next write works."""
+    machine.program.put(LAST_WORD, 7)
+    run_until_led(machine, pin)
+    machine.run(cycles=BUSY_TCY // 2)
+    machine.reset(cause)
+    assert machine.program.word(LAST_WORD) == left
+    machine.run(cycles=1_000)
+    assert (machine.peek("errors"), machine.peek("found")) == (1, left)
+    machine.run(cycles=2 * BUSY_TCY + 2_000)
+    assert machine.peek("done") == machine.program.word(LAST_WORD) == 1
+    assert machine.peek("NVMCON") & 0x8000 == 0
