@@ -25,10 +25,10 @@ C compiler, assembler and linker for the dsPIC30F6014A, used like gcc.
   -flto / -fno-lto      optimise the whole program when linking C files (default on; with -c: off)
   -ffreestanding        no assumptions about library functions; main need not return int
   -fsingle-precision-constant   unsuffixed floating constants are float
+  -mlarge-code          two-word calls, which reach all of the flash (default -msmall-code: RCALL, +-32 K words)
   -fstack-check         functions with a frame above 8 bytes probe SPLIM on entry
   -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000), at the place that does it
   -finstrument-functions  call __cyg_profile_func_enter and _exit
-  -fxc16-attributes     accept XC16's spelling __attribute__((interrupt, no_auto_psv))
   -I -D -U -include -isystem -iquote -std= -W... -w -pedantic   as in gcc
   -MD -MMD -MF -MT -MQ -MP -M -MM                               dependency files, as in gcc
   -L DIR -l NAME        libraries; the run-time library is always searched last
@@ -71,7 +71,7 @@ IGNORED_FLAGS = {
     "-fno-data-sections", "-fomit-frame-pointer", "-fno-omit-frame-pointer", "-fno-exceptions", "-fno-unwind-tables",
     "-fno-asynchronous-unwind-tables", "-fno-stack-protector", "-mno-eds-warn", "-fno-ident", "-fno-pic", "-fno-pie",
     "-msmart-io=0", "-msmart-io=1", "-omf=elf", "-mdfp", "-legacy-libc", "-static", "-fuse-linker-plugin", "-fno-plt",
-    "-mconst-in-code", "-msmall-data", "-msmall-code", "-mlarge-data", "-mlarge-code", "-mlarge-scalar",
+    "-mconst-in-code", "-msmall-data", "-mlarge-data", "-mlarge-scalar", "-fxc16-attributes",
 }  # fmt: skip
 DEVICES = {"30F6014A", "30f6014a", "dsPIC30F6014A", "dspic30f6014a"}
 REFUSED = {
@@ -111,7 +111,7 @@ class CcOptions:
     emit_llvm: bool = False
     stack_check: bool = False
     single_constants: bool = False
-    xc16_attributes: bool = False
+    large_code: bool = False
     clang: list[str] = field(default_factory=list)
     dependency: list[str] = field(default_factory=list)
     linker: list[str] = field(default_factory=list)
@@ -238,10 +238,10 @@ def _code_generation(options: CcOptions, word: str) -> bool:
         options.lto = word == "-flto"
     elif word in ("-fstack-check", "-fno-stack-check"):
         options.stack_check = word == "-fstack-check"
+    elif word in ("-mlarge-code", "-msmall-code"):
+        options.large_code = word == "-mlarge-code"
     elif word == "-fsingle-precision-constant":
         options.single_constants = True
-    elif word == "-fxc16-attributes":
-        options.xc16_attributes = True
     elif word.startswith(("-mcpu=", "-p")) and word not in ("-pedantic", "-pedantic-errors", "-pipe"):
         device = word.split("=", 1)[1] if "=" in word else word[2:]
         if device not in DEVICES:

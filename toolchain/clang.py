@@ -30,7 +30,9 @@ TARGET_FLAGS = [
 ]
 # Plain char is signed (abi-elf.md §1.1; MSP430 says unsigned), wchar_t is unsigned short.
 # A pragma that nobody understands (XC16's `#pragma config`) must not pass in silence.
-LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas"]
+# `space(ymemory), far` are two section names to clang; it keeps the first. Notes about our macros are of no use.
+LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas", "-Wno-section",
+                  "-fmacro-backtrace-limit=1"]  # fmt: skip
 # Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
 ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp2", "exp2f", "exp10", "ldexp",
                     "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf"]  # fmt: skip
@@ -38,7 +40,6 @@ ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp2", "exp2f", "exp10", "ldex
 PREDEFINED = ["__dsPIC30F6014A__", "__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_CODEGUARD__",
               "__HAS_5VOLTS__"]  # fmt: skip
 FOREIGN_MACROS = ["MSP430", "__MSP430__"]
-ATTRIBUTE_WORDS = ["interrupt", "auto_psv", "no_auto_psv", "shadow"]
 CLANG_LEVEL = {"0": "-O0", "1": "-O1", "2": "-O2", "s": "-Oz"}
 
 
@@ -68,19 +69,11 @@ def builtin_include_dir() -> Path:
     return Path(clang_program()[0]).parent / "lib" / "include"
 
 
-def _attribute_macro(word: str, name: str) -> str:
-    keep = "__used__," if word == "interrupt" else ""
-    return f'-D{name}={keep}__annotate__("{word}")'
-
-
 def front_end_flags(options: CcOptions) -> list[str]:
     """Flags that give C source the meaning it has on this target, followed by the user's own."""
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
     flags += [f"-D{name}=1" for name in PREDEFINED]
-    flags += [_attribute_macro(word, f"__{word}__") for word in ATTRIBUTE_WORDS]
-    if options.xc16_attributes:
-        flags += [_attribute_macro(word, word) for word in ATTRIBUTE_WORDS]
     flags += [f"-fno-builtin-{name}" for name in ABSENT_FUNCTIONS]
     flags += ["-include", str(INCLUDE_DIR / "dspic_builtins.h")]
     if options.single_constants:

@@ -43,6 +43,7 @@ class CompileOptions(Protocol):
     level: str  # "0" "1" "2" "s"
     debug: bool
     stack_check: bool
+    large_code: bool
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class Options:
     level: str = "s"
     debug: bool = False
     stack_check: bool = False
+    large_code: bool = False
 
 
 @dataclass
@@ -246,7 +248,7 @@ class ModuleCompiler:
                 self.function(f)
             elif f.linkage == "extern_weak":
                 self.lines.append(f"\t.weak {symbol(self.module, f.name)}")
-        self.lines += data.emit_data(self.module)
+        self.lines += data.emit_data(self.module, self.notes)
         self.aliases()
         if self.options.debug:
             self.lines += self.dwarf.text()
@@ -272,7 +274,7 @@ class ModuleCompiler:
         name = symbol(self.module, f.name)
         rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
         ranges = Ranges(str(self.serial))
-        emitter = emit.Emitter(c.m, str(self.serial), False)
+        emitter = emit.Emitter(c.m, str(self.serial), self.options.large_code)
         self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges)
         gone = c.taken - {b.name for b in c.m.blocks}  # nothing jumps there, but their addresses are still values
         self.lines += [f"{block_label(f.name, block)}:" for block in sorted(gone)]
@@ -288,8 +290,10 @@ class ModuleCompiler:
     def header(self, f: Function, interrupt: str) -> None:
         """Section, symbol and type. Each function has a section of its own for --gc-sections."""
         name = symbol(self.module, f.name)
-        section = f.section or (".isr.text." if interrupt else ".text.") + name
-        self.lines.append(f"\t.section {section},code")
+        own = "" if f.section in data.PLACES else f.section  # near and far say how to call, which -mlarge-code decides
+        section = own or (".isr.text." if interrupt else ".text.") + name
+        modifiers = isr.section_modifiers(f.name, self.notes.get(f.name, set()))
+        self.lines.append(f"\t.section {section},code{modifiers}")
         self.lines.append("\t.align 2")
         if f.linkage in data.WEAK:
             self.lines.append(f"\t.weak {name}")

@@ -13,7 +13,7 @@ from tests.toolchain.c_programs import run
 from toolchain import driver
 from toolchain.cc_options import parse
 from toolchain.clang import clang_program
-from toolchain.elf.read import is_object
+from toolchain.elf.read import is_object, read_executable
 from toolchain.errors import ToolError
 
 
@@ -126,12 +126,68 @@ def test_single_precision_constants(capsys: pytest.CaptureFixture[str], tmp_path
     assert "muldf3" not in (tmp_path / "single.s").read_text()
 
 
-def test_xc16_attributes_on_request(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """-fxc16-attributes accepts Microchip's spelling of interrupt functions (abi-elf.md §2.5)."""
-    source = write(tmp_path, "a.c", "int n; void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void) { n++; }\n"
-                   "int main(void) { return 0; }\n")  # fmt: skip
-    assert cc(capsys, source, "-o", tmp_path / "x.elf")[0] == 1
-    assert cc(capsys, "-fxc16-attributes", source, "-o", tmp_path / "x.elf") == (0, "")
+XC16_ATTRIBUTES = """
+int interrupt, space, address, near; /* attributes are no reserved words */
+#define MY_ISR __attribute__((interrupt, no_auto_psv))
+void __attribute__((interrupt, auto_psv)) _T1Interrupt(void) { interrupt++; }
+void MY_ISR _T2Interrupt(void) { space++; }
+void __attribute__((__interrupt__, __no_auto_psv__, __shadow__)) _T3Interrupt(void) { address++; }
+int __attribute__((space(eedata))) settings = 5;
+const int __attribute__((space(eedata))) defaults[3] = {5, 6, 7};
+int __attribute__((space(xmemory), aligned(32))) x_line[16];
+int __attribute__((__space__(ymemory), far)) y_line[16];
+int __attribute__((persistent)) survivor;
+int __attribute__((near)) close[100];
+int __attribute__((far)) distant;
+int __attribute__((noload)) untouched;
+char __attribute__((reverse(64))) fft[64];
+int __attribute__((address(0x1000))) fixed;
+const char __attribute__((space(prog))) text[] = "hello";
+void __attribute__((address(0x8000), noinline, unused)) moved(void) { near++; }
+int main(void)
+{
+    moved();
+    return x_line[0] + y_line[1] + survivor + close[0] + distant + untouched + fft[0] + fixed;
+}
+"""
+
+
+def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """abi-elf.md §1.4 and §2.5: Microchip's attributes as its users spell them, and the section each gives."""
+    source = write(tmp_path, "a.c", XC16_ATTRIBUTES)
+    assert cc(capsys, "-Os", "-Wall", "-S", source, "-o", tmp_path / "a.s") == (0, "")
+    said = (tmp_path / "a.s").read_text()
+    for line in (
+        ".eedata.0,eedata", ".eedata.1,eedata", ".xmemory._x_line,bss,xmemory", ".ymemory._y_line,bss,ymemory",
+        ".pbss,persist", ".near._close,bss,near", ".far._distant,bss", ".nbss._untouched,bss,near,noload",
+        ".nbss._fft,bss,near,reverse(0x40)", ".bss._fixed,bss,address(0x1000)", ".prog.2,code",
+        ".text._moved,code,address(0x8000)",
+    ):  # fmt: skip
+        assert f"\t.section {line}\n" in said, line
+    assert "push.s" in said
+    assert cc(capsys, source, "-o", tmp_path / "x.elf") == (0, "")
+    unknown = write(tmp_path, "b.c", "\nint __attribute__((bogus)) n;\n")
+    assert f"{unknown}:2:20: warning: unknown attribute 'bogus' ignored" in cc(capsys, "-c", unknown)[1]
+
+
+def test_configuration_words_are_program_words(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """abi-elf.md §6.6: output sections __FOSC, ... with code flags."""
+    text = "#include <p30F6014A.h>\n_FOSC(CSW_FSCM_OFF & XT_PLL8);\n_FWDT(WDT_OFF);\nint main(void) { return 0; }\n"
+    assert cc(capsys, "-Os", write(tmp_path, "a.c", text), "-o", tmp_path / "x.elf") == (0, "")
+    image = read_executable((tmp_path / "x.elf").read_bytes(), "x.elf")
+    found = {s.name: s for s in image.sections if s.name in ("__FOSC", "__FWDT")}
+    assert {name: (s.load, s.is_code, bytes(s.data)) for name, s in found.items()} == {
+        "__FOSC": (0xF80000, True, b"\xe6\xff\0\0"), "__FWDT": (0xF80002, True, b"\xff\x7f\0\0")
+    }  # fmt: skip
+
+
+def test_calls_of_large_programs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """abi-elf.md §1.4: -mlarge-code makes two-word calls; without it RCALL."""
+    text = "extern void f(void), g(void); int main(void) { f(); g(); return 0; }\n"
+    source = write(tmp_path, "a.c", text)
+    for option, call in (("-mlarge-code", "\tcall _f\n"), ("-msmall-code", "\trcall _f\n")):
+        assert cc(capsys, "-Os", option, "-S", source, "-o", tmp_path / "a.s") == (0, "")
+        assert call in (tmp_path / "a.s").read_text()
 
 
 def test_a_program_replaces_library_functions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

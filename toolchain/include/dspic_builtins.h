@@ -2,6 +2,7 @@
 #ifndef DSPIC_BUILTINS_H
 #define DSPIC_BUILTINS_H
 #ifndef __ASSEMBLER__
+#include "dspic_attributes.h"
 
 #define __builtin_nop() __asm__ volatile("nop")
 #define __builtin_clrwdt() __asm__ volatile("clrwdt")

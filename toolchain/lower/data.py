@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from ..ir.model import (
     BlockAddress,
     ConstAgg,
@@ -20,6 +22,7 @@ from ..ir.model import (
     struct_offsets,
 )
 from ..target import NEAR_BYTES
+from .isr import section_modifiers
 from .names import block_label, symbol
 
 WORDS_PER_LINE = 8
@@ -28,7 +31,10 @@ WEAK = ("weak", "weak_odr", "linkonce", "linkonce_odr", "extern_weak", "common")
 SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near", ".bss": "bss", ".data": "data",
                  ".xbss": "bss,xmemory,near", ".xdata": "data,xmemory,near", ".ybss": "bss,ymemory",
                  ".ydata": "data,ymemory",
-                 ".pbss": "persist", ".eedata": "eedata"}  # fmt: skip
+                 ".pbss": "persist", ".eedata": "eedata", ".prog": "code", ".psv": "psv,page"}  # fmt: skip
+# Sections that dspic_attributes.h names; the first word, bss or data, depends on the initialiser.
+PLACES = {".near": ",near", ".far": "", ".xmemory": ",xmemory", ".ymemory": ",ymemory"}
+CONFIG_SECTION = re.compile(r"__\w+\.sec")  # configuration words are program words (abi-elf.md §6.6)
 
 
 def is_near(module: Module, name: str) -> bool:
@@ -37,6 +43,8 @@ def is_near(module: Module, name: str) -> bool:
     Definition and every declaration agree, because only type and section decide.
     """
     var = module.globals.get(name)
+    if var is not None and var.section == ".near":
+        return True
     if var is None or var.constant or var.type.kind == "opaque" or not 0 < size_of(var.type) <= NEAR_BYTES:
         return False
     return not var.section or var.section.startswith((".nbss", ".ndata", "sfr"))
@@ -45,8 +53,9 @@ def is_near(module: Module, name: str) -> bool:
 class DataEmitter:
     """Text of all variables of a module."""
 
-    def __init__(self, module: Module) -> None:
+    def __init__(self, module: Module, notes: dict[str, set[str]]) -> None:
         self.module = module
+        self.notes = notes
         self.lines: list[str] = []
 
     def run(self) -> list[str]:
@@ -65,7 +74,8 @@ class DataEmitter:
         """One definition."""
         name, size = symbol(self.module, var.name), size_of(var.type)
         zero = isinstance(var.init, ConstZero | Undef) or (isinstance(var.init, ConstInt) and var.init.value == 0)
-        self.lines.append(f"\t.section {self._section(var, name, zero)}")
+        modifiers = section_modifiers(var.name, self.notes.get(var.name, set()))
+        self.lines.append(f"\t.section {self._section(var, name, zero, modifiers)}{modifiers}")
         align = max(var.align, 2 if size > 1 else 1)
         if align > 1:
             self.lines.append(f"\t.align {align}")
@@ -86,8 +96,13 @@ class DataEmitter:
         data.pad_to(max(size, 1))
         self.lines += data.text()
 
-    def _section(self, var: GlobalVar, name: str, zero: bool) -> str:
+    def _section(self, var: GlobalVar, name: str, zero: bool, modifiers: str) -> str:
         suffix = name.removeprefix(".L")
+        kind = "bss" if zero else "data"
+        if var.section in PLACES:
+            return f"{var.section}.{suffix},{kind}{PLACES[var.section]}"
+        if CONFIG_SECTION.fullmatch(var.section):
+            return f"{var.section},code"
         if var.section:
             base = next((k for k in SECTION_TYPES if var.section == k or var.section.startswith(k + ".")), "")
             if base:
@@ -95,8 +110,8 @@ class DataEmitter:
             return f"{var.section}," + ("psv,page" if var.constant else "bss" if zero else "data")
         if var.constant:
             return f".const.{suffix},psv,page"
-        kind = "bss" if zero else "data"
-        return f".n{kind}.{suffix},{kind},near" if is_near(self.module, var.name) else f".{kind}.{suffix},{kind}"
+        near = is_near(self.module, var.name) and "address" not in modifiers
+        return f".n{kind}.{suffix},{kind},near" if near else f".{kind}.{suffix},{kind}"
 
 
 class Image:
@@ -211,6 +226,6 @@ class Image:
         return n & ~1
 
 
-def emit_data(module: Module) -> list[str]:
-    """Assembly lines of all variables."""
-    return DataEmitter(module).run()
+def emit_data(module: Module, notes: dict[str, set[str]]) -> list[str]:
+    """Assembly lines of all variables; `notes` are their annotations."""
+    return DataEmitter(module, notes).run()

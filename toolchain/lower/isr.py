@@ -1,6 +1,8 @@
-"""Interrupt functions and other roles given by __attribute__((annotate("...")))."""
+"""Interrupt functions, addresses and other roles given by __attribute__((annotate("...")))."""
 
 from __future__ import annotations
+
+import re
 
 from ..ir.model import ConstAgg, ConstBytes, ConstZero, GlobalRef, Module, UnsupportedError, Value
 
@@ -9,7 +11,7 @@ WORDS = {"interrupt", "auto_psv", "no_auto_psv", "shadow"}
 
 
 def annotations_of(module: Module) -> dict[str, set[str]]:
-    """Function name -> its annotation strings."""
+    """Name of a function or variable -> its annotation strings."""
     table = module.globals.get("llvm.global.annotations")
     out: dict[str, set[str]] = {}
     if table is None or not isinstance(table.init, ConstAgg):
@@ -45,3 +47,18 @@ def wants_probe(notes: set[str], default: bool) -> bool:
     if "os_no_probe" in notes:
         return False
     return default or "os_probe" in notes
+
+
+def section_modifiers(name: str, notes: set[str]) -> str:
+    """`,address(0x1000)`, `,noload`, `,reverse(64)` for a `.section` line (abi-elf.md §4.3)."""
+    out = ",noload" if "noload" in notes else ""
+    for note in sorted(notes):
+        found = re.fullmatch(r"(address|reverse)\((.*)\)", note)
+        if found is None:
+            continue
+        try:
+            number = int(found[2].strip("() ").rstrip("uUlL"), 0)
+        except ValueError:
+            raise UnsupportedError(f"attribute {note}: the argument must be a number", name) from None
+        out += f",{found[1]}(0x{number:X})"
+    return out

@@ -1,0 +1,57 @@
+/* XC16's attributes (abi-elf.md §1.4, §2.5) in clang's words. Inside `__attribute__((...))` only, so that a program may
+ * use `space` or `interrupt` as names: each attribute is looked up as a macro __dspic_a_NAME; those that have none stay as
+ * they are. What only a definition says becomes an annotation; what declarations repeat, a section. toolchain/lower/data.py and
+ * isr.py read them. Constants and variables cannot share a section, hence the counters. */
+#ifndef DSPIC_ATTRIBUTES_H
+#define DSPIC_ATTRIBUTES_H
+#pragma GCC system_header
+
+#define __attribute__(list) __attribute__((__dspic_each list))
+#define __dspic_each(...) __dspic_1(__VA_ARGS__, ) /* ISO C wants an argument for the dots */
+#define __dspic_1(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_2(__VA_ARGS__))
+#define __dspic_2(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_3(__VA_ARGS__))
+#define __dspic_3(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_4(__VA_ARGS__))
+#define __dspic_4(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_5(__VA_ARGS__))
+#define __dspic_5(a, ...) __dspic_one(a) __VA_OPT__(, __dspic_6(__VA_ARGS__))
+#define __dspic_6(a, ...) __dspic_one(a) __VA_OPT__(, __VA_ARGS__)
+#define __dspic_one(a) __dspic_pick(__dspic_a_##a, (a))
+/* A mapped attribute is `~, (replacement)`, so the second argument is the replacement; else it is the attribute. */
+#define __dspic_pick(...) __dspic_second(__VA_ARGS__, )
+#define __dspic_second(first, second, ...) __dspic_open second
+#define __dspic_open(...) __VA_ARGS__
+#define __dspic_text(x) #x
+#define __dspic_number(x) __dspic_text(x)
+
+#define __dspic_a_interrupt ~, (__used__, __annotate__("interrupt"))
+#define __dspic_a_auto_psv ~, (__annotate__("auto_psv"))
+#define __dspic_a_no_auto_psv ~, (__annotate__("no_auto_psv"))
+#define __dspic_a_shadow ~, (__annotate__("shadow"))
+#define __dspic_a_near ~, (__section__(".near"))
+#define __dspic_a_far ~, (__section__(".far"))
+#define __dspic_a_persistent ~, (__section__(".pbss"))
+#define __dspic_a_noload ~, (__annotate__("noload"))
+#define __dspic_a_address(number) ~, (__used__, __annotate__("address(" __dspic_text(number) ")"))
+#define __dspic_a_reverse(number) ~, (__annotate__("reverse(" __dspic_text(number) ")"))
+#define __dspic_a_space(kind) ~, (__dspic_space_##kind)
+
+#define __dspic_space_data
+#define __dspic_space_auto_psv
+#define __dspic_space_prog __section__(".prog." __dspic_number(__COUNTER__))
+#define __dspic_space_psv __section__(".psv." __dspic_number(__COUNTER__))
+#define __dspic_space_eedata __used__, __section__(".eedata." __dspic_number(__COUNTER__))
+#define __dspic_space_xmemory __section__(".xmemory")
+#define __dspic_space_ymemory __section__(".ymemory")
+
+#define __dspic_a___interrupt__ __dspic_a_interrupt
+#define __dspic_a___auto_psv__ __dspic_a_auto_psv
+#define __dspic_a___no_auto_psv__ __dspic_a_no_auto_psv
+#define __dspic_a___shadow__ __dspic_a_shadow
+#define __dspic_a___near__ __dspic_a_near
+#define __dspic_a___far__ __dspic_a_far
+#define __dspic_a___persistent__ __dspic_a_persistent
+#define __dspic_a___noload__ __dspic_a_noload
+#define __dspic_a___address__ __dspic_a_address
+#define __dspic_a___reverse__ __dspic_a_reverse
+#define __dspic_a___space__ __dspic_a_space
+
+#endif
