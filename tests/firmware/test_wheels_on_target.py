@@ -9,6 +9,7 @@ from tests.firmware.wheels import FASTEST, FCY, measure, partner, start
 
 PERIOD_TICKS = 6192
 TICK_TCY = 1536
+SYS_ERROR_ARGUMENT = 5
 
 
 def test_every_speed_is_exact_over_a_whole_period(image: Build) -> None:
@@ -40,7 +41,12 @@ def test_a_minute_is_exact_to_a_step(image: Build, left: int, right: int) -> Non
     assert max(abs(error) for error in errors) <= 1
 
 
-def test_speeds_out_of_range_are_clamped(image: Build) -> None:
-    """Issue 6, Must show 2: 1000 steps/s is the most."""
-    errors = measure(start(image("wheels", TARGET_APPS)), 130, -32768, 5)
-    assert max(abs(error) for error in errors) <= 1
+def test_speeds_out_of_range_are_clamped_and_reported(image: Build) -> None:
+    """Issue 6, Must show 2: 1000 steps/s is the most; the last error says that a speed was beyond, the getter which one
+    is in force."""
+    machine = start(image("wheels", TARGET_APPS))
+    assert max(abs(error) for error in measure(machine, 129, -129, 1)) <= 1
+    assert machine.peek("last_error") == 0
+    assert max(abs(error) for error in measure(machine, 130, -32768, 5)) <= 1
+    assert machine.peek("last_error") == SYS_ERROR_ARGUMENT
+    assert (machine.peek("left_in_force"), machine.peek("right_in_force")) == (129, 0x10000 - 129)

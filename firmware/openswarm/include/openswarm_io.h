@@ -16,7 +16,8 @@
 enum { SYS_MAXIMUM_SPEED = 129 }; /* mm/s at 1000 steps/s (epuck.md §3, openswarm-original.md §5.2) */
 
 typedef struct {
-    sint16 left, right; /* mm/s, forward positive; clamped to +-SYS_MAXIMUM_SPEED after the post-processor */
+    sint16 left, right; /* mm/s, forward positive; clamped to +-SYS_MAXIMUM_SPEED after the post-processor, which sets
+                           the last error to SYS_ERROR_ARGUMENT */
 } sys_wheel_speeds;
 
 /* Turns an event into wheel speeds. In: the speeds in force. False: leave them. Handler context. */

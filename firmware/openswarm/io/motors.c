@@ -15,9 +15,14 @@ bool Sys_Default_MotorProcessor(uint16 event, const sys_event_data *data, sys_wh
     return event == SYS_LEFTMOTOR_SPEED || event == SYS_RIGHTMOTOR_SPEED;
 }
 
+/* A speed beyond the maximum is told by the last error; the getters tell what became of it. */
 static sint16 clamp(sint16 mm_s)
 {
-    return mm_s > SYS_MAXIMUM_SPEED ? SYS_MAXIMUM_SPEED : mm_s < -SYS_MAXIMUM_SPEED ? -SYS_MAXIMUM_SPEED : mm_s;
+    if (mm_s >= -SYS_MAXIMUM_SPEED && mm_s <= SYS_MAXIMUM_SPEED) {
+        return mm_s;
+    }
+    (void)os_fail(SYS_ERROR_ARGUMENT);
+    return mm_s < 0 ? -SYS_MAXIMUM_SPEED : SYS_MAXIMUM_SPEED;
 }
 
 /* Messages are applied in the order they were sent, so the newest one wins. */

@@ -5,6 +5,8 @@
 enum { PAUSE_MS = 10 };
 
 volatile sint16 wanted_left __attribute__((used)), wanted_right __attribute__((used));
+volatile uint16 last_error __attribute__((used));
+volatile sint16 left_in_force __attribute__((used)), right_in_force __attribute__((used));
 
 static void driver(void)
 {
@@ -12,6 +14,9 @@ static void driver(void)
         Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, (uint16)wanted_left);
         Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, (uint16)wanted_right);
         Sys_Sleep(PAUSE_MS);
+        last_error = Sys_Get_LastError();
+        left_in_force = Sys_Get_MotorSpeed_Left();
+        right_in_force = Sys_Get_MotorSpeed_Right();
     }
 }
 
