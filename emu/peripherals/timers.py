@@ -131,15 +131,21 @@ class Timer(Counter):
         within = self.clear_from.value <= self.now < self.clear_until.value
         return within and new == 0 and lanes == 0xFFFF and self.events.due(self._match) != self.now + 1
 
-    def _foretell(self, due: int) -> None:
-        """After a match on a described clock: firmware that counts lines clears TMR now."""
+    def _post_edges(self, due: int) -> None:
+        """After a match on a described clock: post the next one, and foretell what clearing TMR leads to, because
+        firmware that counts lines does that now."""
         self.clear_until.value = 0
-        waveform = self.kit.pins.waveform(self._port, self._pin)
-        if waveform is None or self.is_wide or not self.limit or self._on_change:
+        waveform, limit = self.kit.pins.waveform(self._port, self._pin), self.limit
+        if waveform is None or self.is_wide or not limit or self._on_change:
+            self._post(due - 1)
             return
-        edge = waveform.nth_rise(self._pin, due, self.limit * self._prescale)
+        pin, prescale = self._pin, self._prescale
+        following = waveform.nth_rise(pin, due - 2, (limit + 1) * prescale)
+        self.events.set(self._match, following + 2 if following != NEVER else NEVER)
+        clocks = limit * prescale
+        edge = waveform.nth_rise(pin, due, clocks)
         self.clear_from.value = due
-        self.clear_until.value = waveform.nth_rise(self._pin, due, 1)
+        self.clear_until.value = edge if clocks == 1 else waveform.nth_rise(pin, due, 1)
         self.clear_due.value = NEVER if edge == NEVER else edge + 2
 
     def _replan_simply(self, old_limit: int, written: int | None) -> None:
@@ -301,10 +307,10 @@ class Timer(Counter):
         for listener in self._on_match:
             listener(due)
         source = self._source.value
-        if source in (TCY, WAVE):
+        if source == TCY:
             self._post(due - 1)
-        if source == WAVE:
-            self._foretell(due)
+        elif source == WAVE:
+            self._post_edges(due)
         if self.tick.value and self.limit and not self._is_gated and not self._on_match:
             self.period.value = (self.limit + 1) * self.tick.value
 

@@ -91,9 +91,14 @@ class Stepper(Part):
 
     def _catch_up(self) -> None:
         self.pins.flush()
+        self.settled_steps(self.now)
+
+    def settled_steps(self, now: int) -> int:
+        """Steps up to cycle `now`, once the pins have told all edges."""
         state = self._state
-        if not state[_SETTLED] and self.now - state[_SINCE] >= SETTLE:
+        if not state[_SETTLED] and now - state[_SINCE] >= SETTLE:
             self._settle()
+        return state[_STEPS]
 
     def _changed(self, cycle: int, _changed: int, levels: int) -> None:
         """A new pattern: what the last one was is known now."""
@@ -137,5 +142,8 @@ class Motors:
         self.right: Final = Stepper("motor.right", chip, 4, 1)
 
     def steps(self) -> tuple[int, int]:
-        """Steps of both made so far (left, right)."""
-        return self.left.steps, self.right.steps
+        """Steps of both made so far (left, right): what `Stepper.steps` of each says, in one look."""
+        left, right = self.left, self.right
+        left.pins.flush()
+        now = left.now
+        return left.settled_steps(now), right.settled_steps(now)

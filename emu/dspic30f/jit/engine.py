@@ -98,6 +98,7 @@ class JitEngine:
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2
         self.compiler = shared_compiler()
+        self._computed: Final[dict[int, int]] = {}
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
         self._env_address: Final = ctypes.addressof(self._env)
         self._codes: Final[dict[object, Code]] = {}
@@ -156,10 +157,16 @@ class JitEngine:
         env[BOUNDARY] = 1
         start = before = state.cycle
         why = self._native(self._core.record.address, self._env_address)
-        while why == SERVICE and before != state.cycle < limit:  # most often some device's event is due
+        while before != state.cycle < limit:
             before = state.cycle
-            self._core.events.fire_until(before if state.mode != RUN else before - 1)
+            if why == SERVICE:  # most often some device's event is due
+                self._core.events.fire_until(before if state.mode != RUN else before - 1)
+            elif why == INTERPRET and self._refresh(state.pc, before):
+                env[BOUNDARY] = 0  # that of this instruction has been done
+            else:
+                break
             why = self._native(self._core.record.address, self._env_address)
+            env[BOUNDARY] = 1
             self.counts.runs += 1
         env[BOUNDARY] = 0
         self.counts.runs += 1
@@ -171,6 +178,30 @@ class JitEngine:
             self._core.sequencer.after_retfie()
             return True
         return state.cycle >= limit or (why != SERVICE and state.cycle != start)
+
+    def _refresh(self, pc: int, cycle: int) -> bool:
+        """Have a device bring up to date what native code reads from the record, if that is what the instruction at
+        `pc` waits for."""
+        word = self._computed.get(pc)
+        if word is None:
+            word = self._computed[pc] = self._computed_word(pc)
+        if not word or self._core.events.deadline <= cycle:
+            return False
+        self._core.events.now = cycle
+        compute = self._core.bus.compute[word]
+        assert compute is not None
+        compute()
+        return True
+
+    def _computed_word(self, pc: int) -> int:
+        """Index of the register a one-cycle instruction reads by address, if its device computes it and native code
+        can read it; else 0."""
+        insn = self._fetch(pc)
+        if insn is None or insn.row.cycles != 1 or self._code is None:
+            return 0
+        word = int(getattr(insn.x, "f", 0)) >> 1
+        native = 2 * word in self._code.around.native
+        return word if native and self._core.bus.compute[word] is not None else 0
 
     def measure_time(self) -> None:
         """Note from now on where host time goes (`emu run --stats`); costs a little itself."""
@@ -194,6 +225,7 @@ class JitEngine:
     def forget(self) -> None:
         """Hooked addresses must come back to Python: translate anew around them."""
         self._codes.clear()
+        self._computed.clear()
         self._key = None
         self._cold.forget()
 
@@ -309,6 +341,7 @@ class JitEngine:
     def _flash_changed(self, start: int, end: int) -> None:
         """Program words in [start, end) are new: whatever was made from the old ones is stale."""
         self._codes.clear()
+        self._computed.clear()
         self._key = None
 
 def identity_of(context: Context, around: Surroundings) -> bytes:
