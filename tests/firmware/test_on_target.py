@@ -155,17 +155,6 @@ def test_a_trap_stops_the_motors_and_reports(image: Build) -> None:
 T2IF, T3IF, INT1IF = 1 << 6, 1 << 7, 1 << 0
 
 
-def start_of_scenario(path: Path, ipl_slip: int) -> Machine:
-    """The points firmware when its second round begins."""
-    machine = load(path, ipl_slip)
-    run_to(machine, "scenario_begin")
-    machine.step()
-    run_to(machine, "scenario_begin")
-    for counter in ("heard", "sent", "woken", "isr_sent", "failures", "checked"):
-        machine.poke(counter, 0)
-    return machine
-
-
 def thread_list(machine: Machine) -> list[int]:
     """PCBs on the ring and the blocked list; fails when either is malformed."""
     ring, seen = machine.peek("os_ring"), []
@@ -181,60 +170,6 @@ def thread_list(machine: Machine) -> list[int]:
         assert len(seen) < 20
     assert len(seen) == len(set(seen))
     return seen
-
-
-def queued_messages(machine: Machine) -> int:
-    """Length of the message queue, whose last element its end must point to."""
-    count, link = 0, machine.address_of("queue")
-    while machine.peek(link):
-        link = machine.peek(link)
-        count += 1
-        assert count < 10
-    assert machine.peek("queue_end") == link
-    return count
-
-
-def check_round(machine: Machine, sends: int) -> None:
-    """After scenario_end: nothing lost, nothing doubled, nothing leaked."""
-    assert machine.peek("broken") == 0
-    assert machine.peek("failures") == 0
-    assert machine.peek("woken") == 1
-    assert machine.peek("sent") == 2
-    assert machine.peek("isr_sent") == sends
-    queued = queued_messages(machine)  # an interrupt in the round's last switch, after its delivery
-    assert queued <= sends
-    assert machine.peek("heard") == 2 + sends - queued
-    assert machine.peek("heap_after") - machine.peek("heap_before") == 8 * queued
-    assert len(thread_list(machine)) == 3  # system, checker, driver
-
-
-def interrupt_every_boundary(machine: Machine, stride: int, phase: int) -> int:
-    """From scenario_begin: at every stride-th instruction boundary, tick, stepper and a device that sends arrive
-    together; the round must end as if they had not. Returns the number of boundaries tried."""
-    end = place(machine, "scenario_end")
-    boundary = tried = 0
-    while machine.pc != end:
-        if boundary % stride == phase:
-            here = machine.snapshot()
-            machine.poke("IFS0", machine.peek("IFS0") | T2IF | T3IF)
-            machine.write("IFS1", machine.peek("IFS1") | INT1IF)
-            run_to(machine, "scenario_end")
-            check_round(machine, 1)
-            machine.restore(here)
-            tried += 1
-        machine.step()
-        boundary += 1
-    check_round(machine, 0)
-    return tried
-
-
-@pytest.mark.parametrize("ipl_slip", [0, 1])
-def test_interrupts_at_every_instruction_change_nothing(image: Build, ipl_slip: int) -> None:
-    """Issue 4, Must show 3: tick, a device that sends, and the stepper, together at instruction boundaries of a round
-    of kernel calls (here every 37th; tests/fuzz/fuzz_kernel.py tries more); kernel.md §4 `--ipl-slip`. Bugs 7, 12, 13
-    of openswarm-original.md §7."""
-    machine = start_of_scenario(image("points", TARGET_APPS), ipl_slip)
-    assert interrupt_every_boundary(machine, 37, 18 * ipl_slip) > 80
 
 
 def test_a_thread_keeps_64_of_its_128_bytes(image: Build) -> None:

@@ -1,8 +1,9 @@
-"""The kernel under interrupts: `python tests/fuzz/fuzz_kernel.py [--stride N] [--preemptions N]`.
+"""The kernel under interrupts and without memory: `python tests/fuzz/fuzz_kernel.py [--stride N] [--preemptions N]`.
 
-The campaign behind tests/firmware/test_on_target.py, which samples. Runs a round of kernel calls once for each
-instruction boundary, with tick, stepper and a sending device arriving there, without and with IPL slip (kernel.md §4).
-Then preempts threads that check all their registers.
+The campaign behind tests/firmware/test_every_instruction.py, which samples: every kernel call is interrupted at every
+instruction boundary by all interrupts together and by them one after the other, without and with IPL slip (kernel.md
+§4), and every allocation fails once. Then threads that check all their registers are preempted. An interrupted
+campaign goes on with --way, --ipl-slip and --scene, as its last line said.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.firmware.test_on_target import interrupt_every_boundary, load, place, start_of_scenario  # noqa: E402
+from tests.firmware.injection import WAYS, fail_every_allocation, sweep  # noqa: E402
+from tests.firmware.test_on_target import load, place  # noqa: E402
 
 
 def build(app: str, out: Path) -> Path:
@@ -44,17 +46,29 @@ def preempt_patterns(path: Path, wanted: int) -> None:
     print(f"{switches} preemptions, every register kept", flush=True)
 
 
+def interrupt_everywhere(path: Path, options: argparse.Namespace) -> None:
+    """Every boundary in every way, from where the last run was told to go on."""
+    for way in WAYS[WAYS.index(options.way) :]:
+        for ipl_slip in (0, 1)[options.ipl_slip :]:
+            for done, seen in sweep(path, ipl_slip, way, options.stride, first=options.scene):
+                print(f"--way {way} --ipl-slip {ipl_slip} --scene {done}: {seen}", flush=True)
+            options.scene = 0
+        options.ipl_slip = 0
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--stride", type=int, default=4, help="try every N-th boundary (default 4; 1 takes minutes)")
+    parser.add_argument("--stride", type=int, default=1, help="try every N-th boundary (default 1: 20 minutes)")
+    parser.add_argument("--way", choices=WAYS, default=WAYS[0], help="begin with this way of injection")
+    parser.add_argument("--ipl-slip", type=int, choices=(0, 1), default=0, help="... and this slip")
+    parser.add_argument("--scene", type=int, default=0, help="... and this scene of target/calls")
     parser.add_argument("--preemptions", type=int, default=100_000)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        points, registers = (build(app, Path(folder)) for app in ("points", "registers"))
-        for ipl_slip in (0, 1):
-            machine = start_of_scenario(points, ipl_slip)
-            tried = interrupt_every_boundary(machine, options.stride, 0)
-            print(f"ipl-slip {ipl_slip}: {tried} boundaries, nothing lost, doubled or leaked", flush=True)
+        calls, registers = (build(app, Path(folder)) for app in ("calls", "registers"))
+        for done, failures in fail_every_allocation(calls):
+            print(f"{failures} allocations failed in {done} scenes, nothing lost or leaked", flush=True)
+        interrupt_everywhere(calls, options)
         preempt_patterns(registers, options.preemptions)
     return 0
 

@@ -12,12 +12,13 @@ enum { TICK_PERIOD = 1536, RATE_PER_MM_S = 5, PRIORITY = 5 };
 /* Low nibble: phases A-D of the coils now; right rotation by a nibble = next index (epuck.md §3). */
 enum { PHASES = 0x956A };
 
-/* Shared with stepper.S, which relies on the order of the fields. */
+/* Shared with stepper.S, which relies on the order of the fields. A tick between two stores of a change does no harm, so
+ * that nothing here holds the stepper back. */
 typedef struct {
-    sint16 rate;     /* sixths of a thousandth: 5 v; positive turns to the next index */
-    sint16 fraction; /* 0..6191 */
+    volatile sint16 rate; /* sixths of a thousandth: 5 v; positive turns to the next index */
+    sint16 fraction;      /* 0..6191 */
     uint16 phases;
-    uint16 coils; /* 0x0F on, 0 off */
+    volatile uint16 coils; /* 0x0F on, 0 off */
 } stepper;
 
 stepper stepper_left, stepper_right;
@@ -41,12 +42,11 @@ static void set(stepper *s, sint16 mm_s)
 
 void hal_motors_drive(int16_t left_mm_s, int16_t right_mm_s)
 {
-    IEC0bits.T3IE = 0;
-    __asm__ volatile("nop");
     set(&stepper_left, (sint16)-left_mm_s); /* forward is the previous index on the left, the next on the right */
     set(&stepper_right, right_mm_s);
     if (left_mm_s == 0 && right_mm_s == 0) {
-        T3CON = 0;
+        IEC0bits.T3IE = 0;
+        T3CON = 0; /* the harmless instruction behind a cleared enable */
         LATD &= (uint16)~PIN_MOTORS;
     } else {
         if (!T3CONbits.TON) {
