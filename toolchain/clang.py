@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from toolchain.asm_registers import REFUSED, respell
 from toolchain.cc_options import CcOptions, Input
 from toolchain.errors import ToolError
 
@@ -132,6 +133,33 @@ def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
     return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
 
 
+def _run_respelt(program: list[str], arguments: list[str]) -> subprocess.CompletedProcess[bytes]:
+    """Once more, by way of preprocessed text in which inline assembly names registers as the front end does."""
+    *options, _, _, source, _, output = arguments  # ... -x LANGUAGE SOURCE -o OUTPUT
+    text = Path(output).with_suffix(".respelt.i")
+    emit = {"-emit-llvm", "-S"}
+    first = [option for option in options if option not in emit]
+    made = subprocess.run([*program, *first, "-E", source, "-o", str(text)], capture_output=True, check=False)
+    if made.returncode:
+        return made
+    text.write_text(respell(text.read_text(errors="surrogateescape")), errors="surrogateescape")
+    second = [*without_preprocessing(options), "-Wno-unused-command-line-argument"]
+    second += ["-x", "cpp-output", str(text), "-o", output]
+    return subprocess.run([*program, *second], capture_output=True, check=False)
+
+
+def without_preprocessing(options: list[str]) -> list[str]:
+    """Options of a clang run whose input is preprocessed already: no forced includes, no dependency files."""
+    out: list[str] = []
+    words = iter(options)
+    for word in words:
+        if word in ("-include", "-MF", "-MT", "-MQ"):
+            next(words)
+        elif word not in ("-MD", "-MMD", "-MP"):
+            out.append(word)
+    return out
+
+
 def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
     """Run `jobs`, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
 
@@ -146,7 +174,10 @@ def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
             print(shlex.join([*program, *job.arguments]), file=sys.stderr)
 
     def run(job: Job) -> subprocess.CompletedProcess[bytes]:
-        return subprocess.run([*program, *colour, *job.arguments], capture_output=True, check=False)
+        result = subprocess.run([*program, *colour, *job.arguments], capture_output=True, check=False)
+        if result.returncode and REFUSED.search(result.stderr):
+            return _run_respelt([*program, *colour], job.arguments)
+        return result
 
     with ThreadPoolExecutor(max_workers=parallel or os.cpu_count() or 1) as pool:
         results = list(pool.map(run, jobs))

@@ -170,6 +170,52 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert f"{unknown}:2:20: warning: unknown attribute 'bogus' ignored" in cc(capsys, "-c", unknown)[1]
 
 
+def test_xc16_register_names_in_inline_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Clobbers and register variables named w0-w15; other strings of that spelling stay, and so do diagnostics."""
+    source = write(
+        tmp_path,
+        "a.c",
+        r"""
+int f(int a) { int r; asm("mov %1,w4\n\tadd w4,#1,w4\n\tmov w4,%0" : "=r"(r) : "r"(a) : "w4", "cc"); return r; }
+int g(void) { register int x asm("w5") = 7; asm volatile("inc w5,w5" : "+r"(x)); return x; }
+int main(void) { int unused; const char *s = "w4"; return f(4) == 5 && g() == 8 && s[0] == 'w' ? 0 : 1; }
+""",
+    )
+    status, said = cc(capsys, "-Os", "-Wall", "-MMD", source, "-o", tmp_path / "x.elf")
+    assert status == 0
+    assert f"{source}:4:22: warning: unused variable" in said
+    assert said.count("warning:") == 1
+    assert str(source) in (tmp_path / "x.d").read_text()
+    assert run(tmp_path / "x.elf").status == 0
+    broken = write(tmp_path, "b.c", 'void f(void) { asm("nop" ::: "w4", "w16"); }\n')
+    assert "unknown register name 'w16'" in cc(capsys, "-c", broken)[1]
+
+
+@pytest.mark.parametrize("cycles", [13, 14, 15, 16, 17, 100, 1001, 70000])
+def test_delays_last_as_long_as_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path, cycles: int) -> None:
+    """libpic30.h: __delay32 counts its call and return; timer 1 measures."""
+    source = write(
+        tmp_path,
+        "a.c",
+        f"""
+#include <libpic30.h>
+#include <p30f6014A.h>
+int main(void)
+{{
+    T1CON = 0x8000;
+    T2CON = 0x8008; /* 32 bits */
+    unsigned start = TMR2;
+    __delay32({cycles}ul);
+    unsigned low = TMR2, high = TMR3HLD;
+    unsigned long took = ((unsigned long)high << 16 | low) - start;
+    return took >= {cycles}ul && took <= {cycles}ul + 12 ? 0 : (int)took | 1;
+}}
+""",
+    )
+    assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
+    assert run(tmp_path / "x.elf").status == 0
+
+
 def test_configuration_words_are_program_words(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """abi-elf.md §6.6: output sections __FOSC, ... with code flags."""
     text = "#include <p30F6014A.h>\n_FOSC(CSW_FSCM_OFF & XT_PLL8);\n_FWDT(WDT_OFF);\nint main(void) { return 0; }\n"

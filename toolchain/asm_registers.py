@@ -1,0 +1,35 @@
+"""XC16's register names in inline assembly: `"w0"` as a clobber and `asm("w4")` of a register variable.
+
+The front end knows the registers of the machine whose data layout it borrows, r0-r15 for W0-W15, and refuses others;
+the text of the instructions is ours and stays. Enters: preprocessed C. Leaves: the same with those strings respelt.
+"""
+
+from __future__ import annotations
+
+import re
+
+REFUSED = re.compile(rb"unknown register name 'w\d+' in asm")
+"""What clang says about a source that needs this."""
+
+_TOKEN = re.compile(
+    r'(?P<asm>\b(?:asm|__asm|__asm__)\b)|"(?P<register>[wW](?:1[0-5]|\d))"'
+    r'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'|[()]'
+)
+
+
+def respell(text: str) -> str:
+    """Replace string literals that are register names inside the parentheses of asm statements and declarations."""
+    out: list[str] = []
+    at = depth = 0
+    waiting = False  # after `asm`, before its parenthesis
+    for token in _TOKEN.finditer(text):
+        if token["asm"]:
+            waiting = depth == 0
+        elif token[0] == "(" and (waiting or depth):
+            waiting, depth = False, depth + 1
+        elif token[0] == ")" and depth:
+            depth -= 1
+        elif token["register"] and depth:
+            out += [text[at : token.start()], f'"r{token["register"][1:]}"']
+            at = token.end()
+    return "".join([*out, text[at:]])

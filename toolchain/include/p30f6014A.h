@@ -1,0 +1,2 @@
+/* Microchip's name of the device header. */
+#include "dspic30f6014a.h"
