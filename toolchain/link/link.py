@@ -24,7 +24,7 @@ from toolchain.link import dinit, synthesize
 from toolchain.link.archive import Archive
 from toolchain.link.gc import SECTION_LIMIT, live_sections, vector_names
 from toolchain.link.image import Output, build_executable, build_outputs
-from toolchain.link.memory import script_symbols
+from toolchain.link.memory import HANDLE_LIMIT, script_symbols
 from toolchain.link.options import LinkOptions
 from toolchain.link.place import Layout, Placer, even, is_const, largest_symbols, space_of
 from toolchain.link.relocate import Relocator
@@ -48,7 +48,17 @@ class Linked:
 
 
 def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions) -> Linked:
-    """Link `objects` and what they need of `archives`.  Raises `ToolError` listing everything that is wrong."""
+    """Link `objects` and what they need of `archives`.  Raises `ToolError` listing everything that is wrong.
+
+    GOTO slots for function pointers take flash only in images where a function lies beyond the reach of a pointer.
+    """
+    linked = _link(objects, archives, options, False) or _link(objects, archives, options, True)
+    assert linked is not None, "with slots nothing is out of reach"
+    return linked
+
+
+def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptions, with_slots: bool) -> Linked | None:
+    """One attempt; None when function pointers turn out to need slots."""
     roots = [options.entry, *options.undefined]
     resolution = resolve(objects, archives, roots)
     own = ObjectFile(LINKER_OBJECT)
@@ -60,6 +70,8 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
     _common_sections(resolution, own)
     _fixed_sections(resolution, own, live, options)
     handle, slots = synthesize.handle_section(resolution, live | set(own.sections))
+    if not with_slots:
+        handle.type, handle.flags = c.SHT_NOTE, SectionFlag(0)  # only tells tools whose address is taken
     if options.handles:
         own.sections.append(handle)
     else:
@@ -87,6 +99,8 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
     placer.place_eeprom()
     placer.place_info()
     layout = placer.layout
+    if not with_slots and any(_beyond_pointers(layout, target) for target in slots):
+        return None
 
     stack = _stack(resolution, layout, order, options)
     absolute |= _linker_symbols(resolution, layout, table if options.data_init else None, stack, options)
@@ -101,6 +115,13 @@ def link(objects: list[ObjectFile], archives: list[Archive], options: LinkOption
     entry = relocator.target(synthesize.wanted(options.entry)).address
     image = build_executable(resolution, outputs, relocator, entry, options.processor)
     return Linked(image, resolution, layout, outputs, records, live, stack, messages)
+
+
+def _beyond_pointers(layout: Layout, target: Symbol) -> bool:
+    """Whether a function lies where a 16-bit pointer cannot point (abi-elf.md §1.5)."""
+    if target.section is None or target.section not in layout.placed:
+        return target.home is Home.ABSOLUTE and target.value >= HANDLE_LIMIT
+    return layout.placed[target.section].load + target.value >= HANDLE_LIMIT
 
 
 def _adopt(resolution: Resolution, own: ObjectFile) -> None:

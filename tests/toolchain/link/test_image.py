@@ -154,6 +154,14 @@ def test_handles_are_own_addresses_low_and_slots_high(image):
         image(text, handles=False)
 
 
+def test_pointers_that_reach_every_function_cost_no_flash(image):
+    """abi-elf.md §1.5: slots exist to be jumped through; .handle then only tells tools whose address is taken."""
+    out = image(".text\n near: nop\n user: mov #handle(near), w0\n")
+    (handle,) = out.sections(".handle")
+    assert not handle.is_code
+    assert len(out.flash) == len(image(".text\n near: nop\n user: mov #0, w0\n").flash)
+
+
 def test_config_words_go_to_their_registers(image):
     """abi-elf.md §6.6: sections __FOSC.sec ... to 0xF80000 ..., code flags; output sections without .sec."""
     text = (
