@@ -29,6 +29,10 @@ CALL_CYCLES: Final = 2
 """Cycles of CALL and RCALL (isa.md §13.1)."""
 MASK_STEPS: Final = 150_000
 """Instructions watched for the longest masked window."""
+JITTER_CYCLES: Final = 4_423_680
+"""Tcy watched for the jitter of the clock: 300 ms."""
+BYTE_CYCLES: Final = 1280
+"""Tcy of a byte at 115,200 baud (epuck.md §2)."""
 DISI_LEVEL: Final = 6
 """DISI holds back priorities up to 6 (isa.md §12)."""
 
@@ -94,6 +98,10 @@ def run_measures(image: Image, engine: str = "interp") -> dict[str, Window]:
             raise MeasureError(f"{measure.name}: {error}") from None
     busy = Scenario(threads=1, yielders=1, subscribers=4, waiters=1, payload=24, sender=1)
     taken.update(masked(_start(target, busy)))
+    busy = Scenario(yielders=1, subscribers=4, waiters=1, payload=24, sender=1)  # no thread that only spins
+    taken["1 ms clock: worst jitter, busy kernel"] = jitter(_start(target, busy), b"")
+    traffic = bytes(range(256)) * (JITTER_CYCLES // BYTE_CYCLES // 256 + 1)
+    taken["1 ms clock: worst jitter, busy kernel and UART traffic"] = jitter(_start(target, busy), traffic)
     return taken
 
 
@@ -228,6 +236,24 @@ def tick(irq: str, vector: str, back: str = "latency_spin") -> Taken:
         return window
 
     return take
+
+
+def jitter(meter: Meter, traffic: bytes) -> Window:
+    """By how much the time from the clock's flag to its interrupt varies, while UART1 receives `traffic`."""
+    machine = meter.machine
+    late: list[int] = []
+
+    def entered() -> bool:
+        late.append(machine.cycle - meter.rise("T1"))
+        return False
+
+    machine.uart[1].feed(traffic)
+    remove = machine.hook_pc(meter.target.address("_T1Interrupt"), entered)
+    stop = machine.run(cycles=JITTER_CYCLES)
+    remove()
+    if stop.reason != "limit" or len(late) < JITTER_CYCLES // 14_746:
+        raise MeasureError(f"the clock was watched {len(late)} times only: {stop.reason} {stop.detail}")
+    return Window(max(late) - min(late), False)
 
 
 def masked(meter: Meter) -> dict[str, Window]:

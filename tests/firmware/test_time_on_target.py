@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
+import emu
 from emu import Machine
+from emu.device import flag_since
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_on_target import FCY, INT1IF, T2IF, T3IF, load, place, run_to
 
@@ -15,8 +18,10 @@ SLICE = 147_456
 
 def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
     """Issue 4, Must show 7; kernel.md §3: ISR time counts, handler time does not, a handler that resends for ever
-    starves nobody. The slice is 147,456 Tcy from dispatch to the next T2 interrupt."""
+    starves nobody; a storm of events and a full UART line both ways. The slice is 147,456 Tcy from dispatch to the next
+    T2 interrupt."""
     machine = load(image("slices", TARGET_APPS))
+    machine.uart[1].feed(b"0123456789abcdef" * 150)
     ends: list[int] = []
     restarts: list[int] = []
     machine.hook_pc(place(machine, "_T2Interrupt"), lambda *_: ends.append(machine.cycle))
@@ -25,10 +30,51 @@ def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
     assert len(ends) >= 9
     slices = [end - max(at for at in restarts if at < end) for end in ends]
     late = [length - SLICE for length in slices]
-    assert all(-8 <= extra <= 400 for extra in late), "one timer count, or an ISR of the storm, and nothing else"
+    assert all(-8 <= extra <= 600 for extra in late), "one timer count, or ISRs of the storm, and nothing else"
     assert any(b - a > SLICE + 2_000 for a, b in pairwise(ends)), "handlers took their time between slices"
     assert all(machine.peek(machine.address_of("spins") + 2 * i) for i in range(3))
     assert machine.peek("stormed") - machine.peek("handled") <= 110
+    assert machine.peek("resent") >= len(ends), "once in each drain"
+    assert machine.peek("echoed") >= 40, "of 16 bytes each"
+
+
+def count_clock(path: Path, ticks: int) -> str:
+    """Let `ticks` clock events come under the storm of target/slices; they must take exactly 14,745.6 Tcy each. Returns
+    what was seen, with the worst jitter of the clock's interrupt in the first second."""
+    machine = emu.load(path, engine="jit")
+    flag_rose = flag_since(machine.record, machine.chip.sfrs["IFS0"].address, 3)
+    late: list[int] = []
+
+    def entered() -> bool:
+        late.append(machine.cycle - machine.record.u64[flag_rose])
+        return False
+
+    def counts() -> tuple[int, int, int]:
+        """(cycle of the last tick, ticks, clock events heard)."""
+        at = machine.address_of("clock_events")
+        heard = machine.peek(at) + (machine.peek(at + 2) << 16)
+        return machine.record.u64[flag_rose], machine.peek("now_ms") + (machine.peek("wraps") << 16), heard
+
+    remove = machine.hook_pc(place(machine, "_T1Interrupt"), entered)
+    machine.run(cycles=FCY)
+    remove()
+    while machine.peek("now_ms") % 5 or machine.peek("SR") & 0xE0:  # behind a tick that begins a round of five periods
+        machine.step()
+    begin, ticks_before, heard_before = counts()
+    machine.run(cycles=ticks * 73_728 // 5 + 3_000)
+    end, ticks_after, heard_after = counts()
+    assert ticks_after - ticks_before == ticks
+    assert end - begin == ticks * 73_728 // 5
+    assert abs(heard_after - heard_before - ticks) <= 11, "those of the running slice are not yet heard"
+    return (
+        f"{ticks:,} clock events in {end - begin:,} Tcy, {heard_after - heard_before:,} heard so far;"
+        f" worst jitter {max(late) - min(late)} Tcy"
+    )
+
+
+def test_a_minute_of_clock_events_is_exact(image: Build) -> None:
+    """Issue 4, Must show 7; kernel.md §3: 60,000 are 884,736,000 Tcy; tests/fuzz/fuzz_clock.py counts an hour."""
+    assert "60,000 clock events in 884,736,000 Tcy" in count_clock(image("slices", TARGET_APPS), 60_000)
 
 
 def masked_windows(machine: Machine, cycles: int) -> dict[int, int]:

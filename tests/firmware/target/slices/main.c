@@ -1,10 +1,13 @@
-/* Three threads that never yield, a handler that takes long, and a storm; who runs when is watched from outside. */
+/* Three threads that never yield, a handler that takes long, one that resends for ever, a storm of events and an echo of
+ * what UART1 receives; who runs when is watched from outside. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 
 enum { STORM = SYS_FIRST_USER_EVENT, STORM_PERIOD = 1474 /* 100 us */ };
 
 volatile uint16 handled __attribute__((used)), stormed __attribute__((used));
+volatile uint16 resent __attribute__((used)), echoed __attribute__((used));
+volatile uint32 clock_events __attribute__((used));
 volatile uint16 spins[3] __attribute__((used));
 
 #define SPINNER(name, i)                                              \
@@ -40,7 +43,24 @@ __attribute__((used)) void storm_isr(void)
 static bool resend(uint16 pid, uint16 event, sys_event_data *data)
 {
     (void)pid;
-    Sys_Send_IntEvent(event, data->value); /* for ever */
+    resent += Sys_Send_IntEvent(event, data->value); /* for ever */
+    return true;
+}
+
+static bool echo(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid;
+    (void)event;
+    echoed += Sys_Send_Event(SYS_SEND_UART1, data->payload, data->size);
+    return true;
+}
+
+static bool on_clock(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid;
+    (void)event;
+    (void)data;
+    clock_events++;
     return true;
 }
 
@@ -52,6 +72,8 @@ int main(void)
     Sys_Register_Event(STORM + 1);
     Sys_Subscribe_to_Event(STORM + 1, 0, resend, NULL);
     Sys_Send_IntEvent(STORM + 1, 1);
+    Sys_Subscribe_to_Event(SYS_UART1_RECEIVED, 0, echo, NULL);
+    Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, on_clock, NULL);
     Sys_Start_Process(spin_a);
     Sys_Start_Process(spin_b);
     Sys_Start_Process(spin_c);
