@@ -12,14 +12,19 @@ import multiprocessing
 import platform
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from arena.brain import Brain, ScriptedBrain
+from arena.crew import Crew
+from arena.ether import Ether
 from arena.live import LiveFile, live_path
 from arena.record import MANIFEST, RecordError, write_json, write_trial
 from arena.scene import Scene
@@ -73,35 +78,56 @@ def trial_path(folder: Path, number: int) -> Path:
     return folder / f"trial-{number:04d}.parquet"
 
 
-def make_brains(plan: Plan, seed: int) -> list[Brain]:
-    """One brain per robot. Raises emu.LoadError for an unusable image."""
-    robots = range(plan.scene.robots.count)
+def make_brains(plan: Plan, seed: int, robots: Sequence[int], ether: Ether | None) -> list[Brain]:
+    """Brains of some robots. Raises emu.LoadError for an unusable image."""
     if plan.image is None:
         return [ScriptedBrain(plan.scene, seed, robot, plan.controller) for robot in robots]
     from arena.emulated import EmulatedBrain  # the emulator is loaded by those who need it
-    from arena.infrared import Ether
 
     selector = SELECTOR[plan.controller]
-    ether = Ether(plan.scene.robots.count, plan.scene.clock.quantum_tcy)
     return [EmulatedBrain(plan.scene, seed, robot, plan.image, selector, ether) for robot in robots]
 
 
-def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None) -> Done:
-    """Run trial `number` (from 1) and write its file. Raises SceneError, RecordError, emu.LoadError."""
+@contextmanager
+def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brain], list[Crew], Ether | None]]:
+    """All brains of a trial, spread over some processes, closed at the end. This one has the fewest robots, because it
+    has the world."""
+    count = plan.scene.robots.count
+    ether = Ether(count, plan.scene.clock.quantum_tcy) if plan.image is not None else None
+    bounds = [count * part // processes for part in range(processes + 1)]
+    parts = [range(one, other) for one, other in pairwise(bounds) if other > one]
+    brains: list[Brain] = []
+    crews: list[Crew] = []
+    try:
+        for part in parts[1:]:
+            crews.append(Crew(partial(make_brains, plan, seed), part, ether))
+        brains += make_brains(plan, seed, parts[0], ether) if parts else []
+        for crew in crews:
+            brains += crew.brains
+        yield brains, crews, ether
+    finally:
+        for brain in brains:
+            brain.close()
+        for crew in crews:
+            crew.close()
+
+
+def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None, processes: int = 1) -> Done:
+    """Run trial `number` (from 1), its robots in `processes`, and write its file.
+
+    Raises SceneError, RecordError, emu.LoadError."""
     start = time.perf_counter()
     seed = plan.seed + number - 1
     about = plan.key() | {"seed": seed, "faults": []}
-    brains = make_brains(plan, seed)
     live = LiveFile(live_path(folder, number), about) if plan.image is not None else None
     try:
         progress = None if report is None else (lambda seconds: report(number, seconds))
         on_row = live.write if live is not None else None
-        result = run_trial(plan.scene, seed, brains, plan.seconds, progress, on_row=on_row)
+        with brains_of(plan, seed, processes) as (brains, crews, ether):
+            result = run_trial(plan.scene, seed, brains, plan.seconds, progress, None, on_row, crews, ether)
         about["faults"] = [list(fault) for fault in result.faults]
         write_trial(trial_path(folder, number), result.rows, about)
     finally:
-        for brain in brains:
-            brain.close()
         if live is not None:
             live.close()
     return Done(number, time.perf_counter() - start, result.faults)
@@ -140,11 +166,11 @@ def versions() -> dict[str, str]:
 def run_all(
     plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None]
 ) -> None:
-    """Run trials `numbers` on `jobs` workers; 1 = in this process. Raises what a trial raises, after the others of its
-    moment; files of finished trials stay."""
+    """Run trials `numbers` on `jobs` workers; 1 = in this process. A single trial with emulated brains is spread over
+    them. Raises what a trial raises, after the others of its moment; files of finished trials stay."""
     if jobs <= 1 or len(numbers) <= 1:
         for number in numbers:
-            done(run_one(plan, number, folder, report))
+            done(run_one(plan, number, folder, report, jobs if plan.image is not None else 1))
         return
     context = multiprocessing.get_context("spawn")
     queue: Any = context.Queue()

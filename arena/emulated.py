@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 import emu
 from arena import bodies
 from arena.brain import OK_AT_TCY, STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, extrapolated, switched_on
-from arena.infrared import Ether, Ring
+from arena.ether import Ether
+from arena.infrared import Ring
 from arena.scene import FCY, BatterySetting, Scene
 from arena.vision import COLOURS, Eye
 from arena.world import STREAM_SENSORS, Poses, generator

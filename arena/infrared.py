@@ -7,13 +7,12 @@ robots arrives one quantum late, so that no robot depends on which of them has l
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, NamedTuple
 
 from arena import bodies
+from arena.ether import Ether
 from arena.scene import Scene
 from arena.world import Poses
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS, reflection_at
@@ -29,7 +28,6 @@ SATURATION: Final = 3788.0
 """Counts no light exceeds: the table's first entry (epuck.md §5)."""
 LAMP_CM: Final = 100.0
 """Distance at which `light.lamp_counts` holds."""
-_KEPT: Final = 256
 
 
 class Surface(NamedTuple):
@@ -37,33 +35,6 @@ class Surface(NamedTuple):
 
     millimetres: float
     share: float
-
-
-@dataclass
-class Ether:
-    """What all robots' emitters do: per robot the trial's cycles at which its pulse lines changed, and to what."""
-
-    robots: int
-    quantum: int
-    _cycles: list[list[int]] = field(init=False)
-    _lines: list[list[int]] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._cycles = [[] for _ in range(self.robots)]
-        self._lines = [[0] for _ in range(self.robots)]
-
-    def switch(self, robot: int, cycle: int, line: int, lit: bool) -> None:
-        """A pulse line of a robot is switched."""
-        cycles, lines = self._cycles[robot], self._lines[robot]
-        state = lines[-1] | 1 << line if lit else lines[-1] & ~(1 << line)
-        if len(cycles) > _KEPT and cycles[_KEPT // 2] < cycle - 4 * self.quantum:
-            del cycles[: _KEPT // 2], lines[: _KEPT // 2]
-        cycles.append(cycle)
-        lines.append(state)
-
-    def seen(self, robot: int, cycle: int) -> int:
-        """Bit n: others see pulse line n of a robot lit in a cycle of the trial. That is how it was a quantum ago."""
-        return self._lines[robot][bisect_right(self._cycles[robot], cycle - self.quantum)]
 
 
 class Ring:

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from arena.brain import Brain
+from arena.crew import Crew
+from arena.ether import Ether
 from arena.scene import Scene
 from arena.world import World
 
@@ -45,9 +47,13 @@ def run_trial(
     progress: Callable[[float], None] | None = None,
     world: World | None = None,
     on_row: Callable[[dict[str, Any]], None] | None = None,
+    crews: Sequence[Crew] = (),
+    ether: Ether | None = None,
 ) -> Result:
     """Let `brains` live in a new world for `seconds`. `progress(seconds)` is called once per simulated second,
     `on_row(row)` for every sample.
+
+    Some of the brains may live in other processes, `crews`; `ether` is that of the brains of this one.
 
     A robot whose firmware stops stands still; the others go on. Raises SceneError if there is no room.
     """
@@ -60,6 +66,10 @@ def run_trial(
     samples = 1
     for tick in range(quanta):
         poses = world.poses
+        if crews:
+            switches = ether.take() if ether is not None else []
+            for crew in crews:
+                crew.begin(tick, poses, switches)
         wheels = [brain.think(tick, poses) for brain in brains]
         world.step(wheels)
         # a sample is the end of the quantum nearest to the time asked

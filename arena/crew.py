@@ -1,0 +1,166 @@
+"""Robots of one trial in another process, in lock-step with this one.
+
+A `Crew` is the other process with its robots; a `RemoteBrain` stands for each of them here. At the beginning of a
+quantum the crew is told the poses and what infrared emitters did; while it thinks, the robots of this process do. A
+robot knows nothing of where it runs, so the number of processes cannot show in a record.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import pickle
+import struct
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from typing import Final
+
+from arena.brain import Brain, Lights, Line, Reading
+from arena.ether import Ether, Switch
+from arena.world import Poses
+
+THINK, SAMPLE, ANSWER, FAILED = b"t", b"s", b"a", b"f"
+"""First byte of a message: a quantum begins; what is to be recorded is asked for; what a crew answers."""
+_HEAD: Final = struct.Struct("<qqqq")
+"""Tick, numbers of robots, objects and switches."""
+_SWITCH: Final = struct.Struct("<qqqq")
+Make = Callable[[Sequence[int], Ether | None], list[Brain]]
+"""make(robots, ether): brains of some robots that share an ether, made in the process in which they live."""
+
+
+def packed(tick: int, poses: Poses, switches: Sequence[Switch]) -> bytes:
+    """The message that begins a quantum."""
+    numbers = [value for place in (*poses.robots, *poses.objects) for value in place]
+    head = _HEAD.pack(tick, len(poses.robots), len(poses.objects), len(switches))
+    return THINK + head + struct.pack(f"<{len(numbers)}d", *numbers) + _packed_switches(switches)
+
+
+def unpacked(message: bytes) -> tuple[int, Poses, list[Switch]]:
+    """The inverse of `packed`."""
+    tick, robots, objects, switches = _HEAD.unpack_from(message, 1)
+    place = 1 + _HEAD.size
+    values = struct.unpack_from(f"<{3 * robots + 2 * objects}d", message, place)
+    places = [(values[i], values[i + 1], values[i + 2]) for i in range(0, 3 * robots, 3)]
+    discs = [(values[i], values[i + 1]) for i in range(3 * robots, len(values), 2)]
+    return tick, Poses(places, discs), _unpacked_switches(message, place + 8 * len(values), switches)
+
+
+def _packed_switches(switches: Sequence[Switch]) -> bytes:
+    return b"".join(_SWITCH.pack(*switch) for switch in switches)
+
+
+def _unpacked_switches(message: bytes, place: int, count: int) -> list[Switch]:
+    return [Switch(*_SWITCH.unpack_from(message, place + i * _SWITCH.size)) for i in range(count)]
+
+
+class Crew:
+    """`robots`, made by `make` in a process of their own; `ether` is that of this process, None for scripted brains.
+
+    `make` is pickled: a function of a module, or a `partial` of one. Raises what it raises there.
+    """
+
+    def __init__(self, make: Make, robots: Sequence[int], ether: Ether | None) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self._ether = ether
+        self._process = context.Process(target=_serve, args=(other, make, list(robots), ether), daemon=True)
+        self._process.start()
+        other.close()
+        self._wheels: list[tuple[float, float]] = []
+        self._thinking = False
+        self._sampled: list[tuple[Reading, list[Line], list[Lights]]] = []
+        self.brains: Final[list[Brain]] = [RemoteBrain(self, place) for place in range(len(robots))]
+        self._answer()  # it is there
+
+    def begin(self, tick: int, poses: Poses, switches: Sequence[Switch]) -> None:
+        """A quantum begins. `switches` are all that were made in the last one, by whomever."""
+        self._thinking = True
+        self._pipe.send_bytes(packed(tick, poses, switches))
+
+    def wheels(self, place: int) -> tuple[float, float]:
+        """What a robot of the crew answers to the quantum that was begun."""
+        if self._thinking:
+            self._thinking = False
+            answer = self._answer()
+            (count,) = struct.unpack_from("<q", answer, 1)
+            speeds = struct.unpack_from(f"<{2 * len(self.brains)}d", answer, 9)
+            self._wheels = list(zip(speeds[::2], speeds[1::2], strict=True))
+            if count and self._ether is not None:
+                self._ether.hear(_unpacked_switches(answer, 9 + 8 * len(speeds), count))
+        return self._wheels[place]
+
+    def sample(self, place: int) -> tuple[Reading, list[Line], list[Lights]]:
+        """What is to be recorded of a robot; asked for once for all of the crew, when its first robot is."""
+        if place == 0:
+            self._pipe.send_bytes(SAMPLE)
+            self._sampled = pickle.loads(self._answer()[1:])
+        return self._sampled[place]
+
+    def _answer(self) -> bytes:
+        try:
+            message = self._pipe.recv_bytes()
+        except EOFError:
+            raise RuntimeError("a process with robots of the trial has died") from None
+        if message[:1] == FAILED:
+            raise pickle.loads(message[1:])
+        return message
+
+    def close(self) -> None:
+        """End the process."""
+        self._pipe.close()
+        self._process.join(5)
+        if self._process.is_alive():
+            self._process.terminate()
+
+
+class RemoteBrain:
+    """`Brain` of a robot that lives in a crew."""
+
+    def __init__(self, crew: Crew, place: int) -> None:
+        self._crew: Final = crew
+        self._place: Final = place
+        self._sampled: tuple[Reading, list[Line], list[Lights]] = Reading(), [], []
+
+    def think(self, tick: int, poses: Poses) -> tuple[float, float]:
+        """As `Brain.think`."""
+        return self._crew.wheels(self._place)
+
+    def reading(self) -> Reading:
+        """As `Brain.reading`."""
+        self._sampled = self._crew.sample(self._place)
+        return self._sampled[0]
+
+    def lines(self) -> list[Line]:
+        """As `Brain.lines`."""
+        return self._sampled[1]
+
+    def lights(self) -> list[Lights]:
+        """As `Brain.lights`."""
+        return self._sampled[2]
+
+    def close(self) -> None:
+        """The crew is closed as a whole."""
+
+
+def _serve(pipe: Connection, make: Make, robots: Sequence[int], ether: Ether | None) -> None:
+    """The other process: answer until the pipe is closed."""
+    try:
+        brains = make(robots, ether)
+        pipe.send_bytes(ANSWER)
+        while True:
+            message = pipe.recv_bytes()
+            if message[:1] == THINK:
+                tick, poses, switches = unpacked(message)
+                if ether is not None:
+                    ether.hear(switch for switch in switches if switch.robot not in robots)
+                    ether.take()
+                speeds = [speed for brain in brains for speed in brain.think(tick, poses)]
+                own = ether.take() if ether is not None else []
+                body = struct.pack(f"<q{len(speeds)}d", len(own), *speeds) + _packed_switches(own)
+                pipe.send_bytes(ANSWER + body)
+            else:
+                parts = [(brain.reading(), brain.lines(), brain.lights()) for brain in brains]
+                pipe.send_bytes(ANSWER + pickle.dumps(parts))
+    except (EOFError, KeyboardInterrupt, BrokenPipeError):
+        return  # the trial is over, or given up
+    except Exception as error:
+        pipe.send_bytes(FAILED + pickle.dumps(error))
