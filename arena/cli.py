@@ -1,4 +1,4 @@
-"""The command line: `python -m arena run | sweep | sensitivity | reaction | compare | plot | report | replay | scenes`.
+"""The command line: `python -m arena COMMAND`; each command is a module of `commands/`.
 
 Exit status: 0 done; 1 a robot's firmware stopped in a trial; 2 bad input; 130 interrupted (finished trials are kept).
 """
@@ -11,13 +11,14 @@ import sys
 from collections.abc import Callable, Sequence
 
 import emu
-from arena.commands import compare, plot, reaction, replay, report, run, sensitivity, sweep
+from arena.commands import compare, experiment, plot, reaction, replay, report, run, sensitivity, sweep
 from arena.record import RecordError
 from arena.scene import SceneError, load_scene, scenes
 
 FAULT, BAD_INPUT, INTERRUPTED = 1, 2, 130
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),
+    "experiment": (experiment.parser, experiment.run),
     "sweep": (sweep.parser, sweep.run),
     "sensitivity": (sensitivity.parser, sensitivity.run),
     "compare": (compare.parser, compare.run),

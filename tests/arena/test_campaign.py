@@ -293,3 +293,20 @@ def test_a_film_of_one_robot_is_drawn_and_logged(tmp_path: Path, capsys: pytest.
     assert times[1] > 1.0  # the remote control's OK
     assert main(["plot", str(tmp_path / "run"), "--film", "5", "--out", str(tmp_path)]) == 2
     assert "has robots 0 to 4" in capsys.readouterr().err
+
+
+def test_one_command_runs_every_arm_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Issue "Must show" 3, small: twice the same text, the second time without running anything."""
+    command = ["experiment", "clustering", "--brains", "scripted", "--trials", "2", "--minutes", "0.05", "--twins", "0",
+               "--at", "2", "--jobs", "1", "--out", str(tmp_path)]  # fmt: skip
+    texts = []
+    for _ in range(2):
+        assert main(command) == 0
+        texts.append(capsys.readouterr().out)
+    assert texts[0] == texts[1]
+    assert (
+        texts[0].index("### Controller A") < texts[0].index("| scripted-A | 2 |") < texts[0].index("### Controller B")
+    )
+    assert sorted(contents(tmp_path / "scripted-B")) == ["trial-0001.parquet", "trial-0002.parquet"]
+    assert main([*command, "--controllers", "X"]) == 2
+    assert "expected some of AB" in capsys.readouterr().err
