@@ -108,7 +108,9 @@ def pairs_needed(deviation: float, margin: float, power: float = 0.8) -> int:
 def bootstrap_band(courses: Values, *, share: float = 0.95, draws: int = 1000, seed: int = 0) -> tuple[Values, Values]:
     """Band of the mean over trials (rows) at each time (columns) by drawing trials with replacement."""
     rng = np.random.default_rng(seed)
-    picks = rng.integers(len(courses), size=(draws, len(courses)))
-    means = courses[picks].mean(axis=1)
+    count = len(courses)
+    picks = rng.integers(count, size=(draws, count))
+    times = np.stack([np.bincount(one, minlength=count) for one in picks])
+    means = times @ courses / count  # how often each trial was drawn, instead of copies of all trials for every draw
     low, high = np.quantile(means, [(1 - share) / 2, (1 + share) / 2], axis=0)
     return low, high
