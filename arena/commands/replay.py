@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import suppress
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -39,7 +40,8 @@ def run(options: argparse.Namespace) -> int:
     if options.live:
         with server(Follower(options.trial, options.number), options.port) as serving:
             print(f"http://127.0.0.1:{serving.server_port}/ (Ctrl-C ends)", flush=True)
-            serving.serve_forever()
+            with suppress(KeyboardInterrupt):
+                serving.serve_forever()
         return 0
     if not options.trial.is_file():
         raise RecordError(f"{options.trial}: no such file; expected a trial-NNNN.parquet")

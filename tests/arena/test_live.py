@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import signal
 import subprocess
+import sys
 import threading
 import urllib.error
 import urllib.request
@@ -147,6 +149,27 @@ def test_the_server_answers_its_two_places_only(
         live.write(rows[0])
         with urllib.request.urlopen(address + "/more?from=0", timeout=10) as answer:
             assert len(json.load(answer)["t"]) == 1
+    live.close()
+
+
+def test_the_command_serves_until_it_is_interrupted(
+    tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]
+) -> None:
+    """It names its address; Ctrl-C is the ordinary end."""
+    about, rows = recorded
+    live = LiveFile(live_path(tmp_path, 1), about)
+    live.write(rows[0])
+    command = [sys.executable, "-m", "arena", "replay", str(tmp_path), "--live", "--port", "0"]
+    root = Path(__file__).resolve().parents[2]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=root) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        address = process.stdout.readline().split()[0]
+        with urllib.request.urlopen(address, timeout=30) as answer:
+            assert 'id="trial"' in answer.read().decode()
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
     live.close()
 
 
