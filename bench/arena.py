@@ -1,12 +1,14 @@
 """Time per simulated second in the arena: physics, rendering, emulation, and the rest; with what a trial takes.
 
-In: nothing (the clustering firmware is built). Out: CPU seconds of this process.
+In: nothing (the clustering firmware is built). Out: CPU seconds of this process; for one trial whose robots live in two
+processes, wall seconds, and the memory of all processes together (PSS: what is shared is counted once; Linux only).
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -16,9 +18,11 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from arena.brain import Brain, ScriptedBrain
+from arena.campaign import Plan, brains_of
 from arena.emulated import EmulatedBrain
 from arena.firmware import image_for
 from arena.scene import Scene, load_scene, scripted
+from arena.trial import run_trial
 from arena.world import World
 
 TRIAL_S = 900
@@ -65,6 +69,41 @@ def measure(scene: Scene, brains: list[Brain], seconds: float, warm_up: float) -
     }
 
 
+def in_two_processes(scene: Scene, image: Path, seconds: float, warm_up: float) -> dict[str, float]:
+    """Wall seconds per simulated second of a trial, and megabytes of its processes."""
+    plan = Plan(scene, "openswarm", "A", image, 1, warm_up + seconds, 1)
+    times: list[float] = []
+    with brains_of(plan, 1, 2) as (brains, crews, ether):
+        run_trial(scene, 1, brains, plan.seconds, lambda _: times.append(time.perf_counter()), None, None, crews, ether)
+        megabytes = sum(map(proportional_share, family(os.getpid()))) / 1024
+    wall = (times[-1] - times[round(warm_up)]) / (len(times) - 1 - round(warm_up))
+    return {"wall_s": wall, "trial_wall_s": TRIAL_S * wall, "memory_mb": megabytes}
+
+
+def family(process: int) -> list[int]:
+    """A process and its descendants."""
+    children: dict[int, list[int]] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            parent = int(stat.read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue  # it has ended
+        children.setdefault(parent, []).append(int(stat.parent.name))
+    found = [process]
+    for one in found:
+        found += children.get(one, [])
+    return found
+
+
+def proportional_share(process: int) -> int:
+    """Memory of a process in kB, pages shared with others by their share."""
+    try:
+        lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+    except OSError:
+        return 0
+    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, epilog="example: python bench/arena.py --seconds 20")
     parser.add_argument("--seconds", type=float, default=5.0, help="simulated time of each measurement (default 5)")
@@ -75,17 +114,20 @@ def main() -> int:
     quick = scripted(scene)
     image = image_for("openswarm")
     assert image is not None
+    together = in_two_processes(scene, image, options.seconds, 3.0)  # first: its memory is not to be that of the others
     results = {
         "scripted": measure(quick, [ScriptedBrain(quick, 1, i, "A") for i in robots], 20 * options.seconds, 5.0),
         "openswarm": measure(scene, [EmulatedBrain(scene, 1, i, image, 8) for i in robots], options.seconds, 3.0),
     }
     if options.json:
-        print(json.dumps(results))
+        print(json.dumps(results | {"openswarm, two processes": together}))
         return 0
     for name, one in results.items():
         print(f"{name:10} {one['cpu_s'] * 1000:7.1f} ms CPU per simulated second ({one['real_time']:.1f} x real time): "
               f"physics {one['physics']:.0%}, rendering {one['rendering']:.0%}; "
               f"{len(robots)} robots, 15 min: {one['trial_cpu_s']:.0f} s of one core")  # fmt: skip
+    print(f"one trial in two processes: {together['wall_s'] * 1000:.1f} ms per simulated second, 15 min: "
+          f"{together['trial_wall_s']:.0f} s; {together['memory_mb']:.0f} MB in all")  # fmt: skip
     return 0
 
 
