@@ -6,7 +6,8 @@ them until nothing changes. Needs: real registers. Keeps behaviour; only removes
 
 from __future__ import annotations
 
-from ..target import CALLEE_SAVED, LIT10_BYTE_MAX, LIT10_MAX
+from ..target import CALLEE_SAVED, LIT10_BYTE_MAX, LIT10_MAX, SP
+from . import copies
 from .liveness import bits, has_effect, live_out
 from .mir import MI, File, Imm, MBlock, Mem, MFunction
 
@@ -24,7 +25,7 @@ def run(m: MFunction) -> None:
     """All local rewrites, to a fixed point."""
     at_return = ALL if m.interrupt else AT_RETURN
     for _ in range(4):
-        changed = False
+        changed = copies.run(m)
         out = live_out(m, at_return)
         for b in m.blocks:
             changed |= local(b, out[b.name])
@@ -35,101 +36,13 @@ def run(m: MFunction) -> None:
 def local(b: MBlock, live: int) -> bool:
     """One round over one block. `live` is the registers live at its end."""
     before = len(b.insts)
-    touched = propagate_copies(b)
-    touched |= drop_dead(b, live)
+    touched = drop_dead(b, live)
     touched |= drop_compares(b)
+    touched |= compare_while_copying(b)
     touched |= compare_in_place(b, live)
     touched |= auto_increment(b)
     touched |= merge_pairs(b)
     return touched or len(b.insts) != before
-
-
-def propagate_copies(b: MBlock) -> bool:
-    """Forget moves that restate what is known; read the original of a copy where that lets the copy die.
-
-    `value` maps a register to the register or constant it equals.
-    """
-    copy_of: dict[int, int] = {}
-    constant: dict[int, tuple[str, object]] = {}
-    out: list[MI] = []
-    changed = False
-    for mi in b.insts:
-        if mi.is_copy():
-            source, dest = mi.args
-            assert isinstance(source, int)
-            assert isinstance(dest, int)
-            root = copy_of.get(source, source)
-            if copy_of.get(dest, dest) == root:
-                changed = True
-                continue
-            if root in constant and constant.get(dest) == constant[root]:
-                changed = True
-                continue
-        known = _constant(mi)
-        if known is not None:
-            dest = mi.args[-1]
-            assert isinstance(dest, int)
-            if constant.get(dest) == known:
-                changed = True
-                continue
-        changed |= _use_originals(mi, copy_of)
-        for d in mi.defs():
-            _forget(d, copy_of, constant)
-        if mi.is_copy():
-            source, dest = mi.args
-            assert isinstance(source, int)
-            assert isinstance(dest, int)
-            if source < 15 and dest < 15:
-                copy_of[dest] = copy_of.get(source, source)
-                if source in constant:
-                    constant[dest] = constant[source]
-        elif known is not None:
-            dest = mi.args[-1]
-            assert isinstance(dest, int)
-            if dest < 15:
-                constant[dest] = known
-        out.append(mi)
-    b.insts = out
-    return changed
-
-
-def _constant(mi: MI) -> tuple[str, object] | None:
-    """What a constant load puts into its register."""
-    if mi.pred or mi.byte or not mi.args or not isinstance(mi.args[-1], int):
-        return None
-    if mi.op == "clr":
-        return "k", 0
-    if mi.op == "setm":
-        return "k", 0xFFFF
-    if mi.op == "mov" and isinstance(mi.args[0], Imm):
-        return "k", mi.args[0].value
-    return None
-
-
-def _forget(d: int, copy_of: dict[int, int], constant: dict[int, tuple[str, object]]) -> None:
-    copy_of.pop(d, None)
-    constant.pop(d, None)
-    for k in [k for k, v in copy_of.items() if v == d]:
-        del copy_of[k]
-
-
-def _use_originals(mi: MI, copy_of: dict[int, int]) -> bool:
-    """Replace read-only register operands by what they are copies of."""
-    if not copy_of or mi.pred or mi.op in ("asm", "split", "join", "movd"):
-        return False
-    changed = False
-    if mi.byte and any(isinstance(a, File) for a in mi.args):
-        return False  # near bytes move through W0 only (isa.md §3.3)
-    for k, (role, a) in enumerate(zip(mi.info.roles, mi.args, strict=False)):
-        if role != "s":
-            continue
-        if isinstance(a, int) and a in copy_of and k not in mi.late and not mi.op.endswith("f"):
-            mi.args[k] = copy_of[a]
-            changed = True
-        elif isinstance(a, Mem) and a.mode in ("ind", "off") and a.base in copy_of:
-            mi.args[k] = Mem(a.mode, copy_of[a.base], a.off)
-            changed = True
-    return changed
 
 
 def drop_dead(b: MBlock, live: int) -> bool:
@@ -221,6 +134,24 @@ def _repeated(b: MBlock, at: int) -> bool:
     return False
 
 
+def compare_while_copying(b: MBlock) -> bool:
+    """MOV Wa,Wb beside CP0 of either is SUB Wa,#0,Wb: the same flags (isa.md §6.2)."""
+    k, before = 0, len(b.insts)
+    while k + 1 < len(b.insts):
+        one, two = b.insts[k : k + 2]
+        copy, test = (one, two) if two.op == "cp0" else (two, one)
+        k += 1
+        if test.op != "cp0" or test.byte or test.pred or copy.pred or not copy.is_copy():
+            continue
+        source, dest = copy.args
+        tested = test.args[0] == source or (test.args[0] == dest and copy is one)
+        if tested and isinstance(source, int) and isinstance(dest, int) and max(source, dest) < SP:
+            new = MI("sub", source, Imm(0), dest, line=copy.line)
+            new.variables = two.variables
+            b.insts[k - 1 : k + 1] = [new]
+    return len(b.insts) != before
+
+
 def compare_in_place(b: MBlock, live: int) -> bool:
     """MOV #k,Wt; CP Wn,Wt with both dead afterwards is SUB #k,Wn (same flags)."""
     changed = False
@@ -249,12 +180,18 @@ def _flag_source(b: MBlock, at: int, r: int, byte: bool) -> MI | None:
             return None
         if flag_writes(mi):
             dest = mi.args[-1] if mi.args else None
-            if mi.op in SETS_NZ and dest == r and mi.byte == byte:
+            if mi.op in SETS_NZ and dest == r and (mi.byte == byte or _fits_a_byte(mi)):
                 return mi
             return None
         if r in mi.defs() or mi.op in ("call", "callr", "asm", "text"):
             return None
     return None
+
+
+def _fits_a_byte(mi: MI) -> bool:
+    """Whether a word operation masks all but bits 0-6, so that the word and its low byte have the same Z and N."""
+    masks = [a.value for a in mi.args if isinstance(a, Imm)] if mi.op in ("and", "andl") else []
+    return any(isinstance(mask, int) and 0 <= mask <= 0x7F for mask in masks)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
