@@ -43,9 +43,12 @@ class Target:
         return symbol.address
 
     def size(self, name: str) -> int:
-        """Size of a symbol in its own units."""
+        """Size of a symbol in its own units; up to the next symbol where the compiler tells none."""
         symbol = self.image.symbols.find(name)
-        return symbol.size if symbol is not None else 0
+        if symbol is None or symbol.size:
+            return symbol.size if symbol is not None else 0
+        behind = (s.address for s in self.image.symbols.all if s.space == symbol.space and s.address > symbol.address)
+        return min(behind, default=symbol.address) - symbol.address
 
     def word(self, address: int) -> int:
         """A word of RAM."""

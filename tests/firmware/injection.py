@@ -172,7 +172,8 @@ def sweep(
                         raise AssertionError(f"{where}: {error}") from error
                     machine.restore(here)
                 number += 1
-            machine.step()
+            if machine.step() is not None:  # a place the sweep stops at
+                machine.step()
         _check_end(stage, base)
         yield scene + 1, stage.seen
 

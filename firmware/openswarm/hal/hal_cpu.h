@@ -10,7 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef struct sys_pcb sys_pcb;
+#include "openswarm_scheduler.h" /* sys_pcb; C99 allows a typedef once */
+
 typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the thread to resume */
 
 #include "hal_port.h"

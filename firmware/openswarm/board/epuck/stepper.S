@@ -6,7 +6,7 @@
 
         .macro  advance motor
         mov     \motor+2, w0
-        add     \motor, wreg            ; fraction + rate
+        add     \motor, WREG            ; fraction + rate
         bra     n, 1f
         mov     #FULL_STEP, w1
         sub     w0, w1, w1
@@ -38,12 +38,12 @@ __T3Interrupt:
         advance _stepper_left
         advance _stepper_right
         mov     _stepper_right+4, w0
-        and     _stepper_right+6, wreg
+        and     _stepper_right+6, WREG
         sl      w0, #4, w2
         mov     _stepper_left+4, w0
-        and     _stepper_left+6, wreg
+        and     _stepper_left+6, WREG
         ior     w0, w2, w0
-        mov.b   wreg, LATD
+        mov.b   WREG, LATD
         bclr    IFS0, #T3IF             ; last: a trap on the way abandons this tick, not the next
         pop     w2
         pop.d   w0

@@ -1,0 +1,136 @@
+"""`make TOOLCHAIN=xc16`: the command line, the C and the assembly are what Microchip's compiler understands.
+
+The compiler itself is not at hand. A stand-in on PATH accepts only options it documents (XC16 C Compiler User's Guide
+DS50002071, MPLAB Assembler, Linker and Utilities DS50002106) and builds with ours.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from emu.cli import main
+from tests.firmware.conftest import FIRMWARE, ROOT
+
+APPS = ["hello", "listing1", "processors", "footprint", "latency", "stress"]
+OPTIONS = (
+    r"-mcpu=30F6014A|-omf=elf|-std=gnu99|-Os|-g|-fno-short-double|-ffunction-sections|-Wall|-Wextra|-o|-D\w+(=.*)?|-I\S+"
+    r"|-Wl(,(--script=p30F6014A\.gld|--gc-sections|-Map=\S+?))+"
+)
+STAND_IN = f'''#!{sys.executable}
+import re, subprocess, sys
+known = re.compile(r"""{OPTIONS}""")
+words = sys.argv[1:]
+for word in words:
+    if word.startswith("-") and not known.fullmatch(word):
+        sys.exit("xc16-gcc: unknown option " + word)
+kept = [w for w in words if not re.match("-mcpu|-omf|-std|-fno-short-double|-ffunction-sections|-Wl", w)]
+sys.exit(subprocess.run([sys.executable, "-m", "toolchain", "cc", *kept]).returncode)
+'''
+DIRECTIVES = {".equ", ".global", ".text", ".bss", ".space", ".macro", ".endm"}
+"""pic30-as knows them all (DS50002106)."""
+HEADERS = sorted({path.parent for path in (FIRMWARE / "openswarm").rglob("*.h")} - {
+    FIRMWARE / "openswarm" / "port" / "posix", FIRMWARE / "openswarm" / "port" / "template"})  # fmt: skip
+
+
+def script(path: Path, text: str) -> None:
+    path.write_text(text)
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+
+
+@pytest.fixture(scope="module")
+def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with xc16-gcc and xc16-bin2hex."""
+    folder = tmp_path_factory.mktemp("xc16")
+    script(folder / "xc16-gcc", STAND_IN)
+    script(
+        folder / "xc16-bin2hex",
+        f"#!{sys.executable}\nimport subprocess, sys\nassert sys.argv[2:] == ['-a', '-omf=elf'], sys.argv\n"
+        "sys.exit(subprocess.run([sys.executable, '-m', 'toolchain', 'hex', sys.argv[1]]).returncode)\n",
+    )
+    return folder
+
+
+def make(stand_in: Path, app: str, out: Path) -> Path:
+    path = os.pathsep.join([str(stand_in), os.environ["PATH"]])
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "MAKEFLAGS": ""}
+    command = ["make", "-s", "-C", str(FIRMWARE), f"APP={app}", "TOOLCHAIN=xc16", f"OUT={out}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out / "firmware.elf"
+
+
+def test_it_builds_and_the_measuring_commands_find_their_symbols(stand_in: Path, tmp_path: Path, capsys) -> None:
+    """Issue 4: `make -C firmware APP=... TOOLCHAIN=xc16`; such an image, compiled without stack checks, is measured."""
+    image = make(stand_in, "latency", tmp_path / "latency")
+    assert (tmp_path / "latency" / "firmware.hex").exists()
+    assert main(["cycles", str(image)]) == 0
+    assert "Sys_Yield to a preempted thread" in capsys.readouterr().out
+    assert main(["footprint", str(make(stand_in, "footprint", tmp_path / "footprint"))]) == 0
+    assert "exact for all" in capsys.readouterr().out
+    assert main(["run", str(make(stand_in, "listing1", tmp_path / "listing1")), "--seconds", "0.4"]) == 0
+
+
+def test_an_option_of_ours_is_none_of_theirs(stand_in: Path) -> None:
+    """The stand-in refuses what it should."""
+    done = subprocess.run([stand_in / "xc16-gcc", "-fstack-check"], capture_output=True, text=True, check=False)
+    assert "unknown option" in done.stderr
+
+
+@pytest.mark.parametrize("source", sorted(FIRMWARE.glob("openswarm/**/*.c")), ids=lambda path: path.name)
+def test_the_kernel_is_gnu99(source: Path) -> None:
+    """GCC 4.5 knows neither C11 nor later extensions."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    if "posix" in source.parts or "template" in source.parts or "host" in source.parts:
+        pytest.skip("not built for the dsPIC30F")
+    check_gnu99(source)
+
+
+@pytest.mark.parametrize("app", sorted(path.name for path in FIRMWARE.glob("apps/*") if path.is_dir()))
+def test_the_applications_are_gnu99(app: str) -> None:
+    """The same for firmware/apps."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    for source in sorted((FIRMWARE / "apps" / app).glob("*.c")):
+        check_gnu99(source)
+
+
+def check_gnu99(source: Path) -> None:
+    includes = [f"-I{folder}" for folder in [*HEADERS, FIRMWARE / "apps" / "clustering"]] + [
+        "-isystem",
+        str(ROOT / "toolchain" / "include"),
+    ]
+    flags = [
+        "-std=gnu99",
+        "-pedantic",
+        "-Wall",
+        "-Wextra",
+        "-Wc99-c11-compat",
+        "-Wno-pointer-to-int-cast",
+        "-fsyntax-only",
+    ]
+    # Addresses of 16 bits only: pointers do not fit into integers on a host.
+    layout = ["-DSYS_DEFAULT_STACK=256", "-include", "stddef.h", "-Wno-type-limits", "-Wno-attributes"]
+    command = ["gcc", *flags, *layout, *includes, str(source)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    found = [line for line in done.stderr.splitlines() if re.search(r"(error|warning):", line)]
+    assert [line for line in found if not re.search(r"size of array|different size", line)] == []
+
+
+@pytest.mark.parametrize("source", sorted(FIRMWARE.glob("openswarm/**/*.[Si]*")), ids=lambda path: path.name)
+def test_the_assembly_uses_directives_of_pic30_as_only(source: Path) -> None:
+    """Labels, instructions, comments behind `;`, preprocessor lines and a handful of directives."""
+    for number, line in enumerate(source.read_text().splitlines(), 1):
+        code = line.split(";")[0].strip()
+        if code.startswith("#"):
+            assert re.fullmatch(r'#include "[\w.]+"', code), f"{source.name}:{number}"
+        for word in re.findall(r"(?<!\S)\.\w+", code):
+            assert word in DIRECTIVES, f"{source.name}:{number}: {word}"
