@@ -1,0 +1,61 @@
+"""A boot loader over UART1: the firmware programs its own flash, on both engines (dspic30f6014a.md §10, §16)."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu.boards.epuck.board import Epuck
+from emu.loader import load_image
+from emu.machine import Machine
+
+ROW = 0x8000
+RETURN = 0x060000
+
+
+def constant(value: int) -> list[int]:
+    """mov #value, w0; return; the rest erased (isa.md: MOV #lit16 is 0010 kkkk kkkk kkkk kkkk dddd)."""
+    return [0x200000 | value << 4, RETURN] + [0xFFFFFF] * 30
+
+
+def packet(words: list[int], damage: int = 0) -> bytes:
+    data = b"".join(word.to_bytes(3, "little") for word in words)
+    return b"\xc1" + data + bytes([sum(data) + damage & 0xFF])
+
+
+@pytest.fixture(params=["interp", "auto"])
+def machine(request, program) -> Machine:
+    image = load_image(program("bootload.c"))
+    made = Machine(image.chip, engine=request.param, board=Epuck)
+    if request.param == "auto" and hasattr(made.runner, "wait"):
+        made.runner.threshold, made.runner.wait = 1, True
+    made.load(image)
+    made.program.put_flash(ROW, constant(7))
+    return made
+
+
+def talk(machine: Machine, data: bytes, cycles: int = 300_000) -> bytes:
+    heard = bytearray()
+    machine.board.bluetooth.on_byte = lambda byte, _cycle: heard.append(byte)
+    machine.board.bluetooth.feed(data)
+    machine.run(cycles=cycles)
+    return bytes(heard)
+
+
+def test_rows_sent_are_run_instead_of_the_old_ones(machine):
+    """§16: 2 ms to erase and 2 ms to program, in which the CPU stands; code made from the old row is not run again."""
+    machine.run(cycles=2_500_000)
+    assert machine.peek("answer") == 7
+    for number, value in enumerate((1234, 0, 0xBEEF), start=1):
+        assert talk(machine, packet(constant(value))) == b"qKK"
+        assert machine.peek("rows") == number
+        assert [machine.program.word(ROW + 2 * i) for i in range(3)] == [*constant(value)[:2], 0xFFFFFF]
+        machine.run(cycles=2_500_000)
+        assert machine.peek("answer") == value
+
+
+def test_a_damaged_row_is_refused_and_nothing_is_erased(machine):
+    assert talk(machine, packet(constant(1), damage=1)) == b"qKN"
+    assert machine.program.word(ROW) == constant(7)[0]
+    assert talk(machine, packet(constant(1))[:50], cycles=3_000_000) == b"qKN"
+    machine.run(cycles=2_500_000)
+    assert machine.peek("answer") == 7
