@@ -6,9 +6,10 @@
  * Each function below carries one contract line:
  *     callers | blocks? | worst-case Tcy on the dsPIC30F | stack bytes | error codes (Sys_Get_LastError)
  * Callers: M = main before Sys_Start_Kernel, T = thread, H = event handler or condition, I = ISR of priority 4.
- * n threads, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, d payload bytes.
- * Cycles were measured on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. A call from a
- * context that is not listed is refused: it returns failure, sets SYS_ERROR_CONTEXT and adds one to
+ * n threads, m events, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, d payload
+ * bytes. Cycles were measured on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. Stack is
+ * `python -m toolchain stack`, return address included; a switch takes its frame on top (port/dspic30f/README.md). A call
+ * from a context that is not listed is refused: it returns failure, sets SYS_ERROR_CONTEXT and adds one to
  * sys_statistics.refused.
  */
 #ifndef OPENSWARM_H
@@ -101,31 +102,32 @@ typedef struct {
     uint16 deadline_ms;    /* relative to each release; 1..period_ms */
 } sys_process_config;
 
-/* MTH | no | 820, of which 5 per byte paint the stack | 52 | MEMORY.  PID, or 0 = failed (PID 0 is the system
+/* MTH | no | 840, of which 5 per byte paint the stack | 40 | MEMORY.  PID, or 0 = failed (PID 0 is the system
  * thread). */
 uint16 Sys_Start_Process(sys_function f);
-/* MTH | no | as above | 34 | MEMORY, ARGUMENT.  As above. */
+/* MTH | no | as above | 40 | MEMORY, ARGUMENT.  As above. */
 uint16 Sys_Start_ProcessWith(const sys_process_config *config);
-/* MTH | own PID: never returns | ~200 + 30 per subscription in the system | 40 | PROCESS.  Also ends its
+/* MTH | own PID: never returns | ~450 + 25 m + 30 per subscription of its own | 42 | PROCESS.  Also ends its
  * subscriptions, its wait and its uncleared wait result. */
 bool Sys_Kill_Process(uint16 pid);
-/* T | no | 61 to a yielded thread, 69 to a preempted one | 24 | CONTEXT.  Hands the rest of the slice on. */
+/* T | no | 57 to a yielded thread, 65 to a preempted one | 24 | CONTEXT.  Hands the rest of the slice on. */
 void Sys_Yield(void);
-/* T | yes, ms rounded up to the next 1 ms tick | ~150 + 20 n | 40 | CONTEXT.  0 ms = Sys_Yield. */
+/* T | yes, ms rounded up to the next 1 ms tick | ~200 + 20 n | 42 | CONTEXT.  0 ms = Sys_Yield. */
 void Sys_Sleep(uint16 ms);
-/* T with SYS_PERIODIC | until its next release | ~170 + 20 n | 40 | CONTEXT, PROCESS.  True: the deadline was met. */
+/* T with SYS_PERIODIC | until its next release | ~240 + 20 n | 46 | CONTEXT, PROCESS.  True: the deadline was met. */
 bool Sys_Wait_for_Period(void);
-/* MTHI | no | 12 | 4 | none.  Nests. No thread switch and no handler runs until the matching End; a tick that falls
+/* MTHI | no | 16 | 4 | none.  Nests. No thread switch and no handler runs until the matching End; a tick that falls
  * inside is taken there. Interrupts stay enabled. */
 void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);
 /* MTHI | no | 6 | 4 | none.  In a handler: the interrupted thread; use the pid argument of the handler instead. */
 uint16 Sys_Get_ProcessID(void);
-/* MTHI | no | 70 + 10 n | 22 | none.  SYS_UNKNOWN: no such thread. */
+/* MTHI | no | ~65 + 18 n | 16 | none.  SYS_UNKNOWN: no such thread. */
 sys_state Sys_Get_ProcessState(uint16 pid);
-/* MTH | no | 4 per byte | 24 | none.  Stack bytes never used so far; 0 also for an unknown PID and PID 0. */
+/* MTH | no | ~80 + 18 n + 6 per byte | 16 | none.  Stack bytes never used so far; 0 also for an unknown PID and
+ * PID 0. */
 uint16 Sys_Get_UnusedStack(uint16 pid);
-/* MTH | no | 4 per byte | 20 | none.  The same for the stack of handlers, ISRs and scheduler. */
+/* MTH | no | 6 per byte | 4 | none.  The same for the stack of handlers, ISRs and scheduler. */
 uint16 Sys_Get_UnusedKernelStack(void);
 
 /* ---- Scheduling --------------------------------------------------------------------------------------------- */
@@ -133,41 +135,42 @@ uint16 Sys_Get_UnusedKernelStack(void);
 /* Chooses among the ready threads; see openswarm_scheduler.h to write one. */
 typedef struct sys_scheduler sys_scheduler;
 extern const sys_scheduler sys_round_robin, sys_fixed_priority, sys_earliest_deadline;
-/* MTH | no | 12 | 4 | none.  Takes effect at the next thread switch. */
+/* MTHI | no | 19 | 4 | none.  Takes effect at the next thread switch. */
 void Sys_Set_Scheduler(const sys_scheduler *scheduler);
 
 /* ---- Events ------------------------------------------------------------------------------------------------- */
 
-/* MTH | no | 111 + 9 b | 14 | MEMORY.  True also if already registered. */
+/* MTH | no | 146 + 9 b | 28 | MEMORY.  True also if already registered. */
 bool Sys_Register_Event(uint16 event);
-/* MTH | no | ~120 + 30 s + 20 n | 36 | EVENT.  Its subscriptions end, its undelivered messages are dropped,
+/* MTH | no | ~230 + 9 b + 45 s + 20 n | 26 | EVENT.  Its subscriptions end, its undelivered messages are dropped,
  * its waiters wake with NULL. */
 bool Sys_Unregister_Event(uint16 event);
-/* MTHI | no | 40 + 9 b | 14 | none. */
+/* MTHI | no | ~70 + 9 b | 12 | none. */
 bool Sys_IsEventRegistered(uint16 event);
-/* MTH | no | 130 + 9 b + 10 s + 10 n | 18 | EVENT, PROCESS, MEMORY, ARGUMENT.  Once per (event, pid, handler):
+/* MTH | no | ~140 + 9 b + 11 s + 18 n | 34 | EVENT, PROCESS, MEMORY, ARGUMENT.  Once per (event, pid, handler):
  * subscribing again replaces the condition. condition NULL = always. */
 bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_condition condition);
-/* MTH | no | ~60 + 9 b + 30 s | 30 | EVENT.  All handlers of this thread; false: there was none. */
+/* MTH | no | ~120 + 9 b + 45 s | 34 | EVENT.  All handlers of this thread; false: there was none. */
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
-/* MTH | no | ~60 + 9 b + 30 s | 30 | EVENT.  One handler; false: it was not subscribed. */
+/* MTH | no | ~120 + 9 b + 45 s | 34 | EVENT.  One handler; false: it was not subscribed. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
-/* MTHI | no | 108 + 9 b; 17 + d/2 more unless d = 2; 74 if nobody listens | 24 | EVENT, MEMORY, ARGUMENT.  Copies
+/* MTHI | no | 105 + 9 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 if nobody
+ * listens; ~400 more when the heap is nearly full | 38 | EVENT, MEMORY, ARGUMENT.  Copies
  * the payload and queues it. True also if nobody listens; then nothing is stored. False: nothing was queued.
  * Payloads above SYS_SMALL_PAYLOAD: not from an ISR. */
 bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
-/* MTHI | no | 117 + 9 b | 30 | EVENT, MEMORY. */
+/* MTHI | no | 114 + 9 b | 44 | EVENT, MEMORY. */
 bool Sys_Send_IntEvent(uint16 event, uint16 value);
-/* T | yes | ~180 + 9 b + 10 n | 44 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
+/* T | yes | ~250 + 9 b + 30 n | 46 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
  * result at a time: its next wait, sleep excepted, frees the previous one. */
 sys_event_data *Sys_Wait_for_Event(uint16 event);
 sys_event_data *Sys_Wait_for_Condition(uint16 event, sys_condition condition);
 /* As above; NULL with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
 sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 event, sys_condition condition, uint16 ms);
-/* T | no | ~80 + 10 n | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler it only sets
+/* T | no | ~100 + 25 n | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler it only sets
  * NULL. */
 void Sys_Clear_EventData(sys_event_data **data);
-/* MTHI | no | 30 | 12 | none.  Messages of this event that found no memory; saturates at 65535. */
+/* MTHI | no | ~50 | 8 | none.  Messages of this event that found no memory; saturates at 65535. */
 uint16 Sys_Get_LostEvents(uint16 event);
 
 /* ---- Information -------------------------------------------------------------------------------------------- */
@@ -181,7 +184,7 @@ typedef struct {
     uint16 overflows;   /* threads stopped by their stack limit */
 } sys_statistics;
 
-/* MTHI | no | 10 | 4 | none. */
+/* MTHI | no | ~20 | 8 | none. */
 const sys_statistics *Sys_Get_Statistics(void);
 /* MTHI | no | 12 | 8 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
 uint32 Sys_Get_SystemTime(void);
