@@ -154,12 +154,12 @@ bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_c
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
 /* MTH | no | ~120 + 9 b + 45 s | 34 | EVENT.  One handler; false: it was not subscribed. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
-/* MTHI | no | 105 + 9 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 if nobody
+/* MTHI | no | 104 + 9 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 if nobody
  * listens; ~400 more when the heap is nearly full | 38 | EVENT, MEMORY, ARGUMENT.  Copies
  * the payload and queues it. True also if nobody listens; then nothing is stored. False: nothing was queued.
  * Payloads above SYS_SMALL_PAYLOAD: not from an ISR. */
 bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
-/* MTHI | no | 114 + 9 b | 44 | EVENT, MEMORY. */
+/* MTHI | no | 113 + 9 b | 44 | EVENT, MEMORY. */
 bool Sys_Send_IntEvent(uint16 event, uint16 value);
 /* T | yes | ~250 + 9 b + 30 n | 46 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
  * result at a time: its next wait, sleep excepted, frees the previous one. */
