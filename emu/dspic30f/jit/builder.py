@@ -24,9 +24,10 @@ Y_RAM: Final = 0x1800
 W_END: Final = 0x20  # W0..W15 are data addresses 0x00..0x1F, isa.md §2.2
 STACK_POINTER: Final = 15
 
-NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE = range(6)
+NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK = range(7)
 """Why native code came back: go on at PC; interpret the instruction at PC; the block at PC reaches the deadline;
-look at events and interrupts before PC; no native code at PC; a RETFIE has run for two cycles."""
+look at events and interrupts before PC; no native code at PC; a RETFIE has run for two cycles;
+PC is hooked."""
 
 Access = Literal["plain", "slow", "irq", "flags", "sr"]
 """How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;
@@ -60,6 +61,8 @@ class Surroundings:
     rcon_wdto: int
     native: Mapping[int, NativeRegister] = field(default_factory=dict)
     """Device registers with native accesses, by even address."""
+    hooks: frozenset[int] = frozenset()
+    """Program addresses that Python wants to see."""
     do_start: int = -1
     do_end: int = -1
     """The DO loop that is active: its first and last instruction; -1: none."""

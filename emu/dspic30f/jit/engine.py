@@ -25,7 +25,7 @@ from emu.dspic30f.jit.devices import NativeRegister, native_registers
 from emu.dspic30f.jit.region import discover
 from emu.dspic30f.jit.runtime import BLOCKS, BOUNDARY, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
-from emu.dspic30f.jit.translate import Translator
+from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.state import DA, NOT_REPEATING, RUN
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
@@ -130,20 +130,20 @@ class JitEngine:
                 return
             self._prepare()
         self._env[LIMIT] = min(limit, state.cycle + NATIVE_CYCLES)
+        self._env[RESUME] = state.pc
         start = state.cycle
         why = self._native(self._core.record.address, self._env_address)
+        self._env[RESUME] = NOWHERE
         self.counts.runs += 1
         if why == RETFIE:
             sequencer.after_retfie()
-        elif self._hooks and state.pc in self._hooks:  # the machine calls hooks, once per arrival
-            if state.cycle == start:
-                sequencer.execute()
-        elif why == INTERPRET:
+        elif why == INTERPRET and (state.cycle == start or state.pc not in self._hooks):
             self.counts.interpreted += 1
             self._interpret()
         elif why in (MISS, DEADLINE):
             cycle = state.cycle
-            if cycle == start or (cycle < limit and self._core.events.deadline >= cycle):
+            quiet = cycle < limit and self._core.events.deadline >= cycle and state.pc not in self._hooks
+            if cycle == start or quiet:
                 self._miss(limit)
 
     def natively(self, limit: int) -> bool:
@@ -170,7 +170,7 @@ class JitEngine:
             self.counts.runs += 1
         env[BOUNDARY] = 0
         self.counts.runs += 1
-        if why == INTERPRET and not (self._hooks and state.pc in self._hooks):
+        if why == INTERPRET and state.pc not in self._hooks:
             self.counts.interpreted += 1
             self._interpret()
             return True
@@ -246,9 +246,9 @@ class JitEngine:
             self._install(tag, address)
         heat = code.heat.get(pc, 0) + 1
         code.heat[pc] = heat
-        if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words and pc not in self._hooks:
+        if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words:
             self._request(code, pc)
-            if code.steps[pc >> 1]:
+            if code.steps[pc >> 1] and pc not in self._hooks:  # a hook has been called and must not be again
                 return
         self.counts.cold += 1
         self._run_cold(min(limit, self._state.cycle + COLD_CYCLES))
@@ -281,7 +281,7 @@ class JitEngine:
         start, end = loop if loop is not None else (-1, -1)
         around = Surroundings(self._offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
                               self._words, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
-                              self._native_registers(), start, end)
+                              self._native_registers(), frozenset(self._hooks), start, end)
         table = ctypes.c_uint64 * self._words
         return Code(context, around, identity_of(context, around), table(), table())
 
@@ -300,8 +300,8 @@ class JitEngine:
             self._native = self._dispatch
 
     def _fetch(self, pc: int) -> Insn | None:
-        """Decoded instruction for the translator; none where Python must see the program counter."""
-        if pc >> 1 >= self._words or pc in self._hooks or not self._core.program.executable(pc):
+        """Decoded instruction for the translator; none where nothing can be run."""
+        if pc >> 1 >= self._words or not self._core.program.executable(pc):
             return None
         flash = self._core.program.flash
         second = flash[(pc >> 1) + 1] if (pc >> 1) + 1 < self._words else 0
@@ -309,14 +309,15 @@ class JitEngine:
 
     def _request(self, code: Code, pc: int) -> None:
         """Get native code for the region at `pc`, from disk or from the compile process."""
-        region = discover(pc, self._fetch, code.entries)
+        region = discover(pc, self._fetch, code.entries, self._hooks)
         code.regions[pc] = set()
         if not region.steps:
             return
         code.regions[pc] = {word for at, step in region.steps.items() for word in (at >> 1, (at >> 1) + 1)}
         code.entries |= region.leaders
         self.counts.regions += 1
-        identity = repr((region.words(), sorted(region.leaders), pc)).encode()
+        hooked = sorted(code.around.hooks & region.steps.keys())
+        identity = repr((region.words(), sorted(region.leaders), pc, hooked)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
             key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
             kept = self.compiler.from_disk(key)
@@ -345,8 +346,9 @@ class JitEngine:
         self._key = None
 
 def identity_of(context: Context, around: Surroundings) -> bytes:
-    """Hash of processor modes and surroundings."""
-    parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in vars(around).values()]
+    """Hash of processor modes and surroundings, without the hooks: those in a region belong to the region."""
+    facts = vars(around) | {"hooks": None}
+    parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in facts.values()]
     return hashlib.sha256(repr((context, parts)).encode()).digest()
 
 

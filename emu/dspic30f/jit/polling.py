@@ -46,7 +46,7 @@ def _empty_loop(region: Region, back: Step, around: Surroundings, context: Conte
     head = back.target
     assert head is not None
     path = _path(region, head, back.pc)
-    if path is None or any(step.pc == around.do_end for step in path):
+    if path is None or any(step.pc == around.do_end or step.pc in around.hooks for step in path):
         return None
     inside = range(head + 1, back.pc + 1)
     if any(step.target in inside for step in region.steps.values()):

@@ -63,8 +63,8 @@ ENDS: Final = (Goto, Call, Return, Reset, Sleep)
 """Flows behind which the next word is not reached by falling through."""
 
 
-def discover(start: int, fetch: Fetch, known: Container[int] = ()) -> Region:
-    """The region entered at `start`; it ends where `known` code can be entered."""
+def discover(start: int, fetch: Fetch, known: Container[int] = (), hooks: Container[int] = ()) -> Region:
+    """The region entered at `start`; it ends where `known` code can be entered. At `hooks` Python goes in and out."""
     region = Region(start)
     work = [start]
     region.leaders.add(start)
@@ -78,6 +78,8 @@ def discover(start: int, fetch: Fetch, known: Container[int] = ()) -> Region:
             next_pc = (pc + 2 * insn.words) & PC_WRAP
             target = static_target(pc, insn, fetch)
             region.steps[pc] = Step(pc, insn, facts, next_pc, target)
+            if pc in hooks:
+                region.leaders.add(pc)
             if target is not None:
                 region.leaders.add(target)
                 work.append(target)

@@ -58,6 +58,8 @@ class Repeats:
         last_of_loop = target.pc == self._t.around.do_end
         if target.facts.flow is not None or not target.insn.row.repeat_ok or last_of_loop:
             return False
+        if target.pc in self._t.around.hooks:  # an iteration is an arrival
+            return False
         scratch = Emitter()
         scratch.start("scratch")
         t = self._t

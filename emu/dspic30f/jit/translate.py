@@ -13,6 +13,7 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Repeat, Return, Skip, Sleep
 from emu.dspic30f.jit.builder import (
     DEADLINE,
+    HOOK,
     INTERPRET,
     MISS,
     NEXT,
@@ -30,6 +31,9 @@ from emu.dspic30f.jit.variables import MemoryVariables, Variables, pointer
 from emu.dspic30f.state import FIRST, IDLE, IPL3, NOT_REPEATING, PC_MASK, RA
 from emu.events import NEVER
 
+RESUME: Final = 5
+"""Word of the environment: the hooked address Python has just seen, or"""
+NOWHERE: Final = -1
 PROLOGUE: Final = """declare i16 @llvm.fshl.i16(i16, i16, i16)
 declare i16 @llvm.ctlz.i16(i16, i1)
 declare i16 @llvm.cttz.i16(i16, i1)
@@ -176,6 +180,8 @@ class Translator:
         late = self.exit(start, SERVICE if self.exact else DEADLINE)
         e.end(f"br i1 {fits.text}, label %{go}, label %{late}, !prof !0")
         e.start(go)
+        if start in self.around.hooks:
+            self._stop_for_hook(start)
         if start in self._heads:
             e.line(f"store i1 true, ptr %passed.{start:x}")
         if start == self.around.do_end:
@@ -199,6 +205,16 @@ class Translator:
             if ended:
                 return
             pc = step.next_pc
+
+    def _stop_for_hook(self, pc: int) -> None:
+        """Python is to see that `pc` is reached, unless it has just done so."""
+        e = self.e
+        place, seen = e.name(), e.fresh("seen")
+        e.line(f"{place} = getelementptr i64, ptr %env, i64 {RESUME}")
+        hooked = e.load(place, 64)
+        e.end(f"br i1 {truth(hooked == pc)}, label %{seen}, label %{self.exit(pc, HOOK)}")
+        e.start(seen)
+        e.line(f"store i64 {NOWHERE}, ptr {place}, align 1")
 
     def fits(self, cost: Number) -> Value:
         """Whether `cost` cycles from now on end before the cycle of the deadline."""

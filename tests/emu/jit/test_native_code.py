@@ -95,16 +95,39 @@ def test_interrupts_are_entered_and_left_without_python() -> None:
     assert native.runner.counts.interpreted < 40
 
 
-def test_a_hook_is_called_at_each_arrival_although_the_code_around_it_is_native() -> None:
-    """Hooked addresses are left out of regions."""
+@pytest.mark.parametrize("seed", range(6))
+def test_hooks_are_called_at_each_arrival_and_the_code_around_them_is_native(seed: int) -> None:
+    """Regions are translated with the hooks in them: same calls in the same cycles, same records."""
+    firmware = random_firmware(seed)
+    generator = random.Random(seed)
+    hooked = generator.sample(sorted(firmware.flash), 40)
+    machines, calls = [], []
+    for machine in pair(firmware, ipl_slip=seed % 2):
+        seen: list[tuple[int, int]] = []
+        for pc in hooked:
+            machine.hook_pc(pc, lambda m=machine, c=seen: c.append((m.pc, m.cycle)))
+        machines.append(machine)
+        calls.append(seen)
+    plain, native = machines
+    for _ in range(8):
+        cycles = generator.randrange(1, 600)
+        assert plain.run(cycles) == native.run(cycles)
+        assert not difference(plain, native)
+    assert calls[0] == calls[1]
+
+
+def test_a_hook_in_a_loop_leaves_its_instruction_native() -> None:
+    """Python is called per arrival, but interprets nothing."""
     seen: list[list[int]] = []
     for machine in pair(counting_firmware()):
         calls: list[int] = []
         machine.hook_pc(0x1002, lambda m=machine, c=calls: c.append(m.cycle))
-        machine.run(2_000)
+        machine.run(20_000)
         seen.append(calls)
     assert seen[0] == seen[1]
-    assert len(seen[0]) > 10
+    assert len(seen[0]) > 150
+    assert isinstance(machine.runner, JitEngine)
+    assert machine.runner.counts.interpreted < 40
 
 
 def test_reprogrammed_flash_is_translated_anew() -> None:
