@@ -1,106 +1,150 @@
-"""Native code against the plain interpreter: random firmware with interrupts, the whole record at random stops.
+"""Native code against the interpreters: random legal code, interrupts at odd cycles, the whole record at random stops.
 
-Run `python tests/fuzz/fuzz_jit.py [--programs N] [--seed S] [--stops N]`; exits 1 at the first difference, naming its
-seed. Prints how many instructions, distinct words in distinct modes, rows and interrupts were compared.
+Three campaigns, until their targets are met: `straight` (thousands of distinct instructions per program, in step with
+the plain interpreter, each program also in exact code alone), `wild` (jumps, traps and mode changes at odd places) and
+`long` (loops for millions of instructions, block code beside exact code, a share of it also beside the specialised
+interpreter). Odd seeds run with ipl_slip 1.
+
+    python tests/fuzz/fuzz_jit.py                                           # a few minutes
+    python tests/fuzz/fuzz_jit.py --pairs 1000000 --interrupts 100000 --instructions 1000000000 --wild 2000 \
+        --state jit.npz                                                     # all of it; may be stopped and run again
+
+Exits 1 at the first difference, naming campaign and seed; 130 after Ctrl-C, with what was done until then.
 """
 
 from __future__ import annotations
 
 import argparse
-import random
+import json
+import os
 import sys
-import tempfile
 import time
-from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "jit")]
 
-from random_firmware import difference, load, random_firmware  # noqa: E402
+from long_runs import check_long  # noqa: E402
+from twins import Difference, Tally, check_straight, check_wild  # noqa: E402
 
-from emu.dspic30f.jit.cache import ObjectCache  # noqa: E402
-from emu.dspic30f.jit.compiler import Compiler  # noqa: E402
-from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.machine import Machine  # noqa: E402
-
-MODES = ("CORCON", "MODCON", "XBREV")
-
-
-class Tally:
-    """What the plain machines executed."""
-
-    def __init__(self) -> None:
-        self.instructions = 0
-        self.interrupts = 0
-        self.pairs: set[tuple[int, ...]] = set()
-        self.rows: Counter[str] = Counter()
-
-    def watch(self, machine: Machine) -> None:
-        """Count every instruction of a plain machine."""
-        sequencer = machine.core.sequencer
-        execute = sequencer.execute
-        enter = machine.core.exceptions.enter
-
-        def counted() -> None:
-            pc = machine.pc
-            self.instructions += 1
-            word = machine.program.word(pc)
-            self.pairs.add((word, *(machine.peek(name) for name in MODES)))
-            if machine.program.executable(pc):
-                try:
-                    self.rows[sequencer.fetch(pc).insn.row.syntax] += 1
-                except Exception:  # an illegal word: the machine will say so itself
-                    self.rows["(illegal)"] += 1
-            execute()
-
-        def entered(accepted: object, last: int) -> None:
-            self.interrupts += 1
-            enter(accepted, last)  # type: ignore[arg-type]
-
-        sequencer.execute = counted  # type: ignore[method-assign]
-        machine.core.exceptions.enter = entered  # type: ignore[method-assign]
+SAVE_EVERY = 60.0
+"""Seconds between two savings of the state."""
+LONG = 40_000_000
+"""Instructions per program of the campaign `long`."""
 
 
-def run(seed: int, stops: int, tally: Tally, folder: Path) -> str:
-    """One program; the difference found, or nothing."""
-    firmware = random_firmware(seed)
-    plain, native = (Machine(engine=engine, ipl_slip=seed % 2) for engine in ("plain", "jit"))
-    assert isinstance(native.runner, JitEngine)
-    native.runner.threshold, native.runner.wait = 1, True
-    native.runner.compiler = Compiler(ObjectCache(folder))
-    tally.watch(plain)
-    load(plain, firmware)
-    load(native, firmware)
-    generator = random.Random(seed)
-    for _ in range(stops):
-        cycles = generator.randrange(1, 600)
-        one, other = plain.run(cycles), native.run(cycles)
-        if one != other or difference(plain, native):
-            return f"{one} {other} {difference(plain, native)}"
-        if one.reason != "limit":
-            break
-    return ""
+class Campaign:
+    """Tallies and the next seed of each kind of program; kept in a file if there is one."""
+
+    def __init__(self, seed: int, file: Path | None) -> None:
+        self.tally = Tally()
+        self.seeds = dict.fromkeys(("straight", "wild", "long"), seed)
+        self.seconds = 0.0
+        self._file = file
+        self._saved = time.monotonic()
+        if file is not None and file.exists():
+            with np.load(file) as kept:
+                counts = json.loads(str(kept["counts"]))
+                self.tally.unpack(counts, {name: kept[name].tobytes() for name in ("seen", "native", "both")})
+            self.seeds, self.seconds = counts["seeds"], counts["seconds"]
+
+    def save(self) -> None:
+        """Write the state by atomic rename."""
+        if self._file is None:
+            return
+        sets = {name: np.frombuffer(data, np.uint64) for name, data in self.tally.packed().items()}
+        part = self._file.with_suffix(".part.npz")
+        np.savez(part, counts=json.dumps(self.report()), **sets)
+        os.replace(part, self._file)
+        self._saved = time.monotonic()
+
+    def report(self) -> dict[str, Any]:
+        """Everything that was counted."""
+        return self.tally.as_json() | {"seeds": self.seeds, "seconds": round(self.seconds, 1)}
+
+    def run(self, kind: str, check: Callable[[int], Tally]) -> None:
+        """One program of a kind. Raises Difference."""
+        seed, start = self.seeds[kind], time.process_time()
+        try:
+            found = check(seed)
+        except Difference as difference:
+            raise Difference(f"{kind} seed {seed}: {difference}") from difference
+        self.tally.add(found)
+        self.seeds[kind] = seed + 1
+        self.seconds += time.process_time() - start
+        if time.monotonic() - self._saved > SAVE_EVERY:
+            self.save()
+
+
+def campaign(state: Campaign, options: argparse.Namespace, progress: Progress) -> None:
+    """Run until every target is met, always the kind of program that is furthest behind."""
+    tally = state.tally
+    goals: dict[str, tuple[int, Callable[[], int]]] = {
+        "native pairs": (options.pairs, lambda: len(tally.native)),
+        "interrupts": (options.interrupts, lambda: tally.places["interrupts"]),
+        "wild programs": (options.wild, lambda: tally.programs["wild"]),
+        "instructions": (options.instructions, tally.executed),
+    }
+    tasks = {name: progress.add_task(name, total=total) for name, (total, _done) in goals.items()}
+    while True:
+        shares = {name: done() / total for name, (total, done) in goals.items() if total}
+        for name, task in tasks.items():
+            progress.update(task, completed=goals[name][1]())
+        behind = min(shares, key=shares.__getitem__)
+        if shares[behind] >= 1:
+            return
+        if behind == "instructions":
+            state.run("long", lambda seed: check_long(seed, min(LONG, options.instructions - tally.executed())))
+        else:
+            state.run(*(("wild", check_wild) if behind == "wild programs" else ("straight", check_straight)))
+
+
+def text_of(report: dict[str, Any]) -> str:
+    """The tally for people."""
+    rows, native = report["rows"], report["native_rows"]
+    rarest = sorted(rows.items(), key=lambda item: item[1])[:3]
+    never = sorted(set(rows) - set(native), key=lambda name: int(name.split()[0]))
+    programs = ", ".join(f"{count} {name}" for name, count in report["programs"].items())
+    places = "\n".join(f"    {count:9} {name}" for name, count in sorted(report["places"].items(), key=lambda i: -i[1]))
+    rare = ", ".join(f"{name}: {count}" for name, count in rarest)
+    return (f"{programs} programs, {report['executed']} instructions, {report['stops']} stops "
+            f"({report['exchanges']} with snapshots "
+            f"exchanged), {sum(report['entries'].values())} exceptions: no difference, {report['seconds']:.0f} s\n"
+            f"(word, modes) pairs: {report['pairs']}, natively {report['native_pairs']}, in exact code once more "
+            f"{report['exact_pairs']}\n{len(rows)} rows, the rarest {rare}\n"
+            f"rows never native: {', '.join(never) or 'none'}\nexceptions entered in step, by place:\n{places}")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--programs", type=int, default=2_000, help="random programs (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=10_000, help="first seed (default %(default)s)")
-    parser.add_argument("--stops", type=int, default=20, help="comparisons per program (default %(default)s)")
+    parser.add_argument("--pairs", type=int, default=50_000, help="distinct native pairs (default %(default)s)")
+    parser.add_argument("--interrupts", type=int, default=4_000, help="interrupts in step (default %(default)s)")
+    parser.add_argument("--wild", type=int, default=100, help="wild programs (default %(default)s)")
+    parser.add_argument("--instructions", type=int, default=40_000_000, help="in all (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=10_000, help="first seed of each kind (default %(default)s)")
+    parser.add_argument("--state", type=Path, help="file to go on from and to keep the tallies in")
+    parser.add_argument("--json", action="store_true", help="print the tallies as JSON")
     options = parser.parse_args()
-    tally, start = Tally(), time.perf_counter()
-    with tempfile.TemporaryDirectory() as folder:
-        for seed in range(options.seed, options.seed + options.programs):
-            found = run(seed, options.stops, tally, Path(folder))
-            if found:
-                print(f"DIFFERENCE: seed {seed}: {found}")
-                return 1
-    rare = min(tally.rows.values(), default=0)
-    print(f"{options.programs} programs, {tally.instructions} instructions, {len(tally.pairs)} (word, modes) pairs, "
-          f"{len(tally.rows)} rows (rarest {rare} times), {tally.interrupts} exceptions: no difference, "
-          f"{time.perf_counter() - start:.0f} s")
-    return 0
+    state, status = Campaign(options.seed, options.state), 0
+    columns = (TextColumn("{task.description:>14}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress:
+        try:
+            campaign(state, options, progress)
+        except Difference as difference:
+            print(f"DIFFERENCE: {difference}")
+            status = 1
+        except KeyboardInterrupt:
+            status = 130
+    state.save()
+    report = state.report()
+    print(json.dumps(report) if options.json else text_of(report))
+    return status
 
 
 if __name__ == "__main__":

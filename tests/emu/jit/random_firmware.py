@@ -53,6 +53,10 @@ class Firmware:
 
     seed: int
     flash: dict[int, int] = field(default_factory=dict)
+    end: int = -1
+    """Where a pass through the program ends; -1: nowhere in particular."""
+    ram: dict[int, int] = field(default_factory=dict)
+    """Words of RAM that are not random at the beginning."""
 
     def put(self, address: int, words: list[int]) -> int:
         """Place words; returns the address behind them."""
@@ -173,12 +177,19 @@ def random_firmware(seed: int) -> Firmware:
 
 def load(machine: Machine, firmware: Firmware) -> None:
     """Put the program and random data into a machine and reset it."""
-    for address, word in firmware.flash.items():
-        machine.program.put_flash(address, [word])
+    start, words = 0, []
+    for address, word in sorted(firmware.flash.items()):
+        if address != start + 2 * len(words):
+            machine.program.put_flash(start, words)
+            start, words = address, []
+        words.append(word)
+    machine.program.put_flash(start, words)
     machine.reset("POR")
     generator = random.Random(firmware.seed + 1)
     for address in range(0x800, 0x2800, 2):
         machine.poke(address, generator.getrandbits(16))
+    for address, word in firmware.ram.items():
+        machine.poke(address, word)
 
 
 def difference(one: Machine, other: Machine) -> str:

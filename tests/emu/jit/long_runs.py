@@ -1,0 +1,180 @@
+"""Long runs: loops for millions of instructions in native code, counted exactly and compared.
+
+Block code as the engine likes it runs beside exact code alone, which stays in the record after every instruction and
+counts. At random places both go on beside the specialised interpreter, which counts too, from the same snapshot.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import random
+from typing import Any, Final
+
+from random_firmware import difference, load
+from straight_body import Shape
+from straight_firmware import straight_firmware
+from twins import NO_WATCHDOG, Difference, QuickCompiler, Tally, advance
+
+from emu.dspic30f.jit import engine as jit_engine
+from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.runtime import ENV_WORDS
+from emu.dspic30f.jit.translate import Translator
+from emu.dspic30f.jit.values import Number
+from emu.dspic30f.pysource import Source
+from emu.dspic30f.specialised import SpecialisedEngine
+from emu.machine import Machine
+
+EXECUTED: Final = ENV_WORDS - 1
+"""Word of the native environment in which instructions are counted."""
+
+
+class CountedSource(Source):
+    """Functions of the specialised interpreter that add what they executed to `executed[0]`."""
+
+    each = False
+    """Count at the instruction (loops) instead of at the way out."""
+    _done = 0
+
+    def emit(self, line: str) -> None:
+        if self._done and line.lstrip().startswith("return"):
+            super().emit(f"{line[:len(line) - len(line.lstrip())]}executed[0] += {self._done}")
+        super().emit(line)
+
+    def commit(self) -> None:
+        super().commit()
+        if self.each:
+            self.emit("executed[0] += 1")
+        else:
+            self._done += 1
+
+
+class CountedInterpreter(SpecialisedEngine):
+    """The specialised interpreter with a count of instructions."""
+
+    def __init__(self, machine: Machine) -> None:
+        super().__init__(machine.core, {})
+        self.executed = self._names["executed"] = [0]
+        self._each = False
+        sequencer = machine.core.sequencer
+        execute, executed = sequencer.execute, self.executed
+
+        def counted() -> None:
+            executed[0] += 1
+            execute()
+
+        sequencer.execute = counted  # type: ignore[method-assign]
+
+    def _source(self) -> Source:
+        plain = super()._source()
+        source = CountedSource(plain.places, plain.context, plain.initialised, plain._limit_armed)
+        source.each = self._each
+        return source
+
+    def _write_repeat(self, pc: int) -> Any:
+        self._each = True
+        try:
+            return super()._write_repeat(pc)
+        finally:
+            self._each = False
+
+
+class CountingTranslator(Translator):
+    """Exact code that counts instructions: `advance` is translated once for each."""
+
+    def advance(self, cycles: Number, mask: int) -> None:
+        super().advance(cycles, mask)
+        if self.exact:
+            e = self.e
+            place = e.name()
+            e.line(f"{place} = getelementptr i64, ptr %env, i64 {EXECUTED}")
+            e.store(place, e.load(place, 64) + 1, 64)
+
+
+class CountedExact:
+    """Makes a native machine run exact code alone, with a count of instructions."""
+
+    def __init__(self, machine: Machine) -> None:
+        runner = machine.runner
+        assert isinstance(runner, JitEngine)
+        self._runner: Final = runner
+        self.python = 0
+        execute = machine.core.sequencer.execute
+
+        def counted() -> None:
+            self.python += 1
+            execute()
+
+        machine.core.sequencer.execute = counted  # type: ignore[method-assign]
+        runner._interpret = counted
+        runner._run_cold = lambda _limit: counted()
+        request = runner._request
+
+        def requested(code: Any, pc: int) -> None:
+            jit_engine.Translator = CountingTranslator  # type: ignore[misc]
+            try:
+                request(code, pc)
+            finally:
+                jit_engine.Translator = Translator  # type: ignore[misc]
+            ctypes.memset(ctypes.addressof(code.blocks), 0, ctypes.sizeof(code.blocks))
+
+        runner._request = requested  # type: ignore[method-assign]
+
+    @property
+    def executed(self) -> int:
+        """Instructions so far."""
+        return self.python + int(self._runner._env[EXECUTED])
+
+
+def native_machine(ipl_slip: int) -> Machine:
+    """Native code from the second arrival on, compiled at once."""
+    machine = Machine(engine="jit", ipl_slip=ipl_slip)
+    runner = machine.runner
+    assert isinstance(runner, JitEngine)
+    runner.threshold, runner.wait, runner.compiler = 2, True, QuickCompiler(2)
+    return machine
+
+
+def check_long(seed: int, instructions: int, share: float = 0.03) -> Tally:
+    """A program with loops for about `instructions`, `share` of them beside the interpreter. Raises Difference."""
+    shape = Shape(instructions=300, periods=(1500, 9000), loops=(20, 300), calm=True)
+    firmware = straight_firmware(seed, shape)
+    generator = random.Random(seed)
+    blocks, exact = native_machine(seed & 1), native_machine(seed & 1)
+    interpreted = Machine(engine="interp", ipl_slip=seed & 1)
+    count = CountedExact(exact)
+    interpreter = interpreted.runner = CountedInterpreter(interpreted)  # type: ignore[misc]
+    for machine in (blocks, exact, interpreted):
+        machine.stop_on_fault = False
+        machine.program.put(machine.chip.config["FWDT"].address, NO_WATCHDOG)
+        load(machine, firmware)
+    tally = Tally()
+    while count.executed < instructions:
+        advance(blocks, exact, int(10 ** generator.uniform(1, 6.6)), tally, generator.random() < 0.1)
+        while interpreter.executed[0] < share * count.executed:
+            beside(interpreted, interpreter, blocks, exact, count, int(10 ** generator.uniform(1, 5.3)))
+            tally.stops += 1
+    runner = blocks.runner
+    assert isinstance(runner, JitEngine)
+    tally.programs["long"] += 1
+    tally.instructions["long"] += count.executed
+    tally.instructions["of these beside the interpreter"] += interpreter.executed[0]
+    tally.entries["long"] += runner.interrupts
+    return tally
+
+
+def beside(
+    interpreted: Machine,
+    interpreter: CountedInterpreter,
+    blocks: Machine,
+    exact: Machine,
+    count: CountedExact,
+    cycles: int,
+) -> None:
+    """The interpreter goes on from the native machines' snapshot, and they with it. Raises Difference."""
+    interpreted.restore(blocks.snapshot())
+    before = interpreter.executed[0], count.executed
+    stops = [machine.run(cycles) for machine in (interpreted, blocks, exact)]
+    found = difference(interpreted, blocks) or difference(interpreted, exact)
+    ran = interpreter.executed[0] - before[0], count.executed - before[1]
+    if found or stops[0] != stops[1] or stops[0] != stops[2] or ran[0] != ran[1]:
+        raise Difference(f"{stops} instructions {ran} {found}")

@@ -1,0 +1,309 @@
+"""Two machines with different engines in step: native code against an interpreter, and what that has covered.
+
+`Tally` counts only what was compared afterwards without a difference. Native execution is not assumed: instructions
+that the native machine gave to Python are counted there and subtracted.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import random
+from array import array
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from random_firmware import Firmware, difference, load, random_firmware
+from straight_body import Shape
+from straight_firmware import straight_firmware
+
+from emu.dspic30f.faults import Breakpoint, IllegalOpcode
+from emu.dspic30f.isa.flow import Branch, Return, Skip, Sleep
+from emu.dspic30f.jit.compiler import Compiler
+from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.worker import Backend
+from emu.dspic30f.state import DA, NOT_REPEATING, RA
+from emu.machine import Machine
+
+MODE_BITS = 0x10F7
+"""CORCON bits that are processor modes (isa.md §2.4)."""
+NO_WATCHDOG = 0x7FFF
+"""FWDT with FWDTEN clear (dspic30f6014a.md §17)."""
+LOST = 6000
+"""Tcy without a new address after which a straight program is sent on by a reset pin."""
+
+
+class Difference(Exception):
+    """Two engines disagree."""
+
+
+@dataclass
+class Tally:
+    """What was executed and found equal."""
+
+    programs: Counter[str] = field(default_factory=Counter)
+    instructions: Counter[str] = field(default_factory=Counter)
+    """By campaign."""
+    stops: int = 0
+    exchanges: int = 0
+    """Stops at which each machine went on from the other's snapshot."""
+    entries: Counter[str] = field(default_factory=Counter)
+    """Exceptions entered, by campaign."""
+    places: Counter[str] = field(default_factory=Counter)
+    """Exceptions entered in one step, by the kinds of place they hit; one may hit several."""
+    rows: Counter[str] = field(default_factory=Counter)
+    native_rows: Counter[str] = field(default_factory=Counter)
+    seen: set[int] = field(default_factory=set)
+    native: set[int] = field(default_factory=set)
+    """(word, modes) pairs: executed at all, and executed by native code."""
+    both: set[int] = field(default_factory=set)
+    """Pairs executed by block code or exact code, and again by exact code alone."""
+
+    def executed(self) -> int:
+        """Instructions of all campaigns."""
+        return sum(self.instructions[kind] for kind in self.programs)
+
+    def as_json(self) -> dict[str, Any]:
+        """Counts by name."""
+        names = ("programs", "instructions", "entries", "places", "rows", "native_rows")
+        return {name: dict(getattr(self, name)) for name in names} | {
+            "executed": self.executed(), "stops": self.stops, "exchanges": self.exchanges, "pairs": len(self.seen),
+            "native_pairs": len(self.native), "exact_pairs": len(self.both)}
+
+    def add(self, other: Tally) -> None:
+        """Take over what another tally counted."""
+        for name in ("programs", "instructions", "entries", "places", "rows", "native_rows"):
+            getattr(self, name).update(getattr(other, name))
+        self.stops += other.stops
+        self.exchanges += other.exchanges
+        for name in ("seen", "native", "both"):
+            getattr(self, name).update(getattr(other, name))
+
+    def packed(self) -> dict[str, bytes]:
+        """The sets as 64-bit words."""
+        return {name: array("Q", getattr(self, name)).tobytes() for name in ("seen", "native", "both")}
+
+    def unpack(self, counts: dict[str, Any], sets: dict[str, bytes]) -> None:
+        """Set everything from `as_json` and `packed`."""
+        for name in ("programs", "instructions", "entries", "places", "rows", "native_rows"):
+            setattr(self, name, Counter(counts[name]))
+        self.stops, self.exchanges = counts["stops"], counts["exchanges"]
+        for name, data in sets.items():
+            words = array("Q")
+            words.frombytes(data)
+            setattr(self, name, set(words))
+
+
+class _NoCache:
+    """Objects are kept nowhere: no two programs share code."""
+
+    stores = hits = 0
+
+    def key(self, *_parts: bytes) -> str:
+        return ""
+
+    def get(self, _key: str) -> None:
+        return None
+
+    def put(self, _key: str, _code: bytes) -> None:
+        pass
+
+
+class QuickCompiler(Compiler):
+    """Compiles in this process, block code with the LLVM effort it is told; forgets its objects with itself."""
+
+    backend: ClassVar[Backend] = Backend()
+    dispatchers: ClassVar[dict[str, bytes]] = {}
+    """Objects of dispatch loops, by their text."""
+
+    def __init__(self, block_level: int) -> None:
+        super().__init__(_NoCache())  # type: ignore[arg-type]
+        self._block_level = block_level
+        self._backend = self.backend
+
+    def now(self, text: str, level: int, key: str, entries: Any = ()) -> int:
+        if not entries:
+            code = self.dispatchers.get(text) or self.dispatchers.setdefault(text, self.backend.compile(text, level))
+            return self.load(code)
+        return super().now(text, min(level, self._block_level), key, entries)
+
+
+class Watch:
+    """Counts every instruction of a plain machine, and those of its native twin that Python runs."""
+
+    def __init__(self, plain: Machine, native: Machine) -> None:
+        self.plain = plain
+        self.ran: Counter[int] = Counter()
+        """Executions by `(PC, modes)`."""
+        self.python: Counter[int] = Counter()
+        self.addresses: set[int] = set()
+        self.instructions = 0
+        self.tally = Tally()
+        self.last = 0
+        self.stalled = False
+        self._count(plain, self.ran)
+        self._follow_plain(plain)
+        runner = native.runner
+        assert isinstance(runner, JitEngine)
+        counted = self._count(native, self.python)
+        runner._interpret = counted
+        runner._run_cold = lambda _limit: counted()
+
+    def _count(self, machine: Machine, counter: Counter[int]) -> Callable[[], None]:
+        record, at, execute = machine.record, machine.state.at, machine.core.sequencer.execute
+        u16, u32 = record.u16, record.u32
+        pc, corcon, modcon, xbrev, intcon1 = (at[n] for n in ("cpu.pc", "CORCON", "MODCON", "XBREV", "INTCON1"))
+
+        def counted() -> None:
+            modes = u16[corcon] & MODE_BITS | u16[modcon] << 13 | u16[xbrev] >> 15 << 29 | (u16[intcon1] & 0x700) << 22
+            counter[u32[pc] << 33 | modes] += 1
+            execute()
+
+        machine.core.sequencer.execute = counted  # type: ignore[method-assign]
+        return counted
+
+    def _follow_plain(self, machine: Machine) -> None:
+        sequencer, enter = machine.core.sequencer, machine.core.exceptions.enter
+        counted = sequencer.execute
+        state, at = machine.state, machine.state.at
+        u16, u32 = machine.record.u16, machine.record.u32
+        pc_at, stall_at = at["cpu.pc"], at["cpu.stall"]
+        addresses, places = self.addresses, self.tally.places
+        mask = 0
+
+        def followed() -> None:
+            nonlocal mask
+            self.last = u32[pc_at]
+            mask = u16[stall_at]
+            addresses.add(self.last)
+            self.instructions += 1
+            counted()
+
+        def entered(accepted: Any, last: int) -> None:
+            found = ["all", "traps" if accepted.vector.irq is None else "interrupts"]
+            found += ["inside REPEAT"] * bool(state.sr & RA or state.repeat != NOT_REPEATING)
+            found += ["inside DO"] * bool(state.sr & DA)
+            found += ["inside a handler"] * bool(state.ipl)
+            step = self._step(self.last)
+            if step is not None:
+                flow = step.facts.flow
+                away = state.pc != step.next_pc
+                found += ["on a skip taken"] * (flow is Skip and away)
+                found += ["on a branch taken"] * (flow is Branch and away)
+                found += ["on a return"] * (flow is Return)
+                found += ["out of Idle"] * (flow is Sleep)
+                found += ["on a stalled instruction"] * bool(mask & step.facts.source_pointers)
+            following = self._step(state.pc)
+            if following is not None:
+                found += ["in front of a stall"] * bool(state.stall & following.facts.source_pointers)
+            places.update(found)
+            enter(accepted, last)
+
+        sequencer.execute = followed  # type: ignore[method-assign]
+        machine.core.exceptions.enter = entered  # type: ignore[method-assign]
+
+    def _step(self, pc: int) -> Any:
+        try:
+            return self.plain.core.sequencer.fetch(pc) if self.plain.program.executable(pc) else None
+        except (IllegalOpcode, Breakpoint):
+            return None
+
+    def native_now(self) -> set[int]:
+        """What has run natively at least once so far, as keys of `ran`."""
+        python = self.python
+        return {key for key, count in self.ran.items() if count > python[key]}
+
+    def close(self, campaign: str) -> Tally:
+        """Everything this watch has seen; call it when nothing differed."""
+        tally, steps = self.tally, {}
+        tally.programs[campaign] += 1
+        tally.instructions[campaign] += self.instructions
+        tally.entries[campaign] += tally.places["all"]
+        for key, count in self.ran.items():
+            pc = key >> 33
+            if pc not in steps:
+                steps[pc] = self._step(pc)
+            if steps[pc] is None:
+                continue
+            pair, row = self.pair(key), steps[pc].insn.row
+            name = f"{row.id} {row.syntax}"
+            natively = count - self.python[key]
+            tally.rows[name] += count
+            tally.seen.add(pair)
+            if natively > 0:
+                tally.native_rows[name] += natively
+                tally.native.add(pair)
+        return tally
+
+    def pair(self, key: int) -> int:
+        """(program word, modes) for (PC, modes)."""
+        return self.plain.program.word(key >> 33) << 33 | key & (1 << 33) - 1
+
+
+def twins(firmware: Firmware, ipl_slip: int, block_level: int) -> tuple[Machine, Machine]:
+    """A plain machine, and a native one that compiles every address before it runs it."""
+    plain, native = (Machine(engine=engine, ipl_slip=ipl_slip) for engine in ("plain", "jit"))
+    runner = native.runner
+    assert isinstance(runner, JitEngine)
+    runner.threshold, runner.wait, runner.compiler = 1, True, QuickCompiler(block_level)
+    for machine in (plain, native):
+        machine.stop_on_fault = False
+        if firmware.seed & 2:  # otherwise the watchdog runs, and Idle is Python's
+            machine.program.put(machine.chip.config["FWDT"].address, NO_WATCHDOG)
+        load(machine, firmware)
+    return plain, native
+
+
+def advance(one: Machine, other: Machine, cycles: int, tally: Tally, exchange: bool = False) -> None:
+    """Run both and compare everything. Raises Difference."""
+    a, b = one.run(cycles), other.run(cycles)
+    found = difference(one, other)
+    if a != b or found:
+        raise Difference(f"{a} {b} {found}")
+    tally.stops += 1
+    if exchange:
+        first, second = one.snapshot(), other.snapshot()
+        one.restore(second)
+        other.restore(first)
+        tally.exchanges += 1
+
+
+def check_straight(seed: int, shape: Shape | None = None) -> Tally:
+    """A long straight program: once as the engine likes it, once in exact code alone, once more in both."""
+    firmware = straight_firmware(seed, shape)
+    generator = random.Random(seed)
+    plain, native = twins(firmware, seed & 1, 2 if seed % 32 == 5 else 0)
+    watch, runner = Watch(plain, native), native.runner
+    assert isinstance(runner, JitEngine)
+    for exact_only in (False, True):
+        before = watch.native_now()
+        ran = Counter(watch.ran)
+        python = Counter(watch.python)
+        watch.addresses.clear()
+        news, since = 0, plain.cycle
+        while firmware.end not in watch.addresses:
+            if exact_only:
+                for code in runner._codes.values():
+                    ctypes.memset(ctypes.addressof(code.blocks), 0, ctypes.sizeof(code.blocks))
+            advance(plain, native, generator.randrange(1, 1200), watch.tally, generator.random() < 0.1)
+            if len(watch.addresses) > news:
+                news, since = len(watch.addresses), plain.cycle
+            elif plain.cycle - since > LOST:
+                plain.reset("EXTR")
+                native.reset("EXTR")
+                since = plain.cycle
+        if exact_only:
+            again = {key for key in before if watch.ran[key] - ran[key] > watch.python[key] - python[key]}
+            watch.tally.both |= {watch.pair(key) for key in again}
+    return watch.close("straight")
+
+
+def check_wild(seed: int, stops: int = 20) -> Tally:
+    """A short wild program with jumps, traps and mode changes at odd places."""
+    generator = random.Random(seed)
+    plain, native = twins(random_firmware(seed), seed & 1, 2 if seed % 4 == 1 else 0)
+    watch = Watch(plain, native)
+    for _ in range(stops):
+        advance(plain, native, generator.randrange(1, 600), watch.tally, generator.random() < 0.1)
+    return watch.close("wild")
