@@ -15,7 +15,7 @@ import numpy as np
 
 from arena import bodies
 from arena.brain import STRIP_COLUMNS, STRIP_PIXELS
-from arena.metrics import clusters, course, reach_of
+from arena.metrics import clusters, reach_of
 from arena.record import Trial
 from arena.scene import scene_of
 from arena.vision import COLOURS, Eye, sensor_of
@@ -50,7 +50,7 @@ def samples_of(trial: Trial) -> dict[str, Any]:
     """What there is per sample, as arrays over the samples, and the faults so far."""
     radius = trial.about["scene"]["objects"]["radius_cm"]
     columns, objects = trial.columns, trial.objects
-    done = course(trial.times, objects, radius)
+    done = trial.course
     robots = []
     for robot, (seen, strips) in enumerate(_views(trial)):
         keys = ("x", "y", "heading", "leds", "load")

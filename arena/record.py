@@ -9,6 +9,7 @@ import json
 import os
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from arena.metrics import Course, course
 from arena.trial import Rows
 
 LOG: Final = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("text", pa.string())]))
@@ -50,6 +52,11 @@ class Trial:
     def robots(self) -> NDArray[np.float64]:
         """samples x robots x 2, cm."""
         return self._places("r", int(self.about["scene"]["robots"]["count"]))
+
+    @cached_property
+    def course(self) -> Course:
+        """The metrics over time."""
+        return course(self.times, self.objects, self.about["scene"]["objects"]["radius_cm"])
 
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
         if not count:

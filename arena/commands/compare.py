@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from arena.metrics import Course, course, time_to
+from arena.metrics import Course, time_to
 from arena.record import Trial, trials_in
 from arena.statistics import Values, equivalence, signed_rank_p
 
@@ -38,11 +38,7 @@ def parser() -> argparse.ArgumentParser:
 
 def courses(trials: list[Trial]) -> dict[int, tuple[Trial, Course]]:
     """Metrics of each trial by seed."""
-    found = {}
-    for trial in trials:
-        radius = trial.about["scene"]["objects"]["radius_cm"]
-        found[int(trial.about["seed"])] = (trial, course(trial.times, trial.objects, radius))
-    return found
+    return {int(trial.about["seed"]): (trial, trial.course) for trial in trials}
 
 
 def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, Any]:

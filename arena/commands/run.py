@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 from arena.campaign import Done, Plan, note_host_time, open_folder, run_all
 from arena.controllers import CONTROLLERS
 from arena.firmware import image_for
-from arena.metrics import course, time_to
+from arena.metrics import time_to
 from arena.record import Trial, trials_in, write_bytes
 from arena.scene import Scene, load_scene, scripted
 
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
 
 def summary(trial: Trial) -> dict[str, Any]:
     """The numbers of one trial at its end."""
-    done = course(trial.times, trial.objects, trial.about["scene"]["objects"]["radius_cm"])
+    done = trial.course
     return {
         "trial": trial.path.stem,
         "seed": trial.about["seed"],
