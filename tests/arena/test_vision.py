@@ -144,6 +144,24 @@ def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
     assert all(one >= other for one, other in pairwise(shares))
 
 
+@pytest.mark.parametrize(
+    ("pitch_deg", "distance", "low", "high"),
+    [(0.0, 104.0, 1.0, 1.0), (0.0, 125.0, 0.4, 0.65), (-0.38, 134.0, 0.95, 1.0), (-0.38, 140.0, 0.2, 0.5),
+     (1.0, 150.0, 1.0, 1.0), (-1.0, 150.0, 1.0, 1.0)],
+)  # fmt: skip
+def test_pitch_decides_how_far_robots_are_seen(
+    scene: Scene, pitch_deg: float, distance: float, low: float, high: float
+) -> None:
+    """docs/experiment.md §3: two rows of the window to 105 cm, to 135 cm four rows lower, to 150 cm at a degree."""
+    rng = np.random.default_rng(1)
+    pitched = scene.with_values(camera__pitch_deg=pitch_deg)
+    centre = distance + bodies.ROBOT_RADIUS
+    angles = rng.uniform(-1, 1, 200) * math.pi / 180
+    places = [(LENS_X + centre * math.cos(a), 150 + centre * math.sin(a), 0.0) for a in angles]
+    seen = [sensor_of(Eye(pitched, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]
+    assert low <= np.mean(seen) <= high
+
+
 def test_an_object_before_a_robot_wins_the_vote(scene: Scene) -> None:
     """openswarm-original.md §8: red is asked first."""
     poses = Poses([ROBOT_AT, (LENS_X + 40, 152, 0.0)], [(LENS_X + 60, 146)])
