@@ -138,6 +138,7 @@ class Machine:
         wires.trap = self.core.traps.request_flag
         power.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
         power.wires.power = self._power
+        power.wires.restart = self.peripherals.oscillator.wake_tcy
         power.wires.can_wake = lambda: self.peripherals.watchdog.is_enabled
         power.wires.interrupted = lambda: self._interrupt
 

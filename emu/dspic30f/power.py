@@ -8,7 +8,7 @@ from enum import Enum, auto
 from typing import Final
 
 from emu.dspic30f.interrupts import Exceptions
-from emu.dspic30f.state import RUN, State
+from emu.dspic30f.state import RUN, SLEEP, State
 from emu.events import NEVER, Events
 
 STIR: Final = 1_000_000
@@ -32,6 +32,8 @@ class Wires:
     """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
     can_wake: Callable[[], bool] = lambda: False
     """Whether something other than an interrupt or trap can wake a sleeping CPU (the watchdog)."""
+    restart: Callable[[], int] = lambda: 0
+    """Tcy the oscillator needs to start after Sleep."""
     interrupted: Callable[[], bool] = lambda: False
     """Somebody wants the run to end now, even if the CPU sleeps."""
 
@@ -55,8 +57,10 @@ class PowerSaving:
         self._events.kick()
 
     def wake(self) -> None:
-        """Leave Idle or Sleep: execution goes on."""
+        """Leave Idle, or Sleep once the oscillator runs: execution goes on."""
         if self._state.mode != RUN:
+            if self._state.mode == SLEEP:
+                self._state.cycle += self.wires.restart()
             self._state.mode = RUN
             self.wires.power(RUN, self._state.cycle)
             self._events.kick()

@@ -149,13 +149,20 @@ class Oscillator(Peripheral):
         if self._config("FCKSM") & 2:
             self.con["OSWEN"] = 0
             return
-        code = self.con["NOSC"]
+        self.events.set(self._switch, self.now + 1 + self._start_tcy(self.con["NOSC"]))
+
+    def _start_tcy(self, code: int) -> int:
+        """Present Tcy until a source that was off runs: start-up timer of crystals, then the PLL's lock (§3)."""
         wait = 0.0
         if code in (_LP, _EXTERNAL, _PLL):
             wait = _START_PERIODS / (LP_HZ if code == _LP else self.kit.crystal)
         if code == _PLL:
             wait += _LOCK_SECONDS
-        self.events.set(self._switch, self.now + 1 + round(wait * self.fcy()))
+        return round(wait * self.fcy())
+
+    def wake_tcy(self) -> int:
+        """Tcy from the end of Sleep to the first one that counts: the source in force starts anew (§17)."""
+        return self._start_tcy(self.con["COSC"])
 
     def _switched(self, due: int) -> None:
         self._run_from(self.con["NOSC"], due)
