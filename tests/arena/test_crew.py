@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from arena.brain import Brain, Lights, Line, Reading
@@ -63,6 +63,7 @@ def nobody(reason: str, robots: Sequence[int], ether: Ether | None) -> list[Brai
     raise FileNotFoundError(reason)
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])  # a busy machine is no failure
 @given(WORD, st.lists(st.tuples(LENGTH, LENGTH, LENGTH)), st.lists(st.tuples(LENGTH, LENGTH)),
        st.lists(st.builds(Switch, WORD, WORD, WORD, WORD)))  # fmt: skip
 def test_a_quantum_survives_its_message(
