@@ -19,7 +19,7 @@ from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.builder import DEADLINE, INTERPRET, MISS, RETFIE, SERVICE, W_END, Access, Surroundings
+from emu.dspic30f.jit.builder import DEADLINE, HOOK, INTERPRET, MISS, RETFIE, SERVICE, W_END, Access, Surroundings
 from emu.dspic30f.jit.compiler import shared_compiler
 from emu.dspic30f.jit.devices import NativeRegister, native_registers
 from emu.dspic30f.jit.region import discover
@@ -137,7 +137,9 @@ class JitEngine:
         self.counts.runs += 1
         if why == RETFIE:
             sequencer.after_retfie()
-        elif why == INTERPRET and (state.cycle == start or state.pc not in self._hooks):
+        elif (why == INTERPRET and (state.cycle == start or state.pc not in self._hooks)) or (
+            why == HOOK and state.cycle == start  # behind the hook the block did not fit: exact code stops there again
+        ):
             self.counts.interpreted += 1
             self._interpret()
         elif why in (MISS, DEADLINE):
