@@ -108,7 +108,8 @@ def _head(b: Boundary) -> str:
               "p.splim": o["SPLIM"], "p.armed": o["cpu.limit_armed"], "p.stall": o["cpu.stall"],
               "p.inttreg": o["INTTREG"], "p.repeat": o["cpu.repeat"],
               "p.slip": o["cpu.slip_cycle"],
-              "p.mode": o["cpu.mode"], "p.slept": o["cpu.slept"], "p.power": o["wdt.mode"], "p.flash": o["flash"]}
+              "p.mode": o["cpu.mode"], "p.slept": o["cpu.slept"], "p.power": o["wdt.mode"], "p.flash": o["flash"],
+              "p.stopped": o["power.stopped"]}
     return "\n".join([
         "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {", "first:",
         *(_at(name, offset) for name, offset in places.items()),
@@ -144,7 +145,10 @@ due:
   br i1 %early, label %done, label %fire
 resting:
   %idle = icmp eq i16 %mode, {IDLE}
-  br i1 %idle, label %idling, label %python
+  %halted = load i8, ptr %p.stopped
+  %clocked = icmp eq i8 %halted, 0
+  %simple = and i1 %idle, %clocked
+  br i1 %simple, label %idling, label %python
 idling:
   br i1 %early, label %sleep, label %fire
 sleep:
