@@ -18,6 +18,8 @@ CODE, ISR, HANDLER, LEAF = 0x200, 0x1000, 0x1100, 0x1180
 """Program addresses of the body, the interrupt handlers, the trap handler and a callee."""
 BODY_WORDS = 60
 STACK = 0x2000
+TRAP_COUNT = 0x1FF0
+"""Word in RAM: after 32 traps the trap handler begins anew instead of returning, in case PC got lost."""
 
 FLOWS = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RETLW")
 LEFT_OUT = ("RESET", "PWRSAV")
@@ -169,6 +171,8 @@ def random_firmware(seed: int) -> Firmware:
             at = firmware.put(at, words_of("BCLR{.B} f, #bit4", f=DSPIC30F6014A.sfrs["IFS0"].address, b=flag))
         firmware.put(at, words_of("RETFIE"))
     at = firmware.put(HANDLER, words_of("CLR{.B} f", B=0, f=DSPIC30F6014A.sfrs["INTCON1"].address))
+    at = firmware.put(at, words_of("INC{.B} f", B=0, f=TRAP_COUNT) + words_of("BTSS{.B} f, #bit4", f=TRAP_COUNT, b=5))
+    at = firmware.put(at, words_of("RETFIE") + words_of("CLR{.B} f", B=0, f=TRAP_COUNT))
     at = firmware.put(at, literal(STACK, 15))
     firmware.put(at, words_of("GOTO Expr", n=0x100))
     firmware.put(LEAF, words_of("RETURN"))

@@ -9,8 +9,19 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from random_firmware import FLOWS, STACK, Firmware, device_words, interrupt_words, literal, to_sfr, words_of
+from random_firmware import (
+    FLOWS,
+    STACK,
+    TRAP_COUNT,
+    Firmware,
+    device_words,
+    interrupt_words,
+    literal,
+    to_sfr,
+    words_of,
+)
 
+from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa import codec, table
 from emu.dspic30f.isa.fields import Operands
@@ -19,8 +30,6 @@ from emu.dspic30f.isa.row import Row
 BODY, BODY_END = 0x2000, 0xE000
 LEAVES, LEAF_WORDS, LEAF_COUNT = 0x1200, 8, 16
 """Callees: a few instructions and RETURN or RETLW."""
-TRAP_COUNT = 0x1FF0
-"""Word in RAM: address errors in this stretch; 64 of them end it, in case PC got lost."""
 PROGRESS = 0x27FC
 """Word in RAM: where to go on after a reset, the stretch behind the present one."""
 MODE_CORCON = 0x10F7
@@ -287,6 +296,8 @@ class BodyWriter:
             self.point(n)
         for _ in range(self.generator.randrange(1, 5)):
             self.generator.choice((self.branch, self.skip, self.repeat, self.divide, lambda: self.plain(3)))()
+        if not self.shape.calm and self.generator.random() < 0.1:
+            self.end_early()
         self.put([0])  # NOP: no skip reaches over the end
         self.one(PLAIN)
         while facts_of(codec.decode(self.firmware.flash[self.at - 2], 0)).flow is not None:  # type: ignore[arg-type]
@@ -295,6 +306,16 @@ class BodyWriter:
         words = words_of("DO Wn, Expr", s=register, n=n) if by_register else words_of("DO #lit14, Expr", k=count, n=n)
         self.firmware.put(start, words)
         self.leap()
+
+    def end_early(self) -> None:
+        """Have the loop end by EDT, or another number of times."""
+        corcon = DSPIC30F6014A.sfrs["CORCON"]
+        edt = words_of("BSET{.B} f, #bit4", f=corcon.address + 1, b=corcon.fields["EDT"][0] - 8)
+        other = to_sfr("DCOUNT", self.generator.randrange(3)) if self.generator.random() < 0.2 else edt
+        self.put(words_of("BTSC{.B} f, #bit4", f=0x0900 + self.generator.randrange(16), b=0) + edt)
+        if other is not edt:
+            self.put(other)
+            self.good &= ~1
 
     def leap(self) -> None:
         """A computed jump to the next instruction: what is translated together in other modes ends here."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import random
 
-from random_firmware import BY_SYNTAX, CODE, HANDLER, ISR, Firmware, literal, to_sfr, words_of
+from random_firmware import BY_SYNTAX, CODE, HANDLER, ISR, TRAP_COUNT, Firmware, literal, to_sfr, words_of
 from straight_body import (
     BODY,
     LEAF_COUNT,
@@ -16,7 +16,6 @@ from straight_body import (
     LEAVES,
     MODE_CORCON,
     PROGRESS,
-    TRAP_COUNT,
     BodyWriter,
     Shape,
 )

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from random_firmware import Firmware, difference, load, random_firmware
-from straight_body import Shape
+from random_firmware import BODY_WORDS, CODE, Firmware, difference, load, random_firmware
+from straight_body import BODY, Shape
 from straight_firmware import straight_firmware
 
 from emu.dspic30f.faults import Breakpoint, IllegalOpcode
@@ -48,6 +48,8 @@ class Tally:
     stops: int = 0
     exchanges: int = 0
     """Stops at which each machine went on from the other's snapshot."""
+    hooks: int = 0
+    """Arrivals at hooked addresses."""
     entries: Counter[str] = field(default_factory=Counter)
     """Exceptions entered, by campaign."""
     places: Counter[str] = field(default_factory=Counter)
@@ -68,7 +70,8 @@ class Tally:
         """Counts by name."""
         names = ("programs", "instructions", "entries", "places", "rows", "native_rows")
         return {name: dict(getattr(self, name)) for name in names} | {
-            "executed": self.executed(), "stops": self.stops, "exchanges": self.exchanges, "pairs": len(self.seen),
+            "executed": self.executed(), "stops": self.stops, "exchanges": self.exchanges, "hooks": self.hooks,
+            "pairs": len(self.seen),
             "native_pairs": len(self.native), "exact_pairs": len(self.both)}
 
     def add(self, other: Tally) -> None:
@@ -77,6 +80,7 @@ class Tally:
             getattr(self, name).update(getattr(other, name))
         self.stops += other.stops
         self.exchanges += other.exchanges
+        self.hooks += other.hooks
         for name in ("seen", "native", "both"):
             getattr(self, name).update(getattr(other, name))
 
@@ -88,7 +92,7 @@ class Tally:
         """Set everything from `as_json` and `packed`."""
         for name in ("programs", "instructions", "entries", "places", "rows", "native_rows"):
             setattr(self, name, Counter(counts[name]))
-        self.stops, self.exchanges = counts["stops"], counts["exchanges"]
+        self.stops, self.exchanges, self.hooks = counts["stops"], counts["exchanges"], counts.get("hooks", 0)
         for name, data in sets.items():
             words = array("Q")
             words.frombytes(data)
@@ -241,6 +245,25 @@ class Watch:
         return self.plain.program.word(key >> 33) << 33 | key & (1 << 33) - 1
 
 
+class Hooks:
+    """Hooks at some of the addresses in two machines, and the arrivals there."""
+
+    def __init__(self, machines: tuple[Machine, Machine], addresses: range, generator: random.Random) -> None:
+        self._arrivals: tuple[list[Any], list[Any]] = ([], [])
+        for address in generator.sample(addresses, 8):
+            for machine, seen in zip(machines, self._arrivals, strict=True):
+                machine.hook_pc(address, lambda m=machine, s=seen: s.append((m.pc, m.cycle)))  # type: ignore[misc]
+
+    def compare(self, tally: Tally) -> None:
+        """Same addresses in the same cycles since the last time? Raises Difference."""
+        one, other = self._arrivals
+        if one != other:
+            raise Difference(f"arrivals at hooks {one[-3:]} {other[-3:]}")
+        tally.hooks += len(one)
+        one.clear()
+        other.clear()
+
+
 def twins(firmware: Firmware, ipl_slip: int, block_level: int) -> tuple[Machine, Machine]:
     """A plain machine, and a native one that compiles every address before it runs it."""
     plain, native = (Machine(engine=engine, ipl_slip=ipl_slip) for engine in ("plain", "jit"))
@@ -276,6 +299,7 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
     plain, native = twins(firmware, seed & 1, 2 if seed % 32 == 5 else 0)
     watch, runner = Watch(plain, native), native.runner
     assert isinstance(runner, JitEngine)
+    hooks = Hooks((plain, native), range(BODY, firmware.end, 2), generator) if seed % 3 == 0 else None
     for exact_only in (False, True):
         before = watch.native_now()
         ran = Counter(watch.ran)
@@ -287,6 +311,8 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
                 for code in runner._codes.values():
                     ctypes.memset(ctypes.addressof(code.blocks), 0, ctypes.sizeof(code.blocks))
             advance(plain, native, generator.randrange(1, 1200), watch.tally, generator.random() < 0.1)
+            if hooks is not None:
+                hooks.compare(watch.tally)
             if len(watch.addresses) > news:
                 news, since = len(watch.addresses), plain.cycle
             elif plain.cycle - since > LOST:
@@ -300,10 +326,13 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
 
 
 def check_wild(seed: int, stops: int = 20) -> Tally:
-    """A short wild program with jumps, traps and mode changes at odd places."""
+    """A short wild program with jumps, traps and mode changes at odd places; every third one with hooks."""
     generator = random.Random(seed)
     plain, native = twins(random_firmware(seed), seed & 1, 2 if seed % 4 == 1 else 0)
     watch = Watch(plain, native)
+    hooks = Hooks((plain, native), range(CODE, CODE + 2 * BODY_WORDS, 2), generator) if seed % 3 == 0 else None
     for _ in range(stops):
         advance(plain, native, generator.randrange(1, 600), watch.tally, generator.random() < 0.1)
+        if hooks is not None:
+            hooks.compare(watch.tally)
     return watch.close("wild")
