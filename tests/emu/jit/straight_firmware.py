@@ -44,7 +44,7 @@ def straight_firmware(seed: int, shape: Shape | None = None) -> Firmware:
     writer = BodyWriter(firmware, generator, shape, corcon)
     writer.body()
     firmware.end = writer.at
-    resets = not shape.calm and generator.random() < 0.2
+    resets = not shape.calm and generator.random() < 0.6
     firmware.put(firmware.end, words_of("RESET") if resets else words_of("GOTO Expr", n=CODE))
     _handlers(firmware, generator)
     return firmware
