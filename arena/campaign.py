@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
+import os
 import platform
 import sys
 import time
@@ -20,6 +21,7 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 from arena.brain import Brain, ScriptedBrain
@@ -191,6 +193,15 @@ def run_all(
 def _begin(queue: Any) -> None:
     global _queue
     _queue = queue
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A trial can take minutes: end it when the process that wanted it has been killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _work(plan: Plan, number: int, folder: Path) -> Done:

@@ -279,6 +279,34 @@ def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_pa
     assert (tmp_path / "a" / "trial-0001.parquet").stat().st_mtime_ns == stamp
 
 
+def alive(process: str) -> bool:
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] != "Z"  # a container without init may leave the dead unburied
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="lists processes through /proc")
+def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
+    """SIGKILL cannot be handled by the run itself; its workers would compute on for nobody."""
+    command = [sys.executable, "-m", "arena", "run", "clustering", "--brain", "scripted", "--minutes", "600"]
+    process = subprocess.Popen([*command, "--trials", "2", "--jobs", "2", "--out", str(tmp_path)],
+                               stderr=subprocess.DEVNULL)  # fmt: skip
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    workers: list[str] = []
+    end = time.monotonic() + 60
+    while len(workers) < 3 and time.monotonic() < end:  # two, and multiprocessing's resource tracker
+        time.sleep(0.1)
+        workers = children.read_text().split()
+    process.kill()
+    process.wait()
+    assert len(workers) >= 3
+    while any(map(alive, workers)) and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not any(map(alive, workers))
+
+
 def test_a_film_of_one_robot_is_drawn_and_logged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Issue "Must show" 1, the picture: changes of the wheels in time, and only robots there are."""
     run("--trials", 1, "--jobs", 1, "--set", "clock.sample_s=0.1", "--out", tmp_path / "run")

@@ -151,7 +151,7 @@ class JitEngine:
     def natively(self, limit: int) -> bool:
         """As `Engine.natively`."""
         state = self._state
-        if self._dispatch is None or state.edt or not state.cycle:  # native boundaries look at the cycle before, unsigned
+        if self._dispatch is None or state.edt or not state.cycle:  # native boundaries count with the cycle before
             return False
         self._select()
         env = self._env
