@@ -102,7 +102,7 @@ def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brai
     crews: list[Crew] = []
     try:
         for part in parts[1:]:
-            crews.append(Crew(partial(make_brains, plan, seed), part, ether))
+            crews.append(Crew(partial(make_brains, plan, seed), part, ether, len(parts)))
         brains += make_brains(plan, seed, parts[0], ether) if parts else []
         for crew in crews:
             brains += crew.brains

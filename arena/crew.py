@@ -8,11 +8,14 @@ robot knows nothing of where it runs, so the number of processes cannot show in 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import pickle
 import struct
 from collections.abc import Callable, Sequence
+from ctypes import c_uint64
 from multiprocessing.connection import Connection
-from typing import Final
+from multiprocessing.context import SpawnContext
+from typing import Any, Final
 
 from arena.brain import Brain, Lights, Line, Reading
 from arena.ether import Ether, Switch
@@ -23,6 +26,9 @@ THINK, SAMPLE, ANSWER, FAILED = b"t", b"s", b"a", b"f"
 _HEAD: Final = struct.Struct("<qqqq")
 """Tick, numbers of robots, objects and switches."""
 _SWITCH: Final = struct.Struct("<qqqq")
+LOOKS: Final = 3_000
+"""How often a reader looks for the next message before it sleeps until one comes: about 0.15 ms, in which the other
+process has most often come round. To be woken takes as long as a robot needs for its quantum (bench/arena.py)."""
 Make = Callable[[Sequence[int], Ether | None], list[Brain]]
 """make(robots, ether): brains of some robots that share an ether, made in the process in which they live."""
 
@@ -52,15 +58,56 @@ def _unpacked_switches(message: bytes, place: int, count: int) -> list[Switch]:
     return [Switch(*_SWITCH.unpack_from(message, place + i * _SWITCH.size)) for i in range(count)]
 
 
+class Wire:
+    """One end of a pipe between two processes, with counters of what was sent each way in memory they share.
+
+    With `looks` a reader watches the counter that often before it sleeps; right where each process has a CPU.
+    """
+
+    def __init__(self, pipe: Connection, sent: Any, coming: Any, looks: int) -> None:
+        self._pipe: Final = pipe
+        self._sent: Final = sent
+        self._coming: Final = coming
+        self._looks: Final = looks
+        self._heard = 0
+
+    def send(self, message: bytes) -> None:
+        """Raises OSError if the other end is closed."""
+        self._pipe.send_bytes(message)
+        self._sent.value += 1
+
+    def receive(self) -> bytes:
+        """The next message. Raises EOFError if the other end was closed."""
+        self._heard += 1
+        coming, heard = self._coming, self._heard
+        for _ in range(self._looks):
+            if coming.value >= heard:
+                break
+        return self._pipe.recv_bytes()
+
+    def close(self) -> None:
+        """What the other end reads is EOFError."""
+        self._pipe.close()
+
+
+def wire(context: SpawnContext, processes: int) -> tuple[Wire, Wire]:
+    """Both ends of a new wire of a trial that is spread over `processes`."""
+    one, other = context.Pipe()
+    there, back = context.RawValue(c_uint64), context.RawValue(c_uint64)
+    looks = LOOKS if processes <= (os.cpu_count() or 1) else 0
+    return Wire(one, there, back, looks), Wire(other, back, there, looks)
+
+
 class Crew:
     """`robots`, made by `make` in a process of their own; `ether` is that of this process, None for scripted brains.
 
-    `make` is pickled: a function of a module, or a `partial` of one. Raises what it raises there.
+    The trial is spread over `processes`. `make` is pickled: a function of a module, or a `partial` of one. Raises what
+    it raises there.
     """
 
-    def __init__(self, make: Make, robots: Sequence[int], ether: Ether | None) -> None:
+    def __init__(self, make: Make, robots: Sequence[int], ether: Ether | None, processes: int = 2) -> None:
         context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
+        self._wire, other = wire(context, processes)
         self._ether = ether
         self._process = context.Process(target=_serve, args=(other, make, list(robots), ether), daemon=True)
         self._process.start()
@@ -74,7 +121,7 @@ class Crew:
     def begin(self, tick: int, poses: Poses, switches: Sequence[Switch]) -> None:
         """A quantum begins. `switches` are all that were made in the last one, by whomever."""
         self._thinking = True
-        self._pipe.send_bytes(packed(tick, poses, switches))
+        self._wire.send(packed(tick, poses, switches))
 
     def wheels(self, place: int) -> tuple[float, float]:
         """What a robot of the crew answers to the quantum that was begun."""
@@ -91,13 +138,13 @@ class Crew:
     def sample(self, place: int) -> tuple[Reading, list[Line], list[Lights]]:
         """What is to be recorded of a robot; asked for once for all of the crew, when its first robot is."""
         if place == 0:
-            self._pipe.send_bytes(SAMPLE)
+            self._wire.send(SAMPLE)
             self._sampled = pickle.loads(self._answer()[1:])
         return self._sampled[place]
 
     def _answer(self) -> bytes:
         try:
-            message = self._pipe.recv_bytes()
+            message = self._wire.receive()
         except EOFError:
             raise RuntimeError("a process with robots of the trial has died") from None
         if message[:1] == FAILED:
@@ -106,7 +153,7 @@ class Crew:
 
     def close(self) -> None:
         """End the process."""
-        self._pipe.close()
+        self._wire.close()
         self._process.join(5)
         if self._process.is_alive():
             self._process.terminate()
@@ -141,13 +188,13 @@ class RemoteBrain:
         """The crew is closed as a whole."""
 
 
-def _serve(pipe: Connection, make: Make, robots: Sequence[int], ether: Ether | None) -> None:
-    """The other process: answer until the pipe is closed."""
+def _serve(wire: Wire, make: Make, robots: Sequence[int], ether: Ether | None) -> None:
+    """The other process: answer until the wire is closed."""
     try:
         brains = make(robots, ether)
-        pipe.send_bytes(ANSWER)
+        wire.send(ANSWER)
         while True:
-            message = pipe.recv_bytes()
+            message = wire.receive()
             if message[:1] == THINK:
                 tick, poses, switches = unpacked(message)
                 if ether is not None:
@@ -156,11 +203,11 @@ def _serve(pipe: Connection, make: Make, robots: Sequence[int], ether: Ether | N
                 speeds = [speed for brain in brains for speed in brain.think(tick, poses)]
                 own = ether.take() if ether is not None else []
                 body = struct.pack(f"<q{len(speeds)}d", len(own), *speeds) + _packed_switches(own)
-                pipe.send_bytes(ANSWER + body)
+                wire.send(ANSWER + body)
             else:
                 parts = [(brain.reading(), brain.lines(), brain.lights()) for brain in brains]
-                pipe.send_bytes(ANSWER + pickle.dumps(parts))
+                wire.send(ANSWER + pickle.dumps(parts))
     except (EOFError, KeyboardInterrupt, BrokenPipeError):
         return  # the trial is over, or given up
     except Exception as error:
-        pipe.send_bytes(FAILED + pickle.dumps(error))
+        wire.send(FAILED + pickle.dumps(error))

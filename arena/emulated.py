@@ -59,6 +59,11 @@ class EmulatedBrain:
         self._rng = generator(seed, STREAM_SENSORS, robot)
         noise = self._rng.normal(0.0, scene.camera.pixel_noise, _NOISE + 3 * 640)
         self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
+        self._shown: Final = [
+            np.stack([_noisy(np.resize(np.roll(one, phase), len(noise)), self._noise) for one in _COLOURS])
+            for phase in range(3)
+        ]
+        """Values of a pixel of each class with each noise; by where in the noise a red one is, modulo 3."""
         board = partial(Epuck, camera=scene.camera.sensor, selector=selector, seed=seed * 1000 + robot)
         self.machine = emu.load(image, board=board)
         self._board: Epuck = self.machine.board
@@ -96,15 +101,17 @@ class EmulatedBrain:
             return 0.0, 0.0
         self._look_around(tick, poses)
         machine = self.machine
-        while machine.cycle < end:
+        reached = 0
+        while reached < end:
             stop = machine.run_until(min(self._probe_at, end))
             if stop is not None:
                 self._fault = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}: {stop.detail}".rstrip(": ")
                 return 0.0, 0.0
-            if machine.cycle >= self._probe_at:
+            reached = machine.cycle
+            if reached >= self._probe_at:
                 self._probes += 1
                 self._busy += not machine.is_asleep
-                self._probe_at = machine.cycle + 1 + int(self._rng.integers(2 * PROBE_TCY))
+                self._probe_at = reached + 1 + int(self._rng.integers(2 * PROBE_TCY))
         return self._speeds()
 
     def _look_around(self, tick: int, poses: Poses) -> None:
@@ -126,13 +133,15 @@ class EmulatedBrain:
     def _pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
         pose = extrapolated(self._before, self._pose, (cycle - self._start) / self._quantum)
         eye = Eye(self._scene, self._poses, self._robot, pose)
-        colours = _COLOURS[eye.classes(y, columns)]
+        seen = eye.classes(y, columns)
+        first, count = int(self._rng.integers(_NOISE)), len(columns)
         if self._scene.camera.vignetting:
             bright = eye.lens.vignetting(y, columns, self._scene.camera.vignetting)
-            colours = np.rint(colours * bright[:, None]).astype(np.int16)
-        first = int(self._rng.integers(_NOISE))
-        noise = self._noise[first : first + 3 * len(columns)].reshape(-1, 3)
-        pixels: NDArray[np.uint8] = np.minimum(np.maximum(colours + noise, 0), 255).astype(np.uint8)
+            colours = np.rint(_COLOURS[seen] * bright[:, None]).astype(np.int16)
+            pixels = _noisy(colours, self._noise[first : first + 3 * count].reshape(-1, 3))
+        else:
+            shown = self._shown[first % 3][:, first : first + 3 * count].reshape(-1, count, 3)
+            pixels = shown[seen] if isinstance(seen, int) else shown[seen, np.arange(count)]
         if y in _STRIP_ROWS:
             self._strip = columns, pixels
         return pixels
@@ -178,6 +187,12 @@ class EmulatedBrain:
 
     def close(self) -> None:
         """Memory goes with the object."""
+
+
+def _noisy(colours: NDArray[np.int16], noise: NDArray[np.int16]) -> NDArray[np.uint8]:
+    """Red, green and blue as the sensor tells them."""
+    values: NDArray[np.uint8] = np.minimum(np.maximum(colours + noise, 0), 255).astype(np.uint8)
+    return values
 
 
 def volts_after(battery: BatterySetting, seconds: float) -> float:

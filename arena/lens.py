@@ -31,9 +31,11 @@ class Rays:
         self.length2: Final = 1 + left * left
         """Squares of lengths over the floor, per depth."""
         self.length: Final = np.sqrt(self.length2)
+        self.longest: Final = float(self.length.max())
         self.basis: Final = np.stack([np.ones_like(left), left])
         """What is linear in the slope is two numbers times this."""
         self.right_most, self.left_most = float(left.min()), float(left.max())
+        self.lowest, self.highest = float(up.min()), float(up.max())
 
 
 class Lens:

@@ -88,6 +88,6 @@ def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
             if seen[sample] < 0:
                 seen[sample] = sensor_of(eye)
             if is_script:
-                strips[sample] = COLOURS[eye.classes(_MIDDLE_ROW, _STRIP)].tobytes()
+                strips[sample] = COLOURS[np.broadcast_to(eye.classes(_MIDDLE_ROW, _STRIP), len(_STRIP))].tobytes()
         views.append((seen, strips))
     return views

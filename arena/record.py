@@ -11,18 +11,17 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from arena.metrics import Course, course
 from arena.trial import Rows
 
-LOG: Final = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("text", pa.string())]))
-LIGHTS: Final = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("leds", pa.int16())]))
+if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
+    import pyarrow as pa
+
 MANIFEST: Final = "manifest.json"
 
 
@@ -68,6 +67,9 @@ class Trial:
 
 def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
     """Write a trial. Raises RecordError, for example on a full disk; then no file is left."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     arrays = {}
     for name, values in rows.columns.items():
         arrays[name] = pa.array(values, kind_of(name))
@@ -89,13 +91,20 @@ def reason_of(error: OSError) -> str:
 
 def kind_of(column: str) -> pa.DataType:
     """Type of a column: numbers by sample, but what robots said and showed as lists of events."""
-    kinds = {"log": LOG, "lights": LIGHTS, "seen": pa.int16(), "leds": pa.int16(), "strip": pa.binary(),
+    import pyarrow as pa
+
+    said = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("text", pa.string())]))
+    shown = pa.list_(pa.struct([("robot", pa.int16()), ("cycle", pa.int64()), ("leds", pa.int16())]))
+    kinds = {"log": said, "lights": shown, "seen": pa.int16(), "leds": pa.int16(), "strip": pa.binary(),
              "infrared": pa.list_(pa.int16())}  # fmt: skip
     return kinds.get(column.rsplit("_", 1)[-1], pa.float64())
 
 
 def read_trial(path: Path) -> Trial:
     """Read a trial. Raises RecordError for what is none."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     try:
         table = pq.read_table(path)
         about = json.loads((table.schema.metadata or {})[b"arena"])
@@ -107,6 +116,8 @@ def read_trial(path: Path) -> Trial:
 
 def _values(column: Any) -> Any:
     """Numbers as an array, anything else as a list."""
+    import pyarrow as pa
+
     plain = pa.types.is_integer(column.type) or pa.types.is_floating(column.type)
     return column.to_numpy() if plain else column.to_pylist()
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena import bodies
-from arena.lens import lens_of
+from arena.lens import Rays, lens_of
 from arena.scene import Scene
 from arena.world import Poses
 
@@ -31,6 +31,8 @@ classifier, red (80,0,0), green (0,40,0), white (100,80,80) (openswarm-original.
 
 _NEAREST: Final = 0.05
 """Depth of what touches the lens."""
+_SURE: Final = 1e-9
+"""More than rounding can make of a length or a slope."""
 Disc = tuple[float, float, float, float, int]
 """Ahead and left of the camera, radius, height, class."""
 
@@ -122,15 +124,23 @@ class Eye:
             if disc[1] - 1.1 * disc[2] <= left * disc[0] and disc[1] + 1.1 * disc[2] >= right * disc[0]
         ]
 
-    def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Classes of the pixels of one row in some columns."""
+    def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp] | int:
+        """Classes of the pixels of one row in some columns; one number if all are the same."""
         rays = self.lens.row(v, columns)
+        seen = self._background(rays)
+        discs = [disc for disc in self.within(rays.right_most, rays.left_most) if _matters(disc, rays)]
+        if len(discs) == 1 and _is_plain(discs[0], rays, self._range):
+            ahead, left, radius, _, kind = discs[0]
+            b = ahead + rays.left * left
+            return np.where(b * b > rays.length2 * (ahead * ahead + left * left - radius * radius), kind, seen)
+        return self._with(discs, rays, seen) if discs else seen
+
+    def _with(self, discs: list[Disc], rays: Rays, background: NDArray[np.intp] | int) -> NDArray[np.intp]:
+        """Classes with discs in any order at any distance."""
         slopes, rise, a = rays.left, rays.up, rays.length2
-        near = np.minimum(self._wall_closeness(rays.basis), 1 / _NEAREST)
-        seen = np.where(rise < -bodies.CAMERA_HEIGHT * near, FLOOR, WALL)
-        seen[rise > (bodies.WALL_HEIGHT - bodies.CAMERA_HEIGHT) * near] = ABOVE
+        seen = np.full(len(slopes), background) if isinstance(background, int) else background
         blocked: Any = math.inf
-        for ahead, left, radius, height, kind in self.within(rays.right_most, rays.left_most):
+        for ahead, left, radius, height, kind in discs:
             b = ahead + slopes * left
             root = b * b - a * (ahead * ahead + left * left - radius * radius)
             meets = root > 0
@@ -141,21 +151,55 @@ class Eye:
             blocked = np.where(shows, depth, blocked)
         return seen
 
-    def _wall_closeness(self, basis: NDArray[np.float64]) -> NDArray[np.float64]:
-        """1 / depth at which rays meet a wall: of the four, that with the largest; it is linear in the slope."""
+    def _background(self, rays: Rays) -> NDArray[np.intp] | int:
+        """Classes without discs. Most rows show nothing but wall, or nothing but floor: two rays then tell it."""
+        walls = self._walls()
+        right = [across + along * rays.right_most for across, along in walls]
+        left = [across + along * rays.left_most for across, along in walls]
+        least = min(max(map(min, right, left)), 1 / _NEAREST)  # closeness to a wall is convex in the slope
+        most = min(max(*right, *left), 1 / _NEAREST)
+        over = bodies.WALL_HEIGHT - bodies.CAMERA_HEIGHT
+        if rays.lowest > -bodies.CAMERA_HEIGHT * least + _SURE and rays.highest < over * least - _SURE:
+            return WALL
+        if rays.highest < -bodies.CAMERA_HEIGHT * most - _SURE:
+            return FLOOR
+        near = np.minimum((np.array(walls) @ rays.basis).max(axis=0), 1 / _NEAREST)
+        seen = np.where(rays.up < -bodies.CAMERA_HEIGHT * near, FLOOR, WALL)
+        seen[rays.up > over * near] = ABOVE
+        return seen
+
+    def _walls(self) -> list[tuple[float, float]]:
+        """1 / depth at which rays meet each wall, as (a, b) in a + b slope. The largest of the four counts."""
         cos, sin = self._cos, self._sin
         right, top = 1 / max(self._width - self._x, _NEAREST), 1 / max(self._height - self._y, _NEAREST)
         lower, bottom = -1 / max(self._x, _NEAREST), -1 / max(self._y, _NEAREST)
-        walls = np.array(
-            [
-                (cos * right, -sin * right),
-                (cos * lower, -sin * lower),
-                (sin * top, cos * top),
-                (sin * bottom, cos * bottom),
-            ]
-        )
-        closeness: NDArray[np.float64] = (walls @ basis).max(axis=0)
-        return closeness
+        return [
+            (cos * right, -sin * right),
+            (cos * lower, -sin * lower),
+            (sin * top, cos * top),
+            (sin * bottom, cos * bottom),
+        ]
+
+
+def _heights(disc: Disc, rays: Rays) -> tuple[float, float]:
+    """Between which heights all rays are where they may meet a disc."""
+    near, far = max(disc[0] - disc[2], _NEAREST), max(disc[0] + disc[2], _NEAREST)
+    low, high = min(rays.lowest * near, rays.lowest * far), max(rays.highest * near, rays.highest * far)
+    return bodies.CAMERA_HEIGHT + low, bodies.CAMERA_HEIGHT + high
+
+
+def _matters(disc: Disc, rays: Rays) -> bool:
+    """False if all rays pass over a disc, or all meet the floor before it."""
+    low, high = _heights(disc, rays)
+    return low <= disc[3] + _SURE and high >= -_SURE
+
+
+def _is_plain(disc: Disc, rays: Rays, sight: float) -> bool:
+    """Whether every ray that is not led past a disc's side shows it: ahead, within sight, neither over nor under it."""
+    ahead, _, radius, height, _ = disc
+    low, high = _heights(disc, rays)
+    seen = ahead > radius + _NEAREST and (ahead + radius) * rays.longest < sight - _SURE
+    return seen and low > _SURE and high < height - _SURE
 
 
 # -- the sensor of the clustering firmware (openswarm-original.md §8, revision A) ------------------------------------

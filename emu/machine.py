@@ -163,7 +163,7 @@ class Machine:
             return None
         state, sequencer, engine, hooks = self.state, self.core.sequencer, self.runner, self._pc_hooks
         stop = None
-        while stop is None and state.cycle < cycle:
+        while stop is None and u64[now] < cycle:
             try:
                 if engine.natively(cycle):
                     pass
@@ -248,12 +248,13 @@ class Machine:
         What is due in the very cycle a sleeping CPU has got to is left for the next run: cutting a run in two must
         not show, not even in the cycle in which nothing is left to happen.
         """
-        cycle = self.state.cycle
+        u64, now, _, mode = self._clock
+        cycle = u64[now]
         try:
-            self.events.arrive(cycle if self.state.mode == RUN else cycle - 1)
-            self.events.now = cycle
+            self.events.arrive(cycle if self.record.u16[mode] == RUN else cycle - 1)
         except DeviceReset as reset:
             return self._reset_by(reset)
+        u64[self.events.now_index] = cycle
         return None
 
     def interrupt(self) -> None:

@@ -144,9 +144,10 @@ class Pins:
         if not count:
             return
         self._u64[self._count] = 0
-        entries = self.ring[:count].tolist()
+        ring = self.ring
+        entries = ring[:count].tolist()
         for place in range(count):
-            self.ring[place] = 0
+            ring[place] = 0
         for entry in entries:
             self._tell_lazy(entry >> 24, entry >> 16 & 0xFF, entry & 0xFFFF)
 

@@ -143,7 +143,7 @@ class Motors:
 
     def steps(self) -> tuple[int, int]:
         """Steps of both made so far (left, right): what `Stepper.steps` of each says, in one look."""
-        left, right = self.left, self.right
+        left = self.left
         left.pins.flush()
-        now = left.now
-        return left.settled_steps(now), right.settled_steps(now)
+        now = left.events.now
+        return left.settled_steps(now), self.right.settled_steps(now)

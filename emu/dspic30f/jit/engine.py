@@ -40,6 +40,9 @@ NATIVE_CYCLES: Final = 30_000_000
 MODES: Final = ("CORCON", "MODCON", "XBREV", "INTCON1", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")
 """Registers that decide which code is valid: Python writes them, and chooses anew."""
 
+SELECTORS: Final = ("CORCON", "MODCON", "XBREV", "INTCON1", "SR", "cpu.limit_armed", "cpu.initialised")
+"""What decides which tables of code are current (and, while SR.DA is set, the DO loop)."""
+
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
 
@@ -108,7 +111,10 @@ class JitEngine:
         self._native: Callable[..., Any] = lambda record, env: self._dispatch(record, env)
         self._interpret: Callable[[], None] = core.sequencer.execute
         self._run_cold: Callable[[int], None] = cold.run
-        self._at: Final = {name: core.state.at[name] for name in ("CORCON", "MODCON", "XBREV", "INTCON1", "SR")}
+        self._u64: Final = core.record.u64
+        self._now: Final = core.state.at["cpu.cycle"]
+        self._edt: Final = core.state.at["cpu.edt"]
+        self._at: Final = tuple(core.state.at[name] for name in SELECTORS)
         self._offset: Final = offsets(core)
         self.counts: Final = Counts()
         self.seconds: dict[str, float] | None = None
@@ -149,37 +155,37 @@ class JitEngine:
                 self._miss(limit)
 
     def natively(self, limit: int) -> bool:
-        """As `Engine.natively`."""
-        state = self._state
-        if self._dispatch is None or state.edt or not state.cycle:  # native boundaries count with the cycle before
+        """As `Engine.natively`. Many runs are short: what is looked at is read from the record directly."""
+        u64, now = self._u64, self._now
+        start = before = u64[now]
+        if self._dispatch is None or not start or self._u16[self._edt]:  # native boundaries count with the cycle before
             return False
         self._select()
-        env = self._env
-        env[LIMIT] = min(limit, state.cycle + NATIVE_CYCLES)
+        env, native, record, surroundings = self._env, self._native, self._core.record.address, self._env_address
+        env[LIMIT] = min(limit, start + NATIVE_CYCLES)
         env[BOUNDARY] = 1
-        start = before = state.cycle
-        why = self._native(self._core.record.address, self._env_address)
-        while before != state.cycle < limit:
-            before = state.cycle
+        why = native(record, surroundings)
+        while before != (cycle := u64[now]) < limit:
+            before = cycle
             if why == SERVICE:  # most often some device's event is due
-                self._core.events.fire_until(before if state.mode != RUN else before - 1)
-            elif why == INTERPRET and self._refresh(state.pc, before):
+                self._core.events.fire_until(cycle if self._state.mode != RUN else cycle - 1)
+            elif why == INTERPRET and self._refresh(self._state.pc, cycle):
                 env[BOUNDARY] = 0  # that of this instruction has been done
             else:
                 break
-            why = self._native(self._core.record.address, self._env_address)
+            why = native(record, surroundings)
             env[BOUNDARY] = 1
             self.counts.runs += 1
         env[BOUNDARY] = 0
         self.counts.runs += 1
-        if why == INTERPRET and state.pc not in self._hooks:
+        if why == INTERPRET and self._state.pc not in self._hooks:
             self.counts.interpreted += 1
             self._interpret()
             return True
         if why == RETFIE:
             self._core.sequencer.after_retfie()
             return True
-        return state.cycle >= limit or (why != SERVICE and state.cycle != start)
+        return cycle >= limit or (why != SERVICE and cycle != start)
 
     def _refresh(self, pc: int, cycle: int) -> bool:
         """Have a device bring up to date what native code reads from the record, if that is what the instruction at
@@ -258,17 +264,17 @@ class JitEngine:
     # -- modes ------------------------------------------------------------------------------------------------------
     def _select(self) -> None:
         """Make the tables of the present processor modes current."""
-        u16, at, state = self._u16, self._at, self._state
-        loop = (state.pair("DOSTARTL"), state.pair("DOENDL")) if u16[at["SR"]] & DA else None
-        key = (u16[at["CORCON"]] & ~0x0F08, u16[at["MODCON"]], u16[at["XBREV"]] & 0x8000,
-               u16[at["INTCON1"]] & 0x700, state.limit_armed, state.initialised, loop)
+        u16, state = self._u16, self._state
+        corcon, modcon, xbrev, intcon1, sr, limit_armed, initialised = self._at
+        loop = (state.pair("DOSTARTL"), state.pair("DOENDL")) if u16[sr] & DA else None
+        key = (u16[corcon] & ~0x0F08, u16[modcon], u16[xbrev] & 0x8000,
+               u16[intcon1] & 0x700, u16[limit_armed], u16[initialised], loop)
         if key == self._key:
             return
         self._key = key
         code = self._codes.get(key)
         if code is None:
-            context = context_of(u16[at["CORCON"]], u16[at["MODCON"]], u16[at["XBREV"]] >> 15,
-                                 u16[at["INTCON1"]] & 0x700)
+            context = context_of(u16[corcon], u16[modcon], u16[xbrev] >> 15, u16[intcon1] & 0x700)
             code = self._codes[key] = self._new_code(context, loop)
         self._code = code
         self._env[BLOCKS] = ctypes.addressof(code.blocks)
