@@ -19,12 +19,12 @@ from typing import Any, Final
 
 from arena.brain import Brain, Lights, Line, Reading
 from arena.ether import Ether, Switch
-from arena.world import Poses
+from arena.world import Poses, Table
 
 THINK, SAMPLE, ANSWER, FAILED = b"t", b"s", b"a", b"f"
 """First byte of a message: a quantum begins; what is to be recorded is asked for; what a crew answers."""
-_HEAD: Final = struct.Struct("<qqqq")
-"""Tick, numbers of robots, objects and switches."""
+_HEAD: Final = struct.Struct("<qqqqq")
+"""Tick, numbers of robots and objects, bytes of their table, number of switches."""
 _SWITCH: Final = struct.Struct("<qqqq")
 LOOKS: Final = 3_000
 """How often a reader looks for the next message before it sleeps until one comes: about 0.15 ms, in which the other
@@ -35,19 +35,27 @@ Make = Callable[[Sequence[int], Ether | None], list[Brain]]
 
 def packed(tick: int, poses: Poses, switches: Sequence[Switch]) -> bytes:
     """The message that begins a quantum."""
-    numbers = [value for place in (*poses.robots, *poses.objects) for value in place]
-    head = _HEAD.pack(tick, len(poses.robots), len(poses.objects), len(switches))
-    return THINK + head + struct.pack(f"<{len(numbers)}d", *numbers) + _packed_switches(switches)
+    values, robots, objects = poses.table or _table_of(poses)
+    head = _HEAD.pack(tick, len(robots), len(objects), len(values), len(switches))
+    places = struct.pack(f"<{len(robots) + len(objects)}q", *robots, *objects)
+    return THINK + head + places + values + _packed_switches(switches)
 
 
 def unpacked(message: bytes) -> tuple[int, Poses, list[Switch]]:
     """The inverse of `packed`."""
-    tick, robots, objects, switches = _HEAD.unpack_from(message, 1)
-    place = 1 + _HEAD.size
-    values = struct.unpack_from(f"<{3 * robots + 2 * objects}d", message, place)
-    places = [(values[i], values[i + 1], values[i + 2]) for i in range(0, 3 * robots, 3)]
-    discs = [(values[i], values[i + 1]) for i in range(3 * robots, len(values), 2)]
-    return tick, Poses(places, discs), _unpacked_switches(message, place + 8 * len(values), switches)
+    tick, robots, objects, size, switches = _HEAD.unpack_from(message, 1)
+    start = 1 + _HEAD.size
+    places = struct.unpack_from(f"<{robots + objects}q", message, start)
+    start += 8 * len(places)
+    table = Table(message[start : start + size], places[:robots], places[robots:])
+    return tick, Poses.of(table), _unpacked_switches(message, start + size, switches)
+
+
+def _table_of(poses: Poses) -> Table:
+    numbers = [value for place in (*poses.robots, *poses.objects) for value in place]
+    end = 24 * len(poses.robots)
+    objects = range(end, end + 16 * len(poses.objects), 16)
+    return Table(struct.pack(f"{len(numbers)}d", *numbers), tuple(range(0, end, 24)), tuple(objects))
 
 
 def _packed_switches(switches: Sequence[Switch]) -> bytes:

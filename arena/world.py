@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pymunk
@@ -41,22 +41,40 @@ def generator(seed: int, stream: int, robot: int = 0) -> np.random.Generator:
 class Poses:
     """Where everything is, never changed. Robots: x, y, heading; objects: x, y. cm and rad."""
 
-    __slots__ = ("_objects", "robots")
+    __slots__ = ("_objects", "robots", "table")
 
     def __init__(
         self,
         robots: list[tuple[float, float, float]],
-        objects: list[tuple[float, float]] | Callable[[], list[tuple[float, float]]],
+        objects: list[tuple[float, float]] | None,
+        table: Table | None = None,
     ) -> None:
         self.robots: Final = robots
         self._objects = objects
+        self.table: Final = table
+        """The same as bytes, if that is where they come from: the cheapest way to another process."""
+
+    @classmethod
+    def of(cls, table: Table) -> Poses:
+        """Objects are read when first asked for: most quanta end before anybody looks."""
+        return cls([_POSE.unpack_from(table.values, place) for place in table.robots], None, table)
 
     @property
     def objects(self) -> list[tuple[float, float]]:
-        """Made when first asked for: most quanta end before anybody looks."""
-        if not isinstance(self._objects, list):
-            self._objects = self._objects()
+        """Places of the objects."""
+        if self._objects is None:
+            assert self.table is not None
+            values = self.table.values
+            self._objects = [_PLACE.unpack_from(values, place) for place in self.table.objects]
         return self._objects
+
+
+class Table(NamedTuple):
+    """Doubles of any bodies as bytes: at which offsets those of robots (x, y, heading) and objects (x, y) are."""
+
+    values: bytes
+    robots: tuple[int, ...]
+    objects: tuple[int, ...]
 
 
 class World:
@@ -185,22 +203,22 @@ class World:
             left, right = rng.uniform(1 - share, 1 + share, 2).tolist()
             self._noise[index] = left, right
 
-    def _find_places(self) -> tuple[list[int], list[int]]:
+    def _find_places(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Where the poses of robots and objects are in the bytes of pymunk's list of all bodies, which stays as it is
         while none is removed."""
         self._buffer.clear()
         pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._buffer)
         found = np.frombuffer(self._buffer.int_buf(), dtype=np.int64).tolist()
-        robots, objects = ([_POSE.size * found.index(body.id) for body in some] for some in (self.robots, self.objects))
+        robots, objects = (
+            tuple(_POSE.size * found.index(body.id) for body in some) for some in (self.robots, self.objects)
+        )
         return robots, objects
 
     def _read(self) -> Poses:
         """All poses in one call: asking body by body costs more than the physics."""
         self._buffer.clear()
         pymunk.batch.get_space_bodies(self.space, _FIELDS, self._buffer)
-        values = bytes(self._buffer.float_buf())
-        return Poses([_POSE.unpack_from(values, place) for place in self._robot_places],
-                     lambda: [_PLACE.unpack_from(values, place) for place in self._object_places])  # fmt: skip
+        return Poses.of(Table(bytes(self._buffer.float_buf()), self._robot_places, self._object_places))
 
     @property
     def seconds(self) -> float:

@@ -32,6 +32,8 @@ NO_WATCHDOG = 0x7FFF
 """FWDT with FWDTEN clear (dspic30f6014a.md §17)."""
 LOST = 6000
 """Tcy without a new address after which a straight program is sent on by a reset pin."""
+FRUITLESS = 30
+"""Resets in a row without a new address after which a pass is given up: its data may lead it round for ever."""
 
 
 class Difference(Exception):
@@ -305,8 +307,8 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
         ran = Counter(watch.ran)
         python = Counter(watch.python)
         watch.addresses.clear()
-        news, since = 0, plain.cycle
-        while firmware.end not in watch.addresses:
+        news, since, resets = 0, plain.cycle, 0
+        while firmware.end not in watch.addresses and resets < FRUITLESS:
             if exact_only:
                 for code in runner._codes.values():
                     ctypes.memset(ctypes.addressof(code.blocks), 0, ctypes.sizeof(code.blocks))
@@ -314,11 +316,11 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
             if hooks is not None:
                 hooks.compare(watch.tally)
             if len(watch.addresses) > news:
-                news, since = len(watch.addresses), plain.cycle
+                news, since, resets = len(watch.addresses), plain.cycle, 0
             elif plain.cycle - since > LOST:
                 plain.reset("EXTR")
                 native.reset("EXTR")
-                since = plain.cycle
+                since, resets = plain.cycle, resets + 1
         if exact_only:
             again = {key for key in before if watch.ran[key] - ran[key] > watch.python[key] - python[key]}
             watch.tally.both |= {watch.pair(key) for key in again}
