@@ -1,4 +1,4 @@
-"""Options of the emulator's tests: another folder of vectors, a single engine."""
+"""Where the recorded vectors are."""
 
 from __future__ import annotations
 
@@ -7,11 +7,6 @@ from pathlib import Path
 import pytest
 
 VECTORS = Path(__file__).resolve().parents[3] / "shared" / "vectors"
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--vectors", default=None, help="folder with encodings.csv and semantics*.jsonl.gz to run")
-    parser.addoption("--engine", default=None, help="run vectors with this engine only")
 
 
 @pytest.fixture(scope="session")

@@ -168,7 +168,9 @@ def _examine(work: tuple[int, Path | None]) -> Verdict:
 
 def main() -> int:
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__, epilog="example: csmith_campaign.py --count 1000 --jobs 2")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example: csmith_campaign.py --count 1000 --jobs 2")  # fmt: skip
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1, help="number of the first program")
     parser.add_argument("--jobs", type=int, default=2)

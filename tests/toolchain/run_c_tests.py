@@ -245,7 +245,9 @@ def _judge(work: tuple[Path, str, int]) -> Verdict:
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(
-        description=__doc__, epilog="example: run_c_tests.py gcc.c-torture/execute --jobs 2 -Os"
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="example: run_c_tests.py gcc.c-torture/execute --jobs 2 -Os",
     )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--jobs", type=int, default=2)

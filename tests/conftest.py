@@ -1,0 +1,30 @@
+"""Options of all tests: another folder of vectors, a single engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from emu import machine
+from emu.dspic30f.engines import NAMES, make_engine
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--vectors", default=None, help="folder with encodings.csv and semantics*.jsonl.gz to run")
+    parser.addoption("--engine", default=None, help="run what names no engine with this one only")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def default_engine(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What machines of this process get that are not given an engine by name."""
+    named = request.config.getoption("--engine")
+    with pytest.MonkeyPatch.context() as patch:
+        if named in NAMES:  # the vectors know one more
+
+            def make(name: str, *arguments: Any) -> Any:
+                return make_engine(named if name == "auto" else name, *arguments)
+
+            patch.setattr(machine, "make_engine", make)
+        yield
