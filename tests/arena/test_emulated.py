@@ -16,7 +16,7 @@ from arena.emulated import EmulatedBrain
 from arena.record import read_trial
 from arena.scene import FCY, Scene, load_scene
 from arena.trial import run_trial
-from arena.vision import WINDOW_ROWS
+from arena.vision import COLOURS, WINDOW_ROWS, Eye
 from arena.world import World
 from emu.boards.epuck.board import Epuck
 
@@ -48,6 +48,25 @@ def test_a_robot_turns_as_its_controller_says_for_what_its_camera_sees(
         half = math.asin(5 / (240 - 200 - 3.3)) if place == (240.0, 150.0) else 0.0
         assert red.sum() == pytest.approx(2 * 602 * math.tan(half) / 8, abs=1)
         assert red.tolist() == sorted(red.tolist()[:10]) + sorted(red.tolist()[10:], reverse=True)
+
+
+@pytest.mark.parametrize("vignetting", [0.0, 0.3])
+def test_pixels_are_the_colours_of_what_is_seen_with_noise(
+    clustering_image: Path, alone: Scene, vignetting: float
+) -> None:
+    """docs/experiment.md §2: normal noise of sd 3 in each channel, in rows of one class and of several."""
+    scene = alone.with_values(objects__count=1, camera__vignetting=vignetting)
+    brain = EmulatedBrain(scene, 1, 0, clustering_image)
+    poses = World.of(scene, 1, [(200, 150, 0.0)], [(240.0, 150.0)]).poses
+    brain.think(1000, poses)
+    columns = np.arange(0, 640, 3)
+    left_over = []
+    for y in (0, 100, 240, 300, 470):
+        classes = [Eye(scene, poses, 0).column(int(u), (y,))[0] for u in columns]
+        bright = Eye(scene, poses, 0).lens.vignetting(y, columns, vignetting)
+        left_over.append(brain._pixels(y, columns, 0) - COLOURS[classes] * bright[:, None])
+    assert np.abs(np.mean(left_over, axis=(0, 1))) == pytest.approx(0, abs=0.5)
+    assert np.std(left_over, axis=(0, 1)) == pytest.approx(3.0, abs=0.3)
 
 
 def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering_image: Path, alone: Scene) -> None:
