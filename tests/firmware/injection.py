@@ -61,8 +61,8 @@ class Seen:
         counts = ", ".join(f"{count} {name}" for name, count in sorted(self.interrupts.items()))
         return (
             f"{self.boundaries} boundaries ({counts}); registers compared {self.compared} times; stepper at most"
-            f" {self.stepper_late} Tcy late behind IPL 6, {self.behind_dsp} behind DSP state as well; {self.stack_left} of"
-            " 128 bytes of stack left"
+            f" {self.stepper_late} Tcy late behind IPL 6, {self.behind_dsp} behind DSP state as well;"
+            f" {self.stack_left} of 128 bytes of stack left"
         )
 
 
