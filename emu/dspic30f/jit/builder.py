@@ -67,6 +67,13 @@ class Surroundings:
     do_end: int = -1
     """The DO loop that is active: its first and last instruction; -1: none."""
 
+    def accumulator_at(self, address: int) -> tuple[int, int] | None:
+        """Accumulator of which the word at `address` is a part, and from which bit on; None elsewhere."""
+        for i, low in enumerate((self.offset["ACCAL"], self.offset["ACCBL"])):
+            if low <= address < low + 6:
+                return i, 8 * (address - low)
+        return None
+
 
 @dataclass
 class Pending:
@@ -309,6 +316,10 @@ class LlvmBuilder:
                 return shown if size == 2 else (shown >> 8 if ea & 1 else shown & 0xFF)
         if word_address == self.around.offset["RCOUNT"] and self.repeating is not None and size == 2:
             return self.repeating
+        place = self.around.accumulator_at(word_address)
+        if place is not None and self.repeating is None:  # block code keeps accumulators out of the record
+            part = self.acc(place[0]) >> place[1] & 0xFFFF
+            return part if size == 2 else (part >> 8 if ea & 1 else part & 0xFF)
         if word_address < RAM and (self.around.reads.get(word_address) != "plain" or self.repeating is not None):
             raise NeedsInterpreter
         if ea >= DATA_BYTES:
@@ -349,6 +360,10 @@ class LlvmBuilder:
         how, mask = self.around.writes.get(word_address, ("slow", 0))
         if how == "slow" or self.repeating is not None:
             raise NeedsInterpreter
+        place = self.around.accumulator_at(word_address)
+        if place is not None:
+            self._store_accumulator(*place, placed, mask & lanes)
+            return
         if how == "sr":
             old = self._sr_word()
             nstdis = self.e.load(pointer(self.e, self.around.offset["INTCON1"]), 16) & NSTDIS
@@ -363,6 +378,11 @@ class LlvmBuilder:
         if how in ("irq", "flags"):
             self.pending.stop = True
         self.pending.stores.append(lambda: self._store_masked(word_address, placed, mask & lanes))
+
+    def _store_accumulator(self, i: int, shift: int, v: Number, free: int) -> None:
+        """A data write to 16 bits of accumulator `i`, or to the 8 that are kept of the upper word (isa.md §2.1)."""
+        kept = self.acc(i) & (0xFF_FFFF_FFFF ^ (free << shift))
+        self.pending.acc[i] = ((kept | ((v & free) << shift)) ^ (1 << 39)) - (1 << 39)
 
     def _store_masked(self, address: int, v: Number, free: int) -> None:
         place = pointer(self.e, address)

@@ -178,3 +178,35 @@ def test_vectors_are_not_executed_as_instructions() -> None:
         machine.run(50)
     assert plain.pc == 0x1102
     assert not difference(plain, native)
+
+
+def test_accumulators_are_one_thing_by_name_and_by_address() -> None:
+    """isa.md §2.1: DSP instructions and data accesses in one block, words and bytes, of all six words."""
+    firmware = Firmware(0)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    at = 0x100
+    for register in range(16):
+        at = firmware.put(at, literal(0x900 if register == 15 else 0x1234 * register & 0xFFFF, register))
+    loop = [
+        0xCA0001,  # LAC W1, A
+        0xEE2022,  # NEG ACCAL
+        0xEE4024,  # NEG.B ACCAH, WREG
+        0xCB0000,  # ADD A
+        0x800134,  # MOV ACCAU, W4
+        0xEC602C,  # INC.B ACCBU
+        0x880147,  # MOV W7, ACCBL
+        0xCB8000,  # ADD B
+        0x880125,  # MOV W5, ACCAH
+        0x800156,  # MOV ACCBH, W6
+        0xEC602B,  # INC.B ACCBH + 1
+        0xE80081,  # INC W1, W1
+        0xE88285,  # INC2 W5, W5
+    ]
+    firmware.put(at, loop + words_of("BRA Expr", n=-len(loop) - 1))
+    plain, native = pair(firmware)
+    for length in (*range(1, 40), 997, 5003):
+        assert plain.run(length) == native.run(length)
+        assert not difference(plain, native)
+    runner = native.runner
+    assert isinstance(runner, JitEngine)
+    assert runner.counts.interpreted < 10
