@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 from . import layout
 from .liveness import bits, live_out
 from .mir import CC_INVERSE, MI, Imm, MBlock, Mem, MFunction
@@ -252,10 +254,19 @@ def _flags_needed(b: MBlock, skip_at: int) -> bool:
 
 
 def tail_calls(m: MFunction) -> None:
-    """CALL, epilogue, RETURN -> epilogue, BRA: the callee returns to our caller. `MI.tail` says when that is sound."""
+    """CALL, epilogue, RETURN -> epilogue, BRA: the callee returns to our caller. `MI.tail` says when that is sound.
+
+    A branch to a bare RETURN counts as one.
+    """
     if m.interrupt:
         return
+    bare = {b.name: b.insts[0] for b in m.blocks if len(b.insts) == 1 and b.insts[0].op == "ret"}
     for b in m.blocks:
+        if len(b.insts) > 1 and b.insts[-1].op == "jump" and b.insts[-2].op == "call":
+            end = str(b.insts[-1].args[0])
+            if end in bare:
+                b.insts[-1] = copy.copy(bare[end])
+                b.succs = []
         if not b.insts or b.insts[-1].op != "ret" or b.insts[-1].text:
             continue
         at = len(b.insts) - 2
