@@ -110,7 +110,7 @@ uint16 Sys_Start_ProcessWith(const sys_process_config *config);
 /* MTH | own PID: never returns | ~450 + 25 m + 30 per subscription of its own | 42 | PROCESS.  Also ends its
  * subscriptions, its wait and its uncleared wait result. */
 bool Sys_Kill_Process(uint16 pid);
-/* T | no | 54 to a yielded thread, 65 to a preempted one | 24 | CONTEXT.  Hands the rest of the slice on. */
+/* T | no | 54 to a yielded thread, 65 to a preempted one | 20 | CONTEXT.  Hands the rest of the slice on. */
 void Sys_Yield(void);
 /* T | yes, ms rounded up to the next 1 ms tick | ~200 + 20 n | 42 | CONTEXT.  0 ms = Sys_Yield. */
 void Sys_Sleep(uint16 ms);
