@@ -41,6 +41,8 @@ class Bus:
         self.on_write: Final[list[WriteHook | None]] = [None] * words
         self.modelled: Final = [False] * words
         """Set for registers a device or the CPU stands behind; others are reported once when touched."""
+        self.off: Final[set[int]] = set()
+        """Registers of modules that are switched off: they read 0 and ignore writes."""
         self.watched: Final[set[int]] = set()
         """Registers every access of which somebody outside wants to see."""
         self.report: Callable[[int, bool], None] | None = None

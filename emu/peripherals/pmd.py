@@ -98,10 +98,12 @@ class ModuleDisable(Peripheral):
         bus.compute[word] = _zero
         bus.on_read[word] = None
         bus.on_write[word] = None
+        bus.off.add(word)
 
     def _mend(self, word: int) -> None:
         access = self._off.pop(word)
         bus = self.bus
+        bus.off.discard(word)
         bus.writable[word], bus.clear_only[word] = access.writable, access.clear_only
         bus.compute[word], bus.on_read[word], bus.on_write[word] = access.compute, access.on_read, access.on_write
 

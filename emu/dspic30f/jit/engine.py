@@ -40,7 +40,9 @@ NATIVE_CYCLES: Final = 30_000_000
 MODES: Final = ("CORCON", "MODCON", "XBREV", "INTCON1", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")
 """Registers that decide which code is valid: Python writes them, and chooses anew."""
 
-SELECTORS: Final = ("CORCON", "MODCON", "XBREV", "INTCON1", "SR", "cpu.limit_armed", "cpu.initialised")
+SELECTORS: Final = (
+    "CORCON", "MODCON", "XBREV", "INTCON1", "SR", "cpu.limit_armed", "cpu.initialised", "PMD1", "PMD2",
+)  # fmt: skip
 """What decides which tables of code are current (and, while SR.DA is set, the DO loop)."""
 
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
@@ -195,21 +197,21 @@ class JitEngine:
             word = self._computed[pc] = self._computed_word(pc)
         if not word or self._core.events.deadline <= cycle:
             return False
-        self._core.events.now = cycle
         compute = self._core.bus.compute[word]
-        assert compute is not None
+        if compute is None:
+            return False
+        self._core.events.now = cycle
         compute()
         return True
 
     def _computed_word(self, pc: int) -> int:
-        """Index of the register a one-cycle instruction reads by address, if its device computes it and native code
-        can read it; else 0."""
+        """Index of the register a one-cycle instruction reads by address, if native code can read it; else 0."""
         insn = self._fetch(pc)
         if insn is None or insn.row.cycles != 1 or self._code is None:
             return 0
         word = int(getattr(insn.x, "f", 0)) >> 1
         native = 2 * word in self._code.around.native
-        return word if native and self._core.bus.compute[word] is not None else 0
+        return word if native else 0
 
     def measure_time(self) -> None:
         """Note from now on where host time goes (`emu run --stats`); costs a little itself."""
@@ -265,10 +267,10 @@ class JitEngine:
     def _select(self) -> None:
         """Make the tables of the present processor modes current."""
         u16, state = self._u16, self._state
-        corcon, modcon, xbrev, intcon1, sr, limit_armed, initialised = self._at
+        corcon, modcon, xbrev, intcon1, sr, limit_armed, initialised, pmd1, pmd2 = self._at
         loop = (state.pair("DOSTARTL"), state.pair("DOENDL")) if u16[sr] & DA else None
         key = (u16[corcon] & ~0x0F08, u16[modcon], u16[xbrev] & 0x8000,
-               u16[intcon1] & 0x700, u16[limit_armed], u16[initialised], loop)
+               u16[intcon1] & 0x700, u16[limit_armed], u16[initialised], u16[pmd1], u16[pmd2], loop)
         if key == self._key:
             return
         self._key = key
@@ -294,9 +296,9 @@ class JitEngine:
         return Code(context, around, identity_of(context, around), table(), table())
 
     def _native_registers(self) -> dict[int, NativeRegister]:
-        """Without those somebody watches."""
-        watched = self._core.bus.watched
-        return {at: one for at, one in native_registers(self._core).items() if at >> 1 not in watched}
+        """Without those somebody watches, and those of modules that are off."""
+        apart = self._core.bus.watched | self._core.bus.off
+        return {at: one for at, one in native_registers(self._core).items() if at >> 1 not in apart}
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:

@@ -210,3 +210,25 @@ def test_accumulators_are_one_thing_by_name_and_by_address() -> None:
     runner = native.runner
     assert isinstance(runner, JitEngine)
     assert runner.counts.interpreted < 10
+
+
+def test_registers_of_a_module_that_goes_off_and_on_are_its_own_again() -> None:
+    """dspic30f6014a.md §4: with T2MD set PR2 reads 0 and cannot be written; the same instructions meet both."""
+    firmware = Firmware(0)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    at = 0x100
+    for register in range(16):
+        at = firmware.put(at, literal(0x900 if register == 15 else 3 * register, register))
+    sfrs = Machine(engine="plain").chip.sfrs
+    bit = sfrs["PMD1"].fields["T2MD"][0]
+    loop = words_of("BTG{.B} f, #bit4", f=sfrs["PMD1"].address + (bit >> 3), b=bit & 7)
+    loop += to_sfr("T2CON", 0x8000)
+    loop += words_of("MOV{.W} Wns, f", s=1, f=sfrs["PR2"].address)
+    loop += words_of("MOV{.W} f, Wnd", f=sfrs["PR2"].address, d=4)
+    loop += words_of("MOV{.W} f, Wnd", f=sfrs["TMR2"].address, d=5)
+    loop += words_of("INC2{.B} Ws, Wd", B=0, s=1, p=0, d=1, q=0)
+    firmware.put(at, loop + words_of("BRA Expr", n=-len(loop) - 1))
+    plain, native = pair(firmware)
+    for length in (*range(1, 60), 997, 5003):
+        assert plain.run(length) == native.run(length)
+        assert not difference(plain, native)
