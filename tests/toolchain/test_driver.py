@@ -167,7 +167,8 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert "push.s" in said
     assert cc(capsys, source, "-o", tmp_path / "x.elf") == (0, "")
     unknown = write(tmp_path, "b.c", "\nint __attribute__((bogus)) n;\n")
-    assert f"{unknown}:2:20: warning: unknown attribute 'bogus' ignored" in cc(capsys, "-c", unknown, "-o", tmp_path / "b.o")[1]
+    said = cc(capsys, "-c", unknown, "-o", tmp_path / "b.o")[1]
+    assert f"{unknown}:2:20: warning: unknown attribute 'bogus' ignored" in said
 
 
 def test_xc16_register_names_in_inline_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
