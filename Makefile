@@ -16,13 +16,14 @@ run: firmware.elf
 test: $(STAMP)
 	$(PY) -m ruff check emu toolchain arena tests bench
 	$(PY) -m mypy emu toolchain arena
-	$(PY) -m pytest -n auto tests
+	$(PY) -m pytest -n auto tests -rs
 
 bench: $(STAMP)
 	$(PY) -m bench
 
-fuzz: $(STAMP)
-	$(PY) -m tests.fuzz
+campaigns: SECONDS = 300
+campaigns: $(STAMP)
+	$(PY) -m tests.fuzz --seconds $(SECONDS)
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; set PYTHON=...")'
@@ -34,4 +35,4 @@ clean:
 	rm -rf firmware.elf firmware/build
 
 FORCE:
-.PHONY: run test bench fuzz clean FORCE
+.PHONY: run test bench campaigns clean FORCE

@@ -10,21 +10,16 @@ from typing import Final, NamedTuple, Protocol
 
 from arena import bodies
 from arena.controllers import steps_per_second
-from arena.scene import Scene
-from arena.vision import NOTHING, OBJECT, Eye, sensor_of
-from arena.world import STREAM_SENSORS, STREAM_START, Poses, generator
-
-SPREAD_TCY: Final = 1_600_000
-"""Robots are switched on within one camera frame of each other, each at its own moment."""
-
+from arena.look import NOTHING, OBJECT
+from arena.scene import FCY, Scene
+from arena.vision import Eye, sensor_of
+from arena.world import STREAM_SENSORS, STREAM_START, Poses, generator, traits_of
 
 LATENCY_TCY: Final = 258_484
 """From the middle of the window's rows to the new wheel speed, 17.5 ms, and"""
 FIRST_LOOK_TCY: Final = 853_232
 """from power-on to the first such row: both as the `clustering` firmware does it, which reads the region to its end
 (16.4 ms) before it answers. tests/arena/test_emulated.py measures both."""
-OK_AT_TCY: Final = 14_745_600
-"""The remote control's OK, which starts all robots together (experiment.md §4), begins 1 s after the trial does."""
 OK_DECODED_TCY: Final = 354_275
 """From there until the `clustering` firmware has understood it, 24.0 ms; the bare one needs 345,804."""
 NEVER: Final = 1 << 62
@@ -82,13 +77,21 @@ class Brain(Protocol):
     def lights(self) -> list[Lights]:
         """Changes of the LEDs since the last call."""
 
+    def tell(self, data: bytes) -> None:
+        """What a host sends it by Bluetooth."""
+
     def close(self) -> None:
         """Give back processes and memory."""
 
 
-def switched_on(seed: int, robot: int) -> int:
+def switched_on(scene: Scene, seed: int, robot: int) -> int:
     """Tcy after the trial's start at which a robot gets power."""
-    return int(generator(seed, STREAM_START, robot).integers(SPREAD_TCY))
+    return int(generator(seed, STREAM_START, robot).integers(scene.start.spread_tcy))
+
+
+def told_at(scene: Scene) -> int:
+    """Tcy after the trial's start at which somebody presses the remote control's key (experiment.md §4)."""
+    return round(scene.start.remote_at_s * FCY)
 
 
 class ScriptedBrain:
@@ -96,7 +99,7 @@ class ScriptedBrain:
 
     It looks once per frame, at the pose extrapolated to that cycle; `LATENCY_TCY` later the wheels turn accordingly.
     Both happen at their own cycle within a quantum. `FIRST_LOOK_TCY` after power-on comes the first look; it stands
-    still until the remote control's OK.
+    still until the remote control's key is understood.
     """
 
     def __init__(self, scene: Scene, seed: int, robot: int, controller: str) -> None:
@@ -104,7 +107,9 @@ class ScriptedBrain:
         self._robot = robot
         self._controller = controller
         self._quantum = scene.clock.quantum_tcy
-        self._next_look = switched_on(seed, robot) + FIRST_LOOK_TCY
+        self._next_look = switched_on(scene, seed, robot) + FIRST_LOOK_TCY
+        self._goes_at = told_at(scene) + OK_DECODED_TCY if scene.start_of(robot).remote else 0
+        self._traits = traits_of(scene, seed, robot)
         self._rng = generator(seed, STREAM_SENSORS, robot)
         self._missing = scene.camera.false_negative
         self._inventing = scene.camera.false_positive
@@ -121,7 +126,7 @@ class ScriptedBrain:
         if self._next_look < end:
             ahead = max(self._next_look - start, 0) / self._quantum
             self._reading.seen = seen = self._look(poses, extrapolated(self._before or pose, pose, ahead))
-            if self._next_look + LATENCY_TCY >= OK_AT_TCY + OK_DECODED_TCY:
+            if self._next_look + LATENCY_TCY >= self._goes_at:
                 left, right = steps_per_second(self._controller, seen)
                 self._wanted = left * bodies.CM_PER_STEP, right * bodies.CM_PER_STEP
                 self._change_at = self._next_look + LATENCY_TCY
@@ -135,7 +140,7 @@ class ScriptedBrain:
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
 
     def _look(self, poses: Poses, pose: tuple[float, float, float]) -> int:
-        seen = sensor_of(Eye(self._scene, poses, self._robot, pose))
+        seen = sensor_of(Eye(self._scene, poses, self._robot, pose, self._traits))
         if seen != NOTHING and self._missing and self._rng.random() < self._missing:
             return NOTHING
         if seen == NOTHING and self._inventing and self._rng.random() < self._inventing:
@@ -153,6 +158,9 @@ class ScriptedBrain:
     def lights(self) -> list[Lights]:
         """A script has no LEDs."""
         return []
+
+    def tell(self, data: bytes) -> None:
+        """A script does not listen."""
 
     def close(self) -> None:
         """Nothing to give back."""

@@ -10,27 +10,28 @@ import hashlib
 import json
 import multiprocessing
 import os
-import platform
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from arena.brain import Brain, ScriptedBrain
 from arena.crew import Crew
 from arena.ether import Ether
+from arena.experiments import Experiment, experiment_of
 from arena.live import LiveFile, live_path
-from arena.record import MANIFEST, RecordError, write_json, write_trial
+from arena.record import MANIFEST, FolderInUseError, RecordError, write_json, write_trial
 from arena.scene import Scene
 from arena.trial import run_trial
+from arena.versions import host, versions
 
 Report = Callable[[int, float], None]
 """report(trial, seconds simulated)."""
@@ -52,18 +53,49 @@ class Plan:
     trials: int
     seconds: float
     seed: int
+    experiment: Path | None = None
+    """The experiment's file, if it is one's own."""
+    images: tuple[tuple[str, Path | None], ...] = ()
+    """Brains of groups that have their own, by the name the scene has for them."""
+
+    @property
+    def to_do(self) -> Experiment:
+        """What is measured, and who supervises. Raises SceneError."""
+        return experiment_of(str(self.experiment) if self.experiment is not None else self.scene.experiment)
+
+    @property
+    def has_firmware(self) -> bool:
+        """Whether any robot is emulated: all of a trial's robots then live in its shorter quantum."""
+        own = dict(self.images)
+        groups = self.scene.groups or (self.scene.group_of(0),)
+        return any((own[one.image] if one.image else self.image) is not None for one in groups)
 
     def key(self) -> dict[str, Any]:
         """What a trial depends on beside its seed: recorded in every file."""
-        digest = hashlib.sha256(self.image.read_bytes()).hexdigest() if self.image is not None else None
-        scene = json.loads(json.dumps(asdict(self.scene)))
+        scene = _plain(json.loads(json.dumps(asdict(self.scene))))
         return {
             "scene": scene,
             "brain": self.brain,
             "controller": self.controller,
-            "image_sha256": digest,
+            "image_sha256": _digest(self.image),
+            "experiment_sha256": _digest(self.experiment),
+            "images_sha256": {name: _digest(path) for name, path in self.images},
             "seconds": self.seconds,
+            "versions": versions(),
         }
+
+
+def _plain(value: Any) -> Any:
+    """JSON without nan, which is not equal to itself."""
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_plain(one) for one in value]
+    return None if value != value else value
+
+
+def _digest(path: Path | None) -> str | None:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path is not None else None
 
 
 @dataclass(frozen=True)
@@ -82,12 +114,20 @@ def trial_path(folder: Path, number: int) -> Path:
 
 def make_brains(plan: Plan, seed: int, robots: Sequence[int], ether: Ether | None) -> list[Brain]:
     """Brains of some robots. Raises emu.LoadError for an unusable image."""
-    if plan.image is None:
-        return [ScriptedBrain(plan.scene, seed, robot, plan.controller) for robot in robots]
+    own = dict(plan.images)
+    return [_brain(plan, own, seed, robot, ether) for robot in robots]
+
+
+def _brain(plan: Plan, own: dict[str, Path | None], seed: int, robot: int, ether: Ether | None) -> Brain:
+    group = plan.scene.group_of(robot)
+    image = own[group.image] if group.image else plan.image
+    controller = group.controller or plan.controller
+    if image is None:
+        return ScriptedBrain(plan.scene, seed, robot, controller)
     from arena.emulated import EmulatedBrain  # the emulator is loaded by those who need it
 
-    selector = SELECTOR[plan.controller]
-    return [EmulatedBrain(plan.scene, seed, robot, plan.image, selector, ether) for robot in robots]
+    chosen = plan.scene.start_of(robot).selector
+    return EmulatedBrain(plan.scene, seed, robot, image, SELECTOR[controller] if chosen < 0 else chosen, ether)
 
 
 @contextmanager
@@ -95,7 +135,7 @@ def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brai
     """All brains of a trial, spread over some processes, closed at the end. This one has the fewest robots, because it
     has the world."""
     count = plan.scene.robots.count
-    ether = Ether(count, plan.scene.clock.quantum_tcy) if plan.image is not None else None
+    ether = Ether(count, plan.scene.clock.quantum_tcy) if plan.has_firmware else None
     bounds = [count * part // processes for part in range(processes + 1)]
     parts = [range(one, other) for one, other in pairwise(bounds) if other > one]
     brains: list[Brain] = []
@@ -121,12 +161,13 @@ def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None,
     start = time.perf_counter()
     seed = plan.seed + number - 1
     about = plan.key() | {"seed": seed, "faults": []}
-    live = LiveFile(live_path(folder, number), about) if plan.image is not None else None
+    live = LiveFile(live_path(folder, number), about) if plan.has_firmware else None
     try:
         progress = None if report is None else (lambda seconds: report(number, seconds))
         on_row = live.write if live is not None else None
         with brains_of(plan, seed, processes) as (brains, crews, ether):
-            result = run_trial(plan.scene, seed, brains, plan.seconds, progress, None, on_row, crews, ether)
+            result = run_trial(plan.scene, seed, brains, plan.seconds, progress, None, on_row, crews, ether,
+                               plan.to_do)  # fmt: skip
         about["faults"] = [list(fault) for fault in result.faults]
         write_trial(trial_path(folder, number), result.rows, about)
     finally:
@@ -135,34 +176,46 @@ def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None,
     return Done(number, time.perf_counter() - start, result.faults)
 
 
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """A run's folder, for one run at a time; the system gives it free when a run is killed.
+
+    Raises FolderInUseError if another run has it, RecordError if it cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder / ".lock", timeout=0):
+            yield
+    except Timeout:
+        raise FolderInUseError(f"{folder}: another run is writing here; wait for it or choose another --out") from None
+    except FileExistsError:
+        raise RecordError(f"{folder}: is not a folder") from None
+
+
 def open_folder(plan: Plan, folder: Path, command: list[str]) -> list[int]:
-    """Make or continue the folder of a run; numbers of the trials still to do.
+    """Begin or continue the run in a folder that is `claimed`; numbers of the trials still to do.
 
     Raises RecordError if it holds another run.
     """
     key = plan.key() | {"seed": plan.seed}
     manifest = folder / MANIFEST
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         before = json.loads(manifest.read_text()) if manifest.exists() else None
     except (OSError, ValueError) as error:
         raise RecordError(f"{manifest}: {error}") from None
     if before is not None and before.get("key") != key:
-        changed = [name for name in key if before.get("key", {}).get(name) != key[name]]
-        raise RecordError(f"{folder}: holds another run (different {', '.join(changed)}); choose another --out")
-    write_json(manifest, (before or {"host": []}) | {"key": key, "versions": versions(), "command": command})
+        raise RecordError(f"{folder}: holds another run (different {', '.join(_changed(before.get('key'), key))}); "
+                          "choose another --out")  # fmt: skip
+    write_json(manifest, (before or {"host": []}) | {"key": key, "made_on": host(), "command": command})
     return [number for number in range(1, plan.trials + 1) if not trial_path(folder, number).exists()]
 
 
-def versions() -> dict[str, str]:
-    """Of everything a result can depend on."""
-    found = {"python": platform.python_version(), "machine": platform.machine(), "system": sys.platform}
-    for name in ("openswarm", "pymunk", "numpy", "pyarrow", "llvmlite"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "absent"
-    return found
+def _changed(before: Any, now: dict[str, Any]) -> list[str]:
+    """Which parts of two keys differ, in the words of people."""
+    before = before if isinstance(before, dict) else {}
+    changed = [name for name in now if name != "versions" and before.get(name) != now[name]]
+    old = before.get("versions") or {}
+    new = now["versions"]
+    return changed + [f"version of {name}" for name in new if old.get(name) != new[name]]
 
 
 def run_all(
@@ -172,7 +225,7 @@ def run_all(
     them. Raises what a trial raises, after the others of its moment; files of finished trials stay."""
     if jobs <= 1 or len(numbers) <= 1:
         for number in numbers:
-            done(run_one(plan, number, folder, report, jobs if plan.image is not None else 1))
+            done(run_one(plan, number, folder, report, jobs if plan.has_firmware else 1))
         return
     context = multiprocessing.get_context("spawn")
     queue: Any = context.Queue()

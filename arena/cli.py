@@ -1,6 +1,8 @@
 """The command line: `python -m arena COMMAND`; each command is a module of `commands/`.
 
-Exit status: 0 done; 1 a robot's firmware stopped in a trial; 2 bad input; 130 interrupted (finished trials are kept).
+Exit status: 0 done; 1 something happened to a robot (its firmware stopped, sits in a trap handler or is silent); 2 bad
+input; 3 the run could not go on (cluster lost, folder in use by another run); 130 interrupted. Finished trials are
+kept.
 """
 
 from __future__ import annotations
@@ -11,11 +13,12 @@ import sys
 from collections.abc import Callable, Sequence
 
 import emu
-from arena.commands import compare, experiment, plot, reaction, replay, report, run, sensitivity, sweep
-from arena.record import RecordError
+from arena.cluster import ClusterLostError
+from arena.commands import bundle, compare, experiment, figures, plot, reaction, replay, report, run, sensitivity, sweep
+from arena.record import FolderInUseError, RecordError
 from arena.scene import SceneError, load_scene, scenes
 
-FAULT, BAD_INPUT, INTERRUPTED = 1, 2, 130
+FAULT, BAD_INPUT, CANNOT_GO_ON, INTERRUPTED = 1, 2, 3, 130
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),
     "experiment": (experiment.parser, experiment.run),
@@ -23,7 +26,10 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
     "sensitivity": (sensitivity.parser, sensitivity.run),
     "compare": (compare.parser, compare.run),
     "plot": (plot.parser, plot.run),
+    "figures": (figures.parser, figures.run),
     "report": (report.parser, report.run),
+    "bundle": (bundle.parser, bundle.run),
+    "verify": (bundle.verify_parser, bundle.verify),
     "reaction": (reaction.parser, reaction.run),
     "replay": (replay.parser, replay.run),
 }
@@ -42,7 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         commands.add_parser(name, parents=[one], help=one.description, description=one.description, epilog=one.epilog,
                             formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False)  # fmt: skip
     commands.add_parser("scenes", help="list the scenes that come along")
-    options = parser.parse_args(arguments)
+    try:
+        options = parser.parse_args(arguments)
+    except SystemExit as ended:  # --help, or what argparse has told already
+        return ended.code if isinstance(ended.code, int) else BAD_INPUT
     try:
         if options.command == "scenes":
             for name in scenes():
@@ -55,6 +64,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
         return 0
+    except (FolderInUseError, ClusterLostError) as error:
+        print(f"arena: {error}; finished trials are kept, the same command goes on", file=sys.stderr)
+        return CANNOT_GO_ON
     except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
         print(f"arena: {error}", file=sys.stderr)
         return BAD_INPUT

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from arena.vision import NOTHING, OBJECT, ROBOT
+from arena.look import NOTHING, OBJECT, ROBOT
 
 MAXIMUM_MM_S: Final = 129
 STEPS_PER_S: Final = 1000

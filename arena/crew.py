@@ -21,8 +21,9 @@ from arena.brain import Brain, Lights, Line, Reading
 from arena.ether import Ether, Switch
 from arena.world import Poses, Table
 
-THINK, SAMPLE, ANSWER, FAILED = b"t", b"s", b"a", b"f"
-"""First byte of a message: a quantum begins; what is to be recorded is asked for; what a crew answers."""
+THINK, SAMPLE, TELL, ANSWER, FAILED = b"t", b"s", b"m", b"a", b"f"
+"""First byte of a message: a quantum begins; what is to be recorded is asked for; something for a robot, which is not
+answered; what a crew answers."""
 _HEAD: Final = struct.Struct("<qqqqq")
 """Tick, numbers of robots and objects, bytes of their table, number of switches."""
 _SWITCH: Final = struct.Struct("<qqqq")
@@ -150,6 +151,10 @@ class Crew:
             self._sampled = pickle.loads(self._answer()[1:])
         return self._sampled[place]
 
+    def tell(self, place: int, data: bytes) -> None:
+        """Something for a robot, before its next quantum."""
+        self._wire.send(TELL + struct.pack("<q", place) + data)
+
     def _answer(self) -> bytes:
         try:
             message = self._wire.receive()
@@ -192,6 +197,10 @@ class RemoteBrain:
         """As `Brain.lights`."""
         return self._sampled[2]
 
+    def tell(self, data: bytes) -> None:
+        """As `Brain.tell`."""
+        self._crew.tell(self._place, data)
+
     def close(self) -> None:
         """The crew is closed as a whole."""
 
@@ -212,6 +221,9 @@ def _serve(wire: Wire, make: Make, robots: Sequence[int], ether: Ether | None) -
                 own = ether.take() if ether is not None else []
                 body = struct.pack(f"<q{len(speeds)}d", len(own), *speeds) + _packed_switches(own)
                 wire.send(ANSWER + body)
+            elif message[:1] == TELL:
+                (place,) = struct.unpack_from("<q", message, 1)
+                brains[place].tell(message[9:])
             else:
                 parts = [(brain.reading(), brain.lines(), brain.lights()) for brain in brains]
                 wire.send(ANSWER + pickle.dumps(parts))

@@ -6,7 +6,9 @@ UART1 (Bluetooth). Poses are extrapolated within the quantum to the cycle in whi
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -16,14 +18,18 @@ from numpy.typing import NDArray
 
 import emu
 from arena import bodies
-from arena.brain import OK_AT_TCY, STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, extrapolated, switched_on
+from arena.brain import STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, extrapolated, switched_on, told_at
 from arena.ether import Ether
 from arena.infrared import Ring
+from arena.look import colours_of
 from arena.scene import FCY, BatterySetting, Scene
-from arena.vision import COLOURS, Eye
-from arena.world import STREAM_SENSORS, Poses, generator
+from arena.vision import Eye
+from arena.world import STREAM_SENSORS, Poses, generator, traits_of
 from emu.boards.epuck.board import Epuck
+from emu.boards.epuck.remote import REPEAT_SECONDS
 from emu.boards.epuck.simple import LED_PINS, Battery
+from emu.boards.epuck.stimulus import parse
+from emu.faults import VECNUM
 
 WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
@@ -33,11 +39,15 @@ LINE_LIMIT: Final = 200
 """Bytes after which a line without an end is taken as one."""
 LIGHTS_LIMIT: Final = 100
 """Changes of the LEDs kept per sample: a firmware may dim them by switching fast."""
+STUCK_TCY: Final = FCY // 10
+"""A trap's handler that is at work longer does not come back."""
+_ENABLES: Final = ("IEC0", "IEC1", "IEC2")
+_TRAP_BIT: Final = 3
+"""IPL3 of CORCON: a trap is being handled (isa.md §14.4)."""
 FULL_VOLTS: Final = 4.2
 """epuck.md §6."""
 _STRIP_ROWS: Final = range(232, 249)
 """Rows of the whole picture that count as its middle."""
-_COLOURS: Final = COLOURS.astype(np.int16)
 _NOISE: Final = 1 << 14
 """Values of pixel noise drawn once per robot; each line of pixels starts at a random one."""
 
@@ -55,12 +65,14 @@ class EmulatedBrain:
         self._scene = scene
         self._robot = robot
         self._quantum = scene.clock.quantum_tcy
-        self._on_at = switched_on(seed, robot)
+        self._on_at = switched_on(scene, seed, robot)
         self._rng = generator(seed, STREAM_SENSORS, robot)
+        self._traits = traits_of(scene, seed, robot)
+        self._colours = colours_of(scene).astype(np.int16)
         noise = self._rng.normal(0.0, scene.camera.pixel_noise, _NOISE + 3 * 640)
         self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
         self._shown: Final = [
-            np.stack([_noisy(np.resize(np.roll(one, phase), len(noise)), self._noise) for one in _COLOURS])
+            np.stack([_noisy(np.resize(np.roll(one, phase), len(noise)), self._noise) for one in self._colours])
             for phase in range(3)
         ]
         """Values of a pixel of each class with each noise; by where in the noise a red one is, modulo 3."""
@@ -70,7 +82,7 @@ class EmulatedBrain:
         assert self._board.camera is not None
         self._board.camera.lamp = scene.light.brightness
         self._board.camera.sample(self._pixels)
-        self._board.remote.press("ok", cycle=OK_AT_TCY - self._on_at)
+        self._begin(scene)
         self.machine.uart[1].on_byte = self._byte
         ether = ether or Ether(scene.robots.count, self._quantum)
         self._ring = Ring(scene, self._board, ether, robot, self._on_at)
@@ -91,6 +103,26 @@ class EmulatedBrain:
         self._busy = self._probes = 0
         self._probe_at = 1
         self._fault = ""
+        self._patience = scene.start.silent_s * FCY
+        self._active_at = 0
+        self._steps = (0, 0)
+        self._stuck_at = -1
+        self._told = ""
+
+    def _begin(self, scene: Scene) -> None:
+        """What is done to the robot from outside (`scene.Start`)."""
+        start = scene.start_of(self._robot)
+        if start.remote:
+            key = int(start.remote) if start.remote.isdecimal() else start.remote
+            frames = 1 + int(start.remote_held_s / REPEAT_SECONDS)
+            period = round(REPEAT_SECONDS * FCY)
+            missed = max(math.ceil((self._on_at - told_at(scene)) / period), 0)  # sent before the robot had power
+            if missed < frames:
+                first = told_at(scene) + missed * period - self._on_at
+                self._board.remote.press(key, cycle=first, repeat=frames - missed)
+        if start.stimulus:
+            steps = parse(self._board, start.stimulus, f"{scene.name}: start.stimulus")
+            self._board.stimulus.play([replace(step, cycle=max(step.cycle - self._on_at, 0)) for step in steps])
 
     # -- one quantum -------------------------------------------------------------------------------------------------
 
@@ -105,12 +137,15 @@ class EmulatedBrain:
         while reached < end:
             stop = machine.run_until(min(self._probe_at, end))
             if stop is not None:
-                self._fault = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}: {stop.detail}".rstrip(": ")
+                place = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}"
+                said = f"stopped: {place}: {stop.fault.cause if stop.fault else stop.detail}".rstrip(":, ")
+                self._fault = self._told if self._told and machine.is_asleep else said
                 return 0.0, 0.0
             reached = machine.cycle
             if reached >= self._probe_at:
                 self._probes += 1
                 self._busy += not machine.is_asleep
+                self._watch()
                 self._probe_at = reached + 1 + int(self._rng.integers(2 * PROBE_TCY))
         return self._speeds()
 
@@ -120,6 +155,35 @@ class EmulatedBrain:
         self._poses, self._pose = poses, pose
         self._start = tick * self._quantum - self._on_at
         self._ring.move(poses)
+
+    def _watch(self) -> None:
+        """Notice firmware that does nothing more: it sits in a trap's handler, or sleeps and nothing can wake it."""
+        machine = self.machine
+        why = ""
+        if machine.peek("CORCON") >> _TRAP_BIT & 1:
+            trap = machine.chip.vectors[machine.peek("INTTREG") & VECNUM].name
+            why = f"sits in the handler of {trap}"
+        elif machine.is_asleep and not any(machine.peek(name) for name in _ENABLES):
+            why = "sleeps with every interrupt off"
+        if not why:
+            self._stuck_at = -1
+        elif self._stuck_at < 0:
+            self._stuck_at = machine.cycle
+        elif not self._told.startswith(why) and machine.cycle - self._stuck_at > STUCK_TCY:
+            where = f" in {machine.image.symbols.text(machine.pc)}" if machine.image else ""
+            fault = machine.stopped("halt").fault
+            why += f": {fault.cause.rstrip(',')}" if fault is not None else ""
+            self._told = f"{why} since {(self._stuck_at + self._on_at) / FCY:.2f} s, at {machine.pc:#08x}{where}"
+
+    def _listen(self) -> None:
+        """Notice firmware that nothing is seen or heard of."""
+        now = self.machine.cycle
+        steps = self._board.motors.steps()
+        if steps != self._steps or self._lights or self._said or self._text:
+            self._active_at, self._steps = now, steps
+        elif not self._told and now - self._active_at > self._patience:
+            since = (self._active_at + self._on_at) / FCY
+            self._told = f"is silent: no motor step, LED or byte since {since:.1f} s"
 
     def _speeds(self) -> tuple[float, float]:
         left, right = self._board.motors.steps()
@@ -132,12 +196,12 @@ class EmulatedBrain:
 
     def _pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
         pose = extrapolated(self._before, self._pose, (cycle - self._start) / self._quantum)
-        eye = Eye(self._scene, self._poses, self._robot, pose)
+        eye = Eye(self._scene, self._poses, self._robot, pose, self._traits)
         seen = eye.classes(y, columns)
         first, count = int(self._rng.integers(_NOISE)), len(columns)
         if self._scene.camera.vignetting:
             bright = eye.lens.vignetting(y, columns, self._scene.camera.vignetting)
-            colours = np.rint(_COLOURS[seen] * bright[:, None]).astype(np.int16)
+            colours = np.rint(self._colours[seen] * bright[:, None]).astype(np.int16)
             pixels = _noisy(colours, self._noise[first : first + 3 * count].reshape(-1, 3))
         else:
             shown = self._shown[first % 3][:, first : first + 3 * count].reshape(-1, count, 3)
@@ -169,11 +233,12 @@ class EmulatedBrain:
     def reading(self) -> Reading:
         """As `Brain.reading`. `load` comes from looking at the CPU at random cycles."""
         self.machine.peripherals.pins.flush()
+        self._listen()
         self._board.battery.volts = volts_after(self._scene.battery, self.machine.cycle / FCY)
         load = self._busy / self._probes if self._probes else 0.0
         self._busy = self._probes = 0
         strip = strip_of(*self._strip) if self._strip is not None else b""
-        return Reading(-1, load, self._leds, strip, self._ring.readings, self._fault)
+        return Reading(-1, load, self._leds, strip, self._ring.readings, self._fault or self._told)
 
     def lines(self) -> list[Line]:
         """As `Brain.lines`."""
@@ -184,6 +249,10 @@ class EmulatedBrain:
         """As `Brain.lights`."""
         changed, self._lights = self._lights, []
         return changed
+
+    def tell(self, data: bytes) -> None:
+        """As `Brain.tell`: into UART1, byte after byte at its rate."""
+        self.machine.uart[1].feed(data)
 
     def close(self) -> None:
         """Memory goes with the object."""

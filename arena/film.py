@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from arena import bodies
 from arena.brain import STRIP_COLUMNS, STRIP_PIXELS
+from arena.look import COLOURS, NAMES, OBJECT, ROBOT, WALL
 from arena.page import samples_of
 from arena.record import Trial
-from arena.vision import COLOURS, NAMES, OBJECT, ROBOT, WALL, WINDOW_COLUMNS
+from arena.vision import WINDOW_COLUMNS
 
 PICTURES: Final = 6
 LINES: Final = 20

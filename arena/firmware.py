@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,20 +14,21 @@ ROOT: Final = Path(__file__).resolve().parent.parent / "firmware"
 APPLICATIONS: Final = {"openswarm": "clustering", "bare": "clustering-bare"}
 
 
-def image_for(brain: str) -> Path | None:
-    """The image of a brain, built if it is one of ours; None for `scripted`. Raises LoadError for a file that is no
-    image, ValueError for a name that is none or firmware that cannot be built."""
+def image_for(brain: str, home: Path = Path()) -> Path | None:
+    """The image of a brain, built if it is one of ours, or the file at a path from `home` on; None for `scripted`.
+    Raises LoadError for a file that is no image, ValueError for a name that is none or what cannot be built."""
     if brain == "scripted":
         return None
-    if brain not in APPLICATIONS:
-        path = Path(brain)
+    application = APPLICATIONS.get(brain, brain)
+    is_own = re.fullmatch("[a-z0-9-]+", application) and (ROOT / "apps" / application).is_dir()
+    if brain not in APPLICATIONS and not is_own:
+        path = home / brain
         if not path.exists():
-            known = ", ".join(("scripted", *APPLICATIONS))
+            known = ", ".join(("scripted", *APPLICATIONS, "an application of firmware/apps"))
             raise ValueError(f"--brain {brain}: no such file, and none of {known}")
         emu.load(path)  # says at once what is wrong with it
         return path
-    application = APPLICATIONS[brain]
-    if not (ROOT / "apps" / application).is_dir():
+    if not is_own:
         raise ValueError(f"--brain {brain}: there is no firmware/apps/{application} beside this package")
     command = ["make", "-C", str(ROOT), f"APP={application}", f"PYTHON={sys.executable}"]
     try:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final, NamedTuple
 
-from arena import bodies
+from arena import bodies, geometry
 from arena.ether import Ether
 from arena.scene import Scene
 from arena.world import Poses
@@ -103,16 +103,22 @@ def surfaces(scene: Scene, poses: Poses, robot: int) -> list[Surface]:
     surface that stands askew reflects by the cosine (Lambert, UNVERIFIED)."""
     x, y, _ = poses.robots[robot]
     ring = scene.infrared
-    discs = [(ox - x, oy - y, scene.objects.radius_cm, ring.object_share) for ox, oy in poses.objects]
+    discs = [(ox - x, oy - y, radius, share) for ox, oy, radius, share in _objects(scene, poses)]
+    discs += [(one.x_cm - x, one.y_cm - y, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
     discs += [(one[0] - x, one[1] - y, bodies.ROBOT_RADIUS, ring.robot_share)
               for i, one in enumerate(poses.robots) if i != robot]  # fmt: skip
     reach = bodies.ROBOT_RADIUS + bodies.IR_RANGE
     near = [(dx, dy, r, share) for dx, dy, r, share in discs if dx * dx + dy * dy < (reach + r) ** 2]
+    outlines = [(side, white) for side, white in _outlines(scene) if geometry.distance_to(x, y, side) < reach]
     found = []
     for east, north in _axes(poses.robots[robot]):
         to_x, to_y = _to_wall(x, east, scene.arena.width_cm), _to_wall(y, north, scene.arena.height_cm)
         distance, share = (to_x, abs(east)) if to_x < to_y else (to_y, abs(north))
         share *= ring.wall_share
+        for side, white in outlines:
+            along = geometry.meeting(x, y, east, north, side)
+            if along < distance:
+                distance, share = along, white * abs(_facing(side, east, north))
         for dx, dy, r, white in near:
             along = dx * east + dy * north
             root = r * r - (dx * dx + dy * dy - along * along)
@@ -121,6 +127,36 @@ def surfaces(scene: Scene, poses: Poses, robot: int) -> list[Surface]:
         gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
         found.append(Surface(10 * gap, share) if gap <= bodies.IR_RANGE else Surface(math.inf, 0.0))
     return found
+
+
+def _outlines(scene: Scene) -> list[tuple[geometry.Side, float]]:
+    """Sides of the room and of obstacles with their shares, made once for a scene."""
+    kept = _kept.get(id(scene))
+    if kept is None or kept[0] is not scene:
+        room = geometry.sides(scene.arena.polygon) if scene.arena.polygon else []
+        found = [(side, scene.infrared.wall_share) for side in room]
+        found += [(side, one.share) for one in scene.obstacles if one.polygon for side in geometry.sides(one.polygon)]
+        if len(_kept) > 16:
+            _kept.clear()
+        kept = _kept[id(scene)] = scene, found
+    return kept[1]
+
+
+_kept: dict[int, tuple[Scene, list[tuple[geometry.Side, float]]]] = {}
+
+
+def _objects(scene: Scene, poses: Poses) -> list[tuple[float, float, float, float]]:
+    """Place, radius and share of every object."""
+    if not scene.kinds:
+        return [(x, y, scene.objects.radius_cm, scene.infrared.object_share) for x, y in poses.objects]
+    kinds = map(scene.kind_of, range(len(poses.objects)))
+    return [(x, y, one.radius_cm, one.share) for (x, y), one in zip(poses.objects, kinds, strict=True)]
+
+
+def _facing(side: geometry.Side, east: float, north: float) -> float:
+    """Cosine between a ray and what stands upright on a side."""
+    dx, dy = side[2] - side[0], side[3] - side[1]
+    return (east * dy - north * dx) / math.hypot(dx, dy)
 
 
 def _to_wall(at: float, direction: float, size: float) -> float:
@@ -134,13 +170,19 @@ def ambient(scene: Scene, pose: tuple[float, float, float]) -> list[int]:
     """Raw counts of the sensors with all emitters off: the room's, lowered by the lamp (high above the arena, without
     shadows) as 1 / d^2 and by the cosine of the angle to it."""
     light = scene.light
-    if not light.lamp_counts:
+    lamps = [(one.x_cm, one.y_cm, one.counts) for one in scene.lamps]
+    if light.lamp_counts:
+        lamps.append((light.lamp_x_cm, light.lamp_y_cm, light.lamp_counts))
+    if not lamps:
         return [light.ambient_counts] * SENSORS
-    dx, dy = light.lamp_x_cm - pose[0], light.lamp_y_cm - pose[1]
-    distance = max(math.hypot(dx, dy), bodies.ROBOT_RADIUS)
-    full = light.lamp_counts * (LAMP_CM / distance) ** 2
-    facing = [max((dx * east + dy * north) / distance, 0.0) for east, north in _axes(pose)]
-    return [round(max(light.ambient_counts - full * one, 0.0)) for one in facing]
+    taken = [0.0] * SENSORS
+    for x, y, counts in lamps:
+        dx, dy = x - pose[0], y - pose[1]
+        distance = max(math.hypot(dx, dy), bodies.ROBOT_RADIUS)
+        full = counts * (LAMP_CM / distance) ** 2
+        for sensor, (east, north) in enumerate(_axes(pose)):
+            taken[sensor] += full * max((dx * east + dy * north) / distance, 0.0)
+    return [round(max(light.ambient_counts - one, 0.0)) for one in taken]
 
 
 def signals(scene: Scene, poses: Poses, robot: int) -> list[list[tuple[int, int, float]]]:
@@ -171,7 +213,11 @@ def _is_hidden(scene: Scene, poses: Poses, one: int, other: int) -> bool:
     (x, y, _), (to_x, to_y, _) = poses.robots[one], poses.robots[other]
     dx, dy = to_x - x, to_y - y
     apart2 = dx * dx + dy * dy
-    discs = [(ox, oy, scene.objects.radius_cm) for ox, oy in poses.objects]
+    discs = [(ox, oy, radius) for ox, oy, radius, _ in _objects(scene, poses)]
+    discs += [(fixed.x_cm, fixed.y_cm, fixed.radius_cm) for fixed in scene.obstacles if fixed.radius_cm]
+    for shape in (fixed.polygon for fixed in scene.obstacles if fixed.polygon):
+        if any(geometry.meeting(x, y, dx, dy, side) < 1 for side in geometry.sides(shape)):
+            return True
     discs += [
         (third[0], third[1], bodies.ROBOT_RADIUS) for i, third in enumerate(poses.robots) if i not in (one, other)
     ]

@@ -97,6 +97,7 @@ def _lens(pitch_deg: float, mirrored: bool, distortion: float) -> Lens:
     return Lens(pitch_deg, mirrored, distortion)
 
 
-def lens_of(camera: CameraSetting) -> Lens:
-    """The lens of a scene's camera; one per process for the same values."""
-    return _lens(camera.pitch_deg, camera.mirrored, camera.distortion)
+def lens_of(camera: CameraSetting, pitch_deg: float = 0.0) -> Lens:
+    """The lens of a scene's camera, of a robot whose camera looks up by so much more; one per process for the same
+    values."""
+    return _lens(camera.pitch_deg + pitch_deg, camera.mirrored, camera.distortion)

@@ -11,6 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
 
+from filelock import FileLock, Timeout
+
 from arena.page import page, samples_of
 from arena.record import RecordError, Trial, read_trial
 
@@ -20,13 +22,20 @@ def live_path(folder: Path, number: int) -> Path:
     return folder / f"trial-{number:04d}.live"
 
 
+def _lock(path: Path) -> FileLock:
+    """Held while a trial runs: the system gives it free when its process is killed."""
+    return FileLock(path.with_name(path.name + ".lock"), timeout=0, thread_local=False)
+
+
 class LiveFile:
     """Writes: first what the trial is, then its rows."""
 
     def __init__(self, path: Path, about: dict[str, Any]) -> None:
         self._path = path
         self._file: TextIO | None = None
-        with suppress(OSError):
+        self._lock = _lock(path)
+        with suppress(OSError, Timeout):
+            self._lock.acquire()
             self._file = path.open("w", encoding="utf-8")
         self.write(about)
 
@@ -43,8 +52,12 @@ class LiveFile:
     def close(self) -> None:
         """The trial is over, one way or the other."""
         self._end()
-        with suppress(OSError):
-            self._path.unlink()
+        held = self._lock.is_locked
+        self._lock.release()
+        if held:
+            for path in (self._path, Path(self._lock.lock_file)):
+                with suppress(OSError):
+                    path.unlink()
 
     def _end(self) -> None:
         if self._file is not None:
@@ -73,7 +86,8 @@ class Follower:
         return page(self._trial(0), live=True)
 
     def more(self, first: int) -> dict[str, Any]:
-        """Samples from `first` on. `state`: running, done, or gone (the run was ended before the trial was done)."""
+        """Samples from `first` on. `state`: running, done, or gone (the run was ended before the trial was done, by
+        whatever means)."""
         state = self._catch_up()
         samples = len(self._finished.times) if self._finished is not None else len(self._rows)
         found = samples_of(self._trial(first)) if samples > first else {}
@@ -99,7 +113,17 @@ class Follower:
                 self._about = json.loads(line)
             else:
                 self._rows.append(_decoded(json.loads(line)))
-        return "running"
+        return "running" if self._is_written() else "gone"
+
+    def _is_written(self) -> bool:
+        """Whether the process that writes the file is still alive, or has just finished it."""
+        try:
+            with _lock(self._path):
+                return not self._path.exists() or self._path.with_suffix(".parquet").exists()
+        except Timeout:
+            return True
+        except OSError:
+            return True  # a folder one may not write to: nothing can be told
 
     def _trial(self, first: int) -> Trial:
         """The samples from `first` on."""

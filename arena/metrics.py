@@ -1,12 +1,16 @@
-"""What is measured about the objects, each with its definition and source. Lengths cm, times s."""
+"""What can be measured about objects, each with its definition and source. Lengths cm, times s."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 Places = NDArray[np.float64]
 """n x 2."""
@@ -30,41 +34,60 @@ def compactness(places: Places, radius_cm: float) -> float:
     return float(((places - places.mean(axis=0)) ** 2).sum() / (4 * radius_cm**2))
 
 
+def compactnesses(places: NDArray[np.float64], radius_cm: float) -> NDArray[np.float64]:
+    """`compactness` at every sample: `places` is samples x objects x 2."""
+    return np.array([compactness(one, radius_cm) for one in places], dtype=float)
+
+
 def clusters(places: Places, reach_cm: float) -> list[int]:
     """For each object the number of its cluster: connected parts of the graph of adjacent objects, numbered in the
-    order of their first object."""
+    order of their first object. Memory grows with the number of neighbours, not of pairs."""
+    if not len(places):
+        return []
+    labels: list[int] = connected_components(_adjacent(places, reach_cm), directed=False)[1].tolist()
+    return labels
+
+
+def _adjacent(places: Places, reach_cm: float) -> coo_array:
+    """The pairs of objects nearer to each other than `reach_cm`, as a sparse matrix."""
     count = len(places)
-    near = ((places[:, None, :] - places[None, :, :]) ** 2).sum(axis=2) < reach_cm**2
-    label = [-1] * count
-    found = 0
-    for first in range(count):
-        if label[first] >= 0:
-            continue
-        label[first] = found
-        open_ends = [first]
-        while open_ends:
-            for other in np.flatnonzero(near[open_ends.pop()]).tolist():
-                if label[other] < 0:
-                    label[other] = found
-                    open_ends.append(other)
-        found += 1
-    return label
+    pairs = cKDTree(places).query_pairs(
+        reach_cm, output_type="ndarray"
+    )  # includes the distance itself, which we do not
+    one, other = places[pairs[:, 0]], places[pairs[:, 1]]
+    near = pairs[((one - other) ** 2).sum(axis=1) < reach_cm**2]
+    return coo_array((np.ones(len(near), dtype=np.int8), (near[:, 0], near[:, 1])), shape=(count, count))
 
 
 def largest_share(places: Places, reach_cm: float) -> float:
     """Share of the objects that are in the largest cluster, 0..1; 0 without objects."""
     if not len(places):
         return 0.0
-    labels = clusters(places, reach_cm)
-    return max(labels.count(one) for one in set(labels)) / len(labels)
+    return int(np.bincount(clusters(places, reach_cm)).max()) / len(places)
+
+
+SMALL: Final = 48
+"""Objects up to which matrices of all pairs are quicker than sparse graphs."""
+_CHUNK: Final = 1 << 20
+"""Numbers in such matrices at a time: memory stays the same however long a trial is."""
 
 
 def largest_shares(places: NDArray[np.float64], reach_cm: float) -> NDArray[np.float64]:
-    """`largest_share` at every sample at once: `places` is samples x objects x 2. Who reaches whom over any number of
-    others is the adjacency matrix squared until every path of n - 1 steps is in it."""
+    """`largest_share` at every sample: `places` is samples x objects x 2."""
     samples, count, _ = places.shape
     if not count:
         return np.zeros(samples)
+    if count > SMALL:
+        return np.array([largest_share(one, reach_cm) for one in places])
+    chunk = max(_CHUNK // count**2, 1)
+    parts = [_largest_shares(places[at : at + chunk], reach_cm) for at in range(0, samples, chunk)]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _largest_shares(places: NDArray[np.float64], reach_cm: float) -> NDArray[np.float64]:
+    """For few objects. Who reaches whom over any number of others is the adjacency matrix squared until every path of
+    n - 1 steps is in it."""
+    count = places.shape[1]
     away = places[:, :, None, :] - places[:, None, :, :]
     reached = ((away**2).sum(axis=3) < reach_cm**2).astype(np.float32)
     steps = 1
@@ -87,36 +110,31 @@ HALF_QUANTUM_S: Final = 0.011
 
 @dataclass(frozen=True)
 class Course:
-    """The metrics of one trial over time."""
+    """Metrics of one trial over time: `curves` by name, one value per sample."""
 
     times: NDArray[np.float64]
-    share: NDArray[np.float64]
-    share_12cm: NDArray[np.float64]
-    compactness: NDArray[np.float64]
+    curves: Mapping[str, NDArray[np.float64]]
 
-    def at(self, seconds: float, values: NDArray[np.float64]) -> float:
+    def at(self, seconds: float, name: str) -> float:
         """A value at the last sample not after `seconds`, give or take half of the longest quantum."""
-        return float(values[max(int(np.searchsorted(self.times, seconds + HALF_QUANTUM_S)) - 1, 0)])
+        return float(self.curves[name][max(int(np.searchsorted(self.times, seconds + HALF_QUANTUM_S)) - 1, 0)])
+
+    def last(self, name: str) -> float:
+        """A value at the end."""
+        return float(self.curves[name][-1])
+
+    def first(self, name: str, level: float) -> float:
+        """First time at which a curve is at least at a level; nan if never."""
+        return time_to(self.times, self.curves[name], level)
 
     def until(self, seconds: float) -> Course:
         """The same up to `seconds`."""
         count = int(np.searchsorted(self.times, seconds + HALF_QUANTUM_S))
-        return Course(self.times[:count], self.share[:count], self.share_12cm[:count], self.compactness[:count])
+        return Course(self.times[:count], {name: values[:count] for name, values in self.curves.items()})
 
-    @property
-    def area(self) -> float:
-        """Mean of the compactness over the trial's time: the area under u(t) divided by its length."""
+    def mean(self, name: str) -> float:
+        """Mean over the trial's time: the area under a curve divided by its length."""
+        values = self.curves[name]
         if len(self.times) < 2:
-            return float(self.compactness[0])
-        return float(np.trapezoid(self.compactness, self.times) / (self.times[-1] - self.times[0]))
-
-
-def course(times: NDArray[np.float64], places: NDArray[np.float64], radius_cm: float) -> Course:
-    """Metrics of a trial: `places` is samples x objects x 2."""
-    wide, narrow = reach_of("4r", radius_cm), reach_of("12cm", radius_cm)
-    return Course(
-        times,
-        largest_shares(places, wide),
-        largest_shares(places, narrow),
-        np.array([compactness(one, radius_cm) for one in places]),
-    )
+            return float(values[0])
+        return float(np.trapezoid(values, self.times) / (self.times[-1] - self.times[0]))

@@ -17,9 +17,9 @@ from PIL import Image, ImageDraw
 
 from arena import bodies
 from arena.brain import STRIP_PIXELS
+from arena.look import COLOURS
 from arena.page import samples_of
 from arena.record import RecordError, Trial, reason_of
-from arena.vision import COLOURS
 
 SCALE: Final = 1.6
 """Pixels per cm."""
@@ -65,14 +65,16 @@ def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
     """A picture for each time in s: arena from above, the robots' camera strips below, time and share."""
     data = samples_of(trial)
     scene = trial.about["scene"]
+    metrics = trial.experiment.curves[:2]
     sample = 0
     for time in times:
         while sample + 1 < len(data["t"]) and data["t"][sample + 1] <= time + 1e-3:
             sample += 1
-        yield _frame(scene, data, sample)
+        said = "   ".join(f"{one.label} {one.shown(data['curves'][one.name][sample])}" for one in metrics)
+        yield _frame(scene, data, sample, said)
 
 
-def _frame(scene: dict[str, Any], data: dict[str, Any], sample: int) -> Image.Image:
+def _frame(scene: dict[str, Any], data: dict[str, Any], sample: int, said: str) -> Image.Image:
     width, height = round(scene["arena"]["width_cm"] * SCALE), round(scene["arena"]["height_cm"] * SCALE)
     rows = len(data["robots"])
     total = height + _LINE * (rows + 1) + 4
@@ -94,8 +96,7 @@ def _frame(scene: dict[str, Any], data: dict[str, Any], sample: int) -> Image.Im
         tip = (x + 9 * math.cos(heading)) * SCALE, height - (y + 9 * math.sin(heading)) * SCALE
         draw.line((x * SCALE, height - y * SCALE, *tip), fill=_INK, width=2)
         draw.text((x * SCALE + 8, height - y * SCALE - 14), str(number), fill=_INK)
-    draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   largest cluster {data['share'][sample]:.0%}   "
-              f"compactness {data['compactness'][sample]:.0f}", fill=_INK)  # fmt: skip
+    draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   {said}", fill=_INK)
     for number in range(rows):
         _strip(draw, number, data["robots"][number], sample, height + _LINE * (number + 1) + 2)
     return image

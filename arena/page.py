@@ -15,11 +15,12 @@ import numpy as np
 
 from arena import bodies
 from arena.brain import STRIP_COLUMNS, STRIP_PIXELS
-from arena.metrics import clusters, reach_of
+from arena.look import colours_of
 from arena.record import Trial
-from arena.scene import scene_of
-from arena.vision import COLOURS, Eye, sensor_of
-from arena.world import Poses
+from arena.scene import Scene
+from arena.scenery import NAMED, Obstacle, Patch
+from arena.vision import Eye, sensor_of
+from arena.world import Poses, traits_of
 
 TEMPLATE: Final = Path(__file__).with_name("page.html")
 PLACE: Final = "/*TRIAL*/null"
@@ -29,40 +30,73 @@ _STRIP: Final = np.arange(STRIP_PIXELS) * len(STRIP_COLUMNS) // STRIP_PIXELS + S
 
 def page(trial: Trial, live: bool = False) -> str:
     """The page's text; `live`: it asks where it came from for more."""
-    data = head_of(trial.about) | samples_of(trial) | {"live": live}
+    data = head_of(trial) | samples_of(trial) | {"live": live}
     text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, text)
 
 
-def head_of(about: dict[str, Any]) -> dict[str, Any]:
+def head_of(trial: Trial) -> dict[str, Any]:
     """What does not change during a trial."""
+    about = trial.about
     scene = about["scene"]
     return {
         "title": f"{scene['name']}, {about['brain']}, controller {about['controller']}, seed {about['seed']}",
         "width": scene["arena"]["width_cm"],
         "height": scene["arena"]["height_cm"],
-        "objectRadius": scene["objects"]["radius_cm"],
+        "polygon": trial.scene.arena.polygon,
+        "kinds": [
+            {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour) if trial.scene.kinds else "#ddd"}
+            for one in map(trial.scene.kind_of, range(trial.scene.objects.count))
+        ],
+        "grouped": trial.experiment.has_groups,
+        "obstacles": [_shape(one) for one in trial.scene.obstacles],
+        "patches": [_shape(one) for one in trial.scene.patches],
+        "lamps": _lamps(trial.scene),
+        "names": [
+            f" ({one.name} {trial.scene.id_of(robot)})" if one.name else ""
+            for robot, one in enumerate(map(trial.scene.group_of, range(trial.scene.robots.count)))
+        ],
         "robotRadius": bodies.ROBOT_RADIUS,
+        "metrics": [
+            {"name": one.name, "label": one.label, "unit": one.unit, "scale": one.scale, "best": one.best}
+            for one in trial.experiment.curves
+        ],
     }
+
+
+def _css(colour: str) -> str:
+    """A colour as a camera shows it is dark: brightened for the eye."""
+    red, green, blue = NAMED.get(colour) or tuple(bytes.fromhex(colour[1:]))
+    brightest = max(red, green, blue, 1)
+    gain = min(230 / brightest, 2.2) if colour in NAMED else 1.0
+    return "#" + "".join(f"{round(min(gain * one, 255)):02x}" for one in (red, green, blue))
+
+
+def _shape(one: Obstacle | Patch) -> dict[str, Any]:
+    return {"name": one.name, "polygon": one.polygon, "x": one.x_cm, "y": one.y_cm, "radius": one.radius_cm,
+            "colour": _css(one.colour)}  # fmt: skip
+
+
+def _lamps(scene: Scene) -> list[dict[str, float]]:
+    lamps = [{"x": one.x_cm, "y": one.y_cm} for one in scene.lamps]
+    return lamps + ([{"x": scene.light.lamp_x_cm, "y": scene.light.lamp_y_cm}] if scene.light.lamp_counts else [])
 
 
 def samples_of(trial: Trial) -> dict[str, Any]:
     """What there is per sample, as arrays over the samples, and the faults so far."""
-    radius = trial.about["scene"]["objects"]["radius_cm"]
     columns, objects = trial.columns, trial.objects
     done = trial.course
     robots = []
     for robot, (seen, strips) in enumerate(_views(trial)):
-        keys = ("x", "y", "heading", "leds", "load")
+        keys = ("x", "y", "heading", "left", "right", "leds", "load")
         robots.append({key: np.asarray(columns[f"r{robot}_{key}"]).tolist() for key in keys})
         robots[-1] |= {"seen": seen, "strip": [base64.b64encode(strip).decode() for strip in strips]}
     return {
         "t": trial.times.tolist(),
         "robots": robots,
         "objects": objects.tolist(),
-        "clusters": [clusters(places, reach_of("4r", radius)) for places in objects],
-        "share": done.share.tolist(),
-        "compactness": done.compactness.tolist(),
+        "clusters": [trial.experiment.groups(trial.scene, places) for places in objects],
+        "curves": {name: values.tolist() for name, values in done.curves.items()},
         "log": columns["log"],
         "lights": columns["lights"],
         "faults": trial.about["faults"],
@@ -72,7 +106,9 @@ def samples_of(trial: Trial) -> dict[str, Any]:
 def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     """Per robot: what its sensor's window shows, and the camera's strips. A brain that keeps its sensor to itself is
     shown what stands before it at that moment; a script, which has no camera, gets a strip in perfect colours."""
-    scene = scene_of(trial.about["scene"])
+    scene = trial.scene
+    colours = colours_of(scene)
+    seed = int(trial.about["seed"])
     count = int(trial.about["scene"]["robots"]["count"])
     views: list[tuple[list[int], list[bytes]]] = []
     headings = [trial.columns[f"r{robot}_heading"] for robot in range(count)]
@@ -84,10 +120,10 @@ def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
             if seen[sample] >= 0 and not is_script:
                 continue
             poses = Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(places)], things)
-            eye = Eye(scene, poses, robot)
+            eye = Eye(scene, poses, robot, None, traits_of(scene, seed, robot))
             if seen[sample] < 0:
                 seen[sample] = sensor_of(eye)
             if is_script:
-                strips[sample] = COLOURS[np.broadcast_to(eye.classes(_MIDDLE_ROW, _STRIP), len(_STRIP))].tobytes()
+                strips[sample] = colours[np.broadcast_to(eye.classes(_MIDDLE_ROW, _STRIP), len(_STRIP))].tobytes()
         views.append((seen, strips))
     return views

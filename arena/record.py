@@ -16,17 +16,25 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from arena.metrics import Course, course
+from arena.experiments import Experiment, Moments, experiment_of
+from arena.metrics import Course
+from arena.scene import Scene, scene_of
 from arena.trial import Rows
 
 if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
     import pyarrow as pa
 
 MANIFEST: Final = "manifest.json"
+EXPERIMENT: Final = "experiment.py"
+"""The experiment's file as it was when the run began, if it is one's own."""
 
 
 class RecordError(Exception):
     """A record cannot be written or read; the text names the file."""
+
+
+class FolderInUseError(RecordError):
+    """Another run writes into the same folder."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +60,35 @@ class Trial:
         """samples x robots x 2, cm."""
         return self._places("r", int(self.about["scene"]["robots"]["count"]))
 
+    @property
+    def is_scripted(self) -> bool:
+        """Whether no robot had firmware."""
+        return not any((self.about.get("image_sha256"), *self.about.get("images_sha256", {}).values()))
+
+    @cached_property
+    def scene(self) -> Scene:
+        """What it was made in. Raises SceneError for a scene this version cannot build."""
+        return scene_of(self.about["scene"])
+
+    @cached_property
+    def experiment(self) -> Experiment:
+        """What it is measured by. Records of before scenes named their experiment are of clustering."""
+        name = self.about["scene"].get("experiment", "clustering")
+        beside = self.path.parent / EXPERIMENT
+        return experiment_of(str(beside.resolve()) if name.endswith(".py") and beside.exists() else name)
+
     @cached_property
     def course(self) -> Course:
         """The metrics over time."""
-        return course(self.times, self.objects, self.about["scene"]["objects"]["radius_cm"])
+        return self.experiment.course(self.moments)
+
+    @property
+    def moments(self) -> Moments:
+        """All samples as the experiment sees them."""
+        headings = [np.asarray(self.columns[f"r{i}_heading"]) for i in range(self.robots.shape[1])]
+        turned = np.stack(headings, axis=1)[:, :, None] if headings else np.zeros((len(self.times), 0, 1))
+        noted = {name[2:]: np.asarray(values) for name, values in self.columns.items() if name.startswith("n_")}
+        return Moments(self.times, np.concatenate([self.robots, turned], axis=2), self.objects, self.scene, noted)
 
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
         if not count:

@@ -8,14 +8,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from arena.commands.compare import PUBLISHED, compared, courses, mean_load
-from arena.metrics import time_to
+from arena.commands.compare import compared, courses, mean_load
 from arena.record import Trial
 from arena.statistics import pairs_needed
 
 Runs = Mapping[str, list[Trial]]
 BEGIN: Final = "<!-- results: written by `arena report`; what is between the two marks is replaced -->"
 END: Final = "<!-- end of results -->"
+PAIRS_SHOWN: Final = 20
+"""Of a comparison, in a table; `arena compare --json` has all."""
 
 
 def by_controller(runs: Runs) -> dict[str, dict[str, list[Trial]]]:
@@ -33,10 +34,11 @@ def report(runs: Runs, figures: Mapping[str, list[str]], host_s: Mapping[str, fl
     for controller, group in by_controller(runs).items():
         parts.append(f"### Controller {controller}")
         parts.append(_runs_table(group, host_s, at))
-        parts.append(_equivalence_table(group, at))
+        parts += _equivalence_tables(group, at)
         parts += [f"![controller {controller}]({address})" for address in figures.get(controller, [])]
         parts += _faults(group)
-    parts.append(f"Published: {PUBLISHED}.")
+    published = {trials[0].experiment.published for trials in runs.values()} - {""}
+    parts += [f"Published: {one}." for one in sorted(published)]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -50,25 +52,18 @@ def with_results(document: str, text: str) -> str:
 
 
 def _runs_table(group: Mapping[str, list[Trial]], host_s: Mapping[str, float], at: float) -> str:
+    """Each measure of the experiment, mean and standard deviation (ddof = 1)."""
+    measures = next(iter(group.values()))[0].experiment.measures
     rows = [
-        f"| run | n | share at {at:g} s | the same, 12 cm rule | share at the end | mean compactness | 80 % reached,"
-        " median time | CPU load | host s per trial |",
-        "|---|---|---|---|---|---|---|---|---|",
+        f"| run | n | {' | '.join(one.label.format(at=at) for one in measures)} | CPU load | host s per trial |",
+        "|---" * (len(measures) + 4) + "|",
     ]
     for name, trials in group.items():
         done = [one for _, one in courses(trials).values()]
-        shares = [
-            _spread([one.at(at, one.share) for one in done]),
-            _spread([one.at(at, one.share_12cm) for one in done]),
-            f"{_spread([float(one.share[-1]) for one in done])} at {min(one.times[-1] for one in done):.0f} s",
-            _spread([one.area for one in done]),
-        ]
-        times = [time_to(one.times, one.share, 0.8) for one in done]
-        reached = [time for time in times if not np.isnan(time)]
-        middle = f", {np.median(reached):.0f} s" if reached else ""
+        cells = [_spread([one.of(course, at) for course in done]) for one in measures]
         load = mean_load(trials)
-        rows.append(f"| {name} | {len(done)} | {' | '.join(shares)} | {len(reached)} of {len(done)}{middle} | "
-                    f"{f'{load:.1%}' if load else '-'} | {host_s[name]:.0f} |")  # fmt: skip
+        rows.append(f"| {name} | {len(done)} | {' | '.join(cells)} | {'-' if load is None else f'{load:.1%}'} | "
+                    f"{host_s[name]:.0f} |")  # fmt: skip
     return "\n".join(rows)
 
 
@@ -78,30 +73,42 @@ def _spread(values: list[float]) -> str:
     return f"{np.mean(values):.{digits}f} ± {deviation:.{digits}f}"
 
 
-def _equivalence_table(group: Mapping[str, list[Trial]], at: float) -> str:
-    rows = [
+def _equivalence_tables(group: Mapping[str, list[Trial]], at: float) -> list[str]:
+    """What was registered, then what was added: exact intervals, every pair, and what limits the comparison."""
+    registered = [
         "| X - Y, same seeds | measure | difference | 90 % interval | margin | equivalent | Wilcoxon p | pairs for 80 %"
         " power |",
         "|---|---|---|---|---|---|---|---|",
     ]
+    added = [
+        "Added to the registered rules: the test of sign flips, and every pair.",
+        "",
+        "| X - Y | measure | exact 90 % interval | p | smallest possible p | X - Y by seed | remark |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for (first, ones), (second, others) in itertools.combinations(group.items(), 2):
         if len(set(courses(ones)) & set(courses(others))) < 2:
             continue
-        result = compared(ones, others, at)
-        for row in result["measures"]:
+        for row in compared(ones, others, at)["measures"]:
             digits = 3 if row["margin"] < 1 else 1
             verdict = "yes" if row["equivalent"] else "not shown"
-            rows.append(f"| {first} - {second}, {row['count']} | {row['measure']} | {row['mean']:+.{digits}f} | "
-                        f"{row['low']:+.{digits}f} to {row['high']:+.{digits}f} | {row['margin']:.{digits}f} | "
-                        f"{verdict} | {row['wilcoxon_p']:.2f} | {pairs_needed(row['deviation'], row['margin'])} |"
-                        )  # fmt: skip
-    return "\n".join(rows) if len(rows) > 2 else ""
+            registered.append(f"| {first} - {second}, {row['count']} | {row['measure']} | {row['mean']:+.{digits}f} | "
+                              f"{row['low']:+.{digits}f} to {row['high']:+.{digits}f} | {row['margin']:.{digits}f} | "
+                              f"{verdict} | {row['wilcoxon_p']:.2f} | {pairs_needed(row['deviation'], row['margin'])} |"
+                              )  # fmt: skip
+            exact, pairs = row["exact"], [one - other for one, other in row["pairs"]]
+            shown = " ".join(f"{one:+.{digits}f}" if one else "0" for one in pairs[:PAIRS_SHOWN])
+            more = f" and {len(pairs) - PAIRS_SHOWN} more" if len(pairs) > PAIRS_SHOWN else ""
+            added.append(f"| {first} - {second} | {row['measure']} | {exact['low']:+.{digits}f} to "
+                         f"{exact['high']:+.{digits}f} | {exact['p']:.2f} | {exact['least_p']:.2g} | {shown}{more} | "
+                         f"{row['remark']} |")  # fmt: skip
+    return ["\n".join(registered), "\n".join(added)] if len(registered) > 2 else []
 
 
 def _faults(group: Mapping[str, list[Trial]]) -> list[str]:
     lines: list[str] = []
     for name, trials in group.items():
         faults: list[Any] = [(trial.path.stem, fault) for trial in trials for fault in trial.about["faults"]]
-        lines += [f"{name}, {trial}: robot {robot} stopped at {seconds:.1f} s: {why}"
+        lines += [f"{name}, {trial}: {seconds:.1f} s: robot {robot} {why}"
                   for trial, (robot, seconds, why) in faults]  # fmt: skip
     return lines

@@ -6,14 +6,16 @@ Robots think in the order of their numbers; none sees a half-moved world.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from arena.brain import Brain
 from arena.crew import Crew
 from arena.ether import Ether
+from arena.experiments import Experiment
 from arena.scene import Scene
+from arena.stage import Stage, Supervised
 from arena.world import World
 
 STOPPED: Final = (0.0, 0.0)
@@ -33,7 +35,7 @@ class Rows:
 
 @dataclass
 class Result:
-    """What a trial leaves: rows, and what went wrong with robots (robot, seconds, why)."""
+    """What a trial leaves: rows, and what happened to robots (robot, seconds, what)."""
 
     rows: Rows
     faults: list[tuple[int, float, str]]
@@ -49,18 +51,21 @@ def run_trial(
     on_row: Callable[[dict[str, Any]], None] | None = None,
     crews: Sequence[Crew] = (),
     ether: Ether | None = None,
+    experiment: Experiment | None = None,
 ) -> Result:
     """Let `brains` live in a new world for `seconds`. `progress(seconds)` is called once per simulated second,
     `on_row(row)` for every sample.
 
     Some of the brains may live in other processes, `crews`; `ether` is that of the brains of this one.
 
-    A robot whose firmware stops stands still; the others go on. Raises SceneError if there is no room.
+    A robot whose firmware stops stands still; the others go on. `experiment` may have a supervisor (stage.py), who can
+    end the trial early. Raises SceneError if there is no room or the supervisor fails.
     """
     world = world or World(scene, seed)
     quanta = math.ceil(seconds / world.dt - 0.5)
     per_second = max(round(1 / world.dt), 1)
-    recorder = _Recorder(world, brains, on_row)
+    supervised = Supervised(experiment, Stage(world, brains, seed))
+    recorder = _Recorder(world, brains, on_row, supervised.stage.noted)
     wheels: list[tuple[float, float]] = [STOPPED] * len(brains)
     recorder.sample(wheels)
     samples = 1
@@ -72,20 +77,30 @@ def run_trial(
                 crew.begin(tick, poses, switches)
         wheels = [brain.think(tick, poses) for brain in brains]
         world.step(wheels)
+        is_over = supervised.is_over()
         # a sample is the end of the quantum nearest to the time asked
-        if world.seconds >= samples * scene.clock.sample_s - world.dt / 2:
+        if is_over or world.seconds >= samples * scene.clock.sample_s - world.dt / 2:
             recorder.sample(wheels)
             samples += 1
         if progress is not None and (tick + 1) % per_second == 0:
             progress(world.seconds)
+        if is_over:
+            break
     return Result(recorder.rows, recorder.faults)
 
 
 class _Recorder:
     """Turns the present state into one row."""
 
-    def __init__(self, world: World, brains: Sequence[Brain], on_row: Callable[[dict[str, Any]], None] | None) -> None:
+    def __init__(
+        self,
+        world: World,
+        brains: Sequence[Brain],
+        on_row: Callable[[dict[str, Any]], None] | None,
+        noted: Mapping[str, float],
+    ) -> None:
         self._on_row = on_row
+        self._noted = noted
         self._world = world
         self._brains = brains
         self.rows = Rows()
@@ -110,11 +125,12 @@ class _Recorder:
             row[f"r{index}_leds"] = reading.leds
             row[f"r{index}_strip"] = reading.strip
             row[f"r{index}_infrared"] = reading.infrared
-            if reading.fault and index not in {robot for robot, _, _ in self.faults}:
+            if reading.fault and (index, reading.fault) not in {(robot, why) for robot, _, why in self.faults}:
                 self.faults.append((index, world.seconds, reading.fault))
             said += [{"robot": index, "cycle": line.cycle, "text": line.text} for line in brain.lines()]
             lit += [{"robot": index, "cycle": change.cycle, "leds": change.leds} for change in brain.lights()]
         row["log"], row["lights"] = said, lit
+        row |= {f"n_{name}": value for name, value in self._noted.items()}
         self.rows.add(row)
         if self._on_row is not None:
             self._on_row(row)

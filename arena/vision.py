@@ -9,25 +9,17 @@ column: two ways to the same answer, compared in the tests. Lengths cm; rows and
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arena import bodies
-from arena.lens import Rays, lens_of
+from arena.lens import Floats, Rays, lens_of
+from arena.look import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL, Look, look_of
 from arena.scene import Scene
-from arena.world import Poses
-
-NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE = range(6)
-"""What a pixel shows; NOTHING is only an answer of the whole sensor, ABOVE is the room over the walls."""
-NAMES: Final = ("nothing", "object", "robot", "wall", "floor", "above")
-
-COLOURS: Final = np.array(
-    [(100, 90, 90), (90, 14, 14), (10, 48, 14), (112, 100, 100), (100, 90, 88), (120, 110, 110)], dtype=np.uint8
-)
-"""As the sensor shows them in the light of the experiment: made to lie near the references of the firmware's
-classifier, red (80,0,0), green (0,40,0), white (100,80,80) (openswarm-original.md §8). UNVERIFIED on a robot."""
+from arena.world import Poses, Traits
 
 _NEAREST: Final = 0.05
 """Depth of what touches the lens."""
@@ -38,21 +30,42 @@ Disc = tuple[float, float, float, float, int]
 
 
 class Eye:
-    """One robot's view at one pose of everything. `own` is the index of the robot that looks, at (x, y, heading)."""
+    """One robot's view at one pose of everything. `own` is the index of the robot that looks, at (x, y, heading);
+    `traits` say how its camera is mounted."""
 
-    def __init__(self, scene: Scene, poses: Poses, own: int, pose: tuple[float, float, float] | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        poses: Poses,
+        own: int,
+        pose: tuple[float, float, float] | None = None,
+        traits: Traits = Traits(),  # noqa: B008 - never changes
+    ) -> None:
         x, y, heading = pose if pose is not None else poses.robots[own]
         self._cos, self._sin = math.cos(heading), math.sin(heading)
         self._x = x + bodies.CAMERA_AHEAD * self._cos
         self._y = y + bodies.CAMERA_AHEAD * self._sin
+        if traits.yaw:
+            self._cos, self._sin = math.cos(heading + traits.yaw), math.sin(heading + traits.yaw)
         self._width, self._height = scene.arena.width_cm, scene.arena.height_cm
         self._range = scene.camera.range_cm
-        self.lens = lens_of(scene.camera)
+        self.lens = lens_of(scene.camera, traits.pitch_deg)
         self.discs: Final[list[Disc]] = []
-        self._collect(poses.objects, scene.objects.radius_cm, bodies.OBJECT_HEIGHT, OBJECT)
+        self._look = look = look_of(scene) if scene.is_furnished else None
+        if look is None:
+            self._collect(poses.objects, scene.objects.radius_cm, bodies.OBJECT_HEIGHT, OBJECT)
+        else:
+            for place, (radius, height, kind) in zip(poses.objects, look.objects, strict=True):
+                self._collect([place], radius, height, kind)
+        self._sides = self._turned(look) if look is not None else []
         others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
         self._collect(others, bodies.ROBOT_RADIUS, bodies.ROBOT_HEIGHT, ROBOT)
         self.discs.sort()
+
+    @property
+    def sensed(self) -> list[int] | None:
+        """What the clustering sensor takes each class for; None where classes are what they are."""
+        return self._look.sensed if self._look is not None else None
 
     def _collect(self, places: list[tuple[float, float]], radius: float, height: float, kind: int) -> None:
         """Keep what the picture's widest ray can touch within range."""
@@ -66,6 +79,16 @@ class Eye:
                 left = dy * cos - dx * sin
                 if abs(left) - 1.2 * radius < widest * (ahead + radius):  # 1.2: the ray's slope to the rim
                     self.discs.append((ahead, left, radius, height, kind))
+
+    def _turned(self, look: Look) -> list[tuple[float, float, float, float, float, int]]:
+        """Sides of walls and obstacles as the camera sees them: ahead and left of both ends, height, class."""
+        cos, sin, found = self._cos, self._sin, []
+        for (x1, y1, x2, y2), height, kind in look.sides:
+            x1, y1, x2, y2 = x1 - self._x, y1 - self._y, x2 - self._x, y2 - self._y
+            ends = x1 * cos + y1 * sin, y1 * cos - x1 * sin, x2 * cos + y2 * sin, y2 * cos - x2 * sin
+            if ends[0] > 0 or ends[2] > 0:
+                found.append((*ends, height, kind))
+        return found
 
     def hits(self, slope: float, discs: list[Disc] | None = None) -> list[tuple[float, float, int]]:
         """(depth, height, class) of the discs a ray meets, nearest first; slope = left per ahead."""
@@ -81,8 +104,43 @@ class Eye:
             depth = max((b - math.sqrt(root)) / a, _NEAREST)
             if depth <= reach:
                 found.append((depth, height, kind))
+        for ax, ay, bx, by, height, kind in self._sides:
+            across = (by - ay) - slope * (bx - ax)
+            if across:
+                depth, part = (ax * (by - ay) - ay * (bx - ax)) / across, (ax * slope - ay) / across
+                if depth > 0 and 0 <= part <= 1:
+                    found.append((max(depth, _NEAREST), height, kind))
+        if self._look is not None:
+            found += self._fixed(slope)
         found.sort()
         return found
+
+    def _fixed(self, slope: float) -> list[tuple[float, float, int]]:
+        """Depth, height and class of the round obstacles a ray meets, at any distance, as walls are."""
+        assert self._look is not None
+        found = []
+        a = 1 + slope * slope
+        for x, y, radius, height, kind in self._look.discs:
+            ahead, left = self._seen_from(x, y)
+            b, c = ahead + slope * left, ahead * ahead + left * left - radius * radius
+            root = b * b - a * c
+            if root > 0 and b > 0:
+                found.append((max((b - math.sqrt(root)) / a, _NEAREST), height, kind))
+        return found
+
+    def _seen_from(self, x: float, y: float) -> tuple[float, float]:
+        """A place as (ahead, left) of the camera."""
+        dx, dy = x - self._x, y - self._y
+        return dx * self._cos + dy * self._sin, dy * self._cos - dx * self._sin
+
+    def _floor(self, ray: float, rise: float) -> int:
+        """Class of the floor a ray meets."""
+        if self._look is None or not self._look.patches:
+            return FLOOR
+        depth = -bodies.CAMERA_HEIGHT / rise
+        x = self._x + depth * (self._cos - ray * self._sin)
+        y = self._y + depth * (self._sin + ray * self._cos)
+        return self._look.floor_at(x, y)
 
     def wall_depth(self, slope: float) -> float:
         """Depth at which a ray meets a wall."""
@@ -104,7 +162,7 @@ class Eye:
             for depth, height, kind in hits:
                 z = bodies.CAMERA_HEIGHT + rise * depth
                 if z < 0:
-                    seen.append(FLOOR)
+                    seen.append(self._floor(ray, rise))
                     break
                 if z <= height:
                     seen.append(kind)
@@ -113,7 +171,8 @@ class Eye:
                 if wall < 0:
                     wall = self.wall_depth(slope)
                 z = bodies.CAMERA_HEIGHT + rise * wall
-                seen.append(FLOOR if z < 0 else WALL if z <= bodies.WALL_HEIGHT else ABOVE)
+                kind = WALL if z <= bodies.WALL_HEIGHT else ABOVE
+                seen.append(self._floor(ray, rise) if z < 0 else kind)
         return seen
 
     def within(self, right: float, left: float) -> list[Disc]:
@@ -127,6 +186,8 @@ class Eye:
     def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp] | int:
         """Classes of the pixels of one row in some columns; one number if all are the same."""
         rays = self.lens.row(v, columns)
+        if self._look is not None:
+            return self._furnished(rays)
         seen = self._background(rays)
         discs = [disc for disc in self.within(rays.right_most, rays.left_most) if _matters(disc, rays)]
         if len(discs) == 1 and _is_plain(discs[0], rays, self._range):
@@ -134,6 +195,42 @@ class Eye:
             b = ahead + rays.left * left
             return np.where(b * b > rays.length2 * (ahead * ahead + left * left - radius * radius), kind, seen)
         return self._with(discs, rays, seen) if discs else seen
+
+    def _furnished(self, rays: Rays) -> NDArray[np.intp]:
+        """Classes where there is more than discs between four walls: everything asked for every ray, nearest first."""
+        assert self._look is not None
+        slopes, rise = rays.left, rays.up
+        background = self._background(rays)
+        seen = np.full(len(slopes), background) if isinstance(background, int) else background.copy()
+        near = np.minimum((np.array(self._walls()) @ rays.basis).max(axis=0), 1 / _NEAREST)
+        blocked = 1 / np.maximum(near, 1e-12)
+        for depth, meets, height, kind in self._layers(rays):
+            z = bodies.CAMERA_HEIGHT + rise * depth
+            shows = meets & (z <= height) & (depth < blocked)
+            seen[shows] = np.where(z < 0, FLOOR, kind)[shows]
+            blocked = np.where(shows, depth, blocked)
+        if self._look.patches:
+            for place in np.flatnonzero(seen == FLOOR):
+                seen[place] = self._floor(float(slopes[place]), float(rise[place]))
+        return seen
+
+    def _layers(self, rays: Rays) -> Iterator[tuple[Floats, NDArray[np.bool_], float, int]]:
+        """Depth, whether met, height and class of every disc and side for all rays."""
+        assert self._look is not None
+        slopes, a = rays.left, rays.length2
+        fixed = [(*self._seen_from(x, y), radius, height, kind) for x, y, radius, height, kind in self._look.discs]
+        for number, (ahead, left, radius, height, kind) in enumerate((*self.discs, *fixed)):
+            b = ahead + slopes * left
+            root = b * b - a * (ahead * ahead + left * left - radius * radius)
+            depth = np.maximum((b - np.sqrt(np.maximum(root, 0.0))) / a, _NEAREST)
+            limit = self._range if number < len(self.discs) else math.inf
+            yield depth, (root > 0) & (b > 0) & (depth * rays.length <= limit), height, kind
+        for ax, ay, bx, by, height, kind in self._sides:
+            across = (by - ay) - slopes * (bx - ax)
+            across = np.where(across == 0, np.nan, across)
+            depth, part = (ax * (by - ay) - ay * (bx - ax)) / across, (ax * slopes - ay) / across
+            meets = (depth > 0) & (part >= 0) & (part <= 1)
+            yield np.maximum(np.where(meets, depth, math.inf), _NEAREST), meets, height, kind
 
     def _with(self, discs: list[Disc], rays: Rays, background: NDArray[np.intp] | int) -> NDArray[np.intp]:
         """Classes with discs in any order at any distance."""
@@ -215,11 +312,14 @@ def sensor_of(eye: Eye) -> int:
     """OBJECT, ROBOT or NOTHING by the votes of 24 pixels with perfect colours."""
     edges = [ray for u in WINDOW_EDGES for ray, _ in eye.lens.column(u, WINDOW_ROWS)]
     discs = eye.within(min(edges), max(edges))
-    if not discs:
+    sensed = eye.sensed
+    if not discs and sensed is None:
         return NOTHING
     red = green = 0
     for u in WINDOW_COLUMNS:
         seen = eye.column(u, WINDOW_ROWS, discs)
+        if sensed is not None:
+            seen = [sensed[one] for one in seen]
         red += seen.count(OBJECT)
         green += seen.count(ROBOT)
     return OBJECT if red >= VOTES else ROBOT if green >= VOTES else NOTHING

@@ -16,9 +16,10 @@ import pymunk
 import pymunk.batch
 from numpy.typing import NDArray
 
-from arena import bodies
+from arena import bodies, geometry
 from arena.placement import place_all
 from arena.scene import Scene
+from arena.scenery import ObjectKind
 
 ITERATIONS: Final = 20
 """Of the constraint solver (epuck.md §4)."""
@@ -29,13 +30,30 @@ _POSE, _PLACE = struct.Struct("3d"), struct.Struct("2d")
 _set_velocity: Final[Any] = vars(pymunk.Body)["velocity"].fset
 _set_turning: Final[Any] = vars(pymunk.Body)["angular_velocity"].fset
 """The setters behind the attributes, whose names are checked at a tenth of the cost of the physics."""
-STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START = range(4)
+STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT = range(6)
 """Independent generators of a trial: `generator(seed, stream, robot)`."""
 
 
 def generator(seed: int, stream: int, robot: int = 0) -> np.random.Generator:
     """The generator of one purpose and robot, independent of all others."""
     return np.random.default_rng([seed, stream, robot])
+
+
+class Traits(NamedTuple):
+    """How one robot differs from the others: its camera turned to the left and up, in rad and degrees; how much faster
+    its wheels (left, right) are than commanded, as factors."""
+
+    yaw: float = 0.0
+    pitch_deg: float = 0.0
+    bias: tuple[float, float] = (1.0, 1.0)
+
+
+def traits_of(scene: Scene, seed: int, robot: int) -> Traits:
+    """What is drawn once for a robot of a trial. Without spread nothing differs, to the bit."""
+    spread = scene.robots
+    yaw, pitch, left, right = generator(seed, STREAM_TRAITS, robot).normal(0.0, 1.0, 4).tolist()
+    bias = (1.0 + spread.wheel_bias_sd * left, 1.0 + spread.wheel_bias_sd * right)
+    return Traits(math.radians(spread.camera_yaw_sd_deg * yaw), spread.camera_pitch_sd_deg * pitch, bias)
 
 
 class Poses:
@@ -112,9 +130,13 @@ class World:
         self.space.iterations = ITERATIONS
         self.space.collision_slop = 0.01
         self._add_walls()
+        self._add_obstacles()
+        self._bias = [traits_of(scene, seed, robot).bias for robot in range(len(robots))]
         self.robots = [self._add_robot(*pose) for pose in robots]
+        self._grips: list[tuple[pymunk.PivotJoint, pymunk.GearJoint] | None] = []
         self._drives = [self._add_drive(body) for body in self.robots]
-        self.objects = [self._add_object(x, y) for x, y in objects]
+        self._rests = [False] * len(robots)
+        self.objects = [self._add_object(scene.kind_of(number), x, y) for number, (x, y) in enumerate(objects)]
         self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
         self._noise = [(1.0, 1.0)] * len(robots)
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
@@ -132,6 +154,18 @@ class World:
             wall.friction = bodies.CONTACT_FRICTION
             self.space.add(wall)
 
+    def _add_obstacles(self) -> None:
+        """The room's own shape and what stands fast in it: outlines as thin walls, and discs."""
+        fixed, shapes = self.space.static_body, [self.scene.arena.polygon]
+        shapes += [one.polygon for one in self.scene.obstacles]
+        outlines = [side for shape in shapes if shape for side in geometry.sides(shape)]
+        found: list[pymunk.Shape] = [pymunk.Segment(fixed, side[:2], side[2:], 0.0) for side in outlines]
+        found += [pymunk.Circle(fixed, one.radius_cm, (one.x_cm, one.y_cm))
+                  for one in self.scene.obstacles if one.radius_cm]  # fmt: skip
+        for shape in found:
+            shape.friction = bodies.CONTACT_FRICTION
+            self.space.add(shape)
+
     def _disc(self, mass: float, radius: float, x: float, y: float) -> pymunk.Body:
         body = pymunk.Body(mass, bodies.disc_moment(mass, radius))
         body.position = x, y
@@ -147,23 +181,30 @@ class World:
 
     def _add_drive(self, robot: pymunk.Body) -> pymunk.Body | None:
         """The wheels: a body that moves as commanded and pulls the robot along with at most the tyres' grip."""
-        thrust = self.scene.robots.thrust_n
-        if math.isinf(thrust):
+        if math.isinf(self.scene.robots.thrust_n):
+            self._grips.append(None)
             return None
         wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         push = pymunk.PivotJoint(wheels, robot, (0, 0), (0, 0))
         turn = pymunk.GearJoint(wheels, robot, 0.0, 1.0)
-        grip = bodies.newton(thrust)
-        for joint, force in ((push, grip), (turn, grip * self.scene.robots.axle_cm / 2)):
+        self._grips.append((push, turn))
+        self._hold(len(self._grips) - 1, self.scene.robots.thrust_n)
+        for joint in (push, turn):
             joint.max_bias = 0.0
-            joint.max_force = force
             self.space.add(joint)
         self.space.add(wheels)
         return wheels
 
-    def _add_object(self, x: float, y: float) -> pymunk.Body:
+    def _hold(self, robot: int, force_n: float) -> None:
+        """How hard the wheels of a robot pull or hold it."""
+        joints = self._grips[robot]
+        if joints is not None:
+            push, turn = joints
+            push.max_force = bodies.newton(force_n)
+            turn.max_force = bodies.newton(force_n) * self.scene.robots.axle_cm / 2
+
+    def _add_object(self, setting: ObjectKind, x: float, y: float) -> pymunk.Body:
         """Its friction on the floor is two joints of limited force that want it to stand still."""
-        setting = self.scene.objects
         body = self._disc(setting.mass_kg, setting.radius_cm, x, y)
         grip = pymunk.PivotJoint(self.space.static_body, body, (0, 0), (0, 0))
         hold = pymunk.GearJoint(self.space.static_body, body, 0.0, 1.0)
@@ -183,7 +224,10 @@ class World:
         axle, dt = self.scene.robots.axle_cm, self.dt
         for index, (left, right) in enumerate(wheels):
             noise = self._noise[index]
-            left, right = left * noise[0], right * noise[1]
+            if (not left and not right) is not self._rests[index]:
+                self._rests[index] = not self._rests[index]
+                self._hold(index, self.scene.robots.brake_n if self._rests[index] else self.scene.robots.thrust_n)
+            left, right = left * noise[0] * self._bias[index][0], right * noise[1] * self._bias[index][1]
             body, drive = self.robots[index], self._drives[index]
             turn = (right - left) / axle
             ahead = (left + right) / 2
@@ -193,6 +237,14 @@ class World:
             _set_turning(moved, turn)
         self.space.step(dt)
         self.ticks += 1
+        self.poses = self._read()
+
+    def move(self, body: pymunk.Body, x: float, y: float, heading: float | None = None) -> None:
+        """Put a robot or object somewhere else, at rest; cm, rad."""
+        body.position, body.velocity, body.angular_velocity = (x, y), (0.0, 0.0), 0.0
+        if heading is not None:
+            body.angle = heading
+        self.space.reindex_shapes_for_body(body)
         self.poses = self._read()
 
     def _draw_noise(self) -> None:

@@ -1,9 +1,15 @@
-"""A cycle-exact emulator of the dsPIC30F6014A. Names load when they are first used, so that tools which need only
-the instruction table or the chip's data pay for nothing else.
+"""A cycle-exact emulator of the dsPIC30F6014A, by default on an e-puck.
 
 >>> import emu
->>> machine = emu.load("firmware.elf")      # doctest: +SKIP
->>> stop = machine.run(cycles=14_745_600)   # doctest: +SKIP
+>>> machine = emu.load("firmware.elf")                          # doctest: +SKIP
+>>> machine.uart[1].listen(lambda byte, cycle: print(chr(byte), end=""))  # doctest: +SKIP
+>>> stop = machine.run(seconds=2)                               # doctest: +SKIP
+>>> stop.reason, stop.fault                                     # doctest: +SKIP
+('limit', None)
+
+`load` gives a `Machine` from a firmware file, `Machine` has everything else: run it, look into it, be told, take
+snapshots. A run ends with a `Stop`; if the firmware did something wrong, `Stop.fault` says what, where, in which thread
+and how it got there. Time is counted in Tcy (instruction cycles) since power-on, an integer that only grows.
 """
 
 from __future__ import annotations
@@ -12,6 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from emu.api import Change as Change
     from emu.api import load as load
     from emu.api import watch as watch
     from emu.image import Image as Image
@@ -20,7 +27,15 @@ if TYPE_CHECKING:
     from emu.machine import Machine as Machine
     from emu.machine import Stop as Stop
 
+FCY_HZ: Final = 14_745_600
+"""Instruction cycles per second of an e-puck with the vendor's clock setting, XT_PLL8 (dspic30f6014a.md §3)."""
+TCY_SECONDS: Final = 1 / FCY_HZ
+"""Length of one instruction cycle in s at `FCY_HZ`."""
+
+# Names load when they are first used, so that tools which need only the instruction table or the chip's data pay for
+# nothing else.
 _HOME: Final = {
+    "Change": "emu.api",
     "Image": "emu.image",
     "LoadError": "emu.image",
     "Machine": "emu.machine",
@@ -30,7 +45,7 @@ _HOME: Final = {
     "watch": "emu.api",
 }
 
-__all__ = ["Image", "LoadError", "Machine", "Stop", "load", "load_image", "watch"]
+__all__ = ["FCY_HZ", "TCY_SECONDS", "Change", "Image", "LoadError", "Machine", "Stop", "load", "load_image", "watch"]
 
 
 def __getattr__(name: str) -> Any:
@@ -40,3 +55,7 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

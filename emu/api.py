@@ -29,6 +29,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from emu.boards import BOARDS
 from emu.loader import load_image
 from emu.machine import Machine, Stop
 from emu.peripherals import Peripherals
@@ -39,17 +40,33 @@ def load(
     *,
     engine: str = "auto",
     ipl_slip: int = 0,
-    board: Callable[[Peripherals], Any] | None = None,
+    board: Callable[[Peripherals], Any] | str | None = "epuck",
+    strict: bool = False,
 ) -> Machine:
     """A machine with the firmware file at `path`, ELF or Intel HEX, ready to run from reset.
 
-    `board` is what is around the chip, for example `emu.boards.epuck.board.Epuck`; bare pins without.
-    Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine.
+    `board` is what is around the chip: "epuck" as on the command line, "none" or None for bare pins, or what to call
+    with the chip's peripherals, for example `functools.partial(emu.boards.epuck.board.Epuck, selector=3)`.
+    `engine` is "auto", "jit", "interp" or "plain"; all give the same run. With `strict` the plain one also finds null
+    pointers, uninitialised reads and stores into other threads' stacks, and calls them faults.
+    Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine or board.
     """
     image = load_image(path)
-    machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip, board=board)
+    machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip, board=_board(board), strict=strict)
     machine.load(image)
     return machine
+
+
+def _board(board: Callable[[Peripherals], Any] | str | None) -> Callable[[Peripherals], Any] | None:
+    if not isinstance(board, str):
+        return board
+    if board not in BOARDS:
+        raise ValueError(f"there is no board {board!r}; expected one of {', '.join(BOARDS)}")
+    if board == "none":
+        return None
+    from emu.boards.epuck.board import Epuck
+
+    return Epuck
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from typing import Final
 
 from emu.events import Events
 from emu.record import Record
+from emu.straight import Integers, Rule
 
 SFR_END: Final = 0x0800
 """First data address behind the SFRs (isa.md §1.2)."""
@@ -19,6 +20,31 @@ SFR_END: Final = 0x0800
 ReadHook = Callable[[], int]
 WriteHook = Callable[[int, int, int], None]
 """Called as hook(old, new, lanes) after the new word is in the record; lanes = 0xFFFF, 0x00FF or 0xFF00."""
+
+
+class Tap:
+    """Somebody outside listens to every access of instructions to one register; see `tap`."""
+
+    def __init__(self, remove: Callable[[], None]) -> None:
+        self.hooks: tuple[Callable[[bool, int], object], ...] = ()
+        self.remove: Final = remove
+
+    def __bool__(self) -> bool:
+        return bool(self.hooks)
+
+    def add(self, hook: Callable[[bool, int], object]) -> Callable[[], None]:
+        """Call hook(is_write, word) after each access. Returns how to remove it."""
+        self.hooks = (*self.hooks, hook)
+        removed = False
+
+        def forget() -> None:
+            nonlocal removed
+            if not removed:
+                removed = True
+                place = self.hooks.index(hook)
+                self.hooks = self.hooks[:place] + self.hooks[place + 1 :]
+
+        return forget
 
 
 class Bus:
@@ -39,6 +65,9 @@ class Bus:
         self.on_read: Final[list[ReadHook | None]] = [None] * words
         """Registers whose read changes something; returns the word read."""
         self.on_write: Final[list[WriteHook | None]] = [None] * words
+        self.rules: Final[list[Rule | None]] = [None] * words
+        """What accesses do in the common case; the hooks answer where a rule does not."""
+        self._integers: Final = Integers(record, events)
         self.modelled: Final = [False] * words
         """Set for registers a device or the CPU stands behind; others are reported once when touched."""
         self.off: Final[set[int]] = set()
@@ -52,6 +81,9 @@ class Bus:
     def read(self, address: int) -> int:
         """The word at even SFR `address` (0..0x7FE) as an instruction reads it, side effects included."""
         word = address >> 1
+        rule = self.rules[word]
+        if rule is not None and (shown := self._integers.read(rule)) is not None:
+            return shown
         hook = self.on_read[word] or self.compute[word]
         if hook is not None:
             return hook()
@@ -62,6 +94,9 @@ class Bus:
     def write(self, address: int, value: int, lanes: int = 0xFFFF) -> None:
         """Store `value` at even SFR `address`; only bits in `lanes` (byte writes) are touched."""
         word = address >> 1
+        rule = self.rules[word]
+        if rule is not None and self._integers.write(rule, value, lanes):
+            return
         u16 = self.record.u16
         old = u16[word]
         free = self.writable[word] & lanes
@@ -89,3 +124,34 @@ class Bus:
         self._reported.add(word)
         if self.report is not None:
             self.report(word << 1, is_write)
+
+
+def tap(bus: Bus, word: int) -> Tap:
+    """Put a `Tap` between the instructions and the register with index `word`, until its `remove` is called."""
+    on_read, compute, written, rule = bus.on_read[word], bus.compute[word], bus.on_write[word], bus.rules[word]
+    read = on_read or compute
+    u16, events = bus.record.u16, bus.events
+
+    def remove() -> None:
+        bus.on_read[word], bus.on_write[word], bus.rules[word] = on_read, written, rule
+        bus.watched.discard(word)
+
+    heard = Tap(remove)
+
+    def tapped_read() -> int:
+        value = read() if read is not None else u16[word]
+        if not events.quiet:
+            for hook in heard.hooks:
+                hook(False, value)
+        return value
+
+    def tapped_write(old: int, new: int, lanes: int) -> None:
+        if written is not None:
+            written(old, new, lanes)
+        if not events.quiet:
+            for hook in heard.hooks:
+                hook(True, u16[word])
+
+    bus.on_read[word], bus.on_write[word], bus.rules[word] = tapped_read, tapped_write, None
+    bus.watched.add(word)
+    return heard

@@ -1,7 +1,8 @@
 """`python -m emu COMMAND`: finds the command, turns mistakes of the caller into one line and an exit status.
 
 What enters: arguments. What leaves: an exit status. A command is one module of `emu.commands`, named in COMMANDS and
-imported only when it is asked for, with `parser() -> Parser` and `run(options) -> int`.
+imported only when it is asked for, with `parser() -> Parser` and `run(options) -> int`. Nothing is ever coloured, so
+NO_COLOR holds without being asked.
 """
 
 from __future__ import annotations
@@ -10,35 +11,40 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.metadata import version
 from typing import Final
 
 from emu.command import BAD_INPUT_STATUS, EXIT_BAD_INPUT, EXIT_OK, CommandError, Parser
-
-COMMANDS: Final = {
-    "run": "run a firmware image and show what its UART says",
-    "screenshot": "run a firmware image and write the picture its camera captured",
-    "disasm": "print a firmware image as assembly with symbols and source lines",
-    "info": "print sections, memory use, vectors and configuration words",
-    "footprint": "print what a firmware image costs in ROM and RAM; fit the kernel's memory equation",
-    "profile": "print the CPU load by function and interrupt level in percent, from exact cycles",
-    "cycles": "measure the kernel's operations in exact cycles; check them against a baseline",
-}
+from emu.commands import COMMANDS
 
 _USAGE: Final = """usage: emu COMMAND [options]
 
 {commands}
 
 example: emu run firmware.elf --seconds 5
-`emu COMMAND --help` explains a command."""
+`emu COMMAND --help` explains a command; `emu --version` tells the version."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        status = _answer(words)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
+        return EXIT_OK
+
+
+def _answer(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help"):
         width = max(map(len, COMMANDS))
         print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
         return EXIT_OK if words else EXIT_BAD_INPUT
+    if words == ["--version"]:
+        print(f"emu {version('openswarm')}")
+        return EXIT_OK
     name, rest = words[0], words[1:]
     if name not in COMMANDS:
         print(f"emu: unknown command {name!r}; known are {', '.join(COMMANDS)}", file=sys.stderr)
@@ -57,13 +63,11 @@ def _call(name: str, rest: list[str]) -> int:
     options = parser.parse_args(rest)
     try:
         status: int = command.run(options)
-        sys.stdout.flush()
     except (LoadError, CommandError) as error:
         print(f"emu {name}: {error}", file=sys.stderr)
         return bad_input
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
-        return EXIT_OK
+        raise
     except OSError as error:
         print(f"emu {name}: {error.filename or ''}: {error.strerror}", file=sys.stderr)
         return bad_input

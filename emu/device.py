@@ -12,6 +12,7 @@ from typing import Final
 from emu.bus import Bus, ReadHook, WriteHook
 from emu.events import Events
 from emu.record import Record
+from emu.straight import Place, Rule
 
 
 class Register:
@@ -45,6 +46,15 @@ class Register:
     def __setitem__(self, field: str, number: int) -> None:
         lsb, ones = self._fields[field]
         self._u16[self._word] = self._u16[self._word] & ~(ones << lsb) & 0xFFFF | (number & ones) << lsb
+
+    def ruled(self, rule: Rule) -> None:
+        """Accesses follow `rule` where it can say what they do."""
+        self.bus.rules[self._word] = rule
+
+    @property
+    def place(self) -> Place:
+        """Where the word is, for rules."""
+        return Place(self.address, 16)
 
     def computed(self, hook: ReadHook) -> None:
         """Reads return `hook()`, a function of the cycle and of device state without side effects."""

@@ -32,6 +32,8 @@ class Events:
         self._first = record.reserve("events.due", "Q", SLOTS).index
         self.firing = False
         """An event is being handled, as opposed to an access of an instruction or a call from outside."""
+        self.quiet = False
+        """What happens has happened before and been told: nobody outside hears of it again."""
         self.names: Final[list[str]] = []
         self._fire: Final[list[Callable[[int], None]]] = []
         self._due = record.u64[self._first : self._first + SLOTS]

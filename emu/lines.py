@@ -72,7 +72,7 @@ class Lines:
     def _read(self, sections: Mapping[str, bytes]) -> None:
         # pyelftools answers damaged input with exceptions of a dozen unrelated types; each unit stands alone.
         try:
-            dwarf = _dwarf(sections)
+            dwarf = dwarf_of(sections)
             units = dwarf.iter_CUs()
         except Exception:
             self.broken += 1
@@ -92,7 +92,7 @@ class Lines:
                 self.broken += 1
 
 
-def _dwarf(sections: Mapping[str, bytes]) -> DWARFInfo:
+def dwarf_of(sections: Mapping[str, bytes]) -> DWARFInfo:
     """A pyelftools view of the un-doubled sections."""
     from elftools.dwarf.dwarfinfo import DebugSectionDescriptor, DwarfConfig, DWARFInfo
 
@@ -112,7 +112,7 @@ def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[Line]:
     program = dwarf.line_program_for_CU(unit)
     if program is None:
         return []
-    names = _file_names(program.header)
+    names = file_names(program.header)
     rows: list[Line] = []
     before = None
     for entry in program.get_entries():
@@ -129,7 +129,7 @@ def _unit_rows(dwarf: DWARFInfo, unit: Any) -> list[Line]:
 def _variables(dwarf: DWARFInfo, unit: Any) -> dict[int, str]:
     """Declaring file of the variables of one unit that stand at a fixed address."""
     program = dwarf.line_program_for_CU(unit)
-    names = _file_names(program.header) if program is not None else []
+    names = file_names(program.header) if program is not None else []
     found = {}
     for die in unit.iter_DIEs():
         if die.tag != "DW_TAG_variable" or "DW_AT_location" not in die.attributes:
@@ -142,7 +142,7 @@ def _variables(dwarf: DWARFInfo, unit: Any) -> dict[int, str]:
     return found
 
 
-def _file_names(header: Any) -> list[str]:
+def file_names(header: Any) -> list[str]:
     """Path of every file number of a line program; DWARF before version 5 counts files from 1."""
     folders = [folder.decode("utf-8", "replace") for folder in header["include_directory"]]
     names = [] if header["version"] >= 5 else ["?"]

@@ -6,24 +6,29 @@ What enters: an image, pin levels, bytes. What leaves: `Stop`s, registers and me
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from emu.boards import epuck
-from emu.bus import SFR_END, Bus
-from emu.chips.chip import Chip
+from emu.bus import Bus
+from emu.chips.chip import Chip, Vector
 from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.contents import Contents, Place
+from emu.debug.bysource import BySource
 from emu.dspic30f.core import Core
-from emu.dspic30f.engines import Engine, make_engine
-from emu.dspic30f.faults import Breakpoint, DeviceReset
-from emu.dspic30f.state import RUN
+from emu.dspic30f.engines import make_engine
+from emu.dspic30f.faults import RESTART, Breakpoint, DeviceReset, Violation
+from emu.dspic30f.state import RUN, W15_INITIALISED
 from emu.events import NEVER, Events
 from emu.image import Image
 from emu.peripherals import Peripherals, Wires, build
 from emu.program import ProgramMemory
 from emu.record import Record
+
+if TYPE_CHECKING:
+    from emu.faults import Fault
 
 REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted")
 
@@ -33,18 +38,47 @@ RESET_LOOP: Final = 8
 """Equal resets in a row, each within RESET_LOOP_CYCLES of the last, that count as a fault."""
 RESET_LOOP_CYCLES: Final = 1_000_000
 
+CHECKPOINT_CYCLES: Final = 1 << 23
+"""A run remembers where it was at least this often, to be able to go back when something goes wrong (half a second)."""
+
 PcHook = Callable[[], bool | None]
-SfrHook = Callable[[bool, int], None]
+
+
+@dataclass(slots=True)
+class Evidence:
+    """What a fault is explained with: states of the record, kept as the run goes on."""
+
+    began: bytes | None = None
+    """A while ago; nothing has come from outside since."""
+    middle: tuple[int, bytes] | None = None
+    """Less long ago: cycle and state. It becomes `began` when that has grown old."""
+    ended: bytes | None = None
+    """Where `advance` ended; a machine that begins elsewhere has been changed from outside."""
+    trap: tuple[Vector, bytes, bytes | None] | None = None
+    """The trap entered last: its vector, the state just before, and what `began` was then."""
+    reset: bytes | None = None
+    """Just before the reset for a fault that ended the run."""
+
+    def look(self, cycle: int, state: bytes) -> None:
+        """A run is about to go on from `state`, that of `cycle`."""
+        if state != self.ended:
+            self.began, self.middle = state, (cycle, state)
+        elif self.middle is None or cycle - self.middle[0] >= CHECKPOINT_CYCLES:
+            self.began, self.middle = self.middle[1] if self.middle else state, (cycle, state)
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Why and where a run ended. `pc` is the next instruction, of a fault the culprit, of a debugger word that word."""
+    """Why and where a run ended. `pc` is the next instruction, of a debugger word that word."""
 
     reason: str
+    """One of REASONS: "limit" (of cycles or time), "breakpoint" (a hook said stop, or a debugger word), "halt" (asleep,
+    and nothing will ever wake it), "fault" (the firmware went wrong), "until", "interrupted"."""
     pc: int
     cycle: int
     detail: str = ""
+    fault: Fault | None = None
+    """With reason "fault" and an image loaded: what went wrong, where, in which thread, and how it came to that."""
 
 
 class _WRegisters(Protocol):
@@ -52,11 +86,14 @@ class _WRegisters(Protocol):
     def __setitem__(self, number: int, value: int) -> None: ...
 
 
-class Machine:
+class Machine(Contents, BySource):
     """A chip with a program. See engine documentation in README.md for the choice of `engine`.
 
     `ipl_slip` = 1 lets an interrupt slip through right after a write that raises IPL or clears IEC (isa.md §14.3).
     `board` puts the chip on a board: it is called with the peripherals before the engine is made (`emu.boards`).
+    `strict` makes null pointers, uninitialised reads and stores into other threads' stacks faults
+    (emu/debug/strict.py); it takes the plain engine.
+    Raises ValueError for an engine that does not exist, or is not plain though strict.
     """
 
     def __init__(
@@ -66,17 +103,17 @@ class Machine:
         engine: str = "auto",
         ipl_slip: int = 0,
         board: Callable[[Peripherals], Any] | None = None,
+        strict: bool = False,
     ) -> None:
-        self.chip: Final = chip
-        self.record: Final = Record()
-        self.events: Final = Events(self.record)
-        self.bus: Final = Bus(self.record, self.events)
-        self.program: Final = ProgramMemory(self.record, chip)
+        record = Record()
+        self.events: Final = Events(record)
+        bus = Bus(record, self.events)
+        program = ProgramMemory(record, chip)
         wires = Wires()
-        self.peripherals: Final = build(chip, self.bus, self.program, wires)
+        self.peripherals: Final = build(chip, bus, program, wires)
         self.pins: Final = self.peripherals.pins
         self.uart: Final = self.peripherals.uart
-        self.core: Final = Core(self.record, self.events, self.bus, self.program, chip)
+        super().__init__(chip, Core(record, self.events, bus, program, chip))
         self.core.exceptions.ipl_slip = ipl_slip
         self._connect(wires)
         self.board: Final[Any] = board(self.peripherals) if board is not None else None
@@ -91,6 +128,12 @@ class Machine:
         self._stopped_at: tuple[int, int] | None = None
         self._last_reset = ("", 0, 0, 0)
         self._interrupt = False
+        self.scout: Callable[[], bool] | None = None
+        """Called instead of the hooks of a hooked address while what was told before is run again."""
+        self._no_restart: Callable[[], None] | None = None
+        self.evidence: Final = Evidence()
+        """What the last run left for whoever explains a fault."""
+        self.core.exceptions.on_trap = self._trapped
         self._clock: Final = (
             self.record.u64,
             self.state.at["cpu.cycle"],
@@ -98,9 +141,14 @@ class Machine:
             self.state.at["cpu.mode"],
         )
         """What `run_until` looks at first: the view of the record, indices of the cycle, the deadline and the mode."""
-        self.runner: Final[Engine] = make_engine(engine, self.core, self._pc_hooks)
-        self.image: Image | None = None
-        """What `load` was given last."""
+        if strict:
+            if engine not in ("auto", "plain"):
+                raise ValueError(f"a strict run needs the plain engine, not {engine!r}")
+            from emu.debug import strict as watching
+
+            engine = "plain"
+            self.strict = watching.Strict(self, watching.reserve(self.record, chip.data["ram"].end))
+        self.runner = make_engine(engine, self.core, self._pc_hooks)
         self.reset("POR")
 
     @property
@@ -117,6 +165,20 @@ class Machine:
     def is_asleep(self) -> bool:
         """Whether the CPU stands in Idle or Sleep."""
         return self.state.mode != RUN
+
+    @property
+    def hz(self) -> Fraction:
+        """Instruction cycles per second (Fcy) at the present clock setting: 14,745,600 on an e-puck."""
+        return Fraction(self.peripherals.fcy)
+
+    @property
+    def seconds(self) -> float:
+        """Simulated time since power-on in s, at `cycle`."""
+        return self.peripherals.seconds(self.cycle)
+
+    def cycles_in(self, seconds: float | Fraction) -> int:
+        """Whole cycles in so many seconds at the present clock setting, at least 1."""
+        return max(1, int(Fraction(seconds) * self.hz))
 
     @property
     def pc(self) -> int:
@@ -136,6 +198,8 @@ class Machine:
         wires.wake = power.wake
         wires.stall_until = sequencer.hold_until
         wires.trap = self.core.traps.request_flag
+        wires.run = lambda cycles: self.run(cycles=cycles)
+        wires.end_run = self.interrupt
         power.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
         power.wires.power = self._power
         power.wires.restart = self.peripherals.oscillator.wake_tcy
@@ -171,14 +235,18 @@ class Machine:
                     stop = self.stopped("halt")
                 elif state.cycle >= cycle or self._interrupt:
                     break
-                elif state.pc in hooks and self._hit():
-                    stop = self.stopped("breakpoint")
+                elif state.pc in hooks:
+                    stop = self._hit()
+                    if stop is None:
+                        engine.run(cycle)
                 else:
                     engine.run(cycle)
             except Breakpoint as word:
-                stop = Stop("breakpoint", state.pc - 2, state.cycle, str(word))
+                stop = self._explained(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
             except DeviceReset as reset:
                 stop = self._reset_by(reset)
+            except Violation as what:
+                stop = self._explained(Stop("fault", what.pc, state.cycle, str(what)))
             if self._interrupt:
                 break
         if self._interrupt:
@@ -186,15 +254,33 @@ class Machine:
             stop = stop or self.stopped("interrupted")
         return self._arrive() or stop
 
-    def run(self, cycles: int | None = None, until: Callable[[], bool] | int | None = None) -> Stop:
-        """Run until something stops the machine: at most `cycles` Tcy. `until` is a program address, or a condition
-        tested between instructions (slow)."""
+    def run(
+        self,
+        cycles: int | None = None,
+        until: Callable[[], bool] | Place | None = None,
+        *,
+        seconds: float | Fraction | None = None,
+    ) -> Stop:
+        """Run until something stops the machine: at most `cycles` Tcy or `seconds` of simulated time.
+
+        `until` is the name of a function or label, a program address (the run ends with reason "until" at the next
+        arrival there), or a condition tested between instructions (slow). Raises KeyError for an unknown name,
+        ValueError for both limits.
+        """
+        if seconds is not None:
+            if cycles is not None:
+                raise ValueError("give cycles or seconds, not both")
+            cycles = self.cycles_in(seconds)
         limit = NEVER if cycles is None else self.cycle + cycles
         if until is None:
-            return self.run_until(limit) or self.stopped("limit")
-        if isinstance(until, int):
-            return self._run_to(until, limit)
+            return self.advance(limit) or self.stopped("limit")
+        if not callable(until):
+            return self._run_to(self.program_address(until), limit)
+        checkpoint = 0
         while self.cycle < limit:
+            if self.cycle >= checkpoint:
+                checkpoint = self.cycle + CHECKPOINT_CYCLES
+                self.evidence.look(self.cycle, self.record.snapshot())
             stop = self.step()
             if stop is not None:
                 return stop
@@ -202,12 +288,21 @@ class Machine:
                 return self.stopped("until")
         return self.stopped("limit")
 
+    def advance(self, cycle: int) -> Stop | None:
+        """As `run_until`, and able to tell what led to a fault: it remembers where it was now and then."""
+        while True:
+            self.evidence.look(self.cycle, self.record.snapshot())
+            stop = self.run_until(min(cycle, self.cycle + CHECKPOINT_CYCLES))
+            self.evidence.ended = self.record.snapshot()
+            if stop is not None or self.cycle >= cycle:
+                return stop
+
     def _run_to(self, address: int, limit: int) -> Stop:
         """Run to the next arrival at a program address."""
         start = self.cycle
         remove = self.hook_pc(address, lambda: self.cycle > start)
         try:
-            stop = self.run_until(limit)
+            stop = self.advance(limit)
         finally:
             remove()
         if stop is None:
@@ -224,14 +319,16 @@ class Machine:
         try:
             if not self.core.sequencer.boundary(NEVER):
                 stop = self.stopped("halt")
-            elif state.pc in self._pc_hooks and self._hit():
-                stop = self.stopped("breakpoint")
             else:
-                self.core.sequencer.execute()
+                stop = self._hit() if state.pc in self._pc_hooks else None
+                if stop is None:
+                    self.core.sequencer.execute()
         except Breakpoint as word:
-            stop = Stop("breakpoint", state.pc - 2, state.cycle, str(word))
+            stop = self._explained(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
         except DeviceReset as reset:
             stop = self._reset_by(reset)
+        except Violation as what:
+            stop = self._explained(Stop("fault", what.pc, state.cycle, str(what)))
         return self._arrive() or stop
 
     def approach(self, limit: int) -> Stop | None:
@@ -263,20 +360,47 @@ class Machine:
         self.events.kick()
 
     def stopped(self, reason: str, detail: str = "") -> Stop:
-        """A `Stop` for the present state."""
-        return Stop(reason, self.pc, self.cycle, detail)
+        """A `Stop` for the present state; a firmware that sleeps where it must not is a fault."""
+        stop = Stop(reason, self.pc, self.cycle, detail)
+        return self._explained(stop) if reason in ("halt", "limit") and self.is_asleep else stop
 
-    def _hit(self) -> bool:
-        """Call the hooks of the present PC; true if one of them wants to stop, at most once per arrival."""
+    def _explained(self, stop: Stop) -> Stop:
+        """`stop` with its fault, if it is one and there is an image to tell by."""
+        if self.image is None or self.events.quiet:
+            return stop
+        from emu.faults import explained  # most runs end well
+
+        return explained(self, stop)
+
+    def _trapped(self, vector: Vector) -> None:
+        """A trap is about to be entered: handlers that never come back say little, so keep what there was."""
+        if not self.events.quiet:
+            self.evidence.trap = (vector, self.record.snapshot(), self.evidence.began)
+
+    def _hit(self) -> Stop | None:
+        """Call the hooks of the present PC; a `Stop` if one of them wants it, at most once per arrival."""
         here = (self.state.pc, self.state.cycle)
         if self._stopped_at == here:
             self._stopped_at = None
-            return False
+            return None
+        if self.events.quiet:
+            return self.stopped("breakpoint") if self.scout is not None and self.scout() else None
         hit = False
         for hook in list(self._pc_hooks[self.state.pc]):
             hit = bool(hook()) or hit
-        self._stopped_at = here if hit else None
-        return hit
+        if not hit:
+            return None
+        self._stopped_at = here
+        if self._restarted():
+            return self._explained(self.stopped("fault", RESTART))
+        return self.stopped("breakpoint")
+
+    def _restarted(self) -> bool:
+        """Whether the program is at address 0 without a reset. Behind one it is still the same cycle, or the clock has
+        started up meanwhile and no W register has been written."""
+        if not self.stop_on_fault or self.state.pc or self.state.initialised == W15_INITIALISED:
+            return False
+        return self.resets[-1][0] != self.cycle
 
     # Resets
 
@@ -289,6 +413,8 @@ class Machine:
         if cause == "POR":
             ram = self.chip.data["ram"]
             self.record.bytes[ram.start : ram.end] = bytes(ram.size)
+            if self.strict is not None:
+                self.strict.power_on()
         self.core.reset()
         self.peripherals.reset(cause)
         self.events.kick()
@@ -298,6 +424,7 @@ class Machine:
     def _reset_by(self, reset: DeviceReset) -> Stop | None:
         """Carry out a reset the core or a device asked for; a fault, or a loop of resets, ends the run."""
         culprit = self.pc
+        self.evidence.reset = self.record.snapshot() if reset.fault and not self.events.quiet else None
         if reset.fault:
             self.state.cycle += 1
         self.reset(reset.cause)
@@ -305,7 +432,7 @@ class Machine:
         if not self.stop_on_fault or not (reset.fault or loop):
             return None
         detail = reset.detail if reset.fault else f"reset loop: {reset.detail}, {RESET_LOOP} times in a row"
-        return Stop("fault", culprit, self.cycle, detail)
+        return self._explained(Stop("fault", culprit, self.cycle, detail))
 
     def _loops(self, cause: str, culprit: int) -> bool:
         """Whether the device was reset RESET_LOOP times for the same reason, each soon after the one before."""
@@ -333,43 +460,8 @@ class Machine:
                 for index, word in enumerate(block.words):
                     self.program.put(block.base + 2 * index, word)
         self.reset("POR")
-
-    def address_of(self, place: str | int) -> int:
-        """Data address of a register (`U1STA`, `W3`) or of a variable of the loaded image by name, or the address
-        itself. Raises KeyError for an unknown name."""
-        if not isinstance(place, str):
-            return place
-        sfr = self.chip.sfrs.get(place) or self.chip.sfrs.get(re.sub(r"^[Ww](?=\d+$)", "WREG", place))
-        if sfr is not None:
-            return sfr.address
-        symbol = self.image.symbols.find(place) if self.image is not None else None
-        if symbol is None or symbol.space not in ("data", "absolute"):
-            raise KeyError(f"there is no register or variable {place!r}")
-        return symbol.address
-
-    def read(self, place: str | int, size: int = 2) -> int:
-        """Data space as an instruction reads it, side effects included."""
-        return self.core.data.read(self.address_of(place), size)
-
-    def write(self, place: str | int, value: int, size: int = 2) -> None:
-        """Data space as an instruction writes it, side effects included."""
-        self.core.data.write(self.address_of(place), value, size)
-
-    def peek(self, place: str | int, size: int = 2) -> int:
-        """Data space without side effects. An odd address with size 2 reads the word that holds it."""
-        address = self.address_of(place)
-        word = self.bus.peek(address & ~1) if address < SFR_END else self.record.u16[address >> 1]
-        if size == 2:
-            return word
-        return word >> 8 if address & 1 else word & 0xFF
-
-    def poke(self, place: str | int, value: int, size: int = 2) -> None:
-        """Set what is stored in data space, telling nobody."""
-        address = self.address_of(place)
-        if size == 2:
-            self.record.u16[address >> 1] = value & 0xFFFF
-        else:
-            self.record.u8[address] = value & 0xFF
+        if self._no_restart is None:
+            self._no_restart = self.hook_pc(0, self._restarted)
 
     # State
 
@@ -384,44 +476,53 @@ class Machine:
 
     def restore(self, state: bytes) -> None:
         """Continue from a snapshot of an equally wired machine, whatever engine made it. Raises ValueError."""
+        self.put_back(state)
+        self._stopped_at = None
+        self.evidence.trap = None
+
+    def put_back(self, state: bytes) -> None:
+        """The record alone, of this very machine and run; what else `restore` forgets is kept. Raises ValueError."""
         flash = self.program.flash.tobytes()
         self.record.restore(state)
         if self.program.flash.tobytes() != flash:
             self.program.announce_all()
         self.peripherals.restored()
-        self._stopped_at = None
+
+    def hold(self) -> Callable[[], None]:
+        """Note what is not in the record; returns how to put it back as it was."""
+        stopped_at, last_reset, interrupt, resets = (
+            self._stopped_at, self._last_reset, self._interrupt, list(self.resets),
+        )  # fmt: skip
+        waiting = [(uart.line.backlog, list(uart.line.backlog)) for uart in self.uart.values()]
+
+        def put_back() -> None:
+            self._stopped_at, self._last_reset, self._interrupt = stopped_at, last_reset, interrupt
+            self.resets[:] = resets
+            for backlog, frames in waiting:
+                backlog.clear()
+                backlog.extend(frames)
+
+        return put_back
 
     # Hooks
 
-    def hook_pc(self, address: int, hook: PcHook) -> Callable[[], None]:
-        """Call `hook` before the instruction at `address`; a true result stops the run. Returns how to remove it."""
+    def hook_pc(self, place: Place, hook: PcHook) -> Callable[[], None]:
+        """Call `hook` before the instruction at `place`, the name of a function or label or a program address; a true
+        result stops the run. Returns how to remove it. Raises KeyError for an unknown name, ValueError for an odd
+        address."""
+        address = self.program_address(place)
         self._pc_hooks.setdefault(address, []).append(hook)
         self.runner.forget()
+        removed = False
 
         def remove() -> None:
+            nonlocal removed
+            if removed:
+                return
+            removed = True
             self._pc_hooks[address].remove(hook)
             if not self._pc_hooks[address]:
                 del self._pc_hooks[address]
             self.runner.forget()
 
         return remove
-
-    def hook_sfr(self, place: str | int, hook: SfrHook) -> None:
-        """Call hook(is_write, word) after every access of an instruction to a register."""
-        word = self.address_of(place) >> 1
-        bus = self.bus
-        read, written = bus.on_read[word] or bus.compute[word], bus.on_write[word]
-
-        def on_read() -> int:
-            value = read() if read is not None else self.record.u16[word]
-            hook(False, value)
-            return value
-
-        def on_write(old: int, new: int, lanes: int) -> None:
-            if written is not None:
-                written(old, new, lanes)
-            hook(True, self.record.u16[word])
-
-        bus.on_read[word], bus.on_write[word] = on_read, on_write
-        bus.watched.add(word)
-        self.runner.forget()

@@ -1,8 +1,9 @@
-"""Output files that appear whole or not at all."""
+"""Output files that appear whole or not at all; `-` is standard output."""
 
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,8 +15,12 @@ from typing import TextIO
 def whole_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     """A text file written beside `path` and renamed to it when the block ends without an exception.
 
-    Pipes and devices are written directly. Raises OSError as `open` does.
+    Pipes and devices are written directly, and so is standard output, which `-` means. Raises OSError as `open` does.
     """
+    if path == "-":
+        yield sys.stdout
+        sys.stdout.flush()
+        return
     target = Path(path)
     if target.exists() and not target.is_file():
         with target.open("w", encoding="utf-8") as stream:

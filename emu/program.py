@@ -48,9 +48,16 @@ class ProgramMemory:
         self.eeprom_latch, _ = words("program.eeprom_latch", "H", EEPROM_LATCHES)
         self.changed: Final[list[Callable[[int, int], None]]] = []
         """Called as fn(start, end) after flash words in [start, end) changed: decoded or translated code is stale."""
-        self.on_table_write: Callable[[int], None] | None = None
-        """Called with the address of each table write (NVMADR capture, dspic30f6014a.md §16)."""
+        self._u16: Final = record.u16
+        self.captured_in: tuple[int, int] | None = None
+        """Data addresses of the registers that catch the address of each table write, low word and upper byte
+        (dspic30f6014a.md §16)."""
         self.erase()
+
+    @property
+    def eeprom_range(self) -> tuple[int, int]:
+        """First address of data EEPROM, and the one behind it."""
+        return self._eeprom.start, self._eeprom.end
 
     def erase(self) -> None:
         """Everything as from the factory: all ones, EEPROM and latches too."""
@@ -124,8 +131,9 @@ class ProgramMemory:
         else:
             index = address >> 1 & FLASH_LATCHES - 1
             self.flash_latch[index] = self.flash_latch[index] & ~bits & ERASED_WORD | value & bits
-        if self.on_table_write is not None:
-            self.on_table_write(address)
+        if self.captured_in is not None:
+            low, upper = self.captured_in
+            self._u16[low >> 1], self._u16[upper >> 1] = address & 0xFFFF, address >> 16 & 0xFF
 
     def announce_all(self) -> None:
         """Tell the listeners that any flash word may have changed (a snapshot was put back)."""

@@ -48,7 +48,7 @@ class Session:
         links: dict[int, Any] | None = None,
     ) -> None:
         """`limit`: last cycle. `realtime`: no faster than the wall clock. `advance(cycle)` replaces the machine's
-        `run_until`, for traces. `links`: what lies between a UART's pins and its port, by UART number: `on_byte` and
+        `run_until`, for traces. `links`: what lies between a UART's pins and its port, by UART number: `listen` and
         `feed` like the UART's own."""
         self.machine: Final = machine
         self.ports: Final = ports
@@ -58,13 +58,12 @@ class Session:
         self._record: Final = record
         self._realtime: Final = realtime
         self._hz: Final = machine.peripherals.fcy
-        self._advance: Final = advance or machine.run_until
+        self._advance: Final = advance or machine.advance
         self._links: Final = {number: (links or {}).get(number, machine.uart[number]) for number in ports}
         self._sent: Final = {number: bytearray() for number in ports}
         self._start = 0.0
         self._first_cycle: Final = machine.cycle
-        for number in ports:
-            self._links[number].on_byte = self._collector(number)
+        self._removals: Final = [self._links[number].listen(self._collector(number)) for number in ports]
 
     def run(self) -> tuple[Stop, float]:
         """Run to the end; returns how it ended and the seconds of host time it took."""
@@ -77,6 +76,8 @@ class Session:
                     self.machine.uart[number].drain()
             self._show_output()
         finally:
+            for remove in self._removals:
+                remove()
             signal.setitimer(signal.ITIMER_REAL, 0)
             for number, handler in earlier:
                 signal.signal(number, handler)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,6 +15,11 @@ from emu.dspic30f.engines import NAMES, make_engine
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--vectors", default=None, help="folder with encodings.csv and semantics*.jsonl.gz to run")
     parser.addoption("--engine", default=None, help="run what names no engine with this one only")
+
+
+def pytest_configure() -> None:
+    """The compiler checks itself in all tests, in the programs they start as well."""
+    os.environ["DSPIC_VERIFY_MACHINE"] = "1"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -6,6 +6,7 @@ has no effect here. Starts nothing and reads no file except @response files.
 
 from __future__ import annotations
 
+import os
 import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,15 +27,21 @@ C compiler, assembler and linker for the dsPIC30F6014A, used like gcc.
   -ffreestanding        no assumptions about library functions; main need not return int
   -fsingle-precision-constant   unsuffixed floating constants are float
   -mlarge-code          two-word calls, which reach all of the flash (default -msmall-code: RCALL, +-32 K words)
+  -ffile-prefix-map=OLD=NEW   paths that begin with OLD are recorded as NEW (debug information and __FILE__)
+  -mlarge-data          variables may lie anywhere in RAM; those that must be near say so (default -msmall-data:
+                        objects up to 64 bytes are near); -mlarge-scalar and -mlarge-aggregate mean the same here
   -fstack-check         functions with a frame above 8 bytes probe SPLIM on entry
+  -fverify-machine      check the code after every pass of the back end (also DSPIC_VERIFY_MACHINE=1)
   -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000), at the place that does it
   -finstrument-functions  call __cyg_profile_func_enter and _exit
-  -I -D -U -include -isystem -iquote -std= -W... -w -pedantic   as in gcc
+  -I -D -U -include -isystem -iquote -std= -W... -w -pedantic   as in gcc; without -std= the language is gnu17
+                        with XC16's meaning of `inline` (gnu89: it defines the function)
   -MD -MMD -MF -MT -MQ -MP -M -MM                               dependency files, as in gcc
   -L DIR -l NAME        libraries; the run-time library is always searched last
   -nostdlib -nostartfiles -nodefaultlibs                        leave out run-time library, crt0
   -Map FILE             link map;  -Wl,OPTION and -Xlinker OPTION hand options to the linker
-  -Wa,OPTION            accepted for compatibility
+  -T FILE               accepted for the device's own linker script p30F6014A.gld, whose memory map is built in
+  -Wa,OPTION            accepted for compatibility, as are -msfr-warn= -merrata= -msmart-io= -omf=elf
   -j N                  parallel front-end jobs (default: one per core)
   -save-temps           keep PROGRAM.ll and PROGRAM.s beside the output
   -v  --version  --help
@@ -57,7 +64,7 @@ CLANG_FLAGS = {
     "-fcolor-diagnostics", "-fno-color-diagnostics", "-fdiagnostics-color", "-fno-diagnostics-color",
     "-fdiagnostics-color=always", "-fdiagnostics-color=never", "-fno-delete-null-pointer-checks",
     "-fno-signed-zeros", "-ffinite-math-only", "-fstrict-flex-arrays", "-fdollars-in-identifiers",
-    "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
+    "-ffinite-loops", "-fno-finite-loops", "-fno-caret-diagnostics", "-fno-optimize-sibling-calls",
     "-fno-strict-overflow", "-fstrict-overflow", "-ffp-contract=off", "-ffp-contract=on", "-ffp-contract=fast",
     "-dM", "-dD", "-dI", "-finstrument-functions",
 }  # fmt: skip
@@ -70,13 +77,21 @@ IGNORED_FLAGS = {
     "-pipe", "-fno-short-double", "-ffunction-sections", "-fdata-sections", "-fno-function-sections",
     "-fno-data-sections", "-fomit-frame-pointer", "-fno-omit-frame-pointer", "-fno-exceptions", "-fno-unwind-tables",
     "-fno-asynchronous-unwind-tables", "-fno-stack-protector", "-mno-eds-warn", "-fno-ident", "-fno-pic", "-fno-pie",
-    "-msmart-io=0", "-msmart-io=1", "-omf=elf", "-mdfp", "-legacy-libc", "-static", "-fuse-linker-plugin", "-fno-plt",
-    "-mconst-in-code", "-msmall-data", "-mlarge-data", "-mlarge-scalar", "-fxc16-attributes",
+    "-mdfp", "-legacy-libc", "-no-legacy-libc", "-static", "-fuse-linker-plugin", "-fno-plt", "-mconst-in-code",
+    "-fxc16-attributes",
 }  # fmt: skip
+# Smart I/O links only what a format string needs; ours does so by itself. Errata are those of other silicon, and
+# warnings about SFR accesses are of no use where every register is `volatile`.
+IGNORED_PREFIXES = ("-msmart-io=", "-msfr-warn=", "-merrata=", "-mreserve=")
+LARGE_DATA = {"-mlarge-data", "-mlarge-scalar", "-mlarge-aggregate"}
+SMALL_DATA = {"-msmall-data", "-msmall-scalar", "-msmall-aggregate"}
 DEVICES = {"30F6014A", "30f6014a", "dsPIC30F6014A", "dspic30f6014a"}
 REFUSED = {
     "-fshort-double": "double is always 64-bit IEEE here; there is no 32-bit double",
     "-mconst-in-data": "constants live in program memory and are read through the PSV window",
+    "-omf=coff": "there is no COFF output; Microchip's tools read our ELF (-omf=elf)",
+    "-mauxflash": "this device has no auxiliary flash",
+    "-mpa": "procedural abstraction is not done here; -Os is the smallest code",
     "-shared": "there are no shared libraries on this device",
     "-fpic": "position-independent code is not supported",
     "-fPIC": "position-independent code is not supported",
@@ -110,8 +125,10 @@ class CcOptions:
     lto: bool | None = None
     emit_llvm: bool = False
     stack_check: bool = False
+    verify: bool = field(default_factory=lambda: os.environ.get("DSPIC_VERIFY_MACHINE") == "1")
     single_constants: bool = False
     large_code: bool = False
+    large_data: bool = False
     clang: list[str] = field(default_factory=list)
     dependency: list[str] = field(default_factory=list)
     linker: list[str] = field(default_factory=list)
@@ -124,6 +141,13 @@ class CcOptions:
     save_temps: bool = False
     verbose: bool = False
     action: str = "compile"
+
+    @property
+    def prefix_map(self) -> list[tuple[str, str]]:
+        """What debug information has instead of the beginning of paths: (old, new), the last that fits counts."""
+        maps = ("-ffile-prefix-map=", "-fdebug-prefix-map=")
+        pairs = [word.partition("=")[2].partition("=") for word in self.clang if word.startswith(maps)]
+        return [(old, new) for old, _, new in pairs]
 
     @property
     def whole_program(self) -> bool:
@@ -236,10 +260,18 @@ def _code_generation(options: CcOptions, word: str) -> bool:
         options.debug = word != "-g0"
     elif word in ("-flto", "-fno-lto"):
         options.lto = word == "-flto"
+    elif word in ("-fverify-machine", "-fno-verify-machine"):
+        options.verify = word == "-fverify-machine"
     elif word in ("-fstack-check", "-fno-stack-check"):
         options.stack_check = word == "-fstack-check"
     elif word in ("-mlarge-code", "-msmall-code"):
         options.large_code = word == "-mlarge-code"
+    elif word in LARGE_DATA | SMALL_DATA:
+        options.large_data = word in LARGE_DATA
+    elif word == "-omf=elf" or word.startswith(IGNORED_PREFIXES):
+        pass
+    elif word.startswith("-omf="):
+        raise ToolError(f"'{word}': the output format is ELF (-omf=elf)")
     elif word == "-fsingle-precision-constant":
         options.single_constants = True
     elif word.startswith(("-mcpu=", "-p")) and word not in ("-pedantic", "-pedantic-errors", "-pipe"):
@@ -260,6 +292,8 @@ def _linking(options: CcOptions, word: str, words: _Words) -> bool:
         _linker_words(options, word[4:].split(","))
     elif word == "-Xlinker":
         _linker_words(options, [words.value(word)])
+    elif (script := _joined(word, "-T", words)) is not None:
+        _linker_words(options, [f"--script={script}"])
     elif word.startswith("-Wa,"):
         pass
     elif (directory := _joined(word, "-L", words)) is not None:

@@ -11,13 +11,18 @@ import os
 import shlex
 import subprocess
 import sys
+import tempfile
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 
+from toolchain import config_pragma, name_case
 from toolchain.asm_registers import REFUSED, respell
 from toolchain.cc_options import CcOptions, Input
 from toolchain.errors import ToolError
+from toolchain.record_shapes import LAYOUT_FLAGS
 
 INCLUDE_DIR = Path(__file__).parent / "include"
 
@@ -26,17 +31,19 @@ TARGET_FLAGS = [
     "-fno-unwind-tables",
     "-fno-asynchronous-unwind-tables",
     "-fno-stack-protector",
+    "-fno-finite-loops",  # a loop that only waits is not deleted; XC16's programs have such loops
     "-fno-vectorize",
     "-fno-slp-vectorize",
 ]
 # Plain char is signed (abi-elf.md §1.1; MSP430 says unsigned), wchar_t is unsigned short.
-# A pragma that nobody understands (XC16's `#pragma config`) must not pass in silence.
+# A pragma that nobody understands must not pass in silence; the warning also tells that there is a `#pragma config`.
 # `space(ymemory), far` are two section names to clang; it keeps the first. Notes about our macros are of no use.
 LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas", "-Wno-section",
+                  "-Wno-atomic-alignment",
                   "-fmacro-backtrace-limit=1"]  # fmt: skip
 # Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
 ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp2", "exp2f", "exp10", "ldexp",
-                    "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf"]  # fmt: skip
+                    "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
 # abi-elf.md §2.9 predefined macros; __XC16__ and __C30__ stay undefined, they select Microchip's attribute spellings.
 PREDEFINED = ["__dsPIC30F6014A__", "__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_CODEGUARD__",
               "__HAS_5VOLTS__"]  # fmt: skip
@@ -50,10 +57,11 @@ class CompileError(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """One clang run: `arguments` without the program, the input it is about, and whether it ended well."""
+    """One clang run: `arguments` without the program, and the input it is about."""
 
     arguments: list[str]
     source: Path
+    printed: Path | None = None  # file for what it says on stdout
 
 
 def clang_program() -> list[str]:
@@ -80,9 +88,13 @@ def front_end_flags(options: CcOptions) -> list[str]:
     if options.single_constants:
         flags += ["-Xclang", "-cl-single-precision-constant"]
     if options.debug:
-        flags += ["-g", "-gdwarf-2"]
+        # Where this package and clang are installed is nothing an image should depend on.
+        own = ((INCLUDE_DIR, "toolchain/include"), (builtin_include_dir(), "clang/include"))
+        flags += ["-g", "-gdwarf-2", *(f"-fdebug-prefix-map={path}={name}" for path, name in own)]
     if any(word.startswith("-fsanitize=") for word in options.clang):
         flags.append("-fsanitize-trap=all")  # there is no sanitizer run-time library
+    if not any(word.startswith("-std=") or word == "-ansi" for word in options.clang):
+        flags.append("-fgnu89-inline")  # XC16 takes C for gnu89, where plain `inline` defines the function
     flags += options.clang
     return [*flags, "-isystem", str(INCLUDE_DIR), "-isystem", str(builtin_include_dir())]
 
@@ -104,8 +116,9 @@ def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
 def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
     """Job that turns one C file into unoptimised IR text carrying the level's attributes."""
     arguments = [*front_end_flags(options), *_dependency_flags(options, item)]
-    arguments += ["-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S", "-x", item.language, str(item.path)]
-    return Job([*arguments, "-o", str(output)], item.path)
+    arguments += [*LAYOUT_FLAGS, "-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S"]
+    arguments += ["-x", item.language, str(item.path)]
+    return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"))
 
 
 def repaired(ir: bytes) -> bytes:
@@ -129,23 +142,45 @@ def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
 def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
     """Job that runs clang's middle end once over IR."""
     passed = [flag for flag in options.clang if flag.startswith(("-funroll", "-fno-unroll", "-ffast", "-fno-inline"))]
+    if options.level != "2":  # a table of 256 words for a loop of eight turns is not what these levels are for
+        passed += ["-mllvm", "-disable-loop-idiom-hashrecognize"]
     arguments = [*TARGET_FLAGS, CLANG_LEVEL[options.level], *passed, "-Wno-override-module", "-x", "ir"]
     return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
 
 
-def _run_respelt(program: list[str], arguments: list[str]) -> subprocess.CompletedProcess[bytes]:
-    """Once more, by way of preprocessed text in which inline assembly names registers as the front end does."""
+def _run_changed(
+    program: list[str], arguments: list[str], change: Callable[[str], str]
+) -> subprocess.CompletedProcess[bytes]:
+    """Once more, by way of preprocessed text that `change` puts into the front end's words."""
     *options, _, _, source, _, output = arguments  # ... -x LANGUAGE SOURCE -o OUTPUT
-    text = Path(output).with_suffix(".respelt.i")
+    text = Path(output).with_suffix(".changed.i")
     emit = {"-emit-llvm", "-S"}
     first = [option for option in options if option not in emit]
     made = subprocess.run([*program, *first, "-E", source, "-o", str(text)], capture_output=True, check=False)
     if made.returncode:
         return made
-    text.write_text(respell(text.read_text(errors="surrogateescape")), errors="surrogateescape")
+    text.write_text(change(text.read_text(errors="surrogateescape")), errors="surrogateescape")
     second = [*without_preprocessing(options), "-Wno-unused-command-line-argument"]
     second += ["-x", "cpp-output", str(text), "-o", output]
     return subprocess.run([*program, *second], capture_output=True, check=False)
+
+
+def _run_job(program: list[str], arguments: list[str]) -> subprocess.CompletedProcess[bytes]:
+    """One clang run, and another for a source that says what XC16 knows and the front end does not."""
+    result = subprocess.run([*program, *arguments], capture_output=True, check=False)
+    if result.returncode and name_case.MISSING.search(result.stderr) and "-ivfsoverlay" not in arguments:
+        with tempfile.TemporaryDirectory(prefix="dspic-names-") as folder:
+            overlay = Path(folder) / "overlay.yaml"
+            overlay.write_text(name_case.overlay(arguments))
+            return _run_job(program, ["-ivfsoverlay", str(overlay), *arguments])
+    changes: list[Callable[[str], str]] = []
+    if "-emit-llvm" in arguments and config_pragma.PRESENT in result.stderr:
+        changes.append(config_pragma.applied)
+    if result.returncode and REFUSED.search(result.stderr):
+        changes.append(respell)
+    if changes:
+        return _run_changed(program, arguments, lambda text: reduce(lambda t, change: change(t), changes, text))
+    return result
 
 
 def without_preprocessing(options: list[str]) -> list[str]:
@@ -167,22 +202,22 @@ def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
     Raises CompileError after the last job when any of them failed.
     """
     program = clang_program()
-    colour = ["-fdiagnostics-color=always"] if os.isatty(2) else []
+    colour = ["-fdiagnostics-color=always"] if os.isatty(2) and not os.environ.get("NO_COLOR") else []
 
     if show:
         for job in jobs:
             print(shlex.join([*program, *job.arguments]), file=sys.stderr)
 
     def run(job: Job) -> subprocess.CompletedProcess[bytes]:
-        result = subprocess.run([*program, *colour, *job.arguments], capture_output=True, check=False)
-        if result.returncode and REFUSED.search(result.stderr):
-            return _run_respelt([*program, *colour], job.arguments)
-        return result
+        return _run_job([*program, *colour], job.arguments)
 
     with ThreadPoolExecutor(max_workers=parallel or os.cpu_count() or 1) as pool:
         results = list(pool.map(run, jobs))
-    for result in results:
+    for job, result in zip(jobs, results, strict=True):
         sys.stderr.write(result.stderr.decode(errors="replace").replace("zig: ", "cc: "))
-        sys.stdout.write(result.stdout.decode(errors="replace"))
+        if job.printed is None:
+            sys.stdout.write(result.stdout.decode(errors="replace"))
+        else:
+            job.printed.write_bytes(result.stdout)
     if any(result.returncode != 0 for result in results):
         raise CompileError

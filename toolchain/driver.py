@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 EXIT_DONE, EXIT_C_ERRORS, EXIT_BAD_INPUT = 0, 1, 2
 IR_SOURCES = {"c", "cpp-output"}
 STANDARD_OUTPUT = Path("-")
+MAX_INVENTIONS = 4  # runs of the middle end; each forbids what the one before made up
 
 
 def main(argv: list[str]) -> int:
@@ -37,7 +38,10 @@ def main(argv: list[str]) -> int:
             _print_version()
         else:
             with tempfile.TemporaryDirectory(prefix="dspic-cc-") as scratch:
-                _run(options, Path(scratch))
+                try:
+                    _run(options, Path(scratch))
+                except ToolError as error:
+                    raise _explained(options, error, Path(scratch)) from error
     except CompileError:
         return EXIT_C_ERRORS
     except RecursionError:
@@ -48,6 +52,21 @@ def main(argv: list[str]) -> int:
             print(finding if "error:" in finding else f"error: {finding}", file=sys.stderr)
         return EXIT_BAD_INPUT
     return EXIT_DONE
+
+
+def _explained(options: CcOptions, error: ToolError, scratch: Path) -> ToolError:
+    """`error` with source lines, found by compiling once more with debug information where it helps."""
+    from toolchain.explain import concerns_generated_code, with_places
+
+    if not concerns_generated_code(error) or not any(item.language in IR_SOURCES for item in options.inputs):
+        return error
+    again = replace(options, debug=True, clang=[*options.clang, "-w"], dependency=[], map_file=None, verbose=False)
+    if not options.debug and options.stage != "compile":
+        try:
+            _run(replace(again, output=scratch / "again.elf", save_temps=False), scratch)
+        except ToolError as found:
+            error = found
+    return with_places(error, lambda: (ir.decode() for ir in _front_end(again, scratch).values()))
 
 
 def _print_version() -> None:
@@ -87,6 +106,7 @@ def _preprocess(options: CcOptions) -> None:
 def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     """Unoptimised IR of every input that has any; all C files are compiled before an error ends the run."""
     from toolchain.clang import ir_job, repaired, run_jobs
+    from toolchain.record_shapes import mark
     from toolchain.whole_program import is_bitcode
 
     sources = [item for item in options.inputs if item.language in IR_SOURCES]
@@ -96,7 +116,8 @@ def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     modules: dict[Input, bytes] = {}
     for item in options.inputs:
         if item in targets:
-            modules[item] = repaired(targets[item].read_bytes())
+            layouts = targets[item].with_suffix(".layouts").read_text(errors="replace")
+            modules[item] = mark(repaired(targets[item].read_bytes()), layouts)
         elif item.language in ("ir", "object"):
             content = read_bytes(item.path)
             if item.language == "ir" or is_bitcode(content):
@@ -105,15 +126,31 @@ def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
 
 
 def _optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
-    """One run of clang's middle end over a module (text or bitcode)."""
-    from toolchain.clang import optimise_job, run_jobs
+    """Clang's middle end over a module (text or bitcode).
 
-    handle, before = tempfile.mkstemp(suffix=".ll", dir=scratch)
-    os.write(handle, ir)
-    os.close(handle)
-    after = Path(before).with_suffix(".opt.ll")
-    run_jobs([optimise_job(options, Path(before), after)], 1, options.verbose)
-    return after.read_text()
+    It may recognise a loop as a library function. When the run-time library has no such function, it must not, and
+    runs once more.
+    """
+    from toolchain.clang import optimise_job, run_jobs
+    from toolchain.whole_program import functions_declared, without_builtins
+
+    for _ in range(MAX_INVENTIONS):
+        handle, before = tempfile.mkstemp(suffix=".ll", dir=scratch)
+        os.write(handle, ir)
+        os.close(handle)
+        after = Path(before).with_suffix(".opt.ll")
+        run_jobs([optimise_job(options, Path(before), after)], 1, options.verbose)
+        text = after.read_text()
+        invented = functions_declared(text) - functions_declared(ir.decode(errors="replace"))
+        if not options.runtime or not invented:
+            break
+        from toolchain.runtime_archive import defined_names, library
+
+        absent = invented - {name[1:] for name in defined_names(library(options.jobs))}
+        if not absent:
+            break
+        ir = without_builtins(ir, absent)
+    return text
 
 
 def _to_assembly(options: CcOptions, ir_text: str) -> str:
@@ -136,7 +173,8 @@ def _assemble(options: CcOptions, text: str, name: str, relax: bool) -> bytes:
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
     folders += [b for a, b in zip(options.clang, options.clang[1:], strict=False) if a == "-I"]
-    obj, messages = assemble(text, name, Options(include=folders, relax=relax, debug=options.debug))
+    chosen = Options(include=folders, relax=relax, debug=options.debug, prefix_map=options.prefix_map)
+    obj, messages = assemble(text, name, chosen)
     for message in messages:
         print(message, file=sys.stderr)
     return object_bytes(obj)
@@ -192,6 +230,7 @@ def _output(options: CcOptions, item: Input, suffix: str) -> Path:
 
 def _compile_program(options: CcOptions, scratch: Path) -> Program:
     """Everything the linker needs: native objects in command-line order, merged C code last, archives."""
+    from toolchain import polled_flags
     from toolchain.cc_link import Program, find_library, output_path
     from toolchain.runtime_archive import library
 
@@ -204,7 +243,11 @@ def _compile_program(options: CcOptions, scratch: Path) -> Program:
             program.objects.append((str(item.path), _object(options, item, modules, scratch)))
     program.archives += [archive for name in options.libraries if (archive := find_library(options, name))]
     if modules and options.whole_program:
-        ir_text = _optimise(options, _merge(modules, program), scratch)
+        merged = _merge(modules, program)
+        if "-w" not in options.clang:
+            for finding in polled_flags.findings(merged.decode()):
+                print(finding, file=sys.stderr)
+        ir_text = _optimise(options, merged, scratch)
         assembly = _to_assembly(options, ir_text)
         if options.save_temps:
             base = output_path(options)

@@ -15,10 +15,23 @@ VECTOR_FUNCTIONS = frozenset(
 )
 """C names that the linker puts into the vector tables."""
 
+IRQ_PREFIX = {"irq": "", "altirq": "Alt"}
+"""What `interrupt(irq(N))` says -> prefix of the handler's name."""
+FIRST_INTERRUPT = 8  # vectors before are traps (abi-elf.md §2.7)
+
+
+def irq_name(number: int) -> str:
+    """Name of the vector of an interrupt number. Raises IndexError for one that the chip has no vector for."""
+    if number < 0:
+        raise IndexError(number)
+    return VECTORS[number + FIRST_INTERRUPT].name
+
+
 _DEFINITION = re.compile(r'^define [^@\n]*@("[^"]+"|[\w$.]+)\(', re.MULTILINE)
 _ANNOTATIONS = re.compile(r"^@llvm\.global\.annotations = .*$", re.MULTILINE)
 _ANNOTATED = re.compile(r"\{ ptr @([\w$.]+), ptr (@[\w$.]+),")
 _STRING = re.compile(r'^(@[\w$.]+) = [^\n]*c"interrupt\\00"', re.MULTILINE)
+_NUMBERED = re.compile(r'^(@[\w$.]+) = [^\n]*c"(irq|altirq):([^"]*)\\00"', re.MULTILINE)
 
 
 def check(ir_text: str) -> None:
@@ -27,6 +40,8 @@ def check(ir_text: str) -> None:
     annotations = _ANNOTATIONS.search(ir_text)
     pairs = _ANNOTATED.findall(annotations[0]) if annotations else []
     handlers = {function for function, mark in pairs if mark in marks}
+    numbers = {mark: text for mark, _, text in _NUMBERED.findall(ir_text)}
+    numbered = {function: numbers[mark] for function, mark in pairs if mark in numbers}
     defined = {name.strip('"') for name in _DEFINITION.findall(ir_text)}
     findings = [
         f"error: function '{name}' has the name of an interrupt vector but is not an interrupt function "
@@ -36,10 +51,23 @@ def check(ir_text: str) -> None:
     findings += [
         f"error: interrupt function '{name}' does not have a vector's name, so nothing would call it "
         f"(names look like {_nearest(name)})"
-        for name in sorted((defined & handlers) - VECTOR_FUNCTIONS)
+        for name in sorted((defined & handlers) - VECTOR_FUNCTIONS - set(numbered))
+    ]
+    findings += [
+        f"error: interrupt function '{name}': irq({number}) is not an interrupt number of this chip "
+        f"(expected 0 to {len(VECTORS) - FIRST_INTERRUPT - 1})"
+        for name, number in sorted(numbered.items())
+        if not _is_irq(number)
     ]
     if findings:
         raise ToolError.of(findings)
+
+
+def _is_irq(text: str) -> bool:
+    try:
+        return bool(irq_name(int(text, 0)))
+    except (ValueError, IndexError):
+        return False
 
 
 def _nearest(name: str) -> str:

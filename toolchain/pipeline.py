@@ -13,13 +13,16 @@ from typing import Protocol
 from .ir.model import BlockAddress, ConstAgg, ConstExpr, Function, Module, UnsupportedError, Value
 from .ir.read import read_module
 from .lower import (
+    bindings,
     branches,
     cfg,
     combine,
     constants,
+    constructors,
     data,
     emit,
     frame,
+    holds,
     isr,
     legalize,
     peephole,
@@ -31,10 +34,12 @@ from .lower import (
     tails,
 )
 from .lower.debuginfo import DebugInfo
-from .lower.dwarf import DwarfWriter, FunctionInfo
+from .lower.dwarf import DwarfWriter
 from .lower.mir import MFunction
 from .lower.names import block_label, symbol
+from .lower.scopes import FunctionInfo
 from .lower.variables import Ranges
+from .lower.verify import Verifier
 
 
 class CompileOptions(Protocol):
@@ -44,6 +49,8 @@ class CompileOptions(Protocol):
     debug: bool
     stack_check: bool
     large_code: bool
+    large_data: bool
+    verify: bool  # the machine form, after every pass
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,8 @@ class Options:
     debug: bool = False
     stack_check: bool = False
     large_code: bool = False
+    large_data: bool = False
+    verify: bool = True
 
 
 @dataclass
@@ -67,6 +76,7 @@ class Context:
     interrupt: str
     taken: set[str]  # blocks whose address somebody in the module takes
     probe: bool  # check the stack limit at entry
+    notes: set[str]  # its annotations
     machine: MFunction | None = None
 
     @property
@@ -98,6 +108,7 @@ def _legalize(c: Context) -> None:
 def _select(c: Context) -> None:
     c.machine = select.Selector(c.module, c.function, c.for_size, c.taken).run()
     c.machine.interrupt = c.interrupt
+    c.machine.preserved, c.machine.preprologue = isr.preserved(c.notes), isr.preprologue(c.notes)
     c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
 
 
@@ -113,7 +124,7 @@ def _schedule(c: Context) -> None:
 
 def _combine(c: Context) -> None:
     if c.options.level != "0":
-        combine.combine(c.function)
+        combine.combine(c.function, c.for_size)
 
 
 def _returns(c: Context) -> None:
@@ -127,7 +138,7 @@ def _tails(c: Context) -> None:
 
 
 def _allocate(c: Context) -> None:
-    c.machine = regalloc.allocate(c.m, c.for_size)
+    c.machine = regalloc.allocate(c.m, c.for_size, c.options.verify)
 
 
 FUNCTION_PASSES = [
@@ -151,6 +162,7 @@ FUNCTION_PASSES = [
     Pass("tails", _tails, ("framed",)),
     Pass("branches", lambda c: branches.run(c.m, c.options.level != "0"), ("framed",), ("laid-out",)),
     Pass("returns", _returns, ("laid-out",)),
+    Pass("holds", lambda c: holds.run(c.m), ("laid-out",)),
 ]
 
 
@@ -194,7 +206,7 @@ class LineRows:
     def __init__(self, info: DebugInfo, f: Function, name: str) -> None:
         self.info = info
         self.name = name
-        self.last: tuple[str, int] | None = None
+        self.last: tuple[str, int, str, str] | None = None
         self.rows: list[tuple[str, str, int]] = []
         assert f.dbg is not None
         line = info.number(f.dbg, "scopeLine") or info.number(f.dbg, "line")
@@ -203,9 +215,13 @@ class LineRows:
     def mark(self, ref: str | None) -> str:
         """Label line to put before an instruction that starts a new row, or ""."""
         position = self.info.position(ref)
-        if position is None or position == self.last or ref is None:
+        if position is None or ref is None:
             return ""
-        self.last = position
+        node = self.info.node(ref)
+        place = (*position, node.get("scope", ""), node.get("inlinedAt", ""))
+        if place == self.last:
+            return ""
+        self.last = place
         label = f".Lrow{self.name}_{len(self.rows)}"
         self.rows.append((label, ref, position[1]))
         return f"{label}:"
@@ -222,9 +238,14 @@ def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
     for record in f.dbg_records:
         slot = m.slot_of.get(id(record.value))
         if record.kind == "dbg_declare" and slot is not None:
-            o = m.frame[slot]
-            out.append((record.variable, o.fixed if o.fixed is not None else o.offset + m.locals_base))
+            out.append((record.variable, offset_of(m, slot)))
     return out
+
+
+def offset_of(m: MFunction, index: int) -> int:
+    """Bytes from W15 at entry to an object of the frame."""
+    o = m.frame[index]
+    return o.fixed if o.fixed is not None else o.offset + m.locals_base
 
 
 class ModuleCompiler:
@@ -234,6 +255,8 @@ class ModuleCompiler:
         self.module = module
         self.options = options
         self.notes = isr.annotations_of(module)
+        module.large_data = options.large_data
+        module.far = data.beyond_near(self.notes)
         self.lines: list[str] = []
         self.serial = 0
         self.taken = taken_blocks(module)
@@ -248,6 +271,7 @@ class ModuleCompiler:
                 self.function(f)
             elif f.linkage == "extern_weak":
                 self.lines.append(f"\t.weak {symbol(self.module, f.name)}")
+        self.lines += constructors.emit_constructors(self.module, self.options.large_code)
         self.lines += data.emit_data(self.module, self.notes)
         self.aliases()
         if self.options.debug:
@@ -264,17 +288,24 @@ class ModuleCompiler:
             raise UnsupportedError("an interrupt function takes and returns nothing", f"function '{f.name}'")
         if not self.options.debug:
             f.dbg_records = []
-        c = Context(self.module, self.dwarf.info, f, self.options, interrupt, self.taken.get(f.name, set()), probe)
+        bindings.bind(f, self.dwarf.info)
+        taken = self.taken.get(f.name, set())
+        c = Context(self.module, self.dwarf.info, f, self.options, interrupt, taken, probe, notes)
         try:
+            verifier: Verifier | None = None
             for p in FUNCTION_PASSES:
+                if "machine" in p.gives and self.options.verify:
+                    verifier = Verifier(f)
                 p.run(c)
+                if verifier is not None:
+                    verifier.check(p.name, c.m)
         except UnsupportedError as e:
             raise UnsupportedError(e.what, e.where or where(self.dwarf.info, f, e.line)) from e
         self.header(f, interrupt)
         name = symbol(self.module, f.name)
         rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
         ranges = Ranges(str(self.serial))
-        emitter = emit.Emitter(c.m, str(self.serial), self.options.large_code)
+        emitter = emit.Emitter(c.m, str(self.serial), self.options.large_code, self.dwarf.info.position)
         self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges)
         gone = c.taken - {b.name for b in c.m.blocks}  # nothing jumps there, but their addresses are still values
         self.lines += [f"{block_label(f.name, block)}:" for block in sorted(gone)]
@@ -284,7 +315,9 @@ class ModuleCompiler:
             self.lines.append(f"{end}:")
             ranges.close(end)
             frame_vars = frame_variables(f, c.m)
-            info = FunctionInfo(name, f.dbg, end, c.m.frame_base, rows.rows, frame_vars, ranges.found)
+            known = [record.variable for record in f.dbg_records]
+            objects = {k: offset_of(c.m, k) for k in range(len(c.m.frame))}
+            info = FunctionInfo(name, f.dbg, end, c.m.frame_base, rows.rows, frame_vars, ranges.found, known, objects)
             self.dwarf.add_function(info)
 
     def header(self, f: Function, interrupt: str) -> None:
@@ -301,6 +334,8 @@ class ModuleCompiler:
             self.lines.append(f"\t.global {name}")
         self.lines.append(f"\t.type {name},@function")
         self.lines.append(f"{name}:")
+        for vector in isr.vector_symbols(self.notes.get(f.name, set())):
+            self.lines += [f"\t.global {vector}", f"{vector}:"]
 
     def aliases(self) -> None:
         """alias = target."""

@@ -77,7 +77,14 @@ def _member(source: Path) -> bytes:
     from toolchain import driver
 
     item = Input(source, "c" if source.suffix == ".c" else "assembler")
-    options = CcOptions(inputs=[item], stage="assemble", level=LEVEL, clang=["-std=c11", "-ffreestanding", "-Wall"])
+    options = CcOptions(
+        inputs=[item],
+        stage="assemble",
+        level=LEVEL,
+        stack_check=True,  # a program's own checks are worth nothing if the functions it calls have none
+        runtime=False,
+        clang=["-std=c11", "-ffreestanding", "-Wall"],
+    )
     with tempfile.TemporaryDirectory(prefix="dspic-rt-") as scratch:
         return _weakened(driver.object_of(options, item, Path(scratch)), source.name)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+
 SP = 15  # W15, grows upward, points at the next free word (abi-elf.md §2.1)
 FP = 14  # W14, frame pointer where a frame needs one, else ordinary
 WREG = 0  # W0 in file-register instructions (isa.md §2.2)
@@ -17,4 +19,5 @@ WORD_OFFSET = (-1024, 1022)  # [Wn+Slit10], even (isa.md §3.2)
 BYTE_OFFSET = (-512, 511)
 LNK_MAX = 16382  # isa.md §5.8
 NEAR_BYTES = 64  # larger objects are addressed through pointers, so that near RAM (below 0x2000, abi-elf.md §1.4) lasts
+NEAR_END = DSPIC30F6014A.data["near"].end  # first address that file-register instructions do not reach
 RETURN_ADDRESS_BYTES = 4  # CALL pushes two words (isa.md §7.4)

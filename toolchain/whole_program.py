@@ -18,6 +18,8 @@ from toolchain.isr_names import VECTOR_FUNCTIONS
 VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.weak_odr, llvm.Linkage.linkonce_any,
                     llvm.Linkage.linkonce_odr, llvm.Linkage.common}  # fmt: skip
 BITCODE_MAGIC = b"BC\xc0\xde"
+DECLARED = re.compile(r"^declare [^@\n]*@([\w$.]+)\(", re.MULTILINE)
+ATTRIBUTES = re.compile(rb"^attributes #\d+ = \{", re.MULTILINE)
 ASSEMBLER_NAME = re.compile(r"\b_([A-Za-z_]\w*)")
 
 
@@ -34,6 +36,19 @@ def read_module(source: Path, content: bytes) -> llvm.ModuleRef:
 def is_bitcode(content: bytes) -> bool:
     """True for LLVM bitcode, which is what `-flto -c` writes."""
     return content.startswith(BITCODE_MAGIC)
+
+
+def functions_declared(text: str) -> set[str]:
+    """Functions a module's text declares and does not define, without LLVM's own."""
+    return {name for name in DECLARED.findall(text) if not name.startswith("llvm.")}
+
+
+def without_builtins(ir: bytes, names: Iterable[str]) -> bytes:
+    """IR text in which no function knows the library functions `names` by what they do."""
+    if is_bitcode(ir):
+        ir = str(llvm.parse_bitcode(ir)).encode()
+    words = " ".join(f'"no-builtin-{name}"' for name in sorted(names)).encode()
+    return ATTRIBUTES.sub(rb"\g<0> " + words, ir)
 
 
 def merge(modules: list[tuple[Path, llvm.ModuleRef]]) -> llvm.ModuleRef:

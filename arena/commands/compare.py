@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from arena.metrics import Course, time_to
+from arena.commands.arguments import duration
+from arena.metrics import Course
 from arena.record import Trial, trials_in
-from arena.statistics import Values, equivalence, signed_rank_p
+from arena.statistics import Values, equivalence, exact, remark, signed_rank_p
 
-PUBLISHED = "86.5 % after 600 s: ten trials with real robots, reported for ref. [10], not for either run here"
 NEAR_S = 0.05
 """A sample this near to the time asked for is at that time: quanta do not divide a second."""
 APART_S = (2.0, 5.0, 10.0)
 """When robots of the same seed are compared."""
-MARGIN_SHARE = 0.10
-"""10 points (experiment.md §5); for the other measures 10 % of the second run's mean."""
+MARGIN_PART = 0.10
+"""Of the second run's mean, for measures that declare no margin (experiment.md §5)."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -31,7 +31,7 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("first", type=Path, metavar="X", help="folder of a run")
     made.add_argument("second", type=Path, metavar="Y")
-    made.add_argument("--at", type=float, default=600.0, metavar="S", help="time of the share (default 600 s)")
+    made.add_argument("--at", type=duration, default=600.0, metavar="S", help="time of the share (default 600 s)")
     made.add_argument("--json", action="store_true")
     return made
 
@@ -42,8 +42,11 @@ def courses(trials: list[Trial]) -> dict[int, tuple[Trial, Course]]:
 
 
 def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, Any]:
-    """All measures, over the time of the shortest trial. Raises ValueError for fewer than two seeds in common or trials
-    shorter than `at`."""
+    """All measures of the experiment, over the time of the shortest trial. Raises ValueError for fewer than two seeds
+    in common, trials shorter than `at`, or runs of two experiments."""
+    experiment = first[0].experiment
+    if second[0].experiment != experiment:
+        raise ValueError(f"the runs are of two experiments, {experiment.name} and {second[0].experiment.name}")
     ones, others = courses(first), courses(second)
     seeds = sorted(set(ones) & set(others))
     if len(seeds) < 2:
@@ -52,25 +55,15 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
     if end < at - NEAR_S:
         raise ValueError(f"the shortest trial lasts {end:g} s, less than --at {at:g}")
     pairs = [tuple((trial, one.until(end)) for trial, one in (ones[seed], others[seed])) for seed in seeds]
-
-    def both(value: Any) -> tuple[Values, Values]:
-        return (np.array([value(*one) for one, _ in pairs]), np.array([value(*other) for _, other in pairs]))
-
-    def until_80(_trial: Trial, one: Course) -> float:
-        reached = time_to(one.times, one.share, 0.8)
-        return float(one.times[-1]) if np.isnan(reached) else reached
-
-    measures = {
-        f"share at {at:g} s": (both(lambda _t, one: one.at(at, one.share)), MARGIN_SHARE),
-        f"share at {at:g} s, 12 cm rule": (both(lambda _t, one: one.at(at, one.share_12cm)), MARGIN_SHARE),
-        "mean compactness": (both(lambda _t, one: one.area), None),
-        "time to 80 % (s, the end if never)": (both(until_80), None),
-    }
     rows = []
-    for name, ((x, y), margin) in measures.items():
-        result = equivalence(x, y, margin if margin is not None else 0.1 * float(abs(y.mean())) or 1e-9)
-        rows.append({"measure": name, "first": _spread(x), "second": _spread(y), **asdict(result),
-                     "equivalent": result.equivalent, "wilcoxon_p": signed_rank_p(x, y)})  # fmt: skip
+    for measure in experiment.measures:
+        x, y = (np.array([measure.of(pair[side][1], at) for pair in pairs]) for side in (0, 1))
+        margin = measure.margin if measure.margin is not None else MARGIN_PART * float(abs(y.mean())) or 1e-9
+        result, added = equivalence(x, y, margin), exact(x, y)
+        rows.append({"measure": measure.label.format(at=at), "first": _spread(x), "second": _spread(y),
+                     **asdict(result), "equivalent": result.equivalent, "wilcoxon_p": signed_rank_p(x, y),
+                     "pairs": [[float(one), float(other)] for one, other in zip(x, y, strict=True)],
+                     "exact": asdict(added), "remark": remark(x, y, measure.best)})  # fmt: skip
     loads = [mean_load([trial for trial, _ in runs.values()]) for runs in (ones, others)]
     return {
         "seeds": seeds,
@@ -78,7 +71,7 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
         "measures": rows,
         "cpu_load": loads,
         "apart": _apart(pairs),
-        "published": PUBLISHED,
+        "published": experiment.published,
     }
 
 
@@ -96,11 +89,11 @@ def _apart(pairs: list[Any]) -> list[dict[str, float]]:
     return found
 
 
-def mean_load(trials: list[Trial]) -> float:
-    """CPU load averaged over robots, trials and time; 0 without robots."""
+def mean_load(trials: list[Trial]) -> float | None:
+    """CPU load averaged over robots, trials and time; None without robots or for scripted brains, which have no CPU."""
     robots = range(trials[0].about["scene"]["robots"]["count"])
-    if not robots:
-        return 0.0
+    if not robots or trials[0].is_scripted:
+        return None
     return float(np.mean([trial.columns[f"r{robot}_load"][1:].mean() for trial in trials for robot in robots]))
 
 
@@ -119,12 +112,20 @@ def run(options: argparse.Namespace) -> int:
         x, y = row["first"], row["second"]
         verdict = "equivalent" if row["equivalent"] else "equivalence not shown"
         chance = f"p = {row['p']:.3f}; Wilcoxon p = {row['wilcoxon_p']:.3f}"
+        added = row["exact"]
         print(f"{row['measure']}\n    X {x['mean']:.3f} sd {x['sd']:.3f}   Y {y['mean']:.3f} sd {y['sd']:.3f}\n"
               f"    X - Y {row['mean']:+.3f}, 90 % interval {row['low']:+.3f} to {row['high']:+.3f}, "
-              f"margin {row['margin']:.3f}: {verdict} ({chance})")  # fmt: skip
-    print(f"CPU load: X {result['cpu_load'][0]:.1%}, Y {result['cpu_load'][1]:.1%} (0 for scripted brains)")
+              f"margin {row['margin']:.3f}: {verdict} ({chance})\n"
+              f"    exact (added): 90 % interval {added['low']:+.3f} to {added['high']:+.3f}, p = {added['p']:.3f}, "
+              f"at least {added['least_p']:.2g} with {added['differ']} pairs that differ\n"
+              f"    X - Y by seed: {' '.join(f'{one - other:+.3g}' for one, other in row['pairs'])}")  # fmt: skip
+        if row["remark"]:
+            print(f"    {row['remark']}")
+    loads = ["no CPU" if load is None else f"{load:.1%}" for load in result["cpu_load"]]
+    print(f"CPU load: X {loads[0]}, Y {loads[1]}")
     for one in result["apart"]:
         print(f"robots of the same seed after {one['seconds']:g} s: {one['median_cm']:.2f} cm apart (median), "
               f"at most {one['max_cm']:.2f} cm")  # fmt: skip
-    print(f"Published: {result['published']}")
+    if result["published"]:
+        print(f"Published: {result['published']}")
     return 0

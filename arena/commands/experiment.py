@@ -8,6 +8,7 @@ from pathlib import Path
 
 from arena.commands import report
 from arena.commands import run as single
+from arena.commands.arguments import count, count_or_none, duration
 from arena.controllers import CONTROLLERS
 
 EXAMPLE = "example: arena experiment clustering --document docs/experiment.md --figures docs/figures"
@@ -22,15 +23,15 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
     made.add_argument("--brains", default="openswarm,bare", metavar="B1,B2", help="default openswarm,bare")
     made.add_argument("--controllers", default="AB", help="default AB")
-    made.add_argument("--trials", type=int, default=10, metavar="N", help="per brain and controller (default 10)")
-    made.add_argument("--minutes", type=float, default=15.0, metavar="M", help="simulated, per trial (default 15)")
+    made.add_argument("--trials", type=count, default=10, metavar="N", help="per brain and controller (default 10)")
+    made.add_argument("--minutes", type=duration, default=15.0, metavar="M", help="simulated, per trial (default 15)")
     made.add_argument(
-        "--twins", type=int, default=100, metavar="N", help="scripted trials per controller (default 100)"
+        "--twins", type=count_or_none, default=100, metavar="N", help="scripted trials per controller (default 100)"
     )
-    made.add_argument("--twin-minutes", type=float, default=10.0, metavar="M", help="of a scripted trial (default 10)")
-    made.add_argument("--at", type=float, default=600.0, metavar="S", help="time of the share (default 600 s)")
-    made.add_argument("--seed", type=int, default=1)
-    made.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="worker processes")
+    made.add_argument("--twin-minutes", type=duration, default=10.0, metavar="M", help="of a scripted one (default 10)")
+    made.add_argument("--at", type=duration, default=600.0, metavar="S", help="time of the share (default 600 s)")
+    made.add_argument("--seed", type=count_or_none, default=1)
+    made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes")
     made.add_argument("--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead")
     made.add_argument("--out", type=Path, default=Path("results"), metavar="FOLDER")
     made.add_argument("--document", type=Path, metavar="FILE", help="replace its results; default: standard output")
@@ -42,8 +43,8 @@ def run(options: argparse.Namespace) -> int:
     """Exit status of the worst run. Raises as `run` and `report`."""
     if not options.controllers or set(options.controllers) - set(CONTROLLERS):
         raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(CONTROLLERS)}")
-    if options.trials < 2 or options.twins < 0:
-        raise ValueError("--trials must be 2 or more for a comparison, --twins not negative")
+    if options.trials < 2:
+        raise ValueError("--trials must be 2 or more for a comparison")
     arms = [(brain, options.trials, options.minutes) for brain in options.brains.split(",")]
     if options.twins:
         arms.append(("scripted", options.twins, options.twin_minutes))

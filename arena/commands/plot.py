@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from arena import film, plots
+from arena.commands.arguments import count_or_none
 from arena.record import Trial, trials_in
 
 
@@ -17,8 +18,8 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
     made.add_argument("--out", type=Path, default=Path("figures"), metavar="FOLDER")
-    made.add_argument("--film", type=int, metavar="ROBOT", help="draw what one robot of the first trial saw and did, "
-                      "and print it as a log, instead")  # fmt: skip
+    made.add_argument("--film", type=count_or_none, metavar="ROBOT",
+                      help="draw, and print as a log, what one robot of the first trial saw and did")  # fmt: skip
     made.add_argument("--format", default="png", choices=("png", "svg", "pdf"))
     return made
 

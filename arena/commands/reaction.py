@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import emu
-from arena.brain import OK_AT_TCY
+from arena.commands.arguments import count, count_or_none
 from arena.controllers import CONTROLLERS
 from arena.firmware import image_for
+from arena.look import COLOURS, NOTHING, OBJECT, ROBOT
 from arena.scene import FCY
-from arena.vision import COLOURS, NOTHING, OBJECT, ROBOT
 from emu.boards.epuck.board import Epuck
 
 SPEED_WORDS: Final = {"openswarm": "stepper_left", "bare": "left.0"}
@@ -24,6 +24,8 @@ SPEED_WORDS: Final = {"openswarm": "stepper_left", "bare": "left.0"}
 structure nobody points to in pieces."""
 POLL_TCY: Final = 74
 """How often it is looked at: 5 us."""
+OK_AT_TCY: Final = FCY
+"""When the remote control's key is pressed."""
 FRAME_TCY: Final = 1000
 """How often it is looked whether the last line of a frame has come: less than its capture takes."""
 _ROWS: Final = 480
@@ -38,8 +40,8 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--brain", action="append", help="openswarm, bare, or an ELF file (default both of ours)")
     made.add_argument("--word", metavar="SYMBOL", help="of other firmware: the word that holds the left wheel's speed")
     made.add_argument("--controller", default="A", choices=sorted(CONTROLLERS))
-    made.add_argument("--frames", type=int, default=300, metavar="N")
-    made.add_argument("--seed", type=int, default=1)
+    made.add_argument("--frames", type=count, default=300, metavar="N")
+    made.add_argument("--seed", type=count_or_none, default=1)
     made.add_argument("--json", action="store_true")
     return made
 
@@ -120,8 +122,6 @@ def _run(machine: emu.Machine, cycle: int) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Raises ValueError, LoadError."""
-    if options.frames < 1:
-        raise ValueError("--frames must be positive")
     selector = 0 if options.controller == "A" else 1
     results = {}
     for brain in options.brain or list(SPEED_WORDS):

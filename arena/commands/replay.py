@@ -10,6 +10,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
+from arena.commands.arguments import count, duration, port
 from arena.live import Follower
 from arena.movie import write_movie
 from arena.page import page
@@ -27,11 +28,11 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("trial", type=Path, metavar="TRIAL", help="a trial-NNNN.parquet; with --live the run's folder")
     made.add_argument("--out", type=Path, metavar="FILE", help="default: the trial's name with .html")
     made.add_argument("--export", type=Path, metavar="FILE", help="write a film instead: .gif, or .mp4 with ffmpeg")
-    made.add_argument("--speed", type=float, default=30.0, metavar="X", help="of a film, times real time (default 30)")
+    made.add_argument("--speed", type=duration, default=30.0, metavar="X", help="of a film, x real time (default 30)")
     made.add_argument("--seconds", type=float, metavar="S", help="of a film, simulated time (default: the whole trial)")
     made.add_argument("--live", action="store_true", help="serve a page that follows a trial of a run that goes on")
-    made.add_argument("--number", type=int, metavar="N", help="with --live: the trial (default: the newest)")
-    made.add_argument("--port", type=int, default=8765, metavar="P", help="with --live (default 8765, 0 = any)")
+    made.add_argument("--number", type=count, metavar="N", help="with --live: the trial (default: the newest)")
+    made.add_argument("--port", type=port, default=8765, metavar="P", help="with --live (default 8765, 0 = any)")
     return made
 
 

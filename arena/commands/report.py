@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from arena import plots
+from arena.commands.arguments import duration
 from arena.record import MANIFEST, RecordError, trials_in, write_text
 from arena.report import by_controller, report, with_results
 
@@ -23,8 +24,8 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
     made.add_argument("--document", type=Path, metavar="FILE", help="replace its results; default: standard output")
-    made.add_argument("--at", type=float, default=600.0, metavar="S", help="time of the share (default 600 s)")
-    made.add_argument("--figures", type=Path, metavar="FOLDER", help="draw figures 4 and 5 and the CPU load here")
+    made.add_argument("--at", type=duration, default=600.0, metavar="S", help="time of the share (default 600 s)")
+    made.add_argument("--figures", type=Path, metavar="FOLDER", help="draw snapshots, curves and CPU load here")
     return made
 
 
@@ -38,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     if options.figures is not None:
         options.figures.mkdir(parents=True, exist_ok=True)
         for controller, group in by_controller(runs).items():
-            names = ["figure4-snapshots", "figure5-clustering", "cpu-load"]
+            names = ["snapshots", "curves", "cpu-load"]
             paths = plots.draw_all(group, options.figures, "png", prefix=f"{controller}-", names=names)
             figures[controller] = [Path(os.path.relpath(path, home)).as_posix() for path in paths]
     text = report(runs, figures, {folder.name: _host_s(folder) for folder in options.runs}, options.at)

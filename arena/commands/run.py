@@ -5,19 +5,19 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
-
-from arena.campaign import Done, Plan, note_host_time, open_folder, run_all
+from arena.campaign import Done, Plan, claimed, note_host_time, open_folder, run_all
+from arena.commands.arguments import count, count_or_none, duration
+from arena.commands.progress import Told
 from arena.controllers import CONTROLLERS
+from arena.experiments import experiment_file
 from arena.firmware import image_for
-from arena.metrics import time_to
-from arena.record import Trial, trials_in, write_bytes
+from arena.record import EXPERIMENT, Trial, trials_in, write_bytes
 from arena.scene import Scene, load_scene, scripted
 
 EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/os-A"
@@ -29,13 +29,13 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
     made.add_argument("--brain", default="openswarm", help="openswarm (default), bare, scripted, or an ELF or HEX file")
     made.add_argument("--controller", default="A", choices=sorted(CONTROLLERS), help="table of speeds (default A)")
-    made.add_argument("--trials", type=int, default=10, metavar="N")
-    made.add_argument("--minutes", type=float, default=15.0, metavar="M", help="simulated time of a trial (default 15)")
-    made.add_argument("--robots", type=int, metavar="N", help="instead of the scene's number")
-    made.add_argument("--objects", type=int, metavar="N", help="instead of the scene's number")
+    made.add_argument("--trials", type=count, default=10, metavar="N")
+    made.add_argument("--minutes", type=duration, default=15.0, metavar="M", help="simulated, per trial (default 15)")
+    made.add_argument("--robots", type=count_or_none, metavar="N", help="instead of the scene's number")
+    made.add_argument("--objects", type=count_or_none, metavar="N", help="instead of the scene's number")
     made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
-    made.add_argument("--seed", type=int, default=1, help="of the first trial, then counted on (default 1)")
-    made.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="worker processes")
+    made.add_argument("--seed", type=count_or_none, default=1, help="of the first trial, then counted on (default 1)")
+    made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes")
     made.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
     )
@@ -71,83 +71,83 @@ def parsed(text: str) -> bool | int | float | str:
     return text
 
 
+def folder_name(text: str) -> str:
+    """A text as part of a folder's name: no letter that means something to a file system."""
+    return re.sub("[^A-Za-z0-9.,=+_-]+", "-", text.lower()).strip("-.")
+
+
 def run(options: argparse.Namespace) -> int:
-    """Exit status 1 if a robot's firmware stopped. Raises SceneError, RecordError, LoadError, ValueError."""
-    if options.trials < 1 or not options.minutes > 0:
-        raise ValueError("--trials and --minutes must be positive")
+    """Exit status 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
     scene = changed(load_scene(options.scene), options.set, options.robots, options.objects)
-    image = image_for(options.brain)
-    if image is None:
-        scene = scripted(scene)
+    home = Path(options.scene).parent
+    image = image_for(options.brain) if not scene.groups or any(not one.image for one in scene.groups) else None
+    images = tuple((one, image_for(one, home)) for one in dict.fromkeys(group.image for group in scene.groups) if one)
     name = Path(options.brain).stem
-    plan = Plan(scene, name, options.controller, image, options.trials, 60 * options.minutes, options.seed)
+    own = experiment_file(scene.experiment, home)
+    plan = Plan(scene, name, options.controller, image, options.trials, 60 * options.minutes, options.seed, own, images)
+    if not plan.has_firmware:
+        plan = replace(plan, scene=scripted(scene))
     folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"
-    missing = open_folder(plan, folder, sys.argv)
-    if image is not None:  # kept beside the results; the one it came from may be built anew meanwhile
-        kept = folder / f"firmware{image.suffix}"
-        write_bytes(kept, image.read_bytes())
-        plan = replace(plan, image=kept)
-    faults = with_progress(plan, folder, missing, options.jobs, options.scheduler)
+    with claimed(folder):
+        missing = open_folder(plan, folder, sys.argv)
+        if own is not None:
+            write_bytes(folder / EXPERIMENT, own.read_bytes())
+            plan = replace(plan, experiment=folder / EXPERIMENT)
+        if image is not None:  # kept beside the results; the one it came from may be built anew meanwhile
+            kept = folder / f"firmware{image.suffix}"
+            write_bytes(kept, image.read_bytes())
+            plan = replace(plan, image=kept)
+        kept_images = []
+        for place, (group, path) in enumerate(images, start=1):
+            kept = folder / f"firmware-{place}{path.suffix}" if path is not None else None
+            if kept is not None and path is not None:
+                write_bytes(kept, path.read_bytes())
+            kept_images.append((group, kept))
+        plan = replace(plan, images=tuple(kept_images))
+        faults = with_progress(plan, folder, missing, options.jobs, options.scheduler)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
-    results = [summary(trial) for trial in trials_in(folder) if trial.path.name in wanted]
+    results = [trial for trial in trials_in(folder) if trial.path.name in wanted]
     if options.json:
-        print(json.dumps({"folder": str(folder), "trials": results, "new": len(missing)}))
+        print(json.dumps({"folder": str(folder), "trials": list(map(summary, results)), "new": len(missing)}))
     else:
-        for one in results:
-            print(f"{one['trial']}: seed {one['seed']}, largest cluster {one['share']:.0%} at {one['seconds']:g} s, "
-                  f"compactness {one['compactness']:.0f}, 80 % after {one['t80']:.0f} s")  # fmt: skip
+        print("\n".join(map(told, results)))
         print(f"{len(results)} trials in {folder}")
     return 1 if faults else 0
 
 
 def summary(trial: Trial) -> dict[str, Any]:
-    """The numbers of one trial at its end."""
-    done = trial.course
-    return {
-        "trial": trial.path.stem,
-        "seed": trial.about["seed"],
-        "seconds": float(trial.times[-1]),
-        "share": float(done.share[-1]),
-        "share_12cm": float(done.share_12cm[-1]),
-        "compactness": float(done.compactness[-1]),
-        "area": done.area,
-        "t50": time_to(done.times, done.share, 0.5),
-        "t80": time_to(done.times, done.share, 0.8),
-        "faults": trial.about["faults"],
-    }
+    """The numbers of one trial at its end: every curve's last value and every measure."""
+    done, end = trial.course, float(trial.times[-1])
+    curves = {one.name: done.last(one.name) for one in trial.experiment.curves}
+    measures = {one.name: one.of(done, end) for one in trial.experiment.measures}
+    about = {"trial": trial.path.stem, "seed": trial.about["seed"], "seconds": end, "faults": trial.about["faults"]}
+    return curves | measures | about
+
+
+def told(trial: Trial) -> str:
+    """The same in words."""
+    done, curves = trial.course, trial.experiment.curves
+    values = ", ".join(f"{one.label} {one.shown(done.last(one.name))}" for one in curves)
+    return f"{trial.path.stem}: seed {trial.about['seed']}, after {trial.times[-1]:g} s: {values}"
 
 
 def with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None) -> bool:
-    """Run what is missing, on workers here or on those of a Dask scheduler; true if a robot stopped."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"),
-               TimeRemainingColumn())  # fmt: skip
+    """Run what is missing, on workers here or on those of a Dask scheduler; true if something happened to a robot."""
     stopped = False
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
-        whole = progress.add_task(f"{len(missing)} trials", total=max(len(missing) * plan.seconds, 1))
-        bars: dict[int, TaskID] = {}
-        reached: dict[int, float] = {}
-
-        def report(number: int, seconds: float) -> None:
-            if number not in bars:
-                bars[number] = progress.add_task(f"  trial {number}", total=plan.seconds)
-            reached[number] = max(seconds, reached.get(number, 0.0))
-            progress.update(bars[number], completed=seconds)
-            progress.update(whole, completed=sum(reached.values()))
+    with Told(len(missing), plan.seconds) as telling:
 
         def done(one: Done) -> None:
             nonlocal stopped
-            report(one.trial, plan.seconds)
-            progress.remove_task(bars.pop(one.trial))
+            telling.finished(one.trial, one.host_s)
             note_host_time(folder, one)
             for robot, seconds, why in one.faults:
                 stopped = True
-                console.print(f"trial {one.trial}: robot {robot} stopped at {seconds:.1f} s: {why}", markup=False)
+                telling.line(f"trial {one.trial}, {seconds:.1f} s: robot {robot} {why}")
 
         if scheduler is not None and missing:
             from arena.cluster import run_on
 
-            run_on(scheduler, plan, folder, missing, report, done)
+            run_on(scheduler, plan, folder, missing, telling.reached, done)
         else:
-            run_all(plan, folder, missing, jobs, report, done)
+            run_all(plan, folder, missing, jobs, telling.reached, done)
     return stopped

@@ -6,18 +6,19 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import sys
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from arena.campaign import Plan, open_folder
+from arena.campaign import Plan, claimed, open_folder
+from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.compare import courses
-from arena.commands.run import changed, with_progress
+from arena.commands.run import changed, folder_name, with_progress
 from arena.controllers import CONTROLLERS
-from arena.record import trials_in, write_text
+from arena.experiments import experiment_file, experiment_of
+from arena.record import EXPERIMENT, trials_in, write_bytes, write_text
 from arena.scene import load_scene, scripted
 
 VARIANTS: Final = {
@@ -46,16 +47,16 @@ VARIANTS: Final = {
 def parser() -> argparse.ArgumentParser:
     """Options of the command."""
     made = argparse.ArgumentParser(
-        description="vary one value at a time with scripted brains and print the share in the largest cluster",
+        description="vary one value at a time with scripted brains and print the experiment's first metric",
         epilog="example: arena sensitivity clustering --trials 10 --minutes 10 --save results/sensitivity.md",
     )
     made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
     made.add_argument("--controllers", default="AB", help="default AB")
-    made.add_argument("--trials", type=int, default=10, metavar="N")
-    made.add_argument("--minutes", type=float, default=10.0, metavar="M")
-    made.add_argument("--seed", type=int, default=1)
+    made.add_argument("--trials", type=count, default=10, metavar="N")
+    made.add_argument("--minutes", type=duration, default=10.0, metavar="M")
+    made.add_argument("--seed", type=count_or_none, default=1)
     made.add_argument("--only", action="append", metavar="TEXT", help="only variants whose name contains this")
-    made.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N")
+    made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N")
     made.add_argument("--out", type=Path, default=Path("results/sensitivity"), metavar="FOLDER")
     made.add_argument("--save", type=Path, metavar="FILE", help="write the table as Markdown too")
     made.add_argument("--json", action="store_true")
@@ -64,8 +65,6 @@ def parser() -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace) -> int:
     """Raises SceneError, RecordError, ValueError."""
-    if options.trials < 1 or not options.minutes > 0:
-        raise ValueError("--trials and --minutes must be positive")
     if not options.controllers or set(options.controllers) - set(CONTROLLERS):
         raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(CONTROLLERS)}")
     wanted = [name for name in VARIANTS if not options.only or any(text in name for text in options.only)]
@@ -75,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     for name in wanted:
         row: dict[str, Any] = {"variant": name}
         for controller in options.controllers:
-            row[controller] = _shares(options, name, controller)
+            row[controller] = _ends(options, name, controller)
         rows.append(row)
     text = _markdown(rows, options)
     if options.save is not None:
@@ -84,19 +83,25 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _shares(options: argparse.Namespace, name: str, controller: str) -> list[float]:
-    """Share in the largest cluster at the end of each trial."""
+def _ends(options: argparse.Namespace, name: str, controller: str) -> list[float]:
+    """The experiment's first metric at the end of each trial."""
     scene = scripted(changed(load_scene(options.scene), VARIANTS[name]))
-    plan = Plan(scene, "scripted", controller, None, options.trials, 60 * options.minutes, options.seed)
-    folder = options.out / f"{re.sub('[^a-z0-9.+-]+', '-', name.lower()).strip('-')}-{controller}"
-    with_progress(plan, folder, open_folder(plan, folder, sys.argv), options.jobs)
+    own = experiment_file(scene.experiment, Path(options.scene).parent)
+    plan = Plan(scene, "scripted", controller, None, options.trials, 60 * options.minutes, options.seed, own)
+    folder = options.out / f"{folder_name(name)}-{controller}"
+    with claimed(folder):
+        if own is not None:
+            write_bytes(folder / EXPERIMENT, own.read_bytes())
+        with_progress(plan, folder, open_folder(plan, folder, sys.argv), options.jobs)
     trials = [trial for trial in trials_in(folder) if trial.about["seed"] < options.seed + options.trials]
-    return [float(one.share[-1]) for _, one in courses(trials).values()]
+    metric = trials[0].experiment.curves[0].name
+    return [one.last(metric) for _, one in courses(trials).values()]
 
 
 def _markdown(rows: list[dict[str, Any]], options: argparse.Namespace) -> str:
+    metric = experiment_of(load_scene(options.scene).experiment, Path(options.scene).parent).curves[0].label
     lines = [
-        f"Share in the largest cluster after {60 * options.minutes:g} s, mean ± sd of n = {options.trials} (seeds "
+        f"{metric[0].upper()}{metric[1:]} after {60 * options.minutes:g} s, mean ± sd of n = {options.trials} (seeds "
         f"{options.seed} to {options.seed + options.trials - 1}), scripted brains:",
         "",
         f"| variant | {' | '.join(options.controllers)} |",

@@ -33,22 +33,25 @@ def run(options: argparse.Namespace) -> int:
         if not equals or not values:
             raise ValueError(f"--vary {axis!r}: expected SECTION.KEY=V1,V2,...")
         axes.append([f"{place}={value}" for value in values.split(",")])
-    base = options.out or Path("results") / f"sweep-{Path(options.scene).stem}"
+    base = options.out or Path("results") / f"sweep-{single.folder_name(Path(options.scene).stem)}"
     quiet = argparse.Namespace(**vars(options))
     status = 0
     rows: list[dict[str, Any]] = []
     for settings in itertools.product(*axes):
         quiet.set = [*options.set, *settings]
-        quiet.out = base / "-".join(settings)
+        quiet.out = base / "-".join(map(single.folder_name, settings))
         status = max(status, single.run(quiet))
-        ends = [one.share[-1] for _, one in courses(trials_in(quiet.out)).values()]
-        areas = [one.area for _, one in courses(trials_in(quiet.out)).values()]
-        rows.append({"values": settings, "n": len(ends), "share": float(np.mean(ends)), "sd": float(np.std(ends)),
-                     "area": float(np.mean(areas))})  # fmt: skip
+        trials = trials_in(quiet.out)
+        done = [one for _, one in courses(trials).values()]
+        curves = trials[0].experiment.curves
+        ends = {one.name: [course.last(one.name) for course in done] for one in curves}
+        spreads = {name: {"mean": float(np.mean(values)), "sd": float(np.std(values, ddof=min(1, len(done) - 1)))}
+                   for name, values in ends.items()}  # fmt: skip
+        rows.append({"values": settings, "n": len(done), "metrics": spreads})
     if options.json:
         print(json.dumps({"sweep": rows}))
     else:
         for row in rows:
-            print(f"{', '.join(row['values']):50} n {row['n']:3}  share {row['share']:.2f} sd {row['sd']:.2f}  "
-                  f"mean compactness {row['area']:.0f}")  # fmt: skip
+            shown = [f"{name} {one['mean']:.3g} sd {one['sd']:.2g}" for name, one in row["metrics"].items()]
+            print(f"{', '.join(row['values']):50} n {row['n']:3}  {'  '.join(shown)}")
     return status

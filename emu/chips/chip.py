@@ -191,7 +191,7 @@ class CanSite:
     irq: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Chip:
     """Everything the machine, the toolchain and the documentation need to know about one part."""
 
@@ -220,6 +220,9 @@ class Chip:
     cans: tuple[CanSite, ...]
     nvm_irq: int
     lvd_irq: int
+
+    def __repr__(self) -> str:
+        return f"<{self.name}>"
 
 
 def _fields(text: str) -> Mapping[str, tuple[int, int]]:

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from emu.boards import BOARDS
 from emu.command import CommandError
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from emu.machine import Machine
     from emu.peripherals import Peripherals
 
-BOARDS: Final = ("epuck", "none")
 SENSORS: Final = ("PO6030K", "PO3030K", "PO8030D", "none")
 SELECTOR_POSITIONS: Final = 16
 
@@ -28,7 +28,7 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
     """Add --board, --selector, --camera, --sensor and --stimulus."""
     board = parser.add_argument_group("robot")
     board.add_argument(
-        "--board", choices=BOARDS, default="epuck", help="what is around the chip (default epuck; none: bare pins)"
+        "--board", choices=BOARDS, default=BOARDS[0], help="what is around the chip (default epuck; none: bare pins)"
     )
     board.add_argument("--selector", metavar="N", type=_selector, default=0, help="position of the selector, 0 to 15")
     board.add_argument("--camera", metavar="FILE.png", help="picture in front of the camera (default: darkness)")

@@ -35,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
     for warning in image.warnings:
         print(f"emu disasm: warning: {image.path}: {warning}", file=sys.stderr)
     found = items(image, start, end)
-    lines = _json(image, found) if options.json else listing(image, found, _Sources(options.source))
+    sources = _Sources(options.source, Path(options.image))
+    lines = _json(image, found) if options.json else listing(image, found, sources)
     for line in lines:
         print(line)
     return EXIT_OK
@@ -95,19 +96,19 @@ def _json(image: Image, found: Iterator[Item]) -> Iterator[str]:
 
 
 class _Sources:
-    """Texts of source files, read once; files that are not there simply have no text."""
+    """Texts of source files, read once; files that are not there simply have no text. Images name them from the folder
+    of the project on: they are looked for from here and from the folders around the image."""
 
-    def __init__(self, wanted: bool) -> None:
+    def __init__(self, wanted: bool, image: Path) -> None:
         self.wanted = wanted
+        self._roots = [Path(), *image.resolve().parents]
         self._files: dict[str, list[str]] = {}
 
     def text(self, file: str, line: int) -> str:
         if not self.wanted:
             return ""
         if file not in self._files:
-            try:
-                self._files[file] = Path(file).read_text(encoding="utf-8", errors="replace").splitlines()
-            except OSError:
-                self._files[file] = []
+            found = next((root / file for root in self._roots if (root / file).is_file()), None)
+            self._files[file] = found.read_text("utf-8", "replace").splitlines() if found is not None else []
         lines = self._files[file]
         return f": {lines[line - 1].strip()}" if 0 < line <= len(lines) else ""

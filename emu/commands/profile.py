@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from fractions import Fraction
 from typing import Any, Final
 
 from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
-from emu.faults import fault_of
 from emu.loader import load_image
 from emu.profile import Profile, Profiler
 
@@ -60,12 +60,15 @@ def run(options: argparse.Namespace) -> int:
         machine.run_until(int(options.skip * fcy))
     profile = Profiler(machine, image).run(machine.cycle + max(1, int(options.seconds * fcy)))
     _check_groups(profile, options.group)
-    fault = fault_of(machine, image, profile.stop) if profile.stop is not None else None
+    fault = profile.stop.fault if profile.stop is not None else None
     if options.json:
         print(json.dumps(_facts(profile, options.group), indent=2))
     else:
         _print(profile, options)
-    return EXIT_FAULT if fault is not None else EXIT_OK
+    if fault is not None:
+        print(f"emu profile: {fault.report()}", file=sys.stderr)
+        return EXIT_FAULT
+    return EXIT_OK
 
 
 def _check_groups(profile: Profile, groups: list[tuple[str, list[str]]]) -> None:

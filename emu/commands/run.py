@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, cycles, seconds
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.console import SPECIFICATIONS, Port, open_port
-from emu.faults import Fault, fault_of
 from emu.image import Image
 from emu.loader import load_image
 from emu.outfile import whole_text_file
@@ -24,6 +23,7 @@ from emu.stamps import HEADER, Stamp, read_stamps
 
 if TYPE_CHECKING:
     from emu.machine import Machine, Stop
+    from emu.waves import Waves
 
 FAULT_STATUS: Final = 125
 LIMIT_STATUS: Final = 124
@@ -49,10 +49,24 @@ def parser() -> Parser:
     limit = made.add_mutually_exclusive_group()
     limit.add_argument("--seconds", metavar="S", type=seconds, help="stop after S simulated seconds")
     limit.add_argument("--cycles", metavar="N", type=cycles, help="stop after N instruction cycles")
-    made.add_argument("--uart1", metavar="WHERE", default="-", help=f"{SPECIFICATIONS} (default -: stdout and stdin)")
+    made.add_argument("--uart1", metavar="WHERE", help=f"{SPECIFICATIONS} (default -: stdout and stdin)")
     made.add_argument("--uart2", metavar="WHERE", default="none", help=f"{SPECIFICATIONS} (default none)")
-    made.add_argument("--break", dest="breaks", metavar="SYM|ADDR", action="append", default=[], help="stop there")
-    made.add_argument("--trace", metavar="FILE", help="write cycle, PC, disassembly and changed registers (slow)")
+    made.add_argument(
+        "--break", dest="breaks", metavar="SYM|ADDR", action="append", default=[], help="stop there; may be repeated"
+    )
+    made.add_argument(
+        "--trace",
+        metavar="FILE",
+        help="write cycle, PC, disassembly and changed registers (slow; -: stdout, UART1 is silent then)",
+    )
+    made.add_argument("--vcd", metavar="FILE", help="write pins and UART bytes as a waveform (GTKWave)")
+    made.add_argument(
+        "--vcd-watch",
+        metavar="LIST",
+        type=lambda text: [name.strip() for name in text.split(",") if name.strip()],
+        default=[],
+        help="add ipl, asleep, thread and variables to the waveform (slow)",
+    )
     made.add_argument("--json", action="store_true", help="print one JSON object instead of text; UARTs go into it")
     made.add_argument("--exit-code", action="store_true", help="let the firmware's status be the exit status")
     made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit, interp or plain (default auto)")
@@ -62,6 +76,11 @@ def parser() -> Parser:
     made.add_argument("--record", metavar="FILE", help="write every input with the cycle of its arrival")
     made.add_argument("--replay", metavar="FILE", help="take input from a recorded file instead")
     made.add_argument("--pace", choices=("realtime",), help="run no faster than the robot would")
+    made.add_argument(
+        "--strict",
+        action="store_true",
+        help="null pointers, uninitialised reads and stores into another thread's stack are faults (slow)",
+    )
     made.add_argument("--stats", action="store_true", help="print what the engine did")
     add_board_options(made)
     add_watch_option(made)
@@ -80,6 +99,13 @@ def run(options: argparse.Namespace) -> int:
         ports = _ports(options, stack, captured)
         trace = stack.enter_context(whole_text_file(options.trace)) if options.trace else None
         record = stack.enter_context(_recording(options.record)) if options.record else None
+        advance = _tracer(machine, image, trace) if trace is not None else None
+        if options.vcd:
+            waves = _waves(options, machine, stack.enter_context(whole_text_file(options.vcd)), advance)
+            stack.callback(waves.close)
+            advance = waves.advance
+        elif options.vcd_watch:
+            raise CommandError("--vcd-watch needs --vcd FILE")
         session = Session(
             machine,
             ports,
@@ -87,16 +113,16 @@ def run(options: argparse.Namespace) -> int:
             replay=replay,
             record=record,
             realtime=options.pace == "realtime",
-            advance=_tracer(machine, image, trace) if trace is not None else None,
+            advance=advance,
             links=links_of(machine),
         )
         end_watch = start_watch(machine, options)
         stop, host_seconds = session.run()
         end_watch()
         lost = {number: port.lost for number, port in ports.items() if port.lost}
-    fault = fault_of(machine, image, stop) if stop.pc not in _addresses(image, options.breaks) else None
-    status = exit_status(machine, image, stop, fault) if options.exit_code else EXIT_FAULT if fault else EXIT_OK
-    facts = _facts(machine, image, stop, fault, host_seconds)
+    fault = stop.reason == "fault"
+    status = exit_status(machine, image, stop) if options.exit_code else EXIT_FAULT if fault else EXIT_OK
+    facts = _facts(machine, image, stop, host_seconds)
     if options.stats:
         facts["stats"] = _statistics(machine, host_seconds)
     for number, count in lost.items():
@@ -105,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
         facts |= {f"uart{number}": bytes(data).decode("latin-1") for number, data in captured.items()}
         print(json.dumps(facts | {"status": status}))
     else:
-        _print_end(facts)
+        _print_end(facts, stop)
     return status
 
 
@@ -114,7 +140,9 @@ def _machine(options: argparse.Namespace, image: Image) -> Machine:
     from emu.machine import Machine
 
     try:
-        machine = Machine(image.chip, engine=options.engine, ipl_slip=options.ipl_slip, board=board_of(options))
+        machine = Machine(
+            image.chip, engine=options.engine, ipl_slip=options.ipl_slip, board=board_of(options), strict=options.strict
+        )
     except ValueError as error:
         raise CommandError(str(error)) from None
     measure_time = getattr(machine.runner, "measure_time", None)
@@ -156,9 +184,10 @@ def _replay(options: argparse.Namespace, machine: Machine) -> list[Stamp]:
 
 def _ports(options: argparse.Namespace, stack: ExitStack, captured: dict[int, bytearray]) -> dict[int, Port]:
     """Both UARTs' host ends; with --json what would go to standard output is captured."""
-    places = {1: options.uart1, 2: options.uart2}
-    if list(places.values()).count("-") > 1:
-        raise CommandError("only one UART can have standard output")
+    texts = [options.trace, options.record]
+    places = {1: options.uart1 or ("none" if "-" in texts else "-"), 2: options.uart2}
+    if [*places.values(), *texts].count("-") + (options.json and "-" in texts) > 1:
+        raise CommandError("only one of UARTs, --trace, --record and --json can have standard output")
     ports = {}
     for number, place in places.items():
         try:
@@ -193,9 +222,20 @@ def _tracer(machine: Machine, image: Image, stream: TextIO) -> Any:
     return Tracer(machine, image, stream).advance
 
 
-def exit_status(machine: Machine, image: Image, stop: Stop, fault: Fault | None) -> int:
+def _waves(options: argparse.Namespace, machine: Machine, stream: TextIO, advance: Any) -> Waves:
+    from emu.waves import Waves
+
+    if advance is not None and options.vcd_watch:
+        raise CommandError("--vcd-watch and --trace both step the machine; give one")
+    try:
+        return Waves(machine, stream, options.vcd_watch, advance)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+
+
+def exit_status(machine: Machine, image: Image, stop: Stop) -> int:
     """What the shell gets with --exit-code."""
-    if fault is not None:
+    if stop.reason == "fault":
         return FAULT_STATUS
     if stop.reason == "breakpoint":
         return int(machine.peek("W0")) & 0xFF
@@ -205,11 +245,11 @@ def exit_status(machine: Machine, image: Image, stop: Stop, fault: Fault | None)
     return INTERRUPTED_STATUS if stop.reason == "interrupted" else LIMIT_STATUS
 
 
-def _facts(machine: Machine, image: Image, stop: Stop, fault: Fault | None, host_seconds: float) -> dict[str, Any]:
+def _facts(machine: Machine, image: Image, stop: Stop, host_seconds: float) -> dict[str, Any]:
     """What the last line says, as data."""
     seconds = machine.peripherals.seconds(stop.cycle)
     facts: dict[str, Any] = {
-        "reason": "fault" if fault else stop.reason,
+        "reason": stop.reason,
         "pc": stop.pc,
         **_place(image, stop.pc),
         "cycles": stop.cycle,
@@ -218,8 +258,8 @@ def _facts(machine: Machine, image: Image, stop: Stop, fault: Fault | None, host
         "speed": seconds / host_seconds if host_seconds else None,
         "engine": machine.engine,
     }
-    if fault is not None:
-        facts["fault"] = {"cause": fault.cause, "pc": fault.pc, "cycle": fault.cycle, **_place(image, fault.pc)}
+    if stop.fault is not None:
+        facts["fault"] = stop.fault.facts()
     return facts
 
 
@@ -249,15 +289,16 @@ def _where(place: dict[str, Any]) -> str:
     return f"{place['pc']:#08x} ({names})" if names else f"{place['pc']:#08x}"
 
 
-def _print_end(facts: dict[str, Any]) -> None:
+def _print_end(facts: dict[str, Any], stop: Stop) -> None:
     """The fault, if any, and the last line."""
     sys.stdout.flush()
-    if "fault" in facts:
-        print(f"emu run: firmware fault: {facts['fault']['cause']} at {_where(facts['fault'])}", file=sys.stderr)
+    if stop.fault is not None:
+        print(f"emu run: {stop.fault.report()}", file=sys.stderr)
     for name, value in facts.get("stats", {}).items():
         print(f"emu run: {name}: {value}", file=sys.stderr)
+    where = stop.fault.where if stop.fault is not None else _where(facts)
     print(
-        f"{facts['reason']} at {_where(facts)} after {facts['cycles']:,} cycles,"
+        f"{facts['reason']} at {where} after {facts['cycles']:,} cycles,"
         f" {facts['seconds']:.6f} s simulated, {facts['speed'] or 0:.3g} x real time",
         file=sys.stderr,
     )

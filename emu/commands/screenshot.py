@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
-from emu.faults import fault_of
 from emu.loader import load_image
 
 if TYPE_CHECKING:
@@ -75,18 +74,18 @@ def run(options: argparse.Namespace) -> int:
     set_up(machine, options)
     limit = max(1, int(options.seconds * Fraction(machine.peripherals.fcy)))
     place = _place(machine, options) if options.buffer else None
-    stop = machine.run_until(limit) or machine.stopped("limit")
+    stop = machine.advance(limit) or machine.stopped("limit")
     pixels = _sensor(machine) if place is None else _captured(machine, place, options)
     write_picture(options.output, pixels, options.enlarge)
-    fault = fault_of(machine, image, stop)
     height, width, _ = pixels.shape
     if options.json:
         facts = {"output": options.output, "width": width, "height": height, "cycles": machine.cycle}
-        print(json.dumps(facts | {"reason": "fault" if fault else stop.reason}))
+        facts |= {"reason": stop.reason} | ({"fault": stop.fault.facts()} if stop.fault is not None else {})
+        print(json.dumps(facts))
     else:
         print(f"{options.output}: {width} x {height} pixels after {machine.cycle:,} cycles", file=sys.stderr)
-    if fault is not None:
-        print(f"emu screenshot: firmware fault: {fault.cause} at {fault.pc:#08x}", file=sys.stderr)
+    if stop.fault is not None:
+        print(f"emu screenshot: {stop.fault.report()}", file=sys.stderr)
         return EXIT_FAULT
     return EXIT_OK
 

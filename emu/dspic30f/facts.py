@@ -25,6 +25,8 @@ class Facts:
     writes: int
     """Registers written directly or through a modified destination pointer: sources of stalls."""
     loads: int
+    reads: tuple[int, ...]
+    """Data addresses read that are written in the instruction itself."""
     stores: int
     flow: type | None
     """Class of the Flow returned, None for "next"."""
@@ -55,6 +57,7 @@ class _Notes:
         self.source_pointers = 0
         self.writes = 0
         self.loads = 0
+        self.reads: list[int] = []
         self.stores = 0
 
     def _value(self, *_arguments: object) -> Value:
@@ -83,6 +86,8 @@ class _Notes:
 
     def load(self, ea: Value, size: Size, side: Side = "src", ptr: int | None = None) -> Value:
         self.loads += 1
+        if isinstance(ea, int):
+            self.reads.append(ea)
         return _UNKNOWN
 
     def xload(self, ea: Value, ptr: int) -> Value:
@@ -102,7 +107,8 @@ def facts_of(insn: Insn) -> Facts:
     """The facts of a decoded instruction; they do not depend on where it stands."""
     notes: Any = _Notes(0)
     flow: Flow = insn.row.does(notes, insn.x)
-    return Facts(notes.source_pointers, notes.writes, notes.loads, notes.stores, None if flow is None else type(flow))
+    kind = None if flow is None else type(flow)
+    return Facts(notes.source_pointers, notes.writes, notes.loads, tuple(notes.reads), notes.stores, kind)
 
 
 def flow_of(insn: Insn, pc: int) -> Flow:

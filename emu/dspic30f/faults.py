@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+RESTART: Final = "the program went to address 0 without a reset"
+"""Not for the core but for whoever watches it: a null function pointer ends there."""
+
 
 class DeviceReset(Exception):
     """The device resets; `cause` is the RCON bit (isa.md §14.6), the text says why. A `fault` is the program's."""
@@ -34,6 +37,14 @@ class TrapConflict(DeviceReset):
 
     def __init__(self, detail: str) -> None:
         super().__init__("TRAPR", f"trap conflict: {detail}", fault=True)
+
+
+class Violation(Exception):
+    """The instruction at `pc` has done what strict runs do not allow; the text says what."""
+
+    def __init__(self, detail: str, pc: int) -> None:
+        super().__init__(detail)
+        self.pc: Final = pc
 
 
 class Breakpoint(Exception):

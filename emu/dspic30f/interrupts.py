@@ -11,6 +11,7 @@ What the writing instruction itself changes (IPL, IEC, IPC, DISICNT) counts at t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Final
@@ -67,6 +68,8 @@ class Exceptions:
         self._inttreg: Final = state.at["INTTREG"]
         self._names: Final = [vector.name for vector in chip.vectors]
         self._look: Final = events.slot("cpu.look", lambda _due: events.kick())
+        self.on_trap: Callable[[Vector], None] | None = None
+        """Called before a trap is entered: the machine stands where it happened."""
         self.ipl_slip = 0
         self._slip_cycle: Final = state.record.reserve("cpu.slip_cycle", "Q").index
         self._slip_words: Final = state.record.reserve("cpu.slip_words", "H", 1 + FLAG_WORDS).index
@@ -225,6 +228,8 @@ class Exceptions:
     def enter(self, accepted: Accepted, last: int) -> None:
         """Push PC, SRL and IPL3, and continue at the handler (isa.md §14.2)."""
         state = self._state
+        if accepted.level > UNMASKABLE and self.on_trap is not None:
+            self.on_trap(accepted.vector)
         first = max(accepted.since + 4, last + 3)
         pc, status = state.pc, state.sr & 0xFF
         self._push(pc & 0xFFFF, first - 2)

@@ -1,7 +1,7 @@
 """The memory equation, measured: RAM = A + B n + C m + D s + sum over pending messages of (E + d).
 
 The `footprint` application makes a load of n threads, m events, s subscriptions and messages of d bytes; what it takes
-is seen from outside, as the heap's capacity less what its free lists and its untouched middle hold (kernel/memory.c).
+is seen from outside, as the heap's capacity less its reserve and its tree of holes (kernel/memory.c).
 The allocator's own count must say the same.
 """
 
@@ -38,6 +38,10 @@ KERNEL_EVENTS: Final = (0x01, 0x07)
 """Events Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
 EVENT: Final = 6
 """Bytes of a registered event (kernel.h)."""
+_PIECES: Final = (("low", "high"), ("run", "run_end"))
+"""Variables that hold the ends of free pieces that are no holes: the reserve, and what is given back in this moment."""
+_SIZE: Final = 4
+"""Offset of the size in a hole (kernel/memory.c)."""
 _RESULT_WORDS: Final = 6
 _LONGEST_LIST: Final = 4096
 
@@ -89,21 +93,31 @@ class Heap:
 
     def __init__(self, target: Target) -> None:
         self._target: Final = target
-        self._classes: Final = target.size("small") // WORD
-        if not self._classes:
-            raise MeasureError(f"{target.image.path}: the symbol `small` has no size")
         self.capacity: Final = self.free() + target.words("os_statistics", 1)[0]
         """Bytes of the whole heap: what is free plus what the kernel had taken for itself when first looked at."""
 
     def free(self) -> int:
-        """Bytes of the untouched middle and of all free lists."""
+        """Bytes of the reserve and of all holes."""
         target = self._target
-        free = target.word(target.address("top")) - target.word(target.address("brk"))
-        small = target.address("small")
-        for number in range(self._classes):
-            blocks = sum(1 for _ in self._list(target.word(small + WORD * number)))
-            free += blocks * WORD * (number + 1)
-        return free + sum(target.word(block + WORD) for block in self._list(target.word(target.address("large"))))
+        free = sum(target.word(target.address(end)) - target.word(target.address(begin)) for begin, end in _PIECES)
+        return free + sum(target.word(hole + _SIZE) for hole in self._holes())
+
+    def _holes(self) -> Iterator[int]:
+        """Addresses of the holes. Raises MeasureError if a side leads to a larger hole, or for ever."""
+        found = [self._target.word(self._target.address("holes"))]
+        no_hole = self._target.address("no_hole")
+        seen = 0
+        while found:
+            hole = found.pop()
+            if hole == no_hole:
+                continue
+            seen += 1
+            sides = [self._target.word(hole + WORD * side) for side in range(2)]
+            size = self._target.word(hole + _SIZE)
+            if seen > _LONGEST_LIST or any(self._target.word(side + _SIZE) > size for side in sides):
+                raise MeasureError("the holes of the kernel's heap are not a heap on their sizes")
+            found += sides
+            yield hole
 
     def taken(self) -> int:
         """Bytes handed out."""
@@ -123,7 +137,7 @@ class Heap:
                 return
             yield block
             block = self._target.word(block + link)
-        raise MeasureError("a free list of the kernel's heap does not end")
+        raise MeasureError("a list of the kernel does not end")
 
 
 def measure(image: Image, engine: str = "interp") -> Equation:
@@ -174,7 +188,7 @@ def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int
     for piece in pieces(target.image):
         if piece.name in ("_os_memory", *_APPLICATION) or "apps/" in piece.module:
             continue
-        part = "UART rings and state" if piece.name == "_channels" else _part_of(piece.module)
+        part = "UART state" if piece.name == "_channels" else _part_of(piece.module)
         parts[part] = parts.get(part, 0) + piece.ram
     return {name: size for name, size in parts.items() if size}
 

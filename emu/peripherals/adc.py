@@ -14,19 +14,18 @@ from emu.chips.chip import AdcSite
 from emu.device import Register
 from emu.events import NEVER
 from emu.peripherals.adccourse import FOREVER, Course, Inputs, Published
+from emu.peripherals.adcrules import CONVERTING, OFF, SAMPLING, WAITING, AdcPlaces, Standing, read_standing, write_con1
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import SLEEP, Kit, Peripheral
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.timers import Timer
+from emu.straight import Rule, place_of, slot_of
 
 FULL_SCALE: Final = 0x10000
 """AVDD in units of analog level."""
 _COURSES: Final = 64
 """Register settings remembered; firmware has a handful."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
-
-_OFF, _WAITING, _SAMPLING, _CONVERTING = range(4)
-"""States: ADON = 0; nothing connected; SAMP = 1; SAMP = 0 and the converter at work."""
 
 _MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
 """SSRC: what ends sampling (§13)."""
@@ -79,6 +78,27 @@ class Adc(Peripheral):
         )  # fmt: skip
         """Record words and bits the course depends on."""
         self._courses: Final[dict[tuple[int, ...], Course]] = {}
+        for register in (*self._buffers, self.con2):
+            register.ruled(Rule(Standing(register.place, self._stands.place), read_standing))
+        self.con1.ruled(Rule(self._places(), read_standing, write_con1))
+
+    def _places(self) -> AdcPlaces:
+        sfrs, record = self.kit.chip.sfrs, self.record
+        adon, samp = (1 << sfrs["ADCON1"].fields[name][0] for name in ("ADON", "SAMP"))
+        cells = ("native", "frozen", "sampling", "conversion", "results", "state", "mark", "half")
+        return AdcPlaces(
+            register=self.con1.place,
+            until=self._stands.place,
+            con2=self.con2.place,
+            writable=sfrs["ADCON1"].writable,
+            clear_only=sfrs["ADCON1"].clear_only,
+            adon=adon,
+            samp=samp,
+            bufs=1 << sfrs["ADCON2"].fields["BUFS"][0],
+            begun=tuple(cell.place for cell in (self._scan, self._use_b, self._next, self._count)),
+            step=slot_of(record, self._step),
+            **{name: place_of(record, f"adc.{name}") for name in cells},
+        )
 
     # -- inputs ------------------------------------------------------------------------------------------------------
 
@@ -144,23 +164,23 @@ class Adc(Peripheral):
 
     def _duration(self, course: Course, state: int) -> int:
         """Half Tcy after which a state ends by itself, or NEVER."""
-        if state == _CONVERTING:
+        if state == CONVERTING:
             return course.conversion
-        return course.sampling if state == _SAMPLING else NEVER
+        return course.sampling if state == SAMPLING else NEVER
 
     def _enter(self, state: int, halves: int) -> None:
         self._state.value = state
         self._mark.value = halves >> 1
         self._half.value = halves & 1
-        self.con1["SAMP"] = state == _SAMPLING
-        if state == _CONVERTING:
+        self.con1["SAMP"] = state == SAMPLING
+        if state == CONVERTING:
             self.con1["DONE"] = 0
             self._held.value = self._sample(self._course(), halves + 1 >> 1)
 
     def catch_up(self, cycle: int) -> bool:
         """Carry out every conversion that ends at or before `cycle`. True if one of them raised the interrupt."""
         state = self._state.value
-        if state <= _WAITING:
+        if state <= WAITING:
             return False
         course = self._course()
         begun = 2 * self._mark.value + self._half.value
@@ -172,16 +192,16 @@ class Adc(Peripheral):
                 break
             begun += duration
             moved = True
-            if state == _SAMPLING:
-                state, done = _CONVERTING, 0
+            if state == SAMPLING:
+                state, done = CONVERTING, 0
                 held = self._sample(course, begun + 1 >> 1)
             else:
                 interrupted |= self._store(course, held)
-                state, done = (_SAMPLING if course.again else _WAITING), 1
+                state, done = (SAMPLING if course.again else WAITING), 1
         if moved:
             self._state.value, self._held.value = state, held
             self._mark.value, self._half.value = begun >> 1, begun & 1
-            self.con1["SAMP"] = state == _SAMPLING
+            self.con1["SAMP"] = state == SAMPLING
             self.con1["DONE"] = done
             self._stands.value = FOREVER if duration == NEVER else begun + duration + 1 >> 1
         return interrupted
@@ -196,7 +216,7 @@ class Adc(Peripheral):
             self._count.value = count
             self._next.value = (place + 1) % 16
             return False
-        self._count.value = 0
+        self._count.value = self._scan.value = 0  # the scan starts again behind every interrupt (§13)
         if course.in_halves:
             self.con2["BUFS"] = 1 - self.con2["BUFS"]
             self._next.value = 8 * self.con2["BUFS"]
@@ -215,7 +235,7 @@ class Adc(Peripheral):
             return
         end = 2 * self._mark.value + self._half.value + duration
         self._stands.value = end + 1 >> 1
-        if state == _SAMPLING:
+        if state == SAMPLING:
             end += course.conversion
         if course.again and course.sampling != NEVER:
             missing = max(course.results - 1 - self._count.value, 0)
@@ -233,7 +253,7 @@ class Adc(Peripheral):
 
     def _catch_up_now(self) -> None:
         """Bring the registers to the current cycle; an interrupt cannot fall due here before its event."""
-        if self._state.value > _WAITING and not self.is_frozen:
+        if self._state.value > WAITING and not self.is_frozen:
             self.catch_up(self.now)
 
     # -- control -----------------------------------------------------------------------------------------------------
@@ -248,12 +268,12 @@ class Adc(Peripheral):
         elif not old & adon:
             self._scan.value = self._use_b.value = self._next.value = self._count.value = 0
             self.con2["BUFS"] = 0
-            self._enter(_SAMPLING if new & samp or self.con1["ASAM"] else _WAITING, start)
-        elif self._state.value == _WAITING and (new & samp or self.con1["ASAM"]):
-            self._enter(_SAMPLING, start)
-        elif self._state.value == _SAMPLING and not new & samp:
+            self._enter(SAMPLING if new & samp or self.con1["ASAM"] else WAITING, start)
+        elif self._state.value == WAITING and (new & samp or self.con1["ASAM"]):
+            self._enter(SAMPLING, start)
+        elif self._state.value == SAMPLING and not new & samp:
             self._sampling_ended_by_software(start)
-        elif self._state.value == _CONVERTING:
+        elif self._state.value == CONVERTING:
             self.con1["SAMP"] = 0  # UNVERIFIED: SAMP = 1 while converting is ignored (§13)
         self.restored()
         self._plan()
@@ -261,15 +281,15 @@ class Adc(Peripheral):
     def _sampling_ended_by_software(self, start: int) -> None:
         """SAMP = 0 starts the conversion if nothing else does. UNVERIFIED: otherwise it only ends sampling (§13)."""
         if self.con1["SSRC"] == _MANUAL:
-            self._enter(_CONVERTING, start)
+            self._enter(CONVERTING, start)
         elif self.con1["ASAM"]:
             self.con1["SAMP"] = 1
         else:
-            self._enter(_WAITING, start)
+            self._enter(WAITING, start)
 
     def _switch_off(self) -> None:
         """ADON = 0 aborts without a result; ADCBUF stays (§13)."""
-        self._state.value = _OFF
+        self._state.value = OFF
         self.con1["SAMP"] = 0
         self.events.cancel(self._step)
 
@@ -300,8 +320,8 @@ class Adc(Peripheral):
 
     def _triggered(self, cycle: int) -> None:
         """Sampling ends, conversion begins (SSRC = 1, 2)."""
-        if self._state.value == _SAMPLING and not self.is_frozen:
-            self._enter(_CONVERTING, 2 * cycle)
+        if self._state.value == SAMPLING and not self.is_frozen:
+            self._enter(CONVERTING, 2 * cycle)
             self._plan()
 
     def _route(self, cycle: int) -> None:
@@ -313,7 +333,7 @@ class Adc(Peripheral):
 
     def reset(self, power_on: bool) -> None:
         """Off; all channels analog."""
-        self._state.value = _OFF
+        self._state.value = OFF
         self._stands.value = FOREVER
         self._route(self.now)
         self.restored()

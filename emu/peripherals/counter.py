@@ -41,7 +41,6 @@ class Counter(Peripheral):
         self._phase: Final = self.cell("phase", "H")
         self._before: Final = self.cell("before", "I")
         self._port, self._pin = parse_pin(site.clock_pin)
-        self._words: Final = (self.tmr.address >> 1, self.pr.address >> 1)
 
     @property
     def is_wide(self) -> bool:
@@ -86,13 +85,6 @@ class Counter(Peripheral):
 
     def count(self, cycle: int) -> int:
         """The count in `cycle`, which is not before the last write to the timer."""
-        tick = self.tick.value
-        if tick:
-            tmr, pr = self._words
-            u16 = self.record.u16
-            start, limit = u16[tmr], u16[pr]
-            count = start + max(cycle - self.base.value, 0) // tick
-            return count if start <= limit and count <= limit else advance(start, count - start, limit, 0xFFFF)
         if self.is_taken:
             assert self.lower is not None
             return self.lower.count(cycle) >> 16

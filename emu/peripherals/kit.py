@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from emu.bus import Bus
 from emu.chips.chip import Chip
@@ -18,6 +18,7 @@ from emu.events import NEVER
 from emu.peripherals.pins import Pins
 from emu.program import ProgramMemory
 from emu.record import Record
+from emu.straight import place_of
 
 IDLE: Final = 1
 """Power mode after PWRSAV #1: the CPU stands, peripherals run unless their SIDL bit is set (§17)."""
@@ -39,6 +40,10 @@ class Wires:
     """The watchdog ran out while the CPU slept: execution continues (§4)."""
     stall_until: Callable[[int], None] = _nothing
     """stall_until(cycle): no instruction starts before that cycle (flash is being programmed, §16)."""
+    run: Callable[[int], Any] = _nothing
+    """run(cycles): let the machine run so long; whoever asks stands outside it. Returns how that ended."""
+    end_run: Callable[[], None] = _nothing
+    """Such a run ends at its next boundary."""
     trap: Callable[[str], None] = _nothing
     """trap(flag): set a trap flag of INTCON1; flag is its name, for example "OSCFAIL" (§5.1)."""
 
@@ -46,12 +51,14 @@ class Wires:
 class Cell:
     """One scalar in the record."""
 
-    __slots__ = ("_view", "index")
+    __slots__ = ("_view", "index", "place")
 
     def __init__(self, record: Record, name: str, kind: str, initial: int = 0) -> None:
         self.index: Final = record.reserve(name, kind).index
         self._view: Final = {"B": record.u8, "H": record.u16, "I": record.u32, "Q": record.u64, "q": record.s64}[kind]
         self._view[self.index] = initial
+        self.place: Final = place_of(record, name)
+        """For rules."""
 
     @property
     def value(self) -> int:

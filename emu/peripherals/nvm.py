@@ -54,7 +54,7 @@ class Nvm(Peripheral):
         self._data: Final = self.array("data", "I", FLASH_LATCHES)
         self._done: Final = self.slot("done", self._finish)
         self._wr, self._wren = (1 << kit.chip.sfrs["NVMCON"].fields[name][0] for name in ("WR", "WREN"))
-        kit.program.on_table_write = self._table_written
+        kit.program.captured_in = self.adr.address, self.adru.address
 
     def stops_in(self, mode: int) -> bool:
         """Never: programming is timed by the array itself."""
@@ -76,11 +76,6 @@ class Nvm(Peripheral):
     def is_busy(self) -> bool:
         """An operation is under way."""
         return bool(self.con["WR"])
-
-    def _table_written(self, address: int) -> None:
-        """A table write captures its address (§16)."""
-        self.adr.value = address
-        self.adru.value = address >> 16 & 0xFF
 
     def _key_written(self, _old: int, new: int, _lanes: int) -> None:
         self.key.value = 0

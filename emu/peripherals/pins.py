@@ -97,6 +97,9 @@ class Pins:
         self._u64: Final = record.u64
         self._count: Final = record.reserve("pins.ring_count", "Q").index
         self._edges: list[tuple[int, int, int]] | None = None
+        self.frames: list[tuple[int, int, int, int, int, int]] | None = None
+        """Set to a list to have the frames of UARTs there instead of among the edges: first cycle, port, mask of the
+        pin, levels from bit 0 on, how many, cycles of one."""
         self._eager_before_log: list[int] = []
         self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._lazy_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
@@ -260,7 +263,7 @@ class Pins:
             return
         self.level[port] = level
         self.disturb(port)
-        if self._edges is not None:
+        if self._edges is not None and not self._events.quiet:
             self._edges.append((cycle, port, level))
         if self._lazy_watchers[port]:
             self.flush()

@@ -8,6 +8,7 @@ from typing import Final
 
 from emu.bus import ReadHook, WriteHook
 from emu.peripherals.kit import Kit, Peripheral
+from emu.straight import Rule
 
 _PREFIXES: Final = {
     "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
@@ -29,6 +30,7 @@ class _Access:
     compute: ReadHook | None
     on_read: ReadHook | None
     on_write: WriteHook | None
+    rule: Rule | None
 
 
 class ModuleDisable(Peripheral):
@@ -92,12 +94,14 @@ class ModuleDisable(Peripheral):
     def _cut(self, word: int) -> None:
         bus = self.bus
         self._off[word] = _Access(
-            bus.writable[word], bus.clear_only[word], bus.compute[word], bus.on_read[word], bus.on_write[word]
-        )
+            bus.writable[word], bus.clear_only[word], bus.compute[word], bus.on_read[word], bus.on_write[word],
+            bus.rules[word],
+        )  # fmt: skip
         bus.writable[word] = bus.clear_only[word] = 0
         bus.compute[word] = _zero
         bus.on_read[word] = None
         bus.on_write[word] = None
+        bus.rules[word] = None
         bus.off.add(word)
 
     def _mend(self, word: int) -> None:
@@ -106,6 +110,7 @@ class ModuleDisable(Peripheral):
         bus.off.discard(word)
         bus.writable[word], bus.clear_only[word] = access.writable, access.clear_only
         bus.compute[word], bus.on_read[word], bus.on_write[word] = access.compute, access.on_read, access.on_write
+        bus.rules[word] = access.rule
 
 
 def register_fields(kit: Kit, name: str) -> list[str]:

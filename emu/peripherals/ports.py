@@ -10,6 +10,8 @@ from emu.events import NEVER
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import Kit, Peripheral
 from emu.peripherals.pins import PORTS, parse_pin
+from emu.peripherals.portrules import PortPlaces, Stretch, read_port, write_latch, write_port
+from emu.straight import Rule, place_of
 
 
 class Port(Peripheral):
@@ -30,6 +32,31 @@ class Port(Peripheral):
         self._owned: Final = self.cell("owned", "H")
         self._own_drive: Final = self.cell("own_drive", "H")
         self._own_level: Final = self.cell("own_level", "H")
+        self._rule()
+
+    def _rule(self, stretch: Stretch | None = None) -> None:
+        """The common case of accesses to PORT and LAT; `stretch`: bytes that something shows on the pins."""
+        record = self.record
+        arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waving", "standing", "stands_until",
+                  "changed")  # fmt: skip
+        places = PortPlaces(
+            number=self.index,
+            implemented=self.kit.chip.sfrs[self.lat.name].writable,
+            lat=self.lat.place,
+            port=self.port.place,
+            owned=self._owned.place,
+            ring=place_of(record, "pins.ring"),
+            ring_size=record.fields["pins.ring"].count,
+            ring_count=place_of(record, "pins.ring_count"),
+            stretch=stretch,
+            **{name: place_of(record, f"pins.{name}", self.index) for name in arrays},
+        )
+        self.lat.ruled(Rule(places, None, write_latch))
+        self.port.ruled(Rule(places, read_port, write_port))
+
+    def show(self, stretch: Stretch) -> None:
+        """Something outside shows bytes of the record on pins it drives as a waveform."""
+        self._rule(stretch)
 
     def stops_in(self, mode: int) -> bool:
         """Never: latches hold and pins are watched in every power mode."""

@@ -49,14 +49,15 @@ class SerialLine:
         self._head: Final = reserve("line.head", "H")
         self._count: Final = reserve("line.count", "H")
         self._u16: Final = record.u16
-        self._backlog: Final[deque[Frame]] = deque()
+        self.backlog: Final[deque[Frame]] = deque()
+        """What does not fit into the record yet."""
 
     def __len__(self) -> int:
-        return self._u16[self._count] + len(self._backlog)
+        return self._u16[self._count] + len(self.backlog)
 
     def put(self, frames: Iterable[Frame]) -> None:
         """Append frames."""
-        self._backlog.extend(frames)
+        self.backlog.extend(frames)
         self._top_up()
 
     def head(self) -> Frame | None:
@@ -73,8 +74,8 @@ class SerialLine:
         self._top_up()
 
     def _top_up(self) -> None:
-        while self._backlog and self._u16[self._count] < CAPACITY:
-            frame = self._backlog.popleft()
+        while self.backlog and self._u16[self._count] < CAPACITY:
+            frame = self.backlog.popleft()
             tail = (self._u16[self._head] + self._u16[self._count]) % CAPACITY
             self._earliest[tail], self._data[tail], self._bit[tail] = frame.earliest, frame.data, frame.bit
             self._u16[self._count] += 1

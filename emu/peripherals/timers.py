@@ -1,8 +1,8 @@
 """Timers 1-5 (§7): timer, gated and counter modes, 32-bit pairs. TMR is computed on read, never ticked.
 
-`counter.py` has the count; here is what changes its course, and the match. A match posts one event, whose due date is
-the cycle the interrupt flag first reads 1: one Tcy after TMR became equal to PR (§7 rule 2). README.md tells native
-code how to fire the simple periodic case from the record alone.
+`counter.py` has the count, `timerrules.py` what instructions do to a timer that runs plainly; here is everything else
+that changes its course, and the match. A match posts one event, whose due date is the cycle the interrupt flag first
+reads 1: one Tcy after TMR became equal to PR (§7 rule 2).
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from emu.chips.chip import TimerSite
 from emu.device import Register
 from emu.events import NEVER
 from emu.peripherals.counter import PIN, STOPPED, TCY, WAVE, Counter
-from emu.peripherals.counting import PRESCALE, advance, counts_until
+from emu.peripherals.counting import PRESCALE, advance
 from emu.peripherals.kit import IDLE, SLEEP, Kit
+from emu.peripherals.timerrules import TimerPlaces, read_count, write_count, write_period
+from emu.straight import Rule, place_of, slot_of
 
 
 class Timer(Counter):
@@ -37,12 +39,23 @@ class Timer(Counter):
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []
+        self._listeners: Final = self.cell("listeners", "B")
+        """Those in `_on_change`."""
+        places = self._places()
+        self.tmr.ruled(Rule(places, read_count, write_count))
+        self.pr.ruled(Rule(places, None, write_period))
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
         self.pr.written_by(self._course_written)
         self.con.written_by(self._con_written)
         kit.pins.watch(site.clock_pin, self._edge)
         kit.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
+
+    def _places(self) -> TimerPlaces:
+        cells = ("base", "tick", "period", "before", "phase", "clear_from", "clear_until", "clear_due", "listeners",
+                 "frozen")  # fmt: skip
+        places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
+        return TimerPlaces(tmr=self.tmr.place, pr=self.pr.place, match=slot_of(self.record, self._match), **places)
 
     def pair(self, high: Timer) -> None:
         """Join with the type C partner (T2 with T3, T4 with T5)."""
@@ -102,14 +115,6 @@ class Timer(Counter):
 
     def _tmr_written(self, _old: int, new: int, lanes: int) -> None:
         """The written count stands from the next cycle; the prescaler restarts (§7 rules 6, 8)."""
-        if self.period.value and lanes == 0xFFFF:
-            self._replan_simply(0, new)
-            return
-        if self._clears_as_foretold(new, lanes):
-            self.base.value = self.now + 1
-            self._before.value = self._phase.value = 0
-            self.events.set(self._match, self.clear_due.value)
-            return
         if self.is_taken:
             assert self.low is not None
             self.low.high_written(new, lanes)
@@ -125,11 +130,6 @@ class Timer(Counter):
         self._phase.value = 0
         self.base.value = self.now + 1
         self._plan(rewritten=True)
-
-    def _clears_as_foretold(self, new: int, lanes: int) -> bool:
-        """Whether `clear_due` answers this write. Native code asks the same (devices.py)."""
-        within = self.clear_from.value <= self.now < self.clear_until.value
-        return within and new == 0 and lanes == 0xFFFF and self.events.due(self._match) != self.now + 1
 
     def _post_edges(self, due: int) -> None:
         """After a match on a described clock: post the next one, and foretell what clearing TMR leads to, because
@@ -148,27 +148,6 @@ class Timer(Counter):
         self.clear_until.value = edge if clocks == 1 else waveform.nth_rise(pin, due, 1)
         self.clear_due.value = NEVER if edge == NEVER else edge + 2
 
-    def _replan_simply(self, old_limit: int, written: int | None) -> None:
-        """PR or (`written`) TMR of a plain periodic timer changed: the same as below, without the rare cases."""
-        tmr, pr = self._words
-        u16 = self.record.u16
-        tick, limit, start, base = self.tick.value, u16[pr], u16[tmr], self.now + 1
-        if written is None:
-            counts, rest = divmod(base - self.base.value, tick)
-            start = advance(start, counts, old_limit, 0xFFFF)
-            base -= rest
-        due = self.events.due(self._match)
-        stands = due == self.now + 1 or (due == self.now + 2 and written is None and start == limit)
-        u16[tmr] = start
-        self.base.value = base
-        self.period.value = 0 if stands else (limit + 1) * tick
-        if not stands:
-            counts_ahead = counts_until(start, limit, limit, 0xFFFF)
-            assert counts_ahead is not None  # PR is not 0
-            self.events.set(self._match, base + counts_ahead * tick + 1)
-        for listener in self._on_change:
-            listener()
-
     def high_written(self, new: int, lanes: int) -> None:
         """A direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
         assert self.high is not None
@@ -178,9 +157,6 @@ class Timer(Counter):
 
     def _course_written(self, old: int, new: int, _lanes: int) -> None:
         """PR changed: what was counted until the next cycle was counted with the old PR."""
-        if self.period.value and new:
-            self._replan_simply(old, None)
-            return
         owner = self.low if self.is_taken and self.low is not None else self
         shift = 0 if owner is self else 16
         previous = owner.limit & ~(0xFFFF << shift) | old << shift
@@ -210,11 +186,11 @@ class Timer(Counter):
         halves = (self, self.high)
         counts = [half.count(cycle) & 0xFFFF for half in halves]
         self.con.value = new
-        for half, count in zip(halves, counts, strict=True):
-            half.tmr.value = count
+        for half, value in zip(halves, counts, strict=True):
+            half.tmr.value = value
             half._phase.value = 0
             half.base.value = cycle
-            half._before.value = count
+            half._before.value = value
             half._source.value = half._choose_source()
         for half in halves:
             half._plan()
@@ -295,6 +271,7 @@ class Timer(Counter):
         """Call `on_change()` whenever the course of the count has changed, or no longer (output compare, §9)."""
         if wanted != (on_change in self._on_change):
             self._on_change.append(on_change) if wanted else self._on_change.remove(on_change)
+            self._listeners.value = len(self._on_change)
 
     # -- match -------------------------------------------------------------------------------------------------------
 

@@ -36,6 +36,9 @@ class TxPin:
 
     def log_frame(self, start: int, bits: int, length: int, bit: int) -> None:
         """Write a frame's edges to the log of the pins, if one is kept: `length` levels of `bit` Tcy from `start`."""
+        if self._pins.frames is not None:
+            self._pins.frames.append((start, self._port, self._mask, bits, length, bit))
+            return
         edges = self._pins.edges
         if edges is None:
             return

@@ -7,11 +7,14 @@ that arrive at line rate. The level of the TX pin is a function of the cycle.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from re import Match
 from typing import Final
 
 from emu.chips.chip import UartSite
 from emu.events import NEVER
+from emu.listeners import Listeners
 from emu.peripherals.capture import Capture
+from emu.peripherals.expect import Ear, Pattern
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import SLEEP, Kit, Peripheral
 from emu.peripherals.pins import parse_pin
@@ -49,8 +52,8 @@ class Uart(Peripheral):
         self.rxreg.read_by(self._rx_read)
         self.rxreg.computed(lambda: self._rx[0])
         self.brg.written_by(self._brg_written)
-        self.on_byte: Callable[[int, int], None] | None = None
-        """on_byte(byte, start_cycle): a frame has left TX; its start bit began in start_cycle."""
+        self._ear: Ear | None = None
+        self._sent_to: Final[Listeners[[int, int]]] = Listeners(self.events)
         self._capture: Capture | None = None
         fields = kit.chip.sfrs[prefix + "STA"].fields
         self._trmt, self._utxbf, self._utxen, self._utxisel = (
@@ -95,6 +98,32 @@ class Uart(Peripheral):
         self._line_free: Final = self.cell("line_free", "Q")
         """First cycle the line is free for the next frame."""
         self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
+
+    def listen(self, listener: Callable[[int, int], object], *, part: bool = False) -> Callable[[], None]:
+        """Call listener(byte, start_cycle) for every frame that has left TX; its start bit began in start_cycle. Any
+        number may listen. Returns how to remove this one. `part`: a part of the board, whose state depends on it."""
+        return self._sent_to.add(listener, part=part)
+
+    @property
+    def on_byte(self) -> Callable[[int, int], object] | None:
+        """One listener that an assignment replaces; those of `listen` hear as well."""
+        return self._sent_to.assigned
+
+    @on_byte.setter
+    def on_byte(self, listener: Callable[[int, int], object] | None) -> None:
+        self._sent_to.assigned = listener
+
+    def expect(self, pattern: Pattern, *, within: float) -> Match[bytes]:
+        """Run the machine until `pattern` has been sent, for at most `within` ms of simulated time.
+
+        A text or bytes mean themselves, a compiled pattern of bytes is searched. The search goes on behind the last
+        match; the first use begins to listen. The machine stops at the cycle the match's last byte has left the pin in.
+        Raises ExpectError (an AssertionError) with what was said instead, and with the fault if there was one.
+        """
+        if self._ear is None:
+            self._ear = Ear(self.name.upper().replace("U", "UART", 1), self.kit.wires, self.kit.fcy, lambda: self.now)
+            self.listen(self._ear.hear)
+        return self._ear.expect(pattern, within, self.drain)
 
     def connect_capture(self, capture: Capture) -> None:
         """The capture channel that ABAUD connects to the receive pin."""
@@ -177,8 +206,8 @@ class Uart(Peripheral):
 
     def _sent(self, start: int) -> None:
         data = 0 if self.sta["UTXBRK"] else self._frame.value
-        if self.on_byte is not None and not self.mode["LPBACK"]:
-            self.on_byte(data, start)
+        if not self.mode["LPBACK"]:
+            self._sent_to(data, start)
 
     def _tx_level(self, cycle: int) -> int:
         """Level of TX in `cycle`, 1 = idle."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,12 @@ def clustering_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def talking_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Starts the left motor's coils, says a line, and runs into an illegal opcode after about a second."""
     return _assembled(tmp_path_factory.mktemp("talking"), TALKING)
+
+
+@pytest.fixture(scope="session")
+def assembled(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Makes an image of an assembly text."""
+    return lambda text: _assembled(tmp_path_factory.mktemp("assembled"), text)
 
 
 def _assembled(folder: Path, text: str) -> Path:

@@ -7,8 +7,11 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
+from arena import plots
 from arena.cli import main
 from arena.record import RecordError, read_trial, trials_in, write_trial
 from arena.report import BEGIN, END
@@ -63,20 +66,20 @@ def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
     assert trial.times[-1] == pytest.approx(6.0, abs=0.01)
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     assert manifest["key"]["controller"] == "A"
-    assert manifest["versions"]["pymunk"]
+    assert manifest["key"]["versions"]["pymunk"]
     assert manifest["host"][0]["trial"] == 1
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "nowhere", *SHORT], "there is no scene 'nowhere'; known: clustering"),
+        (["run", "nowhere", *SHORT], "there is no scene 'nowhere'; known: aggregation, avoidance, clustering"),
         (["run", "clustering", *SHORT, "--objects", "200"], "no room: 205 robots and objects on 165 marks"),
         (["run", "clustering", "--brain", "lost.elf"], "no such file"),
         (["run", "clustering", "--brain", __file__], "test_campaign.py"),
         (["run", "clustering", *SHORT, "--set", "range=3"], "expected SECTION.KEY=VALUE"),
         (["run", "clustering", *SHORT, "--set", "camera.range_cm=far"], "camera.range_cm is 'far'; expected float"),
-        (["run", "clustering", *SHORT, "--trials", "0"], "must be positive"),
+        (["run", "clustering", *SHORT, "--trials", "0"], "must be a whole number, 1 or more"),
         (["compare", "nowhere", "elsewhere"], "no finished trials"),
         (["replay", "nowhere.parquet"], "no such file"),
         (["replay", __file__], "is no recorded trial"),
@@ -181,8 +184,8 @@ def test_report_writes_tables_and_figures_into_a_document(tmp_path: Path, capsys
     assert "### Controller A" in text
     assert "| one | 3 |" in text
     assert "| one - two, 3 | share at 5 s |" in text
-    assert "(figures/A-figure5-clustering.png)" in text
-    assert (tmp_path / "docs" / "figures" / "A-figure4-snapshots.png").stat().st_size > 5000
+    assert "(figures/A-curves.png)" in text
+    assert (tmp_path / "docs" / "figures" / "A-snapshots.png").stat().st_size > 5000
     assert main(command) == 0
     assert document.read_text() == text
     document.write_text("no marks")
@@ -202,11 +205,54 @@ def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_plot_draws_the_figures(tmp_path: Path) -> None:
-    """Figure 4, Figure 5, trajectories, CPU load."""
+    """Snapshots, curves, trajectories; CPU load only of firmware."""
     run("--trials", 2, "--jobs", 1, "--out", tmp_path / "run")
     assert main(["plot", str(tmp_path / "run"), "--out", str(tmp_path / "figures")]) == 0
     names = {path.name for path in (tmp_path / "figures").iterdir() if path.stat().st_size > 5000}
-    assert names == {"figure4-snapshots.png", "figure5-clustering.png", "trajectories.png", "cpu-load.png"}
+    assert names == {"snapshots.png", "curves.png", "trajectories.png"}  # a script has no CPU
+
+
+def test_one_command_draws_all_figures_of_a_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each controller over all its runs, scripts together; standard deviations are those of the tables."""
+    for controller in "AB":
+        command = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--controller", controller]
+        assert main([*command, "--trials", "2", "--jobs", "1", "--out", str(tmp_path / f"scripted-{controller}")]) == 0
+    assert main(["figures", str(tmp_path), "--out", str(tmp_path / "f"), "--no-film"]) == 0
+    names = {path.name for path in (tmp_path / "f").iterdir() if path.stat().st_size > 5000}
+    kinds = ("snapshots", "curves", "trajectories")
+    assert names == {f"{c}-{kind}.png" for c in "AB" for kind in kinds} | {
+        "scripted-snapshots.png",
+        "scripted-curves.png",
+    }
+    assert main(["figures", str(tmp_path / "none"), "--no-film"]) == 2
+    assert "no run's folder" in capsys.readouterr().err
+
+
+def test_figures_show_what_is_there(tmp_path: Path) -> None:
+    """No single object filled, deviations of a sample that end where values do, a bar for the scale."""
+    run("--trials", 3, "--jobs", 1, "--out", tmp_path / "run")
+    trials = trials_in(tmp_path / "run")
+    picture = plots.snapshots({"run": trials})
+    filled = [
+        patch for axis in picture.axes for patch in axis.patches if patch.get_facecolor()[:3] == to_rgb("tab:red")
+    ]
+    clusters = [trials[0].experiment.groups(trials[0].scene, trials[0].objects[at]) for at in (0, -1)]
+    sizes = [max(map(one.count, one)) for one in clusters]
+    assert len(filled) == sum(size for size in sizes if size > 1)
+    assert any(text.get_text() == "100 cm" for axis in picture.axes for text in axis.texts)
+    curves = plots.curves({"run": trials})
+    shares = np.array([100 * trial.course.curves["share"] for trial in trials])
+    above = curves.axes[0].lines[1].get_ydata()
+    assert above == pytest.approx(np.minimum(shares.mean(axis=0) + shares.std(axis=0, ddof=1), 100))
+    assert "86.5 %" in curves.axes[0].get_title()
+    assert plots.cpu_load({"run": trials}) is None
+    plain = tmp_path / "plain.toml"
+    plain.write_text('name = "plain"\n')
+    assert main(["run", str(plain), *SHORT, "--trials", "2", "--jobs", "1", "--out", str(tmp_path / "other")]) == 0
+    other = trials_in(tmp_path / "other")
+    assert "86.5" not in "".join(axis.get_title() for axis in plots.curves({"other": other}).axes)
+    with pytest.raises(ValueError, match="several experiments"):
+        plots.draw_all({"run": trials, "other": other}, tmp_path, "png")
 
 
 def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -257,7 +303,7 @@ def test_a_reader_that_goes_away_is_no_failure(arguments: list[str]) -> None:
 
 def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_path: Path) -> None:
     """Issue "Must show" 5: SIGINT while trials run; the same command goes on and gives the bytes of one go."""
-    command = ["run", "clustering", "--brain", "scripted", "--trials", "3", "--minutes", "1"]
+    command = ["run", "clustering", "--brain", "scripted", "--trials", "8", "--minutes", "1"]
     arguments = [*command, "--jobs", "1", "--out", str(tmp_path / "a")]
     code = f"import sys; from arena.cli import main; sys.exit(main({arguments!r}))"
     root = Path(__file__).resolve().parents[2]
@@ -271,7 +317,7 @@ def test_an_interrupted_run_keeps_finished_trials_and_leaves_no_half_ones(tmp_pa
         said = process.stderr.read().decode()
     assert process.returncode == 130
     assert "finished trials are kept" in said
-    assert 1 <= len(contents(tmp_path / "a")) < 3
+    assert 1 <= len(contents(tmp_path / "a")) < 8
     stamp = (tmp_path / "a" / "trial-0001.parquet").stat().st_mtime_ns
     for name in "ab":
         assert main([*command, "--jobs", "2", "--out", str(tmp_path / name)]) == 0

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 import emu
-from arena.brain import FIRST_LOOK_TCY, LATENCY_TCY, OK_AT_TCY, OK_DECODED_TCY, ScriptedBrain, switched_on
+from arena.brain import FIRST_LOOK_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedBrain, switched_on
 from arena.campaign import SELECTOR
 from arena.cli import main
-from arena.commands.reaction import SPEED_WORDS, Show, reaction
+from arena.commands.reaction import OK_AT_TCY, SPEED_WORDS, Show, reaction
 from arena.emulated import EmulatedBrain
+from arena.look import COLOURS
 from arena.record import read_trial
 from arena.scene import FCY, Scene, load_scene
 from arena.trial import run_trial
-from arena.vision import COLOURS, WINDOW_ROWS, Eye
+from arena.vision import WINDOW_ROWS, Eye
 from arena.world import World
 from emu.boards.epuck.board import Epuck
 
@@ -70,7 +71,8 @@ def test_pixels_are_the_colours_of_what_is_seen_with_noise(
 
 
 def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering_image: Path, alone: Scene) -> None:
-    """docs/experiment.md §2: both are measured on the firmware, to a tenth of a millisecond."""
+    """docs/experiment.md §2: both were measured on the firmware, the look to a tenth of a millisecond; the latency
+    changes with the kernel, to a quarter."""
     brain = EmulatedBrain(alone, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE)
     world = World(alone, 1)
     rows: dict[int, int] = {}
@@ -90,7 +92,8 @@ def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering
     middle = (WINDOW_ROWS[0] + WINDOW_ROWS[-1]) // 2
     assert rows[middle] == pytest.approx(FIRST_LOOK_TCY, abs=FCY // 10_000)
     seen = brain.machine.cycle  # within the quantum in which it happened
-    assert seen - alone.clock.quantum_tcy - 1474 <= FIRST_LOOK_TCY + LATENCY_TCY <= seen + 1474
+    margin = FCY // 4_000
+    assert seen - alone.clock.quantum_tcy - margin <= FIRST_LOOK_TCY + LATENCY_TCY <= seen + margin
 
 
 def test_the_remote_controls_ok_starts_all_robots_together(clustering_image: Path) -> None:
@@ -99,7 +102,7 @@ def test_the_remote_controls_ok_starts_all_robots_together(clustering_image: Pat
     brains = [EmulatedBrain(scene, 1, robot, clustering_image, SELECTOR["A"]) for robot in range(2)]
     started: list[int] = []
     for robot, brain in enumerate(brains):
-        on_at = switched_on(1, robot)
+        on_at = switched_on(scene, 1, robot)
         brain.machine.board.leds.listen(lambda _name, _lit, cycle, on_at=on_at: started.append(on_at + cycle))
     scripts = [ScriptedBrain(scene, 1, robot, "A") for robot in range(2)]
     poses = World(scene, 1).poses
@@ -155,15 +158,16 @@ def test_a_robot_whose_firmware_traps_stops_and_the_trial_goes_on(
     trial = read_trial(out / "trial-0001.parquet")
     assert trial.times[-1] == pytest.approx(3.0, abs=0.01)
     assert [fault[0] for fault in trial.about["faults"]] == [0, 1]
+    scene = load_scene("clustering")
     for robot, seconds, why in trial.about["faults"]:
-        assert 1 + switched_on(1, robot) / FCY <= seconds <= 2 + switched_on(1, robot) / FCY
-        assert why.startswith("fault at 0x")
+        assert 1 + switched_on(scene, 1, robot) / FCY <= seconds <= 2 + switched_on(scene, 1, robot) / FCY
+        assert why.startswith("stopped: fault at 0x")
     lines = [(line["robot"], line["text"]) for row in trial.columns["log"] for line in row]
     assert sorted(lines) == [(0, "hi"), (1, "hi")]
     assert trial.columns["r0_leds"][1] == 1
     lit, dark = (change for row in trial.columns["lights"] for change in row if change["robot"] == 0)
     assert (lit["leds"], dark["leds"]) == (1, 0)  # the trap resets the chip
-    assert 0 < lit["cycle"] - switched_on(1, 0) < 10_000
+    assert 0 < lit["cycle"] - switched_on(scene, 1, 0) < 10_000
     assert dark["cycle"] - lit["cycle"] == pytest.approx(FCY, abs=1000)
     assert trial.columns["r0_strip"][1] == b""
     assert trial.columns["r0_infrared"][1] is None

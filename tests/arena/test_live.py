@@ -33,7 +33,7 @@ PROBE = """<pre id="result"></pre><script>
 const found = {before: d.t.length, title: document.title};
 setTimeout(() => {
   Object.assign(found, {after: d.t.length, sample, state: document.getElementById("running").textContent,
-    max: Number(scrub.max), share: d.share[sample], x: d.robots[1].x[sample]});
+    max: Number(scrub.max), share: d.curves.share[sample], x: d.robots[1].x[sample]});
   document.getElementById("result").textContent = JSON.stringify(found);
 }, 6000);
 </script></html>"""

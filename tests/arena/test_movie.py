@@ -100,7 +100,7 @@ class _NothingInstalled:
     ("arguments", "message"),
     [
         (["--export", "film.avi"], "a film is a .gif or a .mp4"),
-        (["--export", "film.gif", "--speed", "0"], "--speed must be positive"),
+        (["--export", "film.gif", "--speed", "0"], "must be positive, 1e7 at most"),
         (["--export", "film.gif", "--speed", "1e-4"], "the limit is 20000"),
         (["--export", "nowhere/film.gif"], "cannot be written"),
     ],

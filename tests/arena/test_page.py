@@ -23,7 +23,7 @@ found.scrubbed = sample;
 found.state = document.getElementById("state").textContent;
 found.robots = d.robots.map(r => [r.x[sample], r.y[sample], r.heading[sample]]);
 const pixel = (x, y) => [...g.getImageData(Math.round(x), Math.round(y), 1, 1).data];
-found.pixels = d.robots.map(r => pixel(X(r.x[sample]) - 3, Y(r.y[sample])));
+found.pixels = d.robots.map(r => pixel(X(r.x[sample]) - 2, Y(r.y[sample])));
 found.corner = pixel(3, 3);
 document.getElementById("speed").value = "64";
 play.click();
@@ -71,7 +71,7 @@ def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Pat
     record = read_trial(trial)
     assert (found["before"], found["samples"]) == (0, len(record.times))
     assert found["scrubbed"] == SAMPLE
-    assert found["state"].startswith(f"{record.times[SAMPLE]:.1f} s, largest cluster")
+    assert found["state"].startswith(f"{record.times[SAMPLE]:.1f} s, objects in the largest cluster")
     expected = [[record.columns[f"r{i}_{key}"][SAMPLE] for key in ("x", "y", "heading")] for i in range(2)]
     assert found["robots"] == expected
     assert found["corner"] == [0, 0, 0, 0]
@@ -113,12 +113,70 @@ def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Pat
     assert found["seen"][0] in (0, 1, 2)  # shown what stands before it
 
 
-def browsed(text: str, folder: Path) -> Any:
+LAYOUT = """<pre id="result"></pre><script>
+const box = name => {
+  const r = document.getElementById(name).getBoundingClientRect();
+  return [r.left, r.top, r.right, r.bottom];
+};
+const found = {inner: [innerWidth, innerHeight], ratio: devicePixelRatio, boxes: {}};
+for (const name of ["play", "scrub", "speed", "state", "view", "plot", "log", "chosen"])
+  found.boxes[name] = box(name);
+found.canvas = [canvas.width, canvas.clientWidth];
+found.legend = document.getElementById("legend").textContent;
+const press = (key, shiftKey) => document.dispatchEvent(new KeyboardEvent("keydown", {key, shiftKey, bubbles: true}));
+press("ArrowRight"); press("ArrowRight"); press("ArrowLeft"); found.one = sample;
+press("ArrowRight", true); found.eleven = sample;
+press("End"); found.end = sample; press("Home"); found.home = sample;
+press("t"); found.trails = document.getElementById("trails").checked;
+press("n"); press("n"); found.second = [chosen, document.getElementById("chosen").textContent];
+press("Escape"); found.none = chosen;
+press("?"); found.help = document.getElementById("help").hidden;
+show(4);
+const r0 = d.robots[0];
+const c = canvas.getBoundingClientRect();
+canvas.dispatchEvent(new MouseEvent("click", {clientX: c.left + X(r0.x[4]) + 2, clientY: c.top + Y(r0.y[4])}));
+found.clicked = chosen;
+const half = clock = (d.t[4] + d.t[5]) / 2;
+found.between = [share(), pose(r0, share())[0], (r0.x[4] + r0.x[5]) / 2];
+press(" "); found.playing = playing; press(" ");
+const p = document.getElementById("plot").getBoundingClientRect();
+const middle = {clientX: p.left + p.width / 2, clientY: p.top + 20};
+document.getElementById("plot").dispatchEvent(new MouseEvent("click", middle));
+found.sought = d.t[sample] / d.t[d.t.length - 1];
+document.getElementById("result").textContent = JSON.stringify(found);
+</script></html>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+@pytest.mark.parametrize("size", ["1280,720", "700,900"])
+def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, size: str) -> None:
+    """Controls, arena, plot and log are all on the screen; keys and clicks do what they say; robots move between
+    samples."""
+    found = browsed(page(read_trial(trial)).replace("</html>", LAYOUT), tmp_path, size)
+    width, height = found["inner"]
+    for name, (left, top, right, bottom) in found["boxes"].items():
+        assert (left >= 0, top >= 0, right <= width, bottom <= height) == (True,) * 4, (name, size, found["inner"])
+        assert (right - left > 5, bottom - top > 5) == (True, True), name
+    assert found["canvas"][0] == found["canvas"][1] * found["ratio"]
+    assert "robot sees nothing" in found["legend"]
+    assert "objects of one group" in found["legend"]
+    assert (found["one"], found["eleven"], found["home"]) == (1, 11, 0)
+    assert found["end"] == 16
+    assert found["trails"] is True
+    assert found["second"][0] == 1
+    assert found["second"][1].startswith("robot 1  at ")
+    assert (found["none"], found["help"], found["clicked"], found["playing"]) == (-1, False, 0, True)
+    share, x, middle = found["between"]
+    assert (share, x) == pytest.approx((0.5, middle))
+    assert found["sought"] == pytest.approx(0.5, abs=0.05)
+
+
+def browsed(text: str, folder: Path, size: str = "1280,720") -> Any:
     """What a page that ends in a probe found out."""
     path = folder / "probed.html"
     path.write_text(text)
     command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}",
-               "--virtual-time-budget=4000", "--dump-dom", path.as_uri()]  # fmt: skip
+               "--virtual-time-budget=4000", f"--window-size={size}", "--dump-dom", path.as_uri()]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     match = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.S)
     assert match is not None, done.stderr[-2000:]

@@ -8,8 +8,9 @@ import pytest
 
 from arena import bodies
 from arena.lens import Lens
+from arena.look import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL
 from arena.scene import Scene, load_scene
-from arena.vision import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL, Eye, sensor_of
+from arena.vision import Eye, sensor_of
 from arena.world import Poses, World
 
 ROBOT_AT = (20.0, 150.0, 0.0)

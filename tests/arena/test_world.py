@@ -8,9 +8,9 @@ import pytest
 from arena import bodies
 from arena.brain import ScriptedBrain
 from arena.controllers import steps_per_second
+from arena.look import NOTHING, OBJECT, ROBOT
 from arena.scene import Scene, SceneError, load_scene
 from arena.trial import run_trial
-from arena.vision import NOTHING, OBJECT, ROBOT
 from arena.world import World
 
 
@@ -144,3 +144,30 @@ def test_impossible_scenes_are_refused_with_the_reason(values: dict[str, object]
     """Bad input: what, where, what was expected."""
     with pytest.raises(SceneError, match=message):
         World(load_scene("clustering").with_values(**values), 1)
+
+
+@pytest.mark.parametrize("quantum_ms", [1.0, 10.0])
+@pytest.mark.parametrize("thrust_n", [1.0, 0.5])
+def test_a_robot_cannot_push_another_that_stands_still(quantum_ms: float, thrust_n: float) -> None:
+    """epuck.md §3: to slip it takes 0.7 m g = 1.04 N, more than the 1.0 N that drive. Both come to rest."""
+    values = {"clock__quantum_ms": quantum_ms, "robots__wheel_noise": 0.0, "robots__thrust_n": thrust_n}
+    scene = load_scene("clustering").with_values(robots__count=2, objects__count=0, **values)
+    world = World.of(scene, 1, [(100, 150, 0.0), (120, 150, 1.0)], [])
+    steps = round(1 / world.dt)
+    places = []
+    for _ in range(10):
+        for _ in range(steps):
+            world.step([(12.8, 12.8), (0.0, 0.0)])
+        places.append(world.poses.robots[1][0])
+    assert places[-1] - 120 < 4
+    assert places[-1] - places[-2] == pytest.approx(0, abs=1e-3)
+
+
+def test_a_stronger_drive_pushes_a_standing_robot() -> None:
+    """ARGoS' 1.5 N are more than what holds it."""
+    scene = load_scene("clustering").with_values(robots__wheel_noise=0.0, robots__thrust_n=1.5, robots__count=2,
+                                                 objects__count=0)  # fmt: skip
+    world = World.of(scene, 1, [(100, 150, 0.0), (120, 150, 1.0)], [])
+    for _ in range(5000):
+        world.step([(12.8, 12.8), (0.0, 0.0)])
+    assert world.poses.robots[1][0] > 150

@@ -17,6 +17,8 @@ from emu.events import NEVER
 from tests.firmware.test_on_target import load, place, run_to, thread_list, words
 
 T1IF, T2IF, T3IF, INT1IF, INT2IF = 1 << 3, 1 << 6, 1 << 7, 1 << 0, 1 << 7
+CLOCK_PERIOD = 14746
+"""Tcy, or one less (kernel.md §3)."""
 DEVICE_PERIOD = 1475
 """100 us in Tcy."""
 TICK_MARGIN = 3000
@@ -40,6 +42,9 @@ HEARD, RECEIVED = 0x40, 0x09
 RETFIE = 0x064000
 COMPARED = (*(f"W{n}" for n in range(15)), "RCOUNT", "TBLPAG", "PSVPAG", "CORCON", "SPLIM")
 """And the low byte of SR: the hardware itself stacks no more (isa.md §14.2)."""
+
+ALL = 0xFFFF
+"""Of isr_wanted: every call an interrupt may make, and every one it may not."""
 
 WAYS = ("together", "nested")
 """Everything at the boundary; or the end of the slice first, the rest up to 44 instructions later."""
@@ -75,7 +80,7 @@ class Base:
     subscriptions: Counter[int]
     now_ms: int
     timer_at: int
-    """Cycle of the timer's next tick; the one after it is behind the scene."""
+    """Cycle of the timer's next tick."""
 
 
 class Stage:
@@ -112,7 +117,18 @@ class Stage:
         machine = self.machine
         while self._next() != scene:
             pass
-        for counter in ("heard", "sent", "isr_sent", "bytes", "leaf", "failures", "broken"):
+        for counter in (
+            "heard",
+            "sent",
+            "isr_sent",
+            "isr_extra",
+            "isr_wrong",
+            "isr_wanted",
+            "bytes",
+            "leaf",
+            "failures",
+            "broken",
+        ):
             machine.poke(counter, 0)
         timer_at = machine.cycle + machine.peek("PR1") - machine.peek("TMR1")
         now_ms = machine.peek("now_ms") + bool(machine.peek("IFS0") & T1IF)
@@ -144,6 +160,11 @@ class Stage:
         while self.machine.image.word(address) != RETFIE:
             address += 2
         return address
+
+    def calls_of(self, number: int) -> int:
+        """What the device's interrupt calls at a boundary: every call of the public headers, or one group of them
+        alone, in turn, so that none hides what another did."""
+        return ALL if number % 2 else 1 + number // 2 % self.machine.peek("isr_acts")
 
     def in_stepper(self) -> bool:
         """Whether the stepper's interrupt runs; it clears its flag last: a second one would fall together with it."""
@@ -180,7 +201,7 @@ def sweep(
                     here = machine.snapshot()
                     where = f"scene {scene}, boundary {number} at {machine.pc:#x}, {way}, slip {ipl_slip}"
                     try:
-                        _inject(stage, base, number * 7 % 45 if way == "nested" else 0)
+                        _inject(stage, base, number * 7 % 45 if way == "nested" else 0, stage.calls_of(number))
                     except AssertionError as error:
                         raise AssertionError(f"{where}: {error}") from error
                     machine.restore(here)
@@ -206,7 +227,8 @@ def fail_every_allocation(path: Path) -> Iterator[tuple[int, int]]:
         return calls == wanted
 
     machine.hook_pc(stage.end, lambda: True)
-    machine.hook_pc(place(machine, "heap_take"), take)
+    for allocator in ("heap_take", "heap_keep"):
+        machine.hook_pc(place(machine, allocator), take)
     for scene, base in enumerate(stage.bases):
         wanted = 0
         while calls >= wanted:  # the last round had a k-th call
@@ -239,8 +261,11 @@ def _registers(machine: Machine) -> tuple[int, ...]:
     return machine.pc, machine.w[15], machine.peek("SR") & 0xFF, *(machine.peek(name) for name in COMPARED)
 
 
-def _inject(stage: Stage, base: Base, later: int) -> None:
-    """The end of the slice, and `later` instructions later everything else at once, the device again every 100 us."""
+def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
+    """The end of the slice, and `later` instructions later everything else at once, the device again every 100 us.
+
+    `calls`: what the device's interrupt calls beside its event, the first time (target/calls/isr_calls.h).
+    """
     machine, seen = stage.machine, stage.seen
     seen.boundaries += 1
     stage.stepper_at, stage.switches_dsp = 0, False
@@ -252,6 +277,7 @@ def _inject(stage: Stage, base: Base, later: int) -> None:
     stage.stepper_at = 0
     tick = not -TICK_MARGIN < at - base.timer_at < TICK_MARGIN
     step = not stage.in_stepper() and not machine.peek("IFS0") & T3IF
+    machine.poke("isr_wanted", calls)
     machine.uart[1]._received(ord("x"))  # a byte is complete in this very cycle
     machine.write("IFS0", machine.peek("IFS0") | T2IF | T3IF * step | T1IF * tick)
     machine.write("IFS1", machine.peek("IFS1") | INT1IF | INT2IF)
@@ -262,12 +288,13 @@ def _inject(stage: Stage, base: Base, later: int) -> None:
         machine.step()
         saved = _registers(machine)
         machine.approach(NEVER)
-    raised, is_first = 1, True
-    while (stop := machine.run_until(at + DEVICE_PERIOD * raised)) is None or machine.pc != stage.end:
+    raised, is_first, periods = 1, True, 1
+    while (stop := machine.run_until(at + DEVICE_PERIOD * periods)) is None or machine.pc != stage.end:
         if stop is None:
+            periods += 1
             raised += not machine.peek("IFS1") & INT1IF
             machine.write("IFS1", machine.peek("IFS1") | INT1IF)
-            assert raised < 50, "the scene does not end"
+            assert periods < 50, "the scene does not end"
             continue
         assert stop.reason == "breakpoint", stop
         machine.step()
@@ -306,13 +333,15 @@ def _queued(machine: Machine) -> Counter[int]:
 def _free_bytes(machine: Machine) -> int:
     """Heap that is not handed out, seen from outside (kernel/memory.c)."""
     assert machine.image is not None
-    small = machine.address_of("small")
-    symbol = machine.image.symbols.find("_small")
-    assert symbol is not None
-    free = machine.peek("top") - machine.peek("brk")
-    for index in range(symbol.size // 2):
-        free += 2 * (index + 1) * len(_along(machine, machine.peek(small + 2 * index)))
-    return free + sum(machine.peek(block + 2) for block in _along(machine, machine.peek("large")))
+    free = machine.peek("high") - machine.peek("low") + machine.peek("run_end") - machine.peek("run")
+    holes = [machine.peek("holes")]
+    while holes:
+        hole = holes.pop()
+        if hole != machine.address_of("no_hole"):
+            free += machine.peek(hole + 4)
+            assert free <= HEAP, "the tree of holes is endless"
+            holes += [machine.peek(hole), machine.peek(hole + 2)]
+    return free
 
 
 def _along(machine: Machine, at: int, link: int = 0) -> list[int]:
@@ -355,12 +384,16 @@ def _check_end(
     assert failing or machine.peek("failures") == 0, "a call gave another result"
     assert len(thread_list(machine)) == 3, "system, checker and driver"
     queued = _queued(machine)
+    assert machine.peek("isr_wrong") == 0, "a call from an interrupt gave another result"
     sends = machine.peek("isr_sent")
     assert failing or sends + bool(machine.peek("IFS1") & INT1IF) == raised, f"{sends} of {raised} device interrupts"
-    assert machine.peek("heard") == machine.peek("sent") + sends - queued[HEARD], "an event was lost or came twice"
+    extra = machine.peek("isr_extra")
+    assert machine.peek("heard") == machine.peek("sent") + sends + extra - queued[HEARD], (
+        "an event was lost or came twice"
+    )
     assert machine.peek("bytes") == byte - queued[RECEIVED], "a received byte was lost or came twice"
     came = (machine.peek("now_ms") - base.now_ms & 0xFFFF) + bool(machine.peek("IFS0") & T1IF)
-    due = tick + (machine.cycle > base.timer_at)
+    due = tick + (machine.cycle - base.timer_at + CLOCK_PERIOD) // CLOCK_PERIOD
     assert came == due, f"{came} of {due} ticks came"
     used, free = machine.peek("os_statistics"), _free_bytes(machine)
     assert used + free == HEAP, f"{used} bytes used and {free} free are not {HEAP}"

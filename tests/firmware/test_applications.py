@@ -44,7 +44,7 @@ def uncobs(frame: bytes) -> bytes:
 
 
 def test_processors_are_swapped_under_traffic_without_loss(image: Build) -> None:
-    """Issue 4: virtual actuator, safety post-processor, COBS + CRC-16 as Rx/Tx pair; paper §III-C."""
+    """Issue 4: virtual actuator, safety post-processor, COBS + CRC-16 as Rx/Tx pair; the paper."""
     machine = load(image("processors"))
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
@@ -88,6 +88,21 @@ def test_stress_neither_leaks_nor_traps(image: Build) -> None:
     assert len(heaps) == 1, "reported after each take-down"
     assert "in thread" not in text
     assert all(int(n) >= 64 for n in re.findall(r"kernel stack left (\d+)", text))
+
+
+# ---- Setting up -----------------------------------------------------------------------------------------------------
+
+SETS_UP = re.compile(
+    r"^\s*(?:\(void\))?(?:Sys_Subscribe_to_Event|Sys_Start_Process(?:With)?|Sys_Connect_Motors)\(", re.MULTILINE
+)
+"""A statement that drops the result."""
+
+
+@pytest.mark.parametrize("app", ["clustering", "hello", "listing1", "processors", "selftest", "spi"])
+def test_no_application_drops_the_result_of_a_call_that_sets_it_up(app: str) -> None:
+    """A subscription that failed unnoticed left a robot that reacts to nothing."""
+    for source in (FIRMWARE / "apps" / app).glob("*.c"):
+        assert not SETS_UP.findall(source.read_text()), source
 
 
 # ---- Faults ---------------------------------------------------------------------------------------------------------

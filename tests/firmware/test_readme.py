@@ -19,7 +19,7 @@ def test_the_python_example_runs(image):
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()
     assert lines[0].startswith("main at ")
-    assert re.fullmatch(r"limit 0x[0-9a-f]+ 7", lines[-1])
+    assert re.fullmatch(r"limit 0x[0-9a-f]+ 7 \[.*'main'.*\]", lines[-1])
 
 
 @pytest.mark.parametrize("command", sorted(set(re.findall(r"-m (emu \w+|toolchain \w+)", README))))

@@ -27,13 +27,13 @@ def test_a_thread_gets_its_whole_slice_under_a_storm(image: Build) -> None:
     machine.hook_pc(place(machine, "_T2Interrupt"), lambda *_: ends.append(machine.cycle))
     machine.hook_sfr("TMR2", lambda write, _: restarts.append(machine.cycle) if write else None)
     machine.run(cycles=12 * SLICE)
-    assert len(ends) >= 9
+    assert len(ends) >= 8, "the rest of the time is handlers'"
     slices = [end - max(at for at in restarts if at < end) for end in ends]
     late = [length - SLICE for length in slices]
     assert all(-8 <= extra <= 600 for extra in late), "one timer count, or ISRs of the storm, and nothing else"
     assert any(b - a > SLICE + 2_000 for a, b in pairwise(ends)), "handlers took their time between slices"
     assert all(machine.peek(machine.address_of("spins") + 2 * i) for i in range(3))
-    assert machine.peek("stormed") - machine.peek("handled") <= 110
+    assert machine.peek("stormed") - machine.peek("handled") <= 125
     assert machine.peek("resent") >= len(ends), "once in each drain"
     assert machine.peek("echoed") >= 40, "of 16 bytes each"
 

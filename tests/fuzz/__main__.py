@@ -1,21 +1,73 @@
-"""`python -m tests.fuzz`: every campaign of this folder, one after the other; ends at the first that fails."""
+"""Every campaign of this folder, one after the other: `python -m tests.fuzz [--seconds S] [--seed N] [NAME...]`.
+
+With --seconds the campaigns share S seconds evenly, else each takes its own number of tries. A failure does not stop
+the others. Seeds come from the commit unless --seed gives the first. Exit status 1 if any campaign failed.
+
+Example: python -m tests.fuzz --seconds 600; python -m tests.fuzz --seconds 60 --seed 7 devices jit
+"""
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+from tests.fuzz.seeds import ROOT, SKIPPED, base_seed, parser
+
 HERE = Path(__file__).parent
+PATIENCE = 600.0
+"""Seconds beyond its share after which a campaign counts as hung: one try may take long, and images are built first."""
+
+
+def campaigns() -> dict[str, Path]:
+    """Scripts by name."""
+    scripts = [*sorted(HERE.glob("fuzz_*.py")), HERE / "csmith_campaign.py"]
+    return {script.stem.removeprefix("fuzz_").removesuffix("_campaign"): script for script in scripts}
+
+
+def run(script: Path, seed: int, seconds: float | None) -> str:
+    """One campaign, from the folder of the project; "passed", "skipped" or why it failed."""
+    command = [sys.executable, str(script), "--seed", str(seed)]
+    if seconds is not None:
+        command += ["--seconds", f"{seconds:g}"]
+    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
+    try:
+        status = process.wait(None if seconds is None else seconds + PATIENCE)
+    except subprocess.TimeoutExpired:
+        return f"hung: still running {PATIENCE:g} s behind its time"
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    return {0: "passed", SKIPPED: "skipped"}.get(status, f"FAILED with status {status}")
 
 
 def main() -> int:
-    for script in [*sorted(HERE.glob("fuzz_*.py")), HERE / "csmith_campaign.py"]:
-        print(f"{script.name}:", flush=True)
-        status = subprocess.run([sys.executable, str(script)], check=False).returncode
-        if status:
-            return status
-    return 0
+    known = campaigns()
+    options = parser(__doc__)
+    options.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(known)} (default: all)")
+    options.add_argument("--seconds", type=float, metavar="S", help="time for all of them together")
+    options.add_argument("--seed", type=int, help="first seed of each (default: from the commit's hash)")
+    given = options.parse_args()
+    if unknown := set(given.names) - known.keys():
+        options.error(f"no such campaign: {', '.join(sorted(unknown))}")
+    names = given.names or list(known)
+    seed = base_seed() if given.seed is None else given.seed
+    share = None if given.seconds is None else given.seconds / len(names)
+    results: dict[str, tuple[str, float]] = {}
+    for name in names:
+        print(f"== {name}", flush=True)
+        start = time.monotonic()
+        results[name] = run(known[name], seed, share), time.monotonic() - start
+    print(f"== summary, seed {seed}")
+    for name, (result, spent) in results.items():
+        print(f"{name:12} {spent:7.0f} s  {result}")
+    failed = [name for name, (result, _) in results.items() if result not in ("passed", "skipped")]
+    print(f"failed: {', '.join(failed)}" if failed else "no failure")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 """Random C programs: -O0 and -Os must give one checksum on the emulator, and avr-gcc with simavr the same one.
 
-`python tests/fuzz/csmith_campaign.py [--count N] [--seed S] [--jobs J] [--log FILE] [--keep DIR]`. Needs Debian's
-`csmith`; the AVR, another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are installed. Programs that
-run too long at -O0 or do not fit into 8 kB of RAM are skipped. FILE gets a line per program, and programs it names are
-not run again. Exit status 0 when all checksums agree; DIR keeps sources of failures.
+`python tests/fuzz/csmith_campaign.py [--count N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`.
+Needs Debian's `csmith`; the AVR, another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are there.
+Programs that run too long at -O0 or do not fit into 8 kB of RAM are skipped. FILE gets a line per program, and programs
+it names are not run again. Exit status 0 when all checksums agree; DIR keeps sources of failures.
 
 Two things csmith leaves undefined here are repaired, because a compiler may do anything with them:
 - its shift wrappers allow distances below 32 for every type; here the limit is the width of the shifted value;
@@ -21,6 +21,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
@@ -29,6 +30,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tests.fuzz.seeds import SKIPPED, base_seed  # noqa: E402
 from tests.toolchain.c_programs import build, run  # noqa: E402
 
 RUNTIME = Path(__file__).parent / "csmith_runtime"
@@ -43,6 +45,8 @@ GENERATOR = [
 ]
 AVR = ["avr-gcc", "-mmcu=atmega1284p", "-Os", "-w"]
 AVR_SECONDS = 20
+BATCH = 32
+"""Programs between two looks at the clock."""
 MEMORY = re.compile(r"does not fit|no room for the stack|overflow")
 MEMBER_ADDRESS = re.compile(r"&\w+(\[\w+\])*(\.|->)f\d")
 
@@ -171,25 +175,33 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="example: csmith_campaign.py --count 1000 --jobs 2")  # fmt: skip
-    parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1, help="number of the first program")
+    parser.add_argument("--count", type=int, help="programs (default 1000; with --seconds no limit)")
+    parser.add_argument("--seed", type=int, default=base_seed(), help="of the first program (default: from the commit)")
+    parser.add_argument("--seconds", type=float, help="begin no new program after S seconds", metavar="S")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--log", type=Path, help="file of verdicts, read and continued")
     parser.add_argument("--keep", type=Path, help="folder for the sources of failures")
     options = parser.parse_args()
     if not available():
         print("csmith is not installed (Debian package csmith): nothing to do", file=sys.stderr)
-        return 0
-    done = known(options.log)
-    work = [(seed, options.keep) for seed in range(options.seed, options.seed + options.count) if seed not in done]
+        return SKIPPED
+    count = options.count if options.count is not None or options.seconds is not None else 1000
+    done, start, seed = known(options.log), time.monotonic(), options.seed
     with ProcessPoolExecutor(options.jobs) as pool:
-        for verdict in pool.map(_examine, work):
-            done[verdict.seed] = verdict
-            if options.log:
-                with options.log.open("a") as log:
-                    print(json.dumps(asdict(verdict)), file=log)
-            if verdict.kind == "failed":
-                print(f"failed: seed {verdict.seed}: {verdict.reason}", flush=True)
+        while count is None or seed < options.seed + count:
+            if options.seconds is not None and time.monotonic() - start >= options.seconds:
+                break
+            end = seed + BATCH if count is None else min(seed + BATCH, options.seed + count)
+            work = [(number, options.keep) for number in range(seed, end) if number not in done]
+            seed = end
+            for verdict in pool.map(_examine, work):
+                done[verdict.seed] = verdict
+                if options.log:
+                    with options.log.open("a") as log:
+                        print(json.dumps(asdict(verdict)), file=log)
+                if verdict.kind == "failed":
+                    print(f"FAILED at seed {verdict.seed}: {verdict.reason}", flush=True)
+                    print(f"again: python tests/fuzz/csmith_campaign.py --seed {verdict.seed} --count 1", flush=True)
     counts = Counter(f"{v.kind} {v.reason if v.kind != 'failed' else ''}".strip() for v in done.values())
     print("\n".join(f"{count} {kind}" for kind, count in sorted(counts.items())))
     return 1 if counts["failed"] else 0

@@ -1,6 +1,7 @@
 """Mutated sources and objects: assembler and linker give an image or clear errors, nothing else.
 
-Run `python tests/fuzz/fuzz_asm.py [COUNT [SEED]]`; exits 1 with the first input that made something else happen.
+`python tests/fuzz/fuzz_asm.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made something
+else happen.
 """
 
 from __future__ import annotations
@@ -9,11 +10,13 @@ import random
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tests.fuzz.seeds import Course, parser  # noqa: E402
 from toolchain.asm.assemble import assemble  # noqa: E402
 from toolchain.asm.directives import DIRECTIVES  # noqa: E402
 from toolchain.asm.state import Options  # noqa: E402
@@ -154,7 +157,7 @@ def mutated_object(data: bytes, rng: random.Random) -> bytes:
 
 
 def object_outcome(data: bytes) -> str:
-    """"object refused" or "object linked"."""
+    """ "object refused" or "object linked"."""
     try:
         linked = link([read_object(data, "fuzz.o")], [], LinkOptions(gc_sections=True))
     except ToolError as error:
@@ -170,37 +173,34 @@ def check_findings(error: ToolError) -> None:
         assert "error: " in finding, finding
 
 
-def campaign(count: int, seed: int) -> Counter[str]:
-    """Run `count` mutated sources; raise AssertionError with the source that misbehaved."""
-    rng = random.Random(seed)
+def campaign(seeds: Iterable[int]) -> Counter[str]:
+    """A mutated source and object for every seed; raise AssertionError with the one that misbehaved."""
     good = object_bytes(assemble(SEED_TEXT, "seed.s")[0])
     outcomes: Counter[str] = Counter()
-    for number in range(count):
+    for seed in seeds:
+        rng = random.Random(seed)
         text = mutate(SEED_TEXT, rng)
         data = mutated_object(good, rng)
         start = time.monotonic()
         try:
-            outcomes[outcome(text, relax=number % 2 == 1)] += 1
+            outcomes[outcome(text, relax=seed % 2 == 1)] += 1
             text = data.hex()
             outcomes[object_outcome(data)] += 1
         except Exception as error:
-            raise AssertionError(f"seed {seed}, input {number}: {type(error).__name__}: {error}\n{text}") from error
+            raise AssertionError(f"{type(error).__name__}: {error}\n{text}") from error
         taken = time.monotonic() - start
-        assert taken < SLOW_SECONDS, f"seed {seed}, input {number} took {taken:.1f} s\n{text}"
+        assert taken < SLOW_SECONDS, f"took {taken:.1f} s\n{text}"
     return outcomes
 
 
 def main() -> int:
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    course = Course(parser(__doc__), "inputs", 20_000, "sources and objects")
+    course.parse()
     try:
-        outcomes = campaign(count, seed)
+        outcomes = campaign(course)
     except AssertionError as error:
-        print(error)
-        return 1
-    summary = ", ".join(f"{n} {what}" for what, n in sorted(outcomes.items()))
-    print(f"{count} sources and objects, seed {seed}: {summary}")
-    return 0
+        return course.failed(error)
+    return course.ended(", ".join(f"{n} {what}" for what, n in sorted(outcomes.items())))
 
 
 if __name__ == "__main__":

@@ -1,35 +1,41 @@
-"""Engines against each other on random programs that live on device registers; the whole state is compared.
+"""Engines against each other on random programs that live on device registers: state, UART bytes, rendered lines.
 
-Run `python tests/fuzz/fuzz_devices.py [--programs N] [--seed S] [--engine NAME]`; exits 1 at the first difference.
+`python tests/fuzz/fuzz_devices.py [--programs N] [--seed S] [--seconds T] [--engine NAME] [--show]`. Exits 1 at the
+first difference. What was touched how often is printed at the end; --show prints the program of a seed instead.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
-import time
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
-from peripherals.device_programs import difference  # noqa: E402
+from peripherals.device_programs import WORDS, difference, program  # noqa: E402
+
+from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--programs", type=int, default=150, help="random programs (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=1, help="first seed (default %(default)s)")
-    parser.add_argument("--engine", default="jit", help="engine to compare with the plain one (default %(default)s)")
-    options = parser.parse_args()
-    start = time.perf_counter()
-    for seed in range(options.seed, options.seed + options.programs):
-        found = difference(seed, options.engine, chunks=6)
+    course = Course(parser(__doc__), "programs", 150, "random programs")
+    course.parser.add_argument("--engine", choices=("interp", "jit"), help="compared with the plain one (default both)")
+    course.parser.add_argument("--show", action="store_true", help="print the first program and end")
+    options = course.parse()
+    if options.show:
+        print(program(course.first)[0])
+        return 0
+    touched: Counter[tuple[str, str]] = Counter()
+    for seed in course:
+        found = difference(seed, *([options.engine] if options.engine else ("interp", "jit")), tally=touched)
         if found is not None:
-            print(found)
-            return 1
-    print(f"{options.programs} programs on {options.engine}, {time.perf_counter() - start:.0f} s, no difference")
-    return 0
+            return course.failed(found)
+    ways: Counter[str] = Counter()
+    for (_name, way), count in touched.items():
+        ways[way] += count
+    print(", ".join(f"{count} {way}" for way, count in sorted(ways.items())))
+    return course.ended(f"{len({name for name, _ in touched})} of {len(WORDS)} registers touched, no difference")
 
 
 if __name__ == "__main__":

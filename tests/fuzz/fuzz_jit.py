@@ -3,7 +3,7 @@
 Three campaigns, until their targets are met: `straight` (thousands of distinct instructions per program, in step with
 the plain interpreter, each program also in exact code alone), `wild` (jumps, traps and mode changes at odd places) and
 `long` (loops for millions of instructions, block code beside exact code, a share of it also beside the specialised
-interpreter). Odd seeds run with ipl_slip 1.
+interpreter). Odd seeds run with ipl_slip 1. With --seconds the targets are out of reach: it ends in time.
 
     python tests/fuzz/fuzz_jit.py                                           # a few minutes
     python tests/fuzz/fuzz_jit.py --pairs 1000000 --interrupts 100000 --instructions 1000000000 --wild 2000 \
@@ -33,10 +33,19 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "jit")]
 from long_runs import check_long  # noqa: E402
 from twins import Difference, Tally, check_straight, check_wild  # noqa: E402
 
+from tests.fuzz.seeds import base_seed  # noqa: E402
+
 SAVE_EVERY = 60.0
 """Seconds between two savings of the state."""
-LONG = 40_000_000
+LONG = 10_000_000
 """Instructions per program of the campaign `long`."""
+
+
+CHECKS: dict[str, Callable[[int], Tally]] = {
+    "straight": check_straight,
+    "wild": check_wild,
+    "long": lambda seed: check_long(seed, LONG),
+}
 
 
 class Campaign:
@@ -74,7 +83,8 @@ class Campaign:
         try:
             found = check(seed)
         except Difference as difference:
-            raise Difference(f"{kind} seed {seed}: {difference}") from difference
+            again = f"python tests/fuzz/fuzz_jit.py --kind {kind} --seed {seed}"
+            raise Difference(f"{kind} seed {seed}: {difference}\nagain: {again}") from difference
         self.tally.add(found)
         self.seeds[kind] = seed + 1
         self.seconds += time.process_time() - start
@@ -84,7 +94,7 @@ class Campaign:
 
 def campaign(state: Campaign, options: argparse.Namespace, progress: Progress) -> None:
     """Run until every target is met, always the kind of program that is furthest behind."""
-    tally = state.tally
+    tally, start = state.tally, time.monotonic()
     goals: dict[str, tuple[int, Callable[[], int]]] = {
         "native pairs": (options.pairs, lambda: len(tally.native)),
         "interrupts": (options.interrupts, lambda: tally.places["interrupts"]),
@@ -92,17 +102,20 @@ def campaign(state: Campaign, options: argparse.Namespace, progress: Progress) -
         "instructions": (options.instructions, tally.executed),
     }
     tasks = {name: progress.add_task(name, total=total) for name, (total, _done) in goals.items()}
+    if options.kind is not None:
+        state.run(options.kind, CHECKS[options.kind])
+        return
     while True:
         shares = {name: done() / total for name, (total, done) in goals.items() if total}
         for name, task in tasks.items():
             progress.update(task, completed=goals[name][1]())
         behind = min(shares, key=shares.__getitem__)
-        if shares[behind] >= 1:
+        if options.seconds is None and shares[behind] >= 1:
             return
-        if behind == "instructions":
-            state.run("long", lambda seed: check_long(seed, min(LONG, options.instructions - tally.executed())))
-        else:
-            state.run(*(("wild", check_wild) if behind == "wild programs" else ("straight", check_straight)))
+        if options.seconds is not None and time.monotonic() - start >= options.seconds:
+            return
+        kind = {"instructions": "long", "wild programs": "wild"}.get(behind, "straight")
+        state.run(kind, CHECKS[kind])
 
 
 def text_of(report: dict[str, Any]) -> str:
@@ -113,12 +126,14 @@ def text_of(report: dict[str, Any]) -> str:
     programs = ", ".join(f"{count} {name}" for name, count in report["programs"].items())
     places = "\n".join(f"    {count:9} {name}" for name, count in sorted(report["places"].items(), key=lambda i: -i[1]))
     rare = ", ".join(f"{name}: {count}" for name, count in rarest)
-    return (f"{programs} programs, {report['executed']} instructions, {report['stops']} stops "
-            f"({report['exchanges']} with snapshots "
-            f"exchanged), {sum(report['entries'].values())} exceptions: no difference, {report['seconds']:.0f} s\n"
-            f"(word, modes) pairs: {report['pairs']}, natively {report['native_pairs']}, in exact code once more "
-            f"{report['exact_pairs']}\n{len(rows)} rows, the rarest {rare}\n"
-            f"rows never native: {', '.join(never) or 'none'}\nexceptions entered in step, by place:\n{places}")
+    return (
+        f"{programs} programs, {report['executed']} instructions, {report['stops']} stops "
+        f"({report['exchanges']} with snapshots "
+        f"exchanged), {sum(report['entries'].values())} exceptions: no difference, {report['seconds']:.0f} s\n"
+        f"(word, modes) pairs: {report['pairs']}, natively {report['native_pairs']}, in exact code once more "
+        f"{report['exact_pairs']}\n{len(rows)} rows, the rarest {rare}\n"
+        f"rows never native: {', '.join(never) or 'none'}\nexceptions entered in step, by place:\n{places}"
+    )
 
 
 def main() -> int:
@@ -127,7 +142,9 @@ def main() -> int:
     parser.add_argument("--interrupts", type=int, default=4_000, help="interrupts in step (default %(default)s)")
     parser.add_argument("--wild", type=int, default=100, help="wild programs (default %(default)s)")
     parser.add_argument("--instructions", type=int, default=40_000_000, help="in all (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=10_000, help="first seed of each kind (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=base_seed(), help="first of each kind (default: from the commit)")
+    parser.add_argument("--seconds", type=float, help="begin no new program after S seconds", metavar="S")
+    parser.add_argument("--kind", choices=CHECKS, help="only the program of this kind and seed")
     parser.add_argument("--state", type=Path, help="file to go on from and to keep the tallies in")
     parser.add_argument("--json", action="store_true", help="print the tallies as JSON")
     options = parser.parse_args()
@@ -137,7 +154,7 @@ def main() -> int:
         try:
             campaign(state, options, progress)
         except Difference as difference:
-            print(f"DIFFERENCE: {difference}")
+            print(f"FAILED at {difference}")
             status = 1
         except KeyboardInterrupt:
             status = 130

@@ -1,14 +1,15 @@
-"""The kernel under interrupts and without memory: `python tests/fuzz/fuzz_kernel.py [--stride N] [--preemptions N]`.
+"""The kernel under interrupts and without memory: `python tests/fuzz/fuzz_kernel.py [--rounds N] [--stride N]`.
 
 The campaign behind tests/firmware/test_every_instruction.py, which samples: every kernel call is interrupted at every
-instruction boundary by all interrupts together and by them one after the other, without and with IPL slip (kernel.md
-§4), and every allocation fails once. Then threads that check all their registers are preempted. An interrupted
-campaign goes on with --way, --ipl-slip and --scene, as its last line said.
+instruction boundary by all interrupts together or by them one after the other, without or with IPL slip (kernel.md
+§4): four rounds, in turn by seed. An interrupt itself makes every call of the public headers, those it may not make
+too. With --stride a round tries every N-th boundary, beginning at one that its seed says.
+Without --seconds also every allocation fails once, and threads that check all their registers are preempted. An
+interrupted round goes on with its --seed and --scene, as its last line said.
 """
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -19,6 +20,10 @@ sys.path.insert(0, str(ROOT))
 
 from tests.firmware.injection import WAYS, fail_every_allocation, sweep  # noqa: E402
 from tests.firmware.test_on_target import load, place  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+
+SPARSE = 499
+"""Stride of a run that was given a time."""
 
 
 def build(app: str, out: Path) -> Path:
@@ -46,31 +51,30 @@ def preempt_patterns(path: Path, wanted: int) -> None:
     print(f"{switches} preemptions, every register kept", flush=True)
 
 
-def interrupt_everywhere(path: Path, options: argparse.Namespace) -> None:
-    """Every boundary in every way, from where the last run was told to go on."""
-    for way in WAYS[WAYS.index(options.way) :]:
-        for ipl_slip in (0, 1)[options.ipl_slip :]:
-            for done, seen in sweep(path, ipl_slip, way, options.stride, first=options.scene):
-                print(f"--way {way} --ipl-slip {ipl_slip} --scene {done}: {seen}", flush=True)
-            options.scene = 0
-        options.ipl_slip = 0
-
-
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--stride", type=int, default=1, help="try every N-th boundary (default 1: 20 minutes)")
-    parser.add_argument("--way", choices=WAYS, default=WAYS[0], help="begin with this way of injection")
-    parser.add_argument("--ipl-slip", type=int, choices=(0, 1), default=0, help="... and this slip")
-    parser.add_argument("--scene", type=int, default=0, help="... and this scene of target/calls")
-    parser.add_argument("--preemptions", type=int, default=100_000)
-    options = parser.parse_args()
+    course = Course(parser(__doc__), "rounds", 4, "rounds of calls")
+    add = course.parser.add_argument
+    add("--stride", type=int, help=f"every N-th boundary (default 1: 5 minutes a round; {SPARSE} with --seconds)")
+    add("--scene", type=int, default=0, help="begin with this scene of target/calls")
+    add("--preemptions", type=int, default=100_000, help="of threads with patterns (default %(default)s)")
+    options = course.parse()
+    stride = options.stride or (1 if options.seconds is None else SPARSE)
     with tempfile.TemporaryDirectory() as folder:
         calls, registers = (build(app, Path(folder)) for app in ("calls", "registers"))
-        for done, failures in fail_every_allocation(calls):
-            print(f"{failures} allocations failed in {done} scenes, nothing lost or leaked", flush=True)
-        interrupt_everywhere(calls, options)
-        preempt_patterns(registers, options.preemptions)
-    return 0
+        try:
+            for seed in course:
+                way, slip = WAYS[seed // 2 % len(WAYS)], seed % 2
+                for done, seen in sweep(calls, slip, way, stride, seed % stride, options.scene):
+                    if options.seconds is None:
+                        print(f"--seed {seed} --scene {done} ({way}, slip {slip}): {seen}", flush=True)
+                print(f"{way}, slip {slip}: {seen}", flush=True)
+            if options.seconds is None:
+                for done, failures in fail_every_allocation(calls):
+                    print(f"{failures} allocations failed in {done} scenes, nothing lost or leaked", flush=True)
+                preempt_patterns(registers, options.preemptions)
+        except AssertionError as error:
+            return course.failed(error)
+    return course.ended("nothing lost, doubled or leaked")
 
 
 if __name__ == "__main__":

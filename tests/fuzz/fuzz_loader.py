@@ -1,14 +1,16 @@
 """Mutated ELF and HEX files: the loader gives a valid image or a clear refusal, nothing else.
 
-Run `python tests/fuzz/fuzz_loader.py [COUNT [SEED]]`; exits 1 with the first input that made something else happen.
+`python tests/fuzz/fuzz_loader.py [--inputs N] [--seed S] [--seconds T]`; exits 1 with the first input that made
+something else happen.
 """
 
 from __future__ import annotations
 
 import random
 import sys
-import time
+import traceback
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -22,12 +24,13 @@ from emu.disassembly import items  # noqa: E402
 from emu.footprint import pieces  # noqa: E402
 from emu.image import LoadError  # noqa: E402
 from emu.loader import parse_image  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 INTERESTING = (0, 1, 2, 3, 4, 7, 8, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x17FFE, 0x18000, 0x7FF000)
 WIDE = (*INTERESTING, 0xF80000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF)
 
 
-def seeds() -> list[bytes]:
+def samples() -> list[bytes]:
     """Valid files to start from: ELF with DWARF, and the same program as HEX."""
     sample = xc16_like()
     sample.parts += debug_sections()
@@ -86,29 +89,29 @@ def attempt(data: bytes) -> str:
     return "loaded with unreadable debug information" if image.lines.broken else "loaded"
 
 
-def campaign(count: int, seed: int) -> Counter[str]:
-    """Outcomes of `count` mutated files. Raises whatever escapes the loader, with the input in a note."""
-    rng = random.Random(seed)
-    starts = seeds()
+def campaign(seeds: Iterable[int]) -> Counter[str]:
+    """Outcomes of a mutated file for every seed. Raises whatever escapes the loader, with the input in a note."""
+    starts = samples()
     outcomes: Counter[str] = Counter()
-    for number in range(count):
-        data = mutate(starts[number % len(starts)], rng)
+    for seed in seeds:
+        data = mutate(starts[seed % len(starts)], random.Random(seed))
         try:
             outcomes[attempt(data)] += 1
         except Exception as error:
-            error.add_note(f"seed {seed}, input {number}: {data.hex()}")
+            error.add_note(f"input: {data.hex()}")
             raise
     return outcomes
 
 
-def main(arguments: list[str]) -> int:
-    count = int(arguments[0]) if arguments else 20_000
-    seed = int(arguments[1]) if len(arguments) > 1 else 1
-    start = time.monotonic()
-    outcomes = campaign(count, seed)
-    print(f"loader: {count} inputs, seed {seed}, {time.monotonic() - start:.1f} s: {dict(outcomes)}")
-    return 0
+def main() -> int:
+    course = Course(parser(__doc__), "inputs", 20_000, "files")
+    course.parse()
+    try:
+        outcomes = campaign(course)
+    except Exception:
+        return course.failed(traceback.format_exc())
+    return course.ended(str(dict(outcomes)))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -1,14 +1,12 @@
 """Random register accesses, pin changes, resets and naps on the peripherals alone; snapshots must continue identically.
 
-Run `python tests/fuzz/fuzz_peripherals.py [--rounds N] [--seed S]`; exits 1 at the first failure, naming its seed.
+`python tests/fuzz/fuzz_peripherals.py [--rounds N] [--seed S] [--seconds T]`; exits 1 at the first failure.
 """
 
 from __future__ import annotations
 
-import argparse
 import random
 import sys
-import time
 import traceback
 from pathlib import Path
 
@@ -17,6 +15,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
 from peripherals.conftest import Rig  # noqa: E402
 from peripherals.test_fuzz import WORDS, act  # noqa: E402
+
+from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 ACTIONS = 8000
 """Accesses per round."""
@@ -45,20 +45,14 @@ def check(seed: int) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=200, help="rounds (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=1, help="first seed (default %(default)s)")
-    options = parser.parse_args()
-    start = time.perf_counter()
-    for seed in range(options.seed, options.seed + options.rounds):
+    course = Course(parser(__doc__), "rounds", 200, f"rounds of {ACTIONS} accesses")
+    course.parse()
+    for seed in course:
         try:
             check(seed)
         except Exception:
-            traceback.print_exc()
-            print(f"seed {seed} failed")
-            return 1
-    print(f"{options.rounds} rounds of {ACTIONS} accesses, {time.perf_counter() - start:.0f} s, no failure")
-    return 0
+            return course.failed(traceback.format_exc())
+    return course.ended("no failure")
 
 
 if __name__ == "__main__":

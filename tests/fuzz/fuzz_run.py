@@ -1,14 +1,17 @@
 """Damaged and random firmware, executed: a run always ends with a reason, never with an exception of the emulator.
 
-Run `python tests/fuzz/fuzz_run.py [COUNT [SEED]]`; exits 1 with the first image that made something else happen.
+`python tests/fuzz/fuzz_run.py [--images N] [--seed S] [--seconds T]`; exits 1 with the first image that made something
+else happen.
 """
 
 from __future__ import annotations
 
+import json
 import random
 import sys
-import time
+import traceback
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -17,9 +20,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader"), str(ROOT / "t
 from elf_samples import ElfSample, Part, words  # noqa: E402
 from programs import ECHO, HELLO, SPIN, assembled  # noqa: E402
 
-from emu.faults import fault_of  # noqa: E402
 from emu.loader import parse_image  # noqa: E402
 from emu.machine import REASONS, Machine  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 CYCLES = 3_000
 CODE_WORDS = 300
@@ -49,30 +52,35 @@ def attempt(rng: random.Random, engine: str) -> str:
     machine.uart[1].feed(bytes(rng.getrandbits(8) for _ in range(4)))
     stop = machine.run(cycles=CYCLES)
     assert stop.reason in REASONS
-    fault_of(machine, image, stop)
+    assert (stop.reason == "fault") == (stop.fault is not None)
+    if stop.fault is not None:
+        assert json.dumps(stop.fault.facts())
+        assert stop.fault.report().startswith("firmware fault: ")
     return stop.reason
 
 
-def campaign(count: int, seed: int, engines: tuple[str, ...] = ("plain", "interp")) -> Counter[str]:
-    """Reasons of `count` runs. Raises whatever escapes, with the number of the run in a note."""
+def campaign(seeds: Iterable[int], engines: tuple[str, ...]) -> Counter[str]:
+    """Reasons for which an image for every seed ended, the engines in turn. Raises whatever escapes."""
     outcomes: Counter[str] = Counter()
-    for number in range(count):
+    for seed in seeds:
+        engine = engines[seed % len(engines)]
         try:
-            outcomes[attempt(random.Random(f"{seed}.{number}"), engines[number % len(engines)])] += 1
+            outcomes[attempt(random.Random(seed), engine)] += 1
         except Exception as error:
-            error.add_note(f"seed {seed}, run {number}, engine {engines[number % len(engines)]}")
+            error.add_note(f"engine {engine}")
             raise
     return outcomes
 
 
-def main(arguments: list[str]) -> int:
-    count = int(arguments[0]) if arguments else 5_000
-    seed = int(arguments[1]) if len(arguments) > 1 else 1
-    start = time.monotonic()
-    outcomes = campaign(count, seed, ("plain", "interp", "jit"))
-    print(f"run: {count} images, seed {seed}, {time.monotonic() - start:.1f} s: {dict(outcomes)}")
-    return 0
+def main() -> int:
+    course = Course(parser(__doc__), "images", 5_000, "images to run")
+    course.parse()
+    try:
+        outcomes = campaign(course, ("plain", "interp", "jit"))
+    except Exception:
+        return course.failed(traceback.format_exc())
+    return course.ended(str(dict(outcomes)))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -57,9 +57,9 @@ def run(image: Path, cycles: int = 30_000_000, engine: str = "auto") -> Ran:
     stop = machine.run(cycles=cycles)
     if stop.reason == "halt":
         return Ran(machine.w[0], "", bytes(said), stop.cycle)
-    why = f"{stop.reason} at {stop.pc:#x} {stop.detail}".strip()
+    why = stop.fault.cause if stop.fault is not None else f"{stop.reason} at {stop.pc:#x} {stop.detail}".strip()
     where = machine.image.symbols.code(stop.pc) if machine.image is not None else None
-    if stop.reason == "breakpoint" and where is not None and where[0].name == "__DefaultInterrupt":
+    if stop.reason == "fault" and where is not None and where[0].name == "__DefaultInterrupt":
         flags = machine.peek("INTCON1")
         traps = [name for bit, name in INTCON1_TRAPS.items() if flags >> bit & 1]
         why = f"trap: {', '.join(traps) or 'unexpected interrupt'}"

@@ -219,7 +219,7 @@ def excuse(path: Path, source: str, result: Ran, image: Path) -> str | None:
         return "uses an uninitialised variable"
     if compile_test(path, source, image, "-O0", "-fsanitize=undefined").status == 0:
         checked = run_test(image, 3 * SHORT).why
-        if checked.startswith("breakpoint"):
+        if checked.startswith("undefined behaviour"):
             return f"undefined where int has 16 bits: the sanitizer stops it ({checked})"
         if checked == "trap: math error":
             return "undefined where int has 16 bits: divides by zero"

@@ -107,7 +107,7 @@ def test_libraries(files, capsys):
         (["as", "hello.s", "-p", "33FJ"], "only processor supported"),
         (["as", "hello.s", "-o", "no/such/dir.o"], "cannot write"),
         (["ld"], "no input files"),
-        (["ld", "-T", "p30F6014A.gld", "undefined.o"], "no linker script is needed"),
+        (["ld", "-T", "boot.gld", "undefined.o"], "linker script 'boot.gld' is not used here"),
         (["ld", "hello.s"], "hello.s: not an ELF file"),
         (["ld", "-l", "nothing", "-o", "x"], "cannot find libnothing.a"),
         (["ld", "undefined.o", "-o", "out.elf", "-Map", "out.map"], "undefined symbol _nowhere"),

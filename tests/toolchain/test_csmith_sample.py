@@ -1,4 +1,4 @@
-"""Thirty programs of the csmith campaign (`tests/fuzz/csmith_campaign.py`, which `make fuzz` runs at length)."""
+"""Thirty programs of the csmith campaign (`tests/fuzz/csmith_campaign.py`, which `make campaigns` runs at length)."""
 
 from __future__ import annotations
 

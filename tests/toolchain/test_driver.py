@@ -290,8 +290,8 @@ BAD_COMMAND_LINES = [
     (["-x", "fortran", "a.c"], "unknown language 'fortran'"),
     (["a.c", "-o", "missing/x.elf"], "does not exist"),
     (["a.c", "-lnone"], "cannot find libnone.a"),
-    (["a.c", "-Wl,--frob"], "unknown linker option '--frob'"),
-    (["a.c", "-Wl,--heap=lots"], "needs a number, not 'lots'"),
+    (["a.c", "-Wl,--frob"], "linker option: unrecognized arguments: --frob"),
+    (["a.c", "-Wl,--heap=lots"], "--heap: 'lots' is not a number"),
     (["a.c", "-j", "0"], "positive number"),
     (["@nothere"], "cannot read response file"),
 ]

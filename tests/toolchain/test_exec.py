@@ -1,4 +1,4 @@
-"""Every case of `exec/*.c` on the emulator at four optimisation levels.
+"""Every case of `exec/*.c` on the emulator at four optimisation levels, whole program and file by file.
 
 One image per file and level: a generated main calls the cases in order and reports each over UART1 as `name line`, with
 line 0 for a pass. A case that traps or hangs shows as such, and those after it as not run.
@@ -16,6 +16,8 @@ from tests.toolchain.c_programs import build, run
 
 FOLDER = Path(__file__).parent / "exec"
 LEVELS = ("-O0", "-O1", "-Os", "-O2")
+ALONE = " -fno-lto"
+"""Files compiled one by one: functions keep their calls, so that what they do to each other's objects shows."""
 CASE = re.compile(r'^TEST\((\w+),\s*"([^"]+)"\)', re.MULTILINE)
 CYCLES = 40_000_000
 
@@ -53,8 +55,10 @@ def results(path: Path, level: str, folder: Path) -> dict[str, str]:
             table=", ".join(f'{{"{name}", test_{name}}}' for name in names),
         )
     )
-    image = folder / f"{path.stem}{level}.elf"
-    built = build([path, main], image, level, "-std=gnu11", "-Wall", "-Wno-unused", "-Wno-parentheses", f"-I{FOLDER}")
+    image = folder / f"{path.stem}{level.replace(' ', '')}.elf"
+    built = build(
+        [path, main], image, *level.split(), "-std=gnu11", "-Wall", "-Wno-unused", "-Wno-parentheses", f"-I{FOLDER}"
+    )
     if built.status != 0:
         return dict.fromkeys(names, f"does not build: {built.first_error}")
     ran = run(image, CYCLES, engine="interp")
@@ -74,9 +78,9 @@ def image_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 PARAMETERS = [
-    pytest.param(path, level, name, id=f"{path.stem}-{name}{level}")
+    pytest.param(path, level, name, id=f"{path.stem}-{name}{level}".replace(" ", ""))
     for path in sorted(FOLDER.glob("*.c"))
-    for level in LEVELS
+    for level in (*LEVELS, "-O1" + ALONE, "-Os" + ALONE)
     for name in cases_of(path)
 ]
 

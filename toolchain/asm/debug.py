@@ -80,8 +80,8 @@ def _info(asm: Assembler, line: Symbol, abbrev: Symbol) -> _Bytes:
     body.word(0, abbrev)
     body.data += bytes((ADDRESS_SIZE, 1))
     body.word(0, line)
-    body.text(asm.line_rows[0][1].file)
-    body.text(os.getcwd())
+    body.text(asm.options.recorded(asm.line_rows[0][1].file))
+    body.text(asm.options.recorded(os.getcwd()))
     body.text(PRODUCER)
     body.data += LANGUAGE.to_bytes(2, "little")
     body.data[:4] = (len(body.data) - 4).to_bytes(4, "little")
@@ -97,7 +97,7 @@ def _line_program(asm: Assembler, sections: dict[AsmSection, Section], starts: d
     out.data += bytes((1, 1, LINE_BASE & 0xFF, LINE_RANGE, OPCODE_BASE)) + _OPCODE_LENGTHS
     out.data += b"\0"  # no include directories: file names carry their folder
     for file in files:
-        out.text(file)
+        out.text(asm.options.recorded(file))
         out.data += b"\0\0\0"
     out.data += b"\0"
     out.data[6:10] = (len(out.data) - 10).to_bytes(4, "little")

@@ -44,6 +44,14 @@ class Options:
     relax: bool = False
     debug: bool = False
     processor: int = PROCESSOR_30F6014A
+    prefix_map: list[tuple[str, str]] = field(default_factory=list)
+
+    def recorded(self, path: str) -> str:
+        """A path as debug information names it: the beginning that the last fitting pair of `prefix_map` replaces."""
+        for old, new in reversed(self.prefix_map):
+            if path.startswith(old):
+                return new + path[len(old) :]
+        return path
 
 
 class Assembler:

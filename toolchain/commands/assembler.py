@@ -27,6 +27,8 @@ def main(arguments: list[str]) -> int:
     p.add_argument("--defsym", action="append", default=[], metavar="NAME=VALUE", help="define an absolute symbol")
     p.add_argument("--relax", action="store_true", help="shorten CALL and GOTO within a section")
     p.add_argument("-g", dest="debug", action="store_true", help="write a DWARF line table for this source")
+    p.add_argument("--debug-prefix-map", action="append", default=[], metavar="OLD=NEW", type=_pair,
+                   help="paths that begin with OLD are recorded as NEW")  # fmt: skip
     p.add_argument("-p", dest="part", default=PART, help=f"processor; only {PART} is supported")
     p.add_argument("-omf", default="elf", choices=("elf",), help=argparse.SUPPRESS)
     options = p.parse_args(arguments)
@@ -39,9 +41,17 @@ def main(arguments: list[str]) -> int:
     output = options.output or ("a.out" if options.source == "-" else str(Path(name).with_suffix(".o").name))
     if Path(output) == Path(name):
         raise ToolError(f"the output {output} would overwrite the source")
-    asm_options = Options(options.include, dict(map(definition, options.defsym)), options.relax, options.debug)
+    asm_options = Options(options.include, dict(map(definition, options.defsym)), options.relax, options.debug,
+                          prefix_map=options.debug_prefix_map)  # fmt: skip
     obj, messages = assemble(text, name, asm_options)
     for message in messages:
         print(message, file=sys.stderr)
     write_outputs([(output, object_bytes(obj))])
     return 0
+
+
+def _pair(text: str) -> tuple[str, str]:
+    old, equals, new = text.partition("=")
+    if not equals:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected OLD=NEW")
+    return old, new

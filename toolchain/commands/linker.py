@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -34,10 +33,7 @@ def main(arguments: list[str]) -> int:
     p.add_argument("-L", dest="folders", action="append", default=[], metavar="DIR", help="search -l libraries here")
     p.add_argument("-l", dest="libraries", action="append", default=[], metavar="NAME", help="link libNAME.a")
     add_options(p)
-    p.add_argument("-T", "--script", help=argparse.SUPPRESS)
     options = p.parse_args(arguments)
-    if options.script:
-        raise ToolError(f"{options.script}: no linker script is needed, the memory map of the 30F6014A is built in")
     names = [*options.inputs, *(str(find_library(n, options.folders)) for n in options.libraries)]
     if not names:
         raise ToolError("no input files")
@@ -48,5 +44,5 @@ def main(arguments: list[str]) -> int:
         from toolchain.link.mapfile import memory_report
 
         print(memory_report(linked))
-    write_outputs(output_files(linked, Path(options.output), options.map, options.hex))
+    write_outputs(output_files(linked, Path(options.output), options.map, options.hex, options.memorysummary))
     return 0

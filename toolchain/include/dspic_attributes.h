@@ -22,7 +22,25 @@
 #define __dspic_text(x) #x
 #define __dspic_number(x) __dspic_text(x)
 
-#define __dspic_a_interrupt ~, (__used__, __annotate__("interrupt"))
+/* `interrupt`, or `interrupt(irq(N), save(a, b), preprologue("text"))`: in front of a parenthesis the last word is a macro. */
+#define __dspic_a_interrupt ~, (__annotate__("interrupt"), __used__)
+#define __used__(...) __used__, __dspic_i1(__VA_ARGS__, )
+#define __dspic_i1(a, ...) __dspic_i_##a __VA_OPT__(, __dspic_i2(__VA_ARGS__))
+#define __dspic_i2(a, ...) __dspic_i_##a __VA_OPT__(, __dspic_i3(__VA_ARGS__))
+#define __dspic_i3(a, ...) __dspic_i_##a __VA_OPT__(, __dspic_i4(__VA_ARGS__))
+#define __dspic_i4(a, ...) __dspic_i_##a
+#define __dspic_i_irq(number) __annotate__("irq:" __dspic_number(number))
+#define __dspic_i_altirq(number) __annotate__("altirq:" __dspic_number(number))
+#define __dspic_i_save(...) __annotate__("save:" #__VA_ARGS__)
+#define __dspic_i_preprologue(text) __annotate__("preprologue:" text)
+#define __dspic_i_shadow __annotate__("shadow")
+#define __dspic_i_auto_psv __annotate__("auto_psv")
+#define __dspic_i_no_auto_psv __annotate__("no_auto_psv")
+#define __dspic_i___irq__ __dspic_i_irq
+#define __dspic_i___altirq__ __dspic_i_altirq
+#define __dspic_i___save__ __dspic_i_save
+#define __dspic_i___preprologue__ __dspic_i_preprologue
+#define __dspic_i___shadow__ __dspic_i_shadow
 #define __dspic_a_auto_psv ~, (__annotate__("auto_psv"))
 #define __dspic_a_no_auto_psv ~, (__annotate__("no_auto_psv"))
 #define __dspic_a_shadow ~, (__annotate__("shadow"))
@@ -32,6 +50,7 @@
 #define __dspic_a_noload ~, (__annotate__("noload"))
 #define __dspic_a_address(number) ~, (__used__, __annotate__("address(" __dspic_text(number) ")"))
 #define __dspic_a_reverse(number) ~, (__annotate__("reverse(" __dspic_text(number) ")"))
+#define __dspic_a_user_init ~, (__constructor__)
 #define __dspic_a_space(kind) ~, (__dspic_space_##kind)
 
 #define __dspic_space_data
@@ -52,6 +71,7 @@
 #define __dspic_a___noload__ __dspic_a_noload
 #define __dspic_a___address__ __dspic_a_address
 #define __dspic_a___reverse__ __dspic_a_reverse
+#define __dspic_a___user_init__ __dspic_a_user_init
 #define __dspic_a___space__ __dspic_a_space
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef DSPIC_BUILTINS_H
 #define DSPIC_BUILTINS_H
 #ifndef __ASSEMBLER__
+#pragma GCC system_header
 #include "dspic_attributes.h"
 
 #define __builtin_nop() __asm__ volatile("nop")
@@ -9,6 +10,10 @@
 #define __builtin_pwrsav(mode) __asm__ volatile("pwrsav #%0" ::"i"(mode) : "memory")
 #define __builtin_disi(cycles) __asm__ volatile("disi #%0" ::"i"(cycles) : "memory")
 #define __builtin_software_breakpoint() __asm__ volatile(".pword 0xDA4000" ::: "memory")
+
+/* Arguments lie one below the other, rounded to words (abi-elf.md §2.4). The front end's own version takes the address of
+ * a struct for the struct. */
+#define __builtin_va_arg(list, type) (*(__typeof__(type) *)((list) -= (sizeof(type) + 1) & ~1u))
 
 /* There is no cache; the front end's own version of this builtin does not fit a 16-bit int. */
 #define __builtin_prefetch(address, ...) ((void)(address))
@@ -19,7 +24,7 @@
 #define __builtin_isnanf(x) __builtin_isnan(x)
 #define __builtin_isnanl(x) __builtin_isnan(x)
 #define __builtin_imaxabs(x) __builtin_llabs(x)
-_Noreturn void __dspic_exit(int status) __asm__("exit");
+__attribute__((__noreturn__)) void __dspic_exit(int status) __asm__("exit");
 #define __builtin_exit __dspic_exit
 
 int __dspic_puts(const char *text) __asm__("puts");
@@ -27,7 +32,7 @@ int __dspic_puts(const char *text) __asm__("puts");
 
 /* GCC's buffer is five words, ours ten: it holds the address of ours, which lives as long as the function does. */
 int __dspic_setjmp(unsigned int *environment) __asm__("setjmp") __attribute__((__returns_twice__));
-_Noreturn void __dspic_longjmp(unsigned int *environment, int value) __asm__("longjmp");
+__attribute__((__noreturn__)) void __dspic_longjmp(unsigned int *environment, int value) __asm__("longjmp");
 #define __builtin_setjmp(buffer) \
   __dspic_setjmp(*(unsigned int **)(buffer) = (unsigned int *)__builtin_alloca(20))
 #define __builtin_longjmp(buffer, value) __dspic_longjmp(*(unsigned int **)(buffer), value)
@@ -93,10 +98,19 @@ int __dspic_divf(int numerator, int denominator);
 
 #define __builtin_btg(object, bit)                                                          \
   do {                                                                                      \
-    unsigned int __value;                                                                   \
-    __asm__ volatile("mov [%1],%0\n\tbtg %0,#%2\n\tmov %0,[%1]"                            \
-                     : "=&r"(__value) : "r"(object), "i"(bit) : "memory");                  \
+    __asm__ volatile("btg [%0],#%1" ::"r"(object), "i"(bit) : "memory");                    \
   } while (0)
+
+/* One instruction each (isa.md §6): first one from the left, from the right, and the place of the first bit unlike the sign. */
+#define __dspic_find(instruction, value)                                             \
+  (__extension__({                                                                   \
+    int __place;                                                                     \
+    __asm__(instruction " %1,%0" : "=r"(__place) : "r"((unsigned int)(value)) : "cc"); \
+    __place;                                                                         \
+  }))
+#define __builtin_ff1l(value) __dspic_find("ff1l", value)
+#define __builtin_ff1r(value) __dspic_find("ff1r", value)
+#define __builtin_fbcl(value) __dspic_find("fbcl", value)
 
 /* SR<7:5> is the CPU priority (isa.md §2.3). */
 #define __builtin_get_isr_state()                                                       \

@@ -67,13 +67,18 @@
 #define _ISRFAST __attribute__((__interrupt__, __no_auto_psv__, __shadow__))
 #endif
 
-/* Configuration words by name, as in Microchip's device headers: _FOSC(CSW_FSCM_OFF & XT_PLL8);
+/* Configuration words by name, as in Microchip's device headers: _FOSC(CSW_FSCM_OFF & XT_PLL8), semicolon or none;
  * field codes: dspic30f6014a.md §2. */
-#define _FOSC(value) OS_CONFIG(FOSC, value)
-#define _FWDT(value) OS_CONFIG(FWDT, value)
-#define _FBORPOR(value) OS_CONFIG(FBORPOR, value)
-#define _FGS(value) OS_CONFIG(FGS, value)
-#define _FICD(value) OS_CONFIG(FICD, value)
+#if defined(__clang__) /* sources end them with a semicolon or without */
+#define DSPIC_CONFIG(word, value) OS_CONFIG(word, value);
+#else
+#define DSPIC_CONFIG(word, value) OS_CONFIG(word, value)
+#endif
+#define _FOSC(value) DSPIC_CONFIG(FOSC, value)
+#define _FWDT(value) DSPIC_CONFIG(FWDT, value)
+#define _FBORPOR(value) DSPIC_CONFIG(FBORPOR, value)
+#define _FGS(value) DSPIC_CONFIG(FGS, value)
+#define _FICD(value) DSPIC_CONFIG(FICD, value)
 
 #define CSW_FSCM_OFF 0xFFFF
 #define CSW_ON_FSCM_OFF 0x7FFF
@@ -100,6 +105,9 @@
 #define ECIO 0xFBEC
 #define LPRC 0xFAFF
 #define FRC 0xF9FF
+#define PRI 0xFFFF
+#define PRIOSC_PLL 0xFFFF
+#define LP 0xF8FF
 
 #define WDT_ON 0xFFFF
 #define WDT_OFF 0x7FFF
@@ -107,11 +115,52 @@
 #define WDTPSA_8 0xFFDF
 #define WDTPSA_64 0xFFEF
 #define WDTPSA_512 0xFFFF
+#define WDTA_1 0xFFCF
+#define WDTA_8 0xFFDF
+#define WDTA_64 0xFFEF
+#define WDTA_512 0xFFFF
+#define WDTB_1 0xFFF0
+#define WDTB_2 0xFFF1
+#define WDTB_3 0xFFF2
+#define WDTB_4 0xFFF3
+#define WDTB_5 0xFFF4
+#define WDTB_6 0xFFF5
+#define WDTB_7 0xFFF6
+#define WDTB_8 0xFFF7
+#define WDTB_9 0xFFF8
+#define WDTB_10 0xFFF9
+#define WDTB_11 0xFFFA
+#define WDTB_12 0xFFFB
+#define WDTB_13 0xFFFC
+#define WDTB_14 0xFFFD
+#define WDTB_15 0xFFFE
+#define WDTB_16 0xFFFF
+#define WDTPSB_1 0xFFF0
+#define WDTPSB_2 0xFFF1
+#define WDTPSB_3 0xFFF2
+#define WDTPSB_4 0xFFF3
+#define WDTPSB_5 0xFFF4
+#define WDTPSB_6 0xFFF5
+#define WDTPSB_7 0xFFF6
+#define WDTPSB_8 0xFFF7
+#define WDTPSB_9 0xFFF8
+#define WDTPSB_10 0xFFF9
+#define WDTPSB_11 0xFFFA
+#define WDTPSB_12 0xFFFB
+#define WDTPSB_13 0xFFFC
+#define WDTPSB_14 0xFFFD
+#define WDTPSB_15 0xFFFE
+#define WDTPSB_16 0xFFFF
 
 #define MCLR_EN 0xFFFF
 #define MCLR_DIS 0x7FFF
 #define PBOR_ON 0xFFFF
 #define PBOR_OFF 0xFF7F
+#define BORV_20 0xFFFF
+#define BORV20 0xFFFF
+#define BORV27 0xFFEF
+#define BORV42 0xFFDF
+#define BORV45 0xFFCF
 #define BORV_27 0xFFEF
 #define BORV_42 0xFFDF
 #define BORV_45 0xFFCF
@@ -122,10 +171,26 @@
 
 #define CODE_PROT_OFF 0xFFFF
 #define CODE_PROT_ON 0xFFFD
+#define GWRP_OFF 0xFFFF
+#define GWRP_ON 0xFFFE
+
+#define ICS_PGD 0xFFFF
+#define ICS_EMU1 0xFFFE
+#define ICS_EMU2 0xFFFD
+#define ICS_EMU3 0xFFFC
 
 #define Nop() __builtin_nop()
 #define ClrWdt() __builtin_clrwdt()
 #define Sleep() __builtin_pwrsav(0)
 #define Idle() __builtin_pwrsav(1)
+
+/* CPU priority, as in Microchip's device headers. */
+#define SET_CPU_IPL(level) __builtin_set_isr_state(level)
+#define SET_AND_SAVE_CPU_IPL(saved, level)  \
+  do {                                      \
+    (saved) = __builtin_get_isr_state();    \
+    __builtin_set_isr_state(level);         \
+  } while (0)
+#define RESTORE_CPU_IPL(saved) __builtin_set_isr_state(saved)
 
 #endif

@@ -20,21 +20,26 @@ int __putchar(int character);
 int putchar(int character);
 int fputc(int character, FILE *stream);
 int putc(int character, FILE *stream);
-int fputs(const char *restrict text, FILE *restrict stream);
-size_t fwrite(const void *restrict from, size_t size, size_t count, FILE *restrict stream);
+int fputs(const char *__restrict text, FILE *__restrict stream);
+size_t fwrite(const void *__restrict from, size_t size, size_t count, FILE *__restrict stream);
 int fflush(FILE *stream);
 int puts(const char *text);
-int printf(const char *restrict format, ...) __attribute__((__format__(__printf__, 1, 2)));
-int vprintf(const char *restrict format, va_list arguments) __attribute__((__format__(__printf__, 1, 0)));
-int fprintf(FILE *restrict stream, const char *restrict format, ...) __attribute__((__format__(__printf__, 2, 3)));
-int vfprintf(FILE *restrict stream, const char *restrict format, va_list arguments)
+int printf(const char *__restrict format, ...) __attribute__((__format__(__printf__, 1, 2)));
+int vprintf(const char *__restrict format, va_list arguments) __attribute__((__format__(__printf__, 1, 0)));
+int fprintf(FILE *__restrict stream, const char *__restrict format, ...) __attribute__((__format__(__printf__, 2, 3)));
+int vfprintf(FILE *__restrict stream, const char *__restrict format, va_list arguments)
     __attribute__((__format__(__printf__, 2, 0)));
-int sprintf(char *restrict to, const char *restrict format, ...) __attribute__((__format__(__printf__, 2, 3)));
-int vsprintf(char *restrict to, const char *restrict format, va_list arguments)
+int sprintf(char *__restrict to, const char *__restrict format, ...) __attribute__((__format__(__printf__, 2, 3)));
+int vsprintf(char *__restrict to, const char *__restrict format, va_list arguments)
     __attribute__((__format__(__printf__, 2, 0)));
-int snprintf(char *restrict to, size_t size, const char *restrict format, ...)
+int snprintf(char *__restrict to, size_t size, const char *__restrict format, ...)
     __attribute__((__format__(__printf__, 3, 4)));
-int vsnprintf(char *restrict to, size_t size, const char *restrict format, va_list arguments)
+int vsnprintf(char *__restrict to, size_t size, const char *__restrict format, va_list arguments)
     __attribute__((__format__(__printf__, 3, 0)));
+
+/* Conversions: d i u o x X p c s [ n %, with *, width and hh h l ll j z t L; a e f g too. There is no standard input. */
+int sscanf(const char *__restrict text, const char *__restrict format, ...) __attribute__((__format__(__scanf__, 2, 3)));
+int vsscanf(const char *__restrict text, const char *__restrict format, va_list arguments)
+    __attribute__((__format__(__scanf__, 2, 0)));
 
 #endif

@@ -4,15 +4,15 @@
 
 #include <stddef.h>
 
-void *memcpy(void *restrict to, const void *restrict from, size_t count);
+void *memcpy(void *__restrict to, const void *__restrict from, size_t count);
 void *memmove(void *to, const void *from, size_t count);
 void *memset(void *to, int value, size_t count);
 int memcmp(const void *left, const void *right, size_t count);
 void *memchr(const void *in, int value, size_t count);
-char *strcpy(char *restrict to, const char *restrict from);
-char *strncpy(char *restrict to, const char *restrict from, size_t count);
-char *strcat(char *restrict to, const char *restrict from);
-char *strncat(char *restrict to, const char *restrict from, size_t count);
+char *strcpy(char *__restrict to, const char *__restrict from);
+char *strncpy(char *__restrict to, const char *__restrict from, size_t count);
+char *strcat(char *__restrict to, const char *__restrict from);
+char *strncat(char *__restrict to, const char *__restrict from, size_t count);
 int strcmp(const char *left, const char *right);
 int strncmp(const char *left, const char *right, size_t count);
 char *strchr(const char *in, int value);
@@ -21,7 +21,7 @@ char *strstr(const char *in, const char *what);
 char *strpbrk(const char *in, const char *accept);
 size_t strspn(const char *in, const char *accept);
 size_t strcspn(const char *in, const char *reject);
-char *strtok(char *restrict in, const char *restrict separators);
+char *strtok(char *__restrict in, const char *__restrict separators);
 size_t strlen(const char *in);
 size_t strnlen(const char *in, size_t limit);
 char *strerror(int number);

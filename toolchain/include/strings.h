@@ -2,6 +2,6 @@
 #ifndef STRINGS_H
 #define STRINGS_H
 
-static inline int ffs(int value) { return __builtin_ffs(value); }
+static __inline int ffs(int value) { return __builtin_ffs(value); }
 
 #endif

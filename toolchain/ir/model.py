@@ -333,7 +333,11 @@ class Function:
 
 @dataclass(slots=True)
 class DbgRecord:
-    """#dbg_value / #dbg_declare: where a source variable lives from here on."""
+    """#dbg_value / #dbg_declare / #dbg_assign: where a source variable lives from here on.
+
+    `value` is None where nobody can tell. Of an assignment, `address` is the memory it went to, `link` the name that
+    the stores share which do it. `location` leads to the scope, and to the call where the code was inlined.
+    """
 
     kind: str
     value: Value | None
@@ -341,6 +345,9 @@ class DbgRecord:
     expression: str
     block: str
     index: int
+    location: str = ""
+    address: Value | None = None
+    link: str = ""
 
 
 @dataclass(slots=True)
@@ -369,3 +376,5 @@ class Module:
     metadata: dict[str, str] = field(default_factory=dict)
     named_metadata: dict[str, str] = field(default_factory=dict)
     module_asm: list[str] = field(default_factory=list)
+    large_data: bool = False  # -mlarge-data: only what says so is near
+    far: frozenset[str] = frozenset()  # variables with an address beyond near memory

@@ -18,6 +18,7 @@ from .model import (
     Instr,
     Module,
     Type,
+    Undef,
     UnsupportedError,
     Value,
 )
@@ -248,6 +249,8 @@ class Reader(InstrReader):
                 instr.extra["align"] = int(c.next())
             elif key == "!dbg":
                 instr.line = c.next()
+            elif key == "!DIAssignID":
+                instr.extra["assign"] = c.next()
             elif key.startswith("!"):
                 c.next()
             else:
@@ -270,21 +273,41 @@ class Reader(InstrReader):
         for record in f.dbg_records:
             if isinstance(record.value, Instr) and record.value.op == "forward":
                 record.value = self.locals.get(record.value.name)
+            if isinstance(record.address, Instr) and record.address.op == "forward":
+                record.address = self.locals.get(record.address.name)
 
     def _dbg(self, f: Function, block: Block, text: str) -> None:
         kind = text.strip().split("(", 1)[0][1:]
-        if kind not in ("dbg_value", "dbg_declare"):
+        if kind not in ("dbg_value", "dbg_declare", "dbg_assign"):
             return
         c = Cursor(text.strip()[len(kind) + 2 :], self.at)
-        if c.peek() == "!" or c.peek().startswith("!"):
-            return
-        value: Value | None = self.typed(c)
+        value = self._debug_value(c)
         c.expect(",")
-        variable = c.next()
+        record = DbgRecord(kind, value, c.next(), "", block.name, len(block.instrs))
         c.expect(",")
         c.next()
-        expression = " ".join(c.skip_parens())
-        f.dbg_records.append(DbgRecord(kind, value, variable, expression, block.name, len(block.instrs)))
+        record.expression = " ".join(c.skip_parens())
+        c.expect(",")
+        if kind == "dbg_assign":
+            record.link = c.next()
+            c.expect(",")
+            record.address = self._debug_value(c)
+            c.expect(",")
+            c.next()
+            c.skip_parens()
+            c.expect(",")
+        record.location = c.next()
+        f.dbg_records.append(record)
+
+    def _debug_value(self, c: Cursor) -> Value | None:
+        """A value; None for lists of values and for what is gone."""
+        if c.peek().startswith("!"):
+            c.next()
+            if c.peek() == "(":
+                c.skip_parens()
+            return None
+        value = self.typed(c)
+        return None if isinstance(value, Undef) else value
 
 
 def read_module(text: str) -> Module:

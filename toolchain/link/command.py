@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
-from toolchain.commands.parser import definition, integer, parser
+from toolchain.commands.parser import definition, integer
 from toolchain.elf.read import read_object
 from toolchain.elf.write import executable_bytes
+from toolchain.errors import ToolError
 from toolchain.link.archive import MAGIC, Archive, open_archive
 from toolchain.link.hexfile import hex_text
 from toolchain.link.link import Linked, link
-from toolchain.link.mapfile import map_text
+from toolchain.link.mapfile import map_text, memory_summary
 from toolchain.link.options import MINIMUM_STACK, STACK_GUARD, LinkOptions
+
+IGNORED_WORDS = (
+    "--start-group", "--end-group", "-(", "-)",  # all libraries are one group anyway
+    "--local-stack", "--no-local-stack",  # the stack follows the data, which may all lie in near RAM
+    "--check-sections", "--no-check-sections",  # overlaps are always errors
+    "--smart-io", "--no-smart-io",  # printf's parts are linked as the format strings need them
+    "--force-link", "--no-force-link", "--warn-common", "--cref", "--select-objects", "--no-select-objects",
+    "--warn-section-align", "--no-warn-section-align",
+)  # fmt: skip
+"""Words of Microchip's linker that change nothing here."""
+DEVICE_SCRIPT = re.compile(r"p30f6014a\w*\.gld", re.IGNORECASE)
+_NUMBERS = {"heap": 0xFFFF, "stack": 0xFFFF, "stackguard": 0xFFFF, "fill_upper": 0xFF}
 
 
 def add_options(p: argparse.ArgumentParser) -> None:
@@ -36,20 +51,25 @@ def add_options(p: argparse.ArgumentParser) -> None:
     p.add_argument("--isr", dest="isr", action="store_true", help=argparse.SUPPRESS)
     p.add_argument("--fill-upper", type=integer, default=0, metavar="BYTE", help="upper byte of data words in flash")
     p.add_argument("--report-mem", action="store_true", help="print memory use")
-    for word in ("--start-group", "--end-group", "-(", "-)"):  # all libraries are one group anyway
+    p.add_argument("--memorysummary", metavar="FILE", help="write memory use as the XML that MPLAB X shows")
+    p.add_argument("-T", "--script", action="append", default=[], metavar="FILE",
+                   help="accepted for the device's own script, p30F6014A.gld: its memory map is built in")  # fmt: skip
+    for word in IGNORED_WORDS:
         p.add_argument(word, action="store_true", help=argparse.SUPPRESS)
     p.add_argument("-p", "--processor", default="30F6014A", help=argparse.SUPPRESS)
 
 
 def link_options(options: argparse.Namespace) -> LinkOptions:
     """Return the linker's options from parsed arguments; raises `ToolError` for values out of range."""
-    from toolchain.errors import ToolError
-
-    for name in ("heap", "stack", "stackguard"):
-        if not 0 <= getattr(options, name) <= 0xFFFF:
-            raise ToolError(f"--{name} {getattr(options, name)} is outside 0..65535")
-    if not 0 <= options.fill_upper <= 0xFF:
-        raise ToolError(f"--fill-upper {options.fill_upper} is not a byte")
+    for name, most in _NUMBERS.items():
+        if not 0 <= getattr(options, name) <= most:
+            raise ToolError(f"--{name.replace('_', '-')} {getattr(options, name)} is outside 0..{most}")
+    for script in options.script:
+        if not DEVICE_SCRIPT.fullmatch(Path(script).name):
+            raise ToolError(
+                f"linker script '{script}' is not used here: the memory map of the device is built in; "
+                f"place objects with __attribute__((address(N))), define symbols with --defsym"
+            )
     return LinkOptions(
         entry=options.entry,
         gc_sections=options.gc_sections,
@@ -66,11 +86,18 @@ def link_options(options: argparse.Namespace) -> LinkOptions:
     )
 
 
-def parse_link_words(words: Sequence[str]) -> LinkOptions:
-    """Return linker options from words such as `--heap=64`; an unknown one exits with a usage message."""
-    p = parser("ld", "Linker options.", "cc -Wl,--heap=64")
+class _Words(argparse.ArgumentParser):
+    """argparse whose findings are errors of the caller's command line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ToolError(f"linker option: {message} (see `python -m toolchain ld --help`)")
+
+
+def parse_link_words(words: Sequence[str]) -> argparse.Namespace:
+    """Linker options that came through -Wl, and -Xlinker. Raises `ToolError` for a word that means nothing."""
+    p = _Words(prog="cc -Wl", allow_abbrev=False, add_help=False)
     add_options(p)
-    return link_options(p.parse_args(list(words)))
+    return p.parse_args(list(words))
 
 
 def link_files(inputs: Sequence[tuple[str, bytes]], options: LinkOptions) -> Linked:
@@ -81,14 +108,20 @@ def link_files(inputs: Sequence[tuple[str, bytes]], options: LinkOptions) -> Lin
 
 
 def output_files(
-    linked: Linked, output: Path, map_file: str | Path | None = None, hex_file: str | Path | None = None
+    linked: Linked,
+    output: Path,
+    map_file: str | Path | None = None,
+    hex_file: str | Path | None = None,
+    summary_file: str | Path | None = None,
 ) -> list[tuple[str | Path, bytes]]:
     """Return (path, content) of everything a link writes; `output` in .hex becomes Intel HEX instead of ELF."""
-    is_hex = output.suffix.lower() == ".hex"
+    is_hex = output.suffix.lower() in (".hex", ".ihex")
     content = hex_text(linked.image).encode() if is_hex else executable_bytes(linked.image)
     files: list[tuple[str | Path, bytes]] = [(output, content)]
     if hex_file:
         files.append((hex_file, hex_text(linked.image).encode()))
     if map_file:
         files.append((map_file, map_text(linked).encode()))
+    if summary_file:
+        files.append((summary_file, memory_summary(linked, output.name).encode()))
     return files

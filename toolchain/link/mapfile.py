@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
 from emu.elffacts import OCTETS_PER_UNIT
 from toolchain.elf.model import Section, Symbol
 from toolchain.elf.symbols import symbol_sizes
@@ -20,6 +22,20 @@ def memory_report(linked: Linked) -> str:
         ("EEPROM", used["eeprom"], EEPROM.size, ""),
     )
     return "\n".join(f"{n:12} {u:6} of {t:6} bytes  {100 * u / t:5.1f} %  {note}".rstrip() for n, u, t, note in rows)
+
+
+def memory_summary(linked: Linked, image: str) -> str:
+    """The same as XML, for MPLAB X's memory gauges (`--memorysummary`)."""
+    used = memory_use(linked)
+    rows = (("program", used["flash"], FLASH.size // OCTETS_PER_UNIT * 3), ("data", used["data"], RAM.size))
+    project = Element("project")
+    executable = SubElement(project, "executable", name=image)
+    for name, taken, length in rows:
+        memory = SubElement(executable, "memory", name=name)
+        for tag, value in (("units", "bytes"), ("length", length), ("used", taken), ("free", length - taken)):
+            SubElement(memory, tag).text = str(value)
+    indent(project)
+    return tostring(project, encoding="unicode", xml_declaration=True) + "\n"
 
 
 def map_text(linked: Linked) -> str:

@@ -41,6 +41,8 @@ def script_symbols() -> dict[str, int]:
         symbols[f"__{name}"] = word.address
     for name, sfr in CHIP.sfrs.items():
         symbols[name] = symbols[f"_{name}"] = symbols[f"_{name}bits"] = sfr.address
+    for accumulator in ("ACCA", "ACCB"):  # three registers each; `PUSH ACCA` takes the lowest (abi-elf.md §3.3)
+        symbols[accumulator] = symbols[f"_{accumulator}"] = CHIP.sfrs[f"{accumulator}L"].address
     return symbols
 
 

@@ -12,6 +12,7 @@ from toolchain.elf.read import read_object
 from toolchain.elf.symbols import is_named
 from toolchain.errors import ToolError
 from toolchain.link.archive import Archive
+from toolchain.link.smartio import plain_name
 
 MAX_REFERENCES = 4  # places shown per undefined symbol
 
@@ -36,6 +37,7 @@ class Resolution:
             if symbol.bind is Bind.LOCAL or not symbol.name:
                 continue
             if symbol.home is Home.UNDEFINED:
+                symbol.name = plain_name(symbol.name, obj.name)
                 self.wanted[symbol.name] = self.wanted.get(symbol.name, False) or symbol.bind is Bind.GLOBAL
             else:
                 self._define(symbol, obj)

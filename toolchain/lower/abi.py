@@ -31,18 +31,24 @@ def scalar_shape(t: Type) -> Shape:
     return Shape(words, words in (1, 2, 4))
 
 
-def struct_shape(t: Type) -> Shape:
-    """Shape of a struct or union passed by value (rule 3)."""
+def struct_shape(t: Type, align: int = 0, loose: bool = False) -> Shape:
+    """Shape of a struct or union passed by value (rule 3). `align` is C's (0: that of the type); `loose` says that it
+    holds an aggregate of 3, 5, 6 or 7 bytes (`record_shapes`)."""
     size = size_of(t)
-    return Shape((size + 1) // 2, align_of(t) == 2 and size in (2, 4, 8))
+    return Shape((size + 1) // 2, (align or align_of(t)) >= 2 and size in (2, 4, 8) and not loose)
 
 
-def place_arguments(shapes: list[Shape], variadic: bool) -> list[Place]:
-    """Rules 1-5: lowest fitting run of W0..W7, back-fill allowed; the rest on the stack in order."""
-    free = [not variadic] * ARGUMENT_REGISTERS
+def place_arguments(shapes: list[Shape], named: int | None = None) -> list[Place]:
+    """Rules 1-5: lowest fitting run of W0..W7, back-fill allowed; the rest on the stack in order.
+
+    `named` is the number of named arguments of a variadic function, a hidden result pointer included: the last of them
+    and what follows is on the stack."""
+    free = [True] * ARGUMENT_REGISTERS
     stack = RETURN_ADDRESS_BYTES
     places = []
-    for shape in shapes:
+    for k, shape in enumerate(shapes):
+        if named is not None and k == named - 1:
+            free = [False] * ARGUMENT_REGISTERS
         n = shape.words
         if n == 0:
             places.append(Place(None, 0))

@@ -49,8 +49,10 @@ class AddressSelector(ValueSelector):
             return False
         return True
 
-    def address(self, p: Value, byte: bool, extra: int = 0, count: int = 1) -> Operand:
-        """Operand for a MOV at p + extra, usable for `count` words by `step`. File only for words and near bytes."""
+    def address(self, p: Value, byte: bool, extra: int = 0, count: int = 1, volatile: int = 0) -> Operand:
+        """Operand for a MOV at p + extra, usable for `count` words by `step`. File only for words and near bytes.
+
+        `volatile` is the number of the access (`mir`)."""
         base, offset = self.decompose(p)
         offset += extra
         if isinstance(base, GlobalRef):
@@ -60,26 +62,26 @@ class AddressSelector(ValueSelector):
                 constant = self._constant_global(base.name)
                 odd = not byte and offset & 1  # a trap when it runs, but not an instruction that exists
                 if (near and not odd) or (not byte and not constant and not odd):
-                    return File(self.address_expr(ref), near)
+                    return File(self.address_expr(ref), near, volatile)
             r = self.temp()
             self.emit("mov", Imm(self.address_expr(ref)), r)
-            return Mem("ind", r)
+            return Mem("ind", r, 0, volatile)
         if isinstance(base, ConstInt):
             at = base.value + offset & 0xFFFF
             if (byte and at < 0x2000) or (not byte and not at & 1):
-                return File(f"0x{at:04X}", at < 0x2000)
+                return File(f"0x{at:04X}", at < 0x2000, volatile)
             r = self.temp()
             self.load_imm(at, r)
-            return Mem("ind", r)
+            return Mem("ind", r, 0, volatile)
         if id(base) in self.slots:
             if not self.far_frame:
-                return Slot(self.slots[id(base)], offset)
+                return Slot(self.slots[id(base)], offset, volatile)
             r = self.temp()
             self.emit("lea", Slot(self.slots[id(base)], offset), r)
-            return Mem("ind", r)
+            return Mem("ind", r, 0, volatile)
         if isinstance(base, Instr) and count == 1 and offset == 0 and self._is_index_sum(base):
-            return Mem("idx", self.reg(base.args[0]), self.reg(base.args[1]))
-        return self.offset_operand(self.reg(base), offset, byte)
+            return Mem("idx", self.reg(base.args[0]), self.reg(base.args[1]), volatile)
+        return self.offset_operand(self.reg(base), offset, byte, volatile)
 
     def _is_index_sum(self, base: Instr) -> bool:
         """base + index, wanted only as an address."""
@@ -89,17 +91,17 @@ class AddressSelector(ValueSelector):
         var = self.module.globals.get(name)
         return var is not None and var.constant
 
-    def offset_operand(self, base: int, offset: int, byte: bool) -> Operand:
+    def offset_operand(self, base: int, offset: int, byte: bool, volatile: int = 0) -> Mem:
         """[base+offset], computing the sum when the offset is out of reach."""
         if offset == 0:
-            return Mem("ind", base)
+            return Mem("ind", base, 0, volatile)
         low, high = BYTE_OFFSET if byte else WORD_OFFSET
         if low <= offset <= high and (byte or not offset & 1):
-            return Mem("off", base, offset)
+            return Mem("off", base, offset, volatile)
         r, k = self.temp(), self.temp()
         self.emit("mov", Imm(offset & 0xFFFF), k)
         self.emit("add", base, k, r)
-        return Mem("ind", r)
+        return Mem("ind", r, 0, volatile)
 
     def foldable_load(self, v: Value, user: Instr) -> Instr | None:
         """The load that defines `v`, when it may move down to its only user.
@@ -136,7 +138,7 @@ class AddressSelector(ValueSelector):
         if not self.is_leaf(base) or id(base) in self.slots:
             return None
         mark = len(self.out)
-        operand = self.address(load.args[0], load.type.bits == 8)
+        operand = self.address(load.args[0], load.type.bits == 8, volatile=self.access_number(load))
         if isinstance(operand, File) and operand.near:
             self.folded.add(id(load))
             return operand

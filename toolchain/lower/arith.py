@@ -61,7 +61,7 @@ def _file_logic(s: Selector, i: Instr, a: Value, b: ConstInt, d: int, byte: bool
     if near is None:
         return False
     s.load_imm(b.value, 0)
-    s.emit(REGISTER_OP[i.op] + "w", near, 0, byte=byte).volatile = True
+    s.emit(REGISTER_OP[i.op] + "w", near, 0, byte=byte)
     s.copy(0, d)
     return True
 

@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..ir.model import ConstInt, GlobalRef, InlineAsm, Instr, Type, UnsupportedError, Value
-from .mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, OpInfo
+from ..ir.model import ConstInt, GlobalRef, InlineAsm, Instr, Type, UnsupportedError, Value, size_of
+from .mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, opaque
 
 if TYPE_CHECKING:
     from .select import Selector
@@ -28,6 +28,11 @@ class Constraint:
     text: str
     tied: int | None
     fixed: int | None
+
+    @property
+    def either(self) -> bool:
+        """`rm` and `g`: a register, as GCC for this chip gives, whose instructions mostly take nothing else."""
+        return "r" in self.text and "m" in self.text
 
 
 def _parse(text: str) -> tuple[list[Constraint], list[int]]:
@@ -74,6 +79,7 @@ class AsmBuilder:
         self.roles: list[str] = []
         self.late: list[int] = []
         self.after: list[tuple[int, tuple[int, ...]]] = []
+        self.stores: list[tuple[int, int, bool]] = []  # pointer, register, byte: "=rm" objects in memory
         self.fixed_uses: list[int] = []
         self.fixed_defs: list[int] = []
         self.blocks = [0, 4]  # free register runs for 64-bit operands
@@ -87,7 +93,9 @@ class AsmBuilder:
         result_at = 0
         early = False
         for c in constraints:
-            if c.output and not c.indirect:
+            if c.output and c.indirect and c.either:
+                self.output_by_way_of_register(c, inputs.pop(0), element(self.i, len(self.i.args) - len(inputs) - 1))
+            elif c.output and not c.indirect:
                 self.output(c, results[result_at], result_at)
                 result_at += 1
                 early |= c.early
@@ -98,7 +106,7 @@ class AsmBuilder:
         if early or clobbers:  # a clobbered register may be written before the inputs have been read
             self.late = [k for k, r in enumerate(self.roles) if r in "sS"]
         mi = MI("asm", *self.operands, line=self.s.line)
-        mi.info = OpInfo("".join(self.roles), "cznv", words=max(1, self.asm.text.count("\n") + 1))
+        mi.info = opaque("".join(self.roles), "cznv", words=max(1, self.asm.text.count("\n") + 1))
         mi.also_defs = tuple(dict.fromkeys([*clobbers, *self.fixed_defs]))
         mi.also_uses = tuple(self.fixed_uses)
         mi.late = tuple(self.late)
@@ -107,6 +115,8 @@ class AsmBuilder:
         if any(r >= 15 for r in mi.also_defs):
             raise UnsupportedError("inline assembly clobbers the stack pointer W15")
         self.s.out.append(mi)
+        for pointer, source, byte in self.stores:
+            self.s.emit("mov", source, Mem("ind", pointer), byte=byte)
         for source, dest in self.after:
             if len(dest) == 1:
                 self.s.copy(source, dest[0])
@@ -142,6 +152,15 @@ class AsmBuilder:
         self.reference.append(self.add(r, "d" if words == 1 else "D"))
         self.after.append((r, dest))
 
+    def output_by_way_of_register(self, c: Constraint, p: Value, t: Type) -> None:
+        """An object in memory that may as well be a register while the statement runs: it is stored behind it."""
+        size = size_of(t)
+        if size > 2:
+            raise UnsupportedError(f"inline assembly operand '{c.text}' of {size} bytes (use r or m)")
+        r = self.s.temp()
+        self.reference.append(self.add(r, "d"))
+        self.stores.append((self.s.reg(p), r, size == 1))
+
     def tied(self, c: Constraint, v: Value) -> None:
         """An input in the register of an output: the output becomes read and written."""
         assert c.tied is not None
@@ -174,7 +193,9 @@ class AsmBuilder:
                 raise UnsupportedError("inline assembly memory operand without an address")
             self.reference.append(self.add(self.memory(v), "s"))
             return
-        if ("r" not in c.text and c.fixed is None) or (("i" in c.text or "n" in c.text) and self.s.is_leaf(v)):
+        if ("r" not in c.text and c.fixed is None) or (
+            ("i" in c.text or "n" in c.text) and not c.either and self.s.is_leaf(v)
+        ):
             if isinstance(v, ConstInt):
                 self.reference.append(self.add(Imm(v.signed), "n"))
                 return
@@ -212,6 +233,15 @@ class AsmBuilder:
             return f"\x00{at}:{m[3] or ''}\x00"
 
         return REFERENCE.sub(replace, self.asm.text)
+
+
+def element(asm: Instr, k: int) -> Type:
+    """Type of the object that argument `k`, an address, stands for."""
+    attributes = asm.extra.get("attrs")
+    assert isinstance(attributes, list)
+    t = attributes[k]["elementtype"]
+    assert isinstance(t, Type)
+    return t
 
 
 def result_registers(s: Selector, asm: Instr, index: int, words: int) -> tuple[int, ...]:

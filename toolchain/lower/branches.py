@@ -6,7 +6,7 @@ import copy
 
 from . import layout
 from .liveness import bits, live_out
-from .mir import CC_INVERSE, MI, Imm, MBlock, Mem, MFunction
+from .mir import CC_INVERSE, MI, File, Imm, MBlock, Mem, MFunction, covered
 from .peephole import ALL, AT_RETURN
 
 
@@ -83,7 +83,7 @@ def fall_through(m: MFunction) -> None:
             b.insts.pop()
 
 
-NEUTRAL = {"clr", "setm", "mov"}
+NEUTRAL = {"clr", "clrd", "setm", "mov"}
 
 
 def hoist_edge_moves(m: MFunction) -> None:
@@ -167,7 +167,7 @@ def _known_value(b: MBlock, r: int) -> int | None:
         if r in mi.defs():
             if mi.pred or mi.byte:
                 return None
-            if mi.op == "clr":
+            if mi.op in ("clr", "clrd"):
                 return 0
             if mi.op == "setm":
                 return 0xFFFF
@@ -200,43 +200,24 @@ def use_skips(b: MBlock) -> None:
     k = 1
     while k < len(b.insts):
         skip = b.insts[k]
-        if skip.op == "skip" and skip.count == 1 and not skip.text and k + 1 < len(b.insts):
-            guarded, test = b.insts[k + 1], b.insts[k - 1]
-            text = _skip_text(test, skip.cc) if guarded.op not in TWO_WORDS else None
-            if text is not None and not _flags_needed(b, k):
-                skip.text = text
-                del b.insts[k - 1]
+        if skip.op == "skip" and covered(b.insts, k) == 1 and b.insts[k + 1].op not in TWO_WORDS:
+            short = _short_skip(b.insts[k - 1], skip)
+            if short is not None and not _flags_needed(b, k):
+                b.insts[k - 1 : k + 1] = [short]
                 continue
         k += 1
 
 
-def _skip_text(test: MI, cc: str) -> str | None:
-    """The skip instruction that skips when `cc` would hold after `test`."""
-    if test.op == "cp" and cc in SKIP_WHEN:
-        a, c = test.args
-        if isinstance(a, int) and isinstance(c, int):
-            return f"{SKIP_WHEN[cc]}{'.b' if test.byte else ''} w{a},w{c}"
-    if test.op == "btst" and cc in ("z", "nz") and not isinstance(test.args[0], str):
-        operand, bit = test.args
-        assert isinstance(bit, Imm)
-        name = "btsc" if cc == "z" else "btss"
-        if isinstance(operand, int):
-            return f"{name} w{operand},#{bit.value}"
-        if isinstance(operand, Mem) and operand.mode == "ind":
-            return f"{name} [w{operand.base}],#{bit.value}"
-    if test.op == "btstf" and cc in ("z", "nz"):
-        name = "btsc" if cc == "z" else "btss"
-        return f"{name}{'.b' if test.byte else ''} {_file(test.args[0])},#{_number(test.args[1])}"
+def _short_skip(test: MI, skip: MI) -> MI | None:
+    """The instruction that does what `test` and `skip` do."""
+    if test.op == "cp" and skip.cc in SKIP_WHEN and all(isinstance(a, int) for a in test.args):
+        return MI(SKIP_WHEN[skip.cc], *test.args, byte=test.byte, line=skip.line)
+    if test.op in ("btst", "btstf") and skip.cc in ("z", "nz"):
+        operand = test.args[0]
+        if isinstance(operand, int | File) or (isinstance(operand, Mem) and operand.mode == "ind"):
+            name = ("btsc" if skip.cc == "z" else "btss") + test.op.removeprefix("btst")
+            return MI(name, *test.args, byte=test.byte, line=skip.line)
     return None
-
-
-def _file(a: object) -> str:
-    return str(getattr(a, "expr", a))
-
-
-def _number(a: object) -> int | str:
-    assert isinstance(a, Imm)
-    return a.value
 
 
 def _flags_needed(b: MBlock, skip_at: int) -> bool:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from emu.dspic30f.isa.debug import FAILED_CHECK, HALT
+
 from ..ir.model import ConstInt, GlobalRef, Instr, UnsupportedError
-from .mir import Imm, Mem, OpInfo
+from .mir import Imm, Mem, opaque
 from .names import symbol
 
 if TYPE_CHECKING:
@@ -22,6 +24,14 @@ def _constant(i: Instr, k: int, limit: int) -> int:
 
 def _disi(s: Selector, i: Instr) -> None:
     s.emit("disi", Imm(_constant(i, 0, 0x3FFF)))
+
+
+def _hold(s: Selector, i: Instr) -> None:
+    s.emit("hold").also_defs = (0,)
+
+
+def _release(s: Selector, i: Instr) -> None:
+    s.emit("release")
 
 
 def _text(*lines: str) -> Callable[[Selector, Instr], None]:
@@ -46,7 +56,7 @@ def _osccon(byte: str, keys: tuple[int, int]) -> Callable[[Selector, Instr], Non
         s.emit("mov", Imm(keys[0]), first)
         s.emit("mov", Imm(keys[1]), second)
         mi = s.emit("asm", first, second, value, pointer)
-        mi.info = OpInfo("ssss", words=3)
+        mi.info = opaque("ssss", words=3)
         mi.text = "mov.b \x000:\x00,[\x003:\x00]\nmov.b \x001:\x00,[\x003:\x00]\nmov.b \x002:\x00,[\x003:\x00]"
 
     return expand
@@ -59,15 +69,14 @@ def _write_nvm(s: Selector, i: Instr) -> None:
         s.load_imm(key, r)
         s.copy(r, 0)
         mi = s.emit("asm", 0)
-        mi.info = OpInfo("s")
+        mi.info = opaque("s")
         mi.text = "mov \x000:\x00,_NVMKEY"
     _text("bset _NVMCON,#15", "nop", "nop")(s, i)
 
 
 def _table_read(op: str, byte: bool) -> Callable[[Selector, Instr], None]:
     def expand(s: Selector, i: Instr) -> None:
-        mi = s.emit(op, Mem("ind", s.reg(i.args[0])), s.value_regs(i)[0], byte=byte)
-        mi.volatile = True
+        s.emit(op, Mem("ind", s.reg(i.args[0])), s.value_regs(i)[0], byte=byte)
 
     return expand
 
@@ -125,7 +134,7 @@ def _get_isr_state(s: Selector, i: Instr) -> None:
     """SR.IPL, bits 7-5."""
     r, t = s.temp(), s.temp()
     mi = s.emit("asm", r)
-    mi.info = OpInfo("d")
+    mi.info = opaque("d")
     mi.text = "mov _SR,\x000:\x00"
     s.emit("lsr", r, Imm(5), t)
     s.emit("and", t, Imm(7), s.value_regs(i)[0])
@@ -137,16 +146,24 @@ def _set_isr_state(s: Selector, i: Instr) -> None:
     s.emit("sl", s.reg(i.args[0]), Imm(5), r)
     s.copy(r, 0)
     mi = s.emit("asm", 0)
-    mi.info = OpInfo("s", "cznv")
+    mi.info = opaque("s", "cznv")
     mi.text = "mov.b WREG,_SR"
+
+
+def _failed_check(s: Selector, i: Instr) -> None:
+    for line in (f".pword {HALT:#08x}", "reset", f".pword {FAILED_CHECK | _constant(i, 0, 0xFF):#08x}"):
+        s.emit("text", line)
 
 
 BUILTINS: dict[str, Callable[[Selector, Instr], None]] = {
     "disi": _disi,
+    "hold": _hold,
+    "release": _release,
     "nop": _text("nop"),
     "clrwdt": _text("clrwdt"),
     "pwrsav": _pwrsav,
-    "software_breakpoint": _text(".pword 0xDA4000"),
+    "software_breakpoint": _text(f".pword {HALT:#08x}"),
+    "failed_check": _failed_check,
     "reset": _text("reset"),
     "write_OSCCONL": _osccon("L", (0x46, 0x57)),
     "write_OSCCONH": _osccon("H", (0x78, 0x9A)),

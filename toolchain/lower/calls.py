@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..ir.model import Arg, ConstInt, GlobalRef, Instr, Type, Undef, Value, align_of, size_of
+from ..record_shapes import ATTRIBUTE
 from ..target import CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
 from . import asm_inline, builtins
 from .abi import Place, Shape, place_arguments, scalar_shape, struct_shape
@@ -25,7 +26,11 @@ def _byval(attrs: dict[str, object]) -> Type | None:
 
 def _shape(v: Value, attrs: dict[str, object]) -> Shape:
     t = _byval(attrs)
-    return scalar_shape(v.type) if t is None else struct_shape(t)
+    if t is None:
+        return scalar_shape(v.type)
+    align = attrs.get("align", 0)
+    assert isinstance(align, int)
+    return struct_shape(t, align, ATTRIBUTE in attrs)
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -35,7 +40,7 @@ def _shape(v: Value, attrs: dict[str, object]) -> Shape:
 def incoming(s: Selector) -> None:
     """Decide where every parameter lives before any code is selected."""
     f = s.f
-    s.places = place_arguments([_shape(a, a.attrs) for a in f.args], f.vararg)
+    s.places = place_arguments([_shape(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
     low = RETURN_ADDRESS_BYTES
     for a, place in zip(f.args, s.places, strict=True):
         t = _byval(a.attrs)
@@ -76,22 +81,12 @@ def receive(s: Selector) -> None:
 def select_call(s: Selector, i: Instr) -> None:
     """Stack arguments last to first, then register arguments, the call, the result."""
     callee = i.args[-1]
-    args: list[Value | int] = list(i.args[:-1])
+    args = i.args[:-1]
     attrs = i.extra["attrs"]
     assert isinstance(attrs, list)
-    variadic = bool(i.extra.get("vararg"))
-    if variadic:
-        fixed = i.extra["fixed"]
-        assert isinstance(fixed, int)
-        shapes = [_shape(a, k) for a, k in zip(i.args[:-1], attrs, strict=True)]
-        for k in range(fixed, len(args)):
-            t = _byval(attrs[k])
-            if t is not None:
-                args[k] = _private_copy(s, i.args[k], t)
-                shapes[k] = Shape(1, True)
-        places = place_arguments(shapes, True)
-    else:
-        places = place_arguments([_shape(a, k) for a, k in zip(i.args[:-1], attrs, strict=True)], False)
+    named = i.extra["fixed"] if i.extra.get("vararg") else None
+    assert named is None or isinstance(named, int)
+    places = place_arguments([_shape(a, k) for a, k in zip(args, attrs, strict=True)], named)
     target: int | str
     target = symbol(s.module, callee.name) if isinstance(callee, GlobalRef) else s.reg(callee)
     pushed = _push_stack_arguments(s, args, attrs, places)
@@ -125,33 +120,13 @@ def _take_results(s: Selector, i: Instr) -> None:
         at += words
 
 
-def _private_copy(s: Selector, a: Value, t: Type) -> int:
-    """Variadic structs travel as the address of a copy (design §5); returns a register with that address."""
-    slot = s.new_slot(size_of(t))
-    dest, source = s.temp(), s.temp()
-    s.emit("lea", Slot(slot), dest)
-    s.copy(s.reg(a), source)
-    result = s.temp()
-    s.copy(dest, result)
-    size = size_of(t)
-    byte = align_of(t) == 1
-    count = size if byte else size // 2
-    if count:
-        s.emit("repmov", Imm(count - 1), source, dest, byte=byte)
-    return result
-
-
-def _push_stack_arguments(
-    s: Selector, args: list[Value | int], attrs: list[dict[str, object]], places: list[Place]
-) -> int:
+def _push_stack_arguments(s: Selector, args: list[Value], attrs: list[dict[str, object]], places: list[Place]) -> int:
     """Push in descending distance; returns the bytes pushed."""
     pushed = 0
     for k in sorted((k for k in range(len(args)) if places[k].stack), key=lambda k: -places[k].stack):
         v = args[k]
         t = _byval(attrs[k])
-        if isinstance(v, int):
-            s.emit("mov", v, Mem("++", SP))
-        elif t is not None:
+        if t is not None:
             _push_struct(s, v, t)
         elif s.is_leaf(v):
             for word in range(places[k].words):
@@ -207,7 +182,7 @@ def _struct_words(s: Selector, v: Value, t: Type) -> list[int]:
 
 
 def _load_register_arguments(
-    s: Selector, args: list[Value | int], attrs: list[dict[str, object]], places: list[Place]
+    s: Selector, args: list[Value], attrs: list[dict[str, object]], places: list[Place]
 ) -> list[int]:
     """Copies into W0-W7; everything that needs work is computed before the first copy."""
     moves: list[tuple[int, int]] = []
@@ -219,7 +194,6 @@ def _load_register_arguments(
         if isinstance(v, Undef):
             continue
         used += range(place.register, place.register + place.words)
-        assert isinstance(v, Value)
         t = _byval(a)
         if t is not None:
             moves += [(r, place.register + k) for k, r in enumerate(_struct_words(s, v, t))]

@@ -9,9 +9,10 @@ countdowns   `n-- != 0`: the decrement moves to the test, whose carry answers it
 from __future__ import annotations
 
 from ..ir.model import Block, ConstInt, Function, Instr, Value
-from . import induction
+from . import induction, magic
 from .cfg import loop_depths, predecessors, reverse_postorder
 
+COUNTED = ("eq", "ne", "sle", "sgt")  # tests against 0 that the flags of the decrement answer
 REMAINDER = {"udiv": "urem", "sdiv": "srem"}
 
 
@@ -26,9 +27,11 @@ def users_of(f: Function) -> dict[int, list[Instr]]:
     return out
 
 
-def combine(f: Function) -> None:
+def combine(f: Function, for_size: bool) -> None:
     """Needs: legal IR. Ensures: the rewrites above, where they apply."""
     remainders(f)
+    if not for_size:
+        magic.run(f)
     pair_divisions(f)
     induction.run(f)
     increments(f)
@@ -186,7 +189,7 @@ def countdowns(f: Function) -> None:
     for b in f.blocks:
         br = b.instrs[-1]
         c = br.args[0] if br.op == "br" and br.args else None
-        if not isinstance(c, Instr) or c.op != "icmp" or c.pred not in ("eq", "ne") or c not in b.instrs:
+        if not isinstance(c, Instr) or c.op != "icmp" or c.pred not in COUNTED or c not in b.instrs:
             continue
         x, zero = c.args
         if not isinstance(zero, ConstInt) or zero.value or x.type.bits not in (8, 16) or not isinstance(x, Instr):

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "sle": "le", "ugt": "nz", "ule": "z"}
 
 
+# Tests of x against 0 by the flags of x - 1: DEC borrows exactly for 0, and N^OV is the sign of the true difference.
+COUNTED = {"eq": "nc", "ne": "c", "sle": "lt", "sgt": "ge"}
+
+
 def condition(s: Selector, c: Value, user: Instr) -> str:
     """Emit a comparison for the truth of `c` and return the branch condition."""
     if isinstance(c, Instr) and c.op == "icmp" and s.same_block(c):
@@ -24,7 +28,7 @@ def condition(s: Selector, c: Value, user: Instr) -> str:
         if step is not None:
             s.folded.add(id(step))
             s.emit("dec", s.reg(step.args[0]), s.value_regs(step)[0], byte=step.type.bits == 8)
-            return "nc" if c.pred == "eq" else "c"  # DEC borrows exactly when the old value was 0
+            return COUNTED[c.pred]
         return compare(s, c, user)
     if isinstance(c, Instr) and c.op == "xor" and c.type is I1 and isinstance(c.args[1], ConstInt):
         inner = condition(s, c.args[0], user)
@@ -36,7 +40,7 @@ def condition(s: Selector, c: Value, user: Instr) -> str:
 def _countdown(s: Selector, c: Instr) -> Instr | None:
     """y = x - 1 of this block, wanted only after it, for a test of x against 0."""
     x, zero = c.args
-    if c.pred not in ("eq", "ne") or not isinstance(zero, ConstInt) or zero.value or c.type is not I1:
+    if c.pred not in COUNTED or not isinstance(zero, ConstInt) or zero.value or c.type is not I1:
         return None
     if x.type.bits not in (8, 16):
         return None
@@ -194,8 +198,7 @@ def select_icmp(s: Selector, i: Instr) -> None:
     s.emit("mov", Imm(1), d)
     if _skippable(s.out[before - 1], cc):
         s.out[before - 1 :] = [s.out[before], s.out[before - 1]]
-    skip = s.emit("skip", "", cc=cc)
-    skip.count = 1
+    s.emit("skip", "", cc=cc)
     s.emit("clr", d).pred = True
 
 
@@ -254,10 +257,9 @@ def select_select(s: Selector, i: Instr) -> None:
     else:
         for k, r in enumerate(d):
             s.load_leaf(b, k, r)
-    skip.count = len(s.out) - start
     for mi in s.out[start:]:
         mi.pred = True
-    if skip.count == 0:
+    if len(s.out) == start:
         s.out.remove(skip)
 
 
@@ -281,7 +283,7 @@ def _select_operation(s: Selector, i: Instr, a: Value, b: Value, cc: str, test: 
         operand = s.reg(x)
     s.copy(s.reg(a), d)
     s.out += test
-    s.emit("skip", "", cc=cc).count = 1
+    s.emit("skip", "", cc=cc)
     if rule is None:
         mi = s.emit(CONDITIONAL[b.op], d, operand, d, byte=byte)
     else:

@@ -126,6 +126,6 @@ def _use_originals(mi: MI, facts: Facts) -> bool:
         elif isinstance(a, Mem) and a.mode in ("ind", "off"):
             original = facts.get(a.base)
             if isinstance(original, int):
-                mi.args[k] = Mem(a.mode, original, a.off)
+                mi.args[k] = Mem(a.mode, original, a.off, a.volatile)
                 changed = True
     return changed

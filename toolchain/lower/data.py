@@ -21,8 +21,8 @@ from ..ir.model import (
     size_of,
     struct_offsets,
 )
-from ..target import NEAR_BYTES
-from .isr import section_modifiers
+from ..target import NEAR_BYTES, NEAR_END
+from .isr import numbers, section_modifiers
 from .names import block_label, symbol
 
 WORDS_PER_LINE = 8
@@ -40,14 +40,26 @@ CONFIG_SECTION = re.compile(r"__\w+\.sec")  # configuration words are program wo
 def is_near(module: Module, name: str) -> bool:
     """Whether the object lies below 0x2000, where file-register instructions reach it (abi-elf.md §1.4).
 
-    Definition and every declaration agree, because only type and section decide.
+    Definition and every declaration agree, because only type, section and -mlarge-data decide; but an address beyond
+    near memory is known where the definition is.
     """
     var = module.globals.get(name)
-    if var is not None and var.section == ".near":
+    if var is not None and var.section.startswith((".near", "sfr")):
         return True
+    if module.large_data or name in module.far:
+        return False
     if var is None or var.constant or var.type.kind == "opaque" or not 0 < size_of(var.type) <= NEAR_BYTES:
         return False
-    return not var.section or var.section.startswith((".nbss", ".ndata", "sfr"))
+    return not var.section or var.section.startswith((".nbss", ".ndata"))
+
+
+def beyond_near(notes: dict[str, set[str]]) -> frozenset[str]:
+    """Objects whose `address(N)` lies where file-register instructions do not reach."""
+    return frozenset(
+        name
+        for name, texts in notes.items()
+        if any(what == "address" and number >= NEAR_END for what, number in numbers(name, texts))
+    )
 
 
 class DataEmitter:
@@ -109,7 +121,7 @@ class DataEmitter:
                 return f"{var.section},{SECTION_TYPES[base]}"
             return f"{var.section}," + ("psv,page" if var.constant else "bss" if zero else "data")
         if var.constant:
-            return f".const.{suffix},psv,page"
+            return ".const,psv,page"  # one section, as Microchip's linker wants it (abi-elf.md §1.4)
         near = is_near(self.module, var.name) and "address" not in modifiers
         return f".n{kind}.{suffix},{kind},near" if near else f".{kind}.{suffix},{kind}"
 

@@ -39,6 +39,16 @@ class DebugInfo:
         text = self.node(ref).get(key, "").strip()
         return int(text) if re.fullmatch(r"-?\d+", text) else default
 
+    def bits(self, ref: str) -> int:
+        """Size of a type in bits, through typedefs and qualifiers; 0 when it has none."""
+        for _ in range(MAX_DEPTH):
+            if not ref.startswith("!"):
+                return 0
+            if size := self.number(ref, "size"):
+                return size
+            ref = self.node(ref).get("baseType", "")
+        return 0
+
     def file(self, ref: str) -> tuple[str, str]:
         """(directory, name) of the DIFile a node or one of its scopes names."""
         if ref not in self._files:

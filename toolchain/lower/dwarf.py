@@ -8,11 +8,11 @@ debuggers report them as optimised out.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 
 from ..ir.model import Module
 from .debuginfo import DebugInfo
 from .names import symbol
+from .scopes import Die, FunctionInfo, Scope, Scopes, split_name
 
 PRODUCER = "toolchain for dsPIC30F, clang front end"
 ADDRESS_BYTES = 4
@@ -20,11 +20,13 @@ REFERENCE = re.compile(r"!\d+")
 # DWARF 2 §7.5.4
 TAGS = {"array_type": 0x01, "enumeration_type": 0x04, "formal_parameter": 0x05, "lexical_block": 0x0B, "member": 0x0D,
         "pointer_type": 0x0F, "compile_unit": 0x11, "structure_type": 0x13, "subroutine_type": 0x15, "typedef": 0x16,
-        "union_type": 0x17, "subrange_type": 0x21, "base_type": 0x24, "const_type": 0x26, "enumerator": 0x28,
-        "subprogram": 0x2E, "variable": 0x34, "volatile_type": 0x35, "unspecified_parameters": 0x18}  # fmt: skip
+        "union_type": 0x17, "unspecified_parameters": 0x18, "inlined_subroutine": 0x1D, "subrange_type": 0x21,
+        "base_type": 0x24, "const_type": 0x26, "enumerator": 0x28, "subprogram": 0x2E, "variable": 0x34,
+        "volatile_type": 0x35}  # fmt: skip
 ATTRIBUTES = {"location": 0x02, "name": 0x03, "byte_size": 0x0B, "bit_offset": 0x0C, "bit_size": 0x0D,
               "stmt_list": 0x10,
               "low_pc": 0x11, "high_pc": 0x12, "language": 0x13, "comp_dir": 0x1B, "const_value": 0x1C,
+              "inline": 0x20, "abstract_origin": 0x31, "ranges": 0x55, "call_file": 0x58, "call_line": 0x59,  # DWARF 3
               "upper_bound": 0x2F, "producer": 0x25, "prototyped": 0x27, "data_member_location": 0x38,
               "decl_file": 0x3A, "decl_line": 0x3B, "declaration": 0x3C, "encoding": 0x3E, "external": 0x3F,
               "frame_base": 0x40, "type": 0x49}  # fmt: skip
@@ -32,6 +34,7 @@ FORMS = {"addr": 0x01, "block1": 0x0A, "data1": 0x0B, "data2": 0x05, "data4": 0x
          "sdata": 0x0D, "ref4": 0x13}  # fmt: skip
 ENCODINGS = {"address": 1, "boolean": 2, "float": 4, "signed": 5, "signed_char": 6, "unsigned": 7, "unsigned_char": 8}
 LANGUAGE_C89 = 1
+INLINED = 1  # DW_INL_inlined
 OP_ADDR, OP_PLUS_UCONST, OP_REG0, OP_BREG0, OP_FBREG, OP_PIECE = 0x03, 0x23, 0x50, 0x70, 0x91, 0x93  # DWARF 2 §7.7.1
 LINE_BASE, LINE_RANGE, OPCODE_BASE = -10, 245, 10  # abi-elf.md §6.7, C units
 STANDARD_LENGTHS = (0, 1, 1, 1, 1, 0, 0, 0, 1)
@@ -39,29 +42,6 @@ SPECIFIERS = {"DW_TAG_const_type": "const_type", "DW_TAG_volatile_type": "volati
               "DW_TAG_pointer_type": "pointer_type", "DW_TAG_typedef": "typedef"}  # fmt: skip
 COMPOSITES = {"DW_TAG_structure_type": "structure_type", "DW_TAG_union_type": "union_type",
               "DW_TAG_enumeration_type": "enumeration_type", "DW_TAG_array_type": "array_type"}  # fmt: skip
-
-
-@dataclass
-class FunctionInfo:
-    """What the back end reports of one function: labels, line rows, frame variables."""
-
-    name: str  # assembler symbol
-    subprogram: str  # metadata reference
-    end_label: str
-    frame_base: tuple[int, int]  # register, offset of W15 at entry from it
-    rows: list[tuple[str, str, int]] = field(default_factory=list)  # label, position node, line
-    variables: list[tuple[str, int]] = field(default_factory=list)  # DILocalVariable, offset from W15 at entry
-    ranges: dict[str, list[tuple[str, str, tuple[int, ...]]]] = field(default_factory=dict)  # start, end, registers
-
-
-@dataclass
-class Die:
-    """One entry: tag, (attribute, form, value), children. `label` marks a type that others refer to."""
-
-    tag: str
-    attributes: list[tuple[str, str, str | int | list[str]]]
-    children: list[Die] = field(default_factory=list)
-    label: str = ""
 
 
 def _uleb(value: int) -> list[str]:
@@ -88,6 +68,18 @@ def _string(text: str) -> str:
     return f'\t.asciz "{escaped}"'
 
 
+def _expression(f: FunctionInfo, where: tuple[int, ...]) -> list[str]:
+    """Location of a variable in registers, or in the frame (a negative number, `mir.Located`)."""
+    if where[0] < 0:
+        return [str(OP_FBREG), *_sleb(f.objects[-1 - where[0]])]
+    data: list[str] = []
+    for r in where:
+        data.append(str(OP_REG0 + r))
+        if len(where) > 1:
+            data += [str(OP_PIECE), "2"]
+    return data
+
+
 class Unit:
     """Debug entries of one compile unit."""
 
@@ -100,7 +92,9 @@ class Unit:
         self.files: list[tuple[str, str]] = []
         self.functions: list[FunctionInfo] = []
         self.globals: list[tuple[str, str]] = []  # DIGlobalVariable, assembler symbol
-        self.lists: list[list[tuple[str, str, tuple[int, ...]]]] = []  # location lists, for .debug_loc
+        self.lists: list[list[tuple[str, str, list[str]]]] = []  # location lists, for .debug_loc
+        self.ranges: list[list[tuple[str, str]]] = []  # addresses of units and scopes, for .debug_ranges
+        self.abstract: dict[str, Die] = {}  # functions that were inlined somewhere
 
     def file_number(self, ref: str) -> int:
         """1-based number of the file of a node."""
@@ -117,9 +111,16 @@ class Unit:
             ("comp_dir", "string", directory), ("low_pc", "addr", 0), ("stmt_list", "data4",
             f".Ldbg_line{self.number}"),
         ])  # fmt: skip
+        if self.functions:
+            top.attributes.append(self._addresses([(f.name, f.end_label) for f in self.functions]))
         body = [self._variable(ref, s) for ref, s in self.globals] + [self._function(f) for f in self.functions]
-        top.children = list(self.types.values()) + body
+        top.children = [*self.types.values(), *self.abstract.values(), *body]
         return top
+
+    def _addresses(self, pieces: list[tuple[str, str]]) -> tuple[str, str, str]:
+        """Attribute that leads to a list of ranges."""
+        self.ranges.append(pieces)
+        return ("ranges", "data4", f".Ldbg_ranges{self.number}_{len(self.ranges) - 1}")
 
     def _declared(self, ref: str) -> list[tuple[str, str, str | int | list[str]]]:
         node = self.info.node(ref)
@@ -157,23 +158,52 @@ class Unit:
             ("frame_base", "block1", [str(OP_BREG0 + register), *_sleb(offset)]),
         ]
         die = Die("subprogram", attributes)
+        scopes = Scopes(self.info, f)
         located = dict(f.variables)
-        for ref in dict.fromkeys([*self._parameters(node), *located, *f.ranges]):
-            if self.info.subprogram(ref) == f.subprogram:  # not a variable of an inlined function
-                die.children.append(self._local(ref, located.get(ref), f.ranges.get(ref)))
+        for name in dict.fromkeys([*self._parameters(node), *f.known]):
+            ref, call = split_name(name)
+            scopes.place(ref, call, self._local(f, ref, located.get(name), f.ranges.get(name)))
+        self._fill(die, scopes.top)
         return die
+
+    def _fill(self, die: Die, scope: Scope) -> None:
+        """Variables of a scope, and the scopes inside that have code or variables."""
+        die.children += scope.variables
+        for inner in scope.inside.values():
+            if not inner.pieces:
+                continue
+            child = Die("lexical_block", [self._addresses(inner.pieces)])
+            if inner.call:
+                child.tag = "inlined_subroutine"
+                child.attributes += [
+                    ("abstract_origin", "ref4", self._abstract(inner.ref).label),
+                    ("call_file", "data1", min(self.file_number(inner.call), 255)),
+                    ("call_line", "data2", self.info.number(inner.call, "line")),
+                ]
+            self._fill(child, inner)
+            die.children.append(child)
+
+    def _abstract(self, subprogram: str) -> Die:
+        """The entry that copies of an inlined function refer to."""
+        if subprogram not in self.abstract:
+            attributes = [*self._declared(subprogram), ("prototyped", "flag", 1), ("inline", "data1", INLINED)]
+            label = f".Ldbg_a{self.number}_{len(self.abstract)}"
+            self.abstract[subprogram] = Die("subprogram", attributes, [], label)
+        return self.abstract[subprogram]
 
     def _parameters(self, subprogram: dict[str, str]) -> list[str]:
         retained = self.info.items(subprogram.get("retainedNodes", ""))
         return [r for r in retained if self.info.number(r, "arg")]
 
-    def _local(self, ref: str, offset: int | None, ranges: list[tuple[str, str, tuple[int, ...]]] | None) -> Die:
+    def _local(
+        self, f: FunctionInfo, ref: str, offset: int | None, ranges: list[tuple[str, str, tuple[int, ...]]] | None
+    ) -> Die:
         attributes = self._declared(ref) + self._type_attribute(self.info.node(ref).get("type"))
         if offset is not None:
             attributes.append(("location", "block1", [str(OP_FBREG), *_sleb(offset)]))
         elif ranges:
             attributes.append(("location", "data4", f".Ldbg_loc{self.number}_{len(self.lists)}"))
-            self.lists.append(ranges)
+            self.lists.append([(start, end, _expression(f, where)) for start, end, where in ranges])
         return Die("formal_parameter" if self.info.number(ref, "arg") else "variable", attributes)
 
     # -- types --------------------------------------------------------------------------------------------------------
@@ -332,6 +362,11 @@ class DwarfWriter:
         self.out.append("\t.section .debug_loc,info")
         for unit, _ in trees:
             self._locations(unit)
+        self.out.append("\t.section .debug_ranges,info")
+        for unit, _ in trees:
+            for k, pieces in enumerate(unit.ranges):
+                self.out.append(f".Ldbg_ranges{unit.number}_{k}:")
+                self.out += [f"\t.4byte {start},{end}" for start, end in [*pieces, ("0", "0")]]
         self.out.append("\t.section .debug_line,info")
         for unit, _ in trees:
             self._lines(unit)
@@ -396,12 +431,7 @@ class DwarfWriter:
         """Start, end, expression; the unit's base address is 0. A pair of zeros ends a list."""
         for k, ranges in enumerate(unit.lists):
             self.out.append(f".Ldbg_loc{unit.number}_{k}:")
-            for start, end, registers in ranges:
-                data: list[str] = []
-                for r in registers:
-                    data.append(str(OP_REG0 + r))
-                    if len(registers) > 1:
-                        data += [str(OP_PIECE), "2"]
+            for start, end, data in ranges:
                 self.out += [f"\t.4byte {start},{end}", f"\t.2byte {len(data)}", f"\t.byte {','.join(data)}"]
             self.out.append("\t.4byte 0,0")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from .mir import MI, File, Imm, Located, MBlock, Mem, MFunction, Operand
+from .mir import MI, File, Imm, MBlock, Mem, MFunction, Operand
 from .names import block_label
-from .variables import Ranges
+from .variables import Ranges, proved
 
 MEM_TEXT = {"ind": "[w{}]", "++": "[w{}++]", "--": "[w{}--]", "+": "[++w{}]", "-": "[--w{}]"}
 RENAMED = {
@@ -20,12 +20,15 @@ RENAMED = {
     "btstc": "btst.c",
 }
 FILE_OPS = {n + "f": n for n in ("inc", "dec", "inc2", "dec2", "neg", "com", "clr", "setm", "sl", "lsr", "asr", "bset",
-                                 "bclr", "btg", "btst", "cp0", "add", "sub", "addc", "subb", "and", "ior", "xor",
+                                 "bclr", "btg", "btst", "btsc", "btss", "cp0", "add", "sub", "addc", "subb", "and",
+                                 "ior", "xor",
                                  "cp")}  # fmt: skip
 TIED_OPS = {n + "l": n for n in ("add", "sub", "addc", "subb", "and", "ior", "xor")}
+BIT_OPS = {"bset", "bclr", "btg", "btst", "btsc", "btss"}
 WREG_OPS = {n + "w": n for n in ("and", "ior", "xor")}
 CONDITION_TEXT = {"c": "geu", "nc": "ltu"}
 ASM_OPERAND = re.compile("\x00(\\d+):(\\w?)\x00|\x00uid\x00")
+HOLD_CYCLES = 4  # from the comparison with DISICNT to the first instruction of the sequence
 SHIFT_FIRST = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
 
 
@@ -51,8 +54,11 @@ def operand_text(a: Operand) -> str:
 class Emitter:
     """Text of one function."""
 
-    def __init__(self, m: MFunction, prefix: str, large_code: bool) -> None:
+    def __init__(
+        self, m: MFunction, prefix: str, large_code: bool, position: Callable[[str | None], tuple[str, int] | None]
+    ) -> None:
         self.m = m
+        self.position = position  # source file and line of a !dbg reference
         self.prefix = prefix  # makes local labels unique in the file
         self.large_code = large_code
         self.serial = 0
@@ -72,6 +78,7 @@ class Emitter:
 
     def text(self, location: Callable[[str | None], str], ranges: Ranges) -> list[str]:
         """All lines. `location` gives the line-table label text for a !dbg reference, or ""."""
+        self.variables = proved(self.m) if self.m.bindings else {}
         for block in self.m.blocks:
             self._block(block, location, ranges)
         return self.lines
@@ -81,30 +88,19 @@ class Emitter:
             self.lines.append(f"{self.label(block.name)}:")
         if block.address_taken:
             self.lines.append(f"{block_label(self.m.name, block.name)}:")
-        pending = 0
-        label = ""
-        state: tuple[Located, ...] | None = block.variables
+        label = ""  # behind what a skip covers
         for mi in block.insts:
-            self.lines += [mark for mark in (ranges.at(state), location(mi.line)) if mark]
-            state = mi.variables
+            self.lines += [mark for mark in (ranges.at(self.variables.get(id(mi), ())), location(mi.line)) if mark]
+            if label and not mi.pred:
+                self.lines.append(f"{label}:")
+                label = ""
             if mi.op == "skip":
-                label = self._skip(mi)
-                pending = mi.count
-                continue
-            self._instruction(mi)
-            if pending:
-                pending -= int(mi.pred)
-                if pending == 0 and label:
-                    self.lines.append(f"{label}:")
-
-    def _skip(self, mi: MI) -> str:
-        """A skip is a branch over the guarded instructions, or a skip instruction when the peephole chose one."""
-        if mi.text:
-            self._out(mi.text)
-            return ""
-        label = self.fresh()
-        self._out(f"bra {CONDITION_TEXT.get(mi.cc, mi.cc)},{label}")
-        return label
+                label = self.fresh()
+                self._out(f"bra {CONDITION_TEXT.get(mi.cc, mi.cc)},{label}")
+            else:
+                self._instruction(mi)
+        if label:
+            self.lines.append(f"{label}:")
 
     def _out(self, text: str) -> None:
         self.lines.append("\t" + text)
@@ -137,13 +133,7 @@ class Emitter:
         return args
 
     def _file(self, mi: MI, op: str, args: list[str]) -> None:
-        if mi.byte and op in ("bset", "bclr", "btg", "btst"):
-            self._out(f"{op}.b {','.join(args)}")
-            return
-        self._out(
-            f"{op}{'.b' if mi.byte else ''} {args[0]}"
-            + (f",{args[1]}" if op in ("bset", "bclr", "btg", "btst") else "")
-        )
+        self._out(f"{op}{'.b' if mi.byte else ''} {args[0]}" + (f",{args[1]}" if op in BIT_OPS else ""))
 
     # -- special instructions -----------------------------------------------------------------------------------------
 
@@ -216,9 +206,30 @@ class Emitter:
                 return str(-int(a.value)) if modifier == "n" else str(a.value)
             return operand_text(a)
 
+        place = self.position(mi.line)
+        if place is not None:  # what the assembler has to say is about the source
+            self.lines.append(f'# {place[1]} "{place[0]}"')
         for line in ASM_OPERAND.sub(replace, mi.text).split("\n"):
             if line.strip():
                 self._out(line.strip())
+
+    def _hold(self, mi: MI) -> None:
+        """DISI for the sequence behind it, unless a longer one is under way (`holds`)."""
+        cycles, end = mi.args[0], self.fresh()
+        assert isinstance(cycles, Imm)
+        assert isinstance(cycles.value, int)
+        self._out(f"mov #{cycles.value + HOLD_CYCLES},w0")
+        self._out("cp _DISICNT")
+        self._out(f"bra geu,{end}")
+        self._out(f"disi #{cycles.value}")
+        self.lines.append(f"{end}:")
+
+    def _release(self, mi: MI) -> None:
+        """Nothing."""
+
+    def _clear_pair(self, mi: MI) -> None:
+        """The product of anything and 0; no flags change (isa.md §6.5)."""
+        self._out(f"mul.uu w{mi.args[0]},#0,w{mi.args[0]}")
 
     def _borrow(self, mi: MI) -> None:
         """-1 after a borrow, else 0."""
@@ -248,5 +259,8 @@ SPECIAL: dict[str, Callable[[Emitter, MI], None]] = {
     "shiftloop": Emitter._shiftloop,
     "asm": Emitter._asm,
     "borrow": Emitter._borrow,
+    "clrd": Emitter._clear_pair,
+    "hold": Emitter._hold,
+    "release": Emitter._release,
     "text": Emitter._plain_text,
 }

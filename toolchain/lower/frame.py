@@ -78,7 +78,7 @@ class FrameBuilder:
     def interrupt_bytes(self) -> int:
         """Bytes an interrupt function pushes before its frame."""
         extra = (2 if self._saves_rcount() else 0) + (2 if "no_auto_psv" not in self.m.interrupt else 0)
-        return 2 * len(self.saved) + extra
+        return 2 * len(self.saved) + 2 * len(self.m.preserved) + extra
 
     def _saves_rcount(self) -> bool:
         return self.repeats or self.calls
@@ -89,8 +89,9 @@ class FrameBuilder:
             pushed = 0
             out: list[MI] = []
             for mi in b.insts:
-                out += self._instruction(mi, pushed)
-                pushed += _pushes(mi)
+                pushes = _pushes(mi)
+                out += mi.replaced(self._instruction(mi, pushed))
+                pushed += pushes
             b.insts = out
         self._prologue()
         for b in self.m.blocks:
@@ -142,22 +143,22 @@ class FrameBuilder:
         low, high = (-512, 511) if mi.byte else WORD_OFFSET
         if low <= offset <= high:
             args: list[Operand] = list(mi.args)
-            args[k] = Mem("off", base, offset) if offset else Mem("ind", base)
+            args[k] = Mem("off", base, offset, slot.volatile) if offset else Mem("ind", base, 0, slot.volatile)
             mi.args = args
             return [mi]
         if k == 0 and isinstance(mi.args[1], int):
             r = mi.args[1]
-            mi.args = [Mem("idx", base, r), r]
+            mi.args = [Mem("idx", base, r, slot.volatile), r]
             return [MI("mov", Imm(offset & 0xFFFF), r, line=mi.line), mi]
-        return self._far_store(mi, base, offset)
+        return self._far_store(mi, base, offset, slot.volatile)
 
-    def _far_store(self, mi: MI, base: int, offset: int) -> list[MI]:
+    def _far_store(self, mi: MI, base: int, offset: int, volatile: int) -> list[MI]:
         """Borrow a register for the offset: PUSH, MOV #offset, MOV [base+Wt], POP. No flags change."""
         source = mi.args[0]
         t = next(r for r in range(8) if r != source)
         if base == SP:
             offset -= 2
-        mi.args = [source, Mem("idx", base, t)]
+        mi.args = [source, Mem("idx", base, t, volatile)]
         return [
             MI("mov", t, Mem("++", SP), line=mi.line),
             MI("mov", Imm(offset & 0xFFFF), t, line=mi.line),
@@ -201,7 +202,8 @@ class FrameBuilder:
         return out
 
     def _interrupt_entry(self) -> list[MI]:
-        out = []
+        out = [MI("text", line) for line in self.m.preprologue]
+        out += [MI("text", f"push {name}") for name in self.m.preserved]
         if self._saves_rcount():
             out.append(MI("text", "push _RCOUNT"))
         if "shadow" in self.m.interrupt:
@@ -225,7 +227,7 @@ class FrameBuilder:
             out.append(MI("text", "pop.s", line=line))
         if self._saves_rcount():
             out.append(MI("text", "pop _RCOUNT", line=line))
-        return out
+        return out + [MI("text", f"pop {name}", line=line) for name in reversed(self.m.preserved)]
 
 
 def _pushes(mi: MI) -> int:
@@ -273,8 +275,6 @@ def _address_into(r: int, base: int, offset: int, mi: MI) -> list[MI]:
         out = [MI("add" if offset > 0 else "sub", base, Imm(abs(offset)), r, line=mi.line)]
     else:
         out = [MI("mov", Imm(offset & 0xFFFF), r, line=mi.line), MI("add", base, r, r, line=mi.line)]
-    for made in out:
-        made.pred = mi.pred
     return out
 
 

@@ -195,6 +195,26 @@ def _replace(f: Function, old: Instr, new: Instr) -> None:
 # counting down
 
 
+def _leaves_at(loop: Loop, test: Instr) -> bool:
+    """Whether every turn begins with the test and ends the loop there, so that the counter never passes 0."""
+    br = loop.header.instrs[-1]
+    if br.op != "br" or not br.args or br.args[0] is not test:
+        return False
+    return br.blocks[0 if test.pred == "eq" else 1] not in {b.name for b in loop.body}
+
+
+def _unclamped(v: Value) -> Value | None:
+    """n when a value is max(n, 0), signed: the middle end's trip count of `i < n`."""
+    if not isinstance(v, Instr) or v.op != "select" or not isinstance(v.args[0], Instr) or v.args[0].op != "icmp":
+        return None
+    test, a, b = v.args
+    assert isinstance(test, Instr)
+    n, zero = (a, b) if test.pred in ("sgt", "sge") else (b, a)
+    if test.pred not in ("sgt", "sge", "slt", "sle") or not isinstance(zero, ConstInt) or zero.value:
+        return None
+    return n if test.args[0] is n and isinstance(test.args[1], ConstInt) and not test.args[1].value else None
+
+
 def _count_down(loop: Loop, counter: Counter) -> None:
     """Turn a counter with no use but the exit test into one that reaches zero there."""
     if counter.amount != 1:
@@ -215,10 +235,15 @@ def _count_down(loop: Loop, counter: Counter) -> None:
     b.line = last.line
     distance = b.binary("sub", limit, counter.start)
     loop.entry.instrs.append(last)
+    unclamped = _unclamped(distance)
+    pred = test.pred
+    if unclamped is not None and test.args[0] is counter.phi and _leaves_at(loop, test):
+        distance, pred = unclamped, "sle" if pred == "eq" else "sgt"
     counter.phi.args = [distance if v is counter.start and n == loop.entry.name else v
                         for v, n in zip(counter.phi.args, counter.phi.blocks, strict=True)]  # fmt: skip
     counter.step.args = [counter.phi, const(I16, -1)]
     test.args = [test.args[0], const(I16, 0)]
+    test.extra["pred"] = pred
     for record in loop.f.dbg_records:
         if record.value is counter.phi or record.value is counter.step:
             record.value = None  # the source variable counts the other way

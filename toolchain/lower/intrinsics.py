@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from emu.dspic30f.isa.debug import PLAIN_TRAP
+
 from ..ir.model import I1, I8, I16, I32, VOID, ConstInt, GlobalRef, Instr, UnsupportedError, Value, int_type
 from . import mathlib
 from .build import const, legal_type
@@ -328,8 +330,16 @@ def _fptoint_sat(lz: Legalizer, i: Instr, name: str) -> Result:
 
 
 def _trap(lz: Legalizer, i: Instr, name: str) -> Result:
-    """Stop: the software breakpoint word, then a reset (abi-elf.md §3.3, as the default interrupt handler)."""
-    lz.b.emit("builtin", VOID, [], name="__builtin_software_breakpoint")
+    """Stop: the software breakpoint word, then a reset (abi-elf.md §3.3, as the default interrupt handler).
+
+    Behind them, where nothing runs, the number of the check that failed tells a debugger that this is no ordinary end.
+    """
+    if name == "debugtrap":
+        lz.b.emit("builtin", VOID, [], name="__builtin_software_breakpoint")
+        return None
+    check = i.args[0] if name == "ubsantrap" else const(I16, PLAIN_TRAP)
+    assert isinstance(check, ConstInt)
+    lz.b.emit("builtin", VOID, [const(I16, check.value & 0xFF)], name="__builtin_failed_check")
     return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from ..ir.model import ConstAgg, ConstBytes, ConstZero, GlobalRef, Module, UnsupportedError, Value
+from ..isr_names import IRQ_PREFIX, irq_name
 
 PREFIX = "os_isr:"
 WORDS = {"interrupt", "auto_psv", "no_auto_psv", "shadow"}
@@ -42,6 +43,25 @@ def interrupt_kind(name: str, notes: set[str]) -> str:
     return kind + (",shadow" if "shadow" in words else "")
 
 
+def preserved(notes: set[str]) -> tuple[str, ...]:
+    """Assembler names of the variables that `save(...)` lists: pushed at entry, popped at the end."""
+    lists = [note.removeprefix("save:") for note in sorted(notes) if note.startswith("save:")]
+    return tuple("_" + name.strip() for names in lists for name in names.split(",") if name.strip())
+
+
+def preprologue(notes: set[str]) -> tuple[str, ...]:
+    """Lines of assembly that run before anything is saved."""
+    texts = [note.removeprefix("preprologue:") for note in sorted(notes) if note.startswith("preprologue:")]
+    return tuple(line.strip() for text in texts for line in re.split(r"[\n;]", text) if line.strip())
+
+
+def vector_symbols(notes: set[str]) -> tuple[str, ...]:
+    """Assembler names under which the linker finds the handlers of `irq(N)` and `altirq(N)`."""
+    wanted = [(kind, int(number, 0)) for note in sorted(notes)
+              for kind, _, number in [note.partition(":")] if kind in IRQ_PREFIX]  # fmt: skip
+    return tuple(f"__{IRQ_PREFIX[kind]}{irq_name(number)}" for kind, number in wanted)
+
+
 def wants_probe(notes: set[str], default: bool) -> bool:
     """Whether a function's frame is probed against SPLIM: -fstack-check, overruled by "os_probe" or "os_no_probe"."""
     if "os_no_probe" in notes:
@@ -52,13 +72,18 @@ def wants_probe(notes: set[str], default: bool) -> bool:
 def section_modifiers(name: str, notes: set[str]) -> str:
     """`,address(0x1000)`, `,noload`, `,reverse(64)` for a `.section` line (abi-elf.md §4.3)."""
     out = ",noload" if "noload" in notes else ""
+    return out + "".join(f",{what}(0x{number:X})" for what, number in numbers(name, notes))
+
+
+def numbers(name: str, notes: set[str]) -> list[tuple[str, int]]:
+    """("address" or "reverse", N) of the notes of one object. Raises UnsupportedError for what is no number."""
+    out = []
     for note in sorted(notes):
         found = re.fullmatch(r"(address|reverse)\((.*)\)", note)
         if found is None:
             continue
         try:
-            number = int(found[2].strip("() ").rstrip("uUlL"), 0)
+            out.append((found[1], int(found[2].strip("() ").rstrip("uUlL"), 0)))
         except ValueError:
             raise UnsupportedError(f"attribute {note}: the argument must be a number", name) from None
-        out += f",{found[1]}(0x{number:X})"
     return out

@@ -14,12 +14,15 @@ from ..ir.model import (
     Undef,
     UnsupportedError,
     Value,
+    int_type,
     size_of,
     store_size,
     struct_offsets,
 )
 from .build import const, legal_type
 from .legal_base import AGGREGATES, LegalizerBase, leaves_of
+
+ATOMIC_CALLS = {"__atomic_load", "__atomic_store", "__atomic_exchange", "__atomic_compare_exchange"}
 
 
 class MemoryLegalizer(LegalizerBase):
@@ -104,10 +107,24 @@ class MemoryLegalizer(LegalizerBase):
         assert isinstance(align, int)
         if i.type.kind in AGGREGATES:
             return self.load_aggregate(i.type, p, align, i.volatile)
-        self.guard(i)
-        t = legal_type(i.type)
-        value = self.load_bits(t, store_size(i.type), p, self.even(p, align), i.volatile)
+        t, size, even = legal_type(i.type), store_size(i.type), self.even(p, align)
+        value = (
+            self.load_at_once(t, size, p, even)
+            if "ordering" in i.extra
+            else self.load_bits(t, size, p, even, i.volatile)
+        )
         return self.to_bool(value) if i.type.bits == 1 else value
+
+    def load_at_once(self, t: Type, size: int, p: Value, even: bool) -> Value:
+        """Atomic load: one instruction, or with interrupts held off."""
+        if size == 1 or (even and size == 2):
+            return self.load_bits(t, size, p, even, True)
+        if even and size == 4:
+            return self.b.emit("loadpair", t, [p])
+        self.hold()
+        value = self.load_bits(t, size, p, even, True)
+        self.release()
+        return value
 
     def load_bits(self, t: Type, size: int, p: Value, even: bool, volatile: bool) -> Value:
         """Load `size` bytes into the low end of a legal type."""
@@ -134,9 +151,23 @@ class MemoryLegalizer(LegalizerBase):
             return
         if isinstance(v, Undef) and not i.volatile:
             return
-        self.guard(i)
         value = self.b.cast("zext", self.use(v), I8) if v.type.bits == 1 else self.zero_extended(v)
-        self.store_bits(value, store_size(v.type), p, self.even(p, align), i.volatile)
+        size, even = store_size(v.type), self.even(p, align)
+        if "ordering" in i.extra:
+            self.store_at_once(value, size, p, even)
+        else:
+            self.store_bits(value, size, p, even, i.volatile)
+
+    def store_at_once(self, value: Value, size: int, p: Value, even: bool) -> None:
+        """Atomic store: one instruction, or with interrupts held off."""
+        if size == 1 or (even and size == 2):
+            self.store_bits(value, size, p, even, True)
+        elif even and size == 4:
+            self.b.emit("storepair", VOID, [value, p])
+        else:
+            self.hold()
+            self.store_bits(value, size, p, even, True)
+            self.release()
 
     def store_bits(self, v: Value, size: int, p: Value, even: bool, volatile: bool) -> None:
         """Store the low `size` bytes of a legal value."""
@@ -150,13 +181,12 @@ class MemoryLegalizer(LegalizerBase):
             part = self.b.cast("trunc", self.b.shift("lshr", v, at * 8) if at else v, I16 if step == 2 else I8)
             self.b.store(part, self.b.add(p, at), volatile)
 
-    def guard(self, i: Instr) -> None:
-        """Atomic accesses wider than a word are made with interrupts of priority 1-6 held off (isa.md §12)."""
-        if "ordering" in i.extra and store_size(i.args[0].type if i.op == "store" else i.type) > 2:
-            self.disi(12)
+    def hold(self) -> None:
+        """From here to `release`, interrupts of priority 1-6 wait (isa.md §12). No calls and branches in between."""
+        self.b.emit("builtin", VOID, [], name="__builtin_hold")
 
-    def disi(self, cycles: int) -> None:
-        self.b.emit("builtin", VOID, [const(I16, cycles)], name="__builtin_disi")
+    def release(self) -> None:
+        self.b.emit("builtin", VOID, [], name="__builtin_release")
 
     def load_aggregate(self, whole: Type, p: Value, align: int, volatile: bool) -> list[Value]:
         out = []
@@ -189,30 +219,68 @@ class MemoryLegalizer(LegalizerBase):
         kind = str(i.extra["kind"])
         p, v = self.use(i.args[0]), self.use(i.args[1])
         t = legal_type(i.type)
-        self.disi(8 + 8 * (t.bits // 16))
+        self.hold()
         old = self.b.load(t, p, True)
-        if kind in ("add", "sub", "and", "or", "xor"):
-            new = self.b.binary(kind, old, v)
-        elif kind == "xchg":
-            new = v
-        elif kind == "nand":
-            new = self.b.binary("xor", self.b.binary("and", old, v), const(t, -1))
-        elif kind in ("max", "min", "umax", "umin"):
-            pred = ("u" if kind[0] == "u" else "s") + ("gt" if kind.endswith("max") else "lt")
-            new = self.b.select(self.b.icmp(pred, old, v), old, v)
-        else:
-            raise UnsupportedError(f"atomicrmw {kind}")
+        new = self.modified(kind, t, old, v)
         self.b.store(new, p, True)
+        self.release()
         return old
+
+    def modified(self, kind: str, t: Type, old: Value, v: Value) -> Value:
+        """What atomicrmw writes."""
+        if kind in ("add", "sub", "and", "or", "xor"):
+            return self.b.binary(kind, old, v)
+        if kind == "xchg":
+            return v
+        if kind == "nand":
+            return self.b.binary("xor", self.b.binary("and", old, v), const(t, -1))
+        if kind in ("max", "min", "umax", "umin"):
+            pred = ("u" if kind[0] == "u" else "s") + ("gt" if kind.endswith("max") else "lt")
+            return self.b.select(self.b.icmp(pred, old, v), old, v)
+        raise UnsupportedError(f"atomicrmw {kind}")
 
     def cmpxchg(self, i: Instr) -> list[Value]:
         p, expected, new = (self.use(a) for a in i.args)
         t = legal_type(i.args[1].type)
-        self.disi(12 + 10 * (t.bits // 16))
+        self.hold()
         old = self.b.load(t, p, True)
         same = self.b.icmp("eq", old, expected)
         self.b.store(self.b.select(same, new, old), p, True)
+        self.release()
         return [old, same]
+
+    def atomic_call(self, i: Instr, name: str) -> Value | None:
+        """Calls of GCC's generic atomic functions, which the front end makes for objects declared _Atomic."""
+        size, p, *operands = (self.use(a) for a in i.args[:-2])
+        assert isinstance(size, ConstInt)
+        n = size.value
+        t = I8 if n == 1 else int_type(8 * n)
+        even = self.even(p, 1)
+        if name == "__atomic_load":
+            value = self.load_at_once(t, n, p, even)
+            self.store_bits(value, n, operands[0], self.even(operands[0], 1), False)
+            return None
+        given = operands[1] if name == "__atomic_compare_exchange" else operands[0]
+        new = self.load_bits(t, n, given, self.even(given, 1), False)
+        if name == "__atomic_store":
+            self.store_at_once(new, n, p, even)
+            return None
+        if name == "__atomic_exchange":
+            self.hold()
+            old = self.load_bits(t, n, p, even, True)
+            self.store_bits(new, n, p, even, True)
+            self.release()
+            self.store_bits(old, n, operands[1], self.even(operands[1], 1), False)
+            return None
+        where = operands[0]
+        expected = self.load_bits(t, n, where, self.even(where, 1), False)
+        self.hold()
+        old = self.load_bits(t, n, p, even, True)
+        same = self.b.icmp("eq", old, expected)
+        self.store_bits(self.b.select(same, new, old), n, p, even, True)
+        self.release()
+        self.store_bits(old, n, where, self.even(where, 1), False)  # when they were equal, what is there already
+        return same
 
 
 def _pieces(size: int, even: bool) -> list[tuple[int, int]]:

@@ -33,7 +33,7 @@ from . import intrinsics, softfloat, vectors
 from .build import Builder, const, legal_type
 from .cfg import reverse_postorder
 from .legal_base import AGGREGATES, leaves_of
-from .legal_memory import MemoryLegalizer
+from .legal_memory import ATOMIC_CALLS, MemoryLegalizer
 
 SIGNED_OPS = frozenset(("sdiv", "srem", "ashr"))
 CLEAN_OPS = frozenset(("udiv", "urem", "lshr", "sdiv", "srem", "ashr"))
@@ -295,6 +295,8 @@ class Legalizer(MemoryLegalizer):
                 return intrinsics.expand(self, i, callee.name)
             if callee.name.startswith("__builtin_"):
                 return self.builtin(i, callee.name)
+            if callee.name in ATOMIC_CALLS and isinstance(i.args[0], ConstInt) and i.args[0].value in (1, 2, 4, 8):
+                return self.atomic_call(i, callee.name)
         if isinstance(callee, InlineAsm):
             return self.inline_asm(i, callee)
         args: list[Value] = []

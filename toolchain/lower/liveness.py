@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .mir import MI, SIDE_EFFECTS, Mem, MFunction, Slot
+from .mir import MI, MBlock, MFunction
 
 SP_BIT = 1 << 15
 
@@ -62,50 +62,32 @@ def live_out(m: MFunction, at_return: int = 0) -> dict[str, int]:
     return out
 
 
-def has_effect(mi: MI) -> bool:
-    """Whether an instruction does more than write registers and flags."""
-    if mi.op in SIDE_EFFECTS or mi.volatile or (mi.op.endswith("f") and mi.op not in ("cpf",)):
-        return True
-    for role, a in zip(mi.info.roles, mi.args, strict=False):
-        if a.__class__ is Mem:
-            if role in "db" or a.mode in ("++", "--", "+", "-"):
-                return True
-        elif (role == "d" and a.__class__ is not int) or (role == "b" and a.__class__ is Slot):
-            return True
-    return False
-
-
 def remove_dead(m: MFunction) -> None:
     """Drop instructions whose results and flags nobody reads. Repeats until nothing changes."""
     changed = True
     while changed:
-        changed = False
         out = live_out(m)
+        changed = False
         for b in m.blocks:
-            live = out[b.name]
-            flags_live = False
-            kept: list[MI] = []
-            guarded = 0
-            for mi in reversed(b.insts):
-                d = bits(mi.defs())
-                dead = not d & (live | SP_BIT) and not has_effect(mi)
-                if dead and mi.info.writes and flags_live:
-                    dead = False
-                if dead and (d or mi.info.writes):
-                    changed = True
-                    guarded += mi.pred
-                    continue
-                if mi.op == "skip":
-                    mi.count -= guarded
-                    guarded = 0
-                    if mi.count == 0:
-                        changed = True
-                        continue
-                if mi.flags_read():
-                    flags_live = True
-                if mi.info.writes and not mi.info.reads and not mi.pred:
-                    flags_live = mi.op in ("skip", "bra")
-                live = live & ~d | bits(mi.uses())
-                kept.append(mi)
-            kept.reverse()
-            b.insts = kept
+            changed |= drop_dead(b, out[b.name])
+
+
+def drop_dead(b: MBlock, live: int) -> bool:
+    """The same in one block, `live` being the registers live at its end; flags never live across blocks."""
+    kept: list[MI] = []
+    flags: set[str] = set()
+    for mi in reversed(b.insts):
+        d, writes = bits(mi.defs()), set(mi.flags_written())
+        if (d or writes) and not d & (live | SP_BIT) and not flags & writes and not mi.effect():
+            continue
+        if mi.op == "skip" and not (kept and kept[-1].pred):
+            continue
+        if not mi.pred:
+            flags -= writes
+        flags |= set(mi.flags_read())
+        live = live & ~d | bits(mi.uses())
+        kept.append(mi)
+    kept.reverse()
+    changed = len(kept) != len(b.insts)
+    b.insts = kept
+    return changed

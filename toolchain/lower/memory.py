@@ -19,13 +19,13 @@ def _words(v: Value) -> int:
     return max(1, v.type.bits // 16)
 
 
-def move_in(s: Selector, source: Operand, d: int, byte: bool, volatile: bool = False) -> None:
+def move_in(s: Selector, source: Operand, d: int, byte: bool) -> None:
     """d = memory operand. Near bytes pass through W0 (isa.md §3.3)."""
     if byte and isinstance(source, File):
-        s.emit("mov", source, 0, byte=True).volatile = volatile
+        s.emit("mov", source, 0, byte=True)
         s.emit("mov", 0, d)
     else:
-        s.emit("mov", source, d, byte=byte).volatile = volatile
+        s.emit("mov", source, d, byte=byte)
 
 
 def move_out(s: Selector, r: int, dest: Operand, byte: bool) -> None:
@@ -38,42 +38,57 @@ def move_out(s: Selector, r: int, dest: Operand, byte: bool) -> None:
 
 
 def select_load(s: Selector, i: Instr) -> None:
-    """One MOV a word. A dead volatile load still reads."""
+    """One MOV a word, low word first. A dead volatile load still reads."""
     d = s.value_regs(i)
-    p, byte = i.args[0], i.type.bits == 8
+    p, byte, number = i.args[0], i.type.bits == 8, s.access_number(i)
     if len(d) == 1:
-        move_in(s, s.address(p, byte), d[0], byte, i.volatile)
+        move_in(s, s.address(p, byte, volatile=number), d[0], byte)
         return
-    for operand, r in zip(_run(s, p, len(d)), d, strict=True):
-        s.emit("mov", operand, r).volatile = i.volatile
+    for operand, r in zip(_run(s, p, len(d), number), d, strict=True):
+        s.emit("mov", operand, r)
 
 
-def _run(s: Selector, p: Value, count: int) -> list[Operand]:
+def select_loadpair(s: Selector, i: Instr) -> None:
+    """Two words in one instruction, which no interrupt divides."""
+    low, high = s.value_regs(i)
+    pair = s.m.new_pair()
+    s.emit("movd", Mem("ind", s.reg(i.args[0]), 0, s.access_number(i)), pair)
+    s.emit("split", low, high, pair)
+
+
+def select_storepair(s: Selector, i: Instr) -> None:
+    """The same for a store."""
+    low, high = s.regs(i.args[0])
+    pair = s.m.new_pair()
+    s.emit("join", pair, low, high)
+    s.emit("movd", pair, Mem("ind", s.reg(i.args[1]), 0, s.access_number(i)))
+
+
+def _run(s: Selector, p: Value, count: int, number: int) -> list[Operand]:
     """Operands of `count` consecutive words at p."""
-    first = s.address(p, False, 0, count)
+    first = s.address(p, False, 0, count, number)
     if isinstance(first, Mem):
         start = first.off if first.mode == "off" else 0
         if first.mode in ("ind", "off") and start + 2 * count <= 1024:
-            return [
-                Mem("off", first.base, start + 2 * k) if start + 2 * k else Mem("ind", first.base) for k in range(count)
-            ]
-        return [first, *(s.offset_operand(first.base, start + 2 * k, False) for k in range(1, count))]
+            places = [start + 2 * k for k in range(count)]
+            return [Mem("off" if at else "ind", first.base, at, number) for at in places]
+        return [first, *(s.offset_operand(first.base, start + 2 * k, False, number) for k in range(1, count))]
     if isinstance(first, Slot):
-        return [Slot(first.index, first.off + 2 * k) for k in range(count)]
+        return [Slot(first.index, first.off + 2 * k, number) for k in range(count)]
     assert isinstance(first, File)
-    return [first, *(s.address(p, False, 2 * k, count) for k in range(1, count))]
+    return [first, *(s.address(p, False, 2 * k, count, number) for k in range(1, count))]
 
 
 def select_store(s: Selector, i: Instr) -> None:
-    """Read-modify-write forms first, then constants with CLR and SETM, then plain moves."""
+    """Read-modify-write forms first, then constants with CLR and SETM, then plain moves, low word first."""
     v, p = i.args
     if _store_modified(s, i):
         return
-    byte = v.type.bits == 8
+    byte, number = v.type.bits == 8, s.access_number(i)
     if _words(v) == 1:
-        _store_word(s, v, s.address(p, byte), byte)
+        _store_word(s, v, s.address(p, byte, volatile=number), byte)
         return
-    operands = _run(s, p, _words(v))
+    operands = _run(s, p, _words(v), number)
     registers = None if s.is_leaf(v) else s.regs(v)
     for k, operand in enumerate(operands):
         if isinstance(v, ConstInt):
@@ -136,7 +151,7 @@ def _store_modified(s: Selector, i: Instr) -> bool:
 def _load_of(s: Selector, v: Value, p: Value, store: Instr) -> Instr | None:
     """The load behind `v` when it reads where the store writes and may move to it."""
     load = s.foldable_load(v, store)
-    if load is None:
+    if load is None or load.volatile != store.volatile:
         return None
     same = s.decompose(load.args[0])
     other = s.decompose(p)
@@ -150,20 +165,22 @@ def _load_of(s: Selector, v: Value, p: Value, store: Instr) -> Instr | None:
     return None
 
 
-def _target(s: Selector, p: Value, byte: bool) -> File | Mem | None:
-    """Near address or [Wn] for a read-modify-write; None when only MOV reaches it."""
+def _target(s: Selector, p: Value, byte: bool, load: Instr) -> File | Mem | None:
+    """Near address or [Wn] for a read-modify-write; None when only MOV reaches it. A volatile one has the number of its
+    load; its store has the next."""
+    number = s.access_number(load)
     base, offset = s.decompose(p)
     if id(base) in s.slots:
         return None
     if s.is_leaf(base):
         mark = len(s.out)
-        operand = s.address(p, byte)
+        operand = s.address(p, byte, volatile=number)
         if isinstance(operand, File) and operand.near:
             return operand
         del s.out[mark:]
         return None
     if offset == 0 and not (isinstance(base, Instr) and base.op == "add" and s.address_only(base)):
-        return Mem("ind", s.reg(base))
+        return Mem("ind", s.reg(base), 0, number)
     return None
 
 
@@ -177,7 +194,7 @@ def _modify_constant(s: Selector, op: Instr, b: ConstInt, load: Instr, p: Value,
     bit = _single_bit(name, k, bits)
     if unary is None and bit is None and name not in FILE_BINARY:
         return False
-    target = _target(s, p, byte)
+    target = _target(s, p, byte, load)
     if target is None:
         return False
     if isinstance(target, File):
@@ -217,7 +234,7 @@ def _single_bit(name: str, k: int, bits: int) -> tuple[str, int] | None:
 
 
 def _modify_register(s: Selector, op: Instr, b: Value, load: Instr, p: Value, byte: bool) -> bool:
-    target = _target(s, p, byte)
+    target = _target(s, p, byte, load)
     if target is None:
         return False
     value = s.reg(b)
@@ -232,8 +249,10 @@ def _modify_register(s: Selector, op: Instr, b: Value, load: Instr, p: Value, by
 
 
 def _modify_wide(s: Selector, store: Instr, op: Instr, p: Value) -> bool:
-    """Several words in near memory: word by word through W0, the carry running along. CLR and MOV keep the carry."""
-    if not s.single_use(op) or not s.same_block(op) or id(op) in s.needed or op.op not in FILE_BINARY:
+    """Several words in near memory: word by word through W0, the carry running along. CLR and MOV keep the carry.
+
+    Volatile words are all read before the first is written, as the source says."""
+    if store.volatile or not s.single_use(op) or not s.same_block(op) or id(op) in s.needed or op.op not in FILE_BINARY:
         return False
     a, b = op.args
     load = _load_of(s, a, p, store)
@@ -347,6 +366,8 @@ def select_vastart(s: Selector, i: Instr) -> None:
 
 SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "load": select_load,
+    "loadpair": select_loadpair,
+    "storepair": select_storepair,
     "store": select_store,
     "blockcopy": select_blockcopy,
     "blockfill": select_blockfill,

@@ -2,7 +2,15 @@
 
 Registers are ints: 0..15 are W0..W15, larger ones are virtual. A virtual register is one word, or an even-aligned pair
 when it is in `MFunction.pairs` (result of MUL, dividend of DIV.SD). OPS says of every operation which operands it reads
-and writes and what it does to the flags; every pass asks `uses` and `defs` and nothing else.
+and writes, what it does to the flags and to memory; every pass asks `uses`, `defs`, `reads_memory`, `writes_memory` and
+`effect` and nothing else.
+
+Skips. A skip instruction covers the conditional instructions (`pred`) right behind it, up to the first that is not;
+there is no second record of how many. Whatever replaces a conditional instruction is conditional as a whole
+(`replaced`).
+
+Volatile. A memory operand carries the number of the volatile access of the source it belongs to, 0 for plain memory. An
+access of several words has one number; two accesses never share one.
 """
 
 from __future__ import annotations
@@ -33,6 +41,7 @@ class Mem:
     mode: str
     base: int
     off: int = 0
+    volatile: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +50,7 @@ class Slot:
 
     index: int
     off: int = 0
+    volatile: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,28 +59,41 @@ class File:
 
     expr: str
     near: bool
+    volatile: int = 0
 
 
 Operand = int | Imm | Mem | Slot | File | str
+MEMORY = Mem | Slot | File
+STEPPING = ("++", "--", "+", "-")
 
 
 class OpInfo:
     """Operand roles, one letter each: s read, d written, b both, n neither, capital S D for even-aligned pairs (the low
-    register stands for both once registers are real); flags written and read; words."""
+    register stands for both once registers are real); flags written and read; words; memory read ("r") and written
+    ("w") other than by operands; `fixed`: does more than write registers, flags and memory, so it stays where it is."""
 
-    __slots__ = ("reads", "roles", "words", "writes")
+    __slots__ = ("fixed", "memory", "reads", "roles", "words", "writes")
 
-    def __init__(self, roles: str, writes: str = "", reads: str = "", words: int = 1) -> None:
+    def __init__(
+        self, roles: str, writes: str = "", reads: str = "", words: int = 1, memory: str = "", fixed: bool = False
+    ) -> None:
         self.roles = roles
         self.writes = writes
         self.reads = reads
         self.words = words
+        self.memory = memory
+        self.fixed = fixed
+
+
+def opaque(roles: str, writes: str = "", words: int = 1) -> OpInfo:
+    """An instruction nobody may look through: any memory, and it stays where it is."""
+    return OpInfo(roles, writes, words=words, memory="rw", fixed=True)
 
 
 ARITH, LOGIC, SHIFT1 = "cznv", "zn", "czn"
 OPS: dict[str, OpInfo] = {
     "mov": OpInfo("sd"),
-    "lea": OpInfo("sd", ARITH, words=2),
+    "lea": OpInfo("nd", ARITH, words=2),
     **{n: OpInfo("ssd", ARITH) for n in ("add", "sub", "subr")},
     **{n: OpInfo("ssd", ARITH, "cz") for n in ("addc", "subb", "subbr")},
     **{n: OpInfo("ssd", LOGIC) for n in ("and", "ior", "xor")},
@@ -80,6 +103,7 @@ OPS: dict[str, OpInfo] = {
     **{n: OpInfo("sd", ARITH) for n in ("inc", "inc2", "dec", "dec2", "neg")},
     "com": OpInfo("sd", LOGIC),
     "clr": OpInfo("d"),
+    "clrd": OpInfo("D"),
     "borrow": OpInfo("d", ARITH, "cz"),
     "setm": OpInfo("d"),
     **{n: OpInfo("ssd", LOGIC) for n in ("sl", "lsr", "asr")},
@@ -107,39 +131,47 @@ OPS: dict[str, OpInfo] = {
     "join": OpInfo("Dss", words=0),
     "movd": OpInfo("SD"),
     # file-register forms: address, and W0 (WREG) where named
-    **{n: OpInfo("n", ARITH) for n in ("incf", "decf", "inc2f", "dec2f", "negf", "cp0f")},
-    **{n: OpInfo("n", LOGIC) for n in ("comf", "movf")},
-    **{n: OpInfo("n") for n in ("clrf", "setmf", "bsetf", "bclrf", "btgf")},
-    **{n: OpInfo("n", SHIFT1) for n in ("slf", "lsrf", "asrf")},
-    **{n: OpInfo("ns", ARITH) for n in ("addf", "subf", "cpf")},
-    **{n: OpInfo("ns", ARITH, "cz") for n in ("addcf", "subbf")},
-    **{n: OpInfo("ns", LOGIC) for n in ("andf", "iorf", "xorf")},
-    **{n: OpInfo("nb", LOGIC) for n in ("andw", "iorw", "xorw")},
-    "btstf": OpInfo("nn", "z"),
-    # blocks, control
-    "repmov": OpInfo("nbb", words=2),
-    "repfill": OpInfo("nbs", words=2),
-    "repclr": OpInfo("nb", words=2),
-    "call": OpInfo("n", ARITH),
-    "callr": OpInfo("s", ARITH),
-    "bra": OpInfo("n"),
-    "jump": OpInfo("n"),
-    "jumpr": OpInfo("s"),
-    "brtable": OpInfo("sn"),
-    "skip": OpInfo("n"),
-    "ret": OpInfo(""),
-    "tailcall": OpInfo("n"),
-    "shiftloop": OpInfo("", ARITH, words=5),
-    "asm": OpInfo("", ARITH),
-    "disi": OpInfo("n"),
-    "nop": OpInfo(""),
-    "text": OpInfo("", ARITH),
-    "spadd": OpInfo("n", ARITH),
-    "setsp": OpInfo("s"),
-    "vastart": OpInfo("d", ARITH, words=2),
-    **{n: OpInfo("sd") for n in ("tblrdl", "tblrdh", "tblwtl", "tblwth")},
+    **{n: OpInfo("b", ARITH) for n in ("incf", "decf", "inc2f", "dec2f", "negf")},
+    "cp0f": OpInfo("s", ARITH),
+    "comf": OpInfo("b", LOGIC),
+    **{n: OpInfo("d") for n in ("clrf", "setmf")},
+    **{n: OpInfo("bn") for n in ("bsetf", "bclrf", "btgf")},
+    **{n: OpInfo("b", SHIFT1) for n in ("slf", "lsrf", "asrf")},
+    **{n: OpInfo("bs", ARITH) for n in ("addf", "subf")},
+    **{n: OpInfo("bs", ARITH, "cz") for n in ("addcf", "subbf")},
+    **{n: OpInfo("bs", LOGIC) for n in ("andf", "iorf", "xorf")},
+    **{n: OpInfo("sb", LOGIC) for n in ("andw", "iorw", "xorw")},
+    "btstf": OpInfo("sn", "z"),
+    # blocks of memory: the pointers are registers
+    "repmov": OpInfo("nbb", words=2, memory="rw"),
+    "repfill": OpInfo("nbs", words=2, memory="w"),
+    "repclr": OpInfo("nb", words=2, memory="w"),
+    # skips: over the conditional instructions behind them, or over one (isa.md §7.3)
+    "skip": OpInfo("n", fixed=True),
+    **{n: OpInfo("ss", fixed=True) for n in ("cpseq", "cpsne", "cpslt", "cpsgt")},
+    **{n: OpInfo("sn", fixed=True) for n in ("btsc", "btss", "btscf", "btssf")},
+    # control
+    "call": opaque("n", ARITH),
+    "callr": opaque("s", ARITH),
+    "bra": OpInfo("n", fixed=True),
+    "jump": OpInfo("n", fixed=True),
+    "jumpr": OpInfo("s", fixed=True),
+    "brtable": OpInfo("sn", fixed=True),
+    "ret": opaque(""),
+    "tailcall": opaque("n"),
+    "shiftloop": OpInfo("", ARITH, words=5, fixed=True),
+    "asm": opaque("", ARITH),
+    "disi": opaque("n"),
+    "hold": opaque("", ARITH, words=4),
+    "release": opaque("", words=0),
+    "text": opaque("", ARITH),
+    "spadd": opaque("n", ARITH),
+    "setsp": opaque("s"),
+    **{n: OpInfo("sd", memory="r", fixed=True) for n in ("tblrdl", "tblrdh")},
+    **{n: opaque("sd") for n in ("tblwtl", "tblwth")},
 }
 
+SKIPS = {"skip", "cpseq", "cpsne", "cpslt", "cpsgt", "btsc", "btss", "btscf", "btssf"}
 READS_FLAGS = {"bra", "skip"}
 CC_FLAGS = {
     "z": "z", "nz": "z", "c": "c", "nc": "c", "n": "n", "nn": "n", "lt": "nv", "ge": "nv", "gt": "znv", "le": "znv",
@@ -149,8 +181,6 @@ CC_INVERSE = {
     "z": "nz", "nz": "z", "c": "nc", "nc": "c", "n": "nn", "nn": "n", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt",
     "gtu": "leu", "leu": "gtu", "ov": "nov", "nov": "ov",
 }  # fmt: skip
-SIDE_EFFECTS = {"call", "callr", "bra", "jump", "jumpr", "brtable", "skip", "ret", "tailcall", "asm", "disi", "nop",
-                "text", "spadd", "setsp", "repmov", "repfill", "repclr", "shiftloop", "tblwtl", "tblwth"}  # fmt: skip
 
 
 class MI:
@@ -158,15 +188,29 @@ class MI:
 
     byte    byte-sized form
     cc      condition of bra and skip
-    count   skip: how many following instructions are conditional
     pred    conditional: executed only when the skip before it is not taken, so its results are also inputs
     also_uses, also_defs   implicit registers (calls, DIV, inline assembly)
     late    indices into args of registers that must survive past the definition (DIV divisor)
     """
 
-    __slots__ = ("also_defs", "also_uses", "args", "byte", "cc", "count", "epilogue", "info", "late", "line",
-                 "op", "pred", "tail",
-                 "text", "variables", "volatile")  # fmt: skip
+    __slots__ = (
+        "also_defs",
+        "also_uses",
+        "args",
+        "byte",
+        "cc",
+        "epilogue",
+        "holds",
+        "holds_before",
+        "info",
+        "late",
+        "line",
+        "op",
+        "pred",
+        "tail",
+        "text",
+        "variables",
+    )  # fmt: skip
 
     def __init__(self, op: str, *args: Operand, byte: bool = False, cc: str = "", line: str | None = None) -> None:
         self.op = op
@@ -174,16 +218,16 @@ class MI:
         self.args = list(args)
         self.byte = byte
         self.cc = cc
-        self.count = 0
         self.pred = False
         self.also_uses: tuple[int, ...] = ()
         self.also_defs: tuple[int, ...] = ()
         self.late: tuple[int, ...] = ()
         self.line = line
-        self.volatile = False
         self.tail = False  # call: the callee does not look at our frame, and nothing follows but the epilogue
         self.epilogue = False  # put before RETURN by the frame pass
-        self.variables: tuple[Located, ...] | None = None  # variables in registers behind it; None: as before
+        self.variables: tuple[Claim, ...] = ()  # where source variables are in front of it
+        self.holds: dict[int, int] = {}  # register it writes -> the value, by number, that it holds then
+        self.holds_before: dict[int, int] = {}  # the same of moves in front of it that allocation made superfluous
         self.text = ""  # asm: template; \0n:m\0 stands for operand n with modifier m
 
     def uses(self) -> list[int]:
@@ -210,7 +254,7 @@ class MI:
                     out.append(a)
                 elif role in "DB":
                     out += (a, a + 1) if a < FIRST_VIRTUAL else (a,)
-            elif a.__class__ is Mem and a.mode in ("++", "--", "+", "-"):
+            elif a.__class__ is Mem and a.mode in STEPPING:
                 out.append(a.base)
         return out
 
@@ -223,7 +267,7 @@ class MI:
                 base = rename.get(a.base, a.base)
                 off = rename.get(a.off, a.off) if a.mode == "idx" else a.off
                 if base != a.base or off != a.off:
-                    self.args[k] = Mem(a.mode, base, off)
+                    self.args[k] = Mem(a.mode, base, off, a.volatile)
         if self.also_uses:
             self.also_uses = tuple(rename.get(r, r) for r in self.also_uses)
         if self.also_defs:
@@ -234,6 +278,34 @@ class MI:
         new = copy.copy(self)
         new.args = list(self.args)
         return new
+
+    @property
+    def volatile(self) -> int:
+        """Number of the volatile access it makes, 0 for none."""
+        return next((a.volatile for a in self.args if isinstance(a, MEMORY) and a.volatile), 0)
+
+    def _memory(self, roles: str) -> bool:
+        return any(role in roles and isinstance(a, MEMORY) for role, a in zip(self.info.roles, self.args, strict=False))
+
+    def reads_memory(self) -> bool:
+        """Whether it reads memory that something else may write."""
+        return "r" in self.info.memory or self._memory("sSbB")
+
+    def writes_memory(self) -> bool:
+        """Whether it writes memory."""
+        return "w" in self.info.memory or self._memory("dDbB")
+
+    def effect(self) -> bool:
+        """Whether it does more than write registers and flags. Stepping a pointer counts: it is not worth a half."""
+        if self.info.fixed or self.info.memory or self.volatile or self._memory("dDbB"):
+            return True
+        return any(a.__class__ is Mem and a.mode in STEPPING for a in self.args)
+
+    def replaced(self, made: list[MI]) -> list[MI]:
+        """The instructions that take its place: conditional when it is."""
+        for mi in made:
+            mi.pred = self.pred
+        return made
 
     def is_copy(self) -> bool:
         """A plain word move between registers."""
@@ -249,6 +321,12 @@ class MI:
         """Flags this instruction looks at."""
         return CC_FLAGS.get(self.cc, "") if self.op in READS_FLAGS else self.info.reads
 
+    def flags_written(self) -> str:
+        """Flags this instruction changes; a byte move from a near address sets N and Z (isa.md §6.2)."""
+        if self.op == "mov" and self.byte and isinstance(self.args[0], File):
+            return "zn"
+        return self.info.writes
+
     def __repr__(self) -> str:
         cc = f".{self.cc}" if self.cc else ""
         text = f"{self.op}{cc}{'.b' if self.byte else ''} " + ", ".join(map(_show, self.args))
@@ -257,13 +335,22 @@ class MI:
         return ("? " if self.pred else "") + text
 
 
+def covered(insts: list[MI], at: int) -> int:
+    """How many instructions the skip at position `at` covers."""
+    end = at + 1
+    while end < len(insts) and insts[end].pred:
+        end += 1
+    return end - at - 1
+
+
 def _show(a: Operand) -> str:
     if isinstance(a, int):
         return f"w{a}" if a < FIRST_VIRTUAL else f"v{a}"
     return str(a)
 
 
-Located = tuple[str, tuple[int, ...]]  # DILocalVariable, registers of its words
+Claim = tuple[str, tuple[int, ...], tuple[int, ...]]  # DILocalVariable, registers, what they hold if it is true
+Located = tuple[str, tuple[int, ...]]  # DILocalVariable, registers of its words; -1 - k is frame object k
 
 
 @dataclass(slots=True)
@@ -275,7 +362,6 @@ class MBlock:
     succs: list[str] = field(default_factory=list)
     depth: int = 0  # loop nesting
     address_taken: bool = False
-    variables: tuple[Located, ...] = ()  # variables in registers at the start
 
 
 @dataclass(slots=True)
@@ -301,9 +387,11 @@ class MFunction:
     dynamic_stack: bool = False  # W15 moves by amounts unknown here
     uses_fp: bool = False  # W14 is the frame pointer
     interrupt: str = ""  # "", "no_auto_psv", "auto_psv"; "shadow" may be appended after a comma
+    preserved: tuple[str, ...] = ()  # variables an interrupt function saves beside the registers it uses
+    preprologue: tuple[str, ...] = ()  # lines of assembly before all else
     tables: list[tuple[str, list[str]]] = field(default_factory=list)
     slot_of: dict[int, int] = field(default_factory=dict)  # id(IR value) -> frame object, for debug information
-    in_registers: list[Located] = field(default_factory=list)  # source variables and the registers of their values
+    bindings: dict[int, Located] = field(default_factory=dict)  # debug record -> its variable and where it is
     locals_base: int = 0  # offset of the locals from W15 at entry
     frame_base: tuple[int, int] = (15, 0)  # register, and W15 at entry relative to it, in the body
     frame_bytes: int = 0  # locals and saved registers, known after the frame pass

@@ -6,10 +6,10 @@ them until nothing changes. Needs: real registers. Keeps behaviour; only removes
 
 from __future__ import annotations
 
-from ..target import CALLEE_SAVED, LIT10_BYTE_MAX, LIT10_MAX, SP
+from ..target import CALLEE_SAVED, FP, LIT10_BYTE_MAX, LIT10_MAX, SP
 from . import copies
-from .liveness import bits, has_effect, live_out
-from .mir import MI, File, Imm, MBlock, Mem, MFunction
+from .liveness import bits, drop_dead, live_out
+from .mir import MI, SKIPS, Imm, MBlock, Mem, MFunction
 
 AT_RETURN = bits([*CALLEE_SAVED, 15])
 ALL = 0xFFFF
@@ -30,7 +30,23 @@ def run(m: MFunction) -> None:
         for b in m.blocks:
             changed |= local(b, out[b.name])
         if not changed:
-            return
+            break
+    for b in m.blocks:
+        clear_pairs(b)
+
+
+def clear_pairs(b: MBlock) -> None:
+    """Two CLR of the registers of a pair become one instruction."""
+    k = 0
+    while k + 1 < len(b.insts):
+        one, two = b.insts[k : k + 2]
+        if one.op == two.op == "clr" and not (one.byte or two.byte or one.pred or two.pred):
+            r, q = one.args[0], two.args[0]
+            if isinstance(r, int) and isinstance(q, int) and r ^ q == 1 and min(r, q) < FP:
+                pair = MI("clrd", min(r, q), line=one.line)
+                pair.variables = two.variables
+                b.insts[k : k + 2] = [pair]
+        k += 1
 
 
 def local(b: MBlock, live: int) -> bool:
@@ -45,42 +61,6 @@ def local(b: MBlock, live: int) -> bool:
     return touched or len(b.insts) != before
 
 
-def drop_dead(b: MBlock, live: int) -> bool:
-    """Remove writes nobody reads, when their flags are not read either."""
-    kept: list[MI] = []
-    flags: set[str] = set()
-    changed = False
-    guarded = 0
-    for mi in reversed(b.insts):
-        d = bits(mi.defs())
-        writes = flag_writes(mi)
-        if d and not d & (live | 1 << 15) and not has_effect(mi) and not flags & set(writes):
-            changed = True
-            guarded += mi.pred
-            continue
-        if mi.op == "skip":
-            mi.count -= guarded
-            guarded = 0
-            if mi.count == 0:
-                changed = True
-                continue
-        if not mi.pred:
-            flags -= set(writes)
-        flags |= set(mi.flags_read())
-        live = live & ~d | bits(mi.uses())
-        kept.append(mi)
-    kept.reverse()
-    b.insts = kept
-    return changed
-
-
-def flag_writes(mi: MI) -> str:
-    """Flags an instruction changes; a byte move from a near address sets N and Z (isa.md §6.2)."""
-    if mi.op == "mov" and mi.byte and isinstance(mi.args[0], File):
-        return "zn"
-    return mi.info.writes
-
-
 def flags_read_after(b: MBlock, at: int) -> set[str] | None:
     """Condition codes that read the flags as left by instruction `at`; None when something unknown does."""
     found: set[str] = set()
@@ -89,9 +69,9 @@ def flags_read_after(b: MBlock, at: int) -> set[str] | None:
             found.add(mi.cc)
         elif mi.info.reads or mi.op in ("asm", "text"):
             return None
-        if flag_writes(mi) and not mi.pred:
+        if mi.flags_written() and not mi.pred:
             return found
-        if mi.pred and flag_writes(mi):
+        if mi.pred and mi.flags_written():
             return None
     return found
 
@@ -129,7 +109,7 @@ def _repeated(b: MBlock, at: int) -> bool:
         before = b.insts[k]
         if before.op == "cp" and before.args == mi.args and before.byte == mi.byte and not before.pred:
             return True
-        if flag_writes(before) or operands & set(before.defs()) or before.op in ("call", "callr", "asm", "text"):
+        if before.flags_written() or operands & set(before.defs()) or before.op in ("call", "callr", "asm", "text"):
             return False
     return False
 
@@ -147,7 +127,7 @@ def compare_while_copying(b: MBlock) -> bool:
         tested = test.args[0] == source or (test.args[0] == dest and copy is one)
         if tested and isinstance(source, int) and isinstance(dest, int) and max(source, dest) < SP:
             new = MI("sub", source, Imm(0), dest, line=copy.line)
-            new.variables = two.variables
+            new.variables = one.variables
             b.insts[k - 1 : k + 1] = [new]
     return len(b.insts) != before
 
@@ -176,9 +156,9 @@ def _flag_source(b: MBlock, at: int, r: int, byte: bool) -> MI | None:
     """The instruction before `at` that wrote r and the flags, with only moves between."""
     for k in range(at - 1, -1, -1):
         mi = b.insts[k]
-        if mi.pred or mi.op == "skip":
+        if mi.pred or mi.op in SKIPS:
             return None
-        if flag_writes(mi):
+        if mi.flags_written():
             dest = mi.args[-1] if mi.args else None
             if mi.op in SETS_NZ and dest == r and (mi.byte == byte or _fits_a_byte(mi)):
                 return mi
@@ -240,7 +220,7 @@ def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
             return _modify(mi, r, amount, "++" if amount > 0 else "--")
-        if mi.op in ("skip", "call", "callr", "asm", "text") or mi.pred:
+        if mi.info.fixed or mi.pred:
             return False
     return False
 
@@ -251,10 +231,7 @@ def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
             return _modify(mi, r, amount, "+" if amount > 0 else "-")
-        if (
-            mi.op in ("skip", "call", "callr", "asm", "text", "bra", "jump", "ret", "brtable", "jumpr", "tailcall")
-            or mi.pred
-        ):
+        if mi.info.fixed or mi.pred:
             return False
     return False
 
@@ -262,16 +239,15 @@ def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
 def _modify(mi: MI, r: int, amount: int, mode: str) -> bool:
     """Turn the only [r] of an instruction into the modifying form, if r has no other part in it (isa.md §3.4)."""
     size = 1 if mi.byte or mi.op in ("se", "ze") else 4 if mi.op == "movd" else 2
-    if abs(amount) != size or mi.pred or mi.op in ("asm", "repmov", "repclr", "repfill", "tblwtl", "tblwth"):
+    if abs(amount) != size or mi.pred or mi.info.fixed or mi.info.memory:
         return False
-    plain = Mem("ind", r)
-    places = [k for k, a in enumerate(mi.args) if a == plain]
+    places = [k for k, a in enumerate(mi.args) if isinstance(a, Mem) and a.mode == "ind" and a.base == r]
     mentions = sum(
         1 for a in mi.args if a == r or (isinstance(a, Mem) and (a.base == r or (a.mode == "idx" and a.off == r)))
     )
     if len(places) != 1 or mentions != 1 or r in mi.also_uses or r in mi.also_defs or mi.op in ("bset", "bclr", "btg"):
         return False
-    mi.args[places[0]] = Mem(mode, r)
+    mi.args[places[0]] = Mem(mode, r, volatile=mi.volatile)
     return True
 
 
@@ -300,16 +276,28 @@ def _merged(first: MI, second: MI) -> MI | None:
             return MI("movd", a, b, line=first.line)
         return None
     if isinstance(b, int) and isinstance(d, int) and isinstance(a, Mem) and isinstance(c, Mem):
-        low, high, x, y = (b, d, a, c) if _offset(a) == 0 else (d, b, c, a)
-        neighbours = low % 2 == 0 and high == low + 1 and low < 14 and x == Mem("ind", y.base)
-        if neighbours and y == Mem("off", x.base, 2) and b != c.base:  # the first load must not move the second
-            return MI("movd", x, low, line=first.line)
-        return None
+        if b == c.base:  # the first load must not move the second
+            return None
+        low = _pair_of(a, b, c, d)
+        return MI("movd", a if low == b else c, low, line=first.line) if low is not None else None
     if isinstance(a, int) and isinstance(c, int) and isinstance(b, Mem) and isinstance(d, Mem):
-        low, high, x, y = (a, c, b, d) if _offset(b) == 0 else (c, a, d, b)
-        if low % 2 == 0 and high == low + 1 and low < 14 and x == Mem("ind", y.base) and y == Mem("off", x.base, 2):
-            return MI("movd", low, x, line=first.line)
+        low = _pair_of(b, a, d, c)
+        return MI("movd", low, b if low == a else d, line=first.line) if low is not None else None
     return None
+
+
+def _pair_of(x: Mem, r: int, y: Mem, q: int) -> int | None:
+    """Even register of a pair when r and q with their places x and y, in this order, can travel in one MOV.D, which
+    goes low word first. Volatile words must belong to one access and keep their order."""
+    if x.base != y.base or x.volatile != y.volatile:
+        return None
+    if _offset(x) == 0 and _offset(y) == 2:
+        low, high = r, q
+    elif _offset(x) == 2 and _offset(y) == 0 and not x.volatile:
+        low, high = q, r
+    else:
+        return None
+    return low if low % 2 == 0 and high == low + 1 and low < 14 else None
 
 
 def _offset(a: Mem) -> int | None:

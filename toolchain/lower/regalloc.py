@@ -17,6 +17,7 @@ from . import variables
 from .liveness import bits, live_out, members, remove_dead
 from .mir import FIRST_VIRTUAL, MI, MFunction
 from .spill import rewrite_spills
+from .verify import allocation
 
 WORD_COLOURS = bits(list(ALLOCATABLE))
 PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
@@ -279,7 +280,7 @@ class Colouring:
         return (self._fresh(c) * (1 + (c == 14)), mismatch, order)
 
 
-def allocate(m: MFunction, for_size: bool) -> MFunction:
+def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
     """Replace virtual registers by W0-W14. Ensures: pairs are even-aligned, split and join are moves or gone.
 
     Merging a value with an argument or result register is usually right and sometimes crowds others out, so small
@@ -288,12 +289,12 @@ def allocate(m: MFunction, for_size: bool) -> MFunction:
     remove_dead(m)
     size = sum(len(b.insts) for b in m.blocks)
     if size > TRIAL_LIMIT:
-        _allocate(m, True)
+        _allocate(m, True, verify)
         return m
     trials = []
     for eager in (True, False):
         trial = m.clone()
-        _allocate(trial, eager)
+        _allocate(trial, eager, verify)
         cost = _cost(trial, for_size)
         trials.append((cost, not eager, trial))
         if eager and not _crowded(trial):
@@ -301,13 +302,15 @@ def allocate(m: MFunction, for_size: bool) -> MFunction:
     return min(trials, key=lambda t: t[:2])[2]
 
 
-def _allocate(m: MFunction, eager: bool) -> None:
+def _allocate(m: MFunction, eager: bool, verify: bool) -> None:
     for _ in range(MAX_ROUNDS):
         g = Graph(m)
         g.coalesce(eager)
         colouring = Colouring(g)
         colouring.run(g.simplify())
         if not colouring.spilled:
+            if verify:
+                allocation.check(m, {r: colouring.colour[g.find(r)] for r in [*g.adjacent, *g.alias]})
             _apply(m, g, colouring.colour)
             return
         groups = {n: list(g_members(g, n)) for n in colouring.spilled}
@@ -337,14 +340,19 @@ def g_members(g: Graph, n: int) -> list[int]:
     return [r for r in [n, *g.alias] if r >= FIRST_VIRTUAL and g.find(r) == n]
 
 
+PAIR_OPS = ("split", "splitlo", "join")
+
+
 def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
     rename = {r: colour[g.find(r)] for r in [*g.adjacent, *g.alias] if g.find(r) in colour}
-    if m.in_registers:
-        variables.annotate(m, rename)
+    if m.bindings:
+        variables.claim(m, rename, {r: g.find(r) for r in rename})
     for b in m.blocks:
         out: list[MI] = []
+        held: dict[int, int] = {}  # what copies to themselves would have written
         for mi in b.insts:
             mi.map_registers(rename)
+            start = len(out)
             if mi.op == "split":
                 out += _pair_moves(mi, ((mi.args[2], mi.args[0], 0), (mi.args[2], mi.args[1], 1)), False)
             elif mi.op == "splitlo":
@@ -352,12 +360,16 @@ def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
             elif mi.op == "join":
                 out += _pair_moves(mi, ((mi.args[0], mi.args[1], 0), (mi.args[0], mi.args[2], 1)), True)
             elif mi.is_copy() and mi.args[0] == mi.args[1]:
-                if out:
-                    out[-1].variables = mi.variables
-                elif mi.variables is not None:
-                    b.variables = mi.variables
+                held.update(mi.holds)
+                continue
             else:
                 out.append(mi)
+            if mi.holds and mi.op in PAIR_OPS:
+                moved = {d: made for made in out[start:] for d in made.defs()}
+                for r, value in mi.holds.items():
+                    (moved[r].holds if r in moved else held)[r] = value
+            elif held and len(out) > start:
+                out[start].holds_before, held = held, {}
         b.insts = out
     m.pairs = set()
 

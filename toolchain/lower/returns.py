@@ -44,6 +44,7 @@ def _load_while_returning(b: MBlock) -> None:
         value = _constant(mi)
         if value is not None:
             b.insts[-1].text = f"retlw #{value},w{RESULT}"
+            b.insts[-1].also_uses = tuple(r for r in b.insts[-1].also_uses if r != RESULT)
             del b.insts[k]
             return
         if RESULT in mi.defs() or RESULT in mi.uses() or mi.pred or mi.op in ("call", "callr", "asm", "text", "bra"):

@@ -6,9 +6,9 @@ Needs: final instructions of each block, before branches are laid out. Keeps beh
 
 from __future__ import annotations
 
-from .liveness import bits, has_effect
-from .mir import MI, Mem, MFunction
-from .peephole import flag_writes
+from ..target import SP
+from .liveness import bits
+from .mir import MI, SKIPS, STEPPING, Mem, MFunction
 
 WINDOW = 4
 
@@ -36,7 +36,7 @@ def _destination_writes(mi: MI) -> list[int]:
         if isinstance(a, int):
             if role in "dbD":
                 out += [a, a + 1] if role == "D" else [a]
-        elif isinstance(a, Mem) and role == "d" and a.mode in ("++", "--", "+", "-"):
+        elif isinstance(a, Mem) and role == "d" and a.mode in STEPPING:
             out.append(a.base)
     return out
 
@@ -52,18 +52,22 @@ def _source_addresses(mi: MI) -> list[int]:
 
 
 def _movable(mi: MI) -> bool:
-    """Plain register work: no memory, no control, not part of a skip."""
-    if mi.pred or mi.volatile or mi.op in ("skip", "bra", "jump") or has_effect(mi) or mi.also_defs or mi.also_uses:
+    """Register work and plain loads: no effect, not part of a skip, nothing with the stack pointer."""
+    if mi.pred or mi.effect() or mi.also_defs or mi.also_uses:
         return False
-    return all(not isinstance(a, Mem) and a != 15 for a in mi.args)
+    return all(a != SP and not (isinstance(a, Mem) and a.base == SP) for a in mi.args)
 
 
 def _independent(a: MI, b: MI) -> bool:
     """Whether two neighbours may change places."""
+    if a.info.fixed or b.info.fixed:
+        return False
+    if (a.writes_memory() and (b.reads_memory() or b.writes_memory())) or (b.writes_memory() and a.reads_memory()):
+        return False
     da, db = bits(a.defs()), bits(b.defs())
     if da & db or da & bits(b.uses()) or db & bits(a.uses()):
         return False
-    wa, wb = set(flag_writes(a)), set(flag_writes(b))
+    wa, wb = set(a.flags_written()), set(b.flags_written())
     return not (wa & wb or wa & set(b.flags_read()) or wb & set(a.flags_read()))
 
 
@@ -71,7 +75,7 @@ def _fill_from_below(insts: list[MI], k: int) -> bool:
     """Bring a later instruction up between insts[k] and insts[k+1]."""
     for j in range(k + 2, min(k + 2 + WINDOW, len(insts))):
         mover = insts[j]
-        if insts[j - 1].op == "skip" or insts[j - 1].pred or mover.op in ("bra", "jump"):
+        if insts[j - 1].op in SKIPS or insts[j - 1].pred or mover.info.fixed:
             return False
         free = _movable(mover) and all(_independent(mover, x) for x in insts[k + 1 : j])
         if free and not stalls(insts[k], mover) and not _flags_reach_end(insts, j, mover):
@@ -82,21 +86,22 @@ def _fill_from_below(insts: list[MI], k: int) -> bool:
 
 def _flags_reach_end(insts: list[MI], j: int, mover: MI) -> bool:
     """Whether somebody after position j reads flags the mover writes: then it stays in place."""
-    live = set(flag_writes(mover))
+    live = set(mover.flags_written())
     for mi in insts[j + 1 :]:
         if live & set(mi.flags_read()) or mi.op in ("asm", "text"):
             return True
         if not mi.pred:
-            live -= set(flag_writes(mi))
+            live -= set(mi.flags_written())
     return False
 
 
 def _fill_from_above(insts: list[MI], k: int) -> None:
     """Move insts[k-1] down behind insts[k]."""
-    if k == 0 or insts[k - 1].op == "skip" or insts[k].pred or insts[k + 1].pred:
+    if k == 0 or insts[k - 1].op in SKIPS or insts[k].pred or insts[k + 1].pred:
         return
     mover = insts[k - 1]
-    if k >= 2 and (insts[k - 2].op == "skip" or insts[k - 2].pred or stalls(insts[k - 2], insts[k])):
+    if k >= 2 and (insts[k - 2].op in SKIPS or insts[k - 2].pred or stalls(insts[k - 2], insts[k])):
         return
-    if _movable(mover) and not mover.info.writes and _independent(mover, insts[k]) and not stalls(mover, insts[k + 1]):
+    free = _movable(mover) and not mover.flags_written() and _independent(mover, insts[k])
+    if free and not stalls(mover, insts[k + 1]):
         insts[k - 1], insts[k] = insts[k], insts[k - 1]

@@ -70,12 +70,13 @@ class Selector(AddressSelector):
                 mb.insts += chunk
             self.m.blocks.append(mb)
         self.m.slot_of = dict(self.slots)
-        for record in self.f.dbg_records:
-            found = (
-                self.registers.get(id(record.value)) if record.kind == "dbg_value" and not record.expression else None
-            )
-            if found is not None:
-                self.m.in_registers.append((record.variable, found))
+        for k, record in enumerate(self.f.dbg_records):
+            slot = self.slots.get(id(record.value)) if record.kind == "memory" else None
+            found = self.registers.get(id(record.value)) if record.kind == "dbg_value" else None
+            if slot is not None:
+                self.m.bindings[k] = (record.variable, (-1 - slot,))
+            elif found is not None and not record.expression:
+                self.m.bindings[k] = (record.variable, found)
         return self.m
 
     def phi_input(self, phi: Instr) -> tuple[int, ...]:
@@ -183,8 +184,8 @@ def select_cast_alias(s: Selector, i: Instr) -> None:
 
 
 EFFECTS = frozenset((
-    "store", "call", "asm", "builtin", "blockcopy", "blockfill", "setsp", "dynalloca", "br", "brtable", "indirectbr",
-    "ret", "unreachable",
+    "store", "loadpair", "storepair", "call", "asm", "builtin", "blockcopy", "blockfill", "setsp", "dynalloca", "br",
+    "brtable", "indirectbr", "ret", "unreachable",
 ))  # fmt: skip
 SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "br": select_br,

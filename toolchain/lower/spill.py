@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .mir import MI, FrameObject, Imm, MFunction, Slot
+from .mir import MI, FrameObject, Imm, MFunction, Slot, covered
 
 REMATERIALISABLE = {"clr", "setm", "lea"}
 
@@ -46,7 +46,7 @@ def _cheap(m: MFunction, mi: MI) -> bool:
         return False
     a = mi.args[0]
     if isinstance(a, Slot):
-        return m.frame[a.index].fixed is not None and not _slot_written(m, a.index)
+        return not a.volatile and m.frame[a.index].fixed is not None and not _slot_written(m, a.index)
     return isinstance(a, Imm)
 
 
@@ -65,7 +65,7 @@ def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], again
     chain = 0  # where `out` was before the last instruction that started to compute flags
     k = 0
     while k < len(insts):
-        size = 1 + (insts[k].count if insts[k].op == "skip" else 0)
+        size = 1 + covered(insts, k)
         unit = insts[k : k + size]
         k += size
         before: list[MI] = []

@@ -6,7 +6,9 @@ others branch instead of branching to the common successor, so nothing grows.
 
 from __future__ import annotations
 
-from .mir import MI, MBlock, MFunction
+from dataclasses import replace
+
+from .mir import MEMORY, MI, MBlock, MFunction
 
 ENDS = {"ret", "tailcall"}
 
@@ -24,7 +26,9 @@ def run(m: MFunction) -> None:
 
 
 def _signature(mi: MI) -> tuple[object, ...]:
-    return (mi.op, tuple(mi.args), mi.byte, mi.cc, mi.count, mi.pred, mi.text, mi.also_uses, mi.also_defs)
+    """Equal for instructions that do the same; of volatile accesses only that they are."""
+    args = tuple(replace(a, volatile=1) if isinstance(a, MEMORY) and a.volatile else a for a in mi.args)
+    return (mi.op, args, mi.byte, mi.cc, mi.pred, mi.text, mi.also_uses, mi.also_defs)
 
 
 def _ending(b: MBlock) -> tuple[object, ...] | None:
@@ -80,14 +84,22 @@ def _common(group: list[MBlock], skip: int) -> int:
         if any(_signature(b.insts[-1 - skip - length]) != _signature(first) for b in group[1:]):
             break
         length += 1
-    while length and _joined(group[0].insts[-skip - length]):
+    end = len(group[0].insts) - skip
+    while length and _joined(group[0].insts[end - length : end]):
         length -= 1
     return length
 
 
-def _joined(mi: MI) -> bool:
-    """Whether an instruction must not be the first of a block."""
-    return mi.pred or mi.op in ("skip", "bra", "jump") or bool(mi.flags_read())
+def _joined(insts: list[MI]) -> bool:
+    """Whether these instructions cannot be a block: they start under a skip or read flags set before them."""
+    if insts[0].pred or insts[0].op in ("bra", "jump"):
+        return True
+    written: set[str] = set()
+    for mi in insts:
+        if set(mi.flags_read()) - written:
+            return True
+        written |= set(mi.flags_written())
+    return False
 
 
 def _merge(m: MFunction, blocks: list[MBlock], length: int, closed: bool, name: str) -> None:

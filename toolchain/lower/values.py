@@ -28,7 +28,9 @@ def words_of(v: Value) -> int:
     return max(1, v.type.bits // 16)
 
 
-MEMORY_BARRIERS = frozenset(("store", "call", "asm", "builtin", "blockcopy", "blockfill", "setsp", "dynalloca"))
+MEMORY_BARRIERS = frozenset(
+    ("store", "loadpair", "storepair", "call", "asm", "builtin", "blockcopy", "blockfill", "setsp", "dynalloca")
+)
 
 
 class ValueSelector:
@@ -48,6 +50,7 @@ class ValueSelector:
         self.users: dict[int, list[Instr]] = {}
         self.position: dict[int, tuple[str, int]] = {}
         self.epoch: dict[int, int] = {}
+        self.access: dict[int, int] = {}  # volatile loads and stores, numbered in their order
         self.folded: set[int] = set()
         self.slots: dict[int, int] = {}
         self.block: Block = f.blocks[0]
@@ -69,6 +72,8 @@ class ValueSelector:
             for at, i in enumerate(block.instrs):
                 self.position[id(i)] = (block.name, at)
                 self.epoch[id(i)] = epoch
+                if i.volatile or i.op in ("loadpair", "storepair"):
+                    self.access[id(i)] = len(self.access) + 1
                 if i.op in MEMORY_BARRIERS or i.volatile:
                     epoch += 1
                 for a in i.args:
@@ -93,6 +98,10 @@ class ValueSelector:
         """Add an object to the frame."""
         self.m.frame.append(FrameObject(max(size, 1), fixed))
         return len(self.m.frame) - 1
+
+    def access_number(self, i: Instr | None) -> int:
+        """Number of a volatile load or store, 0 for a plain one."""
+        return self.access.get(id(i), 0)
 
     def single_use(self, v: Value) -> bool:
         """Whether the value has exactly one user."""

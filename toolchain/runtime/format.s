@@ -239,6 +239,7 @@ signed: btsc    w13,#WIDE
 
 ; W1:W0 in base W4 with prefix W2: a sign, or x or X for 0x.
 integer:
+        mov     [w15+ROOM],w14          ; too short a stack traps here (-fstack-check)
         add     w15,#ROOM,w15
         sub     w15,#ROOM,w14
         lsr     w13,#8,w5               ; what turns 10 into the letter of this conversion

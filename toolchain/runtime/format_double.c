@@ -1,100 +1,108 @@
-/* %f %e %g (C11 7.21.6.1): a double as decimal digits.
+/* %f %e %g (C11 7.21.6.1): a double as decimal digits, each of them exact, rounded to nearest, ties to even.
  *
- * Numbers from 2^-11 up to 2^64 are split exactly into 64-bit integer and fraction, so their digits are exact and
- * rounded to nearest, ties to even. Others are first scaled by a power of ten in double arithmetic, which can change
- * the digits from the 15th on. Precision above 17 is filled with zeros. */
+ * Every double is an integer of 16-bit limbs plus a fraction of such limbs. The integer is divided into groups of four
+ * decimal digits, the fraction gives the next group when it is multiplied by 10^4. Both live on the stack and are as long as
+ * the number's exponent asks: 30 bytes below 2^64, 300 for 1e308. */
 #include "format.h"
 #include "softfloat.h"
+#include "stack_room.h"
 
 #include <math.h>
+#include <stdint.h>
+#include <string.h>
 
-#define DIGITS 40 /* 20 of a 64-bit integer and 20 more */
-#define MOST_PLACES 17
+#define SIGNIFICAND_BITS 53
+#define BIAS 1075 /* of the exponent of the significand's last bit */
+#define LIMB 16
+#define GROUP 10000u
+#define MOST_DIGITS 1100 /* no double has more decimals than 1074 */
 
+/* The digits of a number from the first to the last. */
 typedef struct {
-    char text[DIGITS]; /* digits, most significant first */
-    int count;
-    int whole; /* how many stand before the decimal point */
-} decimal_t;
+    const uint16_t *groups; /* of the integer, lowest first */
+    uint16_t *fraction;     /* limbs, lowest first */
+    int left, low, limbs;   /* groups to come; limbs below `low` are zero */
+    uint16_t group, power;  /* rest of the group that is given out, weight of its next digit or 0 */
+} digits_t;
 
-/* One more unit in the last digit. */
-static void increment(decimal_t *number)
+/* fraction *= 10^4; returns what goes over into the integer. */
+static uint16_t next_group(digits_t *d)
 {
-    int at = number->count;
-    while (at > 0) {
-        if (number->text[--at] != '9') {
-            number->text[at]++;
-            return;
-        }
-        number->text[at] = '0';
+    uint16_t carry = 0;
+    for (int i = d->low; i < d->limbs; i++) {
+        uint32_t product = (uint32_t)d->fraction[i] * GROUP + carry;
+        d->fraction[i] = (uint16_t)product;
+        carry = (uint16_t)(product >> LIMB);
     }
-    for (at = number->count; at > 0; at--)
-        number->text[at] = number->text[at - 1];
-    number->text[0] = '1';
-    number->count++;
-    number->whole++;
+    while (d->low < d->limbs && !d->fraction[d->low])
+        d->low++;
+    return carry;
 }
 
-/* x in [2^-11, 2^64) or 0 as digits with `places` decimals. */
-static void to_decimal(decimal_t *number, double x, int places)
+static char next_digit(digits_t *d)
 {
-    unsigned long long integer = (unsigned long long)x;
-    unsigned long long fraction = 0; /* in units of 2^-64 */
-    double rest = x - (double)integer;
-    if (rest > 0)
-        fraction = (unsigned long long)ldexp(rest, 64);
-    char reversed[20];
-    int count = 0;
-    for (; integer; integer /= 10)
-        reversed[count++] = (char)('0' + (char)(integer % 10));
-    number->count = 0;
-    number->whole = count;
-    while (count)
-        number->text[number->count++] = reversed[--count];
-    for (; places > 0; places--) { /* fraction *= 10; the digit is what overflows */
-        unsigned long long low = (fraction & 0xFFFFFFFF) * 10;
-        unsigned long long high = (fraction >> 32) * 10 + (low >> 32);
-        fraction = high << 32 | (low & 0xFFFFFFFF);
-        number->text[number->count++] = (char)('0' + (char)(high >> 32));
+    if (!d->power) {
+        d->group = d->left ? d->groups[--d->left] : next_group(d);
+        d->power = 1000;
     }
-    int odd = number->count ? number->text[number->count - 1] & 1 : 0;
-    if (fraction > F64_SIGN || (fraction == F64_SIGN && odd))
-        increment(number);
+    char digit = (char)(d->group / d->power);
+    d->group %= d->power;
+    d->power /= 10;
+    return digit;
 }
 
-/* Scale x > 0 by a power of ten into [1, 10); returns the decimal exponent. */
-static int normalise(double *x)
+static int anything_left(const digits_t *d)
 {
-    static const double powers[] = {1e1, 1e2, 1e4, 1e8, 1e16, 1e32, 1e64, 1e128, 1e256};
-    int exponent = 0;
-    for (int i = 8; i >= 0; i--) {
-        if (*x >= powers[i]) {
-            *x /= powers[i];
-            exponent += 1 << i;
-        }
-    }
-    for (int i = 8; i >= 0; i--) {
-        if (*x * powers[i] < 10) {
-            *x *= powers[i];
-            exponent -= 1 << i;
-        }
-    }
-    return exponent;
+    for (int i = 0; i < d->left; i++)
+        if (d->groups[i])
+            return 1;
+    return d->group || d->low < d->limbs;
 }
 
-static void emit(sink_t *sink, const spec_t *spec, char sign, const char *text, int length)
+/* significand * 2^shift into `limbs` limbs that begin with zeros; shift >= 0. */
+static void place(uint16_t *limbs, uint64_t significand, int shift)
 {
-    int padding = spec->width - length - (sign != 0);
-    if (!(spec->flags & (LEFT | ZERO)))
-        __format_pad(sink, ' ', padding);
-    if (sign)
-        sink->put(sink, sign);
-    if ((spec->flags & (LEFT | ZERO)) == ZERO)
-        __format_pad(sink, '0', padding);
-    for (int i = 0; i < length; i++)
-        sink->put(sink, text[i]);
-    if (spec->flags & LEFT)
-        __format_pad(sink, ' ', padding);
+    uint16_t *at = limbs + shift / LIMB;
+    shift %= LIMB;
+    uint64_t rest = significand << shift;
+    for (int i = 0; i < 4; i++, rest >>= LIMB)
+        *at++ = (uint16_t)rest;
+    if (shift) /* what went out of the 64 bits */
+        *at = (uint16_t)(significand >> (64 - shift));
+}
+
+/* Divides the integer of `count` limbs into groups of four digits; returns how many there are. */
+static int into_groups(uint16_t *integer, int count, uint16_t *groups)
+{
+    int made = 0;
+    for (;;) {
+        while (count && !integer[count - 1])
+            count--;
+        if (!count)
+            return made;
+        uint16_t rest = 0;
+        for (int i = count - 1; i >= 0; i--) {
+            uint32_t dividend = (uint32_t)rest << LIMB | integer[i];
+            integer[i] = (uint16_t)(dividend / GROUP);
+            rest = (uint16_t)(dividend % GROUP);
+        }
+        groups[made++] = rest;
+    }
+}
+
+/* Rounds `count` digits by those that follow. Returns 1 when a 1 must stand in front of them, all 0 now. */
+static int round_off(char *digits, int count, digits_t *rest)
+{
+    char next = next_digit(rest);
+    int odd = count > 0 && digits[count - 1] & 1;
+    if (next < 5 || (next == 5 && !odd && !anything_left(rest)))
+        return 0;
+    while (count > 0) {
+        if (++digits[--count] < 10)
+            return 0;
+        digits[count] = 0;
+    }
+    return 1;
 }
 
 static int put_exponent(char *to, int exponent, char letter)
@@ -111,98 +119,129 @@ static int put_exponent(char *to, int exponent, char letter)
     return length;
 }
 
-/* Digits with a decimal point behind the first `whole` ones; `zeros` more decimals follow. Returns the length. */
-static int put_fixed(char *to, const decimal_t *number, int whole, int zeros, int point)
+/* `padding` characters stand before the sign, between sign and number as zeros, or behind. */
+static void put_sign(sink_t *sink, unsigned char flags, char sign, int padding)
 {
-    int length = 0;
-    if (whole <= 0)
-        to[length++] = '0';
-    for (int i = 0; i < whole; i++)
-        to[length++] = number->text[i];
-    if (number->count > whole || zeros || point)
-        to[length++] = '.';
-    for (int i = whole; i < number->count; i++)
-        to[length++] = i < 0 ? '0' : number->text[i];
-    while (zeros-- > 0)
-        to[length++] = '0';
-    return length;
+    if (!(flags & (LEFT | ZERO)))
+        __format_pad(sink, ' ', padding);
+    if (sign)
+        sink->put(sink, sign);
+    if ((flags & (LEFT | ZERO)) == ZERO)
+        __format_pad(sink, '0', padding);
 }
 
-static int without_trailing_zeros(const char *text, int length)
+static void put_infinite(sink_t *sink, const spec_t *spec, char sign, double x)
 {
-    while (text[length - 1] == '0')
-        length--;
-    return text[length - 1] == '.' ? length - 1 : length;
+    const char *text = isnan(x) ? "nan" : "inf";
+    int padding = spec->width - 3 - (sign != 0);
+    put_sign(sink, spec->flags & (unsigned char)~ZERO, sign, padding);
+    for (int i = 0; i < 3; i++)
+        sink->put(sink, (char)(spec->conversion & 0x20 ? text[i] : text[i] & ~0x20));
+    if (spec->flags & LEFT)
+        __format_pad(sink, ' ', padding);
+}
+
+/* `count` digits, the first of weight 10^exponent: in fixed or scientific form with `places` decimals. */
+static void put_number(sink_t *sink, const spec_t *spec, char sign, const char *digits, int count, int exponent,
+                       int places, int scientific)
+{
+    int whole = scientific ? 1 : exponent < 0 ? 1 : exponent + 1;
+    int point = places > 0 || spec->flags & ALTERNATE, letters = 0;
+    char power[5];
+    if (scientific)
+        letters = put_exponent(power, exponent, (char)('E' | (spec->conversion & 0x20)));
+    int padding = spec->width - (sign != 0) - whole - (point != 0) - places - letters;
+    put_sign(sink, spec->flags, sign, padding);
+    int at = scientific ? 0 : exponent < 0 ? exponent : 0; /* index of the first digit to print */
+    for (int i = 0; i < whole + places; i++, at++) {
+        if (i == whole)
+            sink->put(sink, '.');
+        sink->put(sink, (char)('0' + (at >= 0 && at < count ? digits[at] : 0)));
+    }
+    if (point && !places)
+        sink->put(sink, '.');
+    for (int i = 0; i < letters; i++)
+        sink->put(sink, power[i]);
+    if (spec->flags & LEFT)
+        __format_pad(sink, ' ', padding);
 }
 
 void __format_double(sink_t *sink, const spec_t *spec, double value)
 {
-    char lower = (char)(spec->conversion | 0x20), upper_case = (char)(spec->conversion ^ lower);
+    char lower = (char)(spec->conversion | 0x20);
     char sign = (char)(signbit(value) ? '-' : spec->flags & PLUS ? '+' : spec->flags & SPACE ? ' ' : 0);
-    double x = fabs(value);
-    if (!isfinite(x)) {
-        spec_t plain = *spec;
-        plain.flags &= (unsigned char)~ZERO;
-        const char *text = isnan(x) ? upper_case ? "NAN" : "nan" : upper_case ? "INF" : "inf";
-        emit(sink, &plain, sign, text, 3);
+    if (!isfinite(value)) {
+        put_infinite(sink, spec, sign, value);
         return;
     }
-    char text[64];
-    int places = spec->precision < 0 ? 6 : spec->precision, length;
-    decimal_t number;
-    int scientific = lower == 'e', strip = 0, exponent = 0;
-    double scaled = x;
-    if (x != 0)
-        exponent = normalise(&scaled);
+    uint64_t significand;
+    memcpy(&significand, &value, sizeof significand);
+    int power = (int)(significand >> (SIGNIFICAND_BITS - 1) & 0x7FF);
+    significand &= (UINT64_C(1) << (SIGNIFICAND_BITS - 1)) - 1;
+    if (power)
+        significand |= UINT64_C(1) << (SIGNIFICAND_BITS - 1);
+    else
+        power = 1;
+    power -= BIAS; /* |value| = significand * 2^power */
+
+    int below = power < 0 ? -power : 0, above = power > 0 ? power : 0;
+    int limbs = (below + LIMB - 1) / LIMB + 1, count = (above + SIGNIFICAND_BITS) / LIMB + 2;
+    STACK_ROOM(((unsigned)limbs + 5 + 2 * (unsigned)count + (unsigned)count / 4) * sizeof(uint16_t));
+    uint16_t fraction[limbs + 4], integer[count], groups[count + count / 4 + 1];
+    memset(fraction, 0, sizeof fraction);
+    memset(integer, 0, sizeof integer);
+    uint64_t whole_part = below >= 64 ? 0 : significand >> below;
+    uint64_t rest = below >= 64 ? significand : significand - (whole_part << below);
+    place(integer, whole_part, above);
+    limbs--;
+    place(fraction, rest, limbs * LIMB - below);
+    digits_t source = {groups, fraction, into_groups(integer, count, groups), 0, limbs, 0, 0};
+    while (source.low < limbs && !fraction[source.low])
+        source.low++;
+
+    /* The first digit that is not 0, and its weight. */
+    int exponent = 4 * source.left - 1, zero = !significand;
+    char first = zero ? 0 : next_digit(&source);
+    for (; !first && !zero; exponent--)
+        first = next_digit(&source);
+    if (zero)
+        exponent = 0;
+
+    int places = spec->precision < 0 ? 6 : spec->precision;
+    if (lower == 'g' && !places)
+        places = 1;
+    int wanted = lower == 'e' ? places + 1 : lower == 'g' ? places : exponent + 1 + places;
+    int kept = wanted > MOST_DIGITS ? MOST_DIGITS : wanted < 0 ? 0 : wanted;
+    STACK_ROOM((unsigned)kept + 1);
+    char digits[kept + 1];
+    memset(digits, 0, sizeof digits);
+    if (kept) {
+        digits[0] = first;
+        for (int i = 1; i < kept; i++)
+            digits[i] = next_digit(&source);
+    } else { /* the first digit is the one that rounding looks at */
+        source.group += first * (source.power ? source.power * 10 : 1);
+        source.power = source.power ? source.power * 10 : 1;
+    }
+    if (wanted >= 0 && round_off(digits, kept, &source)) {
+        if (lower == 'f')
+            kept++;
+        memmove(digits + 1, digits, (unsigned)(kept ? kept - 1 : 0));
+        digits[0] = 1;
+        exponent++;
+    }
+    int scientific = lower == 'e';
     if (lower == 'g') {
-        if (places == 0)
-            places = 1;
-        to_decimal(&number, scaled, places - 1 > MOST_PLACES ? MOST_PLACES : places - 1);
-        if (x != 0)
-            exponent += number.whole - 1;
         scientific = exponent < -4 || exponent >= places;
-        places = scientific ? places - 1 : places - 1 - exponent;
-        strip = !(spec->flags & ALTERNATE);
+        int shown = kept;
+        if (!(spec->flags & ALTERNATE))
+            while (shown > 1 && !digits[shown - 1])
+                shown--;
+        else
+            shown = places;
+        places = scientific ? shown - 1 : shown - 1 - exponent;
+        if (places < 0)
+            places = 0;
     }
-    int zeros = places > MOST_PLACES ? places - MOST_PLACES : 0;
-    if (zeros > 20)
-        zeros = 20;
-    if (zeros)
-        places = MOST_PLACES;
-    if (scientific) {
-        to_decimal(&number, scaled, places);
-        if (lower == 'e' && x != 0)
-            exponent += number.whole - 1;
-        number.count = places + (x != 0);
-        if (x == 0)
-            number.whole = 0;
-        length = put_fixed(text, &number, x != 0, zeros, spec->flags & ALTERNATE);
-        if (strip && places + zeros > 0)
-            length = without_trailing_zeros(text, length);
-        length += put_exponent(text + length, exponent, spec->conversion == 'E' || spec->conversion == 'G' ? 'E' : 'e');
-    } else if (x < 18446744073709551616.0) {
-        to_decimal(&number, x, places);
-        length = put_fixed(text, &number, number.whole, zeros, spec->flags & ALTERNATE);
-        if (strip && places + zeros > 0)
-            length = without_trailing_zeros(text, length);
-    } else {
-        /* 17 digits, then zeros: no buffer for 309 digits */
-        to_decimal(&number, scaled, MOST_PLACES - 1);
-        exponent += number.whole - 1;
-        int padding = spec->width - (exponent + 1) - (places ? places + 1 : 0) - (sign != 0);
-        if (!(spec->flags & LEFT))
-            __format_pad(sink, spec->flags & ZERO ? '0' : ' ', padding);
-        if (sign)
-            sink->put(sink, sign);
-        for (int i = 0; i <= exponent; i++)
-            sink->put(sink, i < number.count ? number.text[i] : '0');
-        if (places + zeros) {
-            sink->put(sink, '.');
-            __format_pad(sink, '0', places + zeros);
-        }
-        if (spec->flags & LEFT)
-            __format_pad(sink, ' ', padding);
-        return;
-    }
-    emit(sink, spec, sign, text, length);
+    put_number(sink, spec, sign, digits, kept, exponent, places, scientific);
 }

@@ -1,21 +1,19 @@
 ; snprintf, sprintf, vsnprintf, vsprintf (C11 7.21.6): a sink_t (format.h) on the stack around one call of __format.
-; Variadic functions get everything on the stack, first argument highest (abi-elf.md §2.2 rule 5).
+; The last named argument and what follows are on the stack, the named ones before it in registers (abi-elf.md §2.2
+; rule 5).
 
         .section .text._snprintf,code
         .global _snprintf
 _snprintf:
-        mov     [w15-6],w0
-        mov     [w15-8],w1
-        mov     [w15-10],w2
-        sub     w15,#10,w3              ; va_start: address of the last named argument
+        mov     [w15-6],w2
+        sub     w15,#6,w3               ; va_start: address of the last named argument
         bra     _vsnprintf
 
         .section .text._sprintf,code
         .global _sprintf
 _sprintf:
-        mov     [w15-6],w0
-        mov     [w15-8],w2
-        sub     w15,#8,w3
+        mov     [w15-6],w2
+        sub     w15,#6,w3
         com     w0,w1                   ; as much as lies above the buffer
         bra     _vsnprintf
 

@@ -2,7 +2,7 @@
 
 Nothing ticks. HREF, VSYNC and PCLK are closed forms of the cycle (`scan.py`), so the timers that count them post one
 event per match. Pixels of a line are rendered when the first of them is read, and lie in the record until the line is
-over. README.md tells native code how to read both from the record alone.
+over. The port reads a line that is on the bus from the record.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from emu.boards.part import Part
 from emu.events import NEVER
 from emu.peripherals import Peripherals
 from emu.peripherals.i2cbus import I2cDevice
+from emu.peripherals.portrules import Stretch
+from emu.straight import place_of
 
 if TYPE_CHECKING:  # loaded when the first picture is: most runs start faster without
     import numpy as np
@@ -57,6 +59,8 @@ class Camera(Part, I2cDevice):
         self._line_from: Final = self.cell("line_from", "Q")
         self._line_to: Final = self.cell("line_to", "Q")
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
+        places = (place_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
+        chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places))
         self._pixels: PixelSource | None = None
         self._timing: Timing
         self._picture: Picture

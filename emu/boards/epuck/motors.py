@@ -130,7 +130,7 @@ class Stepper(Part):
         elif moved:
             direction = self._forward if moved == 1 else -self._forward
             state[_STEPS] += direction
-            if self._on_step is not None:
+            if self._on_step is not None and not self.events.quiet:
                 self._on_step(state[_SINCE], direction)
 
 

@@ -1,6 +1,6 @@
 """When the sensor's lines and bytes come: HREF, VSYNC, PCLK and byte numbers in closed form (epuck.md §7.4).
 
-Every number is a record cell `camera.<name>`, so that native code can do the same arithmetic (README.md). Sensors
+Every number is a record cell `camera.<name>`, so that a snapshot has it. Sensors
 know columns and rows; here everything is Tcy.
 """
 

@@ -161,6 +161,8 @@ class _Banked:
     start_x: tuple[int, int]
     vsync: tuple[int, int]
     mirror: tuple[int, int]
+    upright: int
+    """Mirror bits (0x40 sideways, 0x80 up and down) with which the sensor sends the picture as it is mounted."""
     control: tuple[int, int]
     exposure: tuple[int, int]
     gains: tuple[int, int]
@@ -199,13 +201,13 @@ def _banked_picture(chip: _Banked, read: ReadRegister) -> Picture:
     manual = _word(read, bank, first) << 16 | _word(read, bank, first + 2)
     bank, first = chip.gains
     gains = (float(read(bank, first)), float(read(bank, first + 1)), float(read(bank, first + 2)))
-    mirror = read(*chip.mirror)
+    turned = read(*chip.mirror) ^ chip.upright
     return Picture(
         form=chip.forms.get(read(*chip.form), YUV),
         origin_x=chip.origin_x,
         origin_y=chip.origin_y,
-        flip_x=not mirror & 0x40,  # mounted upside down: the library sets both mirrors (§7.1)
-        flip_y=not mirror & 0x80,
+        flip_x=bool(turned & 0x40),
+        flip_y=bool(turned & 0x80),
         gains=_gains(gains, balanced=not control & 4),
         exposure=manual / _NOMINAL_EXPOSURE if control & 1 else None,
     )
@@ -226,6 +228,7 @@ _PO6030K: Final = _Banked(
     start_x=(1, 0x50),
     vsync=(1, 0x60),
     mirror=(0, 0x90),
+    upright=0xC0,  # UNVERIFIED: the library sets both mirrors for this sensor and none for the other (§7.1)
     control=(2, 0x04),
     exposure=(2, 0x2C),
     gains=(2, 0xA4),
@@ -246,6 +249,7 @@ _PO8030D: Final = _Banked(
     start_x=(0, 0x08),
     vsync=(0, 0x10),
     mirror=(0, 0x6C),
+    upright=0,
     control=(2, 0x04),
     exposure=(2, 0x12),
     gains=(0, 0x23),

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Final
 
 from emu.boards.part import Part
+from emu.listeners import Listeners
 from emu.peripherals import Peripherals
 from emu.peripherals.pins import parse_pin
 
@@ -32,11 +33,11 @@ class Leds(Part):
         for name, pin in LED_PINS.items():
             self.pins.watch(pin, partial(self._changed, on_change, name))
 
-    @staticmethod
     def _changed(
-        on_change: Callable[[str, bool, int], None], name: str, cycle: int, changed: int, levels: int
+        self, on_change: Callable[[str, bool, int], None], name: str, cycle: int, changed: int, levels: int
     ) -> None:
-        on_change(name, bool(changed & levels), cycle)
+        if not self.events.quiet:
+            on_change(name, bool(changed & levels), cycle)
 
     def __getitem__(self, name: str) -> bool:
         """Whether an LED ("led0".."led7", "front", "body") is lit. Raises KeyError for another name."""
@@ -153,7 +154,7 @@ class Codec(Part):
             self.registers[word >> 8 & self._REGISTERS - 1] = word & 0xFF
             return
         self._control_next.value = word & 1
-        if self.on_sample is not None:
+        if self.on_sample is not None and not self.events.quiet:
             self.on_sample(word - (word >> 15 << 16), cycle)
 
     def _reset_moved(self, _cycle: int, changed: int, levels: int) -> None:
@@ -172,13 +173,12 @@ class Bluetooth(Part):
     def __init__(self, chip: Peripherals, loss: float = 0.0, seed: int = 0) -> None:
         super().__init__("bluetooth", chip)
         self._uart: Final = chip.uart[1]
-        self._uart.on_byte = self._from_robot
+        self._uart.listen(self._from_robot, part=True)
         self.loss = loss
         """Probability that a byte is lost, each way, 0..1."""
         self.dropouts: Final[list[tuple[int, int]]] = []
         """Half-open windows of cycles in which nothing passes."""
-        self.on_byte: Callable[[int, int], None] | None = None
-        """on_byte(byte, start_cycle): what reaches the computer."""
+        self._reached: Final[Listeners[[int, int]]] = Listeners(self.events)
         self._down: Final = self.cell("down", "B")
         self._random: Final = self.cell("random", "Q", seed * 2 + 1 & _ONES)
         self._lost: Final = self.cell("lost")
@@ -196,6 +196,19 @@ class Bluetooth(Part):
     def lost(self) -> int:
         """Bytes that did not get through, both directions."""
         return self._lost.value
+
+    def listen(self, listener: Callable[[int, int], object]) -> Callable[[], None]:
+        """Call listener(byte, start_cycle) for what reaches the computer. Returns how to remove it."""
+        return self._reached.add(listener)
+
+    @property
+    def on_byte(self) -> Callable[[int, int], object] | None:
+        """One listener that an assignment replaces; those of `listen` hear as well."""
+        return self._reached.assigned
+
+    @on_byte.setter
+    def on_byte(self, listener: Callable[[int, int], object] | None) -> None:
+        self._reached.assigned = listener
 
     def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0) -> None:
         """The computer sends; see `Uart.feed` for `cycle` and `errors`."""
@@ -218,5 +231,5 @@ class Bluetooth(Part):
         return (x >> 11) / (1 << 53)
 
     def _from_robot(self, byte: int, start: int) -> None:
-        if not self._drops(start) and self.on_byte is not None:
-            self.on_byte(byte, start)
+        if not self._drops(start):
+            self._reached(byte, start)

@@ -69,15 +69,7 @@ class Watch:
         self._listen(2, self._board.chip.uart[2])
 
     def _listen(self, number: int, line: Bluetooth | Uart) -> None:
-        """Whoever listened before goes on hearing everything."""
-        earlier = line.on_byte
-
-        def heard(byte: int, start: int) -> None:
-            self._byte(number, byte, start)
-            if earlier is not None:
-                earlier(byte, start)
-
-        line.on_byte = heard
+        line.listen(lambda byte, start: self._byte(number, byte, start))
 
     def _byte(self, number: int, byte: int, start: int) -> None:
         """Text is reported by lines."""

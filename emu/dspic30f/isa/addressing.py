@@ -123,9 +123,13 @@ class Place:
         if self.ea is None:
             set_register(self.m, self.register, v, self.size)
             return
+        self.move_pointer()
+        self.m.store(self.ea, v, self.size, ptr=self.register)
+
+    def move_pointer(self) -> None:
+        """What ++ and -- of a destination do; of a source they are done."""
         if self.moved is not None:
             self.m.set_ptr(self.register, self.moved, "dst")
-        self.m.store(self.ea, v, self.size, ptr=self.register)
 
 
 def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:

@@ -108,7 +108,9 @@ def table_address(m: Builder, ea: Value) -> Value:
 
 
 def table_pointer(place: Place) -> Value:
+    """The address a table instruction takes from a place; as a destination it moves now, behind all reads."""
     assert place.ea is not None, "a table pointer is never register direct"
+    place.move_pointer()
     return place.ea
 
 
@@ -128,9 +130,9 @@ def table_read(low: int) -> Does:
 def table_write_low(m: Builder, x: Operands) -> None:
     """Latch<15:0> or one byte of it <- Ws."""
     size = size_of(x)
-    operand = source(m, x, size)
-    ea = table_pointer(destination(m, x, size))
-    v, odd = operand.read(), ea & 1
+    operand, result = source(m, x, size), destination(m, x, size)
+    v, ea = operand.read(), table_pointer(result)
+    odd = ea & 1
     if x.B:
         m.table_write(table_address(m, ea), 1 << odd, v << 8 * odd)
     else:
@@ -140,9 +142,8 @@ def table_write_low(m: Builder, x: Operands) -> None:
 def table_write_high(m: Builder, x: Operands) -> None:
     """Latch<23:16> <- Ws<7:0>; an odd byte address has no effect."""
     size = size_of(x)
-    operand = source(m, x, size)
-    ea = table_pointer(destination(m, x, size))
-    v = operand.read() & 0xFF
+    operand, result = source(m, x, size), destination(m, x, size)
+    v, ea = operand.read() & 0xFF, table_pointer(result)
     m.table_write(table_address(m, ea), (ea & 1 ^ 1) << 2 if x.B else 0b100, v << 16)
 
 

@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from emu.dspic30f.isa.builder import Context, Side, Size
-from emu.dspic30f.jit.devices import NativeRegister
+from emu.dspic30f.jit.reader import NativeReader
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import Variables, pointer
 from emu.dspic30f.registers import NSTDIS
 from emu.dspic30f.state import FIRST, FLAGS, LAST, MIDDLE, RA, SA, SAB, SB
 from emu.record import DATA_BYTES
+from emu.straight import Rule
 
 RAM: Final = 0x0800  # first data address behind the SFRs, isa.md §1.2
 Y_RAM: Final = 0x1800
@@ -32,6 +33,18 @@ PC is hooked."""
 Access = Literal["plain", "slow", "irq", "flags", "sr"]
 """How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;
 interrupt flags, which native code only clears; SR."""
+
+
+@dataclass(frozen=True)
+class Latches:
+    """Where table writes go: byte offsets in the record, and the addresses of EEPROM (`ProgramMemory.table_write`)."""
+
+    flash: int
+    flash_count: int
+    eeprom: int
+    eeprom_count: int
+    eeprom_range: tuple[int, int]
+    captured_in: tuple[int, int] | None
 
 
 @dataclass(frozen=True)
@@ -57,10 +70,13 @@ class Surroundings:
     """Control registers and their bits that stop a device in Idle."""
     watchdog: int
     """Byte offset of the due cycle of the watchdog's time-out."""
+    watchdog_enables: tuple[tuple[int, int], ...]
+    """Byte offsets of words and their bits: the watchdog runs while one of them is set."""
     rcon_idle: int
     rcon_wdto: int
-    native: Mapping[int, NativeRegister] = field(default_factory=dict)
-    """Device registers with native accesses, by even address."""
+    latches: Latches
+    rules: Mapping[int, Rule] = field(default_factory=dict)
+    """Of device registers, by even address."""
     hooks: frozenset[int] = frozenset()
     """Program addresses that Python wants to see."""
     do_start: int = -1
@@ -309,11 +325,10 @@ class LlvmBuilder:
             value = self._sr_word()
             return value if size == 2 else (value >> 8 if ea & 1 else value & 0xFF)
         self.pending.touches_sfr |= self.around.offset["SR"] < word_address < RAM
-        native = self.around.native.get(word_address)
-        if native is not None and self.repeating is None:
-            shown = native.read(self)
-            if shown is not None:
-                return shown if size == 2 else (shown >> 8 if ea & 1 else shown & 0xFF)
+        rule = self.around.rules.get(word_address)
+        if rule is not None and rule.reads is not None and self.repeating is None:
+            shown: Number = rule.reads(NativeReader(self), rule.places)
+            return shown if size == 2 else (shown >> 8 if ea & 1 else shown & 0xFF)
         if word_address == self.around.offset["RCOUNT"] and self.repeating is not None and size == 2:
             return self.repeating
         place = self.around.accumulator_at(word_address)
@@ -350,11 +365,11 @@ class LlvmBuilder:
             self.pending.stores.append(lambda: self.e.store(pointer(self.e, ea), v, 8 * size))
             return
         self.pending.touches_sfr = True
-        native = self.around.native.get(word_address)
+        rule = self.around.rules.get(word_address)
         lanes = 0xFFFF if size == 2 else (0xFF00 if ea & 1 else 0x00FF)
         placed = v << 8 if lanes == 0xFF00 else v
-        if native is not None and self.repeating is None:
-            if not native.write(self, placed, lanes):
+        if rule is not None and rule.writes is not None and self.repeating is None:
+            if not rule.writes(NativeReader(self), rule.places, placed, lanes):
                 raise NeedsInterpreter
             return
         how, mask = self.around.writes.get(word_address, ("slow", 0))
@@ -426,8 +441,25 @@ class LlvmBuilder:
         return self.e.load(pointer(self.e, (word << 2) + self.around.offset["flash"]), 32)
 
     def table_write(self, address: Number, byte_mask: Number, v: Number) -> None:
-        """Programming latches: always the interpreter's."""
-        raise NeedsInterpreter
+        """Merge bytes into a programming latch; as a REPEAT target it is the interpreter's."""
+        if self.repeating is not None:
+            raise NeedsInterpreter
+        to, (first, end) = self.around.latches, self.around.latches.eeprom_range
+        stored = (address >= first) & (address < end)
+        bits = (byte_mask & 1) * 0xFF | (byte_mask >> 1 & 1) * 0xFF00 | (byte_mask >> 2 & 1) * 0xFF0000
+        self.pending.touches_sfr = True
+
+        def now() -> None:
+            for place, count, size, here in ((to.flash, to.flash_count, 4, stored == 0),
+                                             (to.eeprom, to.eeprom_count, 2, stored)):
+                latch = pointer(self.e, (address >> 1 & count - 1) * size + place)
+                old = self.e.load(latch, 8 * size)
+                self.e.store(latch, self.select(here, (old & (bits ^ 0xFFFFFF)) | (v & bits), old), 8 * size)
+            if to.captured_in is not None:
+                self.e.store(pointer(self.e, to.captured_in[0]), address & 0xFFFF, 16)
+                self.e.store(pointer(self.e, to.captured_in[1]), address >> 16 & 0xFF, 16)
+
+        self.pending.stores.append(now)
 
     # -- status, core registers -------------------------------------------------------------------------------------
     def flag(self, name: str) -> Number:

@@ -2,6 +2,9 @@
 
 `request` never waits: cached objects are ready at once, others come back from the compile process and are collected
 by `poll`. `now` compiles at once, in this process, for the few pieces the engine cannot start without.
+
+A compile process that dies is replaced, and its piece tried once more. If that does not help, or the next one dies too,
+what has no code yet stays interpreted, and a line on standard error says so.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -32,6 +36,10 @@ class Statistics:
     compiled: int = 0
     from_disk: int = 0
     loaded: int = 0
+
+
+PATIENCE: Final = 3
+"""Compile processes in a row that may die without having compiled anything."""
 
 
 class Refused(RuntimeError):
@@ -71,7 +79,13 @@ class Compiler:
         self._received = bytearray()
         self._waiting: dict[int, tuple[str, Sequence[int], object]] = {}
         self._outbox: deque[tuple[int, int, bytes]] = deque()
-        self._in_flight = False
+        self._in_flight: tuple[int, int, bytes] | None = None
+        """(ticket, level, text) the process is compiling."""
+        self._retried = 0
+        """The last ticket that was given to a second process."""
+        self._deaths = 0
+        """Processes that died since one compiled something."""
+        self._warned = False
         self._tickets = 0
         self._loader: Any = None
         self._modules = 0
@@ -129,14 +143,46 @@ class Compiler:
 
     def _send(self) -> None:
         """Give the idle process its next piece. One at a time: two full pipes would wait for each other."""
-        if self._in_flight or not self._outbox:
+        while self._outbox and self._in_flight is None:
+            if self._deaths >= PATIENCE:
+                self._outbox.clear()
+                self._waiting.clear()
+                return
+            self._in_flight = ticket, level, data = self._outbox.popleft()
+            try:
+                process = self._start()
+                assert process.stdin is not None
+                process.stdin.write(REQUEST.pack(ticket, level, len(data)) + data)
+                process.stdin.flush()
+            except OSError as error:
+                self._lost(error)
+
+    def _lost(self, why: object) -> None:
+        """The compile process has died or could not be started: its piece goes first to the next one, but only once."""
+        process, self._process = self._process, None
+        if process is not None:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            self._selector.unregister(process.stdout)
+            process.kill()
+            atexit.unregister(process.kill)
+            with suppress(OSError):
+                process.stdin.close()
+            process.stdout.close()
+            why = f"exit status {process.wait()}"
+        self._received.clear()
+        self._deaths += 1
+        piece, self._in_flight = self._in_flight, None
+        if piece is None:
             return
-        process = self._start()
-        ticket, level, data = self._outbox.popleft()
-        assert process.stdin is not None
-        process.stdin.write(REQUEST.pack(ticket, level, len(data)) + data)
-        process.stdin.flush()
-        self._in_flight = True
+        if piece[0] != self._retried and self._deaths < PATIENCE:
+            self._retried = piece[0]
+            self._outbox.appendleft(piece)
+            return
+        self._waiting.pop(piece[0], None)
+        if not self._warned:
+            self._warned = True
+            print(f"emu: warning: compile process died ({why}); code it has not made is interpreted", file=sys.stderr)
 
     def poll(self) -> list[tuple[object, int]]:
         """Code that has arrived since the last call, loaded. Raises Refused on a translator defect."""
@@ -151,7 +197,9 @@ class Compiler:
             assert self._process.stdout is not None
             data = os.read(self._process.stdout.fileno(), 1 << 20)
             if not data:
-                raise RuntimeError("the compile process ended unexpectedly")
+                self._lost("it closed its end")
+                self._send()
+                continue
             self._received += data
             if len(data) < 1 << 16:
                 break
@@ -212,7 +260,7 @@ class Compiler:
             return False
         code = bytes(received[REPLY.size : end])
         del received[:end]
-        self._in_flight = False
+        self._in_flight, self._deaths = None, 0
         self._send()
         key, entries, tag = self._waiting.pop(ticket)
         self.statistics.compiled += 1

@@ -1,4 +1,4 @@
-"""The analog converter in native code: ADON switched by instructions, whole rounds of conversions as events.
+"""The analog converter in native code: whole rounds of conversions as events.
 
 The rules are those of emu/peripherals/adc.py for what emu/peripherals/adccourse.py publishes as plain; inputs are
 numbers that hold, or were foretold to. Everything else is left to the device.
@@ -7,18 +7,12 @@ numbers that hold, or were foretold to. Everything else is left to the device.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.jit.values import Number, Value, wide
-from emu.dspic30f.jit.variables import pointer
 
-if TYPE_CHECKING:
-    from emu.dspic30f.jit.builder import LlvmBuilder
-
-OFF, SAMPLING = 0, 2
-"""States of the device."""
-FOREVER: Final = 1 << 62
+SAMPLING: Final = 2
+"""A state of the device."""
 _BUFFERS: Final = 16
 
 
@@ -27,13 +21,8 @@ class ConverterPlaces:
     """Byte offsets in the record, bits of ADCON1, and the event slot."""
 
     con1: int
-    con2: int
-    writable: int
-    clear_only: int
-    adon: int
     samp: int
     done: int
-    bufs: int
     buffers: int
     cells: tuple[tuple[str, int], ...]
     """Cells of the device by name."""
@@ -57,73 +46,12 @@ def converter_of(core: Core) -> ConverterPlaces | None:
     con1, slot, site = sfrs["ADCON1"], names.index("adc.step"), core.chip.adc
     flag_name, bit = core.chip.interrupts[site.irq].flag
     flag = sfrs[flag_name].address
-    adon, samp, done = (1 << con1.fields[name][0] for name in ("ADON", "SAMP", "DONE"))
+    samp, done = (1 << con1.fields[name][0] for name in ("SAMP", "DONE"))
     return ConverterPlaces(
-        con1.address, sfrs["ADCON2"].address, con1.writable, con1.clear_only, adon, samp, done,
-        1 << sfrs["ADCON2"].fields["BUFS"][0], sfrs["ADCBUF0"].address,
+        con1.address, samp, done, sfrs["ADCBUF0"].address,
         tuple((name[4:], field.offset) for name, field in fields.items() if name.startswith("adc.")),
         slot, fields["events.due"].offset + 8 * slot, fields["events.deadline"].offset,
         flag, bit, fields["irq.since"].offset + 8 * ((flag >> 1) % 4 * 16 + bit))
-
-
-@dataclass(frozen=True)
-class Switch:
-    """ADCON1: native as long as only ADON changes."""
-
-    places: ConverterPlaces
-
-    def read(self, b: LlvmBuilder) -> Number | None:
-        """What is stored, until the device changes it by itself."""
-        p = self.places
-        b.guard(b.now < self._load(b, p.at("stands_until"), 64))
-        return self._load(b, p.con1, 16)
-
-    def write(self, b: LlvmBuilder, value: Number, lanes: int) -> bool:
-        """On: sampling begins with the next cycle, from the first channel on. Off: the conversion under way is lost."""
-        p = self.places
-        old = self._load(b, p.con1, 16)
-        free, kept = p.writable & lanes, p.clear_only & lanes
-        new = (old & (0xFFFF & ~(free | kept))) | (value & free) | (old & value & kept)
-        b.guard(((old ^ new) == p.adon) & (self._load(b, p.at("native"), 8) != 0))
-        b.guard(b.now < self._load(b, p.at("stands_until"), 64))
-        starts = (new & p.adon) != 0
-        sampling, conversion = self._load(b, p.at("sampling"), 32), self._load(b, p.at("conversion"), 32)
-        results = self._load(b, p.at("results"), 8)
-        begun = (b.now + 1) << 1
-        end = begun + results * (sampling + conversion)
-        due = b.select(starts, (end + 1) >> 1, -1)
-        stands = b.select(starts, (begun + sampling + 1) >> 1, FOREVER)
-
-        def commit() -> None:
-            self._store(b, p.con1, b.select(starts, new | p.samp, new & (0xFFFF & ~p.samp)), 16)
-            self._store(b, p.at("state"), b.select(starts, SAMPLING, OFF), 8)
-            con2 = self._load(b, p.con2, 16)
-            self._store(b, p.con2, b.select(starts, con2 & (0xFFFF & ~p.bufs), con2), 16)
-            for cell in ("scan", "use_b", "next", "count"):
-                self._keep_or(b, cell, starts, 0, 8)
-            self._keep_or(b, "mark", starts, b.now + 1, 64)
-            self._keep_or(b, "half", starts, 0, 8)
-            self._store(b, p.at("stands_until"), stands, 64)
-            self._store(b, p.due, due, 64)
-            deadline = self._load(b, p.deadline, 64)
-            nearer = b.e.let(f"call i64 @llvm.umin.i64(i64 {wide(deadline)}, i64 {wide(due)})")
-            self._store(b, p.deadline, nearer, 64)
-
-        b.pending.stores.append(commit)
-        b.pending.replanned = True
-        return True
-
-    def _keep_or(self, b: LlvmBuilder, cell: str, starts: Number, value: Number, bits: int) -> None:
-        place = self.places.at(cell)
-        self._store(b, place, b.select(starts, value, self._load(b, place, bits)), bits)
-
-    @staticmethod
-    def _load(b: LlvmBuilder, offset: int, bits: int) -> Value:
-        return b.e.load(pointer(b.e, offset), bits)
-
-    @staticmethod
-    def _store(b: LlvmBuilder, offset: int, value: Number, bits: int) -> None:
-        b.e.store(pointer(b.e, offset), value, bits)
 
 
 def event_text(p: ConverterPlaces) -> str:
@@ -227,8 +155,7 @@ def _finish_text(n: str, p: ConverterPlaces) -> str:
     bits = p.samp | p.done
     return f"""{n}.finish:
   store i16 %{n}.code, ptr %{n}.q.held
-  %{n}.scan8 = trunc i64 %{n}.place1 to i8
-  store i8 %{n}.scan8, ptr %{n}.p.scan
+  store i8 0, ptr %{n}.p.scan
   store i8 0, ptr %{n}.p.count
   store i8 0, ptr %{n}.p.next
   %{n}.mark1 = lshr i64 %{n}.end, 1

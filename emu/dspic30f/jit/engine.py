@@ -15,18 +15,30 @@ from typing import Any, Final, Protocol
 
 from emu.bus import SFR_END
 from emu.dspic30f.core import Core
+from emu.dspic30f.facts import facts_of
 from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.builder import DEADLINE, HOOK, INTERPRET, MISS, RETFIE, SERVICE, W_END, Access, Surroundings
+from emu.dspic30f.jit.builder import (
+    DEADLINE,
+    HOOK,
+    INTERPRET,
+    MISS,
+    RETFIE,
+    SERVICE,
+    W_END,
+    Access,
+    Latches,
+    Surroundings,
+)
 from emu.dspic30f.jit.compiler import shared_compiler
-from emu.dspic30f.jit.devices import NativeRegister, native_registers
 from emu.dspic30f.jit.region import discover
 from emu.dspic30f.jit.runtime import BLOCKS, BOUNDARY, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.state import DA, NOT_REPEATING, RUN
+from emu.straight import Rule
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM effort for blocks and for single-step code."""
@@ -209,9 +221,8 @@ class JitEngine:
         insn = self._fetch(pc)
         if insn is None or insn.row.cycles != 1 or self._code is None:
             return 0
-        word = int(getattr(insn.x, "f", 0)) >> 1
-        native = 2 * word in self._code.around.native
-        return word if native else 0
+        words = [address >> 1 for address in facts_of(insn).reads]
+        return words[0] if words and 2 * words[0] in self._code.around.rules else 0
 
     def measure_time(self) -> None:
         """Note from now on where host time goes (`emu run --stats`); costs a little itself."""
@@ -291,14 +302,13 @@ class JitEngine:
         start, end = loop if loop is not None else (-1, -1)
         around = Surroundings(self._offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
                               self._words, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
-                              self._native_registers(), frozenset(self._hooks), start, end)
+                              latches_of(core), self._rules(), frozenset(self._hooks), start, end)
         table = ctypes.c_uint64 * self._words
         return Code(context, around, identity_of(context, around), table(), table())
 
-    def _native_registers(self) -> dict[int, NativeRegister]:
-        """Without those somebody watches, and those of modules that are off."""
-        apart = self._core.bus.watched | self._core.bus.off
-        return {at: one for at, one in native_registers(self._core).items() if at >> 1 not in apart}
+    def _rules(self) -> dict[int, Rule]:
+        """Of device registers by address; those that somebody watches and those of modules that are off have none."""
+        return {2 * word: rule for word, rule in enumerate(self._core.bus.rules) if rule is not None}
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
@@ -371,16 +381,26 @@ def offsets(core: Core) -> dict[str, int]:
     return offset
 
 
-def idle_facts(core: Core) -> tuple[tuple[tuple[int, int], ...], int, int, int]:
-    """What decides whether Idle is simple: stop-in-Idle bits, the watchdog's event slot, and the RCON bits."""
+def latches_of(core: Core) -> Latches:
+    """Where table writes go."""
+    flash, eeprom = (core.record.fields[f"program.{kind}_latch"] for kind in ("flash", "eeprom"))
+    program = core.program
+    return Latches(flash.offset, flash.count, eeprom.offset, eeprom.count, program.eeprom_range, program.captured_in)
+
+
+def idle_facts(core: Core) -> tuple[tuple[tuple[int, int], ...], int, tuple[tuple[int, int], ...], int, int]:
+    """What decides whether Idle and CLRWDT are simple: stop-in-Idle bits, the watchdog's event slot, what enables it,
+    and the RCON bits."""
     stops = []
     for sfr in core.chip.sfrs.values():
         bits = sum(1 << lsb for name, (lsb, _width) in sfr.fields.items() if name.endswith("SIDL"))
         if bits:
             stops.append((sfr.address, bits))
     watchdog = core.record.fields["events.due"].offset + 8 * core.events.names.index("wdt.timeout")
-    rcon = core.chip.sfrs["RCON"].fields
-    return tuple(sorted(stops)), watchdog, 1 << rcon["IDLE"][0], 1 << rcon["WDTO"][0]
+    word, rcon = core.chip.config["FWDT"], core.chip.sfrs["RCON"]
+    config = core.record.fields["program.config"].offset + word.address - core.chip.program["config"].start
+    enables = ((config, 1 << word.fields["FWDTEN"][0]), (rcon.address, 1 << rcon.fields["SWDTEN"][0]))
+    return tuple(sorted(stops)), watchdog, enables, 1 << rcon.fields["IDLE"][0], 1 << rcon.fields["WDTO"][0]
 
 
 def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access, int]]]:

@@ -116,8 +116,8 @@ class _Probe(LlvmBuilder):
         emitter = Emitter()
         emitter.start("probe")
         self.notes: Final = _Notes(emitter, around)
-        steady = {at: how for at, how in around.reads.items() if at not in around.native}
-        super().__init__(emitter, self.notes, replace(around, reads=steady, native={}), context)
+        steady = {at: how for at, how in around.reads.items() if at not in around.rules}
+        super().__init__(emitter, self.notes, replace(around, reads=steady, rules={}), context)
 
     def run(self, step: Step) -> object:
         """Translate an instruction; its flow."""
@@ -130,4 +130,8 @@ class _Probe(LlvmBuilder):
 
     def store(self, ea: Number, v: Number, size: Size, ptr: int | None = None) -> None:
         """An iteration with a store is not empty."""
+        raise NeedsInterpreter
+
+    def table_write(self, address: Number, byte_mask: Number, v: Number) -> None:
+        """Nor is one that writes latches."""
         raise NeedsInterpreter

@@ -22,6 +22,9 @@ from emu.record import DATA_BYTES
 DONE, PYTHON = 0, 1
 """Results: the boundary has no work left; Python must do it."""
 
+LANES: Final = 8
+"""Due cycles in the widest vector register."""
+
 COLUMNS: Final = ("place", "shift", "since", "ivt", "aivt", "vector")
 """Names of the constant tables, in the order of `Boundary.sources`."""
 
@@ -46,6 +49,7 @@ class Boundary:
 
     offset: Mapping[str, int]
     slots: int
+    """Event slots, up to a multiple of `LANES`: those behind the last one are never due."""
     look: int
     """Slot that only makes the engine look."""
     matches: tuple[Match, ...]
@@ -79,13 +83,18 @@ def boundary_of(core: Core, offset: Mapping[str, int]) -> Boundary:
         if f"{name}.match" in names:
             flags, bit, rise = rises[site.irq]
             matches.append(Match(names.index(f"{name}.match"), offset[f"{name}.period"], flags, bit, rise))
-    return Boundary(offset, len(names), names.index("cpu.look"), tuple(matches), tuple(words), core.traps.flags,
+    slots = -(-len(names) // LANES) * LANES
+    return Boundary(offset, slots, names.index("cpu.look"), tuple(matches), tuple(words), core.traps.flags,
                     tuple(sources), converter_of(core))
 
 
 def service_text(b: Boundary) -> str:
     """IR of `i64 @service(ptr %rec, i64 %limit, ptr %entered)`."""
-    return "\n".join([_tables(b), _head(b), _events(b), _accept(b), _enter(b), "}"])
+    lanes = f"<{LANES} x i64>"
+    declared = f"""declare i64 @llvm.vector.reduce.umin.v{LANES}i64({lanes})
+declare {lanes} @llvm.umin.v{LANES}i64({lanes}, {lanes})
+declare i128 @llvm.cttz.i128(i128, i1)"""
+    return "\n".join([declared, _tables(b), _head(b), _events(b), _accept(b), _enter(b), "}"])
 
 
 def _tables(b: Boundary) -> str:
@@ -169,27 +178,33 @@ jump:
 
 
 def _events(b: Boundary) -> str:
+    lanes, groups = f"<{LANES} x i64>", range(b.slots // LANES)
+    looked, hits, least = [], [], "%dues0"
+    for g in groups:
+        looked += [f"  %p.group{g} = getelementptr i64, ptr %p.due, i64 {LANES * g}",
+                   f"  %dues{g} = load {lanes}, ptr %p.group{g}, align 8"]
+        if g:
+            looked.append(f"  %min{g} = call {lanes} @llvm.umin.v{LANES}i64({lanes} {least}, {lanes} %dues{g})")
+            least = f"%min{g}"
+        hits += [f"  %equal{g} = icmp eq {lanes} %dues{g}, %least.all",
+                 f"  %bits{g} = bitcast <{LANES} x i1> %equal{g} to i{LANES}",
+                 f"  %wide{g} = zext i{LANES} %bits{g} to i128", f"  %placed{g} = shl i128 %wide{g}, {LANES * g}",
+                 f"  %hits{g} = or i128 %placed{g}, {f'%hits{g - 1}' if g else 0}"]
+    last, newline = groups[-1], "\n"
     lines = [f"""fire:
-  br label %scan
-scan:
-  %i = phi i64 [ 0, %fire ], [ %i1, %scan ]
-  %least = phi i64 [ -1, %fire ], [ %least1, %scan ]
-  %who = phi i64 [ 0, %fire ], [ %who1, %scan ]
-  %p.slot = getelementptr i64, ptr %p.due, i64 %i
-  %slot.due = load i64, ptr %p.slot
-  %less = icmp ult i64 %slot.due, %least
-  %least1 = select i1 %less, i64 %slot.due, i64 %least
-  %who1 = select i1 %less, i64 %i, i64 %who
-  %i1 = add i64 %i, 1
-  %more = icmp ult i64 %i1, {b.slots}
-  br i1 %more, label %scan, label %found
-found:
+{newline.join(looked)}
+  %least1 = call i64 @llvm.vector.reduce.umin.v{LANES}i64({lanes} {least})
   %later = icmp ugt i64 %least1, %last
   br i1 %later, label %settled, label %choose
 settled:
   store i64 %least1, ptr %p.deadline
   br label %accept
 choose:
+  %least.0 = insertelement {lanes} poison, i64 %least1, i64 0
+  %least.all = shufflevector {lanes} %least.0, {lanes} poison, <{LANES} x i32> zeroinitializer
+{newline.join(hits)}
+  %hit = call i128 @llvm.cttz.i128(i128 %hits{last}, i1 true)
+  %who1 = trunc i128 %hit to i64
   %p.who = getelementptr i64, ptr %p.due, i64 %who1
   switch i64 %who1, label %python [ i64 {b.look}, label %look"""]
     slots = [m.slot for m in b.matches] + ([b.converter.slot] if b.converter is not None else [])

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.isa.builder import Context
-from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Repeat, Return, Skip, Sleep
+from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
 from emu.dspic30f.jit.builder import (
     DEADLINE,
     HOOK,
@@ -238,7 +238,10 @@ class Translator:
             return True, 0
         if isinstance(flow, Sleep) and flow.mode == "idle":
             self._check_idle()
-        elif not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip)):
+        elif isinstance(flow, ClearWatchdog):
+            self._check_watchdog()
+            b.pending.touches_sfr = True
+        elif not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip, Disi)):
             raise NeedsInterpreter
         if isinstance(flow, Return) and flow.kind == "retfie":
             self._check_retfie(flow)
@@ -297,8 +300,17 @@ class Translator:
             e.start(other)
             self.jump(step.next_pc)
             return
-        assert isinstance(flow, (Goto, Call, Return, Sleep))
         self.advance(cycles, mask)
+        if isinstance(flow, ClearWatchdog):
+            self._clear_watchdog()
+            self.jump(step.next_pc)
+            return
+        if isinstance(flow, Disi):
+            e.store(pointer(e, self.around.offset["DISICNT"]), flow.count, 16)
+            e.store(pointer(e, self.around.offset["cpu.disi_end"]), self.v.get("cycle") + flow.count, 64)
+            self._look(step.next_pc)
+            return
+        assert isinstance(flow, (Goto, Call, Return, Sleep))
         if isinstance(flow, Sleep):
             self._idle(step.next_pc)
             return
@@ -324,23 +336,38 @@ class Translator:
         e.start(none)
         self.v.new_block()
 
-    # -- Idle -------------------------------------------------------------------------------------------------------
+    # -- watchdog and Idle ------------------------------------------------------------------------------------------
+    def _any_bit(self, words: tuple[tuple[int, int], ...]) -> Number:
+        """Bits set of those named, as one word that is not 0."""
+        found: Number = 0
+        for address, bits in words:
+            found = found | (self.e.load(pointer(self.e, address), 16) & bits)
+        return found
+
+    def _check_watchdog(self) -> None:
+        """Clearing the watchdog is native while none runs (dspic30f6014a.md §4)."""
+        self.b.guard(self._any_bit(self.around.watchdog_enables) == 0)
+
+    def _clear_watchdog(self) -> None:
+        """WDTO falls, and nothing will expire."""
+        e = self.e
+        place = pointer(e, self.around.offset["RCON"])
+        e.store(place, e.load(place, 16) & (0xFFFF & ~self.around.rcon_wdto), 16)
+        e.store(pointer(e, self.around.watchdog), -1, 64)
+
     def _check_idle(self) -> None:
         """Native Idle: no device stops in it, and no watchdog runs (dspic30f6014a.md §4, §17)."""
-        e = self.e
-        stops: Number = 0
-        for address, bits in self.around.idle_stops:
-            stops = stops | (e.load(pointer(e, address), 16) & bits)
-        self.b.guard((stops == 0) & (e.load(pointer(e, self.around.watchdog), 64) == -1))
+        self.b.guard(self._any_bit(self.around.idle_stops) == 0)
+        self._check_watchdog()
         if self.exact:
             self.b.guard(self.fits(2))
 
     def _idle(self, next_pc: int) -> None:
         """The CPU stops; the boundary behind lets time pass."""
         e, offset = self.e, self.around.offset
+        self._clear_watchdog()
         place = pointer(e, offset["RCON"])
-        kept = e.load(place, 16) & (0xFFFF & ~self.around.rcon_wdto)
-        e.store(place, kept | self.around.rcon_idle, 16)
+        e.store(place, e.load(place, 16) | self.around.rcon_idle, 16)
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
         e.store(pointer(e, offset["wdt.mode"]), IDLE, 8)

@@ -74,8 +74,8 @@ int main(void)
     set_running(CLUSTERING_START_AT_ONCE || (selector & SELECT_START) != 0);
     Sys_Start_Camera();
     Sys_Start_Remote();
-    Sys_Subscribe_to_Event(SYS_IO_REMOTECONTROL, 0, obey, NULL);
-    Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, react, NULL);
+    SYS_ASSERT(Sys_Subscribe_to_Event(SYS_IO_REMOTECONTROL, 0, obey, NULL));
+    SYS_ASSERT(Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, react, NULL));
     Sys_Start_Kernel();
     Sys_Run_SystemThread();
     return 0;

@@ -137,11 +137,11 @@ int main(void)
     footprint_built();
     Sys_End_CriticalSection();
     undo();
-    Sys_Yield();
+    Sys_Start_Kernel();
+    Sys_Yield(); /* messages whose event is gone are dropped */
     measure();
     footprint_undone();
     Sys_Start_Process(use_everything);
-    Sys_Start_Kernel();
     Sys_Run_SystemThread();
     return 0;
 }

@@ -6,7 +6,7 @@
 int main(void)
 {
     Sys_Init_Kernel();
-    Sys_Start_Process(greet);
+    SYS_ASSERT(Sys_Start_Process(greet) != 0);
     Sys_Start_Kernel();
     Sys_Run_SystemThread();
     return 0;

@@ -1,5 +1,5 @@
-/* Listing 1 of the paper with its misprints corrected (README.md lists them): a reactive controller in an event
- * handler, and a thread that logs "time:(left,right)" every 250 ms. */
+/* Listing 1 of the paper, in its order and with its names; README.md lists every difference: a thread that logs
+ * "time:(left,right)" every 250 ms, and a reactive controller in an event handler. */
 #include <openswarm.h>
 
 #include <stdio.h>
@@ -9,14 +9,28 @@ enum { LOG_PERIOD_MS = 250, FIRST_LOG_MS = 50 /* soon, so that 5 s show 20 lines
 
 /* Table of the clustering controller: percent of the maximum wheel speed, 129 mm/s (openswarm-original.md §8). */
 #define SPEED(percent) ((uint16)((percent) * 129L / 100))
-#define ROBOT_LEFT SPEED(89)
-#define ROBOT_RIGHT SPEED(53)
-#define OBJECT_LEFT SPEED(98)
-#define OBJECT_RIGHT SPEED(50)
-#define NOTHING_LEFT SPEED(55)
-#define NOTHING_RIGHT SPEED(99)
+#define ROBOT_SPEED_L SPEED(89)
+#define ROBOT_SPEED_R SPEED(53)
+#define OBJECT_SPEED_L SPEED(98)
+#define OBJECT_SPEED_R SPEED(50)
+#define NOTHING_SPEED_L SPEED(55)
+#define NOTHING_SPEED_R SPEED(99)
 
-static bool wait250times(sys_event_data *data)
+void loggingThread(void);
+bool wait250times(sys_event_data *data);
+bool reactiveController(uint16 pid, uint16 eventID, sys_event_data *data);
+
+int main(void)
+{
+    Sys_Init_Kernel();
+    SYS_ASSERT(Sys_Start_Process(loggingThread) != 0);
+    SYS_ASSERT(Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, reactiveController, 0));
+    Sys_Start_Kernel();
+    Sys_Run_SystemThread();
+    return 0;
+}
+
+bool wait250times(sys_event_data *data)
 {
     static uint16 counter = LOG_PERIOD_MS - FIRST_LOG_MS;
     (void)data;
@@ -27,7 +41,7 @@ static bool wait250times(sys_event_data *data)
     return true;
 }
 
-static void loggingThread(void)
+void loggingThread(void)
 {
     char message[29]; /* "4294967295:(-32768,-32768)\r\n" and its end: the range of the types */
     for (;;) {
@@ -39,35 +53,25 @@ static void loggingThread(void)
     }
 }
 
-static bool reactiveController(uint16 pid, uint16 eventID, sys_event_data *data)
+bool reactiveController(uint16 pid, uint16 eventID, sys_event_data *data)
 {
     (void)pid;
     (void)eventID;
     switch ((sys_colour)data->value) {
     case GREEN: /* another robot */
-        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, ROBOT_LEFT);
-        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, ROBOT_RIGHT);
+        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, ROBOT_SPEED_L);
+        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, ROBOT_SPEED_R);
         break;
     case RED: /* an object */
-        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, OBJECT_LEFT);
-        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, OBJECT_RIGHT);
+        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, OBJECT_SPEED_L);
+        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, OBJECT_SPEED_R);
         break;
     case WHITE: /* nothing, or a wall */
-        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, NOTHING_LEFT);
-        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, NOTHING_RIGHT);
+        Sys_Send_IntEvent(SYS_LEFTMOTOR_SPEED, NOTHING_SPEED_L);
+        Sys_Send_IntEvent(SYS_RIGHTMOTOR_SPEED, NOTHING_SPEED_R);
         break;
     default: /* any other colour: keep the speed */
         break;
     }
     return true;
-}
-
-int main(void)
-{
-    Sys_Init_Kernel();
-    Sys_Start_Process(loggingThread);
-    Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, reactiveController, 0);
-    Sys_Start_Kernel();
-    Sys_Run_SystemThread();
-    return 0;
 }

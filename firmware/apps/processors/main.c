@@ -1,4 +1,4 @@
-/* The paper's §III-C at work: processors between events and devices, exchanged at run time.
+/* The paper's idea at work: processors between events and devices, exchanged at run time.
  *
  * A drive event {v, omega} reaches the wheels through a post-processor (a virtual actuator); an unsafe area swaps in a
  * post-processor that halves every speed; the UART swaps plain text for COBS frames under traffic. README.md. */
@@ -119,11 +119,11 @@ int main(void)
     Sys_Register_Event(DRIVE);
     Sys_Register_Event(UNSAFE_AREA);
     Sys_Set_MotorProcessor(drive);
-    Sys_Connect_Motors(DRIVE);
-    Sys_Subscribe_to_Event(UNSAFE_AREA, 0, on_unsafe_area, NULL);
-    Sys_Subscribe_to_Event(SYS_UART1_RECEIVED, 0, on_command, NULL);
-    Sys_Start_Process(pilot);
-    Sys_Start_Process(reporter);
+    SYS_ASSERT(Sys_Connect_Motors(DRIVE));
+    SYS_ASSERT(Sys_Subscribe_to_Event(UNSAFE_AREA, 0, on_unsafe_area, NULL));
+    SYS_ASSERT(Sys_Subscribe_to_Event(SYS_UART1_RECEIVED, 0, on_command, NULL));
+    SYS_ASSERT(Sys_Start_Process(pilot) != 0);
+    SYS_ASSERT(Sys_Start_Process(reporter) != 0);
     Sys_Start_Kernel();
     Sys_Run_SystemThread();
     return 0;

@@ -151,9 +151,9 @@ int main(void)
     Sys_Start_Analog();
     Sys_Start_LEDs();
     Sys_Start_Bluetooth();
-    Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, tell, NULL);
-    Sys_Subscribe_to_Event(SYS_IO_REMOTECONTROL, 0, tell_key, NULL);
-    Sys_Start_Process(test);
+    SYS_ASSERT(Sys_Subscribe_to_Event(SYS_IO_1PXSENSOR, 0, tell, NULL));
+    SYS_ASSERT(Sys_Subscribe_to_Event(SYS_IO_REMOTECONTROL, 0, tell_key, NULL));
+    SYS_ASSERT(Sys_Start_Process(test) != 0);
     Sys_Start_Kernel();
     Sys_Run_SystemThread();
     return 0;

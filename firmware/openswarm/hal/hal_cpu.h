@@ -3,6 +3,12 @@
  *
  * Three levels of exclusion. The slice interrupt and everything that runs on the kernel stack outside ISRs is level
  * "slice"; ISRs that use the kernel are level "device". Code of a level cannot be interrupted by its own level.
+ *
+ * What is a single act, that is, cannot be interrupted half-way: the load or the store of one byte, on every CPU. The
+ * load or store of a word (a pointer, or 16 bits) is one act on some CPUs and several on others, so that what ISRs share
+ * with lower levels without a lock is read and written through HAL_LOAD and HAL_STORE below. Reading, changing and writing
+ * back is a single act on no CPU: it takes a lock. ISRs of level device use plain accesses, nothing interrupts them that
+ * shares.
  */
 #ifndef HAL_CPU_H
 #define HAL_CPU_H
@@ -14,38 +20,77 @@
 
 typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the thread to resume */
 
+#include "hal_compiler.h"
 #include "hal_port.h"
 /* hal_port.h defines:
- *   HAL_USED, HAL_NORETURN        attributes: referenced from assembly only; does not return
- *   HAL_LIKELY(condition)         a hint for the order of branches
- *   HAL_INLINE, HAL_OUTLINE       attributes: always, never copied into the caller
  *   hal_lock_state                opaque level
  *   hal_limit                     type of a stack limit
  *   HAL_STACK_GUARD               bytes at the end of a thread's stack that belong to the port (hal_limits.h)
+ *   HAL_STACK_TRAPS               1 if the CPU traps where a stack passes its limit; otherwise 0, or not defined
+ *   HAL_KERNEL_STACK_GUARD        with HAL_STACK_TRAPS: bytes at the end of the kernel stack that such a trap needs
  *   HAL_STACK_GROWS_DOWN          if it does
- *   HAL_ALLOCATION_FAILS()        false; a test port may say true to make the next allocation fail
+ *   HAL_ALLOCATION_FAILS()        for tests: true makes the next allocation fail. Without it, never
+ *   HAL_STACK_IS_TAKEN            if hal_stack_init takes something that hal_stack_release must give back
+ *   HAL_WORD_IS_ONE_ACT           1 if the load and the store of a pointer and of 16 bits are single acts, else 0
  * and declares or defines inline:
  *   hal_lock_state hal_lock_slice(void);      at least level slice; nests; any context
  *   hal_lock_state hal_lock_devices(void);    at least level device; nests; any context; held for <= 40 Tcy
  *   void hal_unlock(hal_lock_state before);   restore, never lower than before; takes what became due meanwhile
  *   bool hal_in_thread(void);                 level is below slice: a thread outside critical sections
  *   bool hal_in_isr(void);                    level is device or above
- *   void hal_barrier(void);                   the compiler moves no memory access across
  *   void hal_slice_restart(void);             a full slice starts now; a pending slice interrupt is withdrawn
  *   void hal_slice_force(void);               the slice ends as soon as the level allows; any context
+ *   void hal_guard_kernel_stack(void);        with HAL_STACK_TRAPS: kernel stack, slice level; until a thread is resumed the
+ *                                             limit is the kernel stack's. ISRs, which move there, set and restore it
  */
 
-/* Before any other call. No interrupt is enabled until hal_start(); the level is thread. Adopts the running context
- * as process's; fills its sp and limit. */
+#if !HAL_STACK_TRAPS /* the kernel looks at the paint at the end of its stack behind every round of handlers */
+#define HAL_KERNEL_STACK_GUARD 0
+#define hal_guard_kernel_stack() ((void)0)
+#endif
+
+#ifndef HAL_ALLOCATION_FAILS
+#define HAL_ALLOCATION_FAILS() false
+#endif
+
+#if HAL_WORD_IS_ONE_ACT
+#define HAL_LOAD(place) (*(const volatile __typeof__(place) *)&(place))
+#define HAL_STORE(place, value) (*(volatile __typeof__(place) *)&(place) = (value))
+#else
+#define HAL_LOAD(place)                                                                       \
+    __extension__({                                                                           \
+        hal_lock_state hal_lock_ = hal_lock_devices();                                        \
+        __typeof__(place) hal_value_ = (place);                                               \
+        hal_unlock(hal_lock_);                                                                \
+        hal_value_;                                                                           \
+    })
+#define HAL_STORE(place, value)                                                               \
+    do {                                                                                      \
+        hal_lock_state hal_lock_ = hal_lock_devices();                                        \
+        (place) = (value);                                                                    \
+        hal_unlock(hal_lock_);                                                                \
+    } while (0)
+#endif
+
+/* Before any other call. No interrupt is enabled until hal_start() and the level is slice until then, so that what may
+ * block is refused. Adopts the running context as process's; fills its sp and limit. */
 void hal_init(sys_pcb *process);
-/* 1 ms clock (calls os_clock_tick at level device) and slice timer start, interrupts are enabled. */
+/* 1 ms clock (calls os_clock_tick at level device) and slice timer start and interrupts are enabled; then the level becomes
+ * thread. The end of a slice that was forced before is taken now, with both timers running. */
 void hal_start(void);
 
 /* Builds the first frame of a thread that will call entry(arg), then os_thread_returned(). stack..stack + bytes ends
  * where process begins. Fills process->sp and limit. Slice locked. False: no memory. */
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg);
 /* The thread is gone and not running; release what hal_stack_init took beside the block. */
+#ifdef HAL_STACK_IS_TAKEN
 void hal_stack_release(sys_pcb *process);
+#else
+static inline void hal_stack_release(const sys_pcb *process)
+{
+    (void)process;
+}
+#endif
 /* Save the calling thread, run os_slice_end() or os_schedule() on the kernel stack at level slice and resume the thread
  * it returns. Both come back when the caller is resumed, at thread level. */
 void hal_yield(void); /* called at thread level */

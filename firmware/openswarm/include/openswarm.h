@@ -7,10 +7,11 @@
  *     callers | blocks? | worst-case Tcy on the dsPIC30F | stack bytes | error codes (Sys_Get_LastError)
  * Callers: M = main before Sys_Start_Kernel, T = thread, H = event handler or condition, I = ISR of priority 4.
  * n threads, m events, b newer events in the same bucket (identifier modulo 8), s subscriptions of one event, d payload
- * bytes. Cycles were measured on firmware/apps and tests/firmware/target; those with a ~ are counted by hand. Stack is
- * `python -m toolchain stack`, return address included; a switch takes its frame on top (port/dspic30f/README.md). A call
- * from a context that is not listed is refused: it returns failure, sets SYS_ERROR_CONTEXT and adds one to
- * sys_statistics.refused.
+ * bytes; g cycles give a piece of memory back: 60-150, at most 1,200 in a heap of many pieces. Cycles were measured on
+ * firmware/apps and tests/firmware/target; those with a ~ are counted by hand. Stack is `python -m toolchain stack`,
+ * return address included; a switch takes its frame on top (port/dspic30f/README.md). What may block, or yields, is
+ * refused before Sys_Start_Kernel. A call from a context that is not listed is refused: it returns failure, sets
+ * SYS_ERROR_CONTEXT and adds one to sys_statistics.refused.
  */
 #ifndef OPENSWARM_H
 #define OPENSWARM_H
@@ -55,7 +56,7 @@ typedef enum {
 
 /* Events the system registers. Values 1-7 are the published ones; payloads in brackets. */
 enum {
-    SYS_EVENT_TERMINATION = 0x01,
+    SYS_EVENT_TERMINATION = 0x01,   /* [uint16 pid] a thread has ended: returned, killed or stopped by its stack limit */
     SYS_LEFTMOTOR_SPEED = 0x02,     /* [sint16 mm/s] request, by anyone */
     SYS_RIGHTMOTOR_SPEED = 0x03,    /* [sint16 mm/s] */
     SYS_IO_1PXSENSOR = 0x04,        /* [sys_colour] from the camera */
@@ -64,7 +65,7 @@ enum {
     SYS_1ms_TIMER = 0x07,           /* [uint16, low word of the system time] */
     SYS_IO_SELECTOR = 0x08,         /* [uint8 0-15] on change */
     SYS_UART1_RECEIVED = 0x09,      /* [bytes] one chunk or frame */
-    SYS_UART1_READY = 0x0A,         /* [uint16 free bytes] the transmit buffer drained after a refusal */
+    SYS_UART1_READY = 0x0A,         /* [uint16 SYS_UART_TX, all free] everything is sent, after a refusal as BUSY */
     SYS_SEND_UART2 = 0x0B,
     SYS_UART2_RECEIVED = 0x0C,
     SYS_UART2_READY = 0x0D,
@@ -102,12 +103,12 @@ typedef struct {
     uint16 deadline_ms;    /* relative to each release; 1..period_ms */
 } sys_process_config;
 
-/* MTH | no | 840, of which 5 per byte paint the stack | 40 | MEMORY.  PID, or 0 = failed (PID 0 is the system
- * thread). */
+/* MTH | no | 520 + 20 n, of which 2 per byte paint the stack; at most 900 more while memory is short, and
+ * 800 in a handler | 28 | MEMORY.  PID, or 0 = failed (PID 0 is the system thread). */
 uint16 Sys_Start_Process(sys_function f);
-/* MTH | no | as above | 40 | MEMORY, ARGUMENT.  As above. */
+/* MTH | no | as above | 28 | MEMORY, ARGUMENT.  As above. */
 uint16 Sys_Start_ProcessWith(const sys_process_config *config);
-/* MTH | own PID: never returns | ~450 + 25 m + 30 per subscription of its own | 42 | PROCESS.  Also ends its
+/* MTH | own PID: never returns | ~450 + 25 m + g per subscription of its own | 42 | PROCESS.  Also ends its
  * subscriptions, its wait and its uncleared wait result. */
 bool Sys_Kill_Process(uint16 pid);
 /* T | no | 54 to a yielded thread, 65 to a preempted one | 20 | CONTEXT.  Hands the rest of the slice on. */
@@ -122,44 +123,49 @@ void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);
 /* MTHI | no | 6 | 4 | none.  In a handler: the interrupted thread; use the pid argument of the handler instead. */
 uint16 Sys_Get_ProcessID(void);
-/* MTHI | no | ~65 + 18 n | 16 | none.  SYS_UNKNOWN: no such thread. */
+/* MTH | no | ~65 + 18 n | 16 | none.  SYS_UNKNOWN: no such thread. */
 sys_state Sys_Get_ProcessState(uint16 pid);
 /* MTH | no | ~80 + 18 n + 6 per byte | 16 | none.  Stack bytes never used so far; 0 also for an unknown PID and
  * PID 0. */
 uint16 Sys_Get_UnusedStack(uint16 pid);
-/* MTH | no | 6 per byte | 4 | none.  The same for the stack of handlers, ISRs and scheduler. */
+/* MTHI | no | 6 per byte | 4 | none.  The same for the stack of handlers, ISRs and scheduler. */
 uint16 Sys_Get_UnusedKernelStack(void);
 
 /* ---- Scheduling --------------------------------------------------------------------------------------------- */
 
-/* Chooses among the ready threads; see openswarm_scheduler.h to write one. */
+/* Chooses among the ready threads; see openswarm_scheduler.h to write one.
+ * sys_round_robin, the default and the paper's: a thread that wakes goes behind all that are ready, so it waits for up to
+ * (ready threads) * 10 ms and the handlers in between, however short its Sys_Sleep was. sys_fixed_priority: it waits for
+ * threads of higher priority, and for those of its own in turn. sys_earliest_deadline: jobs that are on time by deadline;
+ * late ones, reported once by SYS_DEADLINE_MISSED, take turns with threads without a period in what those leave. */
 typedef struct sys_scheduler sys_scheduler;
 extern const sys_scheduler sys_round_robin, sys_fixed_priority, sys_earliest_deadline;
-/* MTHI | no | 19 | 4 | none.  Takes effect at the next thread switch. */
-void Sys_Set_Scheduler(const sys_scheduler *scheduler);
+/* MTHI | no | 24 | 4 | ARGUMENT.  Takes effect at the next thread switch. NULL is refused. */
+bool Sys_Set_Scheduler(const sys_scheduler *scheduler);
 
 /* ---- Events ------------------------------------------------------------------------------------------------- */
 
-/* MTH | no | 146 + 9 b | 28 | MEMORY.  True also if already registered. */
+/* MTH | no | 146 + 9 b; at most 600 more while memory is short | 30 | MEMORY.  True also if already registered. */
 bool Sys_Register_Event(uint16 event);
-/* MTH | no | ~230 + 9 b + 45 s + 20 n | 26 | EVENT.  Its subscriptions end, its undelivered messages are dropped,
- * its waiters wake with NULL. */
+/* MTH | no | ~230 + 9 b + (15 + g) s + 20 n + g | 26 | EVENT.  Its subscriptions end, its undelivered messages are
+ * dropped, its waiters wake with NULL. */
 bool Sys_Unregister_Event(uint16 event);
 /* MTHI | no | ~70 + 9 b | 12 | none. */
 bool Sys_IsEventRegistered(uint16 event);
 /* MTH | no | ~140 + 9 b + 11 s + 18 n | 34 | EVENT, PROCESS, MEMORY, ARGUMENT.  Once per (event, pid, handler):
- * subscribing again replaces the condition. condition NULL = always. */
+ * subscribing again replaces the condition. condition NULL = always. Handlers run in order of subscription; one that is
+ * subscribed while a message is delivered hears the next, ahead of those that message has not reached yet. */
 bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_condition condition);
-/* MTH | no | ~120 + 9 b + 45 s | 34 | EVENT.  All handlers of this thread; false: there was none. */
+/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT.  All handlers of this thread; false: there was none. */
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
-/* MTH | no | ~120 + 9 b + 45 s | 34 | EVENT.  One handler; false: it was not subscribed. */
+/* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT.  One handler; false: it was not subscribed. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
-/* MTHI | no | 104 + 9 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 if nobody
- * listens; ~400 more when the heap is nearly full | 38 | EVENT, MEMORY, ARGUMENT.  Copies
- * the payload and queues it. True also if nobody listens; then nothing is stored. False: nothing was queued.
- * Payloads above SYS_SMALL_PAYLOAD: not from an ISR. */
+/* MTHI | no | 95 + 9 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 if nobody
+ * listens; at most 460 more while memory is short | 32 | EVENT, MEMORY, ARGUMENT.  Copies the payload and queues it. True
+ * also if nobody listens; then nothing is stored. False: nothing was queued. Payloads above SYS_SMALL_PAYLOAD: not from
+ * an ISR. ISRs share the piece of memory that was the largest when something was last given back or started. */
 bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
-/* MTHI | no | 113 + 9 b | 44 | EVENT, MEMORY. */
+/* MTHI | no | 104 + 9 b | 38 | EVENT, MEMORY.  As above. */
 bool Sys_Send_IntEvent(uint16 event, uint16 value);
 /* T | yes | ~250 + 9 b + 30 n | 46 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
  * result at a time: its next wait, sleep excepted, frees the previous one. */
@@ -167,17 +173,17 @@ sys_event_data *Sys_Wait_for_Event(uint16 event);
 sys_event_data *Sys_Wait_for_Condition(uint16 event, sys_condition condition);
 /* As above; NULL with SYS_OK also after ms milliseconds. ms 0 = no time-out. */
 sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 event, sys_condition condition, uint16 ms);
-/* T | no | ~100 + 25 n | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler it only sets
- * NULL. */
+/* T | no | ~70 + 25 n + g | 30 | none.  Frees a wait result and sets *data = NULL. NULL-safe; in a handler or an ISR it only
+ * sets NULL. */
 void Sys_Clear_EventData(sys_event_data **data);
-/* MTHI | no | ~50 | 8 | none.  Messages of this event that found no memory; saturates at 65535. */
+/* MTHI | no | ~50 | 8 | none.  Messages of this event that found no memory since the start; saturates at 65535. */
 uint16 Sys_Get_LostEvents(uint16 event);
 
 /* ---- Information -------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    uint16 heap_used;   /* bytes taken from the heap now; free lists are not counted */
-    uint16 heap_peak;   /* largest extent of the heap so far: blocks in use and free lists between them */
+    uint16 heap_used;   /* bytes taken from the heap now */
+    uint16 heap_peak;   /* most bytes taken at one time so far */
     uint16 events_lost; /* messages refused for lack of memory; saturates */
     uint16 refused;     /* calls from a context that may not make them; saturates */
     uint16 deadlines_missed;
@@ -188,7 +194,8 @@ typedef struct {
 const sys_statistics *Sys_Get_Statistics(void);
 /* MTHI | no | 12 | 8 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
 uint32 Sys_Get_SystemTime(void);
-/* MTHI | no | 4 | 4 | none.  A sys_error; stays until the next failing call. Shared by all contexts. */
+/* MTHI | no | 14 | 8 | none.  A sys_error of the caller's own: each thread has one, all handlers and conditions have one
+ * together, and all ISRs. It stays until the next failing call, or in a thread until it blocks, which may set SYS_OK. */
 uint16 Sys_Get_LastError(void);
 /* MTHI | no | 6 | 4 | none.  The speed in force, mm/s, after the post-processor. */
 sint16 Sys_Get_MotorSpeed_Left(void);

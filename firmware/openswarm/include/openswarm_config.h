@@ -22,16 +22,23 @@
 #ifndef SYS_LOSS_COUNTERS
 #define SYS_LOSS_COUNTERS 4 /* events with a loss counter of their own; losses of further ones are summed under id 0 */
 #endif
+#ifndef SYS_UARTS
+#define SYS_UARTS 2 /* of the robot */
+#endif
 #ifndef SYS_UART_TX
-#define SYS_UART_TX 64 /* transmit ring of each UART; a power of two */
+#define SYS_UART_TX (SYS_HEAP / 3) /* of the heap, for what one UART still has to send */
 #endif
 #ifndef SYS_UART_RX
 #define SYS_UART_RX 16 /* largest received chunk passed on as one event */
 #endif
+#ifndef SYS_1PXSENSOR
+#define SYS_1PXSENSOR 0 /* 1: the system registers SYS_IO_1PXSENSOR, and starts the camera if the board has one */
+#endif
 
-/* Blocks up to HEAP_CLASSES steps come from exact-size lists and may be taken in an ISR. */
-#define HEAP_STEP sizeof(void *)
-#define HEAP_CLASSES 20u
-#define SYS_SMALL_PAYLOAD ((HEAP_CLASSES - 3u) * HEAP_STEP) /* a message costs three words beside its payload */
+#ifndef SYS_SMALL_PAYLOAD
+#define SYS_SMALL_PAYLOAD (17u * HEAP_STEP) /* the largest an ISR may send */
+#endif
+
+#define HEAP_STEP sizeof(void *) /* memory is handed out in multiples of this */
 
 #endif

@@ -17,7 +17,7 @@ enum { SYS_MAXIMUM_SPEED = 129 }; /* mm/s at 1000 steps/s (epuck.md §3, openswa
 
 typedef struct {
     sint16 left, right; /* mm/s, forward positive; clamped to +-SYS_MAXIMUM_SPEED after the post-processor, which sets
-                           the last error to SYS_ERROR_ARGUMENT */
+                           the handlers' last error to SYS_ERROR_ARGUMENT */
 } sys_wheel_speeds;
 
 /* Turns an event into wheel speeds. In: the speeds in force. False: leave them. Handler context. */
@@ -30,11 +30,12 @@ bool Sys_Connect_Motors(uint16 event);
 
 /* ---- UARTs: SYS_SEND_UARTn, SYS_UARTn_RECEIVED, SYS_UARTn_READY ------------------------------------------------ */
 
-enum { SYS_UART1, SYS_UART2, SYS_UARTS };
+enum { SYS_UART1, SYS_UART2 }; /* of which the board has SYS_UARTS */
 
-/* Appends one byte to the message under construction; false: the ring is full and the message will be dropped whole. */
+/* Appends one byte to the message under construction; false: stop, the message will be dropped whole. */
 typedef bool (*sys_put)(uint8 byte);
-/* Writes one message as bytes. False as soon as put fails. Thread or handler context, slice locked. */
+/* Writes one message as bytes. False: the message is refused, also as soon as put fails. Thread or handler context, slice
+ * locked; must not write to a UART itself. */
 typedef bool (*sys_tx_processor)(const uint8 *message, uint16 size, sys_put put);
 /* One received byte. Returns the size of a message now complete in buffer (SYS_UART_RX bytes), or 0. *used is the fill
  * level, kept between calls, 0 after a completed message. ISR context. */
@@ -50,13 +51,15 @@ sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor processor); /*
 /* MTHI.  Bytes already received by the old processor are passed on first, as one chunk. */
 sys_rx_processor Sys_Set_RxProcessor(uint8 uart, sys_rx_processor processor);
 
-/* MTH | no | 60 + 30 per byte | 44 | BUSY.  Queues one message, whole or not at all. After SYS_ERROR_BUSY the event
- * SYS_UARTn_READY follows once half the ring is free. */
+/* MTH | no | 60 + 30 per byte | 44 | BUSY, ARGUMENT.  Queues one message behind those before it, whole or not at all. It
+ * is copied into blocks of the heap, freed one by one as they are sent: E + 1 bytes and up to SYS_SMALL_PAYLOAD - 1 of the
+ * message each. BUSY: SYS_UART_TX or the heap is exhausted; SYS_UARTn_READY follows once everything queued is sent.
+ * ARGUMENT: the message alone needs more than SYS_UART_TX, or the Tx-processor refused it. */
 bool Sys_Write_UART1(const void *message, uint16 size);
 bool Sys_Write_UART2(const void *message, uint16 size);
 
 typedef struct {
-    uint16 tx_refused; /* messages that found the ring too full */
+    uint16 tx_refused; /* messages that were not queued */
     uint16 rx_lost;    /* messages lost for lack of memory, or overrun bytes */
     uint16 rx_damaged; /* frames with a wrong length or checksum */
 } sys_uart_statistics;

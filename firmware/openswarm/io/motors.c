@@ -31,8 +31,8 @@ static bool on_speed(uint16 pid, uint16 event, sys_event_data *data)
     sys_wheel_speeds wanted = speeds;
     (void)pid;
     if (processor(event, data, &wanted)) {
-        speeds.left = clamp(wanted.left);
-        speeds.right = clamp(wanted.right);
+        HAL_STORE(speeds.left, clamp(wanted.left)); /* read by ISRs */
+        HAL_STORE(speeds.right, clamp(wanted.right));
         hal_motors_drive(speeds.left, speeds.right);
     }
     return true;

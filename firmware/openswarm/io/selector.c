@@ -1,4 +1,5 @@
 /* Selector: a position counts once it was read equal for DEBOUNCE_MS (openswarm-original.md §5.7: 25 ms). */
+#include "hal_cpu.h"
 #include "io.h"
 
 enum { DEBOUNCE_MS = 25, NONE = 0xFF };
@@ -41,7 +42,7 @@ void selector_tick(void)
 sys_selector_processor Sys_Set_SelectorProcessor(sys_selector_processor wanted)
 {
     sys_selector_processor before = processor;
-    processor = wanted != NULL ? wanted : pass_unchanged;
+    HAL_STORE(processor, wanted != NULL ? wanted : pass_unchanged);
     return before;
 }
 

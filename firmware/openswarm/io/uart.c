@@ -1,28 +1,26 @@
-/* UARTs: bounded buffers, back-pressure and replaceable Tx- and Rx-processors.
+/* UARTs: dynamically buffered transmission, back-pressure and replaceable Tx- and Rx-processors.
  *
- * A message is encoded straight into the transmit ring behind what is committed, and committed as a whole or not at
- * all. Writers lock the slice; the ISR only moves tail. */
+ * A message is encoded into a chain of small blocks of the heap, which is committed as a whole or not at all. Writers lock
+ * the slice; the ISR sends from the first block and hands it to the kernel when it is empty. */
 #include "io.h"
 #include "kernel.h"
 
 #include <string.h>
 
-#define MASK (SYS_UART_TX - 1u)
-typedef char ring_is_a_power_of_two[(SYS_UART_TX & (SYS_UART_TX - 1)) == 0 && SYS_UART_TX <= 128 ? 1 : -1];
-
 typedef struct {
     sys_tx_processor encode;
     sys_rx_processor decode;
-    volatile uint8 head, tail;  /* free-running; head - tail bytes are committed */
-    volatile bool wants_ready;  /* a writer was refused */
-    bool quiet;                 /* no byte since the last 1 ms tick */
-    uint16 used;                /* bytes in received */
-    uint8 sent[SYS_UART_TX];
+    message *first, *last; /* blocks to be sent; devices locked, as the next two */
+    uint16 position;       /* of the byte sent last in the first block */
+    uint16 taken;          /* bytes of the heap they are */
+    bool quiet;            /* no byte since the last 1 ms tick */
+    uint16 used;           /* bytes in received */
     uint8 received[SYS_UART_RX];
     sys_uart_statistics statistics;
 } channel;
 
 static channel channels[SYS_UARTS];
+static uint8 refused; /* bit n: UART n has refused a message as BUSY; devices locked */
 
 enum { PER_UART = SYS_UART2_RECEIVED - SYS_UART1_RECEIVED };
 
@@ -33,56 +31,141 @@ static uint16 event_of(uint8 uart, uint16 of_uart1)
 
 /* ---- Sending ---------------------------------------------------------------------------------------------------- */
 
-static channel *writing; /* slice locked while set */
-static uint8 writing_head;
+/* A block is a message whose payload is the number of bytes in it, then the bytes. */
+enum {
+    LARGEST = SYS_SMALL_PAYLOAD - 1, /* bytes; such blocks are taken and given in constant time */
+    GROWTH = 7                       /* bytes by which an encoded message outgrows what was expected; odd, for even sizes */
+};
 
-static bool put(uint8 byte)
+static uint8 *bytes_of(message *block)
 {
-    if ((uint8)(writing_head - writing->tail) >= SYS_UART_TX) {
+    return (uint8 *)(block + 1);
+}
+
+static uint16 size_of(const message *block)
+{
+    return (uint16)(sizeof *block + block->queued.size);
+}
+
+/* The message under construction; slice locked. Of a writer that was stopped half-way the next one frees it. */
+static struct {
+    const channel *to;
+    message *first, *last;
+    uint16 expected; /* bytes for which there is no block yet */
+    uint16 taken;    /* bytes of the heap its blocks are */
+    uint16 limit;    /* of taken; the rest of SYS_UART_TX waits to be sent */
+    sys_error error; /* of a message that cannot be sent */
+} building;
+
+static void discard(void)
+{
+    while (building.first != NULL) {
+        message *block = building.first;
+        building.first = block->queued.next;
+        heap_give(block, size_of(block));
+    }
+}
+
+static HAL_OUTLINE bool begin_block(void)
+{
+    uint16 room = building.expected > LARGEST ? LARGEST : building.expected != 0 ? building.expected | 1u : GROWTH;
+    uint16 taken = (uint16)(building.taken + sizeof(message) + 1 + room);
+    message *block = taken <= building.limit ? heap_take((uint16)(taken - building.taken)) : NULL;
+    if (block == NULL) {
+        if (taken <= SYS_UART_TX) {
+            building.error = SYS_ERROR_BUSY; /* there will be room */
+        }
         return false;
     }
-    writing->sent[writing_head & MASK] = byte;
-    writing_head++;
+    building.taken = taken;
+    building.expected = building.expected > room ? (uint16)(building.expected - room) : 0;
+    block->queued.next = NULL;
+    block->queued.size = (uint16)(1 + room);
+    *bytes_of(block) = 0;
+    *(building.first == NULL ? &building.first : &building.last->queued.next) = block;
+    building.last = block;
     return true;
 }
 
-static bool write_message(uint8 uart, const void *message, uint16 size)
+static bool put(uint8 byte)
+{
+    if ((building.first == NULL || *bytes_of(building.last) + 1u == building.last->queued.size) && !begin_block()) {
+        return false;
+    }
+    uint8 *bytes = bytes_of(building.last);
+    bytes[++*bytes] = byte;
+    return true;
+}
+
+static HAL_OUTLINE bool write_message(uint8 uart, const void *message, uint16 size)
 {
     channel *c = &channels[uart];
     if (os_enter() != SYS_OK) {
         return false;
     }
-    writing = c;
-    writing_head = c->head;
-    bool fits = c->encode(message, size, put);
-    hal_lock_state device_lock = hal_lock_devices();
-    if (fits) {
-        c->head = writing_head;
+    discard();
+    building.to = c;
+    building.expected = size;
+    building.taken = 0;
+    building.error = SYS_ERROR_ARGUMENT;
+    building.limit = (uint16)(SYS_UART_TX - HAL_LOAD(c->taken));
+    bool sound = c->encode(message, size, put) && building.to == c; /* not if the processor has written to a UART */
+    building.to = NULL;
+    hal_lock_state lock = hal_lock_devices();
+    if (!sound) {
+        refused |= (uint8)((building.error == SYS_ERROR_BUSY) << uart);
+    } else if (building.first != NULL) {
+        *(c->first == NULL ? &c->first : &c->last->queued.next) = building.first;
+        c->last = building.last;
+        c->taken += building.taken;
+        building.first = NULL;
         hal_uart_transmit(uart);
-    } else {
-        c->wants_ready = true;
     }
-    hal_unlock(device_lock);
-    if (!fits) {
-        os_count(&c->statistics.tx_refused);
+    hal_unlock(lock);
+    if (sound) {
+        return os_leave(SYS_OK);
     }
-    return os_leave(fits ? SYS_OK : SYS_ERROR_BUSY);
+    discard();
+    os_count(&c->statistics.tx_refused);
+    return os_leave(building.error);
+}
+
+/* An ISR gives nothing back to the heap; the kernel stack does, with the next messages. */
+static void retire(message *block)
+{
+    block->queued.event = NULL;
+    block->queued.next = NULL;
+    *queue_end = block;
+    queue_end = &block->queued.next;
+    os_pending |= OS_MESSAGES;
 }
 
 sint16 uart_next_byte(uint8 uart)
 {
     channel *c = &channels[uart];
-    uint8 waiting = (uint8)(c->head - c->tail);
-    if (c->wants_ready && waiting <= SYS_UART_TX / 2) {
-        c->wants_ready = false;
-        (void)Sys_Send_IntEvent(event_of(uart, SYS_UART1_READY), (uint16)(SYS_UART_TX - waiting));
-    }
-    if (waiting == 0) {
+    message *block = c->first;
+    if (block == NULL) {
         return -1;
     }
-    uint8 byte = c->sent[c->tail & MASK];
-    c->tail++;
+    uint8 byte = bytes_of(block)[++c->position];
+    if (c->position == *bytes_of(block)) {
+        c->position = 0;
+        c->taken -= size_of(block);
+        c->first = block->queued.next;
+        retire(block);
+    }
     return byte;
+}
+
+/* ISR. Without memory for the event the next tick tries again. */
+static HAL_OUTLINE void tell_ready(void)
+{
+    for (uint8 uart = 0; uart < SYS_UARTS; uart++) {
+        if ((refused & 1u << uart) && channels[uart].first == NULL &&
+            Sys_Send_IntEvent(event_of(uart, SYS_UART1_READY), SYS_UART_TX)) {
+            refused &= (uint8)~(1u << uart);
+        }
+    }
 }
 
 static bool on_send(uint16 pid, uint16 event, sys_event_data *data)
@@ -99,7 +182,7 @@ bool Sys_Write_UART1(const void *message, uint16 size)
 
 bool Sys_Write_UART2(const void *message, uint16 size)
 {
-    return write_message(SYS_UART2, message, size);
+    return SYS_UARTS > SYS_UART2 ? write_message(SYS_UART2, message, size) : os_fail(SYS_ERROR_ARGUMENT);
 }
 
 bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put_byte)
@@ -159,10 +242,12 @@ void uart_tick(void)
         }
         c->quiet = true;
     }
+    if (refused != 0) {
+        tell_ready();
+    }
 }
 
-/* ---- Processors and life cycle
- * ------------------------------------------------------------------------------------ */
+/* ---- Processors and life cycle ---------------------------------------------------------------------------------- */
 
 sys_tx_processor Sys_Set_TxProcessor(uint8 uart, sys_tx_processor wanted)
 {
@@ -177,6 +262,7 @@ sys_rx_processor Sys_Set_RxProcessor(uint8 uart, sys_rx_processor wanted)
 {
     channel *c = &channels[uart];
     uint8 left[SYS_UART_RX];
+    Sys_Start_CriticalSection(); /* the caller is not killed between taking the bytes and passing them on */
     hal_lock_state lock = hal_lock_devices();
     sys_rx_processor before = c->decode;
     uint16 size = c->used;
@@ -187,6 +273,7 @@ sys_rx_processor Sys_Set_RxProcessor(uint8 uart, sys_rx_processor wanted)
     if (size != 0) {
         pass_on(uart, left, size <= sizeof left ? size : (uint16)sizeof left);
     }
+    Sys_End_CriticalSection();
     return before;
 }
 

@@ -19,7 +19,7 @@ uint32 Sys_Get_SystemTime(void)
 
 uint16 clock_now(void)
 {
-    return now_ms;
+    return HAL_LOAD(now_ms);
 }
 
 void os_clock_tick(void)
@@ -64,10 +64,10 @@ void clock_wake_due(void)
         if (!(p->status & OS_TIMED)) {
             continue;
         }
-        if ((uint16)(p->wake - now + elapsed) <= elapsed) {
+        if ((uint16)(p->own.wake - now + elapsed) <= elapsed) {
             process_wake(p, NULL);
         } else {
-            set_alarm(p->wake);
+            set_alarm(p->own.wake);
         }
     }
 }
@@ -75,7 +75,7 @@ void clock_wake_due(void)
 void clock_set_wake(sys_pcb *process, uint16 ms)
 {
     clock_wake_due(); /* base becomes the present, so that 65,535 ms fit behind it */
-    process->wake = (uint16)(base + ms);
+    process->own.wake = (uint16)(base + ms);
     process->status |= OS_TIMED;
-    set_alarm(process->wake);
+    set_alarm(process->own.wake);
 }

@@ -3,7 +3,7 @@
 
 sys_statistics os_statistics;
 
-static volatile uint16 last_error;
+static volatile uint8 error_of_handlers, error_of_isrs;
 
 /* Losses of the first SYS_LOSS_COUNTERS events that lost something; entry 0 counts those of all others. */
 typedef struct {
@@ -12,9 +12,16 @@ typedef struct {
 
 static loss losses[SYS_LOSS_COUNTERS + 1];
 
+/* The last error of whoever calls. A thread keeps its own, so that nobody overwrites it between its call and its question;
+ * handlers, which interrupt each other never, have one together, and so have ISRs. */
+static HAL_OUTLINE volatile uint8 *last_error(void)
+{
+    return hal_in_isr() ? &error_of_isrs : os_in_kernel ? &error_of_handlers : &os_running->own.error;
+}
+
 bool os_fail(sys_error error)
 {
-    last_error = (uint16)error;
+    *last_error() = (uint8)error;
     return false;
 }
 
@@ -35,57 +42,44 @@ sys_error os_refuse(void)
     return SYS_ERROR_CONTEXT;
 }
 
+/* A free entry is taken by the first who comes, and kept. */
+static bool belongs_to(loss *entry, uint16 id)
+{
+    hal_lock_state lock = hal_lock_devices();
+    if (entry->event == 0) {
+        entry->event = id;
+    }
+    bool own = entry->event == id;
+    hal_unlock(lock);
+    return own;
+}
+
 void event_lost(uint16 id)
 {
-    loss *entry = losses + SYS_LOSS_COUNTERS + 1;
-    bool counted;
-    os_count(&os_statistics.events_lost);
-    do {
-        entry--;
-        hal_lock_state lock = hal_lock_devices();
-        counted = entry == losses || entry->count == 0 || entry->event == id;
-        if (counted) {
-            uint16 more = (uint16)(entry->count + 1u);
-            entry->event = id;
-            if (more != 0) {
-                entry->count = more;
-            }
-        }
-        hal_unlock(lock);
-    } while (!counted);
-}
-
-/* The entry of an event, or the first. */
-static loss *entry_of(uint16 id)
-{
     loss *entry = losses + SYS_LOSS_COUNTERS;
-    while (entry != losses && (entry->count == 0 || entry->event != id)) {
+    os_count(&os_statistics.events_lost);
+    while (entry != losses && (id == 0 || !belongs_to(entry, id))) {
         entry--;
     }
-    return entry;
-}
-
-void event_forget_losses(uint16 id)
-{
-    loss *entry = entry_of(id);
-    if (entry != losses) {
-        entry->count = 0;
-    }
+    os_count(&entry->count);
 }
 
 uint16 Sys_Get_LostEvents(uint16 id)
 {
-    const loss *entry = entry_of(id);
-    return entry != losses || id == 0 ? entry->count : 0;
+    const loss *entry = losses + SYS_LOSS_COUNTERS;
+    while (entry != losses && (id == 0 || entry->event != id)) {
+        entry--;
+    }
+    return entry != losses || id == 0 ? HAL_LOAD(entry->count) : 0;
 }
 
 uint16 Sys_Get_LastError(void)
 {
-    return last_error;
+    return *last_error();
 }
 
 const sys_statistics *Sys_Get_Statistics(void)
 {
-    heap_note_peak();
+    heap_note_use();
     return &os_statistics;
 }

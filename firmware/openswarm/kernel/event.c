@@ -11,9 +11,11 @@
 
 enum { BUCKETS = 8 };                        /* a power of two */
 static event *events[BUCKETS];               /* by the low bits of the identifier */
-static message *queue, **queue_end;          /* devices locked */
+static message *queue;                       /* devices locked */
+message **queue_end;                         /* the same */
 static message *undelivered;                 /* the rest of the batch in delivery */
-static subscription *next_subscriber;        /* the delivery's place in the list, moved by removals */
+static subscription *const nobody;
+static subscription *const *place;           /* where the delivery stands among the subscribers, moved with them */
 
 void event_init(void)
 {
@@ -22,23 +24,26 @@ void event_init(void)
 
 /* ---- Registration ------------------------------------------------------------------------------------------- */
 
-static HAL_OUTLINE event *find_from(event *e, uint16 id)
+/* What points to the event, or to nothing. */
+static HAL_OUTLINE event **link_of(uint16 id)
 {
-    while (e != NULL && e->id != id) {
-        e = e->next;
+    event **link = &events[id % BUCKETS];
+    while (*link != NULL && (*link)->id != id) {
+        link = &(*link)->next;
     }
-    return e;
-}
-
-static HAL_INLINE event *find(uint16 id)
-{
-    event *first = events[id % BUCKETS];
-    return first != NULL && first->id == id ? first : find_from(first, id);
+    return link;
 }
 
 event *event_find(uint16 id)
 {
-    return find_from(events[id % BUCKETS], id);
+    return *link_of(id);
+}
+
+/* The same for senders: the event that was registered last in its bucket is found without a call. */
+static HAL_INLINE event *find(uint16 id)
+{
+    event *first = events[id % BUCKETS];
+    return first != NULL && first->id == id ? first : event_find(id);
 }
 
 static HAL_OUTLINE const sys_pcb *first_waiter(const event *e)
@@ -66,13 +71,13 @@ bool Sys_Register_Event(uint16 id)
     }
     if (event_find(id) == NULL) {
         event **first = &events[id % BUCKETS];
-        event *e = heap_take(sizeof *e);
+        event *e = heap_keep(sizeof *e);
         if (e != NULL) {
             e->id = id;
             e->next = *first; /* the application's events are found before the system's */
             e->subscribers = NULL;
             hal_barrier();
-            *first = e;
+            HAL_STORE(*first, e);
         } else {
             error = SYS_ERROR_MEMORY;
         }
@@ -83,29 +88,32 @@ bool Sys_Register_Event(uint16 id)
 static HAL_OUTLINE void unlink_subscription(subscription **link)
 {
     subscription *s = *link;
-    if (next_subscriber == s) {
-        next_subscriber = s->next;
+    if (place == &s->next) {
+        place = link;
     }
-    *link = s->next;
-    hal_barrier();
+    HAL_STORE(*link, s->next);
     heap_give(s, sizeof *s);
 }
 
-static void wake_waiters_of(const event *e)
+/* Those that wait for e without condition; with m = NULL all, because e goes. */
+static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
 {
+    bool any = false;
     sys_pcb *next;
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
-        if (p->awaited == e) {
-            process_wake(p, NULL);
-            p->awaited = NULL;
+        if (p->awaited == e && (m == NULL || p->wait.condition == NULL)) {
+            process_wake(p, m);
+            p->own.error = m != NULL ? SYS_OK : SYS_ERROR_EVENT;
+            any = true;
         }
     }
+    return any;
 }
 
 static HAL_OUTLINE void disown_messages(message *m, const event *e)
 {
-    for (; m != NULL; m = m->queued.next) {
+    for (; m != NULL; m = HAL_LOAD(m->queued.next)) {
         if (m->queued.event == e) {
             m->queued.event = NULL;
         }
@@ -117,23 +125,21 @@ bool Sys_Unregister_Event(uint16 id)
     if (os_enter() != SYS_OK) {
         return false;
     }
-    event **link = &events[id % BUCKETS];
-    while (*link != NULL && (*link)->id != id) {
-        link = &(*link)->next;
-    }
+    event **link = link_of(id);
     event *e = *link;
     if (e == NULL) {
         return os_leave(SYS_ERROR_EVENT);
     }
-    *link = e->next; /* from here on ISRs queue nothing for it */
-    hal_barrier();
+    HAL_STORE(*link, e->next); /* from here on ISRs queue nothing for it */
     while (e->subscribers != NULL) {
         unlink_subscription(&e->subscribers);
     }
-    wake_waiters_of(e);
-    disown_messages(queue, e);
+    if (place == &e->subscribers) {
+        place = &nobody;
+    }
+    (void)wake_waiters(e, NULL);
+    disown_messages(HAL_LOAD(queue), e);
     disown_messages(undelivered, e);
-    event_forget_losses(id);
     heap_give(e, sizeof *e);
     return os_leave(SYS_OK);
 }
@@ -143,24 +149,28 @@ bool Sys_Unregister_Event(uint16 id)
 /* Slice locked. Finds or adds the subscription. */
 static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condition condition)
 {
-    subscription *s, **link = &e->subscribers;
-    while ((s = *link) != NULL && (s->pid != pid || s->handler != handler)) {
-        link = &s->next;
+    subscription *s = e->subscribers, **link = &e->subscribers;
+    while (s != NULL && (s->pid != pid || s->handler != handler)) {
+        s = s->next;
     }
-    if (s != NULL) {
-        s->condition = condition;
-        return SYS_OK;
-    }
-    s = heap_take(sizeof *s);
     if (s == NULL) {
-        return SYS_ERROR_MEMORY;
+        s = heap_keep(sizeof *s);
+        if (s == NULL) {
+            return SYS_ERROR_MEMORY;
+        }
+        while (*link != NULL && link != place) { /* in front of a delivery it would be heard this time already */
+            link = &(*link)->next;
+        }
+        if (link == place) {
+            place = &s->next;
+        }
+        s->next = *link;
+        s->handler = handler;
+        s->pid = pid;
+        hal_barrier();
+        HAL_STORE(*link, s);
     }
-    s->next = NULL;
-    s->handler = handler;
     s->condition = condition;
-    s->pid = pid;
-    hal_barrier();
-    *link = s;
     return SYS_OK;
 }
 
@@ -294,42 +304,41 @@ static uint16 value_of(const message *m, uint16 size)
     return size >= sizeof(any_word) ? *(const any_word *)payload : size != 0 ? *(const uint8 *)payload : 0;
 }
 
-static void run_handlers(event *e, sys_event_data *data)
+/* A condition or handler may end any subscription and any thread, its own as well. */
+static void run_handlers(const event *e, sys_event_data *data)
 {
-    uint16 id = e->id; /* a handler may unregister the event */
-    next_subscriber = e->subscribers;
-    while (next_subscriber != NULL) {
-        subscription *s = next_subscriber;
-        sys_handler handler = s->handler;
-        uint16 pid = s->pid;
-        next_subscriber = s->next;
-        if ((s->condition == NULL || s->condition(data)) && !handler(pid, id, data)) {
-            (void)Sys_Unsubscribe_Handler(id, pid, handler);
+    uint16 id = e->id;
+    const subscription *s;
+    place = &e->subscribers;
+    while ((s = *place) != NULL) {
+        if ((s->condition == NULL || s->condition(data)) && *place == s) {
+            sys_handler handler = s->handler;
+            uint16 pid = s->pid;
+            if (!handler(pid, id, data)) {
+                (void)Sys_Unsubscribe_Handler(id, pid, handler);
+            }
+        }
+        if (*place == s) {
+            place = &s->next;
         }
     }
 }
 
-static bool wake_waiters(const event *e, message *m)
+/* Takes the condition off every waiter for which it holds. None is woken before all are asked: a condition may kill a
+ * thread, and with it the message that this thread was just given. */
+static void ask_waiters(const event *e, sys_event_data *data)
 {
-    bool kept = false;
     sys_pcb *p;
     process_scan = &os_blocked;
     while ((p = *process_scan) != NULL) {
-        bool meant = p->awaited == e;
-        if (meant && p->wait.condition != NULL) {
-            meant = p->wait.condition(&m->data);
-            if (*process_scan != p) { /* the condition killed its own thread */
-                continue;
+        bool holds = p->awaited == e && p->wait.condition != NULL && p->wait.condition(data);
+        if (*process_scan == p) { /* else the condition ended its own wait */
+            if (holds) {
+                p->wait.condition = NULL;
             }
-        }
-        if (meant) {
-            process_wake(p, m);
-            kept = true;
-        } else {
             process_scan = &p->next;
         }
     }
-    return kept;
 }
 
 static void deliver(message *m)
@@ -342,10 +351,11 @@ static void deliver(message *m)
         m->data.value = value_of(m, size);
         m->data.payload = PAYLOAD(m);
         run_handlers(e, &m->data);
+        ask_waiters(e, &m->data);
         kept = wake_waiters(e, m);
     }
     if (!kept) {
-        heap_give(m, (uint16)(sizeof *m + size));
+        heap_give_later(m, (uint16)(sizeof *m + size));
     }
 }
 
@@ -362,13 +372,14 @@ void event_deliver_queued(void)
         undelivered = m->queued.next;
         deliver(m);
     }
+    heap_settle();
 }
 
 /* ---- Waiting ------------------------------------------------------------------------------------------------ */
 
 static bool holds(const sys_pcb *p, const message *m)
 {
-    return !((p->status & OS_OFF_RING) && p->awaited != NULL) && p->wait.result == m;
+    return p->awaited == NULL && p->wait.result == m;
 }
 
 void event_release_result(sys_pcb *process)
@@ -401,11 +412,7 @@ sys_event_data *Sys_Wait_for_ConditionTimeout(uint16 id, sys_condition condition
     }
     self->wait.condition = condition;
     process_block(e, ms);
-    message *m = self->wait.result;
-    if (m == NULL) {
-        (void)os_fail(self->awaited == NULL ? SYS_ERROR_EVENT : SYS_OK);
-    }
-    return (sys_event_data *)m; /* the first member of the union, or NULL */
+    return (sys_event_data *)self->wait.result; /* the first member of the union, or NULL */
 }
 
 sys_event_data *Sys_Wait_for_Condition(uint16 id, sys_condition condition)
@@ -423,11 +430,12 @@ void Sys_Clear_EventData(sys_event_data **data)
     if (data == NULL || *data == NULL) {
         return;
     }
-    Sys_Start_CriticalSection();
-    message *m = os_running->wait.result;
-    if (m != NULL && *data == &m->data && !os_delivering) {
-        event_release_result(os_running);
+    if (os_enter() == SYS_OK) {
+        message *m = os_running->wait.result;
+        if (m != NULL && *data == &m->data && !os_in_kernel) {
+            event_release_result(os_running);
+        }
+        Sys_End_CriticalSection();
     }
-    Sys_End_CriticalSection();
     *data = NULL;
 }

@@ -29,7 +29,7 @@ static HAL_NORETURN void stop(void)
     hal_stop();
 }
 
-/* "address trap at 0x0:1234 in thread 1"; "stack" is that of the kernel, or of main in thread 0. Called by the port, on a
+/* "address trap at 0x0:1234 in thread 1"; "stack" is that of the kernel, or of main (at 0x0:0). Called by the port, on a
  * stack of its own choice, with everything masked. */
 void os_trap(uint16 cause, uint16 pc, uint16 pc_high)
 {
@@ -68,6 +68,5 @@ sys_pcb *os_overflow(void)
     end = put_number(end, pid, 10);
     (void)Sys_Send_Event(SYS_SEND_UART1, text, sizeof text - 1);
     (void)Sys_Send_Event(SYS_SEND_UART1, end, (uint16)(number + sizeof number - end));
-    (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
     return process_end_running();
 }

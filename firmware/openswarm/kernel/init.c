@@ -8,6 +8,9 @@ void Sys_Init_Kernel(void)
     process_init(); /* the caller becomes PID 0; no interrupt is enabled */
     (void)Sys_Register_Event(SYS_EVENT_TERMINATION);
     (void)Sys_Register_Event(SYS_1ms_TIMER);
+    if (SYS_1PXSENSOR) {
+        (void)Sys_Register_Event(SYS_IO_1PXSENSOR);
+    }
     board_init();
 }
 

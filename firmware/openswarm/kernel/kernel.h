@@ -1,10 +1,10 @@
 /* Private to the kernel, its ports and its schedulers.
  *
  * Who may touch what:
- *   slice locked     ring, blocked list, events, subscriptions, large heap blocks   (threads and kernel stack)
- *   devices locked   small heap blocks, message queue, os_pending, alarm            (ISRs as well)
- * ISRs walk events, subscriptions and the blocked list without a lock: links are changed by single stores, in an order
- * (hal_barrier) that leaves every list well-formed at each instruction.
+ *   slice locked     ring, blocked list, events, subscriptions, holes in the heap   (threads and kernel stack)
+ *   devices locked   the heap's reserve, message queue, os_pending, alarm            (ISRs as well)
+ * ISRs walk events, subscriptions and the blocked list without a lock: links are changed by single stores (HAL_STORE), in
+ * an order (hal_barrier) that leaves every list well-formed at each instruction. The ring is closed to ISRs.
  */
 #ifndef OS_KERNEL_H
 #define OS_KERNEL_H
@@ -46,8 +46,11 @@ union message {
 struct sys_pcb {
     void *sp;
     hal_limit limit;
-    event *awaited; /* blocked: what it waits for; NULL = only for time, or its event was unregistered */
-    uint16 wake;    /* blocked with OS_TIMED: low word of the system time */
+    event *awaited; /* blocked: what it waits for; otherwise NULL, as while it waits for time only */
+    union {
+        uint16 wake;          /* while blocked with OS_TIMED: low word of the system time */
+        volatile uint8 error; /* while ready: the thread's last error */
+    } own;
     uint8 status;   /* OS_* bits */
     uint8 priority;
     uint8 *block; /* start of the heap block; NULL for the system thread */
@@ -63,7 +66,8 @@ enum {
     OS_STATE = 0x03, /* SYS_NEW..SYS_ZOMBIE; OS_OFF_RING is set in the last two */
     OS_OFF_RING = 0x02,
     OS_TIMED = 0x04,
-    OS_MISSED = 0x20 /* this period's miss is reported */
+    OS_MISSED = 0x20, /* this period's miss is reported */
+    OS_DRIVES = 0x40 /* it uses a bus (io/bus.h) */
     /* 0x08 SYS_PERIODIC, 0x10 SYS_DSP */
 };
 
@@ -87,8 +91,9 @@ extern sys_pcb os_system;     /* PID 0 */
 extern sys_pcb *os_ring;      /* ring member before the running one (or before the next, if it blocked); NULL = empty */
 extern sys_pcb *os_blocked;   /* in order of blocking */
 extern bool os_eager;         /* a message ends the slice */
-extern volatile uint16 os_delivering; /* handlers, conditions and wake-ups are at work on the kernel stack */
+extern volatile bool os_in_kernel; /* handlers, conditions, wake-ups and schedulers are at work on the kernel stack */
 extern sys_statistics os_statistics;
+extern sys_process_config os_plain; /* all defaults: zeros, for which RAM is cheaper than flash */
 
 /* memory.c: one array, so that the kernel stack lies below the heap and with it below every thread stack */
 typedef union {
@@ -97,13 +102,17 @@ typedef union {
 } os_memory_space;
 extern os_memory_space os_memory;
 void heap_init(void);
-void *heap_take(uint16 size);             /* NULL: none left. Sizes above HEAP_CLASSES * HEAP_STEP: not in an ISR */
+/* Sizes are at least three pointers. NULL: none left. */
+void *heap_take(uint16 size);             /* any context */
+void *heap_keep(uint16 size);             /* for what is small and stays: as low as possible; not in an ISR */
 void heap_give(void *block, uint16 size); /* the size it was taken with; not in an ISR */
-void heap_note_peak(void);
+void heap_give_later(void *block, uint16 size); /* quick for one piece behind the other; to be had after heap_settle() */
+void heap_settle(void);                         /* and ISRs find some room again, if there is any */
+void heap_note_use(void);
 
 /* stack.c */
-void stack_paint(uint8 *stack, uint16 bytes);
-bool kernel_stack_is_intact(void); /* its last byte was never written; asserted after every round of handlers */
+void stack_paint(void *begin, const void *end); /* whole words */
+bool kernel_stack_is_intact(void); /* its last byte was never written; asked where the CPU does not trap */
 
 /* event.c */
 void event_init(void);
@@ -111,6 +120,9 @@ void event_deliver_queued(void);           /* kernel stack: all messages queued 
 void event_drop_subscriptions(uint16 pid);
 void event_release_result(sys_pcb *process); /* it gives up its wait result; the last holder frees it */
 event *event_find(uint16 id);                /* any context */
+/* The link behind the last queued message; devices locked, and OS_MESSAGES follows. A device may hang a block of its own
+ * there, with event NULL and its size: the kernel stack frees it with the next messages. */
+extern message **queue_end;
 
 /* process.c */
 void process_init(void);
@@ -141,11 +153,10 @@ uint16 clock_now(void);  /* low word; any context */
 HAL_USED void os_clock_tick(void); /* ISR, every 1 ms */
 
 /* error.c */
-bool os_fail(sys_error error); /* sets the last error, returns false */
+HAL_OUTLINE bool os_fail(sys_error error); /* sets the last error of whoever calls, returns false */
 sys_error os_refuse(void);     /* sets, counts and returns SYS_ERROR_CONTEXT */
 void os_count(uint16 *counter); /* saturating */
 void event_lost(uint16 id);
-void event_forget_losses(uint16 id);
 
 /* fault.c */
 HAL_USED sys_pcb *os_overflow(void); /* kernel stack: the running thread hit its stack limit; picks the next */

@@ -1,31 +1,48 @@
-/* All dynamic memory: bounded, deterministic, without headers, because the kernel knows the size of what it frees.
+/* All dynamic memory: without headers, because the kernel knows the size of what it frees, and in bounded time.
  *
- *      os_memory                brk                 top                       end
- *      | kernel stack | small blocks |   untouched   | large blocks: threads |
+ *      os_memory       low            high                          end
+ *      | kernel stack | blocks, holes | the reserve | blocks, holes |
  *
- * Small blocks are cut upwards from brk and go back to a free list of exactly their size: O(1), safe in ISRs. Large
- * blocks are cut downwards from top, kept in an address-ordered, coalescing first-fit list; no ISR touches it. */
+ * The reserve is one free piece that ISRs may cut from as well: messages from its lower end. Every other free piece is a
+ * hole, in a tree that only code with the slice locked touches. Neighbouring free pieces are always one; none is smaller
+ * than a tree node, so no byte is ever lost.
+ *
+ * The tree is a trie on addresses and a heap on sizes at once: a node of level n is the largest hole of an address range
+ * of SPAN / 2^n bytes, its sides lead into the halves of that range. Two holes lie at least two smallest blocks apart, so
+ * paths are short and every search, insertion and removal is bounded, whatever happened before. README.md has the
+ * reason for this and the figures. */
 #include "kernel.h"
 
-typedef struct block block;
-struct block { /* what a free block holds */
-    block *next;
-    uint16 size; /* large blocks only */
+typedef struct hole hole;
+struct hole { /* the beginning of a free piece; its size stands in its last HEAP_STEP bytes once more */
+    hole *side[2];
+    uint16 size;
 };
 
+enum { /* the bit by which the halves of the whole memory differ */
+    TOP_BIT = sizeof os_memory > 0x8000 ? 0x8000 : sizeof os_memory > 0x4000 ? 0x4000
+            : sizeof os_memory > 0x2000 ? 0x2000 : sizeof os_memory > 0x1000 ? 0x1000
+            : sizeof os_memory > 0x0800 ? 0x0800 : sizeof os_memory > 0x0400 ? 0x0400 : 0x0200
+};
+
+#define BEGIN (os_memory.bytes + SYS_KERNEL_STACK)
 #define END (os_memory.bytes + sizeof os_memory.bytes)
+
+typedef char kernel_stack_is_whole_steps[SYS_KERNEL_STACK % HEAP_STEP == 0 ? 1 : -1];
 
 os_memory_space os_memory;
 
-static block *small[HEAP_CLASSES];
-static block large; /* in front of the lowest large block */
-static uint8 *brk, *top;
+static uint8 *low, *high; /* the reserve; devices locked */
+static hole *holes;       /* slice locked; every path ends at no_hole */
+static hole no_hole;      /* of size 0 */
+static uint8 *run, *run_end; /* slice locked; given back last, piece after piece, and not yet joined */
 
 void heap_init(void)
 {
-    stack_paint(os_memory.bytes, SYS_KERNEL_STACK);
-    brk = os_memory.bytes + SYS_KERNEL_STACK;
-    top = END;
+    stack_paint(os_memory.bytes, BEGIN);
+    low = BEGIN;
+    high = END;
+    holes = no_hole.side[0] = no_hole.side[1] = &no_hole;
 }
 
 static uint16 round_up(uint16 size)
@@ -33,184 +50,207 @@ static uint16 round_up(uint16 size)
     return (uint16)((size + (HEAP_STEP - 1u)) & ~(HEAP_STEP - 1u));
 }
 
-/* Where the list of a size begins: list n holds blocks of (n + 1) * HEAP_STEP bytes, and a list head is HEAP_STEP
- * long. */
-static block **list_of(uint16 size)
+/* How much is in use, and the most of it: noted before it becomes less and when somebody asks, not on each taking. */
+HAL_OUTLINE void heap_note_use(void)
 {
-    return (block **)(void *)((uint8 *)small + size - HEAP_STEP);
-}
-
-/* The peak is the largest extent; it is noted before the extent shrinks and when somebody asks, not on each taking. */
-void heap_note_peak(void)
-{
-    uint16 extent = (uint16)(SYS_HEAP - (top - brk));
-    if (extent > os_statistics.heap_peak) {
-        os_statistics.heap_peak = extent;
+    uint16 used = HAL_LOAD(os_statistics.heap_used);
+    if (used > os_statistics.heap_peak) {
+        os_statistics.heap_peak = used;
     }
 }
 
-static bool is_small(uint16 size)
+/* ---- The tree: slice locked ----------------------------------------------------------------------------------- */
+
+static HAL_INLINE uint16 offset_of(const void *at)
 {
-    return size <= HEAP_CLASSES * HEAP_STEP;
+    return (uint16)((const uint8 *)at - os_memory.bytes);
 }
 
-/* Devices locked. */
-static HAL_INLINE void push_small(void *freed, uint16 size)
+static HAL_INLINE uint16 *last_step(uint8 *end)
 {
-    block *b = freed;
-    b->next = *list_of(size);
-    *list_of(size) = b;
+    return (uint16 *)(void *)(end - HEAP_STEP);
 }
 
-/* From a larger free block. At most HEAP_CLASSES short locks. */
-static void *split_small(uint16 size)
+/* The link to the hole that begins there, or to nothing. */
+static HAL_OUTLINE hole **find_hole(uintptr_t at)
 {
-    block *b = NULL;
-    for (uint16 rest = HEAP_STEP; b == NULL && is_small((uint16)(size + rest)); rest += HEAP_STEP) {
-        block **list = list_of((uint16)(size + rest));
-        hal_lock_state lock = hal_lock_devices();
-        b = *list;
-        if (b != NULL) {
-            *list = b->next;
-            push_small((uint8 *)b + size, rest);
-            os_statistics.heap_used += size;
+    hole **link = &holes;
+    uint16 offset = (uint16)(at - (uintptr_t)os_memory.bytes);
+    for (uint16 bit = TOP_BIT; *link != &no_hole && (uintptr_t)*link != at; bit >>= 1) {
+        link = offset & bit ? &(*link)->side[1] : &(*link)->side[0];
+    }
+    return link;
+}
+
+/* From the top downwards whoever is larger stays, the other goes on into its half. */
+static HAL_OUTLINE void put_hole(void *at, uint16 size)
+{
+    hole *h = at, **link = &holes;
+    uint16 bit = TOP_BIT;
+    h->size = size;
+    *last_step((uint8 *)at + size) = size;
+    do {
+        hole *stays = *link;
+        if (stays->size < h->size) {
+            *link = h;
+            h->side[0] = stays->side[0];
+            h->side[1] = stays->side[1];
+            h = stays;
+            stays = *link;
         }
-        hal_unlock(lock);
-    }
-    return b;
+        link = offset_of(h) & bit ? &stays->side[1] : &stays->side[0];
+        bit >>= 1;
+    } while (h != &no_hole);
 }
 
-/* When memory is short, brk moves down over the free small blocks that touch it, so that memory once used for one size
- * serves another. ISRs never give, so a list may be taken apart while they find it empty. At most f rounds for f free
- * small blocks; NULL: brk did not move. */
-static HAL_OUTLINE uint8 *shrink_small(void)
+/* Out of the tree: the larger of the two below fills the gap, and so on downwards. */
+static HAL_OUTLINE hole *pull_hole(hole **link)
 {
-    uint8 *lowest = NULL;
-    uint16 size = 0;
-    heap_note_peak();
-    while (is_small(size += HEAP_STEP)) {
-        uint16 from = size;
-        block *next;
-        hal_lock_state lock = hal_lock_devices();
-        block *b = *list_of(from);
-        *list_of(from) = NULL;
-        hal_unlock(lock);
-        for (; b != NULL; b = next) {
-            next = b->next;
-            lock = hal_lock_devices();
-            if ((uint8 *)b + from == brk) {
-                brk = (uint8 *)b;
-                lowest = brk;
-                size = 0; /* look at all again */
-            } else {
-                push_small(b, from);
-            }
-            hal_unlock(lock);
+    hole *gone = *link, *left = gone->side[0], *right = gone->side[1];
+    while (left != right) { /* not both nothing */
+        hole *next;
+        if (left->size >= right->size) {
+            *link = left;
+            link = &left->side[0];
+            next = left->side[1];
+            left->side[1] = right;
+            left = left->side[0];
+            right = next;
+        } else {
+            *link = right;
+            link = &right->side[1];
+            next = right->side[0];
+            right->side[0] = left;
+            right = right->side[1];
+            left = next;
         }
     }
-    return lowest;
+    *link = &no_hole;
+    return gone;
 }
 
-/* Large blocks are cut at their end, or taken whole. */
-static void *take_listed(uint16 size)
+/* ---- The reserve ------------------------------------------------------------------------------------------------ */
+
+static HAL_INLINE uint16 reserve(void)
 {
-    block *b, *before = &large;
-    for (; (b = before->next) != NULL; before = b) {
-        if (b->size == size) {
-            before->next = b->next;
-        } else if (b->size < size + sizeof *b) {
-            continue;
-        }
-        b->size -= size;
-        return (uint8 *)b + b->size;
+    return (uint16)(high - HAL_LOAD(low));
+}
+
+/* Slice locked. */
+static HAL_OUTLINE void join_run(void)
+{
+    uint8 *begin = run, *end = run_end;
+    bool apart = false;
+    if (begin == end) {
+        return;
     }
-    return NULL;
-}
-
-static void *take_large(uint16 size)
-{
-    void *b = take_listed(size);
+    run = run_end;
+    /* The size of a hole, if one ends here; if not, no hole begins so far below that ends here. */
+    hole **link = find_hole((uintptr_t)begin - *last_step(begin));
+    if ((uint8 *)*link + (*link)->size == begin) {
+        begin = (uint8 *)pull_hole(link);
+    }
+    end += pull_hole(find_hole((uintptr_t)end))->size; /* of nothing: 0 */
     hal_lock_state lock = hal_lock_devices();
-    if (b != NULL || (uint16)(top - brk) >= size) {
-        os_statistics.heap_used += size;
-        if (b == NULL) {
-            top -= size;
-            b = top;
-        }
+    if (end == low) {
+        low = begin;
+    } else if (begin == high) {
+        high = end;
+    } else {
+        apart = true;
     }
     hal_unlock(lock);
-    return b;
+    if (apart) {
+        put_hole(begin, (uint16)(end - begin));
+    }
 }
 
-static HAL_OUTLINE void join_next(block *b)
+/* Slice locked. A hole that is larger than the reserve changes places with it. */
+static HAL_OUTLINE uint16 renew_reserve(void)
 {
-    if ((uint8 *)b + b->size == (uint8 *)b->next) {
-        b->size += b->next->size;
-        b->next = b->next->next;
+    if (holes->size <= reserve()) {
+        return 0;
     }
+    hole *h = pull_hole(&holes);
+    hal_lock_state lock = hal_lock_devices();
+    uint8 *from = low, *to = high;
+    low = (uint8 *)h;
+    high = (uint8 *)h + h->size;
+    hal_unlock(lock);
+    if (from != to) {
+        put_hole(from, (uint16)(to - from));
+    }
+    return 1;
 }
 
-static void give_large(block *freed, uint16 size)
+void heap_settle(void)
 {
-    block *below = &large;
-    while (below->next != NULL && below->next < freed) {
-        below = below->next;
-    }
-    freed->size = size;
-    freed->next = below->next;
-    below->next = freed;
-    join_next(freed);
-    join_next(below);
-    if ((uint8 *)large.next == top) {
-        heap_note_peak();
-        top += large.next->size; /* one store, read by ISRs */
-        large.next = large.next->next;
-    }
+    join_run();
+    renew_reserve();
 }
 
-static HAL_OUTLINE void *take_slowly(uint16 size)
-{
-    void *taken = is_small(size) ? split_small(size) : take_large(size);
-    if (taken == NULL && !hal_in_isr() && shrink_small() != NULL) {
-        taken = heap_take(size); /* not deeper: brk is as low as it goes */
-    }
-    return taken;
-}
+/* ---- Taking and giving ------------------------------------------------------------------------------------------ */
 
+/* What remains of a piece is nothing, or enough for a hole. */
 void *heap_take(uint16 size)
 {
-    void *taken = NULL;
     if (HAL_ALLOCATION_FAILS()) {
         return NULL;
     }
     size = round_up(size);
-    if (is_small(size)) { /* from its list, or from the untouched memory */
-        block **list = list_of(size);
+    do {
         hal_lock_state lock = hal_lock_devices();
-        taken = *list;
-        if (taken != NULL) {
-            *list = (*list)->next;
+        uint8 *block = low, *rest = block + size;
+        if (HAL_LIKELY(high - rest >= (ptrdiff_t)sizeof(hole)) || rest == high) {
+            low = rest;
             os_statistics.heap_used += size;
-        } else if ((uint16)(top - brk) >= size) {
-            taken = brk;
-            brk += size;
-            os_statistics.heap_used += size;
+            hal_unlock(lock);
+            return block;
         }
         hal_unlock(lock);
+    } while (!hal_in_isr() && renew_reserve());
+    return NULL;
+}
+
+/* Down the left side, as far as there is room. */
+void *heap_keep(uint16 size)
+{
+    hole **link = NULL, **next = &holes;
+    while ((*next)->size >= size + sizeof(hole)) {
+        link = next;
+        next = &(*link)->side[0];
     }
-    return taken != NULL ? taken : take_slowly(size);
+    if (link == NULL) {
+        return heap_take(size);
+    }
+    if (HAL_ALLOCATION_FAILS()) {
+        return NULL;
+    }
+    hal_lock_state lock = hal_lock_devices();
+    os_statistics.heap_used += size;
+    hal_unlock(lock);
+    hole *h = pull_hole(link);
+    uint16 rest = (uint16)(h->size - size);
+    put_hole(h, rest);
+    return (uint8 *)h + rest;
+}
+
+void heap_give_later(void *freed, uint16 size)
+{
+    size = round_up(size);
+    heap_note_use();
+    hal_lock_state lock = hal_lock_devices();
+    os_statistics.heap_used -= size;
+    hal_unlock(lock);
+    if (freed != run_end) {
+        join_run();
+        run = freed;
+    }
+    run_end = (uint8 *)freed + size;
 }
 
 void heap_give(void *freed, uint16 size)
 {
-    size = round_up(size);
-    if (!is_small(size)) {
-        give_large(freed, size);
-    }
-    hal_lock_state lock = hal_lock_devices();
-    if (is_small(size)) {
-        push_small(freed, size);
-    }
-    os_statistics.heap_used -= size;
-    hal_unlock(lock);
+    heap_give_later(freed, size);
+    heap_settle();
 }

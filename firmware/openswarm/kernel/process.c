@@ -8,12 +8,13 @@ sys_pcb os_system;
 sys_pcb *os_running;
 sys_pcb *os_ring;
 sys_pcb *os_blocked;
+sys_process_config os_plain;
 
 sys_pcb **process_scan;
 
 static uint16 newest_pid;
-static uint16 critical_depth;
-static hal_lock_state critical_before;
+static volatile uint16 critical_depth;
+static volatile hal_lock_state critical_before;
 
 /* ---- Ring and blocked list: slice locked ---------------------------------------------------------------------- */
 
@@ -44,15 +45,21 @@ static HAL_OUTLINE void ring_remove(const sys_pcb *p)
     hal_barrier();
 }
 
-/* m becomes the wait result of a thread that waits for one. */
-static HAL_OUTLINE void unlink_blocked(sys_pcb *p, message *m)
+/* The link of the blocked list that points to p. */
+static HAL_OUTLINE sys_pcb **link_to(const sys_pcb *p)
 {
     sys_pcb **link = &os_blocked;
     while (*link != p) {
         link = &(*link)->next;
     }
-    *link = p->next;
-    hal_barrier();
+    return link;
+}
+
+/* m becomes the wait result of a thread that waits for one. */
+static HAL_OUTLINE void unlink_blocked(sys_pcb *p, message *m)
+{
+    sys_pcb **link = link_to(p);
+    HAL_STORE(*link, p->next);
     if (process_scan == &p->next) {
         process_scan = link;
     }
@@ -70,17 +77,14 @@ static void set_state(sys_pcb *p, sys_state state)
 static HAL_OUTLINE sys_pcb *leave_ring(event *awaited)
 {
     sys_pcb *self = os_running;
-    sys_pcb **link = &os_blocked;
     critical_depth = 0;
     ring_remove(self);
     self->awaited = awaited;
     set_state(self, SYS_BLOCKED);
     self->next = NULL;
-    while (*link != NULL) {
-        link = &(*link)->next;
-    }
+    sys_pcb **end = link_to(NULL);
     hal_barrier();
-    *link = self;
+    HAL_STORE(*end, self);
     return self;
 }
 
@@ -88,6 +92,8 @@ void process_wake(sys_pcb *p, message *m)
 {
     unlink_blocked(p, m);
     set_state(p, SYS_READY);
+    p->awaited = NULL;
+    p->own.error = SYS_OK;
     ring_append(p);
 }
 
@@ -159,10 +165,11 @@ static HAL_OUTLINE uint16 start(const sys_process_config *config, void (*entry)(
     }
     if (entry != NULL && is_valid(config, stack)) {
         uint8 *block = heap_take(size);
+        heap_settle();
         error = SYS_ERROR_MEMORY;
         if (block != NULL) {
-            sys_pcb *p = (sys_pcb *)(block + extra + stack);
-            stack_paint(block + extra, stack);
+            sys_pcb *p = (sys_pcb *)(void *)(block + extra + stack);
+            stack_paint(block + extra, p);
             if (hal_stack_init(p, block + extra, stack, entry, config->arg)) {
                 error = SYS_OK;
                 pid = unused_pid();
@@ -170,6 +177,7 @@ static HAL_OUTLINE uint16 start(const sys_process_config *config, void (*entry)(
                 p->status = (uint8)config->flags; /* and SYS_NEW */
                 p->priority = config->priority;
                 p->block = block;
+                p->own.error = SYS_OK;
                 p->wait.result = NULL;
                 p->awaited = NULL;
                 if (extra != 0) {
@@ -192,8 +200,7 @@ union callable { /* a thread function without argument, in the place of one with
 
 uint16 Sys_Start_Process(sys_function f)
 {
-    static const sys_process_config plain; /* all defaults */
-    return start(&plain, ((union callable){f}).with_argument);
+    return start(&os_plain, ((union callable){f}).with_argument);
 }
 
 uint16 Sys_Start_ProcessWith(const sys_process_config *config)
@@ -229,10 +236,11 @@ static sys_pcb *retire_running(void)
 
 void Sys_Run_SystemThread(void)
 {
-    if (os_running == &os_system && os_enter_blocking() == SYS_OK) {
+    if (os_running != &os_system) {
+        (void)os_refuse();
+    } else if (os_enter_blocking() == SYS_OK) {
         hal_abandon(retire_running);
     }
-    (void)os_refuse();
 }
 
 /* ---- Critical sections ------------------------------------------------------------------------------------------ */
@@ -240,15 +248,22 @@ void Sys_Run_SystemThread(void)
 void Sys_Start_CriticalSection(void)
 {
     hal_lock_state before = hal_lock_slice();
-    if (critical_depth++ == 0) { /* an ISR in between leaves the depth as it was */
+    uint16 depth = critical_depth;
+    HAL_STORE(critical_depth, (uint16)(depth + 1u)); /* an ISR before or behind it leaves the depth as it was */
+    if (depth == 0) {
         critical_before = before;
     }
 }
 
 void Sys_End_CriticalSection(void)
 {
-    if (critical_depth != 0 && --critical_depth == 0) {
-        hal_unlock(critical_before);
+    hal_lock_state before = critical_before; /* first: at depth 0 the section of an ISR stores its own */
+    uint16 depth = critical_depth;
+    if (depth != 0) {
+        HAL_STORE(critical_depth, (uint16)(depth - 1u));
+        if (depth == 1) {
+            hal_unlock(before);
+        }
     }
 }
 
@@ -272,11 +287,8 @@ sys_error os_enter_blocking(void)
 
 bool os_leave(sys_error error)
 {
-    if (error != SYS_OK) {
-        (void)os_fail(error);
-    }
     Sys_End_CriticalSection();
-    return error == SYS_OK;
+    return error == SYS_OK || os_fail(error);
 }
 
 /* ---- End -------------------------------------------------------------------------------------------------------- */
@@ -293,10 +305,12 @@ static HAL_OUTLINE void bury(sys_pcb *p)
     event_drop_subscriptions(p->pid);
     event_release_result(p);
     if (os_running == p) {
-        os_running = &os_system;
+        HAL_STORE(os_running, &os_system);
     }
     hal_stack_release(p);
+    uint16 pid = p->pid;
     heap_give(p->block, (uint16)((uint8 *)(p + 1) - p->block));
+    (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
 }
 
 sys_pcb *process_end_running(void)
@@ -321,8 +335,8 @@ bool Sys_Kill_Process(uint16 pid)
     if (pid != 0) {
         sys_pcb *p = process_find(pid);
         if (p != NULL) {
-            if (p == os_running && !os_delivering) {
-                hal_abandon(process_end_running);
+            if (p == os_running && !os_in_kernel) {
+                os_thread_returned();
             }
             bury(p);
             error = SYS_OK;
@@ -341,10 +355,12 @@ uint16 Sys_Get_ProcessID(void)
 sys_state Sys_Get_ProcessState(uint16 pid)
 {
     sys_state state = SYS_UNKNOWN;
-    Sys_Start_CriticalSection();
+    if (os_enter() != SYS_OK) {
+        return state;
+    }
     const sys_pcb *p = process_find(pid);
     if (p != NULL) {
-        state = (p == os_running && !os_delivering) ? SYS_RUNNING : (sys_state)(p->status & OS_STATE);
+        state = (p == os_running && !os_in_kernel) ? SYS_RUNNING : (sys_state)(p->status & OS_STATE);
     }
     Sys_End_CriticalSection();
     return state;

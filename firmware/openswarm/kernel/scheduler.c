@@ -3,7 +3,7 @@
 
 volatile uint16 os_pending;
 bool os_eager;
-volatile uint16 os_delivering;
+volatile bool os_in_kernel;
 
 static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
 
@@ -11,7 +11,6 @@ static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
 
 static void work(void)
 {
-    os_delivering = 1;
     event_deliver_queued();
     if (os_pending & OS_ALARM) {
         hal_lock_state lock = hal_lock_devices();
@@ -19,35 +18,40 @@ static void work(void)
         hal_unlock(lock);
         clock_wake_due();
     }
-    os_delivering = 0;
+#if !HAL_STACK_TRAPS
     if (!kernel_stack_is_intact()) {
         os_trap(OS_STACK, 0, 0);
     }
+#endif
 }
 
 static HAL_INLINE sys_pcb *dispatch(sys_pcb *next)
 {
-    os_running = next;
+    HAL_STORE(os_running, next);
     hal_slice_restart(); /* handlers are over: the whole slice belongs to next */
     return next;
 }
 
 sys_pcb *os_schedule(void)
 {
+    hal_guard_kernel_stack();
+    os_in_kernel = true;
     if ((os_pending & OS_WORK) != 0) {
         work();
     }
     while (os_ring == NULL) {
-        os_running = &os_system;
+        HAL_STORE(os_running, &os_system);
         hal_idle(&os_pending);
         work();
     }
-    if (pick_thread != NULL) {
-        const sys_pcb *next = pick_thread(os_ring->next);
+    sys_pcb *(*pick)(sys_pcb *) = HAL_LOAD(pick_thread);
+    if (pick != NULL) {
+        const sys_pcb *next = pick(os_ring->next);
         while (os_ring->next != next) {
             os_ring = os_ring->next;
         }
     }
+    os_in_kernel = false;
     return dispatch(os_ring->next);
 }
 
@@ -69,8 +73,11 @@ void Sys_Yield(void)
     }
 }
 
-void Sys_Set_Scheduler(const sys_scheduler *scheduler)
+bool Sys_Set_Scheduler(const sys_scheduler *scheduler)
 {
+    if (scheduler == NULL) {
+        return os_fail(SYS_ERROR_ARGUMENT);
+    }
     hal_lock_state lock = hal_lock_devices();
     pick_thread = scheduler->pick;
     os_eager = scheduler->eager;
@@ -79,6 +86,7 @@ void Sys_Set_Scheduler(const sys_scheduler *scheduler)
         os_pending &= (uint16)~OS_CHOICE;
     }
     hal_unlock(lock);
+    return true;
 }
 
 /* ---- Schedulers ------------------------------------------------------------------------------------------------- */
@@ -121,7 +129,8 @@ static bool is_late(const periodic *timing, uint16 now)
     return (sint16)(now - timing->due) > 0;
 }
 
-/* Threads without a period run when no periodic thread is ready. */
+/* A job that is late has no deadline to meet any more: it takes turns with the threads without a period, which run when
+ * no job is on time. So whatever it does, it starves nobody. */
 static sys_pcb *earliest_deadline(sys_pcb *first)
 {
     uint16 now = clock_now();
@@ -129,12 +138,11 @@ static sys_pcb *earliest_deadline(sys_pcb *first)
     const periodic *earliest = NULL;
     sys_pcb *p = first;
     do {
-        if (p->status & SYS_PERIODIC) {
+        if ((p->status & (SYS_PERIODIC | OS_MISSED)) == SYS_PERIODIC) {
             const periodic *timing = process_periodic(p);
-            if (is_late(timing, now) && !(p->status & OS_MISSED)) {
+            if (is_late(timing, now)) {
                 report_miss(p);
-            }
-            if (earliest == NULL || (sint16)(timing->due - earliest->due) < 0) {
+            } else if (earliest == NULL || (sint16)(timing->due - earliest->due) < 0) {
                 earliest = timing;
                 best = p;
             }

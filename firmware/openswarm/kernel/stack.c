@@ -5,11 +5,12 @@
 
 enum { PAINT = 0xA5 };
 
-void stack_paint(uint8 *stack, uint16 bytes)
+HAL_OUTLINE void stack_paint(void *begin, const void *end)
 {
-    while (bytes-- > 0) {
-        *stack++ = PAINT;
-    }
+    volatile uint16 *word = begin; /* volatile: as a call of memset it takes more room */
+    do {
+        *word++ = PAINT * 0x101u;
+    } while (word != end);
 }
 
 static uint16 unused(const uint8 *stack, uint16 bytes)
@@ -33,11 +34,18 @@ static uint16 unused(const uint8 *stack, uint16 bytes)
 uint16 Sys_Get_UnusedStack(uint16 pid)
 {
     uint16 bytes = 0;
-    Sys_Start_CriticalSection();
+    if (os_enter() != SYS_OK) {
+        return 0;
+    }
     const sys_pcb *p = process_find(pid);
     if (p != NULL && p->block != NULL) {
         const uint8 *stack = p->block + ((p->status & SYS_PERIODIC) ? sizeof(periodic) : 0);
+#ifdef HAL_STACK_GROWS_DOWN
+        stack += HAL_STACK_GUARD;
+        bytes = unused(stack, (uint16)((const uint8 *)p - stack));
+#else
         bytes = unused(stack, (uint16)((const uint8 *)p - stack - HAL_STACK_GUARD));
+#endif
     }
     Sys_End_CriticalSection();
     return bytes;
@@ -45,7 +53,7 @@ uint16 Sys_Get_UnusedStack(uint16 pid)
 
 uint16 Sys_Get_UnusedKernelStack(void)
 {
-    return unused(os_memory.bytes, SYS_KERNEL_STACK);
+    return unused(os_memory.bytes, SYS_KERNEL_STACK - HAL_KERNEL_STACK_GUARD);
 }
 
 bool kernel_stack_is_intact(void)

@@ -217,6 +217,22 @@ def test_mirrors_turn_the_picture():
     assert np.array_equal(data, rgb565(picture[rows][:, columns]))
 
 
+@pytest.mark.parametrize(("mirrors", "turned"), [(0x00, {"PO6030K"}), (0xC0, {"PO8030D"})])
+def test_equal_mirrors_turn_the_pictures_of_the_two_banked_sensors_against_each_other(mirrors, turned):
+    """§7.1: the library sets both mirrors for PO6030K and none for PO8030D, and gets upright pictures."""
+    picture = np.zeros((480, 640, 3), np.uint8)
+    picture[:240, :320, 0] = 255
+    for sensor, register in (("PO6030K", 0x90), ("PO8030D", 0x6C)):
+        robot = Robot(camera=sensor)
+        robot.board.camera.show(picture)
+        robot.configure([(1, 0x38 if sensor == "PO6030K" else 0x4E, 0x08 if sensor == "PO6030K" else 0x30),
+                         (0, register, mirrors)])  # fmt: skip
+        red = robot.board.camera.frame()[:, :, 0] > 128
+        corner = red[-1, -1] if sensor in turned else red[0, 0]
+        assert corner
+        assert red[0, 0] + red[0, -1] + red[-1, 0] + red[-1, -1] == 1
+
+
 def test_yuv_and_grey_follow_bt601():
     """§7.4: U Y V Y; grey is Y."""
     robot = Robot()
@@ -340,7 +356,7 @@ def test_po8030d_delivers_the_openswarm_window():
     robot = Robot(camera="PO8030D")
     picture = scene()
     robot.board.camera.show(picture)
-    window = {0x08: 0x00, 0x09: 0x3B, 0x10: 0x00, 0x11: 0xA0, 0x12: 0x01, 0x13: 0xE4, 0x6A: 0x02, 0x6C: 0xC0}
+    window = {0x08: 0x00, 0x09: 0x3B, 0x10: 0x00, 0x11: 0xA0, 0x12: 0x01, 0x13: 0xE4, 0x6A: 0x02, 0x6C: 0x00}
     mode = {0x4E: 0x30, 0xB7: 3, 0x93: 0x80, 0x94: 0x80}
     robot.configure([*((0, reg, value) for reg, value in window.items()), *((1, r, v) for r, v in mode.items())])
     pixels = capture(robot, 20, 2 * 40, skip_lines=1).reshape(20, 40, 2)[:, ::2]

@@ -71,3 +71,21 @@ def test_a_scan_at_the_vendors_rate_needs_no_python(program):
     assert machine.peek("rounds") - rounds > 900
     assert machine.runner.counts.interpreted - before < 10
     assert [machine.peek(machine.address_of("seen") + 2 * i) for i in range(2)] == [2048, 2048]
+
+
+@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+def test_one_late_interrupt_does_not_shift_the_channels_for_good(program, engine):
+    """dspic30f6014a.md §13: the scan starts again behind every interrupt. Interrupt 5 comes when a round of five has
+    three results; the round after the next has its own channels again."""
+    image = load_image(program("late.c"))
+    machine = Machine(image.chip, engine=engine)
+    machine.load(image)
+    for channel in range(16):
+        machine.peripherals.adc.set_input(channel, 100 * channel << 4)
+    machine.run(cycles=70_000)
+    assert machine.peek("rounds") >= 24
+    at = machine.address_of("seen")
+    rows = [[machine.peek(at + 10 * row + 2 * place) for place in range(5)] for row in range(24)]
+    three, five = [200, 300, 400], [900, 1000, 1100, 1200, 1300]
+    assert rows[2:5] == [three + five[3:], five, three + five[3:]]
+    assert rows[7:24] == [five if row % 2 else three + five[3:] for row in range(7, 24)]

@@ -77,8 +77,14 @@ def test_a_debugger_word_ends_the_run_with_w0_as_status(build):
     [
         ("main:\nmov #0x801, w1\nmov [w1], w2\nnop\n", "address error trap"),
         ("main:\nclr w2\nclr w3\nrepeat #17\ndiv.u w3, w2\nnop\n", "math error trap"),
-        ("main:\nmov #0x400, w15\npush w0\nnop\nnop\nnop\n", "stack error trap"),
-        ("main:\nmov #0x900, w0\nmov w0, {SPLIM}\nmov w0, w15\npush w0\npush w0\nnop\nnop\n", "stack error trap"),
+        (
+            "main:\nmov #0x400, w15\npush w0\nnop\nnop\nnop\n",
+            "stack underflow: W15 is 0x0400, below RAM (stack error trap, no handler), at 0x000102",
+        ),
+        (
+            "main:\nmov #0x900, w0\nmov w0, {SPLIM}\nmov w0, w15\npush w0\npush w0\nnop\nnop\n",
+            "stack overflow: W15 is 0x0904, the limit 0x0900",
+        ),
         ("main:\nmov [w1], w2\n", "W1 is used as an address pointer before it was written"),
         ("main:\n.pword 0xDB0000\n", "illegal opcode DB0000"),
         ("main:\nbset {IEC0}, #3\nbset {IFS0}, #3\nnop\nnop\nnop\n", "T1Interrupt, no handler,"),
@@ -118,7 +124,10 @@ def test_a_firmware_that_sleeps_inside_a_trap_has_given_up(build, capfd):
     )
     assert main(["run", path]) == 1
     err = capfd.readouterr().err
-    assert "AddressError trap, in whose handler the firmware went to sleep, at 0x00010a (_forever)" in err
+    assert (
+        "reading 2 bytes at 0x0801, an odd address, in whose handler the firmware went to sleep, at 0x000102 (main"
+        in err
+    )
 
 
 @pytest.mark.parametrize(
@@ -314,7 +323,7 @@ def test_a_run_on_a_terminal_takes_typed_input(build):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["--uart2", "-"], "only one UART can have standard output"),
+        (["--uart2", "-"], "only one of UARTs, --trace, --record and --json can have standard output"),
         (["--uart1", "tcp:x"], "expected tcp:PORT"),
         (["--uart1", "/nowhere/log"], "/nowhere/log: No such file or directory"),
         (["--break", "nowhere"], "no symbol 'nowhere'"),

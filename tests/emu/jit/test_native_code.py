@@ -95,6 +95,28 @@ def test_interrupts_are_entered_and_left_without_python() -> None:
     assert native.runner.counts.interpreted < 40
 
 
+@pytest.mark.parametrize("watchdog", [False, True])
+def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bool) -> None:
+    """A boot loader's loop stays in native code while the watchdog is off; latches and NVMADR come out right."""
+    firmware = counting_firmware()
+    at = next(a for a in range(0x100, 0x400, 2) if firmware.flash.get(a) == words_of("BRA Expr", n=-2)[0])
+    loop = [*words_of("CLRWDT"), *words_of("DISI #lit14", k=3), *to_sfr("TBLPAG", 0x7F), *literal(0xF000, 4)]
+    loop += words_of("TBLWTL{.B} Ws, [Wd]", B=0, s=1, p=0, d=4, q=2)
+    loop += words_of("TBLWTH{.B} Ws, [Wd]", B=1, s=1, p=0, d=4, q=3)
+    loop += [*to_sfr("TBLPAG", 0), *words_of("TBLWTL{.B} Ws, [Wd]", B=1, s=1, p=0, d=4, q=3)]
+    firmware.put(at, loop + words_of("BRA Expr", n=-len(loop) - 2))
+    plain, native = pair(firmware)
+    for machine in (plain, native):
+        if not watchdog:
+            machine.program.put(machine.chip.config["FWDT"].address, 0x7FFF)
+            machine.reset("POR")
+    for cycles in (1, 50_000, 17, 3_000):
+        assert plain.run(cycles) == native.run(cycles)
+        assert not difference(plain, native)
+    assert isinstance(native.runner, JitEngine)
+    assert (native.runner.counts.interpreted > 1_000) == watchdog
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_hooks_are_called_at_each_arrival_and_the_code_around_them_is_native(seed: int) -> None:
     """Regions are translated with the hooks in them: same calls in the same cycles, same records."""

@@ -17,8 +17,7 @@ from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.builder import Surroundings
-from emu.dspic30f.jit.devices import native_registers
-from emu.dspic30f.jit.engine import access_kinds, offsets
+from emu.dspic30f.jit.engine import access_kinds, latches_of, offsets
 from emu.dspic30f.jit.polling import empty_loops
 from emu.dspic30f.jit.region import discover
 from emu.machine import Machine
@@ -74,8 +73,9 @@ def loops_of(words: list[int]) -> int:
         return decode_for_execution(flash[pc >> 1], flash[(pc >> 1) + 1])
 
     reads, writes = access_kinds(machine.core)
-    around = Surroundings(offsets(machine.core), reads, writes, 0xFFFF, False, 0x10000, (), 0, (), 0, 0, 0,
-                          native_registers(machine.core))
+    rules = {2 * word: rule for word, rule in enumerate(machine.core.bus.rules) if rule is not None}
+    around = Surroundings(offsets(machine.core), reads, writes, 0xFFFF, False, 0x10000, (), 0, (), 0, (), 0, 0,
+                          latches_of(machine.core), rules)
     return len(empty_loops(discover(START, fetch), around, context_of(0x20, 0, 0, 0)))
 
 

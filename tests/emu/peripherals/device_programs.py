@@ -1,104 +1,368 @@
-"""Random programs that do little else than access device registers, and their comparison between engines."""
+"""Random programs that do little else than access device registers, and their comparison between engines.
+
+Every register of every device is touched: words and bytes, by address and by pointer, read, written and both, plainly,
+under REPEAT, in DO loops (also as their last instruction), in handlers, with the module on or switched off, awake,
+after Idle and Sleep. Timers with short periods let their events fall on every cycle of these accesses. A robot is
+around the chip or not; bytes, edges, levels and light come from outside at odd cycles. All follows from the seed.
+"""
 
 from __future__ import annotations
 
 import random
 import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cpu"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "jit"))
 
-from cpu_rig import Rig
+import numpy as np
+from cpu_rig import START, assemble
+from twins import QuickCompiler
 
+from emu.boards.epuck.board import Epuck
 from emu.chips.dspic30f6014a import INTERRUPTS, SFRS, VECTORS
+from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.specialised import SpecialisedEngine
+from emu.machine import Machine
 
-LENGTH = 60
+from .device_scenes import SCENES
+
+LENGTH = 45
 """Statements in the loop of a program."""
-CHUNK = 2500
-"""Tcy between two looks at both machines."""
-_LEFT_ALONE = ("NVM", "OSCCON", "PMD", "INTTREG", "C1", "C2")
-_POOL = [s for s in SFRS.values() if s.size == 2 and s.address >= 0x80 and not s.name.startswith(_LEFT_ALONE)]
-_BUSY = ("T", "PR", "U1", "LAT", "PORT", "IFS", "IEC", "IPC", "ADC", "I2C", "SPI", "IC1", "OC1", "DCI", "CN")
-_HOT = [s for s in _POOL if s.name.startswith(_BUSY)]
-_STATUS = [s for s in _HOT if s.name.startswith(("TMR", "PR1", "PR3", "PORT", "LAT", "IFS", "U1STA", "U1TXREG"))]
-"""What programs touch again and again while their devices keep their settings."""
-_INPUTS = ("RD4", "RF6", "RC3", "RC14")
+CHUNKS = 14
+"""Looks at the machines, some hundred to a few thousand Tcy apart."""
+REGIONS = 40
+"""Compiled pieces after which a program is left: it goes through processor modes, each of which has code of its own."""
+STACK, BUFFER = 0x2400, 0x1000
+FIRST = SFRS["INTCON1"].address
+WORDS = [sfr for sfr in SFRS.values() if sfr.size == 2 and sfr.address >= FIRST]
+NAMES = {sfr.address: sfr.name for sfr in WORDS}
+_CONTROL = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
+"""Drawn less often: they stop, reset or switch off everything else."""
+_FAMILIES = ({"TMR", "PR", "T"}, {"PORT", "LAT", "TRIS", "CNEN", "CNPU"}, {"IFS", "IEC", "IPC", "INTCON"},
+             {"ADCON", "ADCBUF", "ADCHS", "ADCSSL", "ADPCFG"}, {"NVMCON", "NVMADR", "NVMADRU", "NVMKEY"},
+             {"DCICON", "DCISTAT", "TSCON", "RSCON", "RXBUF", "TXBUF"})  # fmt: skip
+"""Registers of one device whose names begin differently; those of others share the letters in front of the number."""
+HOT = 14
+"""Registers a program is about."""
+_INPUTS = ("RD4", "RF6", "RC3", "RC14", "RA12", "RA13", "RD8", "RD9", "RF2", "RF3", "RG2", "RG3", "RC1", "RC2", "RF0",
+           "RG13", "RF7", "RB5", "RB12")  # fmt: skip
 
 
-def _scenes(draw: random.Random) -> list[str]:
-    """Settings under which devices are at work: a timer with interrupts, a pair, a scan, PWM, a UART, the bus."""
-    timer = draw.choice((1, 3, 4, 5))
-    settings = {
-        "timer": {f"PR{timer}": draw.choice((3, 17, 40, 99, 500)), f"T{timer}CON": 0x8000 | draw.randrange(4) << 4},
-        "pair": {"PR2": draw.randrange(200), "PR3": draw.choice((0, 0, 1)), "T2CON": 0x8008},
-        "scan": {"ADCSSL": 0x111C, "ADCON2": 0x0410, "ADCON3": 0x0100 | draw.randrange(40), "ADCON1": 0x80E4},
-        "pwm": {"PR2": 99, "OC1RS": draw.randrange(120), "OC1CON": draw.choice((3, 5, 6)), "T2CON": 0x8000},
-        "uart": {"U1BRG": draw.choice((0, 1, 7)), "U1MODE": 0x8000 | draw.choice((0, 0x40)), "U1STA": 0x8400},
-        "bus": {"I2CBRG": draw.randrange(40), "I2CCON": 0x9001},
-        "ports": {"TRISD": draw.choice((0, 0xFF00)), "TRISA": 0, "CNEN1": 0x6000},
-    }
-    lines = []
-    for name in draw.sample(sorted(settings), 4):
-        for register, value in settings[name].items():
-            lines += [f"mov #{value}, w0", f"mov w0, {SFRS[register].address:#x}"]
-    lines += ["mov #0xFFFF, w0", *(f"mov w0, {SFRS[name].address:#x}" for name in ("IEC0", "IEC1"))]
-    return lines
+@dataclass
+class Writer:
+    """Writes the statements of one program and counts the ways in which it touches registers."""
+
+    draw: random.Random
+    pool: list[Any]
+    touched: Counter[tuple[str, str]] = field(default_factory=Counter)
+    """By register and way."""
+    loops: int = 0
+
+    def sfr(self) -> Any:
+        """A register, mostly of the devices this program is about."""
+        chosen = self.draw.choice(self.pool if self.draw.random() < 0.85 else WORDS)
+        return self.draw.choice(WORDS) if chosen.name in _CONTROL and self.draw.random() < 0.9 else chosen
+
+    def note(self, sfr: Any, way: str) -> str:
+        """Its address as text, noted as touched."""
+        self.touched[sfr.name, way] += 1
+        return f"{sfr.address:#x}"
+
+    def data(self) -> str:
+        """A register of the main program that holds data."""
+        return f"w{self.draw.randrange(8)}"
+
+    def direct(self, place: str) -> str:
+        """One one-word instruction with a register by its address."""
+        draw, sfr, w = self.draw, self.sfr(), self.data()
+        odd = draw.randrange(2)
+        bit, bit8 = draw.randrange(16), draw.randrange(8)
+        low = sfr.address < 0x1FFE
+        word, byte = self.note(sfr, f"{place} word"), f"{sfr.address + odd:#x}"
+        forms = [f"mov {w}, {word}", f"mov {word}, {w}", f"mov {w}, {word}", f"mov {word}, {w}", f"push {word}",
+                 f"pop {word}"]  # fmt: skip
+        if low:
+            forms += [f"inc {word}", f"xor {word}", f"btg {word}, #{bit}", f"cp0 {word}", f"ior {word}, WREG",
+                      f"setm {word}", f"sl {word}"]  # fmt: skip
+            if draw.random() < 0.45:
+                self.note(sfr, f"{place} byte")
+                forms = [f"mov.b {byte}, WREG", f"mov.b WREG, {byte}", f"bset.b {byte}, #{bit8}", f"clr.b {byte}"]
+                forms += [f"bclr.b {byte}, #{bit8}", f"inc.b {byte}", f"com.b {byte}, WREG", f"and.b {byte}"]
+        return draw.choice(forms)
+
+    def pointer(self, place: str, p: str = "w8", q: str = "w9") -> list[str]:
+        """A pointer to a register and one instruction through it."""
+        draw, sfr, w = self.draw, self.sfr(), self.data()
+        start = draw.choice((0, 0, 2, -2))
+        moved = {0: f"[{p}]", 2: draw.choice((f"[--{p}]", f"[{p}-2]")), -2: f"[++{p}]"}[start]
+        if start == 0 and draw.random() < 0.5:
+            moved = draw.choice((f"[{p}++]", f"[{p}--]"))
+        offset = moved.endswith("-2]")
+        if draw.random() < 0.4 and start == 0:
+            self.note(sfr, f"{place} pointer byte")
+            start = draw.randrange(2)
+            forms = [f"mov.b {w}, {moved}", f"mov.b {moved}, {w}", f"inc.b {moved}, {w}", f"ior.b {w}, #5, {moved}"]
+            if "+" not in moved and "--" not in moved:
+                forms += [f"bset.b [{p}], #{draw.randrange(8)}", f"inc.b [{p}], [{p}]"]
+        else:
+            self.note(sfr, f"{place} pointer word")
+            forms = [f"mov {w}, {moved}", f"mov {moved}, {w}"]
+            if not offset:
+                forms += [f"add {w}, {moved}, {w}", f"mov {moved}, [{q}]", f"mov [{q}], {moved}", f"cp0 {moved}"]
+            if start == 0:
+                forms += [f"btg [{p}], #{draw.randrange(16)}", f"inc [{p}], [{p}]", f"btss [{p}], #3"]
+                forms += [f"mov.d [{p}], w2", f"mov.d w4, [{p}]"]
+        target = BUFFER + 2 * draw.randrange(64)
+        return [f"mov #{sfr.address + start:#x}, {p}", f"mov #{target:#x}, {q}", draw.choice(forms)]
+
+    def repeated(self, place: str) -> list[str]:
+        """REPEAT and an access, by address or walking along registers."""
+        draw, sfr, count = self.draw, self.sfr(), self.draw.choice((0, 1, 2, 3, 7, 15))
+        self.note(sfr, f"{place} REPEAT")
+        word = f"{sfr.address:#x}"
+        head = f"repeat #{count}"
+        if draw.random() < 0.5:
+            forms = (f"mov {word}, w1", f"mov w1, {word}", f"inc {word}", f"btg.b {word}, #1", f"push {word}")
+            return [head, draw.choice(forms)]
+        form = draw.choice(("mov [w8++], [w9++]", "mov [w9++], [w8++]", "mov [w8], [w9++]", "mov.b [w8++], [w9++]",
+                            "mov w3, [w8++]", "inc [w8], [w8++]", "add w0, [w8++], w0"))  # fmt: skip
+        return [f"mov #{sfr.address:#x}, w8", f"mov #{BUFFER + 0x100:#x}, w9", head, form]
+
+    def loop(self) -> list[str]:
+        """A DO loop; its last instruction is an access too."""
+        self.loops += 1
+        label = f"end{self.loops}"
+        body = [line for _ in range(self.draw.randrange(1, 4)) for line in self.statement("DO", plain=True)]
+        last = self.direct("DO end")
+        return [f"do #{self.draw.choice((0, 1, 2, 5))}, {label}", *body, "nop", f"{label}: {last}"]
+
+    def statement(self, place: str = "", plain: bool = False) -> list[str]:
+        """One of the things a program does."""
+        draw, kind = self.draw, self.draw.random()
+        if kind < 0.42:
+            return [self.direct(place)]
+        if kind < 0.66:
+            return self.pointer(place)
+        if kind < 0.74:
+            return self.repeated(place)
+        if kind < 0.80:
+            return [f"btss {self.note(self.sfr(), 'skip')}, #{draw.randrange(8)}", self.direct(place)]
+        if plain:
+            return ["nop"] * draw.randrange(3)
+        if kind < 0.86:
+            return self.loop()
+        if kind < 0.90:
+            return [f"repeat #{draw.randrange(40)}", "nop"]
+        if kind < 0.91:
+            return self.nap()
+        if kind < 0.94:
+            return [draw.choice((f"disi #{draw.randrange(20)}", "clrwdt", f"mov w{draw.randrange(8)}, 0x42"))]
+        if kind < 0.955:
+            return [draw.choice(("tblwtl w1, [w9++]", "tblwth.b w1, [w9]", "tblrdl [w9++], w2"))]
+        if kind < 0.96:
+            name = draw.choice(("PMD1", "PMD2"))
+            return [f"mov #{draw.choice((0, 0, draw.randrange(0x10000)))}, w0", f"mov w0, {SFRS[name].address:#x}"]
+        if kind < 0.97:
+            return self.setting()
+        return [f"add {self.data()}, {self.data()}, {self.data()}"]
+
+    def nap(self) -> list[str]:
+        """Idle until timer 1 matches; rarely Sleep until somebody outside pulls INT0."""
+        at = {name: f"{SFRS[name].address:#x}" for name in ("PR1", "T1CON", "IEC0", "IPC0", "PMD1")}
+        wake = [f"mov #{self.draw.choice((3, 20, 60, 150))}, w0", f"mov w0, {at['PR1']}", f"bclr {at['PMD1']}, #11",
+                "mov #0x8000, w0", f"mov w0, {at['T1CON']}", f"bset {at['IEC0']}, #3", f"bset {at['IEC0']}, #0",
+                "mov #0x4444, w0", f"mov w0, {at['IPC0']}"]  # fmt: skip
+        return [*wake, "pwrsav #0" if self.draw.random() < 0.04 else "pwrsav #1"]
+
+    def setting(self) -> list[str]:
+        """A device is put to work."""
+        return self.written(SCENES[self.draw.choice(sorted(SCENES))](self.draw))
+
+    def written(self, settings: list[tuple[str, int]]) -> list[str]:
+        """Registers and values in order."""
+        lines = []
+        for name, value in settings:
+            self.note(SFRS[name], "setting")
+            lines += [f"mov #{value:#x}, w0", f"mov w0, {SFRS[name].address:#x}"]
+        return lines
+
+    def handler(self, number: int) -> list[str]:
+        """Touches devices with registers of its own and clears all flags, by word or one byte at a time."""
+        lines = [f"handler{number}: inc w11, w11"]
+        for _ in range(self.draw.randrange(4)):
+            way = self.draw.random()
+            direct = self.direct("handler")
+            if way < 0.5 and "WREG" not in direct and not direct.startswith(("push", "pop")):
+                lines.append(direct)
+            else:
+                lines += [line for line in self.pointer("handler", "w12", "w13") if "w4" not in line]
+        clear = self.draw.choice(("clr", "clr", "clr.b"))
+        for name in ("IFS0", "IFS1", "IFS2"):
+            lines.append(f"{clear} {SFRS[name].address:#x}")
+            if clear == "clr.b":
+                lines.append(f"clr.b {SFRS[name].address + 1:#x}")
+        return [*lines, "retfie"]
 
 
-def program(seed: int) -> str:
-    """A loop over random accesses, mostly with devices at work, and one handler that clears every interrupt flag."""
+def family(name: str) -> frozenset[str]:
+    """The devices a register belongs to, by the letters its name begins with."""
+    letters = "".join(takewhile(str.isalpha, name)) if not name.startswith(("PORT", "LAT", "TRIS")) else name[:-1]
+    return frozenset(next((one for one in _FAMILIES if letters in one), {letters}))
+
+
+def program(seed: int) -> tuple[str, Writer]:
+    """Assembly text, and who has written it: some devices at work, and their registers accessed again and again."""
     draw = random.Random(seed)
-
-    pool = _POOL if seed % 4 == 0 else _HOT if seed % 2 else _STATUS
-
-    def sfr() -> str:
-        return f"{draw.choice(pool if draw.random() < 0.9 else _HOT).address:#x}"
-
-    def w() -> str:
-        return f"w{draw.randrange(10)}"
-
-    statements = (
-        (35, lambda: f"mov {w()}, {sfr()}"),
-        (25, lambda: f"mov {sfr()}, {w()}"),
-        (15, lambda: f"bset {sfr()}, #{draw.randrange(8)}"),
-        (10, lambda: f"bclr {sfr()}, #{draw.randrange(8)}"),
-        (5, lambda: f"repeat #{draw.randrange(40)}\nnop"),
-        (5, lambda: f"btss {sfr()}, #{draw.randrange(8)}\nnop"),
-        (4, lambda: f"add {w()}, {w()}, {w()}"),
-        (1, lambda: "pwrsav #1"),
-    )
+    writer = Writer(draw, [])
+    lines = [f"mov #{STACK:#x}, w15", "clr 0x42"]
+    set_up: set[str] = set()
+    for name in draw.sample(sorted(SCENES), draw.choice((1, 2, 2, 3))):
+        settings = SCENES[name](draw)
+        set_up |= {register for register, _ in settings}
+        lines += writer.written(settings)
+    devices = {family(name) for name in set_up} | {family(draw.choice(WORDS).name)}
+    pool = [sfr for sfr in WORDS if family(sfr.name) in devices]
+    writer.pool[:] = draw.sample(pool, min(HOT, len(pool)))
+    for name in ("IEC0", "IEC1", "IEC2"):
+        lines += [f"mov #{draw.choice((0, 0xFFFF, draw.randrange(0x10000)))}, w0", f"mov w0, {SFRS[name].address:#x}"]
+    for number in range(draw.randrange(4)):
+        lines += [f"mov #{draw.randrange(0x10000)}, w0", f"mov w0, {SFRS[f'IPC{3 * number}'].address:#x}"]
     values = (0x8000, 0xA000, 0x8030, 0xFFFF, draw.randrange(0x10000), draw.randrange(64))
-    lines = _scenes(draw) if seed % 4 else []
-    lines += [f"mov #{draw.choice(values)}, w{number}" for number in range(10)]
-    lines.append("loop: inc w10, w10")
-    makers = draw.choices([make for _, make in statements], [weight for weight, _ in statements], k=LENGTH)
-    lines += [make() for make in makers]
-    lines += ["bra loop", f"handler: clr {SFRS['IFS0'].address:#x}"]
-    lines += [f"clr {SFRS[name].address:#x}" for name in ("IFS1", "IFS2")]
-    return "\n".join([*lines, "inc w11, w11", "retfie"])
+    lines += [f"mov #{draw.choice(values)}, w{number}" for number in range(8)]
+    lines += [f"mov #{BUFFER:#x}, w{number}" for number in (8, 9, 12, 13)]
+    lines += [f"loop: mov #{STACK:#x}, w15", "inc w10, w10"]
+    if draw.random() < 0.8:
+        lines.append("clr.b 0x42")
+    for _ in range(LENGTH):
+        lines += writer.statement("main")
+    lines.append("goto loop")
+    for number in range(2):
+        lines += writer.handler(number)
+    lines += [f"trap: clr {SFRS['INTCON1'].address:#x}", f"mov #{STACK:#x}, w15", "clr 0x42", "clr 0x44", "goto loop"]
+    return "\n".join(lines), writer
 
 
-def machine(seed: int, engine: str) -> Rig:
-    """A machine about to run the program, every interrupt vector pointing at the handler."""
-    rig = Rig(program(seed), engine, w10=0, w11=0)
+@dataclass
+class Subject:
+    """One machine with a program, and what was heard from it."""
+
+    machine: Machine
+    heard: list[tuple[int, int, int]] = field(default_factory=list)
+    rendered: list[tuple[int, int]] = field(default_factory=list)
+
+
+def flash(text: str) -> dict[int, list[int]]:
+    """Stretches of program words by address, vectors included."""
+    words, labels = assemble(text)
+    words |= {0: 0x040000 | START, 2: 0}
     for irq in INTERRUPTS:
-        rig.vector(VECTORS[irq + 8].ivt, "handler")
-    return rig
+        words[VECTORS[irq + 8].ivt] = words[VECTORS[irq + 8].aivt] = labels[f"handler{irq & 1}"]
+    for vector in VECTORS[:8]:
+        words[vector.ivt] = words[vector.aivt] = labels["trap"]
+    stretches: dict[int, list[int]] = {}
+    start = -1
+    for address in sorted(words):
+        if start < 0 or address != start + 2 * len(stretches[start]):
+            start = address
+            stretches[start] = []
+        stretches[start].append(words[address])
+    return stretches
 
 
-def difference(seed: int, engine: str, chunks: int = 4) -> str | None:
-    """Run both engines side by side with bytes and edges from outside; what differs first, or None."""
-    rigs = [machine(seed, "plain"), machine(seed, engine)]
+def subject(seed: int, engine: str, stretches: dict[int, list[int]]) -> Subject:
+    """A machine about to run the program: bare, or a robot whose camera notes what it renders."""
+    draw = random.Random(seed ^ 0x5EED)
+    robot = draw.random() < 0.6
+    camera = draw.choice(("PO6030K", "PO8030D", "PO3030K", None))
+    board = partial(Epuck, camera=camera, selector=draw.randrange(16), seed=seed & 0xFFFF) if robot else None
+    machine = Machine(engine=engine, ipl_slip=int(draw.random() < 0.2), board=board)
+    made = Subject(machine)
+    if isinstance(machine.runner, SpecialisedEngine):
+        machine.runner.warm = 1  # write functions at once
+    if isinstance(machine.runner, JitEngine):
+        machine.runner.threshold, machine.runner.wait = 1, True
+        machine.runner.compiler = QuickCompiler(2 if seed % 16 == 5 else 0)
+    machine.stop_on_fault = False
+    if draw.random() < 0.9:
+        machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
+    machine.reset("POR")
+    for address, words in stretches.items():
+        machine.program.put_flash(address, words)
+    for port in (1, 2):
+        machine.uart[port].on_byte = lambda byte, cycle, p=port: made.heard.append((p, byte, cycle))
+
+    def row(y: int, columns: np.ndarray, cycle: int) -> np.ndarray:
+        made.rendered.append((y, cycle))
+        return np.full((len(columns), 3), y & 0xFF, np.uint8)
+
+    if robot and camera is not None:
+        machine.board.camera.sample(row)
+        machine.board.camera.align(3_000 + draw.randrange(3_000), 0)
+    return made
+
+
+def disturb(draw: random.Random, machine: Machine) -> None:
+    """Something happens outside, now or soon."""
+    kind, cycle = draw.randrange(6), machine.cycle
+    if machine.is_asleep:
+        for level in (0, 1, 0):
+            machine.pins.set("RF6", level, cycle)
+    if kind == 0:
+        machine.uart[draw.choice((1, 2))].feed(bytes(draw.randrange(256) for _ in range(3)), cycle + draw.randrange(99))
+    elif kind == 1:
+        for name in draw.sample(_INPUTS, 3):
+            machine.pins.set(name, draw.randrange(2), cycle)
+    elif kind == 2 and machine.board is None:
+        machine.peripherals.adc.set_input(draw.randrange(16), draw.randrange(0x10000))
+    elif kind == 3 and machine.board is not None:
+        machine.board.ir.set_distance(draw.randrange(8), draw.randrange(5, 100))
+    elif kind == 4 and machine.board is not None:
+        machine.board.remote.press(draw.randrange(64))
+
+
+def difference(
+    seed: int, *engines: str, chunks: int = CHUNKS, tally: Counter[tuple[str, str]] | None = None
+) -> str | None:
+    """Run engines side by side with the plain one, with bytes, edges and levels from outside; what differs first."""
+    text, writer = program(seed)
+    stretches = flash(text)
+    subjects = [subject(seed, engine, stretches) for engine in ("plain", *engines)]
+    plain = subjects[0].machine
     for chunk in range(chunks):
-        stops = [rig.machine.run(CHUNK) for rig in rigs]
-        states = [rig.machine.snapshot() for rig in rigs]
-        if stops[0] != stops[1]:
-            return f"seed {seed}: plain stops with {stops[0]}, {engine} with {stops[1]}"
-        if states[0] != states[1]:
-            field_at = rigs[0].machine.record.field_at
-            places = {field_at(i) for i, (a, b) in enumerate(zip(*states, strict=True)) if a != b}
-            return f"seed {seed}: the engines differ in {', '.join(sorted(places)[:8])} by cycle {stops[0].cycle}"
-        for rig in rigs:
-            rig.machine.uart[1].feed(b"ab", rig.machine.cycle + 10)
-            rig.machine.pins.set(_INPUTS[chunk % 4], chunk & 1, rig.machine.cycle)
+        draw = random.Random(f"{seed} {chunk}")
+        cycles = draw.choice((draw.randrange(1, 300), draw.randrange(1, 3000), 2500))
+        stops = [one.machine.run(cycles) for one in subjects]
+        states = [one.machine.snapshot() for one in subjects]
+        for one, name, stop, state in zip(subjects[1:], engines, stops[1:], states[1:], strict=True):
+            where = f"by cycle {stops[0].cycle}, chunk {chunk}"
+            if stops[0] != stop:
+                return f"plain stops with {stops[0]}, {name} with {stop} {where}"
+            if states[0] != state:
+                field_at = plain.record.field_at
+                places = {field_at(i) for i, (a, b) in enumerate(zip(states[0], state, strict=True)) if a != b}
+                return f"{name} differs in {', '.join(_named(place) for place in sorted(places)[:8])} {where}"
+            if subjects[0].heard != one.heard:
+                return f"{name} sends {one.heard[-4:]} instead of {subjects[0].heard[-4:]} {where}"
+            if subjects[0].rendered != one.rendered:
+                return f"{name} renders {len(one.rendered)} lines instead of {len(subjects[0].rendered)} {where}"
+        if any(isinstance(one.machine.runner, JitEngine) and one.machine.runner.counts.regions > REGIONS
+               for one in subjects):  # fmt: skip
+            break
+        for one in subjects:
+            disturb(random.Random(f"{seed} {chunk} outside"), one.machine)
+    if tally is not None:
+        tally.update(writer.touched)
     return None
+
+
+def _named(place: str) -> str:
+    """A data address with the register that is there."""
+    if place.startswith("data "):
+        return f"{place} {NAMES.get(int(place.split()[1], 0) & ~1, '')}".strip()
+    return place

@@ -246,3 +246,17 @@ def test_looking_at_the_converter_does_not_change_what_it_does(seed):
         outcomes.append((seen, [rig.read(f"ADCBUF{n:X}") for n in range(16)], rig.record.snapshot()))
     assert outcomes[0][0]
     assert outcomes[0][:2] == outcomes[1][:2]
+
+
+def test_the_scan_starts_again_behind_every_interrupt(rig):
+    """§13: five inputs, three results an interrupt: always the first three."""
+    for number in range(16):
+        rig.dev.adc.set_input(number, 100 * number << 4)
+    rig.write("ADCSSL", 0x1F00)
+    rig.write("ADCON3", 0x0101)
+    rig.write("ADCON2", 0x0408)
+    rig.write("ADCON1", 0x80E4)
+    for _ in range(4):
+        rig.first_cycle(lambda: rig.flag("ADIF"), rig.events.now, rig.events.now + 200)
+        rig.clear_flags()
+        assert [rig.read(f"ADCBUF{n}") for n in range(3)] == [800, 900, 1000]

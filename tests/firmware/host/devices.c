@@ -1,7 +1,7 @@
-/* Devices: processors, bounded buffers, back-pressure (design.md §6, kernel.md §2, paper §III-C). */
+/* Devices: processors, bounded buffers, back-pressure (design.md §6, kernel.md §2, the paper). */
 #include "test.h"
 
-static uint8 line[2][512];
+static uint8 line[2][4 * SYS_UART_TX];
 static size_t sent[2];
 static void capture(uint8 uart, uint8 byte)
 {
@@ -42,27 +42,148 @@ TEST(a_send_event_puts_its_bytes_on_the_line, "SYS_SEND_UART1: Listing 1")
     CHECK(sent[1] == 5 && memcmp(line[1], "there", 5) == 0);
 }
 
-TEST(a_full_transmit_ring_refuses_whole_messages_and_reports_when_ready, "openswarm_io.h: back-pressure")
+TEST(a_refused_message_has_room_when_ready_is_said, "openswarm_io.h: back-pressure")
 {
     boot();
     host_uart_sink(capture);
     Sys_Subscribe_to_Event(SYS_UART1_READY, 0, on_ready, NULL);
     host_hold_line(true);
     char block[16];
-    int accepted = 0;
+    size_t accepted = 0;
     memset(block, 'x', sizeof block);
     while (Sys_Write_UART1(block, sizeof block)) {
         accepted++;
     }
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_BUSY);
-    CHECK_EQ(accepted, SYS_UART_TX / 16);
+    CHECK_EQ(accepted, SYS_UART_TX / (sizeof(message) + 1 + sizeof block + 1)); /* the number of bytes, and an even size */
     CHECK_EQ(Sys_Get_UARTStatistics(SYS_UART1)->tx_refused, 1);
-    host_hold_line(false);
+    host_tick();
     Sys_Yield();
-    CHECK_EQ(sent[0], SYS_UART_TX);
+    CHECK_EQ(ready_events, 0);
+    host_hold_line(false);
+    host_tick();
+    Sys_Yield();
+    CHECK_EQ(sent[0], accepted * sizeof block);
     CHECK_EQ(ready_events, 1);
-    CHECK(ready_bytes >= SYS_UART_TX / 2);
+    CHECK_EQ(ready_bytes, SYS_UART_TX);
     CHECK(Sys_Write_UART1(block, sizeof block));
+    host_tick();
+    Sys_Yield();
+    CHECK_EQ(ready_events, 1); /* once */
+}
+
+TEST(messages_of_any_size_are_buffered_in_order, "dynamically buffered transmission; a 65-byte message got BUSY for ever")
+{
+    static uint8 text[SYS_UART_TX];
+    boot();
+    host_uart_sink(capture);
+    Sys_Yield();
+    uint16 used = Sys_Get_Statistics()->heap_used;
+    for (uint16 i = 0; i < sizeof text; i++) {
+        text[i] = (uint8)(i * 7);
+    }
+    static const uint16 sizes[] = {1, 2, 64, 65, 66, 0, 100, 3};
+    size_t total = 0;
+    host_hold_line(true);
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        CHECK(Sys_Write_UART1(text + total, sizes[i]));
+        total += sizes[i];
+    }
+    CHECK(Sys_Write_UART2(text, 200));
+    CHECK(Sys_Get_Statistics()->heap_used >= used + total + 200);
+    CHECK(Sys_Get_Statistics()->heap_used <= used + (total + 200) * 2 + 8 * (sizeof(message) + 2));
+    host_hold_line(false);
+    CHECK(sent[0] == total && memcmp(line[0], text, total) == 0);
+    CHECK(sent[1] == 200 && memcmp(line[1], text, 200) == 0);
+    Sys_Yield();
+    CHECK_EQ(Sys_Get_Statistics()->heap_used, used);
+    CHECK(!Sys_Write_UART1(text, sizeof text)); /* its blocks need more than it has bytes */
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    CHECK_EQ(Sys_Get_Statistics()->heap_used, used);
+    uint16 largest = sizeof text;
+    while (!Sys_Write_UART1(text, largest)) {
+        largest--;
+    }
+    CHECK(largest >= SYS_UART_TX / 2);
+    CHECK(sent[0] == total + largest && memcmp(line[0] + total, text, largest) == 0);
+}
+
+TEST(ready_also_follows_when_the_heap_was_exhausted, "openswarm_io.h: BUSY")
+{
+    boot();
+    host_uart_sink(capture);
+    Sys_Subscribe_to_Event(SYS_UART1_READY, 0, on_ready, NULL);
+    static void *all[SYS_HEAP / 8];
+    static uint16 sizes[SYS_HEAP / 8];
+    size_t blocks = 0;
+    for (uint16 size = 160; size != 0; size -= 8) {
+        while ((all[blocks] = heap_take(size)) != NULL) {
+            sizes[blocks++] = size;
+        }
+    }
+    CHECK(!Sys_Write_UART1("hello", 5));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_BUSY);
+    host_tick(); /* without memory for the event itself */
+    while (blocks-- != 0) {
+        heap_give(all[blocks], sizes[blocks]);
+    }
+    Sys_Yield();
+    CHECK_EQ(ready_events, 0);
+    host_tick();
+    Sys_Yield();
+    CHECK_EQ(ready_events, 1);
+    CHECK(Sys_Write_UART1("hello", 5));
+    CHECK(sent[0] == 5 && memcmp(line[0], "hello", 5) == 0);
+}
+
+static bool inner_done;
+static bool nesting(const uint8 *text, uint16 size, sys_put put_byte)
+{
+    for (uint16 i = 0; i < size; i++) {
+        put_byte(text[i]);
+        if (i == 3 && text[0] == 'o') {
+            inner_done = Sys_Write_UART1("inner", 5);
+        }
+    }
+    return true;
+}
+static bool dying(const uint8 *text, uint16 size, sys_put put_byte)
+{
+    CHECK(Sys_Raw_Tx(text, size, put_byte));
+    Sys_Kill_Process(Sys_Get_ProcessID());
+    return true;
+}
+static bool refusing(const uint8 *text, uint16 size, sys_put put_byte)
+{
+    (void)Sys_Raw_Tx(text, size, put_byte);
+    return false;
+}
+static void write_long_line(void)
+{
+    static const char text[90] = "a message of three blocks";
+    (void)Sys_Write_UART1(text, sizeof text);
+}
+
+TEST(a_message_is_sent_whole_or_not_at_all, "openswarm_io.h: writers that nest, refuse or die")
+{
+    boot();
+    host_uart_sink(capture);
+    uint16 used = Sys_Get_Statistics()->heap_used;
+    Sys_Set_TxProcessor(SYS_UART1, nesting);
+    CHECK(!Sys_Write_UART1("outer message", 13));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    CHECK(inner_done && sent[0] == 5 && memcmp(line[0], "inner", 5) == 0);
+    Sys_Set_TxProcessor(SYS_UART1, refusing);
+    CHECK(!Sys_Write_UART1("refused", 7));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    Sys_Set_TxProcessor(SYS_UART1, dying);
+    CHECK(Sys_Start_Process(write_long_line) != 0);
+    Sys_Yield();
+    CHECK_EQ(sent[0], 5);
+    Sys_Set_TxProcessor(SYS_UART1, NULL);
+    CHECK(Sys_Write_UART2("x", 1)); /* frees what the dead writer left */
+    Sys_Yield();
+    CHECK_EQ(Sys_Get_Statistics()->heap_used, used);
 }
 
 TEST(received_bytes_arrive_as_chunks, "openswarm_io.h: Sys_Chunk_Rx")
@@ -169,7 +290,7 @@ TEST(a_damaged_frame_costs_only_itself, "openswarm_io.h: damaged frames are drop
     CHECK_EQ(messages, before + 1);
 }
 
-TEST(swapping_processors_under_traffic_loses_nothing, "§III-C: Rx- and Tx-processors are exchanged at run time")
+TEST(swapping_processors_under_traffic_loses_nothing, "the paper: Rx- and Tx-processors are exchanged at run time")
 {
     boot();
     host_uart_sink(loop_back);
@@ -213,7 +334,7 @@ static bool safety(uint16 id, const sys_event_data *data, sys_wheel_speeds *spee
     return moved;
 }
 
-TEST(motor_post_processors_are_exchanged_at_run_time, "§III-C: a safety post-processor in an unsafe area")
+TEST(motor_post_processors_are_exchanged_at_run_time, "the paper: a safety post-processor in an unsafe area")
 {
     boot();
     Sys_Register_Event(DRIVE);
@@ -250,7 +371,7 @@ static bool mirror(uint8 *position)
     return *position != 0;
 }
 
-TEST(the_selector_is_debounced_and_preprocessed, "§III-C: pre-processors of input devices")
+TEST(the_selector_is_debounced_and_preprocessed, "the paper: pre-processors of input devices")
 {
     boot();
     Sys_Subscribe_to_Event(SYS_IO_SELECTOR, 0, on_selector, NULL);

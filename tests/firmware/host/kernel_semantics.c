@@ -40,13 +40,62 @@ TEST(blocking_calls_are_refused_outside_threads, "kernel.md §2: handler, ISR, c
     CHECK_EQ(calls, 1);
     CHECK(refused_wait == NULL);
     CHECK_EQ(Sys_Get_Statistics()->refused, 2);
-    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_CONTEXT);
+    CHECK_EQ(Sys_Get_LastError(), SYS_OK);
     Sys_Start_CriticalSection();
     CHECK(Sys_Wait_for_Event(E1) == NULL);
     Sys_Sleep(1);
     Sys_Yield();
     Sys_End_CriticalSection();
     CHECK_EQ(Sys_Get_Statistics()->refused, 5);
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_CONTEXT);
+}
+
+TEST(blocking_calls_are_refused_before_the_start, "openswarm.h: what may block is refused before Sys_Start_Kernel")
+{
+    host_use_virtual_time();
+    Sys_Init_Kernel();
+    CHECK(Sys_Wait_for_Event(SYS_1ms_TIMER) == NULL);
+    CHECK(Sys_Wait_for_ConditionTimeout(SYS_1ms_TIMER, NULL, 1) == NULL);
+    CHECK(!Sys_Wait_for_Period());
+    Sys_Sleep(1);
+    Sys_Sleep(0);
+    Sys_Yield();
+    Sys_Run_SystemThread();
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_CONTEXT);
+    CHECK_EQ(Sys_Get_Statistics()->refused, 7);
+    Sys_Start_CriticalSection();
+    Sys_End_CriticalSection();
+    Sys_Sleep(1);
+    CHECK_EQ(Sys_Get_Statistics()->refused, 8);
+    Sys_Start_Kernel();
+    Sys_Sleep(1);
+    CHECK_EQ(Sys_Get_SystemTime(), 1);
+    CHECK_EQ(Sys_Get_Statistics()->refused, 8);
+}
+
+TEST(no_scheduler_is_refused, "openswarm.h: Sys_Set_Scheduler")
+{
+    boot();
+    CHECK(Sys_Set_Scheduler(&sys_fixed_priority));
+    CHECK(!Sys_Set_Scheduler(NULL));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    Sys_Start_Process(idle_thread);
+    Sys_Yield();
+}
+
+static uint16 state_seen_by_isr;
+static void ask_for_state(void)
+{
+    state_seen_by_isr = Sys_Get_ProcessState(0);
+    CHECK_EQ(Sys_Get_UnusedStack(0), 0);
+}
+
+TEST(an_isr_may_not_walk_the_threads, "openswarm.h: the lists change under the slice lock only")
+{
+    boot();
+    host_device(ask_for_state);
+    CHECK_EQ(state_seen_by_isr, SYS_UNKNOWN);
+    CHECK_EQ(Sys_Get_Statistics()->refused, 2);
 }
 
 static void isr_tries_everything(void)
@@ -201,6 +250,251 @@ TEST(a_handler_that_returns_false_is_unsubscribed, "kernel.md §1: false = unsub
     Sys_Send_IntEvent(E1, 1);
     Sys_Yield();
     CHECK_EQ(calls, 3);
+}
+
+static uint16 ended[3];
+static bool on_termination(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)id;
+    CHECK_EQ(Sys_Get_ProcessState(data->value), SYS_UNKNOWN);
+    ended[calls++] = data->value;
+    return true;
+}
+static void returns_at_once(void)
+{
+}
+
+TEST(the_end_of_every_thread_is_told, "openswarm.h: SYS_EVENT_TERMINATION")
+{
+    boot();
+    Sys_Subscribe_to_Event(SYS_EVENT_TERMINATION, 0, on_termination, NULL);
+    uint16 before = heap_now(), returns = Sys_Start_Process(returns_at_once), killed = Sys_Start_Process(idle_thread);
+    Sys_Yield();
+    CHECK(Sys_Kill_Process(killed));
+    Sys_Yield();
+    CHECK_EQ(calls, 2);
+    CHECK_EQ(ended[0], returns);
+    CHECK_EQ(ended[1], killed);
+    CHECK_EQ(heap_now(), before);
+}
+
+static int rounds_of_two[2];
+static bool resubscribe(uint16 pid, uint16 id, int which, sys_handler self)
+{
+    CHECK(++rounds_of_two[which] < 100);
+    CHECK(Sys_Unsubscribe_Handler(id, pid, self));
+    CHECK(Sys_Subscribe_to_Event(id, pid, self, NULL));
+    return true;
+}
+static bool resubscribe_one(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    return resubscribe(pid, id, 0, resubscribe_one);
+}
+static bool resubscribe_two(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    return resubscribe(pid, id, 1, resubscribe_two);
+}
+
+TEST(a_delivery_reaches_those_that_had_subscribed_when_it_began, "openswarm.h: Sys_Subscribe_to_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    uint16 empty = heap_now();
+    Sys_Subscribe_to_Event(E1, 0, resubscribe_one, NULL);
+    Sys_Subscribe_to_Event(E1, 0, resubscribe_two, NULL);
+    Sys_Subscribe_to_Event(E1, 0, count_calls, NULL);
+    for (int i = 1; i <= 3; i++) {
+        Sys_Send_IntEvent(E1, 1);
+        Sys_Yield();
+        CHECK_EQ(rounds_of_two[0], i);
+        CHECK_EQ(rounds_of_two[1], i);
+        CHECK_EQ(calls, i);
+    }
+    Sys_Unsubscribe_from_Event(E1, 0);
+    CHECK_EQ(heap_now(), empty);
+}
+
+static bool subscribe_another(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    CHECK(Sys_Subscribe_to_Event(id, pid, count_calls, NULL));
+    return true;
+}
+
+TEST(who_subscribes_during_a_delivery_hears_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, subscribe_another, NULL);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(calls, 0);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(calls, 1);
+}
+
+static bool register_anew(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    CHECK(Sys_Unregister_Event(id) && Sys_Register_Event(id));
+    CHECK(Sys_Subscribe_to_Event(id, pid, register_anew, NULL));
+    CHECK(Sys_Subscribe_to_Event(id, pid, count_calls, NULL));
+    CHECK(++rounds_of_two[0] < 100);
+    return true;
+}
+
+TEST(an_event_registered_anew_by_its_handler_begins_anew, "openswarm.h: Sys_Unregister_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, register_anew, NULL);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(rounds_of_two[0], 1);
+    CHECK_EQ(calls, 0);
+}
+
+static bool kill_victim_when_asked(sys_event_data *data)
+{
+    (void)data;
+    (void)Sys_Kill_Process(victim);
+    return true;
+}
+
+TEST(a_condition_that_kills_its_owner_spares_the_handler, "openswarm.h: Sys_Kill_Process ends the subscriptions")
+{
+    boot();
+    Sys_Register_Event(E1);
+    uint16 empty = heap_now();
+    victim = Sys_Start_Process(idle_thread);
+    Sys_Subscribe_to_Event(E1, victim, count_calls, kill_victim_when_asked);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(calls, 0);
+    CHECK_EQ(Sys_Get_ProcessState(victim), SYS_UNKNOWN);
+    CHECK_EQ(heap_now(), empty);
+}
+
+static bool resubscribe_and_hold(sys_event_data *data)
+{
+    (void)data;
+    CHECK(++rounds_of_two[0] < 100);
+    CHECK(Sys_Unsubscribe_Handler(E1, 0, count_calls));
+    CHECK(Sys_Subscribe_to_Event(E1, 0, count_calls, resubscribe_and_hold));
+    return true;
+}
+
+TEST(a_condition_that_subscribes_its_handler_anew_hears_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, count_calls, resubscribe_and_hold);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(calls, 0);
+    CHECK_EQ(rounds_of_two[0], 1);
+}
+
+static void keep_result(void)
+{
+    (void)Sys_Wait_for_Event(E1);
+    note('k');
+    idle_thread();
+}
+static void wait_and_kill(void)
+{
+    sys_event_data *data = Sys_Wait_for_Condition(E1, kill_victim_when_asked);
+    note(data != NULL && data->size == 5 && memcmp(data->payload, "event", 5) == 0 ? 'w' : '?');
+    Sys_Clear_EventData(&data);
+}
+
+TEST(a_condition_may_kill_a_thread_that_the_same_message_woke, "openswarm.h: Sys_Wait_for_Condition")
+{
+    boot();
+    Sys_Register_Event(E1);
+    uint16 empty = heap_now();
+    victim = Sys_Start_Process(keep_result);
+    Sys_Start_Process(wait_and_kill);
+    Sys_Yield();
+    Sys_Send_Event(E1, "event", 5);
+    Sys_Yield();
+    Sys_Yield();
+    CHECK(strcmp(trace, "w") == 0);
+    CHECK_EQ(heap_now(), empty);
+}
+
+static void fail_with_memory(void)
+{
+    host_fail_allocation(1);
+    CHECK(!Sys_Register_Event(E4));
+    Sys_Yield();
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_MEMORY);
+    note('m');
+}
+static void isr_fails(void)
+{
+    CHECK(!Sys_Send_IntEvent(E_NEVER, 1));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
+}
+static bool handler_fails(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)id, (void)data;
+    Sys_Sleep(1);
+    host_device(isr_fails);
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_CONTEXT);
+    return true;
+}
+
+TEST(the_last_error_is_that_of_who_asks, "openswarm.h: Sys_Get_LastError")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, handler_fails, NULL);
+    CHECK(!Sys_Subscribe_to_Event(E1, 0, NULL, NULL));
+    host_device(isr_fails);
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    Sys_Start_Process(fail_with_memory);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    Sys_Yield();
+    CHECK(strcmp(trace, "m") == 0);
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
+    Sys_Sleep(1);
+    CHECK_EQ(Sys_Get_LastError(), SYS_OK);
+}
+
+static sys_event_data *isr_sees;
+static void isr_clears(void)
+{
+    Sys_Clear_EventData(&isr_sees);
+}
+static void result_held(void)
+{
+    sys_event_data *data = Sys_Wait_for_Event(E1);
+    isr_sees = data;
+    uint16 before = heap_now();
+    host_device(isr_clears);
+    CHECK(isr_sees == NULL);
+    CHECK_EQ(heap_now(), before);
+    Sys_Clear_EventData(&data);
+    CHECK(heap_now() < before);
+    note('c');
+}
+
+TEST(an_isr_may_not_clear_a_result, "openswarm.h: Sys_Clear_EventData")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Start_Process(result_held);
+    Sys_Yield();
+    Sys_Send_IntEvent(E1, 7);
+    Sys_Yield();
+    Sys_Yield();
+    CHECK(strcmp(trace, "c") == 0);
 }
 
 TEST(an_event_nobody_listens_to_allocates_nothing, "kernel.md §2")
@@ -401,6 +695,32 @@ TEST(a_missed_deadline_is_counted_and_reported, "kernel.md §2: a miss is counte
     CHECK(calls >= 1);
     CHECK_EQ(miss_pid, 1);
     CHECK_EQ(Sys_Get_Statistics()->deadlines_missed, calls);
+}
+
+static void job_without_end(void *unused)
+{
+    (void)unused;
+    for (uint16 ms = 1;; ms++) {
+        host_tick();
+        if (ms % 10 == 0) {
+            host_slice();
+        }
+    }
+}
+
+TEST(a_late_job_starves_nobody, "openswarm.h: sys_earliest_deadline; once it ran alone for as long as it was late")
+{
+    sys_process_config endless = {job_without_end, NULL, 0, 0, SYS_PERIODIC, 100, 50};
+    boot();
+    Sys_Set_Scheduler(&sys_earliest_deadline);
+    CHECK(Sys_Start_ProcessWith(&endless) != 0);
+    start_job(0, 5, 5);
+    for (uint32 end = 4000; Sys_Get_SystemTime() < end;) {
+        Sys_Sleep(500); /* a thread without a period: it comes to its turns */
+    }
+    CHECK(met[0] >= 790);
+    CHECK_EQ(missed[0], 0);
+    CHECK_EQ(Sys_Get_Statistics()->deadlines_missed, 1);
 }
 
 static void wait_note_h(void)

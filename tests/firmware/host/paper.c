@@ -1,4 +1,4 @@
-/* The behaviour the paper (Trenkwalder et al., IROS 2016, §III-IV) describes, in our words as collected in
+/* The behaviour the paper (Trenkwalder et al., IROS 2016) describes, in our words as collected in
  * openswarm-original.md §2-§6 and design.md §6; one statement, one test. */
 #include "test.h"
 
@@ -35,7 +35,7 @@ static uint16 start_busy(const char *c, uint8 priority)
     return Sys_Start_ProcessWith(&config);
 }
 
-TEST(threads_share_the_processor_by_round_robin, "§III-B: preemptive scheduling, round robin by default")
+TEST(threads_share_the_processor_by_round_robin, "the paper: preemptive scheduling, round robin by default")
 {
     boot();
     start_busy("a", 0);
@@ -47,7 +47,7 @@ TEST(threads_share_the_processor_by_round_robin, "§III-B: preemptive scheduling
     CHECK(strcmp(trace, "abcabcabcabc") == 0);
 }
 
-TEST(the_scheduler_is_exchanged_at_run_time, "§III-B: the scheduling algorithm can be exchanged during run time")
+TEST(the_scheduler_is_exchanged_at_run_time, "the paper: the scheduling algorithm can be exchanged during run time")
 {
     boot();
     Sys_Start_CriticalSection();
@@ -73,7 +73,7 @@ static void end_note(void)
     Sys_Sleep(2);
 }
 
-TEST(a_process_is_new_ready_running_blocked_or_zombie, "§III-B: five process states")
+TEST(a_process_is_new_ready_running_blocked_or_zombie, "the paper: five process states")
 {
     boot();
     uint16 pid = Sys_Start_Process(end_note);
@@ -85,7 +85,7 @@ TEST(a_process_is_new_ready_running_blocked_or_zombie, "§III-B: five process st
     CHECK_EQ(Sys_Get_ProcessState(pid), SYS_UNKNOWN); /* zombie until the kernel stack has freed it */
 }
 
-TEST(handlers_run_between_two_threads_in_order_of_subscription, "§III-C: cooperative event handling between time slices")
+TEST(handlers_run_between_two_threads_in_order_of_subscription, "the paper: cooperative event handling between time slices")
 {
     boot();
     Sys_Register_Event(E1);
@@ -108,7 +108,7 @@ static bool must_not_be_preempted(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(a_handler_runs_to_completion, "§III-C: handlers are executed cooperatively")
+TEST(a_handler_runs_to_completion, "the paper: handlers are executed cooperatively")
 {
     boot();
     Sys_Register_Event(E1);
@@ -135,7 +135,7 @@ static bool interrupted(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(an_interrupt_preempts_a_handler, "§III-C: only interrupts preempt event handlers")
+TEST(an_interrupt_preempts_a_handler, "the paper: only interrupts preempt event handlers")
 {
     boot();
     Sys_Register_Event(E1);
@@ -154,7 +154,7 @@ static bool collect(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(events_are_processed_in_the_order_they_were_sent, "§III-C: events are queued and processed sequentially")
+TEST(events_are_processed_in_the_order_they_were_sent, "the paper: events are queued and processed sequentially")
 {
     boot();
     Sys_Register_Event(E1);
@@ -178,7 +178,7 @@ static bool keep_payload(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(an_event_carries_a_copy_of_its_data, "§III-C: an event is an identifier and data; the data are copied")
+TEST(an_event_carries_a_copy_of_its_data, "the paper: an event is an identifier and data; the data are copied")
 {
     boot();
     uint8 data[5] = {1, 2, 3, 4, 5};
@@ -199,7 +199,7 @@ static bool collect_pid(uint16 pid, uint16 id, sys_event_data *data)
     return true;
 }
 
-TEST(a_handler_shared_by_two_threads_runs_once_for_each, "§III-C: processes subscribe with a handler; kernel.md §2")
+TEST(a_handler_shared_by_two_threads_runs_once_for_each, "the paper: processes subscribe with a handler; kernel.md §2")
 {
     boot();
     Sys_Register_Event(E1);
@@ -218,7 +218,7 @@ static bool is_even(sys_event_data *data)
     return data->value % 2 == 0;
 }
 
-TEST(a_handler_runs_only_when_its_condition_holds, "§III-C: a condition function filters events")
+TEST(a_handler_runs_only_when_its_condition_holds, "the paper: a condition function filters events")
 {
     boot();
     Sys_Register_Event(E1);
@@ -256,7 +256,7 @@ TEST(a_thread_waits_for_a_condition_without_polling, "Listing 1: Sys_Wait_for_Co
     CHECK_EQ(ticks, 250);
 }
 
-TEST(a_critical_section_postpones_the_tick_to_its_end, "§III-B: in critical sections the switch is postponed")
+TEST(a_critical_section_postpones_the_tick_to_its_end, "the paper: in critical sections the switch is postponed")
 {
     boot();
     start_busy("a", 0);
@@ -267,7 +267,7 @@ TEST(a_critical_section_postpones_the_tick_to_its_end, "§III-B: in critical sec
     CHECK_EQ(trace[0], 'a');
 }
 
-TEST(memory_is_taken_when_needed_and_returned, "§IV-A: RAM grows with processes, events and pending data, Eq. (1)")
+TEST(memory_is_taken_when_needed_and_returned, "the paper: RAM grows with processes, events and pending data, Eq. (1)")
 {
     boot();
     uint16 before = heap_now();
@@ -290,7 +290,7 @@ static void count_idle(uint32_t n)
     idles = n;
 }
 
-TEST(the_processor_idles_when_nothing_is_ready, "§IV-B: the processor is idle when no process needs it")
+TEST(the_processor_idles_when_nothing_is_ready, "the paper: the processor is idle when no process needs it")
 {
     boot();
     host_at_idle(count_idle);

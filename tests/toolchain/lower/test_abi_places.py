@@ -46,8 +46,15 @@ def test_arguments_travel_where_xc16_puts_them(name: str, shapes: list[Shape], e
     assert [p.register if p.register is not None else f"stack {p.stack}" for p in places] == expected
 
 
-def test_all_arguments_of_a_variadic_function_are_on_the_stack() -> None:
+def test_all_arguments_of_a_variadic_function_with_one_named_are_on_the_stack() -> None:
     """abi-elf.md §2.2, rule 5: the first ends right below the return address."""
-    places = place_arguments([INT, LONG, scalar(8)], True)
+    places = place_arguments([INT, LONG, scalar(8)], named=1)
     assert [p.register for p in places] == [None] * 3
     assert [p.stack for p in places] == [6, 10, 12]
+
+
+def test_named_arguments_before_the_last_of_a_variadic_function_are_in_registers() -> None:
+    """abi-elf.md §2.2, rule 5, row `g(int a,long b,int n,...)`."""
+    places = place_arguments([INT, LONG, INT, LONG], named=3)
+    assert [p.register for p in places] == [0, 2, None, None]
+    assert [p.stack for p in places[2:]] == [6, 10]

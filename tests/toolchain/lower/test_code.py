@@ -62,6 +62,14 @@ def test_idiom(name: str, source: str, expected: list[str]) -> None:
     assert body(text, "f") == expected
 
 
+def test_constants_are_in_the_one_section_microchips_linker_counts() -> None:
+    """abi-elf.md §1.4: `__const_length` is that of the section named .const."""
+    text = assembly('const int k[3] = {1, 2, 3}; const char *f(void){ return "text"; }')
+    sections = [line for line in text.split("\n") if ".const" in line]
+    assert sections
+    assert {line.strip() for line in sections} == {".section .const,psv,page"}
+
+
 def test_quotient_and_remainder_share_one_division() -> None:
     """isa.md §6.7: DIV leaves the quotient in W0 and the remainder in W1."""
     text = assembly("unsigned f(unsigned a,unsigned b,unsigned*r){ *r=a%b; return a/b; }")
@@ -126,10 +134,10 @@ def test_stack_check_probes_only_frames_above_eight_bytes() -> None:
     assert body(large, "f")[:5] == ["push w7", "mov [w15+20],w7", "pop w7", "nop", "add w15,#20,w15"]
 
 
-def test_every_function_and_object_has_a_section_of_its_own() -> None:
+def test_every_function_and_variable_has_a_section_of_its_own() -> None:
     """The linker's --gc-sections works on sections."""
     text = assembly("int a; int b=1; const int c=2; int f(void){return a+b;} int g(void){return c;}")
-    for section in (".text._f,code", ".text._g,code", ".nbss._a,bss,near", ".ndata._b,data,near", ".const._c,psv,page"):
+    for section in (".text._f,code", ".text._g,code", ".nbss._a,bss,near", ".ndata._b,data,near"):
         assert f"\t.section {section}\n" in text
 
 
@@ -138,3 +146,22 @@ def test_function_pointers_are_handles() -> None:
     text = assembly("int g(void); int (*p)(void)=g; int (*f(void))(void){ return g; }")
     assert ".word handle(_g)" in text
     assert body(text, "f") == ["mov #handle(_g),w0", "return"]
+
+
+def test_a_loop_that_counts_to_n_needs_no_limit_of_its_own() -> None:
+    """DEC answers `i < n` for negative n too: no max(n, 0) before the loop."""
+    lines = body(assembly("void f(int *p, int n){ for (int i = 0; i < n; i++) p[i] = 0; }"), "f")
+    assert lines[1:] == ["clr [w0++]", "dec w1,w1", lines[3], "return"]
+    assert lines[3].startswith("bra ge,")
+
+
+def test_division_by_a_constant_multiplies_where_speed_counts() -> None:
+    """isa.md §6.7: DIV takes 19 cycles; at -Os its two words stay."""
+    source = "unsigned f(unsigned a){ return a / 10; } int g(int a){ return a % 7; }"
+    assert "repeat" not in assembly(source, "2")
+    assert "repeat" in assembly(source, "s")
+
+
+def test_a_pair_is_cleared_by_one_word() -> None:
+    """MUL.UU Wb, #0 (isa.md §6.5)."""
+    assert "mul.uu w0,#0,w0" in body(assembly("long g(void); long f(int a){ return a > 3 ? g() : 0; }"), "f")

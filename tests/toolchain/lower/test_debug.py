@@ -45,7 +45,7 @@ def dwarf_of(image: Path) -> DWARFInfo:
         for section in ELFFile(file).iter_sections():
             content[section.name] = content.get(section.name, b"") + undoubled(section.data())
     arguments = dict.fromkeys(n for n in inspect.signature(DWARFInfo.__init__).parameters if n.endswith("_sec"))
-    for name in ("info", "abbrev", "line", "loc"):
+    for name in ("info", "abbrev", "line", "loc", "ranges"):
         data = content.get(f".debug_{name}", b"")
         arguments[f"debug_{name}_sec"] = DebugSectionDescriptor(io.BytesIO(data), f".debug_{name}", 0, len(data), 0)
     return DWARFInfo(config=DwarfConfig(True, "dsPIC30F", 4), **arguments)

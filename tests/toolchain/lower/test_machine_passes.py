@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from toolchain.lower import branches, layout, peephole, returns, schedule, tails
-from toolchain.lower.mir import MI, Imm, MBlock, Mem, MFunction, Operand
+from toolchain.lower.mir import MI, SKIPS, File, Imm, MBlock, Mem, MFunction, Operand
 
 WORD = 0xFFFF
 DATA = 0x1000
@@ -30,13 +30,15 @@ class Machine:
         if isinstance(a, Imm):
             assert isinstance(a.value, int)
             return a.value & WORD
-        if isinstance(a, Mem):
+        if isinstance(a, Mem | File):
             at = self.address(a, byte)
             return self.memory.get(at, at * 7 & WORD)
         assert isinstance(a, int)
         return self.w[a]
 
-    def address(self, a: Mem, byte: bool) -> int:
+    def address(self, a: Mem | File, byte: bool) -> int:
+        if isinstance(a, File):
+            return int(a.expr, 16)
         size = 1 if byte else 2
         before = {"+": size, "-": -size}.get(a.mode, 0)
         self.w[a.base] = self.w[a.base] + before & WORD
@@ -45,7 +47,7 @@ class Machine:
         return at
 
     def write(self, a: Operand, value: int, byte: bool) -> None:
-        if isinstance(a, Mem):
+        if isinstance(a, Mem | File):
             self.memory[self.address(a, byte)] = value & WORD
         else:
             assert isinstance(a, int)
@@ -68,22 +70,21 @@ class Machine:
         return {"z": z, "nz": not z, "n": n, "nn": not n, "c": c, "nc": not c, "lt": n != v, "ge": n == v,
                 "gt": not z and n == v, "le": z or n != v, "gtu": c and not z, "leu": not c or z}[cc]  # fmt: skip
 
-    def skips(self, text: str) -> bool:
-        """Outcome of a skip instruction given as text."""
-        name, operands = text.split(" ", 1)
-        a, b = operands.split(",")
-        x = self.w[int(a[1:])]
+    def skips(self, mi: MI) -> bool:
+        """Outcome of a skip instruction."""
+        if mi.op == "skip":
+            return self.holds(mi.cc)
+        name, x, y = mi.op.removesuffix("f"), self.read(mi.args[0], False), self.read(mi.args[1], False)
         if name in ("btsc", "btss"):
-            return bool(x >> int(b[1:]) & 1) == (name == "btss")
-        y = self.w[int(b[1:])]
+            return bool(x >> y & 1) == (name == "btss")
         sx, sy = (k - 0x10000 if k & 0x8000 else k for k in (x, y))
         return {"cpseq": x == y, "cpsne": x != y, "cpslt": sx < sy, "cpsgt": sx > sy}[name]
 
     def run(self) -> tuple[int, dict[int, int]]:
-        """W0 at the return and all memory written."""
+        """W0 at the return and all memory written. A skip covers the conditional instructions behind it."""
         name, fuel = self.order[0], 2000
         while True:
-            block, skip = self.blocks[name], 0
+            block, skip = self.blocks[name], False
             at = self.order.index(name) + 1
             name = self.order[at] if at < len(self.order) else ""
             for mi in block.insts:
@@ -92,10 +93,10 @@ class Machine:
                     if mi.text:
                         self.w[0] = int(mi.text.split("#")[1].split(",")[0])
                     return (-1 if fuel == 0 else self.w[0]), self.memory
-                if skip:
-                    skip -= 1
-                elif mi.op == "skip":
-                    skip = mi.count if (self.skips(mi.text) if mi.text else self.holds(mi.cc)) else 0
+                if mi.op in SKIPS:
+                    skip = self.skips(mi)
+                elif mi.pred and skip:
+                    pass
                 elif mi.op == "jump" or (mi.op == "bra" and self.holds(mi.cc)):
                     name = str(mi.args[0])
                     break
@@ -109,16 +110,22 @@ class Machine:
                 self.write(a[1], self.read(a[0], mi.byte), mi.byte)
             case "movd":
                 self.pair(a[0], a[1])
+            case "clrd":
+                assert isinstance(a[0], int)
+                self.w[a[0]] = self.w[a[0] + 1] = 0
             case "clr" | "setm":
                 self.write(a[0], 0 if mi.op == "clr" else WORD, mi.byte)
             case "cp":
                 self.arithmetic(self.read(a[0], False), ~self.read(a[1], False) & WORD, 1)
+            case "andl":
+                assert isinstance(a[1], int)
+                self.w[a[1]] = self.logic(self.w[a[1]] & self.read(a[0], False))
             case "subl":
                 assert isinstance(a[1], int)
                 self.w[a[1]] = self.arithmetic(self.w[a[1]], ~self.read(a[0], False) & WORD, 1)
             case "cp0":
                 self.arithmetic(self.read(a[0], False), WORD, 1)
-            case "btst":
+            case "btst" | "btstf":
                 self.flags["z"] = not self.read(a[0], False) >> self.read(a[1], False) & 1
             case "and" | "ior" | "xor":
                 x, y = self.read(a[0], False), self.read(a[1], False)
@@ -130,6 +137,18 @@ class Machine:
             case "add" | "sub":
                 x, y = self.read(a[0], False), self.read(a[1], False)
                 self.write(a[2], self.arithmetic(x, y if mi.op == "add" else ~y & WORD, int(mi.op == "sub")), False)
+            case "incf" | "slf":
+                x = self.read(a[0], False)
+                self.write(a[0], self.arithmetic(x, 1, 0) if mi.op == "incf" else x << 1, False)
+                if mi.op == "slf":
+                    self.logic(x << 1)
+                    self.flags["c"] = bool(x & 0x8000)
+            case "clrf":
+                self.write(a[0], 0, False)
+            case "iorf":
+                self.write(a[0], self.logic(self.read(a[0], False) | self.read(a[1], False)), False)
+            case "bsetf":
+                self.write(a[0], self.read(a[0], False) | 1 << self.read(a[1], False), False)
             case _:
                 k = {"inc": 1, "inc2": 2, "dec": -1, "dec2": -2}[mi.op]
                 x = self.read(a[0], False)
@@ -151,11 +170,16 @@ class Machine:
                 self.w[dest], self.w[dest + 1] = low, high
 
 
+def near(rng: random.Random) -> File:
+    """A near object among those the pointers reach."""
+    return File(f"0x{DATA + 2 * rng.randrange(9):04X}", True)
+
+
 def instruction(rng: random.Random) -> list[MI]:
     """One random piece of straight-line code; W3-W5 serve as pointers."""
     a, b, d = (rng.randrange(3) + rng.choice((0, 5)) for _ in range(3))
     p = rng.randrange(3, 6)
-    match rng.randrange(12):
+    match rng.randrange(16):
         case 0:
             return [MI("mov", Imm(rng.choice((0, 1, 5, 5, 0xFFFF))), d)]
         case 1:
@@ -170,11 +194,20 @@ def instruction(rng: random.Random) -> list[MI]:
             low = rng.choice((0, 6))
             return [MI("mov", Mem("ind", p), low), MI("mov", Mem("off", p, 2), low + 1)]
         case 6:
-            test = rng.choice((MI("cp", a, b), MI("cp0", a), MI("btst", a, Imm(3))))
-            skip = MI("skip", "", cc=rng.choice(("z", "nz") if test.op == "btst" else ("z", "nz", "lt", "gt", "ge")))
-            guarded = MI(rng.choice(THREE), d, b, d)
-            skip.count, guarded.pred = 1, True
-            return [test, skip, guarded]
+            test = rng.choice((MI("cp", a, b), MI("cp0", a), MI("btst", a, Imm(3)), MI("btstf", near(rng), Imm(2))))
+            cc = rng.choice(("z", "nz") if test.op.startswith("btst") else ("z", "nz", "lt", "gt", "ge"))
+            covered = [MI(rng.choice(THREE), d, b, d) for _ in range(rng.choice((1, 1, 2)))]
+            for mi in covered:
+                mi.pred = True
+            return [test, MI("skip", "", cc=cc), *covered]
+        case 10:
+            return [rng.choice((
+                MI("mov", near(rng), d), MI("mov", a, near(rng)), MI("incf", near(rng)), MI("clrf", near(rng)),
+                MI("slf", near(rng)), MI("bsetf", near(rng), Imm(3)), MI("iorf", near(rng), 0),
+            ))]  # fmt: skip
+        case 11:
+            return [MI("mov", near(rng), p), MI("andl", Imm(62), p), MI("mov", Imm(DATA), d), MI("add", p, d, p),
+                    MI("mov", Mem("ind", p), d)]  # fmt: skip
         case 7:
             return [MI(rng.choice(ONE), a, d)]
         case 9:

@@ -36,7 +36,7 @@ def test_every_ir_pass_leaves_well_formed_legal_functions(level: str) -> None:
         for step in (
             cfg.remove_unreachable,
             cfg.dead_code,
-            combine.combine,
+            lambda g: combine.combine(g, level == "s"),
             cfg.split_logical_branches,
             cfg.sink_compares,
             lambda g: switch.lower_switches(g, True),

@@ -39,14 +39,14 @@ class Machine:
         """Values written to memory, in order."""
         name: str | None = self.order[0]
         while name is not None:
-            block, name, skip = self.blocks[name], None, 0
+            block, name, skip = self.blocks[name], None, False
             for mi in block.insts:
                 fuel -= 1
                 assert fuel > 0
-                if skip:
-                    skip -= 1
-                elif mi.op == "skip":
-                    skip = mi.count if self.z == (mi.cc == "z") else 0
+                if mi.op == "skip":
+                    skip = self.z == (mi.cc == "z")
+                elif mi.pred and skip:
+                    continue
                 elif mi.op in ("bra", "jump"):
                     if mi.op == "jump" or self.z == (mi.cc == "z"):
                         name = str(mi.args[0])
@@ -122,8 +122,8 @@ def body(rng: random.Random, m: MFunction, live: list[int], calls: bool) -> list
             pair, low, high = m.new_pair(), m.new_register(), m.new_register()
             out += [MI("mul.uu", a, b, pair), MI("split", low, high, pair), MI("xor", low, high, d)]
         elif kind == 2:
-            out += [MI("cp0", a), guard := MI("skip", "", cc=rng.choice(["z", "nz"])), moved := MI("mov", b, d)]
-            guard.count, moved.pred = 1, True
+            out += [MI("cp0", a), MI("skip", "", cc=rng.choice(["z", "nz"])), moved := MI("mov", b, d)]
+            moved.pred = True
         elif kind == 3 and calls:
             call = MI("call", "_f")
             call.also_defs = CALLER_SAVED

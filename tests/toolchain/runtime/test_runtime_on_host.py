@@ -80,6 +80,34 @@ def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
+def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -> Path:
+    """The comparison of printing and reading doubles with the host's."""
+    objects = []
+    for source, words in ((printing, []), (RUNTIME / "strtod.c", ["-Dstrtod=rt_strtod", "-Datof=rt_atof"])):
+        objects.append(folder / f"{source.stem}.o")
+        compile_host(objects[-1], "-fsanitize=address,undefined", "-I", RUNTIME, *words, "-c", source)
+    program = folder / "digits"
+    compile_host(program, "-fsanitize=address,undefined", "-I", RUNTIME, HERE / "digits_host.c", *objects)
+    return program
+
+
+def test_doubles_are_printed_and_read_exactly(tmp_path: Path) -> None:
+    """C11 7.21.6.1, 7.22.1.3: every digit that printf gives and every double that strtod finds, as on the host."""
+    words = [digits_program(tmp_path), "100000", "7216"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_comparison_of_digits_notices_a_wrong_last_digit(tmp_path: Path) -> None:
+    text = (RUNTIME / "format_double.c").read_text()
+    assert "next == 5 && !odd" in text
+    (tmp_path / "wrong.c").write_text(text.replace("next == 5 && !odd", "next == 5 && odd"))
+    words = [digits_program(tmp_path, tmp_path / "wrong.c"), "20000", "1"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 1
+    assert "host [" in done.stdout
+
+
 @pytest.mark.parametrize("source", [*soft_float_sources(), *sorted(RUNTIME.glob("math_*.c"))], ids=lambda p: p.name)
 def test_sources_compile_without_warnings(source: Path, tmp_path: Path) -> None:
     """House rule: -Wall -Wextra -Werror. The helpers' names are gcc's own, whose prototypes differ on the host."""

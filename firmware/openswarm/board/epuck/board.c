@@ -4,6 +4,10 @@
 #include "kernel.h"
 #include "pins.h"
 
+#if SYS_1PXSENSOR
+#include "camera.h"
+#endif
+
 /* 7.3728 MHz crystal, PLL x8: 14.7456 MHz instruction clock (epuck.md §2, openswarm-original.md §10). */
 _FOSC(CSW_FSCM_OFF & XT_PLL8);
 _FWDT(WDT_OFF);
@@ -33,6 +37,9 @@ void board_init(void)
     uart_init(SYS_UART2);
     hal_led_init();
     selector_init();
+#if SYS_1PXSENSOR
+    (void)Sys_Start_Camera(); /* without a camera the event is registered, and never comes */
+#endif
 }
 
 void board_start(void)

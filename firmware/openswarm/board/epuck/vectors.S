@@ -1,4 +1,5 @@
 ; Interrupt entries of the board's devices; isr.inc is the port's.
+#include "hal_limits.h"
 #include "isr.inc"
         .text
         .global __U1TXInterrupt, __U2RXInterrupt, __U2TXInterrupt

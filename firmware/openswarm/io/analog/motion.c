@@ -43,7 +43,7 @@ void motion_send(void)
 sys_acceleration_processor Sys_Set_AccelerationProcessor(sys_acceleration_processor wanted)
 {
     sys_acceleration_processor before = processor;
-    processor = wanted;
+    HAL_STORE(processor, wanted);
     return before;
 }
 

@@ -1,5 +1,6 @@
 /* Proximity: reflections without ambient light, as distances. */
 #include "analog_parts.h"
+#include "hal_cpu.h"
 
 /* White surface (epuck.md §5, column OpenSwarm): counts at 0, 5, ... 100 mm. The points between those of the table are
  * geometric means, as the section recommends; in between linear, which is off by less than half a millimetre. */
@@ -52,16 +53,16 @@ void proximity_send(void)
 sys_proximity_processor Sys_Set_ProximityProcessor(sys_proximity_processor wanted)
 {
     sys_proximity_processor before = processor;
-    processor = wanted != NULL ? wanted : Sys_Default_ProximityProcessor;
+    HAL_STORE(processor, wanted != NULL ? wanted : Sys_Default_ProximityProcessor);
     return before;
 }
 
 uint16 Sys_Get_Reflection(uint8 sensor)
 {
-    return reflection[sensor % SYS_PROXIMITY_SENSORS];
+    return HAL_LOAD(reflection[sensor % SYS_PROXIMITY_SENSORS]);
 }
 
 uint16 Sys_Get_AmbientLight(uint8 sensor)
 {
-    return ambient[sensor % SYS_PROXIMITY_SENSORS];
+    return HAL_LOAD(ambient[sensor % SYS_PROXIMITY_SENSORS]);
 }

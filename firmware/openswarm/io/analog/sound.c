@@ -1,5 +1,6 @@
 /* Microphones: the last sample by call, loudness as events. */
 #include "analog_parts.h"
+#include "hal_cpu.h"
 
 #include <string.h>
 
@@ -37,11 +38,11 @@ void sound_send(void)
 sys_sound_processor Sys_Set_SoundProcessor(sys_sound_processor wanted)
 {
     sys_sound_processor before = processor;
-    processor = wanted != NULL ? wanted : Sys_Default_SoundProcessor;
+    HAL_STORE(processor, wanted != NULL ? wanted : Sys_Default_SoundProcessor);
     return before;
 }
 
 sint16 Sys_Get_Sound(uint8 microphone)
 {
-    return latest[microphone % SYS_MICROPHONES];
+    return HAL_LOAD(latest[microphone % SYS_MICROPHONES]);
 }

@@ -1,11 +1,19 @@
-/* I2C: one transfer at a time, stepped by the interrupt, guarded by a time-out. */
+/* I2C: one transfer at a time, stepped by the interrupt on the bus's own block, guarded by a time-out. */
 #include "i2c.h"
 
+#include "bus.h"
 #include "hal_i2c.h"
 #include "kernel.h"
 
-static volatile uint8 result; /* an i2c_result; I2C_BUSY while the interrupt works */
-static bool taken;
+#include <string.h>
+
+typedef struct {
+    i2c_transfer transfer;
+    uint8 bytes[]; /* out, then in */
+} job;
+
+static bus i2c;
+static volatile uint8 result; /* an i2c_result; I2C_BUSY while the interrupt works, and until the lines are known to rest */
 
 bool i2c_stepped(void)
 {
@@ -13,18 +21,18 @@ bool i2c_stepped(void)
     return result != I2C_BUSY;
 }
 
-static bool take(void)
+static bool recover(void)
 {
-    hal_lock_state lock = hal_lock_devices();
-    bool was_free = !taken;
-    taken = true;
-    hal_unlock(lock);
-    return was_free;
+    result = I2C_BUSY; /* a thread killed half-way leaves it so */
+    bool free = i2c_recover();
+    result = I2C_DONE;
+    return free;
 }
 
 static i2c_result transfer_now(const i2c_transfer *transfer)
 {
-    if (!i2c_bus_is_free() && !i2c_recover()) {
+    bool rests = (result == I2C_DONE || result == I2C_NO_ACK) && i2c_bus_is_free();
+    if (!rests && !recover()) {
         return I2C_STUCK;
     }
     result = I2C_BUSY;
@@ -34,29 +42,31 @@ static i2c_result transfer_now(const i2c_transfer *transfer)
     }
     hal_i2c_end();
     i2c_result seen = result == I2C_BUSY ? I2C_TIMEOUT : (i2c_result)result;
-    if ((seen == I2C_TIMEOUT || seen == I2C_COLLISION) && !i2c_recover()) {
+    if ((seen == I2C_TIMEOUT || seen == I2C_COLLISION) && !recover()) {
         seen = I2C_STUCK;
     }
     return seen;
 }
 
-i2c_result Sys_I2C_Transfer(const i2c_transfer *transfer)
+i2c_result Sys_I2C_Transfer(const i2c_transfer *wanted)
 {
-    if (!hal_in_thread()) {
-        (void)os_refuse();
+    job *j = bus_take(&i2c, (uint16)(sizeof *j + wanted->out_size + wanted->in_size), hal_i2c_end);
+    if (j == NULL) {
         return I2C_BUSY;
     }
-    if (!take()) {
-        (void)os_fail(SYS_ERROR_BUSY);
-        return I2C_BUSY;
+    j->transfer = *wanted;
+    j->transfer.out = j->bytes;
+    j->transfer.in = j->bytes + wanted->out_size;
+    memcpy(j->bytes, wanted->out, wanted->out_size);
+    i2c_result seen = transfer_now(&j->transfer);
+    if (seen == I2C_DONE) {
+        memcpy(wanted->in, j->transfer.in, wanted->in_size);
     }
-    i2c_result seen = transfer_now(transfer);
-    taken = false;
+    bus_give(&i2c, hal_i2c_end);
     return seen;
 }
 
 void Sys_Start_I2C(void)
 {
-    taken = false;
     hal_i2c_start();
 }

@@ -52,7 +52,7 @@ void remote_edge(bool falling, uint32 ticks)
 sys_remote_processor Sys_Set_RemoteProcessor(sys_remote_processor wanted)
 {
     sys_remote_processor before = processor;
-    processor = wanted;
+    HAL_STORE(processor, wanted);
     return before;
 }
 

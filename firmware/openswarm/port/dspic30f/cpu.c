@@ -2,14 +2,14 @@
 #include "kernel.h"
 
 /* 1 ms is 14,745.6 Tcy at 14.7456 MHz: five periods are exactly 5 ms (README.md). */
-static const uint16 clock_period[5] = {14745, 14746, 14746, 14745, 14746};
+#define PR(period) ((period) - 1u)
+static const uint16 next_period[5] = {PR(14746), PR(14746), PR(14745), PR(14746), PR(14745)};
 enum { SLICE_PERIOD = 18432 /* counts of 8 Tcy: 10 ms */ };
 
 /* What switch.S assumes. */
-#define ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
-ASSUME(pcb_begins_so, offsetof(sys_pcb, sp) == 0 && offsetof(sys_pcb, limit) == 2 && offsetof(sys_pcb, status) == 8);
-ASSUME(sizes_and_bits, sizeof(sys_pcb) == 18 && SYS_DSP == 1 << 4 && SYS_READY == 1);
-ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
+HAL_ASSUME(pcb_begins_so, offsetof(sys_pcb, sp) == 0 && offsetof(sys_pcb, limit) == 2 && offsetof(sys_pcb, status) == 8);
+HAL_ASSUME(sizes_and_bits, sizeof(sys_pcb) == 18 && SYS_DSP == 1 << 4 && SYS_READY == 1);
+HAL_ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
 
 extern void os_resume_yielded(void), os_thread_start(void);
 static uint16 clock_phase;
@@ -17,7 +17,7 @@ static uint16 clock_phase;
 HAL_USED void cpu_clock_isr(void)
 {
     IFS0bits.T1IF = 0;
-    PR1 = clock_period[clock_phase] - 1u; /* of the period that has just begun */
+    PR1 = next_period[clock_phase]; /* of the period that has just begun */
     clock_phase = clock_phase == 4 ? 0 : clock_phase + 1u;
     os_clock_tick();
 }
@@ -25,21 +25,19 @@ HAL_USED void cpu_clock_isr(void)
 void hal_init(sys_pcb *process)
 {
     process->limit = SPLIM;
+    CPU_SRL |= CPU_IPL_SLICE;
 }
 
 void hal_start(void)
 {
-    clock_phase = 1;
-    PR1 = 14745u - 1u;
-    TMR1 = 0;
-    PR2 = SLICE_PERIOD - 1u;
-    IPC1bits.T2IP = 1; /* T1's is 4 after a reset (dspic30f6014a.md §5) */
-    IFS0bits.T1IF = 0;
+    PR1 = PR(14745); /* after a reset both timers are 0, T1's flag is clear and its priority is 4 (dspic30f6014a.md §5) */
+    PR2 = PR(SLICE_PERIOD);
+    IPC1bits.T2IP = 1;
+    T2CON = 0x8010; /* on, 1:8 */
+    T1CON = 0x8000; /* on, 1:1 */
     IEC0bits.T1IE = 1;
     IEC0bits.T2IE = 1;
-    T2CON = 0x8010; /* on, 1:8 */
-    hal_slice_restart();
-    T1CON = 0x8000; /* on, 1:1 */
+    CPU_SRL = 0; /* level thread; a slice end that was forced before comes now, another thread may go first */
 }
 
 /* Frame of a yielded thread (switch.S) that returns into os_thread_start with W8 = entry, W9 = argument. */
@@ -58,14 +56,8 @@ bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*ent
     return true;
 }
 
-void hal_stack_release(sys_pcb *process)
-{
-    (void)process;
-}
-
 HAL_OUTLINE void hal_stop(void)
 {
-    CPU_SRL |= CPU_IPL;
     IEC0 = IEC1 = IEC2 = INTCON1 = 0; /* nothing wakes the CPU again: the robot rests, an emulated run ends */
     for (;;) {
         __asm__ volatile("pwrsav #1");

@@ -8,21 +8,14 @@
 
 #include "hal_limits.h"
 
-#define HAL_USED __attribute__((used))
-#define HAL_NORETURN __attribute__((noreturn))
-#define HAL_LIKELY(condition) __builtin_expect(condition, 1)
-#define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
-#define HAL_OUTLINE __attribute__((noinline))            /* cold */
-#define HAL_ALLOCATION_FAILS() false
+#define HAL_STACK_TRAPS 1
+#define HAL_WORD_IS_ONE_ACT 1 /* no instruction is interrupted (isa.md §14.2) */
 
 typedef uint16_t hal_lock_state; /* SR */
 typedef uint16_t hal_limit;
 
-#define CPU_TEXT_(x) #x
-#define CPU_TEXT(x) CPU_TEXT_(x)
-
 #define CPU_SRL (*(volatile uint8_t *)&SR)
-enum { CPU_IPL_DEVICE = 0x80, CPU_IPL = 0xE0 };
+enum { CPU_IPL_SLICE = 0x20, CPU_IPL_DEVICE = 0x80, CPU_IPL = 0xE0 };
 
 static HAL_INLINE hal_lock_state hal_lock_slice(void)
 {
@@ -30,7 +23,7 @@ static HAL_INLINE hal_lock_state hal_lock_slice(void)
     uint16_t room;
     /* A read above the stack limit traps (isa.md §10): too little room ends the thread here, not half-way. Device levels
      * stay. After the IPL rises one more instruction may run at the old one (isa.md §14.3): a harmless one. */
-    __asm__ volatile("mov [w15+" CPU_TEXT(HAL_CALL_DEPTH) "], %0\n\tbtss %1, #7\n\tbset _SR, #5\n\tnop"
+    __asm__ volatile("mov [w15+" HAL_TEXT(HAL_CALL_DEPTH) "], %0\n\tbtss %1, #7\n\tbset _SR, #5\n\tnop"
                      : "=&r"(room) : "r"(before) : "memory");
     return before;
 }
@@ -49,6 +42,12 @@ static HAL_INLINE void hal_unlock(hal_lock_state before)
     SR = before; /* one instruction more if it were only the low byte */
 }
 
+static HAL_INLINE void hal_guard_kernel_stack(void)
+{
+    uint16_t limit;
+    __asm__ volatile("mov #_os_memory+" HAL_TEXT(HAL_KERNEL_STACK_LIMIT) ", %0\n\tmov %0, SPLIM" : "=r"(limit));
+}
+
 static HAL_INLINE bool hal_in_thread(void)
 {
     return (CPU_SRL & CPU_IPL) == 0;
@@ -57,11 +56,6 @@ static HAL_INLINE bool hal_in_thread(void)
 static HAL_INLINE bool hal_in_isr(void)
 {
     return (CPU_SRL & CPU_IPL_DEVICE) != 0;
-}
-
-static HAL_INLINE void hal_barrier(void)
-{
-    __asm__ volatile("" ::: "memory");
 }
 
 static HAL_INLINE void hal_slice_restart(void)

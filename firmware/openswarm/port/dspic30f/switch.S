@@ -120,23 +120,17 @@ _os_thread_start:
 save_dsp:
         pop.d   w4                      ; return address
         push    w2
-        push    ACCAL
-        push    ACCAH
-        push    ACCAU
-        push    ACCBL
-        push    ACCBH
-        push    ACCBU
-        push    CORCON
+        .irp    register, ACCAL, ACCAH, ACCAU, ACCBL, ACCBH, ACCBU, CORCON
+        push    \register
+        .endr
         clr     w6                      ; levels
         mov     #0x0700, w7             ; CORCON.DL
 1:      mov     CORCON, w3
         and     w3, w7, w3
         bra     z, 2f
-        push    DCOUNT
-        push    DOSTARTL
-        push    DOSTARTH
-        push    DOENDL
-        push    DOENDH
+        .irp    register, DCOUNT, DOSTARTL, DOSTARTH, DOENDL, DOENDH
+        push    \register
+        .endr
         clr     DCOUNT
         mov     #tbloffset(leave_loop), w3
         mov     w3, DOENDL
@@ -158,22 +152,15 @@ resume_dsp:
 1:      cp0     w6
         bra     z, 3f
         do      #0, 2f                  ; DL + 1
-        pop     DOENDH
-        pop     DOENDL
-        pop     DOSTARTH
-        pop     DOSTARTL
-        pop     DCOUNT
+        .irp    register, DOENDH, DOENDL, DOSTARTH, DOSTARTL, DCOUNT
+        pop     \register
+        .endr
         dec     w6, w6
 2:      nop
         bra     1b
-3:      pop     CORCON
-        pop     ACCBU
-        pop     ACCBH
-        pop     ACCBL
-        pop     ACCAU
-        pop     ACCAH
-        pop     ACCAL
-        pop     w1
+3:      .irp    register, CORCON, ACCBU, ACCBH, ACCBL, ACCAU, ACCAH, ACCAL, w1
+        pop     \register
+        .endr
         goto    w1
 
 ; ---- void hal_idle(const volatile uint16_t *pending): kernel stack, IPL 1 -------------------------------------------
@@ -199,6 +186,7 @@ os_isr_exit:
         pop.d   w4
         pop.d   w2
         pop     RCOUNT
+        pop     SPLIM                   ; above the kernel stack, where W15 still is
         pop     w0
         mov     w0, w15                 ; back to the interrupted stack
         pop.d   w0
@@ -209,10 +197,10 @@ os_isr_exit:
 ; it an ISR entry that had not yet left its stack; that interrupt's flag is still set. On the kernel stack it is the
 ; end.
 __StackError:
+        mov     SPLIM, w0
         setm    SPLIM
-        nop
-        mov     #_os_memory+HAL_KERNEL_STACK, w0
-        cpsgt   w15, w0
+        mov     #_os_memory+HAL_KERNEL_STACK_LIMIT, w1
+        cpsne   w0, w1                  ; whose limit it was
         bra     kernel_stack_error
         bclr    INTCON1, #STKERR
         mov     #_os_memory, w15

@@ -156,7 +156,7 @@ void hal_init(sys_pcb *process)
     main_context.fiber = &main_fiber;
     process->sp = &main_context;
     process->limit = NULL;
-    level = THREAD;
+    level = SLICE;
     kernel = fiber_new(HOST_STACK, kernel_loop);
 }
 

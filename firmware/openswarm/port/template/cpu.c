@@ -129,6 +129,7 @@ void hal_init(sys_pcb *process)
 {
     process->sp = &main_context;
     process->limit = NULL;
+    level = SLICE;
     if (prepare(&kernel, kernel_loop) == NULL) {
         abort();
     }
@@ -137,6 +138,7 @@ void hal_init(sys_pcb *process)
 void hal_start(void)
 {
     started = true; /* replace: start both timers, enable interrupts */
+    hal_unlock(THREAD);
 }
 
 bool hal_stack_init(sys_pcb *process, uint8_t *stack, uint16_t bytes, void (*entry)(void *), void *arg)

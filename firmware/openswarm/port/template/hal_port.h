@@ -2,12 +2,8 @@
 #ifndef HAL_PORT_H
 #define HAL_PORT_H
 
-#define HAL_USED /* your compiler's "referenced from assembly only" */
-#define HAL_NORETURN __attribute__((noreturn))
-#define HAL_LIKELY(condition) __builtin_expect(condition, 1)
-#define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
-#define HAL_OUTLINE __attribute__((noinline))            /* cold */
-#define HAL_ALLOCATION_FAILS() false
+#define HAL_STACK_IS_TAKEN
+#define HAL_WORD_IS_ONE_ACT 0 /* right for every CPU; 1 saves locks where words are loaded and stored at once */
 
 typedef int hal_lock_state; /* replace: whatever restores your interrupt mask */
 typedef void *hal_limit;    /* replace: stack limit register, or any type if there is none */
@@ -19,10 +15,5 @@ bool hal_in_thread(void);
 bool hal_in_isr(void);
 void hal_slice_restart(void);
 void hal_slice_force(void);
-
-static inline void hal_barrier(void)
-{
-    __asm__ volatile("" ::: "memory");
-}
 
 #endif

@@ -1,3 +1,4 @@
+#include "hal_limits.h"
 #include "isr.inc"
         .text
         isr     __INT1Interrupt, _bugs_isr

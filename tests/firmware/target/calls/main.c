@@ -1,11 +1,10 @@
 /* Every kernel call once, in small scenes that leave everything as it was, beside a thread that checks its registers.
  * The test interrupts each scene at every instruction and lets every allocation in it fail
  * (tests/firmware/injection.py). */
-#include <openswarm.h>
+#include "isr_calls.h"
+
 #include <openswarm_io.h>
 #include <p30F6014A.h>
-
-enum { HEARD = SYS_FIRST_USER_EVENT, AWAITED, PASSING, UNKNOWN };
 
 volatile uint16 scene __attribute__((used)), heard __attribute__((used)), sent __attribute__((used));
 volatile uint16 isr_sent __attribute__((used)), bytes __attribute__((used)), leaf __attribute__((used));
@@ -47,7 +46,7 @@ static bool is_nine(sys_event_data *data)
 }
 
 /* Every byte is a message: what the UART received is heard in the same scene. */
-static uint16 each_byte(uint8 byte, uint8 *buffer, uint16 *used)
+uint16 each_byte(uint8 byte, uint8 *buffer, uint16 *used)
 {
     buffer[0] = byte;
     *used = 0;
@@ -58,6 +57,7 @@ __attribute__((used)) void calls_isr(void)
 {
     IFS1bits.INT1IF = 0;
     isr_sent += Sys_Send_IntEvent(HEARD, 3);
+    isr_calls();
 }
 
 static void passes(void)

@@ -1,4 +1,5 @@
 ; A thread that fills its registers, lets two rounds of a loop pass and checks them, then yields.
+#include "hal_limits.h"
 #include "isr.inc"
         .text
         .global _pattern_checker

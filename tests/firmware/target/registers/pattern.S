@@ -146,5 +146,6 @@
         dsp_thread _pattern_dsp_two, 0x4044, 4, _checked+6, 0x1026, 5, 2
 
 ; 100 us device: T4 at IPL 4 sends an event from C.
+#include "hal_limits.h"
 #include "isr.inc"
         isr     __T4Interrupt, _storm_isr

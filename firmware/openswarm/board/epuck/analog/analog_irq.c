@@ -1,11 +1,14 @@
 /* ADC of the e-puck: AN2-4 microphones, AN5-7 accelerometer, AN8-15 proximity (epuck.md §2). Each interrupt ends a scan of
  * eight inputs, the pair of proximity sensors last. */
 #include "hal_analog.h"
-#include "kernel.h"
+#include "openswarm_interrupt.h"
 #include "pins.h"
 
+#define _ADCIF _ADIF /* the one vector whose name differs from its bits' */
+#define _ADCIE _ADIE
+#define _ADCIP _ADIP
+
 enum {
-    PRIORITY = 4,
     ALL_ANALOG = 0x0003, /* ADPCFG: AN0 and AN1 belong to the debugger */
     FIXED = 0x00FC,
     PAIR = 0x1100,       /* AN8 and AN12, to be shifted by the number of the pair */
@@ -38,10 +41,9 @@ static void restart(void)
     ADCON1 = ON | AUTOMATIC;
 }
 
-HAL_USED void analog_isr(void)
+static void scan_done(void)
 {
     volatile unsigned int *buffer = &ADCBUF0;
-    IFS0bits.ADIF = 0;
     for (uint8_t i = 0; i < HAL_ANALOG_FIXED; i++) {
         scan.fixed[i] = (uint16_t)buffer[i];
     }
@@ -56,15 +58,14 @@ HAL_USED void analog_isr(void)
     restart();
     analog_scanned(&done);
 }
+SYS_INTERRUPT(ADC, 4, scan_done)
 
 void hal_analog_start(void)
 {
     ADPCFG = ALL_ANALOG;
     ADCON2 = SCAN_OF_8;
     ADCON3 = SLOWEST;
-    IPC2bits.ADIP = PRIORITY;
-    IFS0bits.ADIF = 0;
-    IEC0bits.ADIE = 1;
+    Sys_Enable_Interrupt(ADC);
     scan.pair = 0;
     scan.lit = false;
     restart();

@@ -1,15 +1,9 @@
 /* The camera's interrupt into the kernel: OC8, a vector nobody else uses, at IPL 4 (kernel.md §4). */
 #include "hal_camera.h"
 #include "i2c_master.h"
-#include "kernel.h"
+#include "openswarm_interrupt.h"
 
-enum { PRIORITY = 4 };
-
-HAL_USED void camera_frame_isr(void)
-{
-    IFS2bits.OC8IF = 0;
-    camera_frame_complete();
-}
+SYS_INTERRUPT(OC8, 4, camera_frame_complete)
 
 camera_type hal_camera_init(void)
 {
@@ -17,9 +11,7 @@ camera_type hal_camera_init(void)
     camera_type type = camera_sensor_init();
     if (type != CAMERA_NONE) {
         camera_capture_init();
-        IPC8bits.OC8IP = PRIORITY;
-        IFS2bits.OC8IF = 0;
-        IEC2bits.OC8IE = 1;
+        Sys_Enable_Interrupt(OC8);
     }
     return type;
 }

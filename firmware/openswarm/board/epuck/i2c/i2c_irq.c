@@ -1,31 +1,28 @@
 /* I2C master interrupt at IPL 4. */
 #include "hal_i2c.h"
-#include "kernel.h"
+#include "openswarm_interrupt.h"
 
-enum { PRIORITY = 4 };
-
-HAL_USED void i2c_isr(void)
+static void step_done(void)
 {
-    IFS0bits.MI2CIF = 0;
     if (i2c_stepped()) {
-        IEC0bits.MI2CIE = 0;
+        Sys_Disable_Interrupt(MI2C);
     }
 }
+SYS_INTERRUPT(MI2C, 4, step_done)
 
 void hal_i2c_start(void)
 {
     i2c_init();
-    IPC3bits.MI2CIP = PRIORITY;
 }
 
 void hal_i2c_begin(const i2c_transfer *transfer)
 {
     i2c_begin(transfer);
-    IEC0bits.MI2CIE = 1;
+    Sys_Enable_Interrupt(MI2C);
 }
 
 void hal_i2c_end(void)
 {
-    IEC0bits.MI2CIE = 0;
+    Sys_Disable_Interrupt(MI2C);
     __asm__ volatile("nop"); /* one more interrupt may slip in behind the write (isa.md §14.3) */
 }

@@ -1,8 +1,9 @@
 /* Remote control receiver on RF6/INT0, idle high (epuck.md §2): both edges, timed by the 1 ms clock T1. */
 #include "hal_remote.h"
 #include "kernel.h"
+#include "openswarm_interrupt.h"
 
-enum { PRIORITY = 4, MS_TCY = 14746 /* 14,745.6; no distance is longer than 2 ms */, JUST_BEGUN = MS_TCY / 2 };
+enum { MS_TCY = 14746 /* 14,745.6; no distance is longer than 2 ms */, JUST_BEGUN = MS_TCY / 2 };
 
 /* The clock's interrupt has this level too: its flag may be waiting while TMR1 has begun again. */
 static uint32_t now(void)
@@ -14,7 +15,7 @@ static uint32_t now(void)
     return (uint32_t)ms * MS_TCY + ticks;
 }
 
-HAL_USED void remote_isr(void)
+static void edge(void)
 {
     uint32_t ticks = now();
     bool falling = INTCON2bits.INT0EP;
@@ -22,11 +23,10 @@ HAL_USED void remote_isr(void)
     IFS0bits.INT0IF = 0; /* a change of polarity may set it */
     remote_edge(falling, ticks);
 }
+SYS_INTERRUPT(INT0, 4, edge)
 
 void hal_remote_start(void)
 {
     INTCON2bits.INT0EP = 1;
-    IPC0bits.INT0IP = PRIORITY;
-    IFS0bits.INT0IF = 0;
-    IEC0bits.INT0IE = 1;
+    Sys_Enable_Interrupt(INT0);
 }

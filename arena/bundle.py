@@ -1,0 +1,139 @@
+"""A study as one file: records, images, experiments, manifests and the hash of each, in a zip archive.
+
+What enters: folders of runs; what leaves: an archive whose bytes depend on these files alone, and `verify`, which
+computes chosen trials again and compares.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+from arena.campaign import Plan, run_one, trial_path
+from arena.record import EXPERIMENT, MANIFEST, RecordError, Trial, read_trial, write_bytes
+from arena.scene import scene_of
+from arena.versions import versions
+
+CONTENTS: Final = "bundle.json"
+KEPT: Final = (MANIFEST, EXPERIMENT, "trial-*.parquet", "firmware*")
+LIMIT: Final = 1 << 32
+"""Bytes of everything unpacked: more is no study of ours."""
+_DATE: Final = (1980, 1, 1, 0, 0, 0)
+
+
+def pack(folders: list[Path], target: Path) -> str:
+    """Write the runs in `folders` into one archive; its SHA-256. Raises RecordError for a folder without a finished
+    trial, two folders of one name, or an archive that cannot be written."""
+    names = [folder.resolve().name for folder in folders]
+    if len(set(names)) < len(names):
+        raise RecordError("two of the folders have the same name; a bundle needs different ones")
+    files: dict[str, bytes] = {}
+    for name, folder in zip(names, folders, strict=True):
+        if not any(folder.glob("trial-*.parquet")) or not (folder / MANIFEST).exists():
+            raise RecordError(f"{folder}: no finished run (manifest.json and trial-*.parquet) here")
+        for path in sorted(path for pattern in KEPT for path in folder.glob(pattern)):
+            files[f"{name}/{path.name}"] = path.read_bytes()
+    hashes = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(files.items())}
+    contents = json.dumps({"format": 1, "files": hashes}, indent=1).encode()
+    with tempfile.TemporaryFile() as scratch:
+        with zipfile.ZipFile(scratch, "w") as archive:
+            for name, data in [(CONTENTS, contents), *sorted(files.items())]:
+                entry = zipfile.ZipInfo(name, _DATE)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, data)
+        scratch.seek(0)
+        whole = scratch.read()
+    write_bytes(target, whole)
+    return hashlib.sha256(whole).hexdigest()
+
+
+@dataclass(frozen=True)
+class Check:
+    """A trial computed again: `equal` to the byte, or in all values if `versions` differ, which are in the file too."""
+
+    run: str
+    number: int
+    equal: bool
+    differs: tuple[str, ...]
+    versions: tuple[str, ...]
+
+
+def unpack(bundle: Path, folder: Path) -> list[Path]:
+    """The runs of a bundle below `folder`. Raises RecordError for what is none, or has been changed."""
+    try:
+        with zipfile.ZipFile(bundle) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > LIMIT:
+                raise RecordError(f"{bundle}: would unpack to more than {LIMIT >> 30} GB")
+            hashes = json.loads(archive.read(CONTENTS))["files"]
+            if set(archive.namelist()) != {CONTENTS, *hashes}:
+                raise RecordError(f"{bundle}: holds other files than its list says")
+            for name, digest in hashes.items():
+                parts = PurePosixPath(name).parts
+                if len(parts) != 2 or ".." in parts or "\\" in name or name.startswith("/"):
+                    raise RecordError(f"{bundle}: {name!r} is no file of a run")
+                data = archive.read(name)
+                if hashlib.sha256(data).hexdigest() != digest:
+                    raise RecordError(f"{bundle}: {name} is not what it was (its hash differs)")
+                (folder / parts[0]).mkdir(parents=True, exist_ok=True)
+                (folder / parts[0] / parts[1]).write_bytes(data)
+    except (OSError, zipfile.BadZipFile, KeyError, TypeError, ValueError, NotImplementedError, EOFError) as error:
+        if isinstance(error, RecordError):
+            raise
+        raise RecordError(f"{bundle}: is no bundle: {error}") from None
+    return sorted({folder / PurePosixPath(name).parts[0] for name in hashes})
+
+
+def plan_of(folder: Path) -> Plan:
+    """The plan of an unpacked run, from its manifest. Raises RecordError, SceneError."""
+    try:
+        key: dict[str, Any] = json.loads((folder / MANIFEST).read_text())["key"]
+        scene = scene_of(key["scene"])
+        own = dict.fromkeys(group.image for group in scene.groups if group.image)
+        firmware = {path.stem: path for path in folder.glob("firmware*")}
+        hashes = key.get("images_sha256", {})
+        images = tuple((name, firmware[f"firmware-{place}"] if hashes.get(name) else None)
+                       for place, name in enumerate(own, start=1))  # fmt: skip
+        image = firmware["firmware"] if key["image_sha256"] else None
+        experiment = folder / EXPERIMENT if key.get("experiment_sha256") else None
+        return Plan(scene, key["brain"], key["controller"], image, len(list(folder.glob("trial-*.parquet"))),
+                    key["seconds"], key["seed"], experiment, images)  # fmt: skip
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RecordError(f"{folder / MANIFEST}: {type(error).__name__}: {error}") from None
+
+
+def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], jobs: int) -> Iterator[Check]:
+    """Compute `chosen` of each run's trial numbers again. Raises RecordError, SceneError, emu.LoadError."""
+    with tempfile.TemporaryDirectory(prefix="arena-") as name:
+        for folder in unpack(bundle, Path(name)):
+            plan = plan_of(folder)
+            again = folder / "again"
+            again.mkdir()
+            numbers = sorted(int(path.stem.partition("-")[2]) for path in folder.glob("trial-*.parquet"))
+            for number in chosen(numbers):
+                run_one(plan, number, again, None, jobs if plan.has_firmware else 1)
+                yield _compared(folder.name, number, trial_path(folder, number), trial_path(again, number))
+
+
+def _compared(run: str, number: int, kept: Path, made: Path) -> Check:
+    if kept.read_bytes() == made.read_bytes():
+        return Check(run, number, True, (), ())
+    one, other = read_trial(kept), read_trial(made)
+    now, then = versions(), one.about.get("versions", {})
+    changed = tuple(
+        f"{name} {then.get(name, '?')} then, {now[name]} now" for name in now if then.get(name) != now[name]
+    )
+    differs = tuple(name for name in sorted({*one.columns, *other.columns}) if not _same(one, other, name))
+    return Check(run, number, not differs and bool(changed), differs, changed)
+
+
+def _same(one: Trial, other: Trial, name: str) -> bool:
+    if name not in one.columns or name not in other.columns:
+        return False
+    return list(one.columns[name]) == list(other.columns[name])

@@ -1,0 +1,325 @@
+"""The tables of a scene: what each value means, and which values it can have. Pure data, of no physics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+Points = tuple[tuple[float, ...], ...]
+"""(x, y) in cm, of poses (x, y, heading in degrees)."""
+FCY: Final = 14_745_600
+"""Tcy per second of the e-puck (epuck.md)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arena:
+    """Inner size between the walls, or the corners of a room of any shape, which gives the size."""
+
+    width_cm: float = 400.0
+    height_cm: float = 300.0
+    polygon: Points = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """Grid of start positions, centred in the arena."""
+
+    columns: int = 15
+    rows: int = 11
+    spacing_cm: float = 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class Robots:
+    """The e-pucks. Wheels that turn pull with `thrust_n` at most, those that stand hold with `brake_n`.
+    `wheel_noise` is a share of the speed, drawn anew every `noise_period_s`.
+
+    Robots differ from each other by what is drawn once per robot and trial, normally distributed: how the camera is
+    turned to the left and up, and by which share each wheel is faster than the other robots'."""
+
+    count: int = 5
+    axle_cm: float = 5.1
+    thrust_n: float = 1.0
+    brake_n: float = 1.04
+    wheel_noise: float = 0.05
+    noise_period_s: float = 0.1
+    camera_yaw_sd_deg: float = 0.0
+    camera_pitch_sd_deg: float = 0.0
+    wheel_bias_sd: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Objects:
+    """What can be pushed: discs seen from above."""
+
+    count: int = 20
+    radius_cm: float = 5.0
+    mass_kg: float = 0.035
+    floor_friction: float = 0.58
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSetting:
+    """The sensor in front; how it is mounted and its lens are explained in `lens.py`. `false_*` are chances per frame
+    and hold for scripted brains only."""
+
+    sensor: str = "PO6030K"
+    frame_tcy: int = 1_600_000
+    range_cm: float = 150.0
+    pitch_deg: float = 0.0
+    mirrored: bool = False
+    distortion: float = 0.0
+    vignetting: float = 0.0
+    pixel_noise: float = 3.0
+    false_negative: float = 0.0
+    false_positive: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class InfraredSetting:
+    """Reflection of surfaces as a share of white paper's. UNVERIFIED but for white walls; black is 0.1 to 0.3."""
+
+    wall_share: float = 1.0
+    object_share: float = 0.8
+    robot_share: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """`brightness` of the scene for cameras, 1 = as their colours say. For infrared sensors: raw counts in the room
+    (falling with light), and what a lamp takes off at 1 m from a sensor that faces it; 0 = no lamp."""
+
+    brightness: float = 1.0
+    ambient_counts: int = 3800
+    lamp_x_cm: float = 0.0
+    lamp_y_cm: float = 0.0
+    lamp_counts: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BatterySetting:
+    """Voltage at the trial's start, and hours until it has fallen in a line from full (4.2 V) to low (3.4 V)."""
+
+    volts: float = 4.0
+    hours: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """How robots come to life. Each is switched on at its own moment within `spread_tcy` (one camera frame), its switch
+    of 16 positions at `selector` (-1: as the run's controller asks, 0 = A, 1 = B). Somebody holds `remote`, a key's
+    name or RC-5 code ("" = nobody does), for `remote_held_s`: frames repeat every 113.8 ms (epuck.md §6).
+    `stimulus` is a script of more (emu/boards/epuck/stimulus.py): what the robot is told by UART, the state of its
+    battery, another position of its switch; its times are those of the trial.
+
+    A robot without a motor step, a change of LEDs or a byte on UART1 for `silent_s` is reported."""
+
+    spread_tcy: int = 1_600_000
+    selector: int = -1
+    remote: str = "ok"
+    remote_at_s: float = 1.0
+    remote_held_s: float = 0.5
+    stimulus: str = ""
+    silent_s: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Lock-step of world and brains, another one when all brains are scripted, and how often rows are written."""
+
+    quantum_ms: float = 1.0
+    scripted_quantum_ms: float = 10.0
+    sample_s: float = 0.5
+
+    @property
+    def quantum_tcy(self) -> int:
+        """The quantum in whole Tcy."""
+        return round(self.quantum_ms * FCY / 1000)
+
+
+INHERIT: Final = "as in [start]"
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """Where several things of one kind stand at the start.
+
+    `place` is one of `marks` (free marks of the grid), `uniform` (in a rectangle `width_cm` x `depth_cm` around the
+    centre; 0: the whole arena), `normal` (`sd_cm` around the centre), `circle` (`circle_cm` from the centre, at equal
+    distances) or `poses` (as in `poses`: x, y, for robots the heading in degrees). The centre is `x_cm`, `y_cm`, by
+    default the arena's.
+    """
+
+    name: str = ""
+    count: int = 1
+    place: str = "marks"
+    poses: Points = ()
+    x_cm: float = math.nan
+    y_cm: float = math.nan
+    width_cm: float = 0.0
+    depth_cm: float = 0.0
+    sd_cm: float = 30.0
+    circle_cm: float = 50.0
+
+
+@dataclass(frozen=True, slots=True)
+class RobotGroup(Placed):
+    """Robots of one kind. `image` is their brain (as `--brain`; a path from the scene's file on; empty: the run's),
+    `controller` A or B (empty: the run's), `id_first` the first one's number, counted on: `{id}` in `stimulus` becomes
+    it. `heading_deg` is theirs at the start, nan: any. The rest as in [start], where it is not given."""
+
+    image: str = ""
+    controller: str = ""
+    id_first: int = 0
+    heading_deg: float = math.nan
+    selector: int = -1
+    remote: str = INHERIT
+    stimulus: str = INHERIT
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectKind(Placed):
+    """Discs that can be pushed. `colour` is a name of `NAMED` or red, green and blue as `#rrggbb`, as a camera
+    shows them; `share` what they reflect in infrared, of white paper's."""
+
+    radius_cm: float = 5.0
+    height_cm: float = 10.0
+    mass_kg: float = 0.035
+    floor_friction: float = 0.58
+    colour: str = "red"
+    share: float = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """What stands fast: a polygon, or a disc of `radius_cm` at `x_cm`, `y_cm`."""
+
+    name: str = ""
+    polygon: Points = ()
+    x_cm: float = 0.0
+    y_cm: float = 0.0
+    radius_cm: float = 0.0
+    height_cm: float = 50.0
+    colour: str = "wall"
+    share: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """A coloured piece of floor, which nothing bumps into."""
+
+    name: str = ""
+    polygon: Points = ()
+    x_cm: float = 0.0
+    y_cm: float = 0.0
+    radius_cm: float = 0.0
+    colour: str = "white"
+
+
+@dataclass(frozen=True, slots=True)
+class Lamp:
+    """As the one of [light]: what it takes off the infrared sensors' counts at 1 m."""
+
+    x_cm: float = 0.0
+    y_cm: float = 0.0
+    counts: float = 1000.0
+
+
+TABLES: Final[Mapping[str, type[Any]]] = {
+    "arena": Arena,
+    "marks": Marks,
+    "robots": Robots,
+    "objects": Objects,
+    "camera": CameraSetting,
+    "infrared": InfraredSetting,
+    "light": Light,
+    "battery": BatterySetting,
+    "start": Start,
+    "clock": Clock,
+}
+LISTS: Final[Mapping[str, type[Any]]] = {
+    "groups": RobotGroup,
+    "kinds": ObjectKind,
+    "obstacles": Obstacle,
+    "patches": Patch,
+    "lamps": Lamp,
+}
+"""Tables of which there can be several. In a file groups are [[robots]] and kinds [[objects]]; what all robots have in
+common is then [chassis]."""
+
+_CENTRE: Final = (-10_000, 10_000)
+_PLACED: Final = {
+    "count": (0, 10_000),
+    "width_cm": (0, 10_000),
+    "depth_cm": (0, 10_000),
+    "sd_cm": (0, 10_000),
+    "circle_cm": (0, 10_000),
+}
+LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
+    Arena: {"width_cm": (20, 10_000), "height_cm": (20, 10_000)},
+    Marks: {"columns": (1, 10_000), "rows": (1, 10_000), "spacing_cm": (1, 10_000)},
+    Robots: {
+        "count": (0, 1000),
+        "axle_cm": (1, 7.4),
+        "thrust_n": (0.01, math.inf),
+        "brake_n": (0.01, 1000),
+        "wheel_noise": (0, 1),
+        "noise_period_s": (0.001, 1000),
+        "camera_yaw_sd_deg": (0, 20),
+        "camera_pitch_sd_deg": (0, 10),
+        "wheel_bias_sd": (0, 0.2),
+    },
+    Objects: {"count": (0, 10_000), "radius_cm": (0.5, 100), "mass_kg": (0.001, 100), "floor_friction": (0, 10)},
+    CameraSetting: {
+        "frame_tcy": (100_000, 100_000_000),
+        "range_cm": (1, math.inf),
+        "pitch_deg": (-20, 20),
+        "distortion": (-1, 1),
+        "vignetting": (0, 1),
+        "pixel_noise": (0, 255),
+        "false_negative": (0, 1),
+        "false_positive": (0, 1),
+    },
+    InfraredSetting: {"wall_share": (0, 1), "object_share": (0, 1), "robot_share": (0, 1)},
+    Light: {"brightness": (0, 100), "ambient_counts": (0, 4095), "lamp_counts": (0, 1_000_000),
+            "lamp_x_cm": _CENTRE, "lamp_y_cm": _CENTRE},
+    BatterySetting: {"volts": (3.0, 4.2), "hours": (0.01, 1000)},
+    Start: {
+        "spread_tcy": (1, 147_456_000),
+        "selector": (-1, 15),
+        "remote_at_s": (0, 100_000),
+        "remote_held_s": (0, 7),
+        "silent_s": (0.1, math.inf),
+    },
+    Clock: {"quantum_ms": (0.1, 20), "scripted_quantum_ms": (0.1, 20), "sample_s": (0.02, 60)},
+    RobotGroup: {**_PLACED, "count": (0, 1000), "id_first": (0, 65_535), "selector": (-1, 15)},
+    ObjectKind: {
+        **_PLACED,
+        "radius_cm": (0.5, 100),
+        "height_cm": (0.1, 1000),
+        "mass_kg": (0.001, 100),
+        "floor_friction": (0, 10),
+        "share": (0, 1),
+    },
+    Obstacle: {"x_cm": _CENTRE, "y_cm": _CENTRE, "radius_cm": (0, 1000), "height_cm": (0.1, 1000), "share": (0, 1)},
+    Patch: {"x_cm": _CENTRE, "y_cm": _CENTRE, "radius_cm": (0, 10_000)},
+    Lamp: {"x_cm": _CENTRE, "y_cm": _CENTRE, "counts": (0, 1_000_000)},
+}  # fmt: skip
+"""Least and greatest value of each number."""
+NAMED: Final = {
+    "red": (90, 14, 14),
+    "green": (10, 48, 14),
+    "blue": (14, 18, 90),
+    "yellow": (96, 84, 16),
+    "white": (120, 112, 112),
+    "grey": (60, 56, 56),
+    "black": (8, 8, 8),
+    "wall": (112, 100, 100),
+    "floor": (100, 90, 88),
+}
+"""Colours by name as a camera shows them in the experiment's light; red, green and wall are those of `look.COLOURS`.
+UNVERIFIED on a robot."""
+
+PLACES: Final = ("marks", "uniform", "normal", "circle", "poses")

@@ -1,0 +1,97 @@
+"""`emu coverage`: which lines, branches and instructions a run has executed, for lcov and Cobertura."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from fractions import Fraction
+from pathlib import Path
+from typing import Final
+
+from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
+from emu.commands.board_options import add_board_options, board_of, set_up
+from emu.coverage import Counts, Report, counting
+from emu.image import Image
+from emu.loader import load_image
+from emu.outfile import whole_text_file
+
+DESCRIPTION: Final = """\
+Run a firmware image and tell what of it was executed, from exact counts of the very code that a robot runs.
+
+Reports: lcov (genhtml --branch-coverage makes pages of it) and Cobertura. Branches are those of the object code: both
+outcomes of every conditional branch and skip. Comments LCOV_EXCL_LINE, _START and _STOP leave lines out. --counts adds
+the counts of earlier runs of the same image, and keeps the sum. UART1 goes to standard output. Functions that the
+linker left out are not in the image and not in the report.
+
+Exit status: 0 done, 1 firmware fault (the reports are written), 2 bad input."""
+
+
+def parser() -> Parser:
+    example = "emu coverage firmware.elf --seconds 1 --lcov out.info && genhtml --branch-coverage -o html out.info"
+    made = Parser("coverage", DESCRIPTION, example)
+    made.add_argument("image", metavar="IMAGE", help="ELF executable with debug information")
+    made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
+    made.add_argument("--lcov", metavar="FILE", help="write an lcov tracefile")
+    made.add_argument("--cobertura", metavar="FILE", help="write Cobertura XML")
+    made.add_argument("--counts", metavar="FILE", help="add the counts of this file, if it is there, and write the sum")
+    made.add_argument("--root", metavar="DIR", default=".", help="what relative file names are relative to (default .)")
+    made.add_argument("--json", action="store_true", help="print the totals as one JSON object")
+    add_board_options(made)
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says."""
+    from emu.machine import Machine
+
+    image = load_image(options.image)
+    if not len(image.lines):
+        raise CommandError(f"{image.path} has no line table; build it with -g")
+    machine = Machine(image.chip, engine="plain", board=board_of(options))
+    machine.load(image)
+    set_up(machine, options)
+    counts = _earlier(options, image)
+    if not options.json:
+        machine.uart[1].listen(lambda byte, _cycle: print(chr(byte & 0xFF), end="", flush=byte == 0x0A))
+    stop_counting = counting(machine, counts)
+    stop = machine.run(seconds=options.seconds)
+    stop_counting()
+    root = Path(options.root).resolve()
+    report = Report(machine.inside, counts, root.joinpath)
+    if options.lcov:
+        with whole_text_file(options.lcov) as stream:
+            stream.writelines(f"{line}\n" for line in report.lcov(root.joinpath))
+    if options.cobertura:
+        with whole_text_file(options.cobertura) as stream:
+            stream.write(report.cobertura(root.joinpath))
+    if options.counts:
+        with whole_text_file(options.counts) as stream:
+            json.dump(counts.facts(image), stream)
+    _print(report, options.json)
+    if stop.fault is not None:
+        print(f"emu coverage: {stop.fault.report()}", file=sys.stderr)
+    return EXIT_FAULT if stop.fault is not None else EXIT_OK
+
+
+def _earlier(options: argparse.Namespace, image: Image) -> Counts:
+    if not options.counts or not Path(options.counts).exists():
+        return Counts()
+    try:
+        return Counts.of(json.loads(Path(options.counts).read_text(encoding="utf-8")), image)
+    except ValueError as error:
+        raise CommandError(f"{options.counts}: {error}") from None
+
+
+def _print(report: Report, as_json: bool) -> None:
+    lines = [count for one in report.files.values() for count in one.lines.values()]
+    totals = {
+        "lines": (sum(count > 0 for count in lines), len(lines)),
+        "branch outcomes": (report.outcomes_seen, report.outcomes),
+        "instructions": (report.instructions_run, report.instructions),
+    }
+    if as_json:
+        print(json.dumps({name: {"run": part, "all": whole} for name, (part, whole) in totals.items()}))
+        return
+    for name, (part, whole) in totals.items():
+        print(f"{name:16} {part:7,} of {whole:7,}  {100 * part / whole if whole else 100:6.2f} %")

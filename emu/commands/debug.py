@@ -1,0 +1,85 @@
+"""`emu debug`: a Debug Adapter Protocol server, for editors."""
+
+from __future__ import annotations
+
+import argparse
+import socket
+import sys
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+from emu.boards import BOARDS
+from emu.command import EXIT_OK, Parser
+
+if TYPE_CHECKING:
+    from emu.dap.wire import Wire
+    from emu.machine import Machine
+
+DESCRIPTION: Final = """\
+Debug firmware from an editor: a server of the Debug Adapter Protocol on standard input and output, or on a TCP port
+of this machine.
+
+Launch arguments: program (the ELF file; required), board, selector, camera (a picture), engine, strict, stopOnEntry,
+sourceRoots (folders that file names of the program are relative to).
+
+Breakpoints in sources, functions, instructions and data, with conditions, hit counts and log messages; stepping by
+line and instruction, forward and back; OpenSwarm's threads; locals, statics, registers, SFRs by bit field; memory;
+disassembly. In the console: expressions of C, assignments, and /help.
+
+Exit status: 0 the client has left, 2 bad input."""
+
+
+def parser() -> Parser:
+    made = Parser("debug", DESCRIPTION, "emu debug --port 4711")
+    made.add_argument("--port", metavar="N", type=int, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
+    made.add_argument("--once", action="store_true", help="with --port: end after the first client")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says."""
+    from emu.dap.wire import Wire
+
+    if options.port is None:
+        out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
+        _serve(Wire(sys.stdin.fileno(), out))
+        return EXIT_OK
+    with socket.create_server(("127.0.0.1", options.port)) as server:
+        print(f"emu debug: listening on 127.0.0.1:{server.getsockname()[1]}", file=sys.stderr, flush=True)
+        while True:
+            connection, _ = server.accept()
+            with connection, connection.makefile("wb") as writer:
+                _serve(Wire(connection.fileno(), writer))
+            if options.once:
+                return EXIT_OK
+
+
+def _serve(wire: Wire) -> None:
+    from emu.dap.server import Server
+
+    try:
+        Server(wire, machine_of).serve()
+    finally:
+        wire.close()
+
+
+def machine_of(arguments: dict[str, Any]) -> Machine:
+    """A machine as the launch arguments say. Raises ValueError."""
+    import emu
+
+    program = arguments.get("program")
+    if not isinstance(program, str):
+        raise ValueError("launch needs `program`, the path of an ELF file")
+    board: Any = arguments.get("board", BOARDS[0])
+    if board == BOARDS[0]:
+        from emu.boards.epuck.board import Epuck
+
+        board = partial(Epuck, selector=int(arguments.get("selector", 0)))
+    machine = emu.load(
+        program, board=board, engine=arguments.get("engine", "auto"), strict=bool(arguments.get("strict", False))
+    )
+    if arguments.get("camera"):
+        from emu.boards.picture import read_picture
+
+        machine.board.camera.show(read_picture(arguments["camera"]))
+    return machine

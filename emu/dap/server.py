@@ -1,0 +1,483 @@
+"""One debugging session: requests of a client become acts of the debuggee, its halts become events.
+
+What enters: a `Wire`, what makes a machine from launch arguments. What leaves: nothing but messages. Between two slices
+of a run the inbox is looked at, so everything but what needs a standing machine is answered while it runs.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from emu.dap.breakpoints import Breakpoint, bad_hit_condition
+from emu.dap.debuggee import Debuggee, Halt
+from emu.dap.sights import Row, Sights, Sources, disassembled
+from emu.dap.wire import Message, Wire
+from emu.debug.expression import ExpressionError, evaluate
+from emu.debug.inside import Value
+from emu.debug.locate import Unavailable, address_of
+
+if TYPE_CHECKING:
+    from emu.machine import Machine
+
+CAPABILITIES: Final = {
+    f"supports{name}": True
+    for name in (
+        "ConfigurationDoneRequest", "ConditionalBreakpoints", "HitConditionalBreakpoints", "LogPoints",
+        "FunctionBreakpoints", "InstructionBreakpoints", "DisassembleRequest", "SteppingGranularity", "DataBreakpoints",
+        "DataBreakpointBytes", "StepBack", "ReadMemoryRequest", "WriteMemoryRequest", "SetVariable", "SetExpression",
+        "EvaluateForHovers", "ExceptionInfoRequest", "RestartRequest", "TerminateRequest",
+        "DelayedStackTraceLoading", "BreakpointLocationsRequest", "CancelRequest",
+    )
+} | {
+    "supportTerminateDebuggee": True,
+    "exceptionBreakpointFilters": [{"filter": "fault", "label": "Firmware faults", "default": True}],
+}  # fmt: skip
+GOING: Final = ("continue", "next", "stepIn", "stepOut", "stepBack", "reverseContinue", "restart")
+WHILE_RUNNING: Final = ("pause", "disconnect", "terminate", "cancel", "threads")
+"""Requests that are answered while the machine runs; the others wait, except those that change breakpoints."""
+HELP: Final = """\
+an expression of C; NAME = VALUE; or
+/time              cycle, seconds, how far in the past
+/goto CYCLE        go to a cycle of the recording
+/lastwrite PLACE   go back to the instruction that changed a place last
+/threads           OpenSwarm's threads with stack use
+"""
+
+
+class Refused(Exception):
+    """A request that cannot be done; the text is for the user."""
+
+
+class Server:
+    """Serves one client to the end. `make(arguments)` gives a machine; it raises ValueError or OSError for bad ones."""
+
+    def __init__(self, wire: Wire, make: Callable[[Row], Machine]) -> None:
+        self._wire: Final = wire
+        self._make: Final = make
+        self._target: Debuggee | None = None
+        self._sights: Sights | None = None
+        self._sources: Sources | None = None
+        self._launch: Row = {}
+        self._configured = self._over = False
+        self._halt = Halt("entry")
+        self._pause = False
+        self._waiting: list[Message] = []
+        self._said: dict[int, bytearray] = {}
+        self._next_id = 0
+        self._thread = 1
+
+    def serve(self) -> None:
+        """Answer until the client leaves."""
+        while not self._over:
+            message = self._waiting.pop(0) if self._waiting else self._wire.inbox.get()
+            if message is None:
+                return
+            if message.get("type") == "request":
+                self._answer(message)
+
+    def _answer(self, message: Message) -> None:
+        command = str(message.get("command", ""))
+        arguments = message.get("arguments") or {}
+        method = getattr(self, f"_do_{command}", None)
+        after: Callable[[], None] | None = None
+        try:
+            if method is None:
+                raise Refused(f"{command} is not supported")
+            result = method(arguments)
+            body, after = result if isinstance(result, tuple) else (result, None)
+            self._respond(message, True, body or {})
+        except (Refused, ExpressionError, Unavailable, ValueError, KeyError, OSError, TypeError) as error:
+            text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
+            self._respond(message, False, {"error": {"id": 1, "format": text}}, text)
+        if after is not None:
+            after()
+
+    def _respond(self, message: Message, success: bool, body: Row, text: str = "") -> None:
+        reply = {"type": "response", "request_seq": message["seq"], "success": success, "command": message["command"]}
+        self._wire.send(reply | {"body": body} | ({"message": text} if text else {}))
+
+    def _event(self, name: str, body: Row | None = None) -> None:
+        self._wire.send({"type": "event", "event": name, "body": body or {}})
+
+    def _say(self, text: str, category: str = "console") -> None:
+        self._event("output", {"category": category, "output": text})
+
+    @property
+    def _debuggee(self) -> Debuggee:
+        if self._target is None:
+            raise Refused("nothing is being debugged")
+        return self._target
+
+    # Life
+
+    def _do_initialize(self, _arguments: Row) -> Row:
+        return CAPABILITIES
+
+    def _do_launch(self, arguments: Row) -> Any:
+        machine = self._make(arguments)
+        if machine.image is None:
+            raise Refused("no program")
+        self._launch = arguments
+        program = Path(machine.image.path).resolve()
+        roots = [Path(root) for root in arguments.get("sourceRoots", [])] + [Path.cwd(), *program.parents]
+        self._target = Debuggee(machine, self._wanted, self._say)
+        self._sources = Sources(machine.inside, roots)
+        self._sights = Sights(machine.inside, self._sources)
+        for number in machine.uart:
+            machine.uart[number].listen(partial(self._heard, number))
+        return {}, lambda: self._event("initialized")
+
+    _do_attach = _do_launch
+
+    def _heard(self, number: int, byte: int, _cycle: int) -> None:
+        text = self._said.setdefault(number, bytearray())
+        text.append(byte & 0xFF)
+        if byte == 0x0A or len(text) >= 256:
+            self._flush()
+
+    def _flush(self) -> None:
+        for number, text in self._said.items():
+            if text:
+                prefix = "" if number == 1 else f"UART{number}: "
+                self._say(prefix + text.decode("latin-1"), "stdout")
+                text.clear()
+
+    def _do_configurationDone(self, _arguments: Row) -> Any:
+        self._configured = True
+        if self._launch.get("stopOnEntry"):
+            return {}, lambda: self._stopped(Halt("entry"))
+        return {}, lambda: self._go(lambda: self._debuggee.go_on())
+
+    def _do_disconnect(self, _arguments: Row) -> Any:
+        return {}, self._leave
+
+    def _leave(self) -> None:
+        self._over = True
+
+    def _do_terminate(self, _arguments: Row) -> Any:
+        return {}, lambda: self._event("terminated")
+
+    def _do_cancel(self, _arguments: Row) -> Row:
+        self._pause = True
+        return {}
+
+    def _do_restart(self, _arguments: Row) -> Any:
+        return {}, lambda: self._go(self._debuggee.restart)
+
+    # Going
+
+    def _wanted(self) -> bool:
+        """Whether the client wants the machine to stand; messages that came meanwhile are answered or wait."""
+        self._flush()
+        while not self._wire.inbox.empty():
+            message = self._wire.inbox.get()
+            if message is None:
+                self._over = self._pause = True
+            elif message.get("type") == "request" and message.get("command") in WHILE_RUNNING:
+                self._pause = self._pause or message["command"] != "threads"
+                self._answer(message)
+            else:
+                self._waiting.append(message)
+                self._pause = self._pause or str(message.get("command", "")).startswith("set")
+        return self._pause
+
+    def _do_pause(self, _arguments: Row) -> Row:
+        self._pause = True
+        return {}
+
+    def _go(self, act: Callable[[], Halt]) -> None:
+        assert self._sights is not None
+        self._sights.forget()
+        self._pause = False
+        halt = act()
+        while halt.reason == "pause" and any(str(m.get("command", "")).startswith("set") for m in self._waiting):
+            while self._waiting:  # breakpoints were changed: answer and run on
+                self._answer(self._waiting.pop(0))
+            self._pause = False
+            halt = self._debuggee.go_on()
+        if not self._over:
+            self._stopped(halt)
+
+    def _stopped(self, halt: Halt) -> None:
+        self._flush()
+        self._halt = halt
+        self._thread = self._current_thread()
+        body: Row = {"reason": halt.reason, "threadId": self._thread, "allThreadsStopped": True}
+        if halt.description:
+            body |= {"description": halt.description, "text": halt.description}
+        if halt.breakpoints:
+            body["hitBreakpointIds"] = list(halt.breakpoints)
+        self._event("stopped", body)
+
+    def _doer(self, act: Callable[[], Halt]) -> Any:
+        target = self._debuggee
+        if not self._configured:
+            raise Refused(f"{target.machine.pc:#x}: the configuration is not done")
+        return {"allThreadsContinued": True}, lambda: self._go(act)
+
+    def _do_continue(self, _arguments: Row) -> Any:
+        return self._doer(self._debuggee.go_on)
+
+    def _do_next(self, arguments: Row) -> Any:
+        return self._doer(self._step(arguments, lambda: self._debuggee.step_line(into=False)))
+
+    def _do_stepIn(self, arguments: Row) -> Any:
+        return self._doer(self._step(arguments, lambda: self._debuggee.step_line(into=True)))
+
+    def _do_stepOut(self, _arguments: Row) -> Any:
+        return self._doer(self._debuggee.step_out)
+
+    def _do_stepBack(self, arguments: Row) -> Any:
+        fine = arguments.get("granularity") == "instruction"
+        return self._doer(self._debuggee.back_instruction if fine else self._debuggee.back_line)
+
+    def _do_reverseContinue(self, _arguments: Row) -> Any:
+        return self._doer(self._debuggee.back)
+
+    def _step(self, arguments: Row, by_line: Callable[[], Halt]) -> Callable[[], Halt]:
+        return self._debuggee.step_instruction if arguments.get("granularity") == "instruction" else by_line
+
+    # Breakpoints
+
+    def _breakpoint(self, wanted: Row, kind: str, places: tuple[int, ...], **more: Any) -> Breakpoint:
+        self._next_id += 1
+        hit = str(wanted.get("hitCondition") or "")
+        made = Breakpoint(
+            self._next_id, kind, places, str(wanted.get("condition") or ""), hit,
+            str(wanted.get("logMessage") or ""), more.pop("size", 0), more.pop("access", "write"),
+        )  # fmt: skip
+        problem = bad_hit_condition(hit) or ("" if places else more.pop("problem", "there is no code"))
+        if problem:
+            made.places = ()
+        made.facts = {"id": made.id, "verified": not problem} | ({"message": problem} if problem else {}) | more
+        return made
+
+    def _set(self, key: str, made: list[Breakpoint]) -> Row:
+        self._debuggee.set_breakpoints(key, made)
+        return {"breakpoints": [one.facts for one in made]}
+
+    def _do_setBreakpoints(self, arguments: Row) -> Row:
+        assert self._sources is not None or self._debuggee
+        sources = self._sources
+        path = str(arguments["source"].get("path", arguments["source"].get("name", "")))
+        wanted = arguments.get("breakpoints") or [{"line": line} for line in arguments.get("lines", [])]
+        made = []
+        for one in wanted:
+            line, places = sources.places(path, int(one["line"])) if sources is not None else (0, ())
+            more: Row = {"line": line or one["line"], "source": {"path": path}}
+            if places:
+                more["instructionReference"] = f"{places[0]:#08x}"
+            problem = "no code of this program comes from here"
+            made.append(self._breakpoint(one, "source", places, problem=problem, **more))
+        return self._set(f"source {path}", made)
+
+    def _do_setFunctionBreakpoints(self, arguments: Row) -> Row:
+        made = []
+        for one in arguments["breakpoints"]:
+            try:
+                places: tuple[int, ...] = (self._debuggee.machine.program_address(one["name"]),)
+            except KeyError:
+                places = ()
+            made.append(self._breakpoint(one, "function", places, problem=f"there is no function {one['name']}"))
+        return self._set("function", made)
+
+    def _do_setInstructionBreakpoints(self, arguments: Row) -> Row:
+        made = []
+        for one in arguments["breakpoints"]:
+            address = int(one["instructionReference"], 0) + int(one.get("offset", 0))
+            code = self._debuggee.inside.is_code(address) and not address & 1
+            made.append(self._breakpoint(one, "instruction", (address,) if code else ()))
+        return self._set("instruction", made)
+
+    def _do_setExceptionBreakpoints(self, arguments: Row) -> Row:
+        options = [one["filterId"] for one in arguments.get("filterOptions", [])]
+        self._debuggee.stops_at_faults = "fault" in [*arguments.get("filters", []), *options]
+        return {}
+
+    def _do_dataBreakpointInfo(self, arguments: Row) -> Row:
+        size = int(arguments.get("bytes") or 0)
+        if arguments.get("asAddress"):
+            address: int | None = int(str(arguments["name"]), 0)
+            size = size or 2
+        else:
+            value = self._named(arguments)
+            address = value.address if isinstance(value, Value) else None
+            size = size or (value.type.bytes if isinstance(value, Value) else 0)
+        if address is None:
+            return {"dataId": None, "description": "it is not in memory"}
+        kinds = ["read", "write", "readWrite"]
+        text = f"{arguments['name']} ({size} bytes at {address:#06x})"
+        return {"dataId": f"{address:04x}/{size}", "description": text, "accessTypes": kinds, "canPersist": True}
+
+    def _named(self, arguments: Row) -> Any:
+        assert self._sights is not None
+        reference = arguments.get("variablesReference")
+        if reference:
+            return self._sights.find(int(reference), str(arguments["name"]))
+        frame = self._sights.frame(arguments.get("frameId"))
+        return evaluate(self._debuggee.inside, str(arguments["name"]), frame)
+
+    def _do_setDataBreakpoints(self, arguments: Row) -> Row:
+        made = []
+        for one in arguments["breakpoints"]:
+            address, _, size = str(one["dataId"]).partition("/")
+            access = one.get("accessType", "write")
+            made.append(self._breakpoint(one, "data", (int(address, 16),), size=int(size), access=access))
+        return self._set("data", made)
+
+    def _do_breakpointLocations(self, arguments: Row) -> Row:
+        first = int(arguments["line"])
+        last = int(arguments.get("endLine", first))
+        rows = self._sources.lines(str(arguments["source"].get("path", ""))) if self._sources is not None else []
+        lines = sorted({row.line for row in rows if first <= row.line <= last})
+        return {"breakpoints": [{"line": line} for line in lines]}
+
+    # Looking
+
+    def _do_threads(self, _arguments: Row) -> Row:
+        threads = self._debuggee.threads() if self._configured else []
+        rows = [{"id": one.pid + 1, "name": f"{one.pid} {one.name} ({one.state})"} for one in threads]
+        return {"threads": rows or [{"id": 1, "name": "main"}]}
+
+    def _current_thread(self) -> int:
+        running = [one for one in self._debuggee.threads() if one.state == "running"]
+        return running[0].pid + 1 if running else 1
+
+    def _do_stackTrace(self, arguments: Row) -> Row:
+        assert self._sights is not None
+        wanted = int(arguments["threadId"])
+        frames = self._debuggee.frames()
+        if wanted != self._thread:
+            frames = next((list(one.frames) for one in self._debuggee.threads() if one.pid + 1 == wanted), [])
+        first = int(arguments.get("startFrame") or 0)
+        levels = int(arguments.get("levels") or 0) or len(frames)
+        return {"stackFrames": self._sights.stack(frames[first : first + levels]), "totalFrames": len(frames)}
+
+    def _do_scopes(self, arguments: Row) -> Row:
+        assert self._sights is not None
+        frame = self._sights.frame(int(arguments["frameId"]))
+        return {"scopes": self._sights.scopes(frame) if frame is not None else []}
+
+    def _do_variables(self, arguments: Row) -> Row:
+        assert self._sights is not None
+        start, count = int(arguments.get("start") or 0), int(arguments.get("count") or 0)
+        return {"variables": self._sights.variables(int(arguments["variablesReference"]), start, count)}
+
+    def _do_evaluate(self, arguments: Row) -> Any:
+        text = str(arguments["expression"]).strip()
+        if arguments.get("context") == "repl" and text.startswith("/"):
+            return self._command(text[1:])
+        name, equals, value = text.partition("=")
+        if arguments.get("context") == "repl" and equals and not value.startswith("=") and name[-1:] not in "!<>=":
+            return self._assigned(name.strip(), value.strip(), arguments)
+        return self._result(text, arguments)
+
+    def _result(self, text: str, arguments: Row) -> Row:
+        assert self._sights is not None
+        found = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
+        if not isinstance(found, Value):
+            return {"result": str(found), "variablesReference": 0}
+        row = self._sights.shown(found, text)
+        if row["value"].startswith("<"):
+            raise Refused(row["value"][1:-1])
+        return {"result": row.pop("value"), **row}
+
+    def _assigned(self, name: str, text: str, arguments: Row) -> Row:
+        assert self._sights is not None
+        inside, frame = self._debuggee.inside, self._sights.frame(arguments.get("frameId"))
+        place = evaluate(inside, name, frame)
+        if not isinstance(place, Value):
+            raise Refused(f"{name} is no place")
+        self._write(place, text, arguments)
+        return self._result(name, arguments)
+
+    def _write(self, place: Value, text: str, arguments: Row) -> None:
+        assert self._sights is not None
+        value = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
+        place.set(value.get() if isinstance(value, Value) else value)
+
+    def _do_setVariable(self, arguments: Row) -> Row:
+        assert self._sights is not None
+        place = self._sights.find(int(arguments["variablesReference"]), str(arguments["name"]))
+        if place is None:
+            raise Refused(f"{arguments['name']} cannot be set")
+        self._write(place, str(arguments["value"]), arguments)
+        return self._sights.shown(place, str(arguments["name"]))
+
+    def _do_setExpression(self, arguments: Row) -> Row:
+        row = self._assigned(str(arguments["expression"]), str(arguments["value"]), arguments)
+        return {"value": row.pop("result"), **row}
+
+    def _do_exceptionInfo(self, _arguments: Row) -> Row:
+        stop = self._halt.stop
+        if stop is None or stop.fault is None:
+            raise Refused("it did not stop at a fault")
+        details = {"message": stop.fault.cause, "stackTrace": stop.fault.report()}
+        return {"exceptionId": "fault", "description": stop.fault.report(), "breakMode": "always", "details": details}
+
+    def _do_disassemble(self, arguments: Row) -> Row:
+        assert self._sources is not None
+        address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
+        address += 2 * int(arguments.get("instructionOffset") or 0)
+        symbols = bool(arguments.get("resolveSymbols"))
+        count = int(arguments["instructionCount"])
+        return {"instructions": disassembled(self._debuggee.inside, self._sources, address & ~1, count, symbols)}
+
+    def _do_readMemory(self, arguments: Row) -> Row:
+        address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
+        count = int(arguments["count"])
+        data = b""
+        for at in range(address, address + count):
+            try:
+                data += self._debuggee.machine.peek_bytes(at, 1)
+            except ValueError:
+                break
+        row: Row = {"address": f"{address:#06x}", "unreadableBytes": count - len(data)}
+        return row | ({"data": base64.b64encode(data).decode()} if data else {})
+
+    def _do_writeMemory(self, arguments: Row) -> Row:
+        address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
+        data = base64.b64decode(arguments["data"])
+        self._debuggee.machine.poke(address, int.from_bytes(data, "little"), len(data))
+        return {"bytesWritten": len(data)}
+
+    # Commands of the console
+
+    def _command(self, text: str) -> Any:
+        word, _, rest = text.partition(" ")
+        target = self._debuggee
+        machine, history = target.machine, target.history
+        if word == "time":
+            past = f", {history.end - machine.cycle:,} before the present" if history.is_past else ""
+            return {"result": f"cycle {machine.cycle:,}, {machine.seconds:.9f} s{past}", "variablesReference": 0}
+        if word == "threads":
+            lines = [f"{one}: {one.state}, stack {one.used} of {one.stack and one.stack[1] - one.stack[0]} bytes used"
+                     for one in target.threads()]  # fmt: skip
+            return {"result": "\n".join(lines) or "there are no threads", "variablesReference": 0}
+        if word == "goto":
+            cycle = int(rest.replace(",", ""), 0)
+            return {"result": "", "variablesReference": 0}, lambda: self._go(lambda: self._sought(cycle))
+        if word == "lastwrite":
+            place = evaluate(target.inside, rest, self._sights.frame(None) if self._sights else None)
+            at = address_of(place.pieces) if isinstance(place, Value) else None
+            if at is None or not isinstance(place, Value):
+                raise Refused(f"{rest} is not in memory")
+            size = place.type.bytes
+            return {"result": "", "variablesReference": 0}, lambda: self._go(lambda: self._last_write(at, size))
+        return {"result": HELP, "variablesReference": 0}
+
+    def _sought(self, cycle: int) -> Halt:
+        history = self._debuggee.history
+        history.seek(min(max(cycle, history.start), history.end))
+        return Halt("goto")
+
+    def _last_write(self, address: int, size: int) -> Halt:
+        found = self._debuggee.last_write(address, size)
+        if found is None:
+            return Halt("goto", "nothing has changed it since the recording began")
+        where = self._debuggee.inside.where(found.pc)
+        return Halt("goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {where}")

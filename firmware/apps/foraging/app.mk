@@ -1,0 +1,1 @@
+DEVICES := analog bluetooth camera i2c

@@ -1,0 +1,43 @@
+/* The Kilobot: pins and the list of its devices. Pins and channels are those of kilolib (README.md). */
+#include "hal_board.h"
+#include "io.h"
+#include "kernel.h"
+#include "pins.h"
+
+#include <avr/io.h>
+
+void board_init(void)
+{
+    ACSR = 1 << ACD; /* the comparator hears infrared pulses: off until a driver for them wants it */
+    hal_led_init();
+    motors_init();
+    uart_init(SYS_UART1);
+}
+
+void board_start(void)
+{
+    uart_start(SYS_UART1);
+}
+
+void board_tick(void)
+{
+    uart_tick();
+    kilobot_motors_tick();
+}
+
+void board_failsafe(void)
+{
+    motors_stop();
+}
+
+void board_report(const char *text)
+{
+    while (*text != '\0') {
+        while (!(UCSR0A & 1 << UDRE0)) {
+        }
+        UCSR0A |= 1 << TXC0;
+        UDR0 = (uint8)*text++;
+    }
+    while (!(UCSR0A & 1 << TXC0)) {
+    }
+}

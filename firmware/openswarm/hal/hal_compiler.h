@@ -1,0 +1,22 @@
+/* What every port and the kernel ask of the compiler: GCC, clang, XC16. A port on another one brings its own. */
+#ifndef HAL_COMPILER_H
+#define HAL_COMPILER_H
+
+#define HAL_USED __attribute__((used)) /* referenced from assembly only */
+#define HAL_NORETURN __attribute__((noreturn))
+#define HAL_LIKELY(condition) __builtin_expect(condition, 1)
+#define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
+#define HAL_OUTLINE __attribute__((noinline))            /* cold */
+
+/* The value of a macro as text; a condition without which the file is not compiled. */
+#define HAL_TEXT(value) HAL_TEXT_(value)
+#define HAL_TEXT_(text) #text
+#define HAL_ASSUME(name, condition) typedef char name[(condition) ? 1 : -1]
+
+/* The compiler moves no memory access across. */
+static inline void hal_barrier(void)
+{
+    __asm__ volatile("" ::: "memory");
+}
+
+#endif

@@ -1,0 +1,47 @@
+/* Who uses a bus (bus.h). */
+#include "bus.h"
+
+#include "kernel.h"
+
+/* A thread loses OS_DRIVES with its life; so a later thread with the same PID is not taken for it. */
+static bool is_used(const bus *b)
+{
+    const sys_pcb *owner = b->block != NULL ? process_find(b->owner) : NULL;
+    return owner != NULL && (owner->status & OS_DRIVES);
+}
+
+void *bus_take(bus *wanted, uint16 size, void (*silence)(void))
+{
+    sys_error error = SYS_ERROR_BUSY;
+    void *block = NULL;
+    if (os_enter_blocking() != SYS_OK) {
+        return NULL;
+    }
+    if (!is_used(wanted)) {
+        silence();
+        if (wanted->block != NULL) {
+            heap_give(wanted->block, wanted->size);
+        }
+        block = heap_take(size);
+        wanted->block = block;
+        wanted->size = size;
+        wanted->owner = os_running->pid;
+        error = SYS_ERROR_MEMORY;
+        if (block != NULL) {
+            os_running->status |= OS_DRIVES;
+            error = SYS_OK;
+        }
+    }
+    (void)os_leave(error);
+    return block;
+}
+
+void bus_give(bus *used, void (*silence)(void))
+{
+    Sys_Start_CriticalSection();
+    silence();
+    heap_give(used->block, used->size);
+    used->block = NULL;
+    os_running->status &= (uint8)~OS_DRIVES;
+    Sys_End_CriticalSection();
+}

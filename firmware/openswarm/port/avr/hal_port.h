@@ -1,0 +1,70 @@
+/* AVR: the level is two bits. "Open", in GPIOR0: threads may be switched; the slice interrupt and device interrupts test it
+ * when they would switch, and note the end of the slice in "due" if it is clear. I, in SREG: clear = level device.
+ * GPIOR0 is changed by SBI and CBI, one instruction each, so no bit of it needs a lock. */
+#ifndef HAL_PORT_H
+#define HAL_PORT_H
+
+#include <avr/io.h>
+
+#undef HAL_INLINE
+#undef HAL_OUTLINE
+#define HAL_INLINE inline /* flash is scarcer than cycles: the compiler decides */
+#define HAL_OUTLINE
+#define HAL_STACK_GROWS_DOWN
+#define HAL_WORD_IS_ONE_ACT 0
+
+typedef uint8_t hal_lock_state; /* I of SREG; CPU_WAS_OPEN: a slice lock that the matching unlock ends */
+typedef uint8_t *hal_limit;     /* lowest byte of the stack */
+
+enum { CPU_WAS_OPEN = 1 << 0, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_I = 1 << SREG_I }; /* switch.S has the numbers */
+
+void cpu_open(void); /* level slice ends: takes a slice end that became due meanwhile */
+
+static inline __attribute__((always_inline)) hal_lock_state hal_lock_slice(void)
+{
+    hal_lock_state before = (hal_lock_state)((SREG & CPU_I) | (GPIOR0 & CPU_OPEN));
+    GPIOR0 &= (uint8_t)~CPU_OPEN;
+    hal_barrier();
+    return before;
+}
+
+static inline __attribute__((always_inline)) hal_lock_state hal_lock_devices(void)
+{
+    hal_lock_state before = SREG & CPU_I;
+    __asm__ volatile("cli" ::: "memory");
+    return before;
+}
+
+static inline __attribute__((always_inline)) void hal_unlock(hal_lock_state before)
+{
+    hal_barrier();
+    if (before & CPU_WAS_OPEN) { /* never behind hal_lock_devices(): the compiler leaves it out there */
+        cpu_open();
+    } else {
+        SREG = before;
+    }
+}
+
+static inline __attribute__((always_inline)) bool hal_in_isr(void)
+{
+    return !(SREG & CPU_I);
+}
+
+static inline __attribute__((always_inline)) bool hal_in_thread(void)
+{
+    return (GPIOR0 & CPU_OPEN) && !hal_in_isr();
+}
+
+static inline __attribute__((always_inline)) void hal_slice_restart(void)
+{
+    TCNT0 = 0;
+    TIFR0 = 1 << OCF0A;
+    GPIOR0 &= (uint8_t)~CPU_DUE;
+}
+
+static inline __attribute__((always_inline)) void hal_slice_force(void)
+{
+    GPIOR0 |= CPU_DUE;
+}
+
+#endif

@@ -1,0 +1,79 @@
+/* Cortex-M: the level is BASEPRI or the running exception. Threads run on the process stack; PendSV, the lowest exception,
+ * is level slice and runs scheduler and handlers on the main stack; interrupts from DEVICE to below PendSV may call
+ * the kernel, those above never. Only priorities with a low nibble of 0 exist on chips with four bits. */
+#ifndef HAL_PORT_H
+#define HAL_PORT_H
+
+#include "registers.h"
+
+#define HAL_STACK_GROWS_DOWN
+#define HAL_STACK_IS_TAKEN /* the guard of the last thread */
+#define HAL_WORD_IS_ONE_ACT 1
+
+typedef uint32_t hal_lock_state; /* BASEPRI */
+typedef uint32_t hal_limit;      /* MPU_RBAR of the guard: its address, CPU_GUARD_REGION */
+
+enum { CPU_PRIORITY_DEVICE = 0x50, CPU_PRIORITY_SLICE = 0xF0, CPU_SLICE_MS = 10, CPU_PENDSV = 14 };
+
+extern volatile uint8_t cpu_slice_ms; /* left of the slice */
+
+/* BASEPRI_MAX only raises, and takes effect with the next instruction. */
+static HAL_INLINE hal_lock_state cpu_raise(uint32_t priority)
+{
+    hal_lock_state before;
+    __asm__ volatile("mrs %0, basepri\n\tmsr basepri_max, %1" : "=&r"(before) : "r"(priority) : "memory");
+    return before;
+}
+
+static HAL_INLINE hal_lock_state hal_lock_slice(void)
+{
+    return cpu_raise(CPU_PRIORITY_SLICE);
+}
+
+static HAL_INLINE hal_lock_state hal_lock_devices(void)
+{
+    return cpu_raise(CPU_PRIORITY_DEVICE);
+}
+
+static HAL_INLINE void hal_unlock(hal_lock_state before)
+{
+    __asm__ volatile("msr basepri, %0" ::"r"(before) : "memory");
+}
+
+static HAL_INLINE uint32_t cpu_exception(void)
+{
+    uint32_t number;
+    __asm__ volatile("mrs %0, ipsr" : "=r"(number));
+    return number;
+}
+
+static HAL_INLINE uint32_t cpu_masked_from(void)
+{
+    uint32_t priority;
+    __asm__ volatile("mrs %0, basepri" : "=r"(priority));
+    return priority;
+}
+
+static HAL_INLINE bool hal_in_thread(void)
+{
+    return (cpu_exception() | cpu_masked_from()) == 0;
+}
+
+static HAL_INLINE bool hal_in_isr(void)
+{
+    uint32_t exception = cpu_exception();
+    return (exception != 0 && exception != CPU_PENDSV) || cpu_masked_from() - 1u < CPU_PRIORITY_DEVICE;
+}
+
+static HAL_INLINE void hal_slice_restart(void)
+{
+    cpu_slice_ms = CPU_SLICE_MS;
+    SCB_ICSR = SCB_ICSR_PENDSVCLR;
+}
+
+static HAL_INLINE void hal_slice_force(void)
+{
+    SCB_ICSR = SCB_ICSR_PENDSVSET;
+}
+
+#endif

@@ -1,0 +1,103 @@
+"""What a simulated robot does for those who measure and test, and the symbols of its image."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Protocol
+
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+
+class NotInstalled(Exception):
+    """A program or library that this machine needs is missing; the text names its Debian package."""
+
+
+class Stopped(Exception):
+    """The run ended before it came where it should: firmware stopped, crashed, or took too long."""
+
+
+class Symbols:
+    """Addresses and sizes by name. `thumb` clears bit 0 of functions."""
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as file:
+            elf = ELFFile(file)
+            self.thumb = elf["e_machine"] == "EM_ARM"
+            tables = [section for section in elf.iter_sections() if isinstance(section, SymbolTableSection)]
+            found = {symbol.name: symbol.entry for table in tables for symbol in table.iter_symbols() if symbol.name}
+            self.sections = {
+                section.name: section["sh_size"] for section in elf.iter_sections() if section["sh_flags"] & 2
+            }
+        self._address = {name: entry["st_value"] for name, entry in found.items()}
+        self._function = {name for name, entry in found.items() if entry["st_info"]["type"] == "STT_FUNC"}
+        self.size = {name: entry["st_size"] for name, entry in found.items()}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._address
+
+    def __getitem__(self, name: str) -> int:
+        """Address of a symbol. Raises KeyError."""
+        address = self._address[name]
+        return address & ~1 if self.thumb and name in self._function else address
+
+    def span(self, name: str) -> range:
+        """Addresses of a function."""
+        return range(self[name], self[name] + self.size[name])
+
+
+class Machine(Protocol):
+    """A robot that stands still until it is told to run."""
+
+    symbols: Symbols
+    pointer: int
+    """Bytes of a pointer."""
+
+    @property
+    def pc(self) -> int:
+        """Byte address of the next instruction."""
+
+    @property
+    def now(self) -> int:
+        """Cycles or instructions so far."""
+
+    def step(self) -> None:
+        """One instruction, interrupt entry included."""
+
+    def run_to(self, *places: str | int) -> int:
+        """At least one instruction, then until one of the places (symbols or addresses); returns where.
+
+        Raises Stopped."""
+
+    def peek_bytes(self, address: int, count: int) -> bytes:
+        """Data memory."""
+
+    def poke_bytes(self, address: int, data: bytes) -> None:
+        """Data memory."""
+
+    def return_address(self) -> int:
+        """At the first instruction of a function: where it will return to."""
+
+    def close(self) -> None:
+        """End the simulator."""
+
+
+def peek(machine: Machine, name: str, offset: int = 0, size: int = 2) -> int:
+    """An unsigned little-endian number at a symbol."""
+    return int.from_bytes(machine.peek_bytes(machine.symbols[name] + offset, size), "little")
+
+
+def pointer(machine: Machine, name: str) -> int:
+    """A pointer variable."""
+    return peek(machine, name, size=machine.pointer)
+
+
+def poke_words(machine: Machine, name: str, values: tuple[int, ...]) -> None:
+    """16-bit words in order, from a symbol on."""
+    machine.poke_bytes(machine.symbols[name], struct.pack(f"<{len(values)}H", *values))
+
+
+def peek_words(machine: Machine, name: str, count: int) -> tuple[int, ...]:
+    """16-bit words in order."""
+    return struct.unpack(f"<{count}H", machine.peek_bytes(machine.symbols[name], 2 * count))

@@ -1,0 +1,133 @@
+"""A study as one file: packed alike each time, unpacked only as it was, computed again to the byte."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from arena import bundle, campaign, versions
+from arena.cli import main
+from arena.record import RecordError
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory, talking_image: Path) -> Path:
+    """Two scripted trials and one with firmware."""
+    folder = tmp_path_factory.mktemp("study")
+    short = ["--minutes", "0.02", "--jobs", "1", "--robots", "2", "--objects", "3"]
+    assert (
+        main(["run", "clustering", "--brain", "scripted", *short, "--trials", "2", "--out", str(folder / "script")])
+        == 0
+    )
+    command = [
+        "run",
+        "clustering",
+        "--brain",
+        str(talking_image),
+        *short,
+        "--trials",
+        "1",
+        "--out",
+        str(folder / "talk"),
+    ]
+    assert main(command) in (0, 1)
+    return folder
+
+
+@pytest.fixture
+def packed(study: Path, tmp_path: Path) -> Path:
+    """The study's bundle."""
+    path = tmp_path / "study.zip"
+    bundle.pack([study / "script", study / "talk"], path)
+    return path
+
+
+def test_the_same_runs_give_the_same_file(study: Path, packed: Path, tmp_path: Path) -> None:
+    """Whenever and in whatever order they are packed."""
+    again = tmp_path / "again.zip"
+    bundle.pack([study / "talk", study / "script"], again)
+    assert again.read_bytes() == packed.read_bytes()
+
+
+def test_a_bundle_is_computed_again_to_the_byte(packed: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All trials, with firmware and without."""
+    assert main(["verify", str(packed), "--trials", "9", "--strict"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[:3] == [
+        f"{name}: equal to the byte" for name in ("script, trial 1", "script, trial 2", "talk, trial 1")
+    ]
+    assert main(["verify", str(packed), "--number", "2", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [(one["run"], one["number"], one["equal"]) for one in found["trials"]] == [("script", 2, True)]
+
+
+def test_another_version_is_told_and_values_are_compared(
+    packed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file names its versions, so its bytes cannot be the same; what happened can."""
+    changed = versions.versions() | {"pymunk": "99"}
+    monkeypatch.setattr(campaign, "versions", lambda: changed)
+    monkeypatch.setattr(bundle, "versions", lambda: changed)
+    assert main(["verify", str(packed)]) == 0
+    assert "all values equal, other versions (pymunk" in capsys.readouterr().out
+    assert main(["verify", str(packed), "--strict"]) == 1
+
+
+def test_a_record_that_is_not_what_the_plan_gives_is_found(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Somebody exchanged two trials before packing: hashes are right, but computing tells."""
+    run = tmp_path / "script"
+    run.mkdir()
+    for path in (study / "script").iterdir():
+        if path.suffix in (".parquet", ".json"):
+            (run / path.name).write_bytes(path.read_bytes())
+    (run / "trial-0001.parquet").write_bytes((study / "script" / "trial-0002.parquet").read_bytes())
+    assert main(["bundle", str(tmp_path / "b.zip"), str(run)]) == 0
+    capsys.readouterr()
+    assert main(["verify", str(tmp_path / "b.zip")]) == 1
+    assert "script, trial 1: different in o0_x" in capsys.readouterr().out
+
+
+def rewritten(packed: Path, target: Path, change: dict[str, bytes]) -> Path:
+    with zipfile.ZipFile(packed) as archive, zipfile.ZipFile(target, "w") as made:
+        for name in archive.namelist():
+            made.writestr(name, change.get(name, archive.read(name)))
+        for name in set(change) - set(archive.namelist()):
+            made.writestr(name, change[name])
+    return target
+
+
+def test_changed_files_and_archives_that_are_none_are_refused(packed: Path, tmp_path: Path) -> None:
+    """One line each; nothing is written outside the folder."""
+    with zipfile.ZipFile(packed) as archive:
+        contents = json.loads(archive.read("bundle.json"))
+    evil = contents["files"] | {"../evil": "0" * 64}
+    cases = {
+        "its hash differs": {"script/manifest.json": b"{}"},
+        "holds other files": {"script/more.txt": b"more"},
+        "is no file of a run": {"bundle.json": json.dumps({"files": evil}).encode(), "../evil": b"x"},
+        "is no bundle": {"bundle.json": b"[]"},
+    }
+    for words, change in cases.items():
+        path = rewritten(packed, tmp_path / "changed.zip", change)
+        with pytest.raises(RecordError, match=words):
+            bundle.unpack(path, tmp_path / "out")
+    assert not (tmp_path / "evil").exists()
+    whole = packed.read_bytes()
+    for cut in (0, 10, len(whole) // 2, len(whole) - 3):
+        (tmp_path / "cut.zip").write_bytes(whole[:cut])
+        with pytest.raises(RecordError):
+            bundle.unpack(tmp_path / "cut.zip", tmp_path / "out")
+
+
+def test_only_runs_can_be_packed(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Status 2."""
+    assert main(["bundle", str(tmp_path / "x.zip"), str(tmp_path)]) == 2
+    assert "no finished run" in capsys.readouterr().err
+    assert main(["bundle", str(tmp_path / "x.zip"), str(study / "talk"), str(study / "talk")]) == 2
+    assert "the same name" in capsys.readouterr().err
+    assert main(["verify", str(tmp_path / "none.zip")]) == 2

@@ -1,0 +1,152 @@
+"""The learning interface: the library's own tests, repeatability, a controller that is evolved and becomes firmware."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pettingzoo", reason="PettingZoo is not installed (extra: learning)")
+
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+from arena.env import SENSED, SIZE, ArenaEnv, serial_command
+from arena.look import OBJECT, ROBOT
+from arena.scene import load_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_pettingzoos_own_tests_pass() -> None:
+    """API and seeding."""
+    parallel_api_test(ArenaEnv("aggregation", seconds=2.0), num_cycles=50)
+    parallel_seed_test(lambda: ArenaEnv("aggregation", seconds=1.0), num_cycles=20)
+
+
+def test_the_same_seed_and_actions_give_the_same_numbers() -> None:
+    """Another seed others; without a seed the next one."""
+    env = ArenaEnv("foraging", seconds=2.0)
+
+    def course(seed: int | None) -> list[np.ndarray]:
+        observed, _ = env.reset(seed=seed)
+        rng, found = np.random.default_rng(0), []
+        while env.agents:
+            actions = {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in env.agents}
+            observed, *_ = env.step(actions)
+            found.append(np.stack(list(observed.values())))
+        return found
+
+    first, again, other = course(5), course(5), course(None)
+    assert len(first) == 20
+    assert all((one == two).all() for one, two in zip(first, again, strict=True))
+    assert not all((one == two).all() for one, two in zip(first, other, strict=True))
+    assert all((one == two).all() for one, two in zip(other, course(6), strict=True))
+
+
+def test_robots_sense_what_stands_before_them_and_move_as_told() -> None:
+    """Robot, object, wall by infrared, light, speeds; 12.8 cm/s straight ahead."""
+    scene = load_scene("foraging").with_values(robots__wheel_noise=0.0, clock__scripted_quantum_ms=10.0)
+    env = ArenaEnv(scene, seconds=5.0, decision_s=0.5)
+    env.reset(seed=1)
+    env.stage.move_robot(0, 100, 75, 0.0)
+    env.stage.move_robot(1, 130, 75, math.pi)
+    env.stage.move_robot(2, 10, 20, math.pi + math.radians(18))
+    for number in range(6):
+        env.stage.move_object(number, 180, 10 + 20 * number)
+    observed, rewards, over, late, _ = env.step({"robot_0": np.array([1, 1]), "robot_1": np.array([0.5, -0.5])})
+    assert env.stage.robots[0, 0] == pytest.approx(106.4, abs=0.2)
+    seen = observed["robot_0"]
+    assert seen.shape == (SIZE,)
+    assert seen[:SENSED].argmax() == ROBOT
+    assert seen[-2:].tolist() == [1.0, 1.0]
+    assert observed["robot_2"][SENSED] > 0.03  # sensor 0 looks at the wall, 6.3 cm away
+    assert observed["robot_2"][SENSED + 8 :][:8].min() < 0.9  # the lamp
+    assert (sum(rewards.values()), any(over.values()), any(late.values())) == (0.0, False, False)
+    env.stage.move_robot(1, 20, 140, 0.0)
+    env.stage.move_object(0, 130, 75)
+    observed, *_ = env.step({})
+    assert observed["robot_0"][:SENSED].argmax() == OBJECT
+
+
+def test_food_brought_home_is_a_reward() -> None:
+    """The experiment's first metric, delivered food, grows by one; its supervisor works as in a trial."""
+    env = ArenaEnv("foraging", seconds=5.0, decision_s=0.2)
+    env.reset(seed=1)
+    env.stage.move_object(0, 100, 75)
+    env.stage.move_robot(0, 100 - 7, 75, 0.0)
+    env.step({})
+    env.stage.move_robot(0, 40, 75)
+    _, rewards, *_ = env.step({})
+    assert set(rewards.values()) == {1.0}
+    mine = ArenaEnv("foraging", seconds=1.0, reward=lambda stage: stage.seconds)
+    mine.reset(seed=1)
+    assert mine.step({})[1]["robot_0"] == pytest.approx(0.1, abs=0.01)
+
+
+ECHO = """
+        .include "p30F6014A.inc"
+        .text
+        .global _main
+_main:  mov     #7, w0
+        mov     w0, U1BRG
+        mov     #0x8000, w0
+        mov     w0, U1MODE
+        bset    U1STA, #10
+1:      btss    U1STA, #0
+        bra     1b
+        mov     U1RXREG, w0
+        mov     w0, U1TXREG
+        bra     1b
+"""
+
+
+def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], Path]) -> None:
+    """In the robot's own text protocol; the firmware decides what it makes of it."""
+    scene = load_scene("foraging").with_values(start__remote="")
+    env = ArenaEnv(scene, seconds=1.0, decision_s=0.2, image=assembled(ECHO))
+    env.reset(seed=1)
+    env.step({agent: np.array([0.5, -0.25]) for agent in env.agents})
+    env.step({})
+    for brain in env.brains:
+        brain.reading()
+        assert [line.text for line in brain.lines()] == ["D,500,-250", "D,0,0"]
+    assert serial_command(1, -1) == b"D,1000,-1000\r"
+    env.close()
+
+
+def test_what_cannot_be_is_refused() -> None:
+    """One line each."""
+    with pytest.raises(ValueError, match="shorter than a quantum"):
+        ArenaEnv("aggregation", decision_s=0.001)
+    with pytest.raises(ValueError, match="not positive"):
+        ArenaEnv("aggregation", seconds=0)
+
+
+def example() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("evolve_aggregation", ROOT / "docs/examples/evolve_aggregation.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_a_controller_is_evolved_and_becomes_firmware(tmp_path: Path) -> None:
+    """It does not get worse, is the same for the same seed, and its constants build."""
+    evolve = example().evolve
+    best, course = evolve(4, [0], 10.0, 3)
+    assert course == sorted(course, reverse=True)
+    again, _ = evolve(4, [0], 10.0, 3)
+    assert (best == again).all()
+    defines = f"-DALONE={best[0]},{best[1]} -DAHEAD={best[2]},{best[3]}"
+    command = ["make", "-C", str(ROOT / "firmware"), "APP=aggregation", f"OUT={tmp_path}", f"DEFINES={defines}",
+               f"PYTHON={sys.executable}"]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,240 @@
+"""What goes wrong around a run: numbers that are none, killed processes, two runs in one folder, versions that mix."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from arena import campaign, cluster, versions
+from arena.campaign import Plan
+from arena.cli import main
+from arena.live import Follower, LiveFile, live_path
+from arena.record import read_trial
+from arena.scene import load_scene, scripted
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--jobs", "1"]
+
+
+def started(*arguments: object) -> subprocess.Popen[str]:
+    """`arena` in a process of its own."""
+    command = [sys.executable, "-m", "arena", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+
+
+def wait_for(path: Path, seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not path.exists():
+        assert time.monotonic() < end, f"{path} never came"
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--minutes", "inf"], ["--minutes", "nan"], ["--minutes", "0"], ["--minutes", "-1"], ["--minutes", "1e300"],
+        ["--jobs", "-5"], ["--jobs", "0"], ["--jobs", "two"], ["--trials", "0"], ["--trials", "1.5"], ["--seed", "-1"],
+        ["--robots", "-1"], ["--objects", "x"],
+    ],
+)  # fmt: skip
+def test_numbers_that_are_none(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each is named, with status 2, and no folder is begun."""
+    assert main([*SHORT, *words, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert f"argument {words[0]}: {words[1]!r} must be" in said
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["../../evil", "/evil", "a/b", "..", "", ".hidden", "x" * 65, "a\nb"])
+def test_a_scene_cannot_choose_a_folder_by_its_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The default folder is made of the scene's name."""
+    inner = tmp_path / "a" / "b"
+    inner.mkdir(parents=True)
+    monkeypatch.chdir(inner)
+    (inner / "s.toml").write_text(f"name = {json.dumps(name)}\n")
+    assert main(["run", "s.toml", *SHORT[2:]]) == 2
+    assert "s.toml:1: name is" in capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["a", "b", "s.toml"]
+
+
+def test_a_sweep_cannot_choose_a_folder_by_its_values(tmp_path: Path) -> None:
+    """Values become parts of folder names without anything that means something there."""
+    command = ["sweep", "clustering", *SHORT[2:], "--vary", "camera.sensor=PO6030K,../../../evil"]
+    assert main([*command, "--out", str(tmp_path / "deep" / "deeper")]) == 0
+    made = [path.parent for path in tmp_path.rglob("manifest.json")]
+    assert len(made) == 2
+    assert all(path.parent == tmp_path / "deep" / "deeper" for path in made)
+
+
+def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
+    """The second is told so with status 3 and changes nothing; the first ends as if it had been alone."""
+    long = ["run", "clustering", "--brain", "scripted", "--minutes", "2", "--trials", "3", "--jobs", "1"]
+    first = started(*long, "--out", tmp_path)
+    wait_for(tmp_path / "manifest.json")
+    second = started(*SHORT, "--seed", 99, "--out", tmp_path)
+    said = second.communicate(timeout=120)[1]
+    assert second.returncode == 3
+    assert said.count("\n") == 1
+    assert "another run is writing here" in said
+    assert first.wait(120) == 0
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["key"]["seed"] == 1
+    assert [one["trial"] for one in manifest["host"]] == [1, 2, 3]
+
+
+def test_a_killed_run_leaves_the_folder_free(tmp_path: Path) -> None:
+    """The lock goes with the process."""
+    long = ["run", "clustering", "--brain", "scripted", "--minutes", "60", "--trials", "1", "--jobs", "1"]
+    first = started(*long, "--out", tmp_path / "run")
+    wait_for(tmp_path / "run" / "manifest.json")
+    first.kill()
+    first.wait()
+    again = [*long[:5], "0.02", *long[6:], "--out", str(tmp_path / "run")]
+    assert main(again) == 2  # another duration is another run; but nobody holds the folder
+    (tmp_path / "run" / "manifest.json").unlink()
+    assert main(again) == 0
+
+
+def test_a_file_where_the_folder_should_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One line, status 2."""
+    (tmp_path / "out").write_text("mine")
+    assert main([*SHORT, "--out", str(tmp_path / "out")]) == 2
+    assert "is not a folder" in capsys.readouterr().err
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+WRITER = """
+import os, sys, time
+from pathlib import Path
+from arena.live import LiveFile
+live = LiveFile(Path(sys.argv[1]), {"a": 1})
+live.write({"t": 0.0})
+print("written", flush=True)
+time.sleep(600)
+"""
+
+
+def test_a_page_that_follows_a_killed_run_says_that_it_is_gone(tmp_path: Path) -> None:
+    """SIGKILL leaves the file of the running trial behind; the page is not to wait for ever."""
+    path = live_path(tmp_path, 1)
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, cwd=ROOT) as writer:
+        assert writer.stdout is not None
+        writer.stdout.readline()
+        follower = Follower(tmp_path)
+        assert follower.more(99)["state"] == "running"
+        os.kill(writer.pid, signal.SIGKILL)
+        writer.wait()
+    assert path.exists()
+    assert follower.more(99)["state"] == "gone"
+
+
+def test_a_trial_that_ends_takes_its_lock_away(tmp_path: Path) -> None:
+    """Nothing is left in the folder."""
+    live = LiveFile(live_path(tmp_path, 1), {})
+    live.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_without_a_terminal_is_plain_lines(tmp_path: Path) -> None:
+    """As in a log file of a batch system."""
+    run = started(*SHORT[:-4], "--trials", 3, "--jobs", 1, "--out", tmp_path)
+    out, said = run.communicate(timeout=120)
+    assert run.returncode == 0
+    lines = said.splitlines()
+    assert [line.split(" done in ")[0] for line in lines] == ["trial 1", "trial 2", "trial 3"]
+    assert lines[-1].endswith("3 of 3 (100% of all)")
+    assert "done in" not in out
+
+
+def test_a_record_names_what_it_depends_on(tmp_path: Path) -> None:
+    """Emulator, arena and libraries, in the file itself; where it was made only in the manifest."""
+    assert main([*SHORT, "--out", str(tmp_path)]) == 0
+    about = read_trial(tmp_path / "trial-0001.parquet").about
+    assert set(about["versions"]) == {"emulator", "arena", "machine", "pymunk", "numpy", "pyarrow", "llvmlite"}
+    assert len(about["versions"]["emulator"]) == len(about["versions"]["arena"]) == 16
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["key"]["versions"] == about["versions"]
+    assert {"python", "system"} <= set(manifest["made_on"])
+    assert "made_on" not in about
+
+
+@pytest.mark.parametrize("name", ["emulator", "arena", "pymunk"])
+def test_versions_do_not_mix_in_a_folder(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Going on with another emulator would make one result of two experiments."""
+    assert main([*SHORT, "--out", str(tmp_path)]) == 0
+    changed = versions.versions() | {name: "another"}
+    monkeypatch.setattr(campaign, "versions", lambda: changed)
+    assert main([*SHORT, "--out", str(tmp_path)]) == 2
+    assert f"different version of {name}" in capsys.readouterr().err
+
+
+def test_the_hash_of_sources_sees_code_and_not_where_it_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One byte of code is another version; a page's looks are not."""
+
+    def hashed(root: Path) -> str:
+        monkeypatch.setattr(versions, "ROOT", root)
+        versions.sources_hash.cache_clear()
+        return versions.sources_hash("arena")
+
+    for root in ("one", "two/deeper"):
+        (tmp_path / root / "arena" / "commands").mkdir(parents=True)
+        (tmp_path / root / "arena" / "world.py").write_text("x = 1\n")
+        (tmp_path / root / "arena" / "page.py").write_text("y = 1\n")
+    before = hashed(tmp_path / "one")
+    assert before == hashed(tmp_path / "two/deeper")
+    (tmp_path / "one" / "arena" / "page.py").write_text("y = 2\n")
+    assert before == hashed(tmp_path / "one")
+    (tmp_path / "one" / "arena" / "world.py").write_text("x = 2\n")
+    assert before != hashed(tmp_path / "one")
+    versions.sources_hash.cache_clear()
+
+
+def test_a_worker_of_another_version_is_refused() -> None:
+    """It says which, instead of sending a record that differs."""
+    plan = Plan(scripted(load_scene("clustering")), "scripted", "A", None, 1, 1.0, 1)
+    with pytest.raises(ValueError, match=r"worker on .* has pymunk .* instead of 0\.1"):
+        cluster.trial_elsewhere(plan, cluster.Files(None, None, []), 1, versions.versions() | {"pymunk": "0.1"})
+
+
+def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: Path) -> None:
+    """Status 3; the same command without the cluster goes on."""
+    pytest.importorskip("distributed", reason="Dask is not installed (extra: cluster)")
+    port = 18786
+    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", str(port), "--no-dashboard"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = subprocess.Popen(dask, **quiet)  # type: ignore[call-overload]
+    worker = subprocess.Popen([sys.executable, "-m", "distributed.cli.dask_worker", f"tcp://127.0.0.1:{port}",
+                               "--nthreads", "1", "--no-dashboard", "--no-nanny", "--death-timeout", "60"],
+                              cwd=ROOT, **quiet)  # type: ignore[call-overload]  # fmt: skip
+    arguments = [*SHORT[:4], "--minutes", "3", "--trials", "40", "--jobs", "1", "--out", str(tmp_path)]
+    try:
+        run = None
+        for _ in range(20):  # until the scheduler listens
+            run = started(*arguments, "--scheduler", f"tcp://127.0.0.1:{port}")
+            time.sleep(3)
+            if run.poll() is None:
+                break
+        assert run is not None
+        wait_for(tmp_path / "trial-0001.parquet", 120)
+        scheduler.kill()
+        said = run.communicate(timeout=120)[1]
+        assert run.returncode == 3, said
+        lines = [line for line in said.splitlines() if not line.startswith("trial ")]
+        assert len(lines) == 1, said
+        assert "lost while trials ran" in lines[0]
+        assert read_trial(tmp_path / "trial-0001.parquet").about["seed"] == 1
+    finally:
+        for process in (scheduler, worker):
+            process.kill()
+            process.wait()

@@ -1,0 +1,442 @@
+"""Scenes with several kinds of things: read with line numbers, built, seen and felt."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from arena import bodies, geometry
+from arena.brain import ScriptedBrain
+from arena.campaign import Plan
+from arena.cli import main
+from arena.infrared import ambient, signals, surfaces
+from arena.look import FLOOR, OBJECT, WALL, colours_of, look_of
+from arena.record import read_trial
+from arena.scene import FCY, Scene, SceneError, load_scene, scene_of
+from arena.scenery import NAMED
+from arena.vision import Eye
+from arena.world import Poses, World, traits_of
+
+FULL = """name = "yard"
+description = "everything a scene can have"
+
+[arena]
+polygon = [[0, 0], [300, 0], [300, 120], [180, 120], [180, 240], [0, 240]]
+
+[chassis]
+wheel_noise = 0.0
+
+[[robots]]
+name = "workers"
+count = 3
+place = "uniform"
+x_cm = 90
+y_cm = 60
+width_cm = 160
+depth_cm = 100
+id_first = 10
+controller = "B"
+
+[[robots]]
+name = "scout"
+place = "poses"
+poses = [[40, 200, 90]]
+image = "scripted"
+
+[[objects]]
+name = "food"
+count = 4
+place = "normal"
+x_cm = 240
+y_cm = 60
+sd_cm = 20
+radius_cm = 3
+colour = "blue"
+
+[[objects]]
+name = "tall"
+place = "poses"
+poses = [[100, 200], [130, 200]]
+height_cm = 30
+colour = "red"
+
+[[obstacles]]
+name = "block"
+polygon = [[150, 20], [170, 20], [170, 50], [150, 50]]
+height_cm = 4
+colour = "yellow"
+
+[[obstacles]]
+name = "pillar"
+x_cm = 60
+y_cm = 150
+radius_cm = 8
+colour = "black"
+share = 0.2
+
+[[patches]]
+name = "nest"
+polygon = [[0, 0], [50, 0], [50, 50], [0, 50]]
+colour = "white"
+
+[[patches]]
+name = "spot"
+x_cm = 240
+y_cm = 60
+radius_cm = 30
+colour = "#204060"
+
+[[lamps]]
+x_cm = 25
+y_cm = 25
+counts = 2000
+"""
+
+
+@pytest.fixture
+def yard(tmp_path: Path) -> Scene:
+    """The scene above."""
+    path = tmp_path / "yard.toml"
+    path.write_text(FULL)
+    return load_scene(str(path))
+
+
+def test_a_scene_of_several_kinds_is_read(yard: Scene) -> None:
+    """Groups in order, each with its own; a record's metadata gives the same scene back."""
+    assert (yard.robots.count, yard.objects.count) == (4, 6)
+    assert (yard.arena.width_cm, yard.arena.height_cm) == (300, 240)
+    assert [yard.id_of(robot) for robot in range(4)] == [10, 11, 12, 0]
+    assert [yard.group_of(robot).name for robot in range(4)] == ["workers"] * 3 + ["scout"]
+    assert [yard.kind_of(number).name for number in range(6)] == ["food"] * 4 + ["tall"] * 2
+    plan = Plan(yard, "scripted", "A", None, 1, 1.0, 1, None, (("scripted", None),))
+    assert repr(scene_of(plan.key()["scene"])) == repr(yard)  # nan is not equal to itself
+
+
+def test_a_scene_that_writes_its_robots_down_has_only_the_objects_it_names(tmp_path: Path) -> None:
+    """And those that come along have what their files say."""
+    path = tmp_path / "few.toml"
+    path.write_text('name = "few"\n[[robots]]\ncount = 2\n')
+    assert load_scene(str(path)).objects.count == 0
+    assert [load_scene(name).objects.count for name in ("aggregation", "avoidance", "foraging")] == [0, 0, 6]
+    path.write_text('name = "few"\n')
+    assert (load_scene(str(path)).robots.count, load_scene(str(path)).objects.count) == (5, 20)
+
+
+def test_everything_stands_where_it_may(yard: Scene) -> None:
+    """Inside the room, touching nothing, within what the groups say; the same for the same seed."""
+    for seed in range(20):
+        poses = World(yard, seed).poses
+        assert poses.robots == World(yard, seed).poses.robots
+        assert poses.robots[3] == pytest.approx((40, 200, math.pi / 2))
+        assert poses.objects[4:] == [(100, 200), (130, 200)]
+        discs = [(x, y, bodies.ROBOT_RADIUS) for x, y, _ in poses.robots]
+        discs += [(x, y, yard.kind_of(number).radius_cm) for number, (x, y) in enumerate(poses.objects)]
+        outline = geometry.sides(yard.arena.polygon) + geometry.sides(yard.obstacles[0].polygon)
+        for number, (x, y, radius) in enumerate(discs):
+            assert geometry.contains(yard.arena.polygon, x, y)
+            assert all(geometry.distance_to(x, y, side) >= radius for side in outline)
+            assert math.hypot(x - 60, y - 150) >= radius + 8
+            assert all(math.hypot(x - ox, y - oy) >= radius + other for ox, oy, other in discs[:number])
+        assert all(10 <= x <= 170 and 10 <= y <= 110 for x, y, _ in poses.robots[:3])
+
+
+@pytest.mark.parametrize("pitch", [0.0, -4.0])
+def test_two_ways_to_see_a_furnished_scene_agree(yard: Scene, pitch: float) -> None:
+    """Whole rows at once and column by column, from anywhere: obstacles, heights, patches, a room with a corner."""
+    scene = yard.with_values(camera__pitch_deg=pitch)
+    rng = np.random.default_rng(8)
+    columns = np.arange(0, 640, 13)
+    kinds: set[int] = set()
+    for seed in range(60):
+        poses = World(scene, seed).poses
+        pose = poses.robots[seed % 4]
+        eye = Eye(scene, poses, seed % 4, (pose[0], pose[1], float(rng.uniform(-math.pi, math.pi))))
+        for row in (30, 208, 216, 238, 245, 255, 262, 300, 420):
+            fast = np.broadcast_to(eye.classes(row, columns), len(columns))
+            slow = [eye.column(int(u), (row,))[0] for u in columns]
+            assert fast.tolist() == slow, f"seed {seed}, row {row}"
+            kinds |= set(slow)
+    assert kinds >= {OBJECT, WALL, FLOOR} | set(range(6, len(colours_of(scene))))
+
+
+def test_colours_and_heights_are_seen(yard: Scene) -> None:
+    """A low block hides the floor behind it but not the wall; a patch is seen where it lies."""
+    colours = [tuple(one) for one in colours_of(yard).tolist()]
+    yellow, blue = colours.index(NAMED["yellow"]), colours.index(NAMED["blue"])
+    eye = Eye(yard, Poses([(100.0, 35.0, 0.0)] * 4, [(300.0, 300.0)] * 6), 0)
+    assert eye.column(320, (240, 250, 200)) == [yellow, yellow, WALL]
+    look = look_of(yard)
+    assert look.floor_at(240, 60) == colours.index((0x20, 0x40, 0x60))
+    assert look.floor_at(20, 20) == colours.index(NAMED["white"])
+    assert look.floor_at(100, 100) == FLOOR
+    assert look.sensed[blue] == 0  # the clustering sensor knows red and green only
+
+
+def test_what_stands_fast_stops_a_robot(yard: Scene) -> None:
+    """Block, pillar and the room's inner corner, each driven against."""
+    for start, end in (((110, 35, 0.0), (150, 35)), ((60, 110, math.pi / 2), (60, 142)), ((120, 180, 0.0), (180, 180))):
+        world = World.of(yard, 1, [start, *[(20.0 + 20 * n, 20.0, 0.0) for n in range(3)]],
+                         [(250.0, 10 + 15 * n) for n in range(6)])  # fmt: skip
+        for _ in range(20_000):
+            world.step([(12.8, 12.8), *[(0.0, 0.0)] * 3])
+        x, y, _ = world.poses.robots[0]
+        assert math.hypot(x - end[0], y - end[1]) == pytest.approx(bodies.ROBOT_RADIUS, abs=0.1)
+
+
+def test_infrared_feels_what_stands_fast_and_all_lamps(yard: Scene) -> None:
+    """Distance and reflection of a block, a black pillar and a wall that is no side of the outer rectangle."""
+    far = [(300.0, 300.0)] * 6
+    for pose, gap, share in (
+        ((150 - 3.7 - 4, 35.0, math.radians(18)), 40, 1.0),  # sensor 0, 18 degrees to the right, looks along x
+        ((60 - 8 - 3.7 - 5, 150.0, math.radians(18)), 50, 0.2),
+        ((180 - 3.7 - 6, 200.0, math.radians(18)), 60, 1.0),
+    ):
+        found = surfaces(yard, Poses([pose, *[(20.0, 20.0, 0.0)] * 3], far), 0)[0]
+        assert found.millimetres == pytest.approx(gap, abs=0.5)
+        assert found.share == pytest.approx(share, abs=0.01)
+    lit = ambient(yard, (25 + 100, 25.0, math.pi + math.radians(18)))
+    assert lit[0] == pytest.approx(3800 - 2000, abs=5)
+    two = Poses([(130.0, 35.0, 0.0), (190.0, 35.0, math.pi), (20.0, 20.0, 0.0), (20.0, 60.0, 0.0)], far)
+    near = Poses([(130.0, 90.0, 0.0), (150.0, 90.0, math.pi), (20.0, 20.0, 0.0), (20.0, 60.0, 0.0)], far)
+    assert not any(signals(yard, two, 0))
+    assert any(signals(yard, near, 0))
+
+
+@pytest.mark.parametrize(
+    ("change", "line", "words"),
+    [
+        (("count = 3", "count = -3"), 12, "robots.count is -3; expected 0 to 1000"),
+        (("radius_cm = 3", 'radius_cm = "big"'), 34, "objects.radius_cm is 'big'; expected float"),
+        (("height_cm = 30", "height = 30"), 41, "unknown key objects.height; expected"),
+        (('place = "normal"', 'place = "gauss"'), 30, "objects.place is 'gauss'; expected marks, uniform"),
+        (('colour = "black"', 'colour = "pink"'), 55, "obstacles.colour is 'pink'; expected red,"),
+        (("[170, 50], [150, 50]]", "[150, 50], [170, 50]]"), 46, "obstacles.polygon: its sides cross"),
+        (("[50, 50], [0, 50]]", "[50]]"), 60, "patches.polygon: [50] is no point [x, y]"),
+        (("poses = [[40, 200, 90]]", ""), 23, 'robots.poses goes with place = "poses"'),
+        (("counts = 2000", "counts = true"), 73, "lamps.counts is True; expected float"),
+        (('name = "yard"', 'name = "../yard"'), 1, "name is '../yard'"),
+        (("[chassis]\n", "[chassis]\ncount = 3\n"), 8, "chassis.count: robots are counted by their groups"),
+        (("[[lamps]]", "[[lumps]]"), 70, "unexpected 'lumps'; expected name,"),
+        (('controller = "B"', "controller = B"), 19, "Invalid value"),
+        (('controller = "B"', 'controller = "C"'), 19, "robots.controller is 'C'; expected A or B"),
+        (("radius_cm = 8", ""), 50, "obstacles: expected either a polygon or a radius_cm"),
+        (("share = 0.2", "share = 2"), 56, "obstacles.share is 2.0; expected 0 to 1"),
+        (("[300, 0]", "[-300, 0]"), 5, "arena.polygon"),
+    ],
+)
+def test_mistakes_are_named_with_their_line(
+    change: tuple[str, str], line: int, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """File, line, key, expectation; status 2."""
+    assert change[0] in FULL
+    path = tmp_path / "my.toml"
+    path.write_text(FULL.replace(*change, 1))
+    assert main(["run", str(path), "--brain", "scripted", "--minutes", "0.01", "--out", str(tmp_path / "o")]) == 2
+    said = capsys.readouterr().err
+    assert f"my.toml:{line}: " in said
+    assert words in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("[[100, 200], [130, 200]]", "[[60, 155], [130, 200]]"), "touches obstacle pillar"),
+        (("[[100, 200], [130, 200]]", "[[200, 200], [130, 200]]"), "is outside the walls"),
+        (("[[100, 200], [130, 200]]", "[[100, 200], [101, 200]]"), "touches what is at (100, 200) cm"),
+        (("[[40, 200, 90]]", "[[2, 200, 90]]"), "robot scout at (2, 200) cm is in a wall"),
+        (("count = 4", "count = 400"), "no place found in 2000 tries for object food"),
+    ],
+)
+def test_scenes_without_room_are_refused(change: tuple[str, str], words: str, tmp_path: Path) -> None:
+    """What stands where, and what is in the way."""
+    path = tmp_path / "my.toml"
+    path.write_text(FULL.replace(*change, 1))
+    with pytest.raises(SceneError, match="no room") as caught:
+        World(load_scene(str(path)), 1)
+    assert words in str(caught.value)
+
+
+def test_five_hundred_mutated_scenes_are_read_or_refused_in_one_line(tmp_path: Path) -> None:
+    """Words, lines and letters exchanged, dropped and doubled: never anything but a SceneError that names the file."""
+    path = tmp_path / "my.toml"
+    pieces = [
+        "-1",
+        "1e999",
+        "nan",
+        "[[]]",
+        "{}",
+        '"x"',
+        "[[robots]]",
+        "=",
+        "\x00",
+        "é",
+        "true",
+        "[0, 0]",
+        "99999999999",
+    ]
+    refused = 0
+    for seed in range(500):
+        rng = random.Random(seed)
+        lines = FULL.splitlines()
+        for _ in range(rng.randint(1, 4)):
+            at = rng.randrange(len(lines))
+            line = lines[at]
+            kind = rng.randrange(6)
+            if kind == 0:
+                del lines[at]
+            elif kind == 1:
+                lines.insert(rng.randrange(len(lines)), line)
+            elif kind == 2 and "=" in line:
+                lines[at] = line.partition("=")[0] + "= " + rng.choice(pieces)
+            elif kind == 3 and line:
+                cut = rng.randrange(len(line))
+                lines[at] = line[:cut] + rng.choice(pieces) + line[cut + 1 :]
+            elif kind == 4:
+                other = rng.randrange(len(lines))
+                lines[at], lines[other] = lines[other], line
+            else:
+                lines[at] = rng.choice(pieces)
+            if len(lines) < 2:
+                break
+        path.write_bytes("\n".join(lines).encode()[: rng.choice((None, 200, 700))])
+        said = _refusal(path)
+        refused += bool(said)
+        assert not said or "my.toml:" in said or "no room" in said, f"seed {seed}: {said}"
+        assert "\n" not in said, f"seed {seed}: {said}"
+    assert 250 < refused < 490
+
+
+def _refusal(path: Path) -> str:
+    """Why a scene is refused; empty if a world could be built."""
+    try:
+        World(load_scene(str(path)), 1)
+    except SceneError as error:
+        return str(error)
+    return ""
+
+
+def test_groups_have_their_own_firmware_switch_and_number(
+    assembled: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two images and a script in one trial; any number of processes writes the same bytes."""
+    one = assembled(SPEAKER.format(letter="P"))
+    two = assembled(SPEAKER.format(letter="Q"))
+    (tmp_path / "p.elf").write_bytes(one.read_bytes())
+    path = tmp_path / "mixed.toml"
+    path.write_text(f"""name = "mixed"
+[[robots]]
+count = 2
+image = "p.elf"
+selector = 3
+id_first = 41
+stimulus = '0.3s uart1 "{{id}}\\n"'
+[[robots]]
+image = "{two}"
+selector = 9
+[[robots]]
+image = "scripted"
+""")
+    for jobs in (1, 2):
+        assert main(["run", str(path), "--trials", "1", "--minutes", "0.01", "--jobs", str(jobs), "--out",
+                     str(tmp_path / str(jobs))]) == 0  # fmt: skip
+    trial = read_trial(tmp_path / "1" / "trial-0001.parquet")
+    said = sorted((line["robot"], line["text"]) for row in trial.columns["log"] for line in row)
+    assert said == [(0, "41"), (0, "PD"), (1, "42"), (1, "PD"), (2, "QJ")]
+    assert trial.path.read_bytes() == (tmp_path / "2" / "trial-0001.parquet").read_bytes()
+    assert {path.name for path in (tmp_path / "1").glob("firmware-*")} == {"firmware-1.elf", "firmware-2.elf"}
+    hashes = trial.about["images_sha256"]
+    assert hashes["p.elf"] != hashes[str(two)]
+    assert hashes["scripted"] is None
+    (tmp_path / "p.elf").write_bytes(two.read_bytes())
+    assert main(["run", str(path), "--trials", "2", "--minutes", "0.01", "--out", str(tmp_path / "1")]) == 2
+    assert "different images_sha256" in capsys.readouterr().err
+
+
+SPEAKER = """
+        .include "p30F6014A.inc"
+        .text
+        .global _main
+_main:  mov     #7, w0
+        mov     w0, U1BRG
+        mov     #0x8000, w0
+        mov     w0, U1MODE
+        bset    U1STA, #10
+        mov     #'{letter}', w0
+        mov     w0, U1TXREG
+        mov     PORTG, w0
+        lsr     w0, #6, w0
+        and     w0, #15, w0
+        mov     #'A', w1
+        add     w0, w1, w0
+        mov     w0, U1TXREG
+        mov     #10, w0
+        mov     w0, U1TXREG
+1:      btss    U1STA, #0
+        bra     1b
+        mov     U1RXREG, w0
+        mov     w0, U1TXREG
+        bra     1b
+"""
+
+
+# -- robots that differ -----------------------------------------------------------------------------------------------
+
+
+def test_robots_without_spread_are_all_alike() -> None:
+    """To the bit."""
+    scene = load_scene("clustering")
+    assert {traits_of(scene, seed, robot) for seed in range(9) for robot in range(5)} == {(0.0, 0.0, (1.0, 1.0))}
+
+
+def test_robots_differ_by_what_the_scene_says() -> None:
+    """Standard deviations of 2,000 robots; another trial has other robots, the same seed the same."""
+    scene = load_scene("clustering").with_values(
+        robots__camera_yaw_sd_deg=2.0, robots__camera_pitch_sd_deg=1.5, robots__wheel_bias_sd=0.02
+    )
+    drawn = [traits_of(scene, seed, robot) for seed in range(400) for robot in range(5)]
+    assert len(set(drawn)) == 2000
+    assert math.degrees(np.std([one.yaw for one in drawn])) == pytest.approx(2.0, rel=0.06)
+    assert np.std([one.pitch_deg for one in drawn]) == pytest.approx(1.5, rel=0.06)
+    assert np.std([one.bias for one in drawn]) == pytest.approx(0.02, rel=0.06)
+    assert np.mean([one.bias for one in drawn]) == pytest.approx(1.0, abs=0.002)
+    assert traits_of(scene, 3, 1) == traits_of(scene, 3, 1)
+
+
+def test_a_turned_camera_sees_to_the_side_and_a_biased_wheel_turns_the_robot() -> None:
+    """What was drawn is what happens."""
+    scene = load_scene("clustering").with_values(robots__count=1, objects__count=1, robots__wheel_noise=0.0)
+    turned = scene.with_values(robots__camera_yaw_sd_deg=5.0, robots__camera_pitch_sd_deg=2.0)
+    traits = traits_of(turned, 4, 0)
+    x, y = 100 + 60 * math.cos(traits.yaw), 150 + 60 * math.sin(traits.yaw)
+    eye = Eye(turned, Poses([(100.0, 150.0, 0.0)], [(x, y)]), 0, None, traits)
+    row = 240 + 602 * math.tan(math.radians(traits.pitch_deg))
+    seen = [eye.column(u, (round(row - 20),))[0] == OBJECT for u in range(640)]
+    assert np.mean(np.flatnonzero(seen)) == pytest.approx(320, abs=3)
+    biased = scene.with_values(robots__wheel_bias_sd=0.05)
+    world = World.of(biased, 2, [(100.0, 150.0, 0.0)], [(350.0, 20.0)])
+    for _ in range(5000):
+        world.step([(10.0, 10.0)])
+    left, right = traits_of(biased, 2, 0).bias
+    assert world.poses.robots[0][2] == pytest.approx(5 * 10 * (right - left) / 5.1, rel=0.02)
+
+
+def test_a_scripted_trial_runs_in_a_furnished_scene(tmp_path: Path) -> None:
+    """End to end, with page and figures; the record says what was where."""
+    path = tmp_path / "yard.toml"
+    path.write_text(FULL)
+    out = tmp_path / "out"
+    assert main(["run", str(path), "--brain", "scripted", "--trials", "1", "--minutes", "0.2", "--out", str(out)]) == 0
+    trial = read_trial(out / "trial-0001.parquet")
+    assert trial.scene.patches[0].name == "nest"
+    assert trial.robots.shape[1:] == (4, 2)
+    assert np.abs(trial.robots[-1] - trial.robots[0]).max() > 5
+    assert main(["replay", str(trial.path)]) == 0
+    assert main(["plot", str(out), "--out", str(tmp_path)]) == 0
+    brain = ScriptedBrain(trial.scene, 1, 3, "A")
+    assert brain.think(int(0.5 * FCY / trial.scene.clock.quantum_tcy), World(trial.scene, 1).poses) == (0.0, 0.0)

@@ -1,0 +1,227 @@
+"""How robots come to life, and how one is noticed that does nothing more: events in record and exit status."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from arena.cli import main
+from arena.emulated import EmulatedBrain
+from arena.record import Trial, read_trial
+from arena.scene import FCY, load_scene
+from arena.world import World
+
+ROOT = Path(__file__).resolve().parents[2]
+Assembled = Callable[[str], Path]
+
+BEGIN = """
+        .include "p30F6014A.inc"
+        .text
+        .global _main
+_main:  mov     #7, w0
+        mov     w0, U1BRG               ; 115,200 baud (epuck.md)
+        mov     #0x8000, w0
+        mov     w0, U1MODE
+        bset    U1STA, #10              ; UTXEN
+"""
+
+
+def run(image: Path, out: Path, *words: object, seconds: float = 1.5) -> tuple[int, Trial]:
+    """Exit status and record of one trial of two robots."""
+    command = ["run", "clustering", "--brain", str(image), "--robots", "2", "--objects", "0", "--trials", "1",
+               "--minutes", str(seconds / 60), "--out", str(out), *map(str, words)]  # fmt: skip
+    if "--jobs" not in command:
+        command += ["--jobs", "1"]
+    status = main(command)
+    return status, read_trial(out / "trial-0001.parquet")
+
+
+@pytest.mark.parametrize(
+    ("handler", "cause"),
+    [
+        ("__AddressError", "mov #0x1001, w0\n mov [w0], w1"),
+        ("__StackError", "mov #0x2000, w0\n mov w0, SPLIM\n mov #0x2100, w15\n push w0"),
+        ("__MathError", "mov #1, w2\n mov #0, w3\n repeat #17\n div.u w2, w3"),
+    ],
+)
+def test_firmware_that_sits_in_its_own_trap_handler_is_noticed(
+    assembled: Assembled, handler: str, cause: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The handler is the firmware's own, so nothing stops the emulator: it turns round for ever."""
+    image = assembled(f"{BEGIN}\n {cause}\n1: bra 1b\n .global {handler}\n{handler}: bra {handler}\n")
+    status, trial = run(image, tmp_path)
+    assert status == 1
+    assert [robot for robot, _, _ in trial.about["faults"]] == [0, 1]
+    for _, seconds, why in trial.about["faults"]:
+        assert why.startswith(f"sits in the handler of {handler.strip('_')} since 0.")
+        assert handler.removeprefix("_") in why
+        assert seconds <= 1.0
+    assert capsys.readouterr().err.count("sits in the handler") == 2
+
+
+def test_a_handler_that_comes_back_is_none(assembled: Assembled, tmp_path: Path) -> None:
+    """It mends what was wrong 2,000 times a second and lets the firmware go on."""
+    image = assembled(f"""{BEGIN}
+1:      mov     #1, w2
+        mov     #0, w3
+        repeat  #17
+        div.u   w2, w3
+        mov     #2000, w1
+2:      dec     w1, w1
+        bra     nz, 2b
+        btg     LATA, #6
+        bclr    TRISA, #6
+        bra     1b
+        .global __MathError
+__MathError: bclr INTCON1, #4
+        retfie
+""")
+    status, trial = run(image, tmp_path)
+    assert (status, trial.about["faults"]) == (0, [])
+
+
+def test_a_kernel_that_stopped_itself_is_noticed(tmp_path: Path) -> None:
+    """A failed assertion ends in hal_stop(), asleep with every interrupt off, whether or not something is still due."""
+    source = tmp_path / "apps" / "wrong" / "main.c"
+    source.parent.mkdir(parents=True)
+    source.write_text("#include <openswarm.h>\nint main(void) { Sys_Init_Kernel(); SYS_ASSERT(0); return 0; }\n")
+    made = ["make", "-C", str(ROOT / "firmware"), "APP=wrong", f"APPS={source.parents[1]}", f"OUT={tmp_path / 'out'}",
+            f"PYTHON={sys.executable}"]  # fmt: skip
+    subprocess.run(made, check=True, capture_output=True, timeout=300)
+    for key, words in (("ok", "sleeps with every interrupt off"), ("", "stopped: ")):
+        status, trial = run(tmp_path / "out" / "firmware.elf", tmp_path / f"run{key}", "--set", f"start.remote={key}")
+        assert status == 1
+        assert len(trial.about["faults"]) == 2
+        assert words in trial.about["faults"][0][2]
+        assert "the kernel stopped the system; UART1 said why" in trial.about["faults"][0][2]
+    assert any("main.c:2" in line["text"] for row in trial.columns["log"] for line in row)
+
+
+def test_a_silent_robot_is_noticed_after_the_stated_time(assembled: Assembled, tmp_path: Path) -> None:
+    """Firmware that never starts looks like this: neither wheels, nor LEDs, nor a byte."""
+    image = assembled(f"{BEGIN}\n1: bra 1b\n")
+    quiet = ["--set", "start.silent_s=1"]
+    status, trial = run(image, tmp_path / "a", *quiet)
+    assert status == 1
+    assert [(robot, why[:-6]) for robot, _, why in trial.about["faults"]] == [
+        (0, "is silent: no motor step, LED or byte since"),
+        (1, "is silent: no motor step, LED or byte since"),
+    ]
+    status, trial = run(image, tmp_path / "b")
+    assert (status, trial.about["faults"]) == (0, [])
+    lively = assembled(f"{BEGIN}\n1: mov #65000, w1\n2: repeat #50\n nop\n dec w1, w1\n bra nz, 2b\n mov #'x', w0\n"
+                       "mov w0, U1TXREG\n bra 1b\n")  # fmt: skip
+    status, trial = run(lively, tmp_path / "c", *quiet)
+    assert (status, trial.about["faults"]) == (0, [])
+
+
+def test_the_remote_control_repeats_its_frame_while_the_key_is_held(talking_image: Path) -> None:
+    """Every 113.8 ms (epuck.md §6): a robot that misses the first has others."""
+    scene = load_scene("clustering").with_values(robots__count=1, objects__count=0, start__remote_held_s=0.5)
+    brain = EmulatedBrain(scene, 1, 0, talking_image)
+    edges: list[int] = []
+    brain.machine.peripherals.pins.watch("RF6", lambda cycle, _changed, _levels: edges.append(cycle))
+    poses = World(scene, 1).poses
+    for tick in range(2000):
+        brain.machine.run_until((tick + 1) * scene.clock.quantum_tcy)
+    assert poses.robots
+    begins = [cycle for before, cycle in zip([-FCY, *edges], edges, strict=False) if cycle - before > FCY // 20]
+    assert len(begins) == 5
+    gaps = [(other - one) / FCY for one, other in itertools.pairwise(begins)]
+    assert gaps == pytest.approx([0.1138] * 4, abs=1e-5)
+
+
+def test_a_robot_switched_on_while_the_key_is_held_gets_the_frames_that_are_left(talking_image: Path) -> None:
+    """No half frame, and none of the past."""
+    values = {"robots__count": 1, "objects__count": 0, "start__remote_at_s": 0.0, "start__spread_tcy": 4 * 1_600_000}
+    scene = load_scene("clustering").with_values(**values)
+    for seed in range(1, 6):
+        brain = EmulatedBrain(scene, seed, 0, talking_image)
+        edges: list[int] = []
+        brain.machine.peripherals.pins.watch("RF6", lambda cycle, _changed, _levels, edges=edges: edges.append(cycle))
+        brain.machine.run_until(FCY)
+        begins = [cycle for before, cycle in zip([-FCY, *edges], edges, strict=False) if cycle - before > FCY // 20]
+        on_at = brain._on_at
+        left = [n * 0.1138 for n in range(5) if n * 0.1138 * FCY >= on_at]
+        assert [(cycle + on_at) / FCY for cycle in begins] == pytest.approx(left, abs=1e-3)
+
+
+@pytest.mark.parametrize("position", [0, 7, 11, 15])
+def test_the_switch_has_sixteen_positions(assembled: Assembled, position: int, tmp_path: Path) -> None:
+    """The firmware says which it reads on RG6 to RG9 (epuck.md §2)."""
+    image = assembled(f"""{BEGIN}
+        mov     PORTG, w0
+        lsr     w0, #6, w0
+        and     w0, #15, w0
+        mov     #'A', w1
+        add     w0, w1, w0
+        mov     w0, U1TXREG
+        mov     #10, w0
+        mov     w0, U1TXREG
+1:      bra     1b
+""")
+    _, trial = run(image, tmp_path, "--set", f"start.selector={position}", seconds=0.5)
+    said = [line["text"] for row in trial.columns["log"] for line in row]
+    assert said == [chr(ord("A") + position)] * 2
+
+
+ECHO = f"""{BEGIN}
+1:      btss    U1STA, #0               ; URXDA
+        bra     1b
+        mov     U1RXREG, w0
+        mov     w0, U1TXREG
+        bra     1b
+"""
+
+
+def test_robots_are_told_things_by_uart_at_times_of_the_trial(assembled: Assembled, tmp_path: Path) -> None:
+    """Each was switched on at another moment; the words arrive together. Any number of processes, the same bytes."""
+    script = '0.5s uart1 "go 7\\n"'
+    image = assembled(ECHO)
+    records = []
+    for jobs in (1, 2):
+        _, trial = run(image, tmp_path / str(jobs), "--set", f"start.stimulus={script}", "--jobs", jobs)
+        records.append(trial.path.read_bytes())
+        lines = [line for row in trial.columns["log"] for line in row]
+        assert sorted((line["robot"], line["text"]) for line in lines) == [(0, "go 7"), (1, "go 7")]
+        assert [line["cycle"] / FCY for line in lines] == pytest.approx([0.5] * 2, abs=2e-3)
+    assert records[0] == records[1]
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("start.selector=16", "start.selector is 16; expected -1 to 15"),
+        ("start.remote=louder", "start.remote is 'louder'; expected standby, swap, sleep, ok, 0 to 63, or empty"),
+        ("start.stimulus=1s jump", "start.stimulus:1: expected one of selector, remote,"),
+        ("start.silent_s=0", "start.silent_s is 0.0; expected 0.1 to inf"),
+    ],
+)
+def test_wrong_start_conditions_are_named(
+    setting: str, message: str, talking_image: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Status 2, no trial is begun."""
+    assert (
+        main(
+            [
+                "run",
+                "clustering",
+                "--brain",
+                str(talking_image),
+                "--trials",
+                "1",
+                "--set",
+                setting,
+                "--out",
+                str(tmp_path),
+            ]
+        )
+        == 2
+    )
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.glob("trial-*"))

@@ -1,0 +1,247 @@
+"""Variables, call stacks, calls and expectations by the names of the source, on programs of our own compiler."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+
+import pytest
+
+import emu
+from emu.debug.calls import CallError
+from emu.debug.locate import Unavailable
+from emu.peripherals.expect import ExpectError
+from toolchain import driver
+
+PROGRAM = """
+#include <stdint.h>
+#include <stdio.h>
+enum colour { RED = 1, GREEN, BLUE };
+struct point { int x; long y; unsigned char flags : 3, mode : 5; signed char low : 4; };
+typedef struct robot { int speed[2]; struct point place, *target; enum colour colour; float gain; char name[8];
+                       uint64_t big; union { int whole; char parts[2]; } u; } robot_type;
+robot_type robot = {{-5, 300}, {7, -70000, 5, 17, -3}, &robot.place, BLUE, 0.5f, "epuck", 0x123456789ABCull, {0x4142}};
+static int hidden[3][2] = {{1, 2}, {3, 4}, {5, 6}};
+const int table[4] = {10, 20, 30, 40};
+volatile unsigned char small = 200; volatile signed char negative = -3; volatile _Bool yes = 1; int *nothing;
+uint16_t __attribute__((noinline, used)) crc16(const uint8_t *data, uint16_t size)
+{
+    uint16_t crc = 0xFFFF;
+    while (size--) { crc ^= *data++; for (int i = 0; i < 8; i++) { crc = crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1; } }
+    return crc;
+}
+int unused_one = 5;
+int32_t __attribute__((noinline, used)) mixed(int8_t a, int32_t b, int16_t c, float d)
+{ return a + b + c + (int32_t)d; }
+void __attribute__((noinline, used)) forever(void) { for (;;) { } }
+void __attribute__((noinline, used)) broken(void) { *(volatile int *)0x3001 = 1; }
+int __attribute__((noinline)) inner(int depth, long wide)
+{
+    int local = depth * 2;
+    if (depth > 0) { int block = local + 1; return inner(depth - 1, wide + block) + local; }
+    printf("ready %d\\n", (int)wide);
+    return hidden[1][1] + table[2];
+}
+const void *volatile keep[16];
+int main(void)
+{
+    keep[0] = &robot; keep[1] = hidden; keep[2] = table; keep[3] = (void *)&small; keep[4] = (void *)&negative;
+    keep[5] = (void *)&yes; keep[6] = &nothing;
+    keep[7] = crc16; keep[8] = mixed; keep[9] = forever; keep[10] = broken;
+    int result = inner(3, 100000L); printf("done %d\\n", result);
+    return 0;
+}
+"""
+GLOBALS = [
+    ("robot.speed[1]", 300),
+    ("robot.speed", [-5, 300]),
+    ("robot.place.y", -70000),
+    ("robot.place.flags", 5),
+    ("robot.place.mode", 17),
+    ("robot.place.low", -3),
+    ("robot.target->x", 7),
+    ("*robot.target", {"x": 7, "y": -70000, "flags": 5, "mode": 17, "low": -3}),
+    ("(*robot.target).y + 1", -69999),
+    ("robot.colour", 3),
+    ("robot.colour == BLUE", 1),
+    ("robot.gain", 0.5),
+    ("robot.name[1]", ord("p")),
+    ("robot.big", 0x123456789ABC),
+    ("robot.u.parts[1]", 0x41),
+    ("&robot.speed[1] - &robot.speed[0]", 2),
+    ("*(&robot.speed[0] + 1)", 300),
+    ("hidden[2][0]", 5),
+    ("table[3]", 40),
+    ("small", 200),
+    ("negative", -3),
+    ("yes", True),
+    ("nothing == 0 && !nothing", 1),
+    ("small > 100 ? RED : GREEN", 1),
+    ("-7 / 2", -3),
+    ("-7 % 3", -1),
+    ("1 << 4 | 0x3 & ~1", 18),
+    ("'a' + '\\n'", 107),
+    ("U1MODE", 0x8000),
+    ("U1MODE.UARTEN", 1),
+    ("U1MODEbits.UARTEN", 1),
+]
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory):
+    built = {}
+
+    def make(*options, source=PROGRAM):
+        if (options, source) not in built:
+            folder = tmp_path_factory.mktemp("c")
+            (folder / "p.c").write_text(source)
+            image = folder / "p.elf"
+            assert driver.main(["-g", *options, str(folder / "p.c"), "-o", str(image)]) == 0
+            built[options, source] = str(image)
+        return built[options, source]
+
+    return make
+
+
+@pytest.fixture(params=["-O0", "-Os"])
+def machine(build, request):
+    """Stopped in `inner`, as deep as it goes."""
+    made = emu.load(build(request.param))
+    made.run(until="main")
+    made.uart[1].expect("ready", within=20)
+    return made
+
+
+@pytest.mark.parametrize(("expression", "value"), GLOBALS)
+def test_expressions_of_c(machine, expression, value):
+    assert machine.var(expression) == value
+
+
+@pytest.mark.parametrize(
+    ("expression", "value"), [("robot.speed[1]", -9), ("robot.place.mode", 30), ("robot.place.low", -8), ("small", 7),
+                              ("robot.gain", 1.25), ("robot.big", 1 << 60), ("robot.u.parts[0]", 1), ("LATB", 0x1234)],
+)  # fmt: skip
+def test_what_is_set_is_had_back_and_nothing_else_changes(machine, expression, value):
+    place = machine.value(expression)
+    around = machine.peek_bytes(place.address - 2, 20) if place.address >= 0x800 else None
+    machine.set_var(expression, value)
+    assert machine.var(expression) == value
+    if around is not None:
+        size = place.type.bytes
+        after = machine.peek_bytes(place.address - 2, 20)
+        assert (after[:2], after[2 + size :]) == (around[:2], around[2 + size :])
+    if "mode" in expression:
+        assert (machine.var("robot.place.flags"), machine.var("robot.place.x")) == (5, 7)
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [("nobody", "nothing called 'nobody'"), ("robot.weight", "no member 'weight'"), ("robot +", "ends too early"),
+     ("robot * 2", "is no number"), ("hidden[3]", "elements 0 to 2"), ("1 / 0", "zero"), ("small small", "too much"),
+     ("", "empty"), ("a ` b", "not understood"), ("&5", "no address"), ("5", "names no place")],
+)  # fmt: skip
+def test_what_means_nothing_is_refused(machine, expression, words):
+    with pytest.raises(ValueError, match=re.escape(words)):
+        machine.value(expression)
+
+
+def test_what_the_linker_left_out_is_said_to_be(build):
+    machine = emu.load(build("-O0"))
+    with pytest.raises(Unavailable, match="nothing uses it"):
+        machine.var("unused_one")
+
+
+def test_values_that_do_not_fit_are_refused(machine):
+    for expression, value in (("small", 256), ("robot.speed[0]", -40000)):
+        with pytest.raises(ValueError, match="does not fit"):
+            machine.set_var(expression, value)
+    with pytest.raises(TypeError, match="only numbers"):
+        machine.set_var("robot", 1)
+
+
+def test_locals_of_every_frame_at_O0(build):
+    machine = emu.load(build("-O0"))
+    machine.run(until="main")
+    remove = machine.hook_pc("printf", lambda: True)
+    assert machine.run(seconds=0.1).reason == "breakpoint"
+    remove()
+    frames = machine.backtrace()
+    assert [frame.function for frame in frames] == ["printf", *["inner"] * 4, "main", "_resetPRI"]
+    wide = 100000
+    for depth, frame in zip(range(3, -1, -1), reversed(frames[1:5]), strict=True):
+        known = {one.name: machine.inside.value(one, frame).get() for one in machine.inside.variables(frame)}
+        assert known["depth"] == depth
+        assert known["local"] == 2 * depth
+        assert known["wide"] == wide
+        wide += 2 * depth + 1
+
+
+def test_a_local_is_right_or_optimised_out(build):
+    machine = emu.load(build("-Os"))
+    machine.run(until="inner")
+    start = machine.inside.debug.function(machine.pc)
+    known = 0
+    for _step in range(8):
+        for name, values in (("depth", {3, 2}), ("wide", {100000, 100007}), ("local", {6, 4})):
+            with contextlib.suppress(Unavailable):
+                assert machine.var(name) in values
+                known += 1
+        machine.step()
+        assert machine.inside.debug.function(machine.pc) is start
+    assert known >= 4  # the parameters, at least before the first call
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
+def test_a_function_is_called_and_the_program_goes_on_as_if_not(build, level, engine):
+    machine = emu.load(build(level), engine=engine)
+    machine.run(until="inner")
+    assert machine.call("crc16", b"123456789", 9) == 0x4B37
+    assert machine.call("mixed", -1, 100000, 10, 2.9) == 100011
+    with pytest.raises(ValueError, match="takes 2 arguments"):
+        machine.call("crc16", 1)
+    with pytest.raises(ValueError, match="does not fit"):
+        machine.call("mixed", 1000, 0, 0, 0)
+    with pytest.raises(KeyError, match="nobody"):
+        machine.call("nobody")
+    assert machine.uart[1].expect(re.compile(rb"done (\d+)\n"), within=50)[1] == b"46"
+
+
+def test_a_function_that_does_not_return_is_told(build):
+    machine = emu.load(build("-Os"))
+    machine.run(until="main")
+    with pytest.raises(CallError, match="did not return: Stop\\(reason='limit'"):
+        machine.call("forever", cycles=1000)
+    machine = emu.load(build("-Os"))
+    machine.run(until="main")
+    with pytest.raises(CallError, match="writing 2 bytes at 0x3001"):
+        machine.call("broken")
+
+
+def test_expect_goes_on_behind_the_last_match_and_stops_at_the_byte(build):
+    machine = emu.load(build("-Os"))
+    ends = []
+    machine.uart[1].listen(lambda byte, start: ends.append((chr(byte), start)))
+    assert machine.uart[1].expect("rea", within=50).group() == b"rea"
+    assert "".join(letter for letter, _ in ends) == "rea"
+    assert machine.cycle >= ends[-1][1] + 10 * 16  # ten bits of 16 Tcy: U1BRG is 0
+    assert machine.cycle < ends[-1][1] + 10 * 16 + 20
+    with pytest.raises(ExpectError, match=r"UART1 did not say b'ready' within 5 ms, but 'dy -31057"):
+        machine.uart[1].expect("ready", within=5)
+    machine.uart[1].expect("done", within=5)
+    with pytest.raises(ExpectError, match="the run ended: halt"):
+        machine.uart[1].expect("never", within=50)
+
+
+def test_expect_tells_a_fault(build):
+    machine = emu.load(build("-O0", source="int main(void) { *(volatile int *)0x3001 = 1; return 0; }"))
+    with pytest.raises(ExpectError, match=r"(?s)writing 2 bytes at 0x3001.*#0 main"):
+        machine.uart[1].expect("anything", within=5)
+
+
+def test_looking_changes_nothing(machine):
+    before = machine.snapshot()
+    machine.backtrace()
+    machine.var("robot")
+    machine.threads()
+    assert machine.snapshot() == before

@@ -1,0 +1,98 @@
+"""The command line as shells and pipes see it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+from programs import SPIN, executable
+
+ROOT = Path(__file__).resolve().parents[3]
+EMU = [sys.executable, "-m", "emu"]
+
+
+@pytest.fixture
+def spin(tmp_path):
+    path = tmp_path / "spin.elf"
+    path.write_bytes(executable(SPIN))
+    return str(path)
+
+
+def emu(*words, **options):
+    return subprocess.run([*EMU, *words], capture_output=True, text=True, cwd=ROOT, timeout=60, check=False, **options)
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"], ["completion", "bash"]])
+def test_a_reader_that_has_gone_is_no_failure(words):
+    """Standard output is a pipe whose other end is closed already."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([*EMU, *words], stdout=writer, stderr=subprocess.PIPE, cwd=ROOT, timeout=60, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_the_version_is_that_of_the_package():
+    assert emu("--version").stdout == f"emu {version('openswarm')}\n"
+
+
+@pytest.mark.parametrize("order", [["spin", "main"], ["main", "spin"]])
+def test_every_breakpoint_holds(spin, order):
+    first = emu("run", spin, "--break", order[0], "--break", order[1])
+    assert "breakpoint at 0x000100 (_main)" in first.stderr
+    second = emu("run", spin, "--break", "0x9000", "--break", "spin", "--break", "0x9002")
+    assert "breakpoint at 0x000102" in second.stderr
+
+
+def test_a_trace_to_standard_output(spin, tmp_path):
+    done = subprocess.run(
+        [*EMU, "run", spin, "--cycles", "4", "--trace", "-"],
+        capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert [line.split()[1] for line in done.stdout.splitlines()[1:]] == ["0x000000", "0x000100", "0x000102"]
+    assert not (tmp_path / "-").exists()
+
+
+@pytest.mark.parametrize("other", [["--uart1", "-"], ["--uart2", "-"], ["--json"], ["--record", "-"]])
+def test_standard_output_is_for_one(spin, other):
+    done = emu("run", spin, "--cycles", "4", "--trace", "-", *other)
+    assert done.returncode == 2
+    assert "standard output" in done.stderr
+
+
+def test_completion_knows_commands_options_and_choices():
+    bash = shutil.which("bash")
+    if bash is None:
+        pytest.skip("there is no bash")
+    script = emu("completion", "bash").stdout
+    ask = 'COMP_WORDS=(emu {words}); COMP_CWORD={last}; _shtab_emu; echo "${{COMPREPLY[@]}}"'
+
+    def completed(*words: str) -> list[str]:
+        text = script + "\n" + ask.format(words=" ".join(f"'{word}'" for word in words), last=len(words))
+        done = subprocess.run([bash, "-c", text], capture_output=True, text=True, timeout=60, check=False)
+        return done.stdout.split()
+
+    assert completed("scr") == ["screenshot"]
+    assert completed("run", "--ipl") == ["--ipl-slip"]
+    assert completed("run", "--board", "") == ["epuck", "none"]
+
+
+def test_nothing_is_coloured_even_on_a_terminal(spin):
+    """So NO_COLOR is honoured; the compiler's messages are the only coloured ones and ask it."""
+    import pty
+
+    leader, follower = pty.openpty()
+    done = subprocess.run(
+        [*EMU, "run", spin, "--cycles", "4"], stdin=subprocess.DEVNULL, stdout=follower, stderr=follower, cwd=ROOT,
+        timeout=60, check=False,
+    )  # fmt: skip
+    os.close(follower)
+    assert done.returncode == 0
+    assert b"\x1b[" not in os.read(leader, 65536)

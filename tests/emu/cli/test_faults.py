@@ -1,0 +1,228 @@
+"""Faults are told so that one finds the bug: C programs with one mistake each, built with our own compiler."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import emu
+from emu.cli import main
+from toolchain import driver
+
+RECURSION = """
+int depth(int n) { volatile char pad[20]; pad[0] = n; return depth(n + 1) + pad[0]; }
+int main(void) { return depth(1); }
+"""
+WILD = """
+typedef void (*function)(void);
+volatile unsigned where = WHERE;
+void caller(int parameter) { ((function)where)(); }
+int main(void) { for (int i = 0; i < 50; i++) { where; } caller(77); return 0; }
+"""
+RETURN = """
+volatile int i;
+void smash(void) { int *top = (int *)__builtin_frame_address(0); for (i = -4; i < 2; i++) { top[i] = WHERE; } }
+int main(void) { smash(); return 0; }
+"""
+STORE = """
+struct point { int x; long y; } room;
+struct point *volatile somewhere = (struct point *)0x3001;
+static __attribute__((noinline)) void set(struct point *p, int value) { p->x = value; }
+int main(void) { set(somewhere, 1234); return room.x; }
+"""
+DIVISION = """
+volatile int zero;
+int quotient(int n) { return n / zero; }
+int main(void) { return quotient(10); }
+"""
+CHECKS = {
+    "volatile int a = 32767; int main(void) { return a + 1; }": "overflow in an addition",
+    "volatile int a = -32767; int main(void) { return a - 2; }": "overflow in a subtraction",
+    "volatile int a = 20000; int main(void) { return a * 2; }": "overflow in a multiplication",
+    "volatile int a = -32767 - 1; int main(void) { return -a; }": "overflow in a negation",
+    "volatile int a; int main(void) { return 5 / a; }": "division by zero",
+    "volatile int a = 16; int main(void) { return 1 << a; }": "a shift by too many bits",
+    "volatile int a = 3; int b[3]; int main(void) { return b[a]; }": "an index out of bounds",
+    "int *volatile p; int main(void) { return *p; }": "a null or misaligned pointer",
+    "volatile int a; int main(void) { if (!a) __builtin_unreachable(); return 0; }": "cannot be reached",
+    "volatile int n = -1; int main(void) { int a[n]; a[0] = 1; return a[0]; }": "length is not positive",
+    "volatile char c = 3; int main(void) { return *(_Bool *)&c; }": "a value that the type does not have",
+}
+
+
+@pytest.fixture
+def build(tmp_path):
+    """Builds C and returns the image's path."""
+
+    def make(source, *options):
+        path = tmp_path / "program.c"
+        path.write_text(source)
+        image = tmp_path / "program.elf"
+        assert driver.main(["-g", *(options or ["-O0"]), str(path), "-o", str(image)]) == 0
+        return str(image)
+
+    return make
+
+
+def fault(path, **options):
+    """The fault of a run through the Python interface, which is that of the command line as well."""
+    stop = emu.load(path).run(seconds=1, **options)
+    assert stop.reason == "fault", stop
+    assert stop.fault is not None
+    return stop.fault
+
+
+def functions(found):
+    return [frame.function for frame in found.frames]
+
+
+def test_a_division_by_zero_is_a_fault_in_python_too(build):
+    found = fault(build(DIVISION))
+    assert found.cause.startswith("math error trap")
+    assert functions(found)[:2] == ["quotient", "main"]
+    assert found.line.endswith("program.c:3")
+    assert dict(found.frames[0].variables) == {"n": "10"}
+
+
+def test_command_line_json_and_python_tell_the_same(build, capfd):
+    path = build(DIVISION)
+    found = fault(path)
+    assert main(["run", path, "--json"]) == 1
+    facts = json.loads(capfd.readouterr().out)
+    assert facts["reason"] == "fault"
+    assert facts["fault"] == json.loads(json.dumps(found.facts()))
+    assert main(["run", path]) == 1
+    assert found.report() in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_recursion_without_end_is_a_stack_overflow_in_the_function_that_recurs(build, level):
+    found = fault(build(RECURSION, level))
+    assert found.cause.startswith("stack overflow: W15 is 0x2")
+    assert "the limit 0x27f0" in found.cause
+    assert found.function == "depth"
+    assert functions(found)[:5] == ["depth"] * 5
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+@pytest.mark.parametrize("where", [0x9876, 0x17F00, 0x40000])
+def test_a_jump_into_nowhere_is_told_with_where_it_came_from(build, level, where):
+    found = fault(
+        build(
+            WILD.replace("volatile unsigned where", "volatile unsigned long where").replace("WHERE", f"{where}ul"),
+            level,
+        )
+    )
+    target = where & 0xFFFF  # a function pointer has 16 bits
+    if target < 0x200:
+        pytest.skip("inside the program")
+    assert found.cause.startswith(f"call to {target:#08x}, where there is erased flash")
+    assert found.branches[-1].target == target
+    assert found.branches[-1].source == found.pc
+    assert ("caller" if level == "-O0" else "main") in functions(found)[:2]
+    assert len(found.branches) == 20
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_a_call_to_0_is_noticed_at_once(build, level):
+    found = fault(build(WILD.replace("WHERE", "0"), level))
+    assert found.cause == "call to address 0 (a null function pointer?)"
+    assert found.branches[-1].source == found.pc
+    assert found.line.endswith("program.c:4")
+
+
+def test_a_return_through_a_smashed_stack_is_told_as_such(build):
+    found = fault(build(RETURN.replace("WHERE", "0x7A")))
+    assert "return to 0x7a007a" in found.cause
+    assert found.function == "smash"
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_a_bad_store_is_told_with_address_and_variables(build, level):
+    found = fault(build(STORE, level))
+    assert found.cause.startswith("address error trap: writing 2 bytes at 0x3001, an odd address")
+    assert functions(found)[:2] == ["set", "main"]
+    known = dict(found.frames[0].variables)
+    assert known["p"] == "0x3001"
+    assert known["value"] in ("1234",) if level == "-O0" else ("1234", "<optimised out>")
+
+
+@pytest.mark.parametrize(("source", "cause"), CHECKS.items())
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_a_check_of_the_sanitizer_that_fails_is_a_fault(build, capfd, level, source, cause):
+    path = build(source, level, "-fsanitize=undefined")
+    found = fault(path)
+    assert found.cause.startswith("undefined behaviour: ")
+    assert cause in found.cause
+    assert found.function == "main"
+    assert main(["run", path]) == 1
+    assert main(["run", path, "--exit-code"]) == 125
+    assert "undefined behaviour" in capfd.readouterr().err
+
+
+def test_a_trap_the_program_asks_for_is_a_fault_and_a_breakpoint_is_none(build):
+    assert fault(build("int main(void) { __builtin_trap(); }")).cause == "__builtin_trap(),"
+    stop = emu.load(build("int main(void) { __builtin_software_breakpoint(); return 0; }")).run(seconds=1)
+    assert (stop.reason, stop.fault) == ("breakpoint", None)
+
+
+def test_a_trap_in_an_interrupt_shows_whom_it_interrupted(build):
+    found = fault(build("""
+#include <p30F6014A.h>
+volatile int zero, seconds;
+static __attribute__((noinline)) int broken(int n) { return n / zero; }
+void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void) { IFS0bits.T1IF = 0; seconds = broken(5); }
+static __attribute__((noinline)) void wait(int inside) { for (;;) { seconds += inside; } }
+int main(void) { PR1 = 1000; IEC0bits.T1IE = 1; T1CON = 0x8000; wait(0); }
+""", "-Os"))  # fmt: skip
+    assert functions(found)[:4] == ["broken", "_T1Interrupt", "wait", "main"]
+    assert [frame.kind for frame in found.frames[:3]] == ["call", "interrupt", "call"]
+    assert any(branch.kind == "exception" for branch in found.branches)
+
+
+@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+def test_engines_and_pieces_tell_the_same(build, engine):
+    """However the run is cut and whatever runs it, and the machine stands afterwards as if nobody had looked."""
+    path = build(DIVISION)
+    whole = emu.load(path)
+    expected = whole.run(seconds=1)
+    machine = emu.load(path, engine=engine)
+    while (stop := machine.run(cycles=7)).reason == "limit":
+        pass
+    assert stop == expected
+    assert machine.snapshot() == whole.snapshot()
+    unexplained = emu.load(path, engine=engine)
+    unexplained.image = None
+    unexplained.run(seconds=1)
+    assert machine.snapshot() == unexplained.snapshot()
+
+
+def test_who_listens_is_not_told_twice(build):
+    machine = emu.load(build("""
+#include <stdio.h>
+volatile int zero;
+int main(void) { printf("before\\n"); for (volatile int i = 0; i < 3000; i++) { } return 1 / zero; }
+"""))  # fmt: skip
+    said, calls, writes = bytearray(), [], []
+    machine.uart[1].listen(lambda byte, _cycle: said.append(byte))
+    machine.hook_pc("main", lambda: calls.append(machine.cycle))
+    machine.hook_sfr("U1TXREG", lambda _write, word: writes.append(word))
+    assert machine.run(seconds=1).reason == "fault"
+    assert said == b"before\n"
+    assert (len(calls), bytes(writes)) == (1, b"before\n")
+
+
+def test_input_that_a_listener_gave_spoils_no_report(build):
+    """What a callback feeds in the middle of a run cannot be known when it is run again: no branches, but the rest."""
+    machine = emu.load(build("""
+#include <p30F6014A.h>
+#include <stdio.h>
+volatile int zero;
+int main(void) { printf("?"); while (!U1STAbits.URXDA) { } return 1 / zero; }
+"""))  # fmt: skip
+    machine.uart[1].listen(lambda _byte, _cycle: machine.uart[1].feed(b"x"))
+    stop = machine.run(seconds=1)
+    assert stop.fault is not None
+    assert stop.fault.function == "main"
+    assert stop.fault.branches == ()

@@ -1,0 +1,252 @@
+"""The Debug Adapter Protocol server, driven over its standard streams."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.emu.dap.client import Client
+from toolchain import driver
+
+SOURCE = Path(__file__).parent / "program.c"
+
+
+def line_of(text: str) -> int:
+    """Line of the program that contains `text`."""
+    return next(n for n, line in enumerate(SOURCE.read_text().splitlines(), 1) if text in line)
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> str:
+    image = tmp_path_factory.mktemp("dap") / "program.elf"
+    assert driver.main(["-g", "-O0", str(SOURCE), "-o", str(image)]) == 0
+    return str(image)
+
+
+@pytest.fixture
+def client() -> Iterator[Client]:
+    made = Client()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def stopped(client: Client, program: str) -> Callable[..., Client]:
+    """A client whose machine stands at the given line for the first time."""
+
+    def stop(text: str, **more: Any) -> Client:
+        client.start(program)
+        wanted = [{"line": line_of(text), **more}]
+        reply = client.ask("setBreakpoints", source={"path": str(SOURCE)}, breakpoints=wanted)["breakpoints"]
+        assert reply[0]["verified"]
+        client.ask("configurationDone")
+        assert client.event("stopped")["reason"] == "breakpoint"
+        return client
+
+    return stop
+
+
+def test_a_breakpoint_shows_stack_scopes_and_values(stopped: Callable[..., Client]) -> None:
+    client = stopped("total = sum;", condition="a == 3 && b == 3")
+    trace = client.ask("stackTrace", threadId=1)
+    assert [frame["name"] for frame in trace["stackFrames"]] == ["add", "twice", "main", "_resetPRI"]
+    assert trace["stackFrames"][0]["line"] == line_of("total = sum;")
+    assert trace["stackFrames"][0]["source"]["path"] == str(SOURCE)
+    assert trace["stackFrames"][1]["line"] == line_of("return add(once, n);")
+    assert client.ask("stackTrace", threadId=1, startFrame=4, levels=16)["stackFrames"] == []
+    frame = trace["stackFrames"][0]["id"]
+    scopes = {scope["name"]: scope for scope in client.ask("scopes", frameId=frame)["scopes"]}
+    assert scopes["SFRs"]["expensive"]
+    values = client.ask("variables", variablesReference=scopes["Locals"]["variablesReference"])["variables"]
+    assert {one["name"]: one["value"] for one in values} == {"a": "3", "b": "3", "sum": "6"}
+    outer = client.ask("scopes", frameId=trace["stackFrames"][2]["id"])["scopes"][0]["variablesReference"]
+    assert {one["name"]: one["value"] for one in client.ask("variables", variablesReference=outer)["variables"]} == {
+        "i": "3"
+    }
+    statics = client.ask("variables", variablesReference=scopes["Statics"]["variablesReference"])["variables"]
+    pairs = next(one for one in statics if one["name"] == "pairs")
+    assert pairs["indexedVariables"] == 3
+    second = client.ask("variables", variablesReference=pairs["variablesReference"], start=1, count=1)["variables"]
+    assert [one["name"] for one in second] == ["[1]"]
+    members = client.ask("variables", variablesReference=second[0]["variablesReference"])["variables"]
+    assert {one["name"]: one["value"] for one in members} == {"first": "2", "second": "20"}
+    assert [one["evaluateName"] for one in members] == ["pairs[1].first", "pairs[1].second"]
+    sfrs = client.ask("variables", variablesReference=scopes["SFRs"]["variablesReference"])["variables"]
+    sr = next(one for one in sfrs if one["name"] == "U1MODE")
+    fields = client.ask("variables", variablesReference=sr["variablesReference"])["variables"]
+    assert {"UARTEN", "PDSEL"} <= {one["name"] for one in fields}
+    assert client.evaluate("pairs[2].second + sum") == "36"
+    refused = client.asked("evaluate", expression="nonsense", context="watch", frameId=frame)
+    assert not refused["success"]
+    assert "nothing called 'nonsense'" in refused["message"]
+
+
+def test_steps_go_over_into_and_out(stopped: Callable[..., Client]) -> None:
+    client = stopped("int once = add(n, 0);")
+
+    def step(how: str, **more: Any) -> tuple[str, int]:
+        client.ask(how, threadId=1, **more)
+        assert client.event("stopped")["reason"] == "step"
+        top = client.top()
+        return top["name"], top["line"]
+
+    assert step("next") == ("twice", line_of("return add(once, n);"))
+    assert step("stepIn")[0] == "add"
+    assert step("next") == ("add", line_of("int sum = a + b;"))
+    assert step("next") == ("add", line_of("total = sum;"))
+    assert step("stepOut") == ("twice", line_of("return add(once, n);"))
+    pc = int(client.top()["instructionPointerReference"], 16)
+    step("next", granularity="instruction")
+    assert int(client.top()["instructionPointerReference"], 16) == pc + 2
+
+
+def test_back_by_line_instruction_and_breakpoint(stopped: Callable[..., Client]) -> None:
+    client = stopped("total = sum;", hitCondition="4")
+    totals = client.evaluate("total"), client.evaluate("a"), client.evaluate("cycle")
+    here = client.top()["instructionPointerReference"]
+    client.ask("stepBack", threadId=1)
+    client.event("stopped")
+    assert client.top()["line"] == line_of("int sum = a + b;")
+    client.ask("next", threadId=1)
+    client.event("stopped")
+    assert (client.evaluate("total"), client.evaluate("a"), client.evaluate("cycle")) == totals
+    for _ in range(5):
+        client.ask("stepBack", threadId=1, granularity="instruction")
+        client.event("stopped")
+    for _ in range(5):
+        client.ask("next", threadId=1, granularity="instruction")
+        client.event("stopped")
+    assert client.top()["instructionPointerReference"] == here
+    assert client.evaluate("cycle") == totals[2]
+    client.ask("setBreakpoints", source={"path": str(SOURCE)}, breakpoints=[{"line": line_of("total = sum;")}])
+    seen = []
+    while True:
+        client.ask("reverseContinue", threadId=1)
+        halt = client.event("stopped")
+        if halt["reason"] == "entry":
+            break
+        assert halt["reason"] == "breakpoint"
+        seen.append((client.evaluate("a"), client.evaluate("b"), client.evaluate("total")))
+    assert seen == [("1", "0", "0"), ("0", "0", "0"), ("0", "0", "0")]
+    assert halt["description"] == "start of recording"
+
+
+def test_data_breakpoints_and_the_last_write(stopped: Callable[..., Client]) -> None:
+    client = stopped('printf("total')
+    info = client.ask("dataBreakpointInfo", name="pairs[1].second", frameId=client.top()["id"])
+    assert info["accessTypes"] == ["read", "write", "readWrite"]
+    client.ask("setDataBreakpoints", breakpoints=[{"dataId": info["dataId"], "accessType": "write"}])
+    client.ask("continue", threadId=1)
+    halt = client.event("stopped")
+    assert halt["reason"] == "data breakpoint"
+    assert client.evaluate("(int)1" if False else "pairs[1].second & 0xff") == "8"
+    client.ask("setDataBreakpoints", breakpoints=[])
+    client.ask("evaluate", expression="/lastwrite total", context="repl")
+    halt = client.event("stopped")
+    assert "0400 -> 0800" in halt["description"]
+    assert (client.top()["name"], client.top()["line"]) == ("add", line_of("total = sum;"))
+    assert client.evaluate("total") == "4"
+    assert "before the present" in client.evaluate("/time", "repl")
+
+
+def test_a_fault_is_an_exception_with_its_report(client: Client, program: str) -> None:
+    client.start(program)
+    client.ask("setExceptionBreakpoints", filters=["fault"])
+    client.ask("configurationDone")
+    halt = client.event("stopped")
+    assert halt["reason"] == "exception"
+    assert "reading 2 bytes at 0x3009, an odd address" in halt["text"]
+    assert "#0 main at" in client.ask("exceptionInfo", threadId=1)["description"]
+    assert "total 8\n" in client.said()
+
+
+def test_memory_registers_and_variables_are_set(stopped: Callable[..., Client]) -> None:
+    client = stopped("total = sum;")
+    frame = client.top()["id"]
+    assert client.evaluate("sum = 77", "repl") == "77"
+    assert client.ask("setExpression", expression="pairs[0].first", value="-5", frameId=frame)["value"] == "-5"
+    scopes = client.ask("scopes", frameId=frame)["scopes"]
+    local = next(scope["variablesReference"] for scope in scopes if scope["name"] == "Locals")
+    assert client.ask("setVariable", variablesReference=local, name="a", value="b + 9")["value"] == "9"
+    refused = client.asked("setVariable", variablesReference=local, name="a", value="70000")
+    assert "does not fit" in refused["message"]
+    place = client.ask("evaluate", expression="pairs", context="watch", frameId=frame)["memoryReference"]
+    data = client.ask("readMemory", memoryReference=place, offset=0, count=6)
+    assert base64.b64decode(data["data"]) == b"\xfb\xff\x0a\0\0\0"
+    client.ask("writeMemory", memoryReference=place, offset=2, data=base64.b64encode(b"\x01\x02").decode())
+    assert client.evaluate("pairs[0].second") == str(0x0201)
+    assert client.ask("readMemory", memoryReference="0x27fe", count=8)["unreadableBytes"] == 6
+    client.ask("next", threadId=1)
+    client.event("stopped")
+    assert client.evaluate("total") == "77"
+
+
+def test_disassembly_has_exactly_the_rows_asked_for(stopped: Callable[..., Client]) -> None:
+    client = stopped("total = sum;")
+    reference = client.top()["instructionPointerReference"]
+    rows = client.ask("disassemble", memoryReference=reference, instructionOffset=-200, instructionCount=400)[
+        "instructions"
+    ]
+    assert len(rows) == 400
+    assert int(rows[200]["address"], 16) == int(reference, 16)
+    assert rows[200]["line"] == line_of("total = sum;")
+    before = client.ask("disassemble", memoryReference="0x000004", instructionOffset=-6, instructionCount=8)[
+        "instructions"
+    ]
+    assert [row.get("presentationHint") for row in before] == ["invalid"] * 4 + [None] * 4
+    client.ask("setInstructionBreakpoints", breakpoints=[{"instructionReference": reference, "offset": -4}])
+    client.ask("setBreakpoints", source={"path": str(SOURCE)}, breakpoints=[])
+    client.ask("continue", threadId=1)
+    client.event("stopped")
+    assert int(client.top()["instructionPointerReference"], 16) == int(reference, 16) - 4
+
+
+def test_function_breakpoints_logpoints_pause_restart_and_terminate(client: Client, program: str) -> None:
+    client.start(program, stopOnEntry=True)
+    log = [{"line": line_of("total = sum;"), "logMessage": "sum is {sum}, {nothing}"}]
+    client.ask("setBreakpoints", source={"path": str(SOURCE)}, breakpoints=log)
+    set_ = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "printf"}, {"name": "missing"}])["breakpoints"]
+    assert [one["verified"] for one in set_] == [True, False]
+    client.ask("configurationDone")
+    assert client.event("stopped")["reason"] == "entry"
+    assert client.ask("threads")["threads"] == [{"id": 1, "name": "main"}]
+    client.ask("continue", threadId=1)
+    assert client.event("stopped")["hitBreakpointIds"] == [set_[0]["id"]]
+    said = client.said()
+    assert "sum is 8, <there is nothing called 'nothing' here>\n" in said
+    assert said.count("sum is ") == 10
+    client.ask("restart")
+    assert client.event("stopped")["reason"] == "entry"
+    assert client.evaluate("cycle") == "0"
+    assert not client.asked("launchMissiles")["success"]
+    client.ask("terminate")
+    client.event("terminated")
+
+
+def test_a_run_is_paused_and_breakpoints_change_while_it_runs(client: Client, tmp_path: Path) -> None:
+    source, image = tmp_path / "spin.c", tmp_path / "spin.elf"
+    source.write_text("volatile int n;\nint main(void) {\n    for (;;) {\n        n++;\n        n += 2;\n    }\n}\n")
+    assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
+    client.start(str(image))
+    client.ask("configurationDone")
+    client.ask("pause", threadId=1)
+    assert client.event("stopped")["reason"] == "pause"
+    client.ask("continue", threadId=1)
+    client.ask("setBreakpoints", source={"path": str(source)}, breakpoints=[{"line": 5}])
+    assert client.event("stopped")["reason"] == "breakpoint"
+    assert client.top()["line"] == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"), [({}, "needs `program`"), ({"program": "/nowhere.elf"}, "cannot be read")]
+)
+def test_a_bad_launch_is_refused_in_words(client: Client, arguments: dict[str, str], words: str) -> None:
+    client.ask("initialize", adapterID="emu")
+    reply = client.asked("launch", **arguments)
+    assert not reply["success"]
+    assert words in reply["message"]
+    assert not client.asked("continue", threadId=1)["success"]

@@ -1,0 +1,64 @@
+"""Rules of devices: a rule and the hooks behind it give the same record, so it does not matter which one answers."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from emu.straight import Integers, Place, Rule
+
+from .conftest import Rig
+from .test_fuzz import WORDS, act
+
+RULED = ("TMR", "PR", "LAT", "PORT", "ADC")
+
+
+def test_every_device_with_rules_has_them_on_the_bus(rig: Rig) -> None:
+    """Timers, ports and the converter."""
+    named = {rig.bus.name[word] or f"{2 * word:#x}" for word, rule in enumerate(rig.bus.rules) if rule is not None}
+    assert len(named) >= 5 + 5 + 7 + 7 + 18 - 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_hooks_alone_give_the_same_record_as_rules(seed: int) -> None:
+    """The same random accesses with the rules on the bus and without. Pins that changed natively are told first."""
+    rigs = [Rig(), Rig()]
+    rigs[1].bus.rules[:] = [None] * len(rigs[1].bus.rules)
+    hot = [sfr for sfr in WORDS if sfr.name.startswith(RULED)]
+    for step in range(500):
+        for rig in rigs:
+            draw = random.Random(f"{seed} {step}")
+            if draw.random() < 0.5:
+                sfr = draw.choice(hot)
+                rig.write(sfr.name, draw.choice((0, 1, 40, 0xFFFF, draw.randrange(0x10000))))
+                rig.at(rig.events.now + draw.choice((1, 1, 2, 50)))
+            elif draw.random() < 0.4:
+                rig.read(draw.choice(hot).name)
+            else:
+                act(rig, draw)
+            rig.dev.pins.flush()
+            rig.record.u64[rig.events.deadline_index] = 0  # derived
+        one, other = (rig.record.snapshot() for rig in rigs)
+        assert one == other, (step, _places(rigs[0], one, other))
+
+
+def _places(rig: Rig, one: bytes, other: bytes) -> set[str]:
+    return {rig.record.field_at(i) for i, (a, b) in enumerate(zip(one, other, strict=True)) if a != b}
+
+
+def test_a_need_that_does_not_hold_leaves_everything_as_it_was(rig: Rig) -> None:
+    """And the register's hooks are asked."""
+
+    def writes(m, place, value, lanes):
+        m.need(value < 10)
+        m.put(place, value)
+        return lanes == 0xFFFF
+
+    integers, place = Integers(rig.record, rig.events), Place(rig.address("PR1"), 16)
+    rule = Rule(place, None, writes)
+    assert integers.write(rule, 7, 0xFFFF)
+    assert not integers.write(rule, 70, 0xFFFF)
+    assert rig.peek("PR1") == 7
+    assert integers.read(rule) is None
+    assert "writes" in repr(rule)

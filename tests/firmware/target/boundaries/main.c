@@ -1,0 +1,191 @@
+/* Every kernel call in a round that leaves everything as it found it; an interrupt makes, at a boundary chosen from
+ * outside, every call that an ISR may make and every one that it may not. README.md. */
+#include "boundaries.h"
+
+#include <openswarm_io.h>
+
+#include <string.h>
+
+enum { HEARD = SYS_FIRST_USER_EVENT, SILENT, WAITED, SHARED = SYS_FIRST_USER_EVENT + 8 /* the bucket of HEARD */, NEVER };
+
+volatile uint16 failures, first_failure; /* calls with another result than they should have; the line of the first */
+volatile uint16 interrupts, sent, isr_sent, heard, ticks, rounds;
+static uint16 driver_pid, waiter_pid;
+static volatile uint16 woken;
+
+static void fail(uint16 line)
+{
+    if (failures++ == 0) {
+        first_failure = line;
+    }
+}
+#define MUST(condition) ((condition) ? (void)0 : fail(__LINE__))
+
+#define STOP(name)                                                    \
+    __attribute__((noinline, used)) void name(void)                   \
+    {                                                                 \
+        __asm__ volatile("nop" ::: "memory");                         \
+    }
+
+STOP(round_begin)
+STOP(round_end)
+
+static bool hear(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid, (void)event;
+    heard++;
+    MUST(data->size == 2 ? data->value == 7 : data->size == 5 && memcmp(data->payload, "event", 5) == 0);
+    return true;
+}
+
+static bool tick(uint16 pid, uint16 event, sys_event_data *data)
+{
+    static uint16 last;
+    (void)pid, (void)event;
+    MUST(ticks == 0 || data->value == (uint16)(last + 1u)); /* none lost, none twice */
+    last = data->value;
+    ticks++;
+    return true;
+}
+
+static bool other(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid, (void)event, (void)data;
+    return false;
+}
+
+
+__attribute__((used)) void boundaries_isr(void)
+{
+    static const sys_process_config config;
+    static const uint16 seven = 7;
+    static uint8 large[SYS_SMALL_PAYLOAD + 1];
+    uint16 refused = Sys_Get_Statistics()->refused;
+    interrupts++;
+    isr_sent += Sys_Send_Event(HEARD, &seven, sizeof seven);
+    MUST(Sys_IsEventRegistered(HEARD) && !Sys_IsEventRegistered(NEVER));
+    isr_sent += Sys_Send_Event(HEARD, "event", 5);
+    MUST(!Sys_Send_IntEvent(NEVER, 1));
+    (void)Sys_Send_IntEvent(SHARED, 1); /* perhaps registered just now */
+    (void)Sys_Send_IntEvent(WAITED, 2); /* not what the waiter waits for */
+    Sys_Start_CriticalSection();
+    Sys_Start_CriticalSection();
+    Sys_End_CriticalSection();
+    Sys_End_CriticalSection();
+    (void)Sys_Get_ProcessID();
+    MUST(Sys_Get_ProcessState(NEVER) == SYS_UNKNOWN);
+    (void)Sys_Get_ProcessState(driver_pid);
+    (void)Sys_Get_SystemTime();
+    (void)Sys_Get_LastError();
+    MUST(Sys_Get_LostEvents(SILENT) == 0);
+    Sys_Set_Scheduler(&sys_round_robin);
+    MUST(!Sys_Send_Event(HEARD, large, sizeof large)); /* too large for an ISR */
+    MUST(!Sys_Register_Event(NEVER) && !Sys_Unregister_Event(HEARD));
+    MUST(!Sys_Subscribe_to_Event(HEARD, 0, other, NULL) && !Sys_Unsubscribe_from_Event(HEARD, 0));
+    MUST(!Sys_Kill_Process(driver_pid) && Sys_Start_ProcessWith(&config) == 0);
+    MUST(Sys_Wait_for_Event(HEARD) == NULL);
+    Sys_Sleep(1);
+    Sys_Yield();
+    MUST(refused > UINT16_MAX - 11 || Sys_Get_Statistics()->refused - refused == 11); /* it saturates */
+}
+
+static bool is_one(sys_event_data *data)
+{
+    return data->value == 1;
+}
+
+static void waiter(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        sys_event_data *data = Sys_Wait_for_Condition(WAITED, is_one);
+        MUST(data != NULL && data->value == 1);
+        woken++;
+        Sys_Clear_EventData(&data);
+        MUST(data == NULL);
+    }
+}
+
+static void short_lived(void *unused)
+{
+    (void)unused;
+    Sys_Yield();
+}
+
+static void lists(void)
+{
+    static const uint16 seven = 7;
+    MUST(Sys_Register_Event(SHARED) && Sys_IsEventRegistered(SHARED));
+    MUST(Sys_Subscribe_to_Event(SHARED, driver_pid, other, NULL));
+    MUST(Sys_Subscribe_to_Event(HEARD, driver_pid, other, is_one));
+    MUST(Sys_Subscribe_to_Event(SYS_1ms_TIMER, driver_pid, other, is_one));
+    sent += Sys_Send_Event(HEARD, &seven, sizeof seven);
+    sent += Sys_Send_Event(HEARD, "event", 5);
+    MUST(Sys_Send_IntEvent(SILENT, 1));
+    (void)Sys_Unsubscribe_Handler(SYS_1ms_TIMER, driver_pid, other);
+    (void)Sys_Unsubscribe_Handler(HEARD, driver_pid, other);
+    MUST(Sys_Unregister_Event(SHARED) && !Sys_IsEventRegistered(SHARED));
+}
+
+static void threads(void)
+{
+    static const sys_process_config config = {short_lived, NULL, 0, 1, 0, 0, 0};
+    uint16 before = woken;
+    uint16 pid = Sys_Start_ProcessWith(&config);
+    MUST(pid != 0);
+    (void)Sys_Get_ProcessState(pid); /* it may have ended by itself, now or below */
+    Sys_Yield();
+    Sys_Set_Scheduler(&sys_fixed_priority);
+    Sys_Yield();
+    Sys_Set_Scheduler(&sys_round_robin);
+    (void)Sys_Kill_Process(pid);
+    MUST(Sys_Get_ProcessState(pid) == SYS_UNKNOWN);
+    MUST(Sys_Send_IntEvent(WAITED, 1));
+    for (uint8 i = 0; i < 4; i++) {
+        Sys_Yield();
+    }
+    MUST(woken == (uint16)(before + 1u));
+    MUST(Sys_Wait_for_ConditionTimeout(SILENT, NULL, 1) == NULL);
+    Sys_Sleep(1);
+    Sys_Start_CriticalSection();
+    Sys_Sleep(1); /* refused */
+    Sys_End_CriticalSection();
+}
+
+static void driver(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        Sys_Sleep(1);
+        Sys_Sleep(1); /* what the last round left in the queue is gone */
+        uint16 heap = Sys_Get_Statistics()->heap_used;
+        sent = isr_sent = heard = 0;
+        rounds++;
+        inject_request();
+        round_begin();
+        lists();
+        threads();
+        inject_cancel();
+        round_end();
+        Sys_Sleep(1);
+        Sys_Sleep(1);
+        MUST(sent == 2 && heard == sent + isr_sent);
+        MUST(Sys_Get_Statistics()->heap_used == heap);
+    }
+}
+
+int main(void)
+{
+    static const sys_process_config driver_config = {driver, NULL, SYS_DEFAULT_STACK + 64, 0, 0, 0, 0};
+    static const sys_process_config waiter_config = {waiter, NULL, 0, 0, 0, 0, 0};
+    Sys_Init_Kernel();
+    MUST(Sys_Register_Event(HEARD) && Sys_Register_Event(SILENT) && Sys_Register_Event(WAITED));
+    driver_pid = Sys_Start_ProcessWith(&driver_config);
+    waiter_pid = Sys_Start_ProcessWith(&waiter_config);
+    MUST(driver_pid != 0 && waiter_pid != 0);
+    MUST(Sys_Subscribe_to_Event(HEARD, 0, hear, NULL) && Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, tick, NULL));
+    inject_init();
+    Sys_Start_Kernel();
+    Sys_Run_SystemThread();
+    return 0;
+}

@@ -1,0 +1,133 @@
+/* Runs the checks as PID 0 and tells the result on UART1: "conforms: N checks", or "N of M checks failed". */
+#include "conformance.h"
+
+#include <string.h>
+
+#define FILE_LETTER 'c'
+
+static uint16 checks, failures;
+
+static char *put(char *at, const char *text)
+{
+    while (*text != '\0') {
+        *at++ = *text++;
+    }
+    return at;
+}
+
+static char *put_number(char *at, uint16 number)
+{
+    char digits[6];
+    char *first = digits + sizeof digits;
+    uint16 count;
+    do {
+        *--first = (char)('0' + number % 10u);
+        number /= 10u;
+    } while (number != 0);
+    count = (uint16)(digits + sizeof digits - first);
+    memcpy(at, first, count);
+    return at + count;
+}
+
+static void say(const char *line, const char *end)
+{
+    while (!Sys_Write_UART1(line, (uint16)(end - line))) {
+        Sys_Sleep(5);
+    }
+    Sys_Sleep(15); /* it leaves before the next one */
+}
+
+void check_line(bool holds, char file, uint16 line)
+{
+    char text[24];
+    checks++;
+    if (!holds) {
+        failures++;
+        text[0] = file;
+        say(text, put(put_number(put(text + 1, ".c:"), line), " fails\r\n"));
+    }
+}
+
+static void tell(void)
+{
+    char text[32];
+    char *end = text;
+    if (failures == 0) {
+        end = put(put_number(put(end, "conforms: "), checks), " checks\r\n");
+    } else {
+        end = put(put_number(put(put_number(end, failures), " of "), checks), " checks failed\r\n");
+    }
+    say(text, end);
+}
+
+uint16 heap_now(void)
+{
+    return Sys_Get_Statistics()->heap_used;
+}
+
+static char trace[16];
+static volatile uint8 length;
+
+void note(char c)
+{
+    Sys_Start_CriticalSection();
+    if (length < sizeof trace) {
+        trace[length++] = c;
+    }
+    Sys_End_CriticalSection();
+}
+
+void forget(void)
+{
+    length = 0;
+}
+
+bool noted(const char *text)
+{
+    return strlen(text) == length && memcmp(text, trace, length) == 0;
+}
+
+uint16 start(void (*entry)(void *), void *arg, uint8 priority)
+{
+    sys_process_config config = {entry, arg, 0, priority, 0, 0, 0};
+    return Sys_Start_ProcessWith(&config);
+}
+
+/* A scheduler other than round robin may be set, and threads may exist, before the kernel starts. */
+static void early(void *unused)
+{
+    (void)unused;
+    note('e');
+}
+
+#if defined(__unix__)
+#include <unistd.h>
+static void leave(void)
+{
+    _exit(failures == 0 ? 0 : 1);
+}
+#else
+static void leave(void)
+{
+    Sys_Run_SystemThread();
+}
+#endif
+
+int main(void)
+{
+    Sys_Init_Kernel();
+    Sys_Set_Scheduler(&sys_fixed_priority);
+    CHECK(start(early, NULL, 1) != 0);
+    Sys_Start_Kernel();
+    Sys_Sleep(2);
+    CHECK(noted("e"));
+    Sys_Set_Scheduler(&sys_round_robin);
+    check_threads();
+    check_events();
+    check_registers();
+    /* A small heap has no room for ticks while the checks fill it. */
+    CHECK(SYS_HEAP < 2048 || Sys_Get_Statistics()->events_lost == 0);
+    tell();
+    leave();
+    return 0;
+}

@@ -1,0 +1,4 @@
+#include "hal_limits.h"
+#include "isr.inc"
+        .text
+        isr     __INT1Interrupt, _deep_isr

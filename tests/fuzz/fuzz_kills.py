@@ -1,0 +1,52 @@
+"""Threads killed inside driver calls: `python tests/fuzz/fuzz_kills.py [--rounds N] [--stride N]`.
+
+The campaign behind tests/firmware/test_kills_on_target.py, which samples: in each round one scene of driver calls,
+without or with IPL slip (kernel.md §4), both in turn by seed, is killed at every boundary of the scene, and the devices
+are used again at once and after a while. With --stride a round tries every N-th boundary, beginning at one that its
+seed says.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tests.firmware.kills import SCENES, Seen, sweep  # noqa: E402
+from tests.fuzz.fuzz_kernel import build  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+
+SPARSE = 97
+"""Stride of a run that was given a time."""
+
+
+def main() -> int:
+    course = Course(parser(__doc__), "rounds", 2 * len(SCENES), "scenes")
+    course.parser.add_argument(
+        "--stride", type=int, help=f"every N-th boundary (default 1: hours; {SPARSE} with --seconds)"
+    )
+    options = course.parse()
+    stride = options.stride or (1 if options.seconds is None else SPARSE)
+    boundaries = 0
+    with tempfile.TemporaryDirectory() as folder:
+        path = build("kills", Path(folder))
+        for seed in course:
+            seen = Seen()
+            scene, slip = seed // 2 % len(SCENES), seed % 2
+            try:
+                for last in sweep(path, slip, scene, stride, seed // (2 * len(SCENES)) % stride):
+                    seen = last
+                    if course.over and options.seconds is not None:
+                        break
+            except AssertionError as error:
+                return course.failed(error)
+            boundaries += seen.boundaries
+            print(f"--seed {seed} ({SCENES[scene]}, slip {slip}): {seen}", flush=True)
+    return course.ended(f"{boundaries} kills tried, every device went on")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""Campaigns begin where the commit says, end in time, and name what failed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.fuzz.__main__ import campaigns
+from tests.fuzz.seeds import ROOT, Course, base_seed, parser
+
+
+def test_the_first_seed_follows_from_the_commit() -> None:
+    """The same for one commit, and small enough for generators that take 31 bits."""
+    assert base_seed() == base_seed()
+    assert 0 < base_seed() < 1 << 28
+
+
+def course(*words: str) -> Course:
+    """A course of at most three tries if nothing else is said."""
+    made = Course(parser("text"), "tries", 3, "tries")
+    made.parse(list(words))
+    return made
+
+
+def test_a_course_has_as_many_seeds_as_asked_for_or_as_fit_into_its_time() -> None:
+    """Counts from the first seed; at least one in no time at all."""
+    assert list(course("--seed", "7")) == [7, 8, 9]
+    assert list(course("--seed", "7", "--tries", "2")) == [7, 8]
+    assert list(course("--seed", "7", "--seconds", "0")) == [7]
+    endless = iter(course("--seed", "7", "--seconds", "1000"))
+    assert [next(endless) for _ in range(9)] == list(range(7, 16))
+
+
+def test_a_failure_names_its_seed_and_how_to_see_it_again(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the options of the run, without its limits."""
+    monkeypatch.setattr(sys, "argv", [str(ROOT / "tests/fuzz/fuzz_x.py"), "--engine", "jit", "--seconds", "5"])
+    failing = course("--seed", "40")
+    for seed in failing:
+        if seed == 41:
+            break
+    assert failing.failed("it differs") == 1
+    said = capsys.readouterr().out
+    assert "seed 41: it differs" in said
+    assert "again: python tests/fuzz/fuzz_x.py --engine jit --seed 41 --tries 1" in said
+
+
+@pytest.mark.parametrize("name", sorted(campaigns()))
+def test_every_campaign_takes_a_seed_and_a_time(name: str) -> None:
+    """What `python -m tests.fuzz --seconds S` gives it."""
+    command = [sys.executable, str(campaigns()[name]), "--help"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
+    assert "--seed " in told
+    assert "--seconds " in told

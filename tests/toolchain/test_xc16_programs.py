@@ -1,0 +1,332 @@
+"""Programs and command lines written for XC16, as they are: each of these was refused or meant something else once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from emu.loader import load_image
+from tests.toolchain.c_programs import run
+from toolchain import config_pragma, driver
+
+LEVELS = ("-O0", "-O1", "-O2", "-Os")
+
+
+def status_of(folder: Path, source: str, *options: str) -> int:
+    """Exit status of a program on the emulator; compiling must be silent."""
+    (folder / "main.c").write_text(source)
+    image = folder / "main.elf"
+    assert driver.main([*options, str(folder / "main.c"), "-o", str(image)]) == 0
+    return run(image, engine="interp").status
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    assert driver.main([str(word) for word in words]) == 2
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_plain_inline_defines_the_function(level: str, tmp_path: Path) -> None:
+    """XC16's default language is gnu89; C99 wants another definition somewhere."""
+    source = """
+    inline int two(int x) { return x + 2; }
+    int (*volatile f)(int) = two;
+    int main(void) { return two(1) + f(2); }
+    """
+    assert status_of(tmp_path, source, level) == 7
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_operands_that_may_be_anything_are_registers(level: str, tmp_path: Path) -> None:
+    """GCC's reload prefers a register for "rm" and "g", and most instructions of this chip take nothing else."""
+    source = """
+    volatile unsigned kept; unsigned char small;
+    int main(void)
+    {
+        unsigned from = 5, to;
+        __asm__ volatile("mov %1,%0" : "=rm"(to) : "g"(from));
+        if (to != 5) return 1;
+        __asm__ volatile("inc %0,%0" : "+rm"(to));
+        if (to != 6) return 2;
+        __asm__ volatile("inc %0,%0" : "+g"(kept));
+        if (kept != 1) return 3;
+        __asm__ volatile("mov.b %1,%0" : "=rm"(small) : "rm"((unsigned char)9));
+        return small == 9 ? 0 : 4;
+    }
+    """
+    assert status_of(tmp_path, source, level) == 0
+
+
+def test_accumulators_have_names_in_assembly(tmp_path: Path) -> None:
+    """0x22 and 0x28, the lowest of three registers each."""
+    source = """
+    int main(void)
+    {
+        unsigned a, b;
+        __asm__("mov #ACCA,%0" : "=r"(a));
+        __asm__("mov #_ACCB,%0" : "=r"(b));
+        return a + b;
+    }
+    """
+    assert status_of(tmp_path, source) == 0x22 + 0x28
+
+
+@pytest.mark.parametrize("options", [("-ansi",), ("-std=c89",), ("-std=gnu89",), ("-std=c99",), ("-std=c11",), ()])
+def test_every_header_is_accepted_in_every_dialect(options: tuple[str, ...], tmp_path: Path) -> None:
+    folder = Path(driver.__file__).parent / "include"
+    names = sorted(h.name for h in folder.glob("*.h") if h.name != "dspic_attributes.h")
+    source = "".join(f"#include <{name}>\n" for name in names) + "int main(void) { return 3; }\n"
+    assert status_of(tmp_path, source, "-Wall", "-Werror", *options) == 3
+
+
+def test_names_of_headers_in_another_case(tmp_path: Path) -> None:
+    """Sources from Windows; the file that stands beside the source, in an -I folder, and the device's own."""
+    (tmp_path / "Library").mkdir()
+    (tmp_path / "Library" / "e_motors.h").write_text("#define ONE 1\n")
+    (tmp_path / "Own.h").write_text("#define TWO 2\n")
+    headers = '#include "library/E_Motors.h"\n#include "own.h"\n#include <P30F6014A.H>\n'
+    source = headers + "int main(void) { return ONE + TWO; }\n"
+    assert status_of(tmp_path, source, f"-I{tmp_path}") == 3
+
+
+def test_a_header_that_is_nowhere_stays_an_error(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "main.c").write_text('#include "nowhere.h"\n')
+    assert driver.main(["-c", str(tmp_path / "main.c"), "-o", str(tmp_path / "main.o")]) == 1
+    assert "main.c:1:10: fatal error: 'nowhere.h' file not found" in capfd.readouterr().err
+
+
+def test_configuration_pragmas_make_configuration_words(tmp_path: Path) -> None:
+    """What MPLAB X's code generator writes for this device (dspic30f6014a.md §2)."""
+    source = """
+    #pragma config FOSFPR = XT_PLL8, FCKSMEN = CSW_FSCM_OFF
+    #pragma config FWPSB = WDTB_16
+    #pragma config FWPSA = WDTA_64
+    #pragma config WDT = WDT_OFF
+    #pragma config FPWRT = PWRT_16, BODENV = BORV27, BOREN = PBOR_OFF, MCLRE = MCLR_EN
+    #pragma config GWRP = GWRP_OFF, GCP = CODE_PROT_ON
+    #pragma config ICS = 1
+    int main(void) { return 0; }
+    """
+    (tmp_path / "main.c").write_text(source)
+    assert driver.main([str(tmp_path / "main.c"), "-o", str(tmp_path / "main.elf")]) == 0
+    image = load_image(tmp_path / "main.elf")
+    set_ = {word.name: image.word(word.address) for word in image.chip.config.values()}
+    words = {name: value & 0xFFFF for name, value in set_.items() if value is not None}
+    assert words == {"FOSC": 0xFFE6, "FWDT": 0x7FEF, "FBORPOR": 0xFF6E, "FGS": 0xFFFD, "FICD": 0xFFFD}
+
+
+def test_a_wrong_configuration_pragma_names_its_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    wrong = "int a;\n#pragma config FPR = XT_PL8\n\n#pragma config FOO = 1\n"
+    (tmp_path / "main.c").write_text(wrong + "int main(void) { return 0; }\n")
+    assert driver.main([str(tmp_path / "main.c"), "-o", str(tmp_path / "main.elf")]) == 2
+    said = capfd.readouterr().err
+    assert "main.c:2: error: #pragma config: 'XT_PL8' is not a value of FPR (did you mean XT_PLL8" in said
+    assert "main.c:4: error: #pragma config: no setting 'FOO' on this device" in said
+    assert not (tmp_path / "main.elf").exists()
+
+
+def test_every_value_macro_of_the_header_changes_one_word() -> None:
+    """A mask has zeros only inside one setting's bits of some word, else a pragma could not use it."""
+    masks = [mask for _, mask in config_pragma.settings().values()]
+    for name, value in config_pragma.values().items():
+        assert any((value | mask) & 0xFFFF == 0xFFFF for mask in [*masks, 0xC71F, 0x803F]), name
+
+
+def test_the_command_lines_of_mplab_x(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
+    compile_words = ["-c", "-mcpu=30F6014A", "-MP", "-MMD", "-MF", str(tmp_path / "main.d"), "-g", "-omf=elf"]
+    compile_words += ["-DXPRJ_default=default", "-legacy-libc", "-O0", "-msmart-io=1", "-Wall", "-msfr-warn=off"]
+    compile_words += ["-merrata=psv_trap"]
+    assert driver.main([*compile_words, str(tmp_path / "main.c"), "-o", str(tmp_path / "main.o")]) == 0
+    linker = (
+        "--local-stack,--defsym=__MPLAB_BUILD=1,--script=p30F6014A.gld,--stack=16,--check-sections,--data-init,"
+        "--pack-data,--handles,--isr,--no-gc-sections,--fill-upper=0,--stackguard=16,--no-force-link,--smart-io,"
+        f"-Map={tmp_path / 'x.map'},--report-mem,--memorysummary,{tmp_path / 'memory.xml'}"
+    )
+    words = ["-o", str(tmp_path / "x.elf"), str(tmp_path / "main.o"), "-mcpu=30F6014A", "-omf=elf", f"-Wl,{linker}"]
+    assert driver.main([*words, "-Wl,-T,p30f6014A.gld", "-T", "p30F6014A.gld"]) == 0
+    assert "of 147456 bytes" in capsys.readouterr().out
+    memories = {m.get("name"): m for m in ElementTree.parse(tmp_path / "memory.xml").iter("memory")}
+    for memory, length in (("program", 147456), ("data", 8192)):
+        used, free = (int(memories[memory].findtext(tag, "")) for tag in ("used", "free"))
+        assert used + free == length
+
+
+def test_what_means_nothing_here_is_refused_with_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main = tmp_path / "main.c"
+    main.write_text("int main(void) { return 0; }\n")
+    assert "there is no COFF output" in refusal(capsys, "-omf=coff", main)
+    assert "linker script 'boot.gld' is not used here" in refusal(capsys, "-Wl,--script=boot.gld", main)
+    assert "linker option: unrecognized arguments: --nonsense" in refusal(capsys, "-Wl,--nonsense", main)
+
+
+@pytest.mark.parametrize("options", [(), ("-mlarge-data",)])
+@pytest.mark.parametrize("level", LEVELS)
+def test_variables_beyond_near_memory(level: str, options: tuple[str, ...], tmp_path: Path) -> None:
+    """An address says it all; -mlarge-data leaves everything else out of near memory as well."""
+    source = """
+    int big __attribute__((address(0x2100))) = 3;
+    unsigned char small __attribute__((address(0x2200)));
+    int other, close __attribute__((near));
+    int main(void) { big++; small |= 4; other += big; close++; return big + small + other + close; }
+    """
+    assert status_of(tmp_path, source, level, *options) == 13
+
+
+def test_priorities_by_microchip_s_macros(tmp_path: Path) -> None:
+    source = """
+    #include <xc.h>
+    _FOSC(CSW_FSCM_OFF & XT_PLL8)
+    _FWDT(WDT_OFF);
+    int main(void)
+    {
+        int saved;
+        SET_CPU_IPL(3);
+        SET_AND_SAVE_CPU_IPL(saved, 5);
+        int now = __builtin_get_isr_state();
+        RESTORE_CPU_IPL(saved);
+        return saved * 100 + now * 10 + __builtin_get_isr_state();
+    }
+    """
+    assert status_of(tmp_path, source, "-Os") == 353
+
+
+def test_bits_found_by_one_instruction(tmp_path: Path) -> None:
+    source = """
+    volatile unsigned word = 0x1000, mask = 0xFFF0;
+    int main(void) { return __builtin_ff1l(word) * 100 + __builtin_ff1r(word) + __builtin_fbcl(mask) + 11; }
+    """
+    assert status_of(tmp_path, source, "-Os") == 413
+
+
+NAMES = ["__printf_cdnopuxX", "__dprintf_cdnopuxX", "__dprintf_acdeEfFgGnopsuxX", "__dprintf_0"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_of_smart_io_link(name: str, tmp_path: Path) -> None:
+    """abi-elf.md §2.8: what an object of XC16 calls printf's relatives."""
+    (tmp_path / "call.s").write_text(
+        "\t.section .text,code\n\t.global _main\n_main: mov #42,w1\n\tmov w1,[w15++]\n\tmov #text,w1\n"
+        f"\tmov w1,[w15++]\n\tcall {name}\n\tsub w15,#4,w15\n\tclr w0\n\treturn\n"
+        '\t.section .const,psv,page\ntext: .asciz "<%d>"\n'
+    )
+    image = tmp_path / "main.elf"
+    assert driver.main([str(tmp_path / "call.s"), "-o", str(image)]) == 0
+    assert run(image, engine="interp").uart == b"<42>"
+
+
+def test_a_call_with_short_doubles_does_not_link(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "call.s").write_text("\t.section .text,code\n\t.global _main\n_main: call __sprintf_fF\n\treturn\n")
+    said = refusal(capsys, tmp_path / "call.s", "-o", tmp_path / "x.elf")
+    assert "call.s: error: it calls sprintf with 32-bit doubles (__sprintf_fF)" in said
+
+
+def test_calendar_time_agrees_with_the_host(tmp_path: Path) -> None:
+    import time
+
+    moments = [0, -1, 951782400, 1795346127, -(2**31) + 1, 2**31 - 1]
+    expected = "".join(time.asctime(time.gmtime(moment)) + "\\n" for moment in moments)
+    source = f"""
+    #include <string.h>
+    #include <time.h>
+    static const time_t moments[] = {{ {", ".join(f"{m}L" for m in moments)} }};
+    int main(void)
+    {{
+        static char all[200];
+        for (unsigned k = 0; k < {len(moments)}; k++) {{
+            struct tm calendar = *gmtime(&moments[k]);
+            if (mktime(&calendar) != moments[k]) return 1;
+            strcat(all, asctime(&calendar));
+        }}
+        return strcmp(all, "{expected}") ? 2 : time(NULL) == -1 ? 7 : 3;
+    }}
+    """
+    assert status_of(tmp_path, source, "-Os") == 7
+
+
+SCANF = """
+#include <stdio.h>
+int main(void)
+{
+    int a = 0, b = 0; long l; long long w; char s[20], t[20], c[4] = {0}; float f; double d; unsigned char h;
+    unsigned x; int n;
+    n = sscanf("  12 -34 0x56 abc", "%d%d %x %s", &a, &b, &x, s);
+    printf("%d %d %d %u %s\\n", n, a, b, x, s);
+    n = sscanf("D,100,-200\\r\\n", "D,%d,%d", &a, &b);
+    printf("%d %d %d\\n", n, a, b);
+    n = sscanf("3.25,-1e3 99999999999x", "%f,%lf%lld%n", &f, &d, &w, &a);
+    printf("%d %f %f %ld%05ld %d\\n", n, (double)f, d, (long)(w / 100000), (long)(w % 100000), a);
+    n = sscanf("key=va lue;123", "%[a-z]=%[^;];%2hhu", s, t, &h);
+    printf("%d [%s][%s]%u\\n", n, s, t, h);
+    n = sscanf("abcdef", "%3c%ln%*s", c, &l);
+    printf("%d %s %ld\\n", n, c, l);
+    printf("%d", sscanf("", "%d", &a));
+    printf("%d", sscanf("x", "%d", &a));
+    printf("%d\\n", sscanf("5%", "%d%%", &a));
+    n = sscanf("010 0x1f ]y", "%i %i %[]x]", &a, &b, s);
+    printf("%d %d %d %s\\n", n, a, b, s);
+    return 0;
+}
+"""
+SCANNED = """\
+4 12 -34 86 abc
+2 100 -200
+3 3.250000 -1000.000000 99999999999 21
+3 [key][va lue]12
+1 abc 3
+-101
+3 8 31 ]
+"""
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_scanf_reads_what_c_says(level: str, tmp_path: Path) -> None:
+    """C11 7.21.6.2; the expected text is what a hosted C library prints for the same program."""
+    (tmp_path / "main.c").write_text(SCANF.replace("\\\\", "\\"))
+    image = tmp_path / "main.elf"
+    assert driver.main([level, str(tmp_path / "main.c"), "-o", str(image)]) == 0
+    assert run(image, engine="interp").uart.decode() == SCANNED
+
+
+HANDLERS = """
+#include <xc.h>
+int saved = 7;
+volatile int seen, count;
+void __attribute__((interrupt(irq(3), save(saved), preprologue("mov w0,_seen")), no_auto_psv)) tick(void)
+{
+    saved = 99;
+    count++;
+    IFS0bits.T1IF = 0;
+}
+void __attribute__((__interrupt__(__save__(saved, seen), __shadow__), no_auto_psv)) _T2Interrupt(void)
+{
+    seen = saved = 1;
+    count += 10;
+    IFS0bits.T2IF = 0;
+}
+int main(void)
+{
+    __asm__ volatile("mov #0x55,w0" ::: "w0");
+    IEC0bits.T1IE = IEC0bits.T2IE = 1;
+    __asm__ volatile("mov #0x55,w0\\n\\tbset _IFS0,#3\\n\\tnop\\n\\tnop\\n\\tnop\\n\\tnop" ::: "w0", "memory");
+    IFS0bits.T2IF = 1;
+    Nop(); Nop(); Nop(); Nop();
+    return seen == 0x55 && saved == 7 ? count : 99;
+}
+"""
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_arguments_of_the_interrupt_attribute(level: str, tmp_path: Path) -> None:
+    """irq(N) binds a handler of any name, save() keeps variables, preprologue() runs before anything is saved."""
+    assert status_of(tmp_path, HANDLERS, level) == 11
+
+
+def test_an_interrupt_number_that_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "main.c").write_text(
+        "void __attribute__((interrupt(irq(99)))) f(void) {}\nint main(void) { return 0; }\n"
+    )
+    said = refusal(capsys, tmp_path / "main.c", "-o", tmp_path / "x.elf")
+    assert "interrupt function 'f': irq(99) is not an interrupt number of this chip (expected 0 to 53)" in said

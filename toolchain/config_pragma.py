@@ -1,0 +1,101 @@
+"""XC16's `#pragma config SETTING = VALUE, ...`: settings in preprocessed C become definitions of configuration words.
+
+Fields, positions and words come from the chip; the names of the values are those of the device header, whose macros are
+16-bit masks with ones outside the field they set (dspic30f6014a.md §2). Enters: preprocessed C with line markers.
+Leaves: the same text without the pragmas, definitions of the words behind it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from emu.chips.dspic30f6014a import CONFIG
+from toolchain.errors import ToolError
+
+PRESENT = b"#pragma config"
+"""What clang shows of a source that needs this, in its warning about unknown pragmas."""
+
+_PRAGMA = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+config\b(.*)$", re.MULTILINE)
+_MARKER = re.compile(r'^# (\d+) "((?:[^"\\]|\\.)*)".*$', re.MULTILINE)
+_HEADER = Path(__file__).parent / "include" / "dspic_compiler.h"
+_MACRO = re.compile(r"^#define (\w+) 0x([0-9A-F]{4})$", re.MULTILINE)
+_SETTING = re.compile(r"\s*(\w+)\s*=\s*(\w+)\s*")
+# What MPLAB X writes, where it differs from the field's own name: setting -> word and fields it may change.
+_SETTINGS = {
+    "FOSFPR": ("FOSC", ("FOS", "FPR")), "FCKSMEN": ("FOSC", ("FCKSM",)), "WDT": ("FWDT", ("FWDTEN",)),
+    "BODENV": ("FBORPOR", ("BORV",)), "MCLRE": ("FBORPOR", ("MCLREN",)), "GCP": ("FGS", ("GSS",)),
+}  # fmt: skip
+
+
+def settings() -> dict[str, tuple[str, int]]:
+    """Name of a setting -> name of its word, mask of the bits it may change."""
+    known = {}
+    for word in CONFIG.values():
+        for field, (lsb, width) in word.fields.items():
+            known[field] = (word.name, ((1 << width) - 1) << lsb)
+    for name, (register, fields) in _SETTINGS.items():
+        known[name] = (register, sum(known[field][1] for field in fields))
+    return known
+
+
+def values() -> dict[str, int]:
+    """Value macros of the device header: name -> mask with zeros where the setting clears bits."""
+    return {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
+
+
+def applied(text: str) -> str:
+    """`text` with its configuration pragmas made definitions. Raises `ToolError` listing every wrong one by line."""
+    known, codes = settings(), values()
+    words: dict[str, int] = {}
+    findings: list[str] = []
+    for pragma in _PRAGMA.finditer(text):
+        for setting in pragma[1].split(","):
+            finding = _apply(setting, known, codes, words)
+            if finding:
+                findings.append(f"{_place(text, pragma.start())}: error: {finding}")
+    if findings:
+        raise ToolError.of(findings)
+    definitions = [
+        f'__attribute__((__used__, __section__("__{name}.sec"))) static const unsigned short '
+        f"__dspic_pragma_{name} = 0x{value:04X};"
+        for name, value in sorted(words.items())
+    ]
+    return "\n".join([_PRAGMA.sub("", text), *definitions, ""])
+
+
+def _apply(setting: str, known: dict[str, tuple[str, int]], codes: dict[str, int], words: dict[str, int]) -> str:
+    """Enter one setting; returns what is wrong with it."""
+    found = _SETTING.fullmatch(setting)
+    if found is None:
+        return f"#pragma config expects SETTING = VALUE, found '{setting.strip()}'"
+    name, value = found[1], found[2]
+    if name not in known:
+        return f"#pragma config: no setting '{name}' on this device{_hint(name, known)}"
+    register, mask = known[name]
+    if value in codes:
+        bits = codes[value]
+    else:
+        try:
+            bits = int(value, 0)
+        except ValueError:
+            return f"#pragma config: '{value}' is not a value of {name}{_hint(value, codes)}"
+        bits = bits * (mask & -mask) | ~mask
+    words[register] = words.get(register, 0xFFFF) & ~mask & 0xFFFF | bits & mask
+    return ""
+
+
+def _hint(word: str, candidates: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word, list(candidates), 3)
+    return f" (did you mean {', '.join(close)}?)" if close else ""
+
+
+def _place(text: str, at: int) -> str:
+    """FILE:LINE of a position, by the last line marker before it."""
+    markers = list(_MARKER.finditer(text, 0, at))
+    if not markers:
+        return f"<source>:{text.count(chr(10), 0, at) + 1}"
+    marker = markers[-1]
+    return f"{marker[2]}:{int(marker[1]) + text.count(chr(10), marker.end() + 1, at)}"

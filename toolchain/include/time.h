@@ -1,0 +1,30 @@
+/* Calendar time (C11 7.27). The chip has no calendar: time() and clock() answer "not available" (-1) until a program
+ * defines functions of these names. Local time is UTC. */
+#ifndef TIME_H
+#define TIME_H
+
+#include <stddef.h>
+
+#define CLOCKS_PER_SEC 1000L
+
+typedef long time_t; /* seconds since 1970-01-01 00:00:00 UTC */
+typedef long clock_t;
+
+struct tm {
+  int tm_sec, tm_min, tm_hour; /* 0-59, 0-59, 0-23 */
+  int tm_mday, tm_mon;         /* 1-31, 0-11 */
+  int tm_year;                 /* since 1900 */
+  int tm_wday, tm_yday;        /* 0 = Sunday; 0-365 */
+  int tm_isdst;
+};
+
+clock_t clock(void);
+time_t time(time_t *result);
+double difftime(time_t end, time_t start);
+time_t mktime(struct tm *calendar); /* normalises its fields */
+struct tm *gmtime(const time_t *seconds);
+struct tm *localtime(const time_t *seconds);
+char *asctime(const struct tm *calendar); /* "Sun Nov 22 11:15:27 2026\n" */
+char *ctime(const time_t *seconds);
+
+#endif

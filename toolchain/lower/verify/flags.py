@@ -1,0 +1,42 @@
+"""Flags live inside a block, and a reader's flags come from the kind of instruction they came from before."""
+
+from __future__ import annotations
+
+from ..mir import CC_INVERSE, MBlock, MFunction
+from .error import MachineError, fail
+
+Source = tuple[str, str, str]  # reader, flag, writer
+LIKE_A_TEST = {"cp", "cp0", "btst"}  # comparisons that another instruction's result may stand for
+
+
+def check(m: MFunction) -> None:
+    """Every flag that is read was written in the same block."""
+    for b in m.blocks:
+        _walk(b)
+
+
+def sources(m: MFunction) -> set[Source]:
+    """Who reads which flag from whom."""
+    return {s for b in m.blocks for s in _walk(b)}
+
+
+def _walk(b: MBlock) -> list[Source]:
+    writer: dict[str, str] = {}
+    out: list[Source] = []
+    for mi in b.insts:
+        for flag in mi.flags_read():
+            if flag not in writer:
+                fail(f"flag {flag.upper()} is read but was not set in the block", b.name, mi)
+            reader = f"{mi.op} {min(mi.cc, CC_INVERSE.get(mi.cc, mi.cc))}".strip()
+            out.append((reader, flag, writer[flag]))
+        for flag in mi.flags_written():
+            writer[flag] = mi.op if not mi.pred else f"conditional {mi.op}"
+    return out
+
+
+def compare(before: set[Source], after: set[Source], exchanges: bool) -> None:
+    """No new combination of reader and writer. `exchanges`: comparisons may have given way to what set the flags."""
+    tested = {(reader, flag) for reader, flag, writer in before if writer.removesuffix("f") in LIKE_A_TEST}
+    for reader, flag, writer in sorted(after - before):
+        if not (exchanges and (reader, flag) in tested):
+            raise MachineError(f"{reader} now reads {flag.upper()} as {writer} leaves it")

@@ -1,0 +1,80 @@
+"""Which structs and unions travel in unaligned register runs although their size is 2, 4 or 8 (abi-elf.md §2.2 rule 3).
+
+A record that holds, at any depth, an array, struct or union of 3, 5, 6 or 7 bytes is placed like one of odd size. IR
+types do not tell: unions keep one member, bit-fields become arrays. The front end's record layouts do
+(`-fdump-record-layouts`, on its standard output); from there the fact goes to the `byval` parameters as an attribute.
+An array whose elements are of a typedef'd array type is taken for scalars.
+"""
+
+from __future__ import annotations
+
+import re
+
+LAYOUT_FLAGS = ["-Xclang", "-fdump-record-layouts"]
+ATTRIBUTE = '"unaligned-run"'
+ODD = {3, 5, 6, 7}
+
+SIZE = re.compile(r"\[sizeof=(\d+),")
+HEAD = re.compile(r"^\s*0 \| (.+)$", re.MULTILINE)
+RECORD = re.compile(r"^Record: \w+ \S+ (?:prev \S+ )?<([^,>]+)")
+FIELD = re.compile(r"^[|`]-FieldDecl .*?'([^']*)'(?::'([^']*)')?[^']*$", re.MULTILINE)
+LLVM_TYPE = re.compile(r"LLVMType:%(\S+) = type")
+TAGGED = re.compile(r"\b(?:struct|union) (\w+) definition$", re.MULTILINE)
+PLACE = re.compile(r"\((?:unnamed|anonymous)[^)]* at ([^)]*)\)")
+ARRAY = re.compile(r"^(.*[^)*])((?:\[\d+\])+)$")
+BYVAL = re.compile(rb"byval\(%([\w.$-]+)\)")
+
+
+def mark(ir: bytes, dump: str) -> bytes:
+    """IR text in which `byval` of every such record is followed by ATTRIBUTE; `dump` is what clang printed."""
+    loose = unaligned_types(dump) if b"byval(" in ir else set()
+    return BYVAL.sub(lambda m: m[0] + b" " + ATTRIBUTE.encode() if m[1].decode() in loose else m[0], ir)
+
+
+def unaligned_types(dump: str) -> set[str]:
+    """Names of LLVM types, such as `struct.s`, whose records hold an odd-sized aggregate."""
+    sizes: dict[str, int] = {}
+    fields: dict[str, list[str]] = {}
+    names: dict[str, str] = {}
+    for part in dump.split("*** Dumping ")[1:]:
+        if part.startswith("AST"):
+            head, size = HEAD.search(part), SIZE.search(part)
+            if head is not None and size is not None:
+                sizes[_key(head[1])] = int(size[1])
+            continue
+        llvm = LLVM_TYPE.search(part)
+        where = RECORD.search(part[part.index("\n") + 1 :])
+        if llvm is None or where is None:
+            continue
+        tag = TAGGED.search(part.split("\n")[1])
+        types = [found[1] or found[0] for found in FIELD.findall(part)]
+        for key in {tag[1] if tag is not None else llvm[1].partition(".")[2], where[1]}:
+            fields[key] = types
+            names[llvm[1]] = key
+    return {llvm for llvm, key in names.items() if _holds_odd(key, sizes, fields)}
+
+
+def _key(type_name: str) -> str:
+    """One name for a record however clang words it: its tag or typedef, or where it stands when it has neither."""
+    place = PLACE.search(type_name)
+    if place is not None:
+        return place[1]
+    return re.sub(r"\b(const|volatile|struct|union|class)\b|\(empty\)", "", type_name).strip()
+
+
+def _holds_odd(key: str, sizes: dict[str, int], fields: dict[str, list[str]]) -> bool:
+    for text in fields.get(key, []):
+        array = ARRAY.match(text)
+        element = text
+        if array is not None:
+            element, count = array[1], 1
+            for dimension in re.findall(r"\d+", array[2]):
+                count *= int(dimension)
+            if count in ODD:  # of bytes or, three of them, of words: 8 bytes hold nothing else
+                return True
+            if not count:
+                continue
+        inner = _key(element)
+        if inner in sizes and (sizes[inner] in ODD or _holds_odd(inner, sizes, fields)):
+            return True
+    return False

@@ -1,0 +1,5 @@
+/* %lld and its relatives of scanf. */
+#include "scan.h"
+#include "scan_integer.h"
+
+SCAN_INTEGER(__scan_wide, unsigned long long)
