@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,9 @@ from emu.cli import main
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_drivers_on_target import START
 
+pipe = signal.getsignal(signal.SIGPIPE)
 vcdvcd = pytest.importorskip("vcdvcd")
+signal.signal(signal.SIGPIPE, pipe)  # the reader is a script first: its import lets a broken pipe end the process
 FCY = 14_745_600
 
 
