@@ -26,12 +26,15 @@ def _library() -> ctypes.CDLL:
     for program, package in (("gcc", "gcc"), ("pkg-config", "pkg-config")):
         if shutil.which(program) is None:
             raise NotInstalled(f"{program} is not installed; Debian package: {package}")
-    flags = subprocess.run(["pkg-config", "--cflags", "--libs", "simavr"], capture_output=True, text=True, check=False)
-    if flags.returncode != 0:
+    # Not --cflags: that fails where libelf, which only a static link of simavr needs, has no development package.
+    asked = ["pkg-config", "--variable=includedir", "simavr"]
+    found = subprocess.run(asked, capture_output=True, text=True, check=False)
+    if found.returncode != 0:
         raise NotInstalled("simavr's library is not installed; Debian package: libsimavr-dev")
+    flags = [f"-I{found.stdout.strip()}/simavr", "-lsimavr"]
     folder = Path(tempfile.mkdtemp(prefix="openswarm-simavr-"))
     made = folder / "simavr.so"
-    command = ["gcc", "-O2", "-shared", "-fPIC", str(HERE / "simavr.c"), *flags.stdout.split(), "-o", str(made)]
+    command = ["gcc", "-O2", "-shared", "-fPIC", str(HERE / "simavr.c"), *flags, "-o", str(made)]
     try:
         subprocess.run(command, check=True)
         library = ctypes.CDLL(str(made))
