@@ -32,15 +32,12 @@ def check(machine: Kilobot, where: str) -> None:
 
 def round_length(machine: Kilobot) -> int:
     """Instructions of a round that nothing disturbs."""
-    end = machine.symbols["round_end"]
-    length = 0
+    begin = 0
     for _ in range(2):  # the first one starts threads for the first time
         machine.run_to("round_begin")
-        length = 0
-        while machine.pc != end:
-            machine.step()
-            length += 1
-    return length
+        begin = machine.instructions
+        machine.run_to("round_end")
+    return machine.instructions - begin
 
 
 def sweep(machine: Kilobot, way: str, stride: int) -> int:

@@ -45,6 +45,8 @@ def _library() -> ctypes.CDLL:
         ("open", handle, [ctypes.c_char_p, ctypes.c_uint32]),
         ("close", None, [handle]),
         ("step", ctypes.c_int, [handle]),
+        ("steps", ctypes.c_int, [handle, ctypes.c_uint32]),
+        ("instructions", ctypes.c_uint64, [handle]),
         ("run", ctypes.c_int, [handle, ctypes.POINTER(ctypes.c_uint32), ctypes.c_int, ctypes.c_uint64]),
         ("pc", ctypes.c_uint32, [handle]),
         ("cycle", ctypes.c_uint64, [handle]),
@@ -91,8 +93,12 @@ class Kilobot:
 
     def steps(self, count: int) -> None:
         """That many instructions."""
-        for _ in range(count):
-            self.step()
+        self._check(self._library.machine_steps(self._machine, count))
+
+    @property
+    def instructions(self) -> int:
+        """Instructions so far, each stretch of sleep counted as one."""
+        return int(self._library.machine_instructions(self._machine))
 
     def run(self, cycles: int) -> None:
         """At least that many cycles."""

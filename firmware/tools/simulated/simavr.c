@@ -1,6 +1,6 @@
-/* An ATmega328P for Python (kilobot.py): simavr's library behind eight functions, one instruction at a time.
+/* An ATmega328P for Python (kilobot.py): simavr's library behind a few functions, one instruction at a time.
  *
- *     gcc -O2 -shared -fPIC simavr.c $(pkg-config --cflags --libs simavr) -o simavr.so */
+ *     gcc -O2 -shared -fPIC simavr.c -I/usr/include/simavr -lsimavr -o simavr.so */
 #include <avr_extint.h>
 #include <avr_uart.h>
 #include <sim_avr.h>
@@ -87,6 +87,16 @@ int machine_step(machine *m)
     return state == cpu_Done ? 1 : state == cpu_Crashed ? 2 : 0;
 }
 
+/* That many instructions, or less: as machine_step. */
+int machine_steps(machine *m, uint32_t count)
+{
+    int stopped = 0;
+    while (count-- != 0 && stopped == 0) {
+        stopped = machine_step(m);
+    }
+    return stopped;
+}
+
 /* Until the program counter is one of `places` (at least one step), or cycle `end`. As machine_step; 3: at a place. */
 int machine_run(machine *m, const uint32_t *places, int count, uint64_t end)
 {
@@ -102,6 +112,12 @@ int machine_run(machine *m, const uint32_t *places, int count, uint64_t end)
         }
     }
     return 0;
+}
+
+/* Instructions so far. */
+uint64_t machine_instructions(const machine *m)
+{
+    return m->instructions;
 }
 
 uint32_t machine_pc(const machine *m)
