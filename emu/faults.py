@@ -176,6 +176,14 @@ def explained(machine: Machine, stop: Stop) -> Stop:
     return replace(stop, reason="fault", fault=fault)
 
 
+def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
+    """The end of a whole run as a fault: a kernel that was never started refused so many calls."""
+    calls = "a call that needs" if refused == 1 else f"{refused:,} calls that need"
+    cause = f"the kernel was never started (Sys_Start_Kernel) and refused {calls} it to run; ended"
+    case = _Case(cause, stop.pc, stop.cycle, is_exact=True)
+    return replace(stop, reason="fault", fault=_told(machine, Inside(machine), case))
+
+
 def _case(machine: Machine, inside: Inside, stop: Stop) -> _Case | None:
     evidence = machine.evidence
     if stop.reason == "fault":

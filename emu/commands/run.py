@@ -33,6 +33,12 @@ INTERRUPTED_STATUS: Final = 130
 EXIT_SYMBOL: Final = "__exit_status"
 """Where start-up code leaves what main returned, before it sleeps for ever."""
 
+STATISTICS: Final = "os_statistics"
+REFUSED: Final = 6
+"""Offset of `refused` in sys_statistics (firmware/openswarm/include/openswarm.h)."""
+CLOCK_RUNS: Final = 1 << 15
+"""TON of T1CON, OpenSwarm's clock, which Sys_Start_Kernel starts (firmware/openswarm/port/dspic30f)."""
+
 DESCRIPTION: Final = """\
 Run a firmware image and show what its UART says.
 
@@ -119,6 +125,10 @@ def run(options: argparse.Namespace) -> int:
         end_watch = start_watch(machine, options)
         stop, host_seconds = session.run()
         end_watch()
+        if stop.reason in ("halt", "limit", "interrupted") and (refused := _refused_before_start(machine, image)):
+            from emu.faults import never_started
+
+            stop = never_started(machine, stop, refused)
         lost = {number: port.lost for number, port in ports.items() if port.lost}
     fault = stop.reason == "fault"
     status = exit_status(machine, image, stop) if options.exit_code else EXIT_FAULT if fault else EXIT_OK
@@ -133,6 +143,14 @@ def run(options: argparse.Namespace) -> int:
     else:
         _print_end(facts, stop)
     return status
+
+
+def _refused_before_start(machine: Machine, image: Image) -> int:
+    """How many calls an OpenSwarm kernel refused that was never started: what called them cannot have worked."""
+    kernel = image.symbols.find(STATISTICS)
+    if kernel is None or machine.peek("T1CON") & CLOCK_RUNS:
+        return 0
+    return machine.peek(kernel.address + REFUSED)
 
 
 def _machine(options: argparse.Namespace, image: Image) -> Machine:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from emu.cli import main
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_on_target import FCY, load, run_to, words
 
@@ -36,3 +39,40 @@ def test_the_start_completes_under_every_scheduler(image: Build, scheduler: int,
         assert min(*rounds, periods) >= 4
     assert machine.peek("T1CON") == 0x8000
     assert machine.peek("T2CON") == 0x8010
+
+
+NEVER_STARTED = """
+#include <openswarm.h>
+int main(void)
+{
+    Sys_Init_Kernel();
+    START
+    do {
+        Sys_Sleep(100);
+        sys_event_data *data = Sys_Wait_for_Event(SYS_1ms_TIMER);
+        Sys_Clear_EventData(&data);
+        Sys_Yield();
+    } while (AGAIN);
+    Sys_Run_SystemThread();
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("start", "again", "refused"),
+    [("", "false", "4 calls"), ("", "true", "65,535 calls"), ("Sys_Start_Kernel();", "true", "")],
+    ids=["and main returns", "for ever", "but started"],
+)
+def test_calls_that_need_a_running_kernel_do_not_look_like_success(
+    image: Build, tmp_path: Path, capfd: pytest.CaptureFixture[str], start: str, again: str, refused: str
+) -> None:
+    """Blocking calls without Sys_Start_Kernel are refused; whoever runs such a program is told, by status 1 as well."""
+    (tmp_path / "early").mkdir()
+    (tmp_path / "early" / "main.c").write_text(NEVER_STARTED.replace("START", start).replace("AGAIN", again))
+    path = image("early", tmp_path, f"DEFINES=-DCASE={len(start) + len(again)}")
+    assert main(["run", str(path), "--seconds", "0.5"]) == (1 if refused else 0)
+    said = capfd.readouterr().err
+    if refused:
+        assert f"firmware fault: the kernel was never started (Sys_Start_Kernel) and refused {refused}" in said
+    assert main(["run", str(path), "--seconds", "0.5", "--exit-code"]) == (125 if refused else 124)
