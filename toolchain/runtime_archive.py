@@ -57,7 +57,7 @@ def _dependencies(root: Path) -> Iterator[Path]:
     for folder in PACKAGE_DIRS:
         for path in (root / folder).rglob("*"):
             name = path.relative_to(root).as_posix()
-            if path.suffix in (".py", ".c", ".h", ".s", ".csv") and not name.startswith(UNRELATED):
+            if path.suffix in (".py", ".c", ".h", ".s", ".inc", ".csv") and not name.startswith(UNRELATED):
                 yield path
 
 
