@@ -16,7 +16,7 @@ run: firmware.elf
 test: $(STAMP)
 	$(PY) -m ruff check emu toolchain arena tests bench
 	$(PY) -m mypy emu toolchain arena
-	$(PY) -m pytest -n auto tests -rs
+	$(PY) -m pytest -n auto --dist worksteal tests -rs
 
 bench: $(STAMP)
 	$(PY) -m bench
