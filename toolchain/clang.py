@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
 
-from toolchain import config_pragma, name_case
+from toolchain import accumulators, config_pragma, name_case
 from toolchain.asm_registers import REFUSED, respell
 from toolchain.cc_options import CcOptions, Input
 from toolchain.errors import ToolError
@@ -178,6 +178,8 @@ def _run_job(program: list[str], arguments: list[str]) -> subprocess.CompletedPr
         changes.append(config_pragma.applied)
     if result.returncode and REFUSED.search(result.stderr):
         changes.append(respell)
+    if result.returncode and accumulators.REFUSED.search(result.stderr):
+        changes += [respell, accumulators.applied]
     if changes:
         return _run_changed(program, arguments, lambda text: reduce(lambda t, change: change(t), changes, text))
     return result

@@ -109,6 +109,8 @@ def _select(c: Context) -> None:
     c.machine = select.Selector(c.module, c.function, c.for_size, c.taken).run()
     c.machine.interrupt = c.interrupt
     c.machine.preserved, c.machine.preprologue = isr.preserved(c.notes), isr.preprologue(c.notes)
+    if c.interrupt:
+        c.machine.preserved += isr.accumulators(c.function)
     c.machine.uses_fp = frame.wants_frame_pointer(c.machine)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ..ir.model import ConstAgg, ConstBytes, ConstZero, GlobalRef, Module, UnsupportedError, Value
+from ..ir.model import ConstAgg, ConstBytes, ConstZero, Function, GlobalRef, InlineAsm, Module, UnsupportedError, Value
 from ..isr_names import IRQ_PREFIX, irq_name
 
 PREFIX = "os_isr:"
@@ -47,6 +47,19 @@ def preserved(notes: set[str]) -> tuple[str, ...]:
     """Assembler names of the variables that `save(...)` lists: pushed at entry, popped at the end."""
     lists = [note.removeprefix("save:") for note in sorted(notes) if note.startswith("save:")]
     return tuple("_" + name.strip() for names in lists for name in names.split(",") if name.strip())
+
+
+_ACCUMULATOR = re.compile(
+    r"\b(?:mac|msc|mpy|mpy\.n|movsac|clr|lac|sac|sac\.r|sftac|add|sub|neg|ed|edac)\s(?:[^\n;]*,)?\s*([AB])\b",
+    re.IGNORECASE,
+)
+
+
+def accumulators(f: Function) -> tuple[str, ...]:
+    """Registers of the accumulators that inline assembly of an interrupt function names: saved like `save(...)`."""
+    texts = [str(a.text) for b in f.blocks for i in b.instrs if isinstance(a := i.extra.get("asm"), InlineAsm)]
+    named = sorted({found.upper() for text in texts for found in _ACCUMULATOR.findall(text)})
+    return tuple(f"_ACC{name}{part}" for name in named for part in "LHU")
 
 
 def preprologue(notes: set[str]) -> tuple[str, ...]:

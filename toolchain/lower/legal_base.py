@@ -43,7 +43,7 @@ class LegalizerBase:
         self.parts: dict[int, list[Value]] = {}
         self.blocks: list[Block] = []
         self.tail: dict[str, str] = {}  # old block name -> name of the new block that holds its terminator
-        self.fixups: list[tuple[Instr, list[Value]]] = []
+        self.fixups: list[tuple[Instr, list[Value], int | None]] = []  # phi, old operands, leaf of an aggregate
         self.b = Builder(Block(""))  # where instructions go; set per block
         self.alive: list[object] = []  # keeps ids in `values` unique while the map lives
 

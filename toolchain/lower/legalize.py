@@ -82,8 +82,8 @@ class Legalizer(MemoryLegalizer):
                 except UnsupportedError as e:
                     raise UnsupportedError(e.what, e.where or self.where(i.line) or f.name) from e
             self.tail[block.name] = self.b.block.name
-        for phi, args in self.fixups:
-            phi.args = [self.use(a) for a in args]
+        for phi, args, leaf in self.fixups:
+            phi.args = [self.use(a) if leaf is None else self.fields(a)[leaf] for a in args]
             phi.blocks = [self.tail[n] for n in phi.blocks]
         for record in f.dbg_records:
             if record.value is not None and not isinstance(record.value, ConstInt):
@@ -216,13 +216,14 @@ class Legalizer(MemoryLegalizer):
 
     # -- control flow -------------------------------------------------------------------------------------------------
 
-    def phi(self, i: Instr) -> Value:
-        if i.type.kind in AGGREGATES:
-            raise UnsupportedError(f"phi of type {i.type}")
-        new = self.b.emit("phi", legal_type(i.type), [])
-        new.blocks = list(i.blocks)
-        self.fixups.append((new, i.args))
-        return new
+    def phi(self, i: Instr) -> Value | list[Value]:
+        aggregate = i.type.kind in AGGREGATES
+        leaves = [t for t, _ in leaves_of(i.type)] if aggregate else [i.type]
+        made = [self.b.emit("phi", legal_type(t), []) for t in leaves]
+        for number, new in enumerate(made):
+            new.blocks = list(i.blocks)
+            self.fixups.append((new, i.args, number if aggregate else None))
+        return list(made) if aggregate else made[0]
 
     def br(self, i: Instr) -> None:
         if not i.args:
@@ -249,7 +250,7 @@ class Legalizer(MemoryLegalizer):
                     keep = [k for k, n in enumerate(phi.blocks) if n != here]
                     phi.args[:] = [phi.args[k] for k in keep]
                     phi.blocks[:] = [phi.blocks[k] for k in keep]
-        for new, old in self.fixups:
+        for new, old, _ in self.fixups:
             if new in next((b.instrs for b in self.blocks if b.name == target), []):
                 keep = [k for k, n in enumerate(new.blocks) if n != here]
                 if len(old) == len(new.blocks):
