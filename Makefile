@@ -14,8 +14,8 @@ run: firmware.elf
 	$(PY) -m emu run firmware.elf --seconds $(SECONDS)
 
 test: $(STAMP)
-	$(PY) -m ruff check emu toolchain arena tests bench
-	$(PY) -m mypy emu toolchain arena
+	$(PY) -m ruff check emu toolchain arena openswarm tests bench setup.py
+	$(PY) -m mypy emu toolchain arena openswarm
 	$(PY) -m pytest -n auto --dist worksteal tests -rs
 
 bench: $(STAMP)
@@ -28,7 +28,7 @@ campaigns: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; set PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[arena,test]'
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[arena,film,test]'
 	touch $@
 
 clean:

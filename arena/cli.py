@@ -1,8 +1,7 @@
 """The command line: `python -m arena COMMAND`; each command is a module of `commands/`.
 
-Exit status: 0 done; 1 something happened to a robot (its firmware stopped, sits in a trap handler or is silent); 2 bad
-input; 3 the run could not go on (cluster lost, folder in use by another run); 130 interrupted. Finished trials are
-kept.
+Exit statuses are those of `emu.status`; 1 is that something happened to a robot: its firmware stopped, sits in a trap
+handler or is silent. Finished trials are kept.
 """
 
 from __future__ import annotations
@@ -11,14 +10,17 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 
 import emu
 from arena.cluster import ClusterLostError
 from arena.commands import bundle, compare, experiment, figures, plot, reaction, replay, report, run, sensitivity, sweep
 from arena.record import FolderInUseError, RecordError
 from arena.scene import SceneError, load_scene, scenes
+from emu.completion import SHELLS, script
+from emu.completion import description as completion_description
+from emu.status import BAD_INPUT, CANNOT_GO_ON, DONE, INTERRUPTED
 
-FAULT, BAD_INPUT, CANNOT_GO_ON, INTERRUPTED = 1, 2, 3, 130
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),
     "experiment": (experiment.parser, experiment.run),
@@ -42,12 +44,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Robots with real firmware in a simulated arena.",
         epilog="example: arena run clustering --brain scripted --trials 4 --minutes 10 --out results/scripted-A",
     )
+    parser.add_argument("--version", action="version", version=f"arena {version('openswarm')}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, (make, _) in COMMANDS.items():
         one = make()
         commands.add_parser(name, parents=[one], help=one.description, description=one.description, epilog=one.epilog,
                             formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False)  # fmt: skip
     commands.add_parser("scenes", help="list the scenes that come along")
+    shells = commands.add_parser("completion", help="print what makes a shell complete these commands",
+                                 description=completion_description("arena"), epilog="example: arena completion bash",
+                                 formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+    shells.add_argument("shell", choices=SHELLS)
     try:
         options = parser.parse_args(arguments)
     except SystemExit as ended:  # --help, or what argparse has told already
@@ -56,14 +63,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "scenes":
             for name in scenes():
                 print(f"{name:20} {load_scene(name).description}")
-            status = 0
+            status = DONE
+        elif options.command == "completion":
+            made = {name: make() for name, (make, _) in COMMANDS.items()}
+            print(script("arena", {name: (one, one.description or "") for name, one in made.items()}, options.shell))
+            status = DONE
         else:
             status = COMMANDS[options.command][1](options)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
-        return 0
+        return DONE
     except (FolderInUseError, ClusterLostError) as error:
         print(f"arena: {error}; finished trials are kept, the same command goes on", file=sys.stderr)
         return CANNOT_GO_ON

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Final
 
 import emu
+from emu import places
 
-ROOT: Final = Path(__file__).resolve().parent.parent / "firmware"
 APPLICATIONS: Final = {"openswarm": "clustering", "bare": "clustering-bare"}
 
 
@@ -20,7 +20,7 @@ def image_for(brain: str, home: Path = Path()) -> Path | None:
     if brain == "scripted":
         return None
     application = APPLICATIONS.get(brain, brain)
-    is_own = re.fullmatch("[a-z0-9-]+", application) and (ROOT / "apps" / application).is_dir()
+    is_own = re.fullmatch("[a-z0-9-]+", application) and (places.firmware() / "apps" / application).is_dir()
     if brain not in APPLICATIONS and not is_own:
         path = home / brain
         if not path.exists():
@@ -30,11 +30,14 @@ def image_for(brain: str, home: Path = Path()) -> Path | None:
         return path
     if not is_own:
         raise ValueError(f"--brain {brain}: there is no firmware/apps/{application} beside this package")
-    command = ["make", "-C", str(ROOT), f"APP={application}", f"PYTHON={sys.executable}"]
+    folder = places.firmware()
+    # a package that was installed may belong to another user or to many: what is built goes into the user's cache
+    out = folder / "build" / application if places.in_checkout() else places.images() / application
+    command = ["make", "-C", str(folder), f"APP={application}", f"OUT={out}", f"PYTHON={sys.executable}"]
     try:
         built = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
         raise ValueError(f"--brain {brain}: make cannot be run: {error}") from None
     if built.returncode:
         raise ValueError(f"--brain {brain}: {' '.join(command)} failed:\n{built.stderr.strip()}")
-    return ROOT / "build" / application / "firmware.elf"
+    return out / "firmware.elf"

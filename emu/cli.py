@@ -14,8 +14,9 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import Final
 
-from emu.command import BAD_INPUT_STATUS, EXIT_BAD_INPUT, EXIT_OK, CommandError, Parser
+from emu.command import CommandError, Parser
 from emu.commands import COMMANDS
+from emu.status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE
 
 _USAGE: Final = """usage: emu COMMAND [options]
 
@@ -34,21 +35,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return status
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
-        return EXIT_OK
+        return DONE
 
 
 def _answer(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help"):
         width = max(map(len, COMMANDS))
         print(_USAGE.format(commands="\n".join(f"  {name:{width}}  {text}" for name, text in COMMANDS.items())))
-        return EXIT_OK if words else EXIT_BAD_INPUT
+        return DONE if words else BAD_INPUT
     if words == ["--version"]:
         print(f"emu {version('openswarm')}")
-        return EXIT_OK
+        return DONE
     name, rest = words[0], words[1:]
     if name not in COMMANDS:
         print(f"emu: unknown command {name!r}; known are {', '.join(COMMANDS)}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return BAD_INPUT
     return _call(name, rest)
 
 
@@ -56,7 +57,7 @@ def _call(name: str, rest: list[str]) -> int:
     """Parse and run; refusals become one line on stderr."""
     from emu.image import LoadError
 
-    bad_input = BAD_INPUT_STATUS if "--exit-code" in rest else EXIT_BAD_INPUT
+    bad_input = BAD_INPUT_AS_STATUS if "--exit-code" in rest else BAD_INPUT
     command = import_module(f"emu.commands.{name}")
     parser: Parser = command.parser()
     parser.arguments = rest
@@ -72,5 +73,5 @@ def _call(name: str, rest: list[str]) -> int:
         print(f"emu {name}: {error.filename or ''}: {error.strerror}", file=sys.stderr)
         return bad_input
     except KeyboardInterrupt:
-        return EXIT_OK
+        return DONE
     return status

@@ -1,4 +1,4 @@
-"""What every command of `python -m emu` is made with: its parser, its exit statuses, its way to refuse."""
+"""What every command of `python -m emu` is made with: its parser, its units, its way to refuse."""
 
 from __future__ import annotations
 
@@ -10,13 +10,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Final, NoReturn
 
-EXIT_OK: Final = 0
-EXIT_FAULT: Final = 1
-EXIT_BAD_INPUT: Final = 2
-"""Exit statuses of design §10."""
-BAD_INPUT_STATUS: Final = 126
-"""Bad input or usage with --exit-code (design §10)."""
-
+from emu.status import BAD_INPUT, BAD_INPUT_AS_STATUS
 
 TEN_YEARS: Final = 10 * 366 * 24 * 3600
 """Longest simulated time a command accepts, in seconds."""
@@ -42,7 +36,7 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print what is wrong in one line and leave."""
         print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
-        sys.exit(BAD_INPUT_STATUS if "--exit-code" in self.arguments else EXIT_BAD_INPUT)
+        sys.exit(BAD_INPUT_AS_STATUS if "--exit-code" in self.arguments else BAD_INPUT)
 
 
 def seconds(text: str) -> Fraction:

@@ -9,10 +9,11 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
 
+from emu.status import BAD_INPUT, DONE, INTERRUPTED
 from toolchain.errors import ToolError
-
-EXIT_BAD_INPUT = 2
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "cc": ("toolchain.driver", "compile, assemble and link C and assembly, gcc-like"),
@@ -24,6 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "nm": ("toolchain.commands.names", "list symbols with addresses and sizes"),
     "hex": ("toolchain.commands.hex", "convert an ELF executable to Intel HEX"),
     "stack": ("toolchain.commands.stack", "worst-case stack use from the call graph"),
+    "completion": ("toolchain.commands.completion", "print what makes a shell complete these commands"),
 }
 
 USAGE = """usage: python -m toolchain COMMAND [options]
@@ -31,11 +33,12 @@ USAGE = """usage: python -m toolchain COMMAND [options]
 {commands}
 
 example: python -m toolchain cc -Os main.c -o firmware.elf
-`python -m toolchain COMMAND --help` explains a command."""
+`python -m toolchain COMMAND --help` explains a command; `--version` tells the version. Installed, the first eight
+are also programs of their own in the manner of gcc and binutils: dspic-cc, dspic-as, dspic-ld, dspic-ar ..."""
 
 
 def _usage() -> str:
-    return USAGE.format(commands="\n".join(f"  {name:8} {text}" for name, (_, text) in COMMANDS.items()))
+    return USAGE.format(commands="\n".join(f"  {name:10} {text}" for name, (_, text) in COMMANDS.items()))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,19 +46,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if not words or words[0] in ("-h", "--help"):
         print(_usage())
-        return 0 if words else EXIT_BAD_INPUT
+        return DONE if words else BAD_INPUT
+    if words == ["--version"]:
+        print(f"toolchain {version('openswarm')}")
+        return DONE
     if words[0] not in COMMANDS:
         print(f"toolchain: unknown command {words[0]!r}; known: {', '.join(COMMANDS)}", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return BAD_INPUT
     try:
         status = import_module(COMMANDS[words[0]][0]).main(words[1:])
         sys.stdout.flush()
-        return int(status or 0)
+        return int(status or DONE)
     except ToolError as error:
         print(error, file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return BAD_INPUT
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return DONE
     except KeyboardInterrupt:
-        return 130
+        return INTERRUPTED
+
+
+def by_name() -> int:
+    """Run the command that the program is called after: `dspic-ar rcs x.a y.o`, as build systems want their tools.
+
+    `dspic-ranlib` is `ar s`. `--version` begins like that of the tool it stands for, as configure scripts expect.
+    """
+    name = Path(sys.argv[0]).stem.removeprefix("dspic-")
+    words = sys.argv[1:]
+    if name != "cc" and words == ["--version"]:
+        print(f"dspic-{name} (openswarm) {version('openswarm')}")
+        return DONE
+    return main(["ar", "s", *words] if name == "ranlib" and "--help" not in words else [name, *words])

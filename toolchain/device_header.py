@@ -67,6 +67,7 @@ def bit_macros(chip: Chip) -> Iterator[str]:
 def header(chip: Chip) -> str:
     """The whole header as text."""
     lines = [
+        "/* SPDX-License-Identifier: MIT */",
         f"/* Registers of the {chip.name}.",
         " * Written by `python -m toolchain.device_header` from the chip's register table; do not edit. */",
         "#ifndef DSPIC30F6014A_H",

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from emu.status import BAD_INPUT, DONE, FAULT
 from toolchain.cc_options import HELP, CcOptions, Input, parse
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes, read_text, write_outputs
@@ -20,7 +21,6 @@ from toolchain.files import read_bytes, read_text, write_outputs
 if TYPE_CHECKING:
     from toolchain.cc_link import Program
 
-EXIT_DONE, EXIT_C_ERRORS, EXIT_BAD_INPUT = 0, 1, 2
 IR_SOURCES = {"c", "cpp-output"}
 STANDARD_OUTPUT = Path("-")
 MAX_INVENTIONS = 4  # runs of the middle end; each forbids what the one before made up
@@ -43,15 +43,15 @@ def main(argv: list[str]) -> int:
                 except ToolError as error:
                     raise _explained(options, error, Path(scratch)) from error
     except CompileError:
-        return EXIT_C_ERRORS
+        return FAULT
     except RecursionError:
         print("error: types or expressions are nested too deeply", file=sys.stderr)
-        return EXIT_BAD_INPUT
+        return BAD_INPUT
     except ToolError as error:
         for finding in error.findings:
             print(finding if "error:" in finding else f"error: {finding}", file=sys.stderr)
-        return EXIT_BAD_INPUT
-    return EXIT_DONE
+        return BAD_INPUT
+    return DONE
 
 
 def _explained(options: CcOptions, error: ToolError, scratch: Path) -> ToolError:

@@ -15,6 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
 
+from emu.places import runtime_libraries
 from toolchain.cc_options import CcOptions, Input
 
 RUNTIME_DIR = Path(__file__).parent / "runtime"
@@ -27,7 +28,7 @@ LEVEL = "s"
 def library(jobs: int = 0) -> bytes:
     """The archive's bytes. Builds it (seconds, once) when the cache has none for these sources and this compiler."""
     key = fingerprint()
-    cached = cache_dir() / f"libdspic-{key}.a"
+    cached = runtime_libraries() / f"libdspic-{key}.a"
     try:
         return cached.read_bytes()
     except OSError:
@@ -36,12 +37,6 @@ def library(jobs: int = 0) -> bytes:
     if fingerprint() == key:  # nobody edited the compiler meanwhile
         _store(cached, content)
     return content
-
-
-def cache_dir() -> Path:
-    """`$XDG_CACHE_HOME/openswarm-toolchain`, by default below `~/.cache`."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "openswarm-toolchain"
 
 
 def fingerprint() -> str:

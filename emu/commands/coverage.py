@@ -9,12 +9,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
+from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.coverage import Counts, Report, counting
 from emu.image import Image
 from emu.loader import load_image
 from emu.outfile import whole_text_file
+from emu.status import DONE, FAULT
 
 DESCRIPTION: Final = """\
 Run a firmware image and tell what of it was executed, from exact counts of the very code that a robot runs.
@@ -71,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
     _print(report, options.json)
     if stop.fault is not None:
         print(f"emu coverage: {stop.fault.report()}", file=sys.stderr)
-    return EXIT_FAULT if stop.fault is not None else EXIT_OK
+    return FAULT if stop.fault is not None else DONE
 
 
 def _earlier(options: argparse.Namespace, image: Image) -> Counts:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 
-from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser
+from emu.command import CommandError, Parser
 from emu.loader import load_image
 from emu.openswarm import baseline
 from emu.openswarm.latency import APPLICATION, run_measures
 from emu.openswarm.target import MeasureError
+from emu.status import DONE, FAULT
 
 DESCRIPTION = """\
 Run the scenarios of the `latency` application and print how many cycles the kernel's operations take.
@@ -52,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     elif not options.check:
         width = max(len(name) for name in numbers)
         print("\n".join(f"{name:{width}} {number.value:8,} cycles" for name, number in numbers.items()))
-    return verdict(options, numbers, "cycles") if options.check else EXIT_OK
+    return verdict(options, numbers, "cycles") if options.check else DONE
 
 
 def verdict(options: argparse.Namespace, numbers: dict[str, baseline.Number], unit: str) -> int:
@@ -66,4 +67,4 @@ def verdict(options: argparse.Namespace, numbers: dict[str, baseline.Number], un
         print(baseline.table(rows, unit))
         if not worse and any(row.old is None or row.new != row.old for row in rows):
             print(f"nothing grew; keep the new numbers with --update {options.check}")
-    return EXIT_FAULT if worse else EXIT_OK
+    return FAULT if worse else DONE

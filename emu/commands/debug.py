@@ -9,7 +9,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.boards import BOARDS
-from emu.command import EXIT_OK, Parser
+from emu.command import Parser
+from emu.status import DONE
 
 if TYPE_CHECKING:
     from emu.dap.wire import Wire
@@ -43,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     if options.port is None:
         out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
         _serve(Wire(sys.stdin.fileno(), out))
-        return EXIT_OK
+        return DONE
     with socket.create_server(("127.0.0.1", options.port)) as server:
         print(f"emu debug: listening on 127.0.0.1:{server.getsockname()[1]}", file=sys.stderr, flush=True)
         while True:
@@ -51,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
             with connection, connection.makefile("wb") as writer:
                 _serve(Wire(connection.fileno(), writer))
             if options.once:
-                return EXIT_OK
+                return DONE
 
 
 def _serve(wire: Wire) -> None:

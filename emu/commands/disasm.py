@@ -8,10 +8,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from emu.command import EXIT_OK, CommandError, Parser
+from emu.command import CommandError, Parser
 from emu.disassembly import Item, items
 from emu.image import Image
 from emu.loader import load_image
+from emu.status import DONE
 
 
 def parser() -> Parser:
@@ -39,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     lines = _json(image, found) if options.json else listing(image, found, sources)
     for line in lines:
         print(line)
-    return EXIT_OK
+    return DONE
 
 
 def _range(image: Image, start: str | None, end: str | None) -> tuple[int, int]:

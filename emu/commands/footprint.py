@@ -9,12 +9,13 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any
 
-from emu.command import EXIT_OK, CommandError, Parser
+from emu.command import CommandError, Parser
 from emu.commands.cycles import add_baseline_arguments, verdict
 from emu.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image import Image
 from emu.loader import load_image
 from emu.openswarm.baseline import Number, save, short
+from emu.status import DONE
 
 DESCRIPTION = """\
 Print what an image costs in ROM and RAM (bytes; 3 per program word), by part, source file and symbol.
@@ -58,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
         print(static_text(facts, options.symbols))
         if equation is not None:
             print("\n" + equation_text(equation))
-    return verdict(options, numbers, "bytes") if options.check else EXIT_OK
+    return verdict(options, numbers, "bytes") if options.check else DONE
 
 
 def _places(facts: dict[str, Any], size: str) -> dict[str, int]:

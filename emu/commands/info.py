@@ -6,9 +6,10 @@ import argparse
 import json
 from typing import Any
 
-from emu.command import EXIT_OK, Parser
+from emu.command import Parser
 from emu.image import BYTES_PER_WORD, Image
 from emu.loader import load_image
+from emu.status import DONE
 
 
 def parser() -> Parser:
@@ -22,7 +23,7 @@ def run(options: argparse.Namespace) -> int:
     """Exit status: 0 printed, 2 bad input."""
     facts = describe(load_image(options.image))
     print(json.dumps(facts, indent=2) if options.json else text(facts))
-    return EXIT_OK
+    return DONE
 
 
 def describe(image: Image) -> dict[str, Any]:

@@ -8,10 +8,11 @@ import sys
 from fractions import Fraction
 from typing import Any, Final
 
-from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
+from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.loader import load_image
 from emu.profile import Profile, Profiler
+from emu.status import DONE, FAULT
 
 DESCRIPTION: Final = """\
 Run a firmware image and print what share of the CPU each function and interrupt level takes.
@@ -67,8 +68,8 @@ def run(options: argparse.Namespace) -> int:
         _print(profile, options)
     if fault is not None:
         print(f"emu profile: {fault.report()}", file=sys.stderr)
-        return EXIT_FAULT
-    return EXIT_OK
+        return FAULT
+    return DONE
 
 
 def _check_groups(profile: Profile, groups: list[tuple[str, list[str]]]) -> None:

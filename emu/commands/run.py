@@ -12,7 +12,7 @@ from dataclasses import asdict
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, cycles, seconds
+from emu.command import CommandError, Parser, cycles, seconds
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.console import SPECIFICATIONS, Port, open_port
 from emu.image import Image
@@ -20,15 +20,11 @@ from emu.loader import load_image
 from emu.outfile import whole_text_file
 from emu.session import FOREVER, Session
 from emu.stamps import HEADER, Stamp, read_stamps
+from emu.status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
 
 if TYPE_CHECKING:
     from emu.machine import Machine, Stop
     from emu.waves import Waves
-
-FAULT_STATUS: Final = 125
-LIMIT_STATUS: Final = 124
-INTERRUPTED_STATUS: Final = 130
-"""Exit statuses with --exit-code (design §10; 124 and 130 as `timeout` and shells use them)."""
 
 EXIT_SYMBOL: Final = "__exit_status"
 """Where start-up code leaves what main returned, before it sleeps for ever."""
@@ -131,7 +127,7 @@ def run(options: argparse.Namespace) -> int:
             stop = never_started(machine, stop, refused)
         lost = {number: port.lost for number, port in ports.items() if port.lost}
     fault = stop.reason == "fault"
-    status = exit_status(machine, image, stop) if options.exit_code else EXIT_FAULT if fault else EXIT_OK
+    status = exit_status(machine, image, stop) if options.exit_code else FAULT if fault else DONE
     facts = _facts(machine, image, stop, host_seconds)
     if options.stats:
         facts["stats"] = _statistics(machine, host_seconds)
@@ -254,13 +250,13 @@ def _waves(options: argparse.Namespace, machine: Machine, stream: TextIO, advanc
 def exit_status(machine: Machine, image: Image, stop: Stop) -> int:
     """What the shell gets with --exit-code."""
     if stop.reason == "fault":
-        return FAULT_STATUS
+        return FAULT_AS_STATUS
     if stop.reason == "breakpoint":
         return int(machine.peek("W0")) & 0xFF
     if stop.reason == "halt":
         symbol = image.symbols.find(EXIT_SYMBOL)
-        return int(machine.peek(symbol.address)) & 0xFF if symbol is not None else EXIT_OK
-    return INTERRUPTED_STATUS if stop.reason == "interrupted" else LIMIT_STATUS
+        return int(machine.peek(symbol.address)) & 0xFF if symbol is not None else DONE
+    return INTERRUPTED if stop.reason == "interrupted" else LIMIT_AS_STATUS
 
 
 def _facts(machine: Machine, image: Image, stop: Stop, host_seconds: float) -> dict[str, Any]:

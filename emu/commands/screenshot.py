@@ -8,9 +8,10 @@ import sys
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final
 
-from emu.command import EXIT_FAULT, EXIT_OK, CommandError, Parser, seconds
+from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.loader import load_image
+from emu.status import DONE, FAULT
 
 if TYPE_CHECKING:
     from emu.machine import Machine
@@ -86,8 +87,8 @@ def run(options: argparse.Namespace) -> int:
         print(f"{options.output}: {width} x {height} pixels after {machine.cycle:,} cycles", file=sys.stderr)
     if stop.fault is not None:
         print(f"emu screenshot: {stop.fault.report()}", file=sys.stderr)
-        return EXIT_FAULT
-    return EXIT_OK
+        return FAULT
+    return DONE
 
 
 def _place(machine: Machine, options: argparse.Namespace) -> int:

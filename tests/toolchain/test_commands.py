@@ -116,7 +116,7 @@ def test_libraries(files, capsys):
         (["nm", "bad.s"], "not an ELF file"),
         (["objdump", "undefined.o"], "nothing to show"),
         (["objdump", "-d", "--start", "zz", "undefined.o"], "no symbol is called zz"),
-        (["ar", "q", "x.a"], "expected one of"),
+        (["ar", "p", "x.a"], "expected one of"),
         (["ar", "t", "x.a"], "no such archive"),
         (["stack", "undefined.o"], "not an executable"),
         (["frobnicate"], "unknown command 'frobnicate'"),

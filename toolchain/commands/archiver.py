@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 from toolchain.commands.parser import parser
@@ -10,26 +11,32 @@ from toolchain.files import read_bytes, write_outputs
 from toolchain.link.archive import Member, archive_bytes, read_members
 
 
-def main(arguments: list[str]) -> int:
-    """Run one operation (first letter of the key, as in GNU ar); returns 0."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser(
         "ar",
-        "Make, list and extract static libraries.  Operations: r replace or add, d delete, t list, x extract;\n"
-        "letters c, s, u, v are accepted and need nothing: an index is always written.",
+        "Make, list and extract static libraries.  Operations: r replace or add, q append, d delete,\n"
+        "t list, x extract, s alone: write the index anew.  Letters c, s, u, v, D are accepted and need\n"
+        "nothing: an index is always written, dates and owners never.",
         "python -m toolchain ar rcs libswarm.a wheel.o camera.o",
     )
-    p.add_argument("operation", help="r, d, t or x, with modifiers")
+    p.add_argument("operation", help="r, q, d, t, x or s, with modifiers")
     p.add_argument("archive")
     p.add_argument("members", nargs="*", metavar="FILE")
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Run one operation (first letter of the key, as in GNU ar); returns 0."""
+    options = options_of().parse_args(arguments)
     letters = options.operation.lstrip("-")
-    action = [letter for letter in letters if letter in "rdtx"]
-    if len(action) != 1 or set(letters) - set("rdtxcsuvD"):
-        raise ToolError(f"operation {options.operation!r}: expected one of r, d, t, x with modifiers c, s, u, v")
+    action = [letter for letter in letters if letter in "rqdtx"] or (["s"] if "s" in letters else [])
+    if len(action) != 1 or set(letters) - set("rqdtxcsuvD"):
+        raise ToolError(f"operation {options.operation!r}: expected one of r, q, d, t, x, s with c, s, u, v, D")
     path = Path(options.archive)
     exists = path.exists()
     members = read_members(read_bytes(path), str(path)) if exists else []
-    if not exists and action[0] != "r":
+    if not exists and action[0] not in "rq":
         raise ToolError(f"{path}: no such archive")
     names = [Path(name).name for name in options.members]
     if action[0] == "t":
@@ -37,9 +44,11 @@ def main(arguments: list[str]) -> int:
     elif action[0] == "x":
         _extract(members, names, str(path))
     else:
-        kept = [m for m in members if m.name not in names]
+        kept = [m for m in members if m.name not in names] if action[0] == "d" else members
         if action[0] == "r":
             kept = _replace(members, options.members)
+        elif action[0] == "q":
+            kept = members + [Member(Path(name).name, read_bytes(name)) for name in options.members]
         write_outputs([(path, archive_bytes(kept))])
     return 0
 

@@ -16,8 +16,8 @@ from toolchain.files import read_text, write_outputs
 PART = "30F6014A"
 
 
-def main(arguments: list[str]) -> int:
-    """Assemble; returns 0.  Raises `ToolError` with every finding."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser(
         "as", "Assemble a source in pic30-as syntax to an ELF object.", "python -m toolchain as start.s -o start.o"
     )
@@ -31,7 +31,12 @@ def main(arguments: list[str]) -> int:
                    help="paths that begin with OLD are recorded as NEW")  # fmt: skip
     p.add_argument("-p", dest="part", default=PART, help=f"processor; only {PART} is supported")
     p.add_argument("-omf", default="elf", choices=("elf",), help=argparse.SUPPRESS)
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Assemble; returns 0.  Raises `ToolError` with every finding."""
+    options = options_of().parse_args(arguments)
     if options.part.upper().removeprefix("DSPIC") != PART:
         raise ToolError(f"-p{options.part}: the only processor supported is {PART}")
     if options.source == "-":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 from toolchain.commands.parser import parser
@@ -10,14 +11,19 @@ from toolchain.files import read_bytes, write_outputs
 from toolchain.link.hexfile import hex_text
 
 
-def main(arguments: list[str]) -> int:
-    """Convert; returns 0."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser(
         "hex", "Convert an ELF executable, ours or XC16's, to Intel HEX.", "python -m toolchain hex firmware.elf"
     )
     p.add_argument("image")
     p.add_argument("-o", dest="output", default="", help="HEX file (default: image name with .hex)")
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Convert; returns 0."""
+    options = options_of().parse_args(arguments)
     image = read_executable(read_bytes(options.image), options.image)
     write_outputs([(options.output or Path(options.image).with_suffix(".hex"), hex_text(image).encode())])
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -20,8 +21,8 @@ def find_library(name: str, folders: list[str]) -> Path:
     raise ToolError(f"cannot find lib{name}.a in {', '.join(folders) or 'any folder: give one with -L'}")
 
 
-def main(arguments: list[str]) -> int:
-    """Link; returns 0.  Raises `ToolError` with every finding."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     example = "python -m toolchain ld start.o main.o -L lib -lc -o firmware.elf -Map firmware.map"
     p = parser("ld", "Link ELF objects and archives for the dsPIC30F6014A.", example)
     p.add_argument("inputs", nargs="*", metavar="FILE", help="objects (.o) and archives (.a)")
@@ -33,7 +34,12 @@ def main(arguments: list[str]) -> int:
     p.add_argument("-L", dest="folders", action="append", default=[], metavar="DIR", help="search -l libraries here")
     p.add_argument("-l", dest="libraries", action="append", default=[], metavar="NAME", help="link libNAME.a")
     add_options(p)
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Link; returns 0.  Raises `ToolError` with every finding."""
+    options = options_of().parse_args(arguments)
     names = [*options.inputs, *(str(find_library(n, options.folders)) for n in options.libraries)]
     if not names:
         raise ToolError("no input files")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 
 from toolchain.commands.parser import parser
@@ -33,8 +34,8 @@ def letter(symbol: Symbol) -> str:
     return kind if symbol.bind is Bind.LOCAL else kind.upper()
 
 
-def main(arguments: list[str]) -> int:
-    """Print the symbols; returns 0."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser(
         "nm", "List symbols: address, size in address units, class, name.", "python -m toolchain nm -S firmware.elf"
     )
@@ -45,7 +46,12 @@ def main(arguments: list[str]) -> int:
     p.add_argument("-u", "--undefined-only", action="store_true")
     p.add_argument("-a", "--all", action="store_true", help="also compilers' local labels")
     p.add_argument("--json", action="store_true", help="machine-readable output")
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Print the symbols; returns 0."""
+    options = options_of().parse_args(arguments)
     listing = {name: _rows(name, options.all) for name in options.files}
     for name, rows in listing.items():
         if options.undefined_only:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+
 from emu.elffacts import RELOCATIONS, SectionFlag
 from toolchain.commands.names import letter
 from toolchain.commands.parser import parser
@@ -22,8 +24,8 @@ _FLAG_WORDS = (
 )  # fmt: skip
 
 
-def main(arguments: list[str]) -> int:
-    """Print what was asked for; returns 0."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser(
         "objdump",
         "Show parts of an object or executable.",
@@ -38,7 +40,12 @@ def main(arguments: list[str]) -> int:
     p.add_argument("-r", "--reloc", action="store_true", help="relocations (within -d, beside the instruction)")
     p.add_argument("-j", "--section", action="append", default=[], metavar="NAME", help="only this section")
     p.add_argument("--start", metavar="SYMBOL", help="only from this function to its end")
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Print what was asked for; returns 0."""
+    options = options_of().parse_args(arguments)
     if not (options.disassemble or options.source or options.headers or options.syms or options.reloc):
         raise ToolError("nothing to show: give -d, -S, -h, -t or -r")
     for name in options.files:

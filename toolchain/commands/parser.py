@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
 from toolchain.errors import ToolError
 
@@ -10,9 +12,10 @@ from toolchain.errors import ToolError
 def parser(
     command: str, description: str, example: str, help_switches: tuple[str, ...] = ("-h", "--help")
 ) -> argparse.ArgumentParser:
-    """Return an empty parser for `python -m toolchain COMMAND`."""
+    """Return an empty parser for `python -m toolchain COMMAND`, or for the program `dspic-COMMAND` if that runs."""
+    called = Path(sys.argv[0]).stem
     result = argparse.ArgumentParser(
-        prog=f"python -m toolchain {command}",
+        prog=called if called.startswith("dspic-") else f"python -m toolchain {command}",
         description=description,
         epilog=f"example: {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,

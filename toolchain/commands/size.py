@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 
 from emu.elffacts import SectionFlag
@@ -32,15 +33,20 @@ def totals(sections: list[Section]) -> dict[str, int]:
     return result
 
 
-def main(arguments: list[str]) -> int:
-    """Print a table, or JSON; returns 0."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser(
         "size", "Show flash bytes (three per instruction word) and RAM bytes.", "python -m toolchain size firmware.elf"
     )
     p.add_argument("files", nargs="+", metavar="FILE")
     p.add_argument("-A", "--sections", action="store_true", help="one line per section")
     p.add_argument("--json", action="store_true", help="machine-readable output")
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Print a table, or JSON; returns 0."""
+    options = options_of().parse_args(arguments)
     rows: dict[str, dict[str, int]] = {}
     detail: dict[str, list[Section]] = {}
     for name in options.files:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 
+from emu.status import DONE, FAULT
 from toolchain.commands.parser import parser
 from toolchain.elf.read import read_executable
 from toolchain.errors import ToolError
@@ -11,7 +13,6 @@ from toolchain.files import read_bytes, read_text
 from toolchain.stack.analyse import Analysis, Entry, Report
 from toolchain.stack.annotations import Annotations, add_symbols, read_annotations
 
-EXIT_OVER_LIMIT = 1
 DESCRIPTION = """Worst-case stack use, in bytes, per function and per entry (reset, interrupt, thread, by pointer),
 found by following every instruction path of the image.  Recursion, calls through pointers and unknown changes of
 W15 are named; an annotation file bounds them:
@@ -26,8 +27,8 @@ A + behind a number marks a lower bound: something on that path is not known.  A
 of its own shows how much it leaves on the interrupted one."""
 
 
-def main(arguments: list[str]) -> int:
-    """Print the report; returns 0, or 1 when a --limit is exceeded or cannot be proved."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser("stack", DESCRIPTION, "python -m toolchain stack firmware.elf --thread blinker --limit blinker=128")
     p.add_argument("image")
     p.add_argument("-a", "--annotations", metavar="FILE")
@@ -36,7 +37,12 @@ def main(arguments: list[str]) -> int:
     p.add_argument("--any-handle", action="store_true", help="pointer calls reach any function whose address is taken")
     p.add_argument("--functions", action="store_true", help="list every function, not only entries")
     p.add_argument("--json", action="store_true", help="machine-readable output")
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Print the report; returns 0, or 1 when a --limit is exceeded or cannot be proved."""
+    options = options_of().parse_args(arguments)
     file = options.annotations
     annotations = read_annotations(read_text(file), file) if file else Annotations()
     image = read_executable(read_bytes(options.image), options.image)
@@ -100,7 +106,7 @@ def _total(entry: Entry) -> int:
 
 def _check(report: Report, limits: list[str]) -> int:
     """Compare with the --limit options; an entry's own figure counts before a function's."""
-    status = 0
+    status = DONE
     for limit in limits:
         name, equals, value = limit.partition("=")
         if not equals or not value.isdigit():
@@ -114,5 +120,5 @@ def _check(report: Report, limits: list[str]) -> int:
         if total > int(value) or usage.unknown:
             more = " or more" if usage.unknown else ""
             print(f"{name}: {total} bytes{more}, the limit is {value}: {' > '.join(usage.path)}")
-            status = EXIT_OVER_LIMIT
+            status = FAULT
     return status

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.2. A failed assertion prints through __putchar and ends the program as abort() does. */
 #undef assert
 #ifdef NDEBUG

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.4, "C" locale (ASCII). */
 #ifndef CTYPE_H
 #define CTYPE_H

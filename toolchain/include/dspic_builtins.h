@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* XC16's device builtins (abi-elf.md §2.9) for this compiler; the driver includes this file before every C source. */
 #ifndef DSPIC_BUILTINS_H
 #define DSPIC_BUILTINS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a C compiler for the dsPIC30F must be told outside ISO C, in one spelling for this toolchain and for XC16:
  * interrupt functions, special function registers, inline-assembly clobbers, configuration words. */
 #ifndef DSPIC_COMPILER_H

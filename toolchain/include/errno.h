@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.5. */
 #ifndef ERRNO_H
 #define ERRNO_H

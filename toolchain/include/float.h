@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 5.2.4.2.2: IEC 60559 single, double; long double is double. */
 #ifndef FLOAT_H
 #define FLOAT_H

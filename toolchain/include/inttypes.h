@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.8.1, the macros in use. */
 #ifndef INTTYPES_H
 #define INTTYPES_H

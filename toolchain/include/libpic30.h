@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Delays of Microchip's libpic30 by their names. FCY, instruction cycles per second, is the program's to define. */
 #ifndef LIBPIC30_H
 #define LIBPIC30_H

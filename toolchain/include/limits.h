@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 5.2.4.2.1; plain char is signed (abi-elf.md §1.1) unless -funsigned-char is given. */
 #ifndef LIMITS_H
 #define LIMITS_H

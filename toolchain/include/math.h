@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.12, the functions listed; double is 64-bit IEEE, float 32-bit. There is no errno reporting. */
 #ifndef MATH_H
 #define MATH_H

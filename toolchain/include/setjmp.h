@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.13: W8-W15 and the return address (abi-elf.md §2.1). */
 #ifndef SETJMP_H
 #define SETJMP_H

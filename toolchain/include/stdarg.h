@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.16. */
 #ifndef STDARG_H
 #define STDARG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.18. */
 #ifndef STDBOOL_H
 #define STDBOOL_H

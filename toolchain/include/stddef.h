@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.19. */
 #ifndef STDDEF_H
 #define STDDEF_H

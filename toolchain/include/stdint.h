@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.20. Widths are those of abi-elf.md §1.1: int and pointers 16 bits, long 32, long long 64. */
 #ifndef STDINT_H
 #define STDINT_H

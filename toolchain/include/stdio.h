@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Formatted output (C11 7.21.6). Conversions: d i u x X o c s p % with flags - 0 + space #, width, precision, *, and
  * lengths hh h l ll z t j; f F e E g G are there when a program that uses them calls the _float variants.
  * There are no files: stdout and stderr both go to the hook __putchar. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.22: conversions, division, random numbers, sorting, end of program. The heap is as large
  * as the linker is told (-Wl,--heap=BYTES); there is no environment. */
 #ifndef STDLIB_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* C11 7.24, without locales; plus the POSIX functions that firmware uses. */
 #ifndef STRING_H
 #define STRING_H

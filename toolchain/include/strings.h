@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* POSIX bit search on int. */
 #ifndef STRINGS_H
 #define STRINGS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Calendar time (C11 7.27). The chip has no calendar: time() and clock() answer "not available" (-1) until a program
  * defines functions of these names. Local time is UTC. */
 #ifndef TIME_H

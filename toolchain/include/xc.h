@@ -1,2 +1,3 @@
+/* SPDX-License-Identifier: MIT */
 /* XC16's name of the header that selects the device; there is one device here. */
 #include "dspic30f6014a.h"

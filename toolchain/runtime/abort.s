@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; abort(): status 134, as a shell reports SIGABRT.
         .section .text._abort,code
         .global _abort

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Failed assertions (C11 7.2.1.1). */
 #include <stdio.h>
 #include <stdlib.h>

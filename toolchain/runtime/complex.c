@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Products and quotients of complex numbers, which compilers call by these names. Infinities and NaN follow the plain
  * formulas, not annex G of C11. */
 #include <float.h>

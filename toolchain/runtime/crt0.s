@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; C start-up, abi-elf.md §3.1: stack, PSV window, initialised data, user_init, main; then the end of the program.
 
         .section .init,code

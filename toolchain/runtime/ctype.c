@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Character classes of the "C" locale (C11 7.4), ASCII. */
 #include <ctype.h>
 

@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; __delay32 (libpic30.h): W1:W0 instruction cycles. Around the loop: RCALL 2, first subtraction 2, branch 1 or 2, RETURN 3.
 ; The loop takes 4 cycles a round and 3 the last time: from `cycles` to `cycles` + 3 in all, at least 9.
 

@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; Bodies of XC16's divide builtins and of the interrupt-priority builtins (abi-elf.md §2.9, dspic_builtins.h).
 ; Dividend in W1:W0, divisor in W2; DIV leaves the quotient in W0, the remainder in W1 (isa.md §6.7).
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Single-precision addition and subtraction. */
 #include "softfloat.h"
 

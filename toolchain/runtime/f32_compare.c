@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Single-precision comparisons. Results are compared with 0 by the caller; NaN answers so that the test fails
  * (abi-elf.md §2.8). */
 #include "softfloat.h"

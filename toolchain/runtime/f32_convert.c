@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Conversions between single precision and integers. To integer: toward zero, saturating; NaN gives 0. */
 #include "softfloat.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Single-precision division: two quotient digits of 16 bits (Knuth, TAOCP 2, 4.3.1 algorithm D). */
 #include "softfloat.h"
 

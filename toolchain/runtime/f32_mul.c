@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Single-precision multiplication. */
 #include "softfloat.h"
 

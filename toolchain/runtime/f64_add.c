@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Double-precision addition and subtraction. */
 #include "softfloat.h"
 

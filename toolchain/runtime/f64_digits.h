@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A 64-bit significand as an array of 16-bit digits, lowest first. */
 #ifndef F64_DIGITS_H
 #define F64_DIGITS_H

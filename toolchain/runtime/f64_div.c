@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Double-precision division on 16-bit digits, the size of the hardware divider. */
 #include "f64_digits.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Double-precision multiplication on 16-bit digits, the size of the hardware multiplier. */
 #include "f64_digits.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Packing, shifting and counting for double precision; the contract is in softfloat.h. */
 #include "softfloat.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Inside of the printf family. */
 #ifndef FORMAT_H
 #define FORMAT_H

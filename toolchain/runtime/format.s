@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; The heart of the printf family (C11 7.21.6.1): int __format(sink_t *sink, const char *format, va_list arguments).
 ; In assembly for its stack: a call of snprintf with integer, string and character conversions takes 50 bytes, return
 ; address included. 64-bit and floating conversions are C functions (format.h), linked when a format string needs them.

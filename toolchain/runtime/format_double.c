@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* %f %e %g (C11 7.21.6.1): a double as decimal digits, each of them exact, rounded to nearest, ties to even.
  *
  * Every double is an integer of 16-bit limbs plus a fraction of such limbs. The integer is divided into groups of four

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Field output shared by the C conversions of the printf family; format.s has its own, for its stack. */
 #include "format.h"
 

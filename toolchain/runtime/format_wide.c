@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* %lld and its relatives: 64-bit integers in bases 8, 10 and 16. */
 #include "format.h"
 

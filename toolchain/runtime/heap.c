@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* malloc, calloc, realloc, free (C11 7.22.3) in the linker's heap (-Wl,--heap=BYTES; without it malloc fails).
  * First fit over one list of blocks in address order; neighbours join when a block is freed. 2 bytes per block. */
 #include <stdint.h>

@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; 32-bit integer helpers (abi-elf.md §2.8): arguments in W1:W0 and W3:W2, result in W1:W0. They change W0-W7 only.
 
         .section .text.___mulsi3,code

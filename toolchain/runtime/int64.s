@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; 64-bit integer helpers (abi-elf.md §2.8): arguments in W3..W0 and W7..W4, result in W3..W0.
 
 ; Low 64 bits of the product: the 16x16 products whose weight is below 2^64, highest weight first, so that each

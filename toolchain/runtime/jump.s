@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; setjmp and longjmp (C11 7.13): buffer = W8..W13, W14, W15 after the return, return address low, high.
 
         .section .text._setjmp,code

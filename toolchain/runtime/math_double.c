@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Elementary functions in double precision (C11 7.12.4-7.12.7). Polynomials are Chebyshev interpolants computed for
  * these intervals with 60 digits; errors stay below 4 units in the last place for |x| < 1e5 in the trigonometric
  * functions, whose argument reduction uses 99 bits of pi/2. */

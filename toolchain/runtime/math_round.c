@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Functions of math.h that work on the bits of a double: rounding to integers, parts, remainders (C11 7.12.6-7.12.12).
  * All are exact. */
 #include "softfloat.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* math.h in single precision. Elementary functions have polynomials of their own, so that a program that uses only
  * float links no double arithmetic; powf and fmodf go through double. Errors stay below 4 units in the last place for
  * |x| < 5000 in the trigonometric functions. */

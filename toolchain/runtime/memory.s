@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; memcpy, memmove, memset, memcmp (C11 7.24): one REPEAT per call, words where both pointers are even.
 ; REPEAT counts to 16384, more than the data space holds.
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* printf, vprintf, puts, putchar: all through __putchar (stdio.h). */
 #include "format.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The library's own __putchar: blocking output on UART1, enabled on first use at the highest rate (U1BRG 0). */
 #include <dspic30f6014a.h>
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* sscanf, vsscanf (C11 7.21.6.2): d i u o x X p c s [ n %, with *, width and hh h l ll j z t L; floating conversions too. */
 #include "scan.h"
 #include "scan_integer.h"

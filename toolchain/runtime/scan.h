@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Inside of the scanf family. */
 #ifndef SCAN_H
 #define SCAN_H

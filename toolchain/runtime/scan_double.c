@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* %f, %e, %g, %a of scanf. */
 #include "scan.h"
 #include "stack_room.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* One integer of a width-limited text (C11 7.22.1.4): SCAN_INTEGER(NAME, TYPE) defines a function that reads into TYPE. */
 #ifndef SCAN_INTEGER_H
 #define SCAN_INTEGER_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* %lld and its relatives of scanf. */
 #include "scan.h"
 #include "scan_integer.h"

@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; snprintf, sprintf, vsnprintf, vsprintf (C11 7.21.6): a sink_t (format.h) on the stack around one call of __format.
 ; The last named argument and what follows are on the stack, the named ones before it in registers (abi-elf.md §2.2
 ; rule 5).

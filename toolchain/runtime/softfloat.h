@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Shared by the soft-float sources: bit patterns of IEC 60559 single and double, and the packing contract.
  *
  * An unpacked number is sign, exponent and significand. The significand's leading one is at bit 30 (single) or 62

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* qsort and bsearch (C11 7.22.5). Heap sort: no recursion, no extra memory, O(n log n) in the worst case. */
 #include <stdlib.h>
 

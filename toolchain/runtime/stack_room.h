@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Arrays of variable length on a stack with a limit: -fstack-check looks at a frame before it is entered, but cannot know
  * their sizes. */
 #ifndef STACK_ROOM_H

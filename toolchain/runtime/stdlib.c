@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Integer conversions, arithmetic, random numbers (C11 7.22). */
 #include <ctype.h>
 #include <errno.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Output to stdout and stderr, which both go to __putchar (stdio.h). */
 #include <stdio.h>
 

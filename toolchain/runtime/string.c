@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The string functions that are not worth assembly (C11 7.24). */
 #include <string.h>
 

@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; strlen, strcpy, strcmp, strncmp (C11 7.24).
 
         .section .text._strlen,code

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* strtod, atof (C11 7.22.1.3): the double nearest to the number in the text, ties to even.
  *
  * Up to 15 digits and powers of ten up to 22 are one exact multiplication or division. Any other number is compared, as an

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Calendar arithmetic of time.h in the proleptic Gregorian calendar; no time zones. */
 #include <time.h>
 

@@ -18,19 +18,12 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
+from emu.places import native_code
+
 CHECKSUM_BYTES: Final = 32
 SHELVES: Final = 256
 LIMIT_BYTES: Final = 128 << 20
 """Space for all objects, some 25,000 of them: they take 5 kB on average, 55 kB at most."""
-
-
-def folder() -> Path:
-    """Where objects are kept: `$OPENSWARM_CACHE`, else the user's cache folder (XDG Base Directory)."""
-    own = os.environ.get("OPENSWARM_CACHE")
-    if own:
-        return Path(own) / "jit"
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "openswarm" / "jit"
 
 
 @cache
@@ -50,7 +43,7 @@ class ObjectCache:
     """Objects on disk by key. A folder that cannot be written only costs speed: objects are then not kept."""
 
     def __init__(self, where: Path | None = None, limit: int = LIMIT_BYTES) -> None:
-        self.where: Final = where if where is not None else folder()
+        self.where: Final = where if where is not None else native_code()
         self.limit: Final = limit
         """Bytes that all objects together may take."""
         self.hits = 0

@@ -24,8 +24,9 @@ from pathlib import Path
 from threading import RLock
 from typing import Any, Final
 
-from emu.dspic30f.jit.cache import ObjectCache, folder
+from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.worker import REFUSED, REPLY, REQUEST, Backend
+from emu.places import native_code
 
 
 @dataclass(slots=True)
@@ -64,7 +65,7 @@ def _shared(_where: Path) -> Compiler:
 
 def shared_compiler() -> Compiler:
     """The compiler all machines of this process use: one compile process, one cache."""
-    return _shared(folder())
+    return _shared(native_code())
 
 
 class Compiler:

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a board provides to the kernel: contract here, code in board/<robot>/. */
 #ifndef HAL_BOARD_H
 #define HAL_BOARD_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What every port and the kernel ask of the compiler: GCC, clang, XC16. A port on another one brings its own. */
 #ifndef HAL_COMPILER_H
 #define HAL_COMPILER_H

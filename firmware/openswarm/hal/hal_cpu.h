@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a CPU port provides: contract here, code in port/<cpu>/. hal_port.h of the port defines the types, and those
  * functions of this list that are worth inlining. docs/porting.md walks through the list.
  *

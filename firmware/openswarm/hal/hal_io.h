@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lower layers of the devices: contract here, code in board/<robot>/. What the lower layer calls back is in io/io.h. */
 #ifndef HAL_IO_H
 #define HAL_IO_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* OpenSwarm: public interface of the kernel.
  *
  * Threads are preempted every 10 ms. Event handlers run to completion between two threads, on the kernel stack, and

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Spellings of the original repository and of the paper's Listing 1, for sources written against them. */
 #ifndef OPENSWARM_COMPAT_H
 #define OPENSWARM_COMPAT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Limits of the kernel, in bytes unless said otherwise. Each may be overridden with -D. */
 #ifndef OPENSWARM_CONFIG_H
 #define OPENSWARM_CONFIG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Interrupts of the application's own: a function in C at a chosen level, without assembly.
  *
  *     static void on_button(void) { Sys_Send_IntEvent(PRESSED, 1); }

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* OpenSwarm devices: events in and out, and the processors that can be exchanged at run time.
  *
  * A device has a lower layer (hal_*.h, fulfilled by the board) and a processor between it and the events:

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How to write a scheduler: one function that picks from the ring of ready threads. */
 #ifndef OPENSWARM_SCHEDULER_H
 #define OPENSWARM_SCHEDULER_H

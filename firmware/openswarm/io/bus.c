@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Who uses a bus (bus.h). */
 #include "bus.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A bus that one thread uses at a time, while an interrupt works on a block of the heap that belongs to the bus: never on
  * memory of the thread, which may be killed at any instruction. The block of a killed thread is freed by the next one that
  * takes the bus. */

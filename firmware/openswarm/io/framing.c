@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* COBS framing with a checksum: a Tx/Rx-processor pair.
  *
  * A frame is COBS(message, CRC high byte, CRC low byte) followed by 0. COBS (Cheshire and Baker, IEEE/ACM

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to the device layer and the boards: what a lower layer (hal_io.h) calls, and the life cycle a board
  * drives. */
 #ifndef OS_IO_H

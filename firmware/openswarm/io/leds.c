@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LEDs: no events, direct access. */
 #include "io.h"
 #include "kernel.h"

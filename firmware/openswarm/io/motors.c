@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Motors: speed events through a replaceable post-processor to the stepper driver. */
 #include "io.h"
 #include "kernel.h"

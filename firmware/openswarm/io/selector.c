@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Selector: a position counts once it was read equal for DEBOUNCE_MS (openswarm-original.md §5.7: 25 ms). */
 #include "hal_cpu.h"
 #include "io.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* UARTs: dynamically buffered transmission, back-pressure and replaceable Tx- and Rx-processors.
  *
  * A message is encoded into a chain of small blocks of the heap, which is committed as a whole or not at all. Writers lock

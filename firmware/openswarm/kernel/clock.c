@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* System time, the 1 ms event and everything that waits for a moment.
  *
  * os_clock_tick compares one alarm per tick; the threads behind it are looked at only when it rings, on the kernel

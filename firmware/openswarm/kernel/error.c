@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What went wrong, and how often: the last error, saturating counters, and losses per event. */
 #include "kernel.h"
 

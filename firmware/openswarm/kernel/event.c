@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Events: registration, subscription, sending, delivery and waiting.
  *
  * A message is copied once, when it is sent, and handed to whoever listens when it is delivered: first the handlers in

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What stops a thread or the system: stack overflow, traps, failed assertions. The motors stop first. */
 #include "kernel.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Start-up: a list of what becomes ready, in order. Once per reset: variables begin as zeros. */
 #include "kernel.h"
 

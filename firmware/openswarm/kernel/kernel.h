@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to the kernel, its ports and its schedulers.
  *
  * Who may touch what:

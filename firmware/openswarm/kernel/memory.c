@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* All dynamic memory: without headers, because the kernel knows the size of what it frees, and in bounded time.
  *
  *      os_memory       low            high                          end

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Threads: creation, the ring of ready threads, the blocked list, the end.
  *
  * The ring is circular and singly linked; os_ring is the member before the running one. Turning it by one member ends a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The two ways into the kernel stack, and the schedulers. */
 #include "kernel.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* How much of a stack was never used: stacks are painted before their first use and looked at from the far end.
  *
  * Stacks grow upwards, away from the start of their block, unless the port defines HAL_STACK_GROWS_DOWN. */

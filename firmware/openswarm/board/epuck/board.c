@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The e-puck: clock and configuration words, pins, and the list of its devices. */
 #include "hal_board.h"
 #include "io.h"

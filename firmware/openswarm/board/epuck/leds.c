@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LEDs and selector of the e-puck. */
 #include "io.h"
 #include "pins.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Stepper motors of the e-puck: rates and coils for the interrupt in stepper.S.
  *
  * T3 runs at 9,600 Hz (1,536 Tcy) while a motor turns. v mm/s are v * 1000 / 129 steps/s, that is v * 5 / 6192 steps

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pins of the e-puck, version 1 (epuck.md §2). */
 #ifndef PINS_H
 #define PINS_H

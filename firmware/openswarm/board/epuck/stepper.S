@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 ; Motor tick, 9,600 Hz, IPL 5: advances both step fractions and drives the coils. Calls nothing, masks nothing and
 ; stays on the interrupted stack (12 bytes with the hardware frame). Fields of stepper (motors.c): rate 0, fraction
 ; 2, phases 4, coils 6.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* UART1 (Bluetooth) and UART2 of the e-puck, both 115,200 baud 8N1 (epuck.md §2). The interrupt entries are in
  * vectors.S. */
 #include "io.h"

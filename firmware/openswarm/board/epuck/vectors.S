@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 ; Interrupt entries of the board's devices; isr.inc is the port's.
 #include "hal_limits.h"
 #include "isr.inc"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Clock of the e-puck2, set from the reset handler, and the mode of its pins. */
 #include "kernel.h"
 #include "pins.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LEDs and selector of the e-puck2. LEDs 1, 3, 5, 7 of the ring are coloured and belong to the radio's CPU: dark here. */
 #include "io.h"
 #include "pins.h"

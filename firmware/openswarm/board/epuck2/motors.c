@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Stepper motors of the e-puck2 in half-steps, from TIM4 at 9,600 Hz, above level device: it never calls the kernel.
  *
  * As on the e-puck 1000 steps are a turn of the wheel and 129 mm/s are 1000 steps/s, that is 2000 half-steps: each tick

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pins of the e-puck2 as its stock firmware uses them. */
 #ifndef PINS_H
 #define PINS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The registers of the STM32F407 that the board uses (ST, RM0090). */
 #ifndef STM32F407_H
 #define STM32F407_H

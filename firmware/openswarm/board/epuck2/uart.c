@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* USART3 of the e-puck2, 115,200 baud 8N1: the line to outside and to the radio's CPU. */
 #include "io.h"
 #include "kernel.h"

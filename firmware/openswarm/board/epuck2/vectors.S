@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 @ Vector table of the STM32F407: the kernel's exceptions, then the interrupts the board uses. Another interrupt gets an
 @ entry by a line "entry NUMBER, handler", in increasing order.
 #include "hal_limits.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The e-puck's devices on a host: UART1 is standard output, motors and LEDs remember what they were told
  * (host_board.h). Works with every port that runs on a host. */
 #include "board.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What tests may do to, and see of, the host board. */
 #ifndef HOST_BOARD_H
 #define HOST_BOARD_H

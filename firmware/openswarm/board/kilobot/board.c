@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The Kilobot: pins and the list of its devices. Pins and channels are those of kilolib (README.md). */
 #include "hal_board.h"
 #include "io.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The Kilobot's one LED as three: 0 red, 1 green, 2 blue; SYS_LED_BODY is all of them. Other numbers are dark. */
 #include "io.h"
 #include "pins.h"

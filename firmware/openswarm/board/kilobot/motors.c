@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Vibration motors of the Kilobot: T2, phase-correct PWM with prescaler 8 on OC2A and OC2B, as kilolib drives them.
  *
  * A Kilobot slides; it knows no speed. The duty at which it goes straight is calibrated for each robot and kept in EEPROM.

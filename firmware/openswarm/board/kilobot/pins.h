@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Pins of the Kilobot as kilolib uses them. */
 #ifndef PINS_H
 #define PINS_H

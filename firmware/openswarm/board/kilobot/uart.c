@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* USART0 of the Kilobot, 38,400 baud 8N1. On the robot PD1 is the debug output and PD0 the charger's pin: bytes come in
  * only where something else drives PD0. */
 #include "io.h"

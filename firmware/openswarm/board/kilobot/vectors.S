@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 ; Interrupt entries of the Kilobot's devices (port/avr/isr.inc).
 #define __SFR_OFFSET 0
 #include <avr/io.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Proximity, accelerometer and microphones from one stream of scans: the emitters of one pair of sensors are dark in one
  * scan and lit in the next, so the difference is free of ambient light. */
 #include "analog_parts.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Everything behind the analog converter: proximity, accelerometer, microphones. Each has a pre-processor between what the
  * converter measured and the event, to be exchanged at run time; NULL restores the default. */
 #ifndef ANALOG_H

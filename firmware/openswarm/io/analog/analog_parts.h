@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Private to this folder: what the stream of scans is made of. */
 #ifndef ANALOG_PARTS_H
 #define ANALOG_PARTS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Accelerometer: the last measurement by call, means as events. */
 #include "analog_parts.h"
 #include "kernel.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Proximity: reflections without ambient light, as distances. */
 #include "analog_parts.h"
 #include "hal_cpu.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Microphones: the last sample by call, loudness as events. */
 #include "analog_parts.h"
 #include "hal_cpu.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Battery (battery.h). */
 #include "battery.h"
 

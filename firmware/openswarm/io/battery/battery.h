@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Battery: the comparator that goes low below 3.4 V (epuck.md §2). */
 #ifndef BATTERY_H
 #define BATTERY_H

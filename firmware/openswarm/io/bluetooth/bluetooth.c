@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Bluetooth: commands and events as lines of text (bluetooth.h). */
 #include "bluetooth.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Text protocol on UART1, which is the Bluetooth link: lines of text become events, and events lines of text.
  *
  * A line ends with CR or LF and has at most SYS_UART_RX - 1 characters; longer ones are dropped whole. Commands are those of

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lines of text as messages of UART1. */
 #include "bluetooth.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Numbers as text, both ways, in a few bytes of stack. Private to this folder. */
 #ifndef BLUETOOTH_TEXT_H
 #define BLUETOOTH_TEXT_H

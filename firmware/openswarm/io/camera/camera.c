@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Camera: the capture's interrupt announces a frame, a handler on the kernel stack processes it and orders the next. */
 #include "camera.h"
 

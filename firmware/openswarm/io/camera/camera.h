@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Camera device: frames, a pre-processor that can be exchanged, and the one-pixel sensor as its default. */
 #ifndef CAMERA_H
 #define CAMERA_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* 24 pixels vote by the nearest of four colours (openswarm-original.md §8, revision A). */
 #include "line_of_sight.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The line-of-sight sensor: one colour for what stands in front of the robot. Plain C99, integers only; knows neither
  * kernel nor robot. */
 #ifndef LINE_OF_SIGHT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* I2C: one transfer at a time, stepped by the interrupt on the bus's own block, guarded by a time-out. */
 #include "i2c.h"
 

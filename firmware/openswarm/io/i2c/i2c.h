@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* I2C for threads: the interrupt does the transfer, the thread sleeps. */
 #ifndef I2C_H
 #define I2C_H

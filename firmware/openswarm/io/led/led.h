@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LEDs by event: SYS_IO_LED. Sys_Set_LED and Sys_Toggle_LED (openswarm_io.h) stay the direct way. */
 #ifndef LED_H
 #define LED_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* LEDs: orders through a post-processor to the lower layer. */
 #include "kernel.h"
 #include "led.h"

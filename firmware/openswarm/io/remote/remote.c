@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* RC-5 from edges (epuck.md §6). Every bit has an edge in its middle: falling is 1, rising 0. Edges between two bits come
  * half a bit later and say nothing, so only the distance to the last middle matters. */
 #include "remote.h"

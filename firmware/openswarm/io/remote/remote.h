@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Infrared remote control: SYS_IO_REMOTECONTROL, once per key press, however long the key is held. */
 #ifndef REMOTE_H
 #define REMOTE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SPI: one transfer at a time, byte by byte from the interrupt on the bus's own block. */
 #include "spi.h"
 

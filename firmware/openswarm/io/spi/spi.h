@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SPI master for threads: the interrupt exchanges the bytes, the thread sleeps. */
 #ifndef SPI_H
 #define SPI_H

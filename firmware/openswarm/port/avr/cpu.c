@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* AVR port of hal_cpu.h: timers, first frames. The rest is in switch.S and hal_port.h. */
 #include "kernel.h"
 

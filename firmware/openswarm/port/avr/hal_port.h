@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* AVR: the level is two bits. "Open", in GPIOR0: threads may be switched; the slice interrupt and device interrupts test it
  * when they would switch, and note the end of the slice in "due" if it is clear. I, in SREG: clear = level device.
  * GPIOR0 is changed by SBI and CBI, one instruction each, so no bit of it needs a lock. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 ; Context switch, idle and entry of interrupts to the kernel stack, for avr-gcc's assembler. Interrupts do not nest.
 ;
 ; A thread that does not run has on its stack, from the top: what brought it here, then what leave_thread saved.

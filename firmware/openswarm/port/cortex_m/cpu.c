@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Cortex-M port of hal_cpu.h: clock, first frames, faults. The switch is in switch.S, the levels in hal_port.h. */
 #include "kernel.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sizes on a Cortex-M4F, bytes. Also read by switch.S and the boards' linker scripts. */
 #ifndef HAL_LIMITS_H
 #define HAL_LIMITS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Cortex-M: the level is BASEPRI or the running exception. Threads run on the process stack; PendSV, the lowest exception,
  * is level slice and runs scheduler and handlers on the main stack; interrupts from DEVICE to below PendSV may call
  * the kernel, those above never. Only priorities with a low nibble of 0 exist on chips with four bits. */

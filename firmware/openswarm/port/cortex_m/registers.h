@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Registers every Cortex-M4 has (ARMv7-M architecture reference manual, B3). Also read by switch.S. */
 #ifndef REGISTERS_H
 #define REGISTERS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 @ Context switch and reset of a Cortex-M4F.
 @
 @ A thread that does not run has on its process stack, from the top: the hardware's frame (32 bytes, 104 if the thread has

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* dsPIC30F: what openswarm_interrupt.h is made of. */
 #ifndef HAL_INTERRUPT_H
 #define HAL_INTERRUPT_H

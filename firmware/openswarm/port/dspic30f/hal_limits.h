@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sizes on the dsPIC30F6014A, bytes. Also read by switch.S. */
 #ifndef HAL_LIMITS_H
 #define HAL_LIMITS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* dsPIC30F: the level is the CPU's interrupt priority (IPL, SR<7:5>). 0 thread, 1 slice and kernel stack, 4 devices;
  * 5 is the stepper and 6 the camera, which never call the kernel and are masked by nothing but idle (kernel level 4
  * only). */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 ; Context switch, entry of interrupts to the kernel stack, and traps, for pic30-as.
 ;
 ; Two kinds of frame lie on the stack of a thread that does not run, each under the address of the code that resumes it:

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* POSIX port of hal_cpu.h. Every thread, and the kernel stack, is a fiber; the level is a variable; interrupts wait in
  * pending flags and are taken when hal_unlock() or their arrival finds the level low enough. */
 #include "fiber.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Fibers on ucontext, with the annotations the address sanitizer needs to follow a stack change. */
 #include "fiber.h"
 

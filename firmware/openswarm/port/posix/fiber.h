@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A host stack with a context on it, known to the address sanitizer. */
 #ifndef FIBER_H
 #define FIBER_H

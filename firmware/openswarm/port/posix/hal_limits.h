@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Sizes on a host. Thread stacks are host stacks of HOST_STACK bytes beside the heap; what the kernel's heap holds for
  * a thread is only nominal. */
 #ifndef HAL_LIMITS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* POSIX: levels are a variable, interrupts are signals or, for tests, calls at chosen points (host.h). */
 #ifndef HAL_PORT_H
 #define HAL_PORT_H

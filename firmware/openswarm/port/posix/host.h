@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What the POSIX port offers to tests, benches and the host board, beside the HAL.
  *
  * Two kinds of time. Real: a 1 ms interval timer raises SIGALRM. Virtual (host_use_virtual_time): the clock moves 1 ms

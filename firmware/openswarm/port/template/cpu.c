@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Template of a port: the smallest fulfilment of hal/hal_cpu.h, on POSIX contexts instead of a CPU.
  *
  * A real port replaces, in this order: levels (interrupt mask), clock and slice timer, first frame, switch, idle.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Copy this folder to port/<your cpu>/ and fill it in; docs/porting.md explains each step. As it stands it runs on a
  * host and passes the conformance suite, so that every function can be replaced and tested one by one. */
 #ifndef HAL_LIMITS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The part of the port that the kernel may inline; contract in hal/hal_cpu.h. */
 #ifndef HAL_PORT_H
 #define HAL_PORT_H

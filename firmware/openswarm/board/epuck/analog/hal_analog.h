@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lower layer of the analog inputs: one scan after the other, a pair of emitters dark, then lit. */
 #ifndef HAL_ANALOG_H
 #define HAL_ANALOG_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* BATT_LOW on RF1: 1 = ok (epuck.md §2). */
 #include "hal_battery.h"
 #include "pins.h"

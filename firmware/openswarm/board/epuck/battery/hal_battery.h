@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lower layer of the battery's comparator. */
 #ifndef HAL_BATTERY_H
 #define HAL_BATTERY_H

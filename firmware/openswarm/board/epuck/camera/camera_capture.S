@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 ; Line capture at IPL 6: PUSH.S, no pushes, calls nothing, knows no kernel.
 ;
 ; The sensor puts byte k of a line on RD8-RD15 from 8 k - 4 to 8 k + 4 Tcy behind the rise of HREF. The first read is the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The camera's interrupt into the kernel: OC8, a vector nobody else uses, at IPL 4 (kernel.md §4). */
 #include "hal_camera.h"
 #include "i2c_master.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Programs the image sensor for the window of camera_sensor.h and arms the capture. */
 #include "camera_sensor.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The camera of the e-puck as its programs see it: one window, frame by frame. Knows no kernel.
  *
  * 160 x 160 sensor pixels in the centre of 640 x 480, every eighth of them: 20 x 20 pixels RGB565, high byte first

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Interrupt of the I2C master. */
 #ifndef HAL_I2C_H
 #define HAL_I2C_H

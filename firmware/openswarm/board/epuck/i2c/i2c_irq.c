@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* I2C master interrupt at IPL 4. */
 #include "hal_i2c.h"
 #include "openswarm_interrupt.h"

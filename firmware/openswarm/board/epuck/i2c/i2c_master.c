@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* I2C master (dspic30f6014a.md §11): one step per MI2CIF. */
 #include "i2c_master.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* I2C master of the e-puck, steered by its interrupt flag; knows no kernel. RG3 is SDA, RG2 is SCL (epuck.md §2). */
 #ifndef I2C_MASTER_H
 #define I2C_MASTER_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lower layer of the remote control: edges of the receiver's line with their time. */
 #ifndef HAL_REMOTE_H
 #define HAL_REMOTE_H

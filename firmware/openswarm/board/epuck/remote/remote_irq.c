@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Remote control receiver on RF6/INT0, idle high (epuck.md §2): both edges, timed by the 1 ms clock T1. */
 #include "hal_remote.h"
 #include "kernel.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Lower layer of the SPI master. */
 #ifndef HAL_SPI_H
 #define HAL_SPI_H

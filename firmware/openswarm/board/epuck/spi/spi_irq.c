@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* SPI2 of the e-puck at 921.6 kHz for a turret: SCK2 RG6, SDI2 RG7, SDO2 RG8, and RG9 as select (dspic30f6014a.md §12). The
  * selector has the same pins (epuck.md §2) and reads whatever the bus leaves on them. */
 #include "hal_spi.h"

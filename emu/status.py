@@ -1,0 +1,33 @@
+"""The exit statuses of every command of the project. A leaf: it imports nothing of ours; the table in the documents is
+`table()`. 124 and 130 are what `timeout` of GNU coreutils and shells use for the same."""
+
+from __future__ import annotations
+
+from typing import Final
+
+DONE: Final = 0
+FAULT: Final = 1
+BAD_INPUT: Final = 2
+CANNOT_GO_ON: Final = 3
+LIMIT_AS_STATUS: Final = 124
+FAULT_AS_STATUS: Final = 125
+BAD_INPUT_AS_STATUS: Final = 126
+INTERRUPTED: Final = 130
+
+MEANING: Final = {
+    DONE: "done; for `emu run` also: the limit of `--seconds` or `--cycles` was reached",
+    FAULT: "what was looked at is wrong: a fault of the firmware, a robot that something happened to, errors in the C "
+    "source, a number over its baseline or limit, something that `openswarm doctor` misses and that is needed",
+    BAD_INPUT: "bad input or usage, or an extra that is not installed; the message says what was expected",
+    CANNOT_GO_ON: "`arena`: cluster lost, or folder in use by another run; finished trials are kept",
+    LIMIT_AS_STATUS: "`emu run --exit-code`: the limit was reached before the firmware ended",
+    FAULT_AS_STATUS: "`emu run --exit-code`: a fault of the firmware",
+    BAD_INPUT_AS_STATUS: "`emu run --exit-code`: bad input or usage",
+    INTERRUPTED: "interrupted from the keyboard",
+}
+
+
+def table() -> str:
+    """Every status with its meaning, as a table in Markdown."""
+    rows = [f"| {status} | {meaning} |" for status, meaning in MEANING.items()]
+    return "\n".join(["| status | meaning |", "|---:|---|", *rows])

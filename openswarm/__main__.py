@@ -1,0 +1,7 @@
+"""`python -m openswarm`."""
+
+import sys
+
+from openswarm.cli import main
+
+sys.exit(main())

@@ -1,0 +1,58 @@
+"""`openswarm clean`: empties the cache. Only what these tools have put there themselves goes."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from emu import places
+from emu.status import DONE
+from openswarm.commands import made_parser
+
+KINDS: Final = {
+    "native code": places.native_code,
+    "run-time libraries": places.runtime_libraries,
+    "images": places.images,
+}
+DESCRIPTION: Final = """\
+Empty the cache: native code the emulator has made, the compiler's run-time library, images that `arena` has built.
+All of it is made again when it is needed. The cache is $OPENSWARM_CACHE, else `openswarm` in the user's cache folder
+($XDG_CACHE_HOME or ~/.cache); other files in that folder stay.
+
+Exit status: 0 done, 2 a file could not be removed."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    made = made_parser("clean", DESCRIPTION, "openswarm clean --dry-run")
+    made.add_argument("--cache", type=Path, metavar="DIR", help="empty this cache instead")
+    made.add_argument("--dry-run", action="store_true", help="only tell what would go")
+    made.add_argument("--json", action="store_true", help="files and bytes by kind, for scripts")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says. Raises OSError for what cannot be removed."""
+    root: Path = options.cache if options.cache is not None else places.cache()
+    told = {}
+    for kind, where in KINDS.items():
+        folder = root / where().name
+        sizes = [path.lstat().st_size for path in _files(folder)]
+        told[kind] = {"files": len(sizes), "bytes": sum(sizes)}
+        if folder.is_dir() and not options.dry_run:
+            shutil.rmtree(folder)
+    if options.json:
+        print(json.dumps({"cache": str(root), "removed": not options.dry_run, "kinds": told}, indent=1))
+    else:
+        for kind, counts in told.items():
+            print(f"{kind:20}{counts['files']:8,} files{counts['bytes'] / 1e6:10.1f} MB")
+        print(f"{'would be removed from' if options.dry_run else 'removed from'} {root}")
+    return DONE
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    return (path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())

@@ -1,0 +1,24 @@
+"""`openswarm completion`: what makes a shell complete the commands and their options."""
+
+from __future__ import annotations
+
+import argparse
+
+from emu.completion import SHELLS, description, script
+from emu.status import DONE
+from openswarm.commands import made_parser
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    made = made_parser("completion", description("openswarm"), "openswarm completion bash")
+    made.add_argument("shell", choices=SHELLS, help="which shell")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status 0."""
+    from openswarm.cli import COMMANDS, command
+
+    print(script("openswarm", {name: (command(name).parser(), text) for name, text in COMMANDS.items()}, options.shell))
+    return DONE

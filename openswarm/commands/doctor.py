@@ -1,0 +1,169 @@
+"""`openswarm doctor`: what is installed, what is missing and what that disables."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from typing import Final
+
+from emu import places
+from emu.status import DONE, FAULT
+from openswarm.commands import made_parser
+
+DESCRIPTION: Final = """\
+Tell what is installed, what is missing and what that disables. With --try also compile a program and run it.
+
+Exit status: 0 what every project needs is there, 1 it is not."""
+
+EXTRAS: Final = {
+    "arena": "`arena`: several robots in one world, experiments, figures",
+    "film": "`arena replay --export FILE.mp4` where there is no ffmpeg",
+    "cluster": "`arena run --scheduler`: trials on a Dask cluster",
+    "learning": "`arena.env`: the PettingZoo interface",
+    "test": "this project's own tests",
+    "docs": "this project's documentation site",
+}
+"""What stops working without an extra."""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A program of the system: its names, the Debian package it is in, and what needs it."""
+
+    names: tuple[str, ...]
+    package: str
+    purpose: str
+    is_needed: bool = False
+
+
+PROGRAMS: Final = (
+    Program(("make",), "make", "building applications with the kernel", is_needed=True),
+    Program(("cmake",), "cmake", "projects built with CMake"),
+    Program(("gcc",), "gcc", "the kernel on this host: make TARGET=posix"),
+    Program(("avr-gcc",), "gcc-avr", "the kernel on a Kilobot: make PORT=avr (also avr-libc)"),
+    Program(("arm-none-eabi-gcc",), "gcc-arm-none-eabi", "an e-puck2: PORT=cortex_m (also libnewlib-arm-none-eabi)"),
+    Program(("xc16-gcc",), "", "make TOOLCHAIN=xc16, Microchip's compiler; not in Debian"),
+    Program(("ffmpeg",), "ffmpeg", "films as MP4 without the extra `film`"),
+    Program(("chromium", "chromium-browser", "google-chrome"), "chromium", "tests of the pages people look at"),
+    Program(("gtkwave",), "gtkwave", "looking at waveforms of `emu run --vcd`"),
+    Program(("genhtml",), "lcov", "coverage as pages, from `emu coverage --lcov`"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the report."""
+
+    kind: str
+    name: str
+    found: str
+    """Version or place; empty if it is missing."""
+    purpose: str
+    remedy: str
+    is_needed: bool
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    made = made_parser("doctor", DESCRIPTION, "openswarm doctor --json")
+    made.add_argument("--try", dest="tries", action="store_true", help="compile and run a program (some seconds)")
+    made.add_argument("--json", action="store_true", help="the findings as data")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says."""
+    findings = [*packages(), *programs(), cache()]
+    if options.tries:
+        findings.append(trial())
+    is_whole = all(one.found for one in findings if one.is_needed)
+    if options.json:
+        about = {
+            "openswarm": version("openswarm"),
+            "python": platform.python_version(),
+            "checkout": places.in_checkout(),
+            "firmware": str(places.firmware()),
+            "complete": is_whole,
+        }
+        print(json.dumps(about | {"findings": [asdict(one) for one in findings]}, indent=1))
+    else:
+        where = "a checkout" if places.in_checkout() else "an installed package"
+        print(f"openswarm {version('openswarm')} from {where}, Python {platform.python_version()}")
+        for one in findings:
+            print(told(one))
+    return DONE if is_whole else FAULT
+
+
+def told(one: Finding) -> str:
+    """A finding as one or two lines."""
+    if one.found:
+        return f"  ok       {one.name:18} {one.found}"
+    lost = f"needed for {one.purpose}" if one.is_needed else f"without it: no {one.purpose}"
+    remedy = f"\n{'':30}{one.remedy}" if one.remedy else ""
+    return f"  {'MISSING' if one.is_needed else 'absent':8} {one.name:18} {lost}{remedy}"
+
+
+def packages() -> Iterator[Finding]:
+    """The packages of Python: each that is needed, and each extra as a whole."""
+    wanted: dict[str, list[str]] = {}
+    for line in requires("openswarm") or ():
+        name = re.match(r"[\w.-]+", line)
+        extra = re.search(r"extra *== *[\"'](\w+)", line)
+        if name:
+            wanted.setdefault(extra[1] if extra else "", []).append(name[0])
+    for one in wanted.pop("", []):
+        yield Finding("package", one, _version(one), "everything", f"pip install {one}", True)
+    yield Finding("package", "pytest", _version("pytest"), "`make test` in a project", "pip install pytest", False)
+    for group, names in wanted.items():
+        lacking = [one for one in names if not _version(one)]
+        found = "" if lacking else ", ".join(f"{one} {_version(one)}" for one in names)
+        remedy = f"lacks {', '.join(lacking)}: pip install 'openswarm[{group}]'"
+        yield Finding("extra", f"[{group}]", found, EXTRAS.get(group, group), remedy, False)
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def programs() -> Iterator[Finding]:
+    """Programs of the system."""
+    for one in PROGRAMS:
+        found = next((place for name in one.names if (place := shutil.which(name))), "")
+        remedy = f"Debian package {one.package}" if one.package else ""
+        yield Finding("program", one.names[0], found, one.purpose, remedy, one.is_needed)
+
+
+def cache() -> Finding:
+    """Whether the cache can be written; without it everything works, slower."""
+    folder = places.cache()
+    there = next(one for one in (folder, *folder.parents) if one.exists())
+    is_open = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+    return Finding("cache", "cache", str(folder) if is_open else "", f"keeping compiled code in {folder}",
+                   "set OPENSWARM_CACHE to a folder that can be written", False)  # fmt: skip
+
+
+def trial() -> Finding:
+    """One program through compiler, linker and emulator."""
+    with tempfile.TemporaryDirectory(prefix="openswarm-doctor-") as name:
+        source, image = Path(name) / "main.c", Path(name) / "main.elf"
+        source.write_text('#include <stdio.h>\nint main(void) { printf("%d", 6 * 7); return 3; }\n')
+        steps = (["toolchain", "cc", "-Os", str(source), "-o", str(image)], ["emu", "run", str(image), "--exit-code"])
+        for module, *words in steps:
+            done = subprocess.run([sys.executable, "-m", module, *words], capture_output=True, text=True, check=False)
+        works = done.returncode == 3 and done.stdout == "42"
+        said = "" if works else (done.stderr.strip().splitlines() or ["no message"])[-1]
+    return Finding("trial", "compile and run", "works" if works else "", "everything", said, True)

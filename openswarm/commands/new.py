@@ -1,0 +1,70 @@
+"""`openswarm new`: a project that builds with make and with CMake, runs on the emulator and has a test."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from emu.status import DONE
+from openswarm.commands import made_parser
+
+TEMPLATE: Final = Path(__file__).resolve().parents[1] / "template"
+HIDDEN: Final = {"vscode": ".vscode", "gitignore": ".gitignore"}
+"""Names of the template that begin with a point in a project: build tools leave hidden files out of packages."""
+NAME: Final = "@PROJECT@"
+DESCRIPTION: Final = """\
+Set up a project in a new folder: an application of OpenSwarm in src/, a Makefile, CMakeLists.txt, a test that runs the
+firmware on the emulated e-puck, settings and tasks for VS Code. `make` builds it,
+`make run` runs it, `make test` tests it (with pytest).
+
+Exit status: 0 done, 2 the folder exists or cannot be made."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The options of the command."""
+    made = made_parser("new", DESCRIPTION, "openswarm new myrobot")
+    made.add_argument("folder", type=Path, help="where; its last part is the project's name (a-z, 0-9, - and _)")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status 0. Raises ValueError for a name that cannot be one, OSError if the folder cannot be made."""
+    folder: Path = options.folder
+    name = folder.resolve().name
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
+        raise ValueError(f"{name!r} cannot be a project's name: expected a letter, then letters, digits, - and _")
+    if folder.exists() or folder.is_symlink():
+        raise ValueError(f"{folder} exists already")
+    if re.search(r"\s", str(folder.resolve())):
+        raise ValueError(f"{folder.resolve()}: make cannot work in a folder with a space in its path")
+    create(folder, name)
+    print(f"{folder} is ready. Next:\n    cd {folder}\n    make run")
+    return DONE
+
+
+def create(folder: Path, name: str) -> None:
+    """All files of the template with the project's name in them, or nothing."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=f".{name}.", dir=folder.parent))
+    try:
+        for source in sorted(path for path in TEMPLATE.rglob("*") if path.is_file() and path.suffix != ".pyc"):
+            parts = source.relative_to(TEMPLATE).parts
+            target = scratch.joinpath(*(HIDDEN.get(part, part).replace("PROJECT", name) for part in parts))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(source.read_text(encoding="utf-8").replace(NAME, name), encoding="utf-8")
+        scratch.chmod(0o777 & ~_umask())
+        scratch.rename(folder)
+    except BaseException:
+        shutil.rmtree(scratch, ignore_errors=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,136 @@
+"""`openswarm`, and what the four command lines have in common: help with examples, versions, completion, statuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from importlib.metadata import requires, version
+from pathlib import Path
+
+import pytest
+
+from emu import places, status
+from openswarm.cli import COMMANDS, command, main
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
+
+
+def ran(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A command line in a process of its own."""
+    return subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, timeout=120, check=False,
+                          cwd=ROOT, env=os.environ | environment)  # fmt: skip
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_program_tells_its_version_and_helps_with_an_example(program):
+    assert ran(program, "--version").stdout == f"{program} {version('openswarm')}\n"
+    told = ran(program, "--help")
+    assert (told.returncode, "example: " in told.stdout) == (0, True)
+    assert ran(program, "no-such-command").returncode == status.BAD_INPUT
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_program_completes_itself_in_bash(program, tmp_path):
+    """The script is asked what bash would ask it: which words may follow the program's name."""
+    script = ran(program, "completion", "bash").stdout
+    (tmp_path / "script").write_text(script)
+    asked = f'source {tmp_path}/script; COMP_WORDS=({program} comp); COMP_CWORD=1; $(complete -p {program} |' \
+            f" sed 's/.*-F \\([^ ]*\\).*/\\1/'); echo \"${{COMPREPLY[@]}}\""  # fmt: skip
+    done = subprocess.run(["bash", "-c", asked], capture_output=True, text=True, check=False)
+    assert "completion" in done.stdout.split(), (done.stdout, done.stderr)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself(name):
+    told = ran("openswarm", name, "--help")
+    assert told.returncode == 0
+    assert f"example: openswarm {name}" in told.stdout or "$(openswarm path" in told.stdout
+    assert command(name).parser().prog == f"openswarm {name}"
+
+
+def test_a_reader_that_goes_away_is_no_failure():
+    pipe = f"{sys.executable} -m openswarm completion bash | head -c 1"
+    done = subprocess.run(pipe, shell=True, cwd=ROOT, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_cache_is_where_the_environment_says(monkeypatch, tmp_path):
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path / "own"))
+    assert places.native_code() == tmp_path / "own" / "jit"
+    monkeypatch.delenv("OPENSWARM_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert places.cache() == tmp_path / "xdg" / "openswarm"
+
+
+def test_clean_takes_what_is_ours_and_nothing_else(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path))
+    for folder, size in ((places.native_code() / "ab", 10), (places.images() / "hello", 20), (tmp_path / "mine", 5)):
+        folder.mkdir(parents=True)
+        (folder / "file").write_bytes(bytes(size))
+    assert main(["clean", "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["kinds"]["native code"] == {"files": 1, "bytes": 10}
+    assert places.native_code().exists()
+    assert main(["clean"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    assert main(["clean", "--cache", str(tmp_path / "nowhere")]) == 0
+
+
+def test_doctor_names_what_a_missing_program_disables(tmp_path):
+    """With an empty PATH every program is missing; only make is needed."""
+    done = ran("openswarm", "doctor", "--json", PATH=str(tmp_path))
+    told = json.loads(done.stdout)
+    assert done.returncode == status.FAULT
+    lacking = {one["name"]: one for one in told["findings"] if not one["found"]}
+    assert lacking["make"]["is_needed"]
+    assert lacking["cmake"]["remedy"] == "Debian package cmake"
+    assert not any(one["found"] for one in told["findings"] if one["kind"] == "program")
+    packages = {one["name"] for one in told["findings"] if one["kind"] == "package"}
+    assert packages == {re.match(r"[\w-]+", line)[0] for line in requires("openswarm") if "extra ==" not in line} | {
+        "pytest"
+    }
+
+
+def test_doctor_tries_compiler_and_emulator():
+    done = ran("openswarm", "doctor", "--try")
+    assert done.returncode == 0, done.stdout
+    assert re.search(r"ok +compile and run +works", done.stdout)
+
+
+def test_the_arena_without_its_extra_names_it(tmp_path):
+    """One line and status 2, whichever of its packages is not there."""
+    for package in ("pymunk", "scipy"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / f"{package}.py").write_text(f"raise ModuleNotFoundError(name={package!r})\n")
+        done = ran("arena", "compare", "x", "y", PYTHONPATH=str(tmp_path / package))
+        assert done.returncode == status.BAD_INPUT
+        assert done.stderr == f"arena: {package} is not installed: pip install 'openswarm[arena]'\n"
+
+
+def test_the_archiver_does_what_cmake_asks(tmp_path):
+    """`ar qc` and `ranlib`; a member that is appended twice is there twice, as with GNU ar."""
+    (tmp_path / "a.s").write_text(".global _a\n_a: return\n")
+    bin_folder = Path(sys.executable).parent
+    for words in ("as a.s -o a.o", "ar qc x.a a.o", "ar q x.a a.o", "ranlib x.a"):
+        name, *rest = words.split()
+        done = subprocess.run(
+            [bin_folder / f"dspic-{name}", *rest], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+    done = subprocess.run(
+        [bin_folder / "dspic-ar", "t", "x.a"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.split() == ["a.o", "a.o"]
+    told = subprocess.run([bin_folder / "dspic-nm", "--version"], capture_output=True, text=True, check=False)
+    assert told.stdout == f"dspic-nm (openswarm) {version('openswarm')}\n"
+
+
+def test_every_file_that_users_link_names_its_licence():
+    for folder in ("firmware/openswarm", "toolchain/runtime", "toolchain/include"):
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in (".c", ".h", ".S", ".s", ".inc", ".ld"):
+                assert "SPDX-License-Identifier: MIT" in path.read_text(encoding="utf-8").splitlines()[0], path

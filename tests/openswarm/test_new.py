@@ -1,0 +1,92 @@
+"""`openswarm new`: the project builds with make and with CMake, and its own test fails when the firmware is wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from openswarm.cli import main
+
+BIN = Path(sys.executable).parent
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("new") / "my-robot"
+    assert main(["new", str(folder)]) == 0
+    return folder
+
+
+def called(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=500, check=False)
+
+
+def test_it_has_its_name_everywhere_and_no_hole(project):
+    names = {path.relative_to(project).as_posix() for path in project.rglob("*") if path.is_file()}
+    assert {
+        "Makefile",
+        "CMakeLists.txt",
+        "src/main.c",
+        "test/test_my-robot.py",
+        ".vscode/tasks.json",
+        ".gitignore",
+    } <= names
+    assert not [path for path in project.rglob("*") if path.is_file() and "@PROJECT@" in path.read_text()]
+
+
+def test_make_builds_and_its_test_tells_right_from_wrong(project):
+    """A mistake in the C source is shown where VS Code's problem matcher finds it."""
+    done = called(project, "make", "test")
+    assert (done.returncode, "3 passed" in done.stdout) == (0, True), done.stdout + done.stderr
+    source = project / "src" / "main.c"
+    right = source.read_text()
+    source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Sleep(900)"))
+    done = called(project, "make", "test")
+    assert (done.returncode, "1 failed" in done.stdout or "2 failed" in done.stdout) == (2, True), done.stdout
+    source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Slep(1000)"))
+    done = called(project, "make")
+    assert done.returncode == 2
+    task = json.loads((project / ".vscode" / "tasks.json").read_text())["tasks"][0]
+    pattern = re.compile(task["problemMatcher"]["pattern"]["regexp"])
+    errors = [found for line in done.stderr.splitlines() if (found := pattern.match(line)) and found[4] == "error"]
+    assert errors
+    assert (project / errors[0][1]).samefile(source)
+    assert errors[0][2] == "10"
+    source.write_text(right)
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake here (Debian package cmake)")
+def test_cmake_builds_it(project):
+    """Generators get the compiler identified; what comes out says the same as make's."""
+    done = called(project, "cmake", "-B", "build/cmake")
+    assert done.returncode == 0, done.stderr
+    assert (project / "build/cmake/compile_commands.json").exists()
+    done = called(project, "cmake", "--build", "build/cmake", "-j2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    done = called(project, str(BIN / "emu"), "run", "build/cmake/firmware.hex", "--seconds", "1.5")
+    assert done.stdout.splitlines() == ["hello from my-robot"] * 2
+    wrong = project / "CMakeLists.txt"
+    wrong.write_text(wrong.read_text().replace("SOURCES ${sources}", "SOURCES ${sources} DEVICES warp-drive"))
+    done = called(project, "cmake", "-B", "build/cmake")
+    assert "DEVICES warp-drive: neither in" in " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("2fast", "cannot be a project's name"), ("a b/c", "a space in its path"), (".", "name")]
+)
+def test_what_cannot_be_a_project_is_refused(name, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", name]) == 2
+    assert message in capsys.readouterr().err
+    (tmp_path / "there").mkdir()
+    assert main(["new", "there"]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
