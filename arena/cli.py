@@ -65,8 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{name:20} {load_scene(name).description}")
             status = DONE
         elif options.command == "completion":
-            made = {name: make() for name, (make, _) in COMMANDS.items()}
-            print(script("arena", {name: (one, one.description or "") for name, one in made.items()}, options.shell))
+            print(script("arena", {name: (one, one.description or "") for name, one in commands.choices.items()},
+                         options.shell))  # fmt: skip
             status = DONE
         else:
             status = COMMANDS[options.command][1](options)

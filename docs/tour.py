@@ -1,4 +1,4 @@
-"""Runs the commands of the README's tour again and puts their present output behind them: `python docs/tour.py`.
+"""Runs the commands of docs/tour.md again and puts their present output behind them: `python docs/tour.py`.
 
 A block that begins with `$ ` is a session: every line that begins so is a command, run by a shell in the checkout, and
 what follows is its output, both streams. A line `...` stands for what is left out: as many lines are kept before it and
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-README = ROOT / "README.md"
+PAGE = ROOT / "docs" / "tour.md"
 CUT = "..."
 
 
@@ -52,10 +52,10 @@ def replayed(block: str) -> str:
 
 
 def main() -> int:
-    text = README.read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     fresh = re.sub(r"(?<=```\n)(\$ .*?)(?=```)", lambda found: replayed(found[1]), text, flags=re.DOTALL)
     if "--check" not in sys.argv[1:]:
-        README.write_text(fresh, encoding="utf-8")
+        PAGE.write_text(fresh, encoding="utf-8")
     return 0
 
 

@@ -29,5 +29,5 @@ def script(program: str, commands: Mapping[str, tuple[argparse.ArgumentParser, s
     top.add_argument("--version", action="store_true", help="tell the version")
     below = top.add_subparsers(parser_class=argparse.ArgumentParser)
     for name, (one, text) in commands.items():
-        below.add_parser(name, parents=[one], add_help=False, help=text, conflict_handler="resolve")
+        below.add_parser(name, parents=[one], add_help=False, help=text)
     return str(shtab.complete(top, shell=shell))

@@ -22,7 +22,7 @@ def parser() -> argparse.ArgumentParser:
     """The options of the command."""
     texts = "\n".join(f"    {name:10}{text}" for name, (_, text) in PLACES.items())
     made = made_parser("path", f"Print where something is:\n\n{texts}", "make -C $(openswarm path firmware) APP=hello")
-    made.add_argument("what", choices=PLACES, help="what to look for")
+    made.add_argument("what", choices=tuple(PLACES), help="what to look for")
     return made
 
 

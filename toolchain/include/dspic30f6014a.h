@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Registers of the dsPIC30F6014A.
  * Written by `python -m toolchain.device_header` from the chip's register table; do not edit. */
 #ifndef DSPIC30F6014A_H

@@ -1,0 +1,58 @@
+"""The wheel: what is in it, that its bytes repeat, and that a newcomer gets as far as a swarm with it."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "docs"))
+import newcomer  # noqa: E402
+
+pytestmark = pytest.mark.skipif(shutil.which("git") is None, reason="no git here (Debian package git)")
+
+
+def test_the_wheel_holds_everything_and_repeats(tmp_path):
+    """Kernel, headers, run-time library, scenes, template, licence; no build output; twice the same bytes."""
+    wheels = []
+    for name in ("one", "another"):
+        (tmp_path / name).mkdir()
+        wheels.append(newcomer.built_wheel(tmp_path / name))
+    first, second = (hashlib.sha256(wheel.read_bytes()).hexdigest() for wheel in wheels)
+    assert first == second
+    with zipfile.ZipFile(wheels[0]) as wheel:
+        names = set(wheel.namelist())
+        metadata = wheel.read(next(name for name in names if name.endswith("/METADATA"))).decode()
+    tracked = subprocess.run(["git", "ls-files", "firmware"], cwd=ROOT, capture_output=True, text=True, check=True)
+    kernel = {name for name in tracked.stdout.split() if not name.endswith(".gitignore")}
+    assert {f"openswarm/{name}" for name in kernel} == {
+        name for name in names if name.startswith("openswarm/firmware/")
+    }
+    for part in ("emu", "toolchain", "arena", "openswarm"):
+        assert f"{part}/py.typed" in names
+    assert {
+        "arena/scenes/clustering.toml",
+        "toolchain/include/xc.h",
+        "toolchain/runtime/crt0.s",
+        "arena/page.html",
+    } <= names
+    assert {"openswarm/cmake/openswarm.cmake", "openswarm/template/src/main.c", "openswarm/template/gitignore"} <= names
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    assert "License-Expression: MIT" in metadata
+    assert not [
+        name for name in names if "/build/" in name or name.endswith((".elf", ".pyc")) or name.startswith("tests")
+    ]
+
+
+@pytest.mark.timeout(3600)
+def test_the_first_steps_say_what_happens(tmp_path):
+    """docs/first-steps.md, played from the wheel in an empty folder with an empty HOME; nothing lands beside them."""
+    words = [sys.executable, str(ROOT / "docs" / "newcomer.py"), "--check", "--keep", str(tmp_path / "newcomer")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
