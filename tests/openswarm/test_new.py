@@ -80,7 +80,7 @@ def test_cmake_builds_it(project):
 
 
 @pytest.mark.parametrize(
-    ("name", "message"), [("2fast", "cannot be a project's name"), ("a b/c", "a space in its path"), ("_x", "'_x' cannot")]
+    ("name", "message"), [("2fast", "cannot be"), ("a b/c", "a space in its path"), ("_x", "cannot be")]
 )
 def test_what_cannot_be_a_project_is_refused(name, message, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)

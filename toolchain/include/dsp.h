@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Microchip's DSP library for the dsPIC30F: its names, types and Q15 results (16-bit Language Tools Libraries, DS51456).
  * Not here: DCT, DCTIP, CosFactorInit. Every function works with signed fractions, saturating stores, accumulators
  * saturated at 9.31 and convergent rounding; it restores CORCON, PSVPAG and MODCON and leaves the accumulators changed.

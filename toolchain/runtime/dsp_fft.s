@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; dsp.h: fast Fourier transforms of N = 2^log2n complex Q15 values {real, imag}, decimation in frequency, each stage halved:
 ; the result is 1/N of the sum. The data lie in Y RAM, the factors in X RAM or program memory.
 

@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; dsp.h: FIR filters. A FIRStruct is {int numCoeffs; coeffsBase, coeffsEnd; int coeffsPage; delayBase, delayEnd, delay}.
 ; The delay is in Y RAM and circular: its pointer is at the oldest sample, which the next one replaces, and every older
 ; one lies above. Y modulo addressing acts on nothing but the Y reads of MAC; X modulo addressing would also change W8 of

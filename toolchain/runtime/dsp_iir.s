@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; dsp.h: IIR filters. Coefficients are half of what the difference equation says, so that they fit Q15; sums are doubled
 ; when they are stored.
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* dsp.h: inverse of a matrix, by Gauss-Jordan elimination with full pivoting (Golub and Van Loan, Matrix Computations,
  * section 3.4). Work space comes from the caller. */
 #include <dsp.h>

@@ -1,3 +1,4 @@
+; SPDX-License-Identifier: MIT
 ; dsp.h: vectors and matrices of Q15 fractions, 1 element or more. Arguments in W0..., the destination returned in W0.
 ; Each section names the cycles of a call, with the RCALL and the RETURN, for vectors in RAM.
 
