@@ -15,9 +15,10 @@ from firmware.tools.simulated.kilobot import HZ, Kilobot
 from firmware.tools.simulated.machine import NotInstalled, Stopped, pointer, poke_words
 from firmware.tools.simulated.measure import sizes
 from tests.firmware.conftest import FIRMWARE, TARGET_APPS, Build, run_make
+from tests.firmware.test_on_target import run_to
 
 CONFORMS = re.compile(rb"conforms: (\d+) checks")
-CHECKS = 166
+CHECKS = 271
 """Of the conformance suite; a check that is not reached would be missed otherwise."""
 
 
@@ -72,23 +73,47 @@ def test_a_host_conforms(target: str, tmp_path: Path) -> None:
     assert done.returncode == 0
 
 
-def test_the_dspic30f_conforms(image: Build) -> None:
+ON_TARGETS = ("nothing", "clock and PIDs wrap", "earliest deadline first")
+"""What is different from a plain start; the suite itself begins with fixed priorities."""
+NEARLY_ROUND = (("now_ms", 0xFE00), ("newest_pid", 0xFF00))
+"""Words of the kernel that wrap half a second and 256 threads later."""
+
+
+def words_of(case: str) -> tuple[str, ...]:
+    """For `make`."""
+    return ("DEFINES=-DFIRST_SCHEDULER=sys_earliest_deadline",) if "deadline" in case else ()
+
+
+@pytest.mark.parametrize("case", ON_TARGETS)
+def test_the_dspic30f_conforms(image: Build, case: str) -> None:
     """The same text on the emulated e-puck."""
-    machine = emu.load(image("conformance", TARGET_APPS), engine="jit")
+    machine = emu.load(image("conformance", TARGET_APPS, *words_of(case)), engine="jit")
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, _: said.append(byte)
-    machine.run(cycles=5 * 14_745_600)
+    if "wrap" in case:
+        run_to(machine, "main")
+        for name, value in NEARLY_ROUND:
+            machine.poke(name, value)
+    machine.run(cycles=7 * 14_745_600)
     check_conforms(bytes(said))
 
 
-def test_the_kilobot_conforms(tmp_path: Path) -> None:
+@pytest.mark.parametrize("case", ON_TARGETS)
+def test_the_kilobot_conforms(case: str, tmp_path: Path) -> None:
     """The same text on an ATmega328P, where a pointer is two stores."""
-    check_conforms(said_by_kilobot(make("kilobot", "conformance", tmp_path, apps=TARGET_APPS), 6))
+    machine = kilobot(make("kilobot", "conformance", tmp_path, *words_of(case), apps=TARGET_APPS))
+    if "wrap" in case:
+        machine.run_to("main")
+        for name, value in NEARLY_ROUND:
+            poke_words(machine, name, (value,))
+    machine.run(7 * HZ)
+    check_conforms(machine.uart())
 
 
-def test_the_epuck2_conforms(tmp_path: Path) -> None:
+@pytest.mark.parametrize("case", [case for case in ON_TARGETS if "wrap" not in case])
+def test_the_epuck2_conforms(case: str, tmp_path: Path) -> None:
     """The same text on a Cortex-M4 with its FPU and MPU at work."""
-    image = make("epuck2", "conformance", tmp_path, apps=TARGET_APPS)
+    image = make("epuck2", "conformance", tmp_path, *words_of(case), apps=TARGET_APPS)
     check_conforms(said_by_epuck2(image, b" checks"))
 
 

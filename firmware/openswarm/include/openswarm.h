@@ -119,7 +119,7 @@ void Sys_Sleep(uint16 ms);
 /* T with SYS_PERIODIC | until its next release | ~240 + 20 n | 46 | CONTEXT, PROCESS.  True: the deadline was met. */
 bool Sys_Wait_for_Period(void);
 /* MTHI | no | 16 | 4 | none.  Nests. No thread switch and no handler runs until the matching End; a tick that falls
- * inside is taken there. Interrupts stay enabled. */
+ * inside is taken there. Interrupts stay enabled. A section left open ends with its thread, or with the handlers. */
 void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);
 /* MTHI | no | 6 | 4 | none.  In a handler: the interrupted thread; use the pid argument of the handler instead. */

@@ -91,6 +91,7 @@ extern sys_pcb *os_running;   /* &os_system while idle */
 extern sys_pcb os_system;     /* PID 0 */
 extern sys_pcb *os_ring;      /* ring member before the running one (or before the next, if it blocked); NULL = empty */
 extern sys_pcb *os_blocked;   /* in order of blocking */
+extern volatile uint16 critical_depth; /* of the running thread; while os_in_kernel, of the handler that runs */
 extern bool os_eager;         /* a message ends the slice */
 extern volatile bool os_in_kernel; /* handlers, conditions, wake-ups and schedulers are at work on the kernel stack */
 extern sys_statistics os_statistics;

@@ -14,7 +14,7 @@ sys_process_config os_plain;
 sys_pcb **process_scan;
 
 static uint16 newest_pid;
-static volatile uint16 critical_depth;
+volatile uint16 critical_depth;
 static volatile hal_lock_state critical_before;
 
 /* ---- Ring and blocked list: slice locked ---------------------------------------------------------------------- */

@@ -13,6 +13,7 @@ static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
 static void work(void)
 {
     event_deliver_queued();
+    HAL_STORE(critical_depth, 0); /* a section that a handler left open ends with the handlers */
     if (os_pending & OS_ALARM) {
         hal_lock_state lock = hal_lock_devices();
         os_pending &= (uint16)~OS_ALARM;
