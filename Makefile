@@ -16,7 +16,7 @@ run: firmware.elf
 test: $(STAMP)
 	$(PY) -m ruff check emu toolchain arena openswarm tests bench setup.py
 	$(PY) -m mypy emu toolchain arena openswarm
-	$(PY) -m pytest -n auto --dist worksteal tests -rs
+	$(PY) -m pytest -n auto --dist worksteal tests $(PYTEST)
 
 bench: $(STAMP)
 	$(PY) -m bench

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from skips import Skips
 
 from emu import machine
 from emu.dspic30f.engines import NAMES, make_engine
@@ -17,9 +19,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--engine", default=None, help="run what names no engine with this one only")
 
 
-def pytest_configure() -> None:
-    """The compiler checks itself in all tests, in the programs they start as well."""
+    parser.addoption("--allowed-skips", default=None, type=Path, help="a file; any other skip is a failure")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The compiler checks itself in all tests and the programs they start; skipped tests are told at the end."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Skips(config.getoption("--allowed-skips")), "skips")
 
 
 @pytest.fixture(scope="session", autouse=True)

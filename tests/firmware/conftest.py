@@ -47,7 +47,7 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Build:
 def host_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The kernel's tests on the POSIX port, under sanitizers."""
     if shutil.which("gcc") is None:
-        pytest.skip("the host tests of the kernel are built with gcc, which is not installed; Debian package: gcc")
+        pytest.skip("the host tests of the kernel are built with gcc, which is not installed (Debian package gcc)")
     out = tmp_path_factory.mktemp("host")
     run_make(Path(__file__).parent / "host", "-j2", f"OUT={out}")
     return out / "kernel_tests"

@@ -131,7 +131,7 @@ int main(void) {
 @pytest.fixture(scope="module")
 def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if shutil.which("gcc") is None:
-        pytest.skip("the POSIX port is built with gcc, which is not installed")
+        pytest.skip("the POSIX port is built with gcc, which is not installed (Debian package gcc)")
     return tmp_path_factory.mktemp("host")
 
 

@@ -17,7 +17,7 @@ from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_drivers_on_target import START
 
 pipe = signal.getsignal(signal.SIGPIPE)
-vcdvcd = pytest.importorskip("vcdvcd")
+vcdvcd = pytest.importorskip("vcdvcd", reason="the independent reader is not installed (extra: test)")
 signal.signal(signal.SIGPIPE, pipe)  # the reader is a script first: its import lets a broken pipe end the process
 FCY = 14_745_600
 

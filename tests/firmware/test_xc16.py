@@ -94,7 +94,7 @@ def test_an_option_of_ours_is_none_of_theirs(stand_in: Path) -> None:
 def test_the_kernel_is_gnu99(source: Path) -> None:
     """GCC 4.5 knows neither C11 nor later extensions."""
     if shutil.which("gcc") is None:
-        pytest.skip("gcc is not installed")
+        pytest.skip("gcc is not installed (Debian package gcc)")
     check_gnu99(source)
 
 
@@ -102,7 +102,7 @@ def test_the_kernel_is_gnu99(source: Path) -> None:
 def test_the_applications_are_gnu99(app: str) -> None:
     """The same for firmware/apps."""
     if shutil.which("gcc") is None:
-        pytest.skip("gcc is not installed")
+        pytest.skip("gcc is not installed (Debian package gcc)")
     for source in sorted((FIRMWARE / "apps" / app).glob("*.c")):
         check_gnu99(source)
 

@@ -59,7 +59,7 @@ def test_make_builds_and_its_test_tells_right_from_wrong(project):
     errors = [found for line in done.stderr.splitlines() if (found := pattern.match(line)) and found[4] == "error"]
     assert errors
     assert (project / errors[0][1]).samefile(source)
-    assert errors[0][2] == "10"
+    assert errors[0][2] == "11"
     source.write_text(right)
 
 

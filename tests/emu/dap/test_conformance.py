@@ -27,7 +27,7 @@ def node_modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
         return Path(given)
     npm = shutil.which("npm")
     if npm is None or shutil.which("node") is None:
-        pytest.skip("there is no node with npm")
+        pytest.skip("there is no node with npm (Debian packages nodejs, npm)")
     folder = tmp_path_factory.mktemp("npm")
     done = subprocess.run(
         [npm, "install", "--no-audit", "--no-fund", "--prefix", str(folder), *PACKAGES],

@@ -12,7 +12,7 @@ from samples import random_insn
 from emu.dspic30f.isa.row import Row
 from emu.dspic30f.isa.table import ROWS
 
-pytest.importorskip("pypcode", reason="the independent decoder is not installed")
+pytest.importorskip("pypcode", reason="the independent decoder is not installed (extra: test)")
 
 from sleigh import disagreement
 

@@ -105,7 +105,7 @@ def test_symbols_have_units_types_and_order(executable):
     assert symbols["_v"]["st_value"] == 0x800
 
 
-@pytest.mark.skipif(shutil.which("readelf") is None, reason="readelf is not installed")
+@pytest.mark.skipif(shutil.which("readelf") is None, reason="readelf is not installed (Debian package binutils)")
 def test_readelf_finds_nothing_to_warn_about(tmp_path, executable):
     """binutils reads headers, symbols and relocations of both kinds of files without a warning."""
     obj = object_bytes(assemble(SOURCE, "x.s")[0])

@@ -70,7 +70,7 @@ def test_archives_round_trip_and_are_readable_by_gnu_ar():
     assert {name: m.name for name, m in archive.index.items()} == {"x": "x.o", "y": "a_name_longer_than_fifteen.o"}
 
 
-@pytest.mark.skipif(shutil.which("ar") is None, reason="GNU ar is not installed")
+@pytest.mark.skipif(shutil.which("ar") is None, reason="GNU ar is not installed (Debian package binutils)")
 def test_gnu_ar_and_ours_read_each_others_archives(tmp_path):
     """Same format both ways, symbol index and long names included."""
     members = [member("x.o", ".global x\nx: nop\n"), member("a_name_longer_than_fifteen.o", ".global y\ny: nop\n")]

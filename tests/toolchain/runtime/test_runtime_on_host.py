@@ -17,7 +17,7 @@ INCLUDE = HERE.parents[2] / "toolchain" / "include"
 PAIRS = 1_000_000
 MATH_ARGUMENTS = 200_000
 
-pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C compiler")
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no host C compiler (Debian package gcc)")
 
 
 def compile_host(output: Path, *words: object) -> None:

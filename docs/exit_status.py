@@ -1,0 +1,20 @@
+"""Writes docs/exit-status.md from the one place in the code: `python docs/exit_status.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from emu.status import table
+
+PAGE = Path(__file__).with_name("exit-status.md")
+TEXT = f"""# Exit statuses
+
+Of `emu`, `toolchain`, `dspic-*`, `arena` and `openswarm`; written by `python docs/exit_status.py` from `emu/status.py`.
+
+{table()}
+
+With `emu run --exit-code` every other status is the firmware's own: the low eight bits of what `main` returned.
+"""
+
+if __name__ == "__main__":
+    PAGE.write_text(TEXT, encoding="utf-8")
