@@ -207,6 +207,48 @@ def test_the_kilobot_stops_when_a_stack_has_overflown(overflowing: Path) -> None
     assert machine.uart().startswith(b"stack trap at 0x0:0 in thread 2")
 
 
+IN_A_HANDLER = r"""
+#include <openswarm.h>
+static volatile uint8 sum;
+static bool handler(uint16 pid, uint16 event, sys_event_data *data)
+{
+    volatile uint8 room[BYTES];
+    (void)pid, (void)event;
+    for (uint16 i = BYTES; data->value == 25 && i-- != 0;) {
+        room[i] = (uint8)i;
+        sum += room[i];
+    }
+    return true;
+}
+int main(void)
+{
+    Sys_Init_Kernel();
+    Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, handler, NULL);
+    Sys_Start_Kernel();
+    Sys_Run_SystemThread();
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("target", ["kilobot", "epuck2"])
+def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path: Path) -> None:
+    """The MPU traps where it happens; the AVR sees it behind the handlers, by the paint of the stack's last byte.
+
+    There only if what lies below the stack lets it come so far: the kernel's own variables (port/avr/README.md)."""
+    (tmp_path / "handler").mkdir()
+    (tmp_path / "handler" / "main.c").write_text(IN_A_HANDLER)
+    bytes_of = {"kilobot": "(SYS_KERNEL_STACK-28)", "epuck2": "SYS_KERNEL_STACK"}
+    image = make(target, "handler", tmp_path / "out", f"DEFINES=-DBYTES='{bytes_of[target]}'", apps=tmp_path)
+    if target == "epuck2":
+        assert said_by_epuck2(image, rb" in thread \d+\r\n").startswith(b"stack trap at 0x")
+    else:
+        machine = kilobot(image)
+        with pytest.raises(Stopped):
+            machine.run(HZ)
+        assert machine.uart().startswith(b"stack trap at 0x0:0 in thread ")
+
+
 # ---- Size ---------------------------------------------------------------------------------------------------------
 
 

@@ -26,9 +26,9 @@ SPARSE = 499
 """Stride of a run that was given a time."""
 
 
-def build(app: str, out: Path) -> Path:
-    """An application of tests/firmware/target."""
-    words = [f"APP={app}", "APPS=../tests/firmware/target", f"OUT={out / app}", f"PYTHON={sys.executable}"]
+def build(app: str, out: Path, apps: str = "../tests/firmware/target") -> Path:
+    """An application of tests/firmware/target, or of another folder, named from firmware/ on."""
+    words = [f"APP={app}", f"APPS={apps}", f"OUT={out / app}", f"PYTHON={sys.executable}"]
     subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True)
     return out / app / "firmware.elf"
 
