@@ -30,6 +30,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from emu.boards import BOARDS
+from emu.chips import chip_named
 from emu.loader import load_image
 from emu.machine import Machine, Stop
 from emu.peripherals import Peripherals
@@ -42,6 +43,7 @@ def load(
     ipl_slip: int = 0,
     board: Callable[[Peripherals], Any] | str | None = "epuck",
     strict: bool = False,
+    chip: str | None = None,
 ) -> Machine:
     """A machine with the firmware file at `path`, ELF or Intel HEX, ready to run from reset.
 
@@ -49,9 +51,10 @@ def load(
     with the chip's peripherals, for example `functools.partial(emu.boards.epuck.board.Epuck, selector=3)`.
     `engine` is "auto", "jit", "interp" or "plain"; all give the same run. With `strict` the plain one also finds null
     pointers, uninitialised reads and stores into other threads' stacks, and calls them faults.
-    Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine or board.
+    `chip` is the part a HEX file is for (an ELF file says so itself): "dsPIC30F6014A" or "dsPIC30F4013".
+    Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine, board or chip.
     """
-    image = load_image(path)
+    image = load_image(path, None if chip is None else chip_named(chip))
     machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip, board=_board(board), strict=strict)
     machine.load(image)
     return machine

@@ -14,9 +14,6 @@ from emu.events import Events
 from emu.record import Record
 from emu.straight import Integers, Rule
 
-SFR_END: Final = 0x0800
-"""First data address behind the SFRs (isa.md §1.2)."""
-
 ReadHook = Callable[[], int]
 WriteHook = Callable[[int, int, int], None]
 """Called as hook(old, new, lanes) after the new word is in the record; lanes = 0xFFFF, 0x00FF or 0xFF00."""
@@ -48,12 +45,14 @@ class Tap:
 
 
 class Bus:
-    """SFR space 0x0000-0x07FF. Word index = address >> 1. Unimplemented bits read 0 and ignore writes."""
+    """SFR space, below `end`. Word index = address >> 1. Unimplemented bits read 0 and ignore writes."""
 
-    def __init__(self, record: Record, events: Events) -> None:
+    def __init__(self, record: Record, events: Events, end: int) -> None:
         self.record: Final = record
         self.events: Final = events
-        words = SFR_END // 2
+        self.end: Final = end
+        """First data address behind the SFRs (isa.md §1.2)."""
+        words = end // 2
         self.writable: Final = [0] * words
         """Bits software can change freely."""
         self.clear_only: Final = [0] * words
@@ -70,7 +69,7 @@ class Bus:
         self._integers: Final = Integers(record, events)
         self.modelled: Final = [False] * words
         """Set for registers a device or the CPU stands behind; others are reported once when touched."""
-        self.off: Final[set[int]] = set()
+        self.off: frozenset[int] = frozenset()
         """Registers of modules that are switched off: they read 0 and ignore writes."""
         self.watched: Final[set[int]] = set()
         """Registers every access of which somebody outside wants to see."""
@@ -79,7 +78,7 @@ class Bus:
         self._reported: set[int] = set()
 
     def read(self, address: int) -> int:
-        """The word at even SFR `address` (0..0x7FE) as an instruction reads it, side effects included."""
+        """The word at even SFR `address` (below `end`) as an instruction reads it, side effects included."""
         word = address >> 1
         rule = self.rules[word]
         if rule is not None and (shown := self._integers.read(rule)) is not None:

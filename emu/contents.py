@@ -10,14 +10,13 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from emu.bus import SFR_END, Tap, tap
+from emu.bus import Tap, tap
 from emu.chips.chip import Chip
 from emu.dspic30f.core import Core
 from emu.dspic30f.data import WINDOW
 from emu.dspic30f.engines import Engine
 from emu.dspic30f.state import PC_MASK
 from emu.image import Image
-from emu.record import DATA_BYTES
 
 if TYPE_CHECKING:
     from emu.debug.strict import Strict
@@ -101,26 +100,26 @@ class Contents:
         Raises KeyError for an unknown name, ValueError where nothing is implemented or for less than one byte.
         """
         address = self.address_of(place)
-        if size == 2 and not address & 1 and 0 <= address < DATA_BYTES:
-            return self.bus.peek(address) if address < SFR_END else self.record.u16[address >> 1]
+        if size == 2 and not address & 1 and 0 <= address < self.record.data_end:
+            return self.bus.peek(address) if address < self.bus.end else self.record.u16[address >> 1]
         return int.from_bytes(self.peek_bytes(address, size), "little")
 
     def peek_bytes(self, place: Place, size: int) -> bytes:
         """`size` bytes from `place` in data space, without side effects. Raises as `peek`."""
         address = self.address_of(place)
         end = address + size
-        if size < 1 or address < 0 or (end > DATA_BYTES and (address < WINDOW or end > 2 * WINDOW)):
-            raise ValueError(f"no {size} bytes of data space at {address:#06x}: it ends at {DATA_BYTES:#x}")
-        if address >= SFR_END and end <= DATA_BYTES:
+        if size < 1 or address < 0 or (end > self.record.data_end and (address < WINDOW or end > 2 * WINDOW)):
+            raise ValueError(f"no {size} bytes of data space at {address:#06x}: it ends at {self.record.data_end:#x}")
+        if address >= self.bus.end and end <= self.record.data_end:
             return bytes(self.record.bytes[address:end])
         words = (self._peek_word(word) for word in range(address & ~1, end, 2))
         first = address & 1
         return b"".join(word.to_bytes(2, "little") for word in words)[first : first + size]
 
     def _peek_word(self, address: int) -> int:
-        if address < SFR_END:
+        if address < self.bus.end:
             return self.bus.peek(address)
-        if address < DATA_BYTES:
+        if address < self.record.data_end:
             return self.record.u16[address >> 1]
         return self.program.word(self.record.u16[self.core.state.at["PSVPAG"]] << 15 | address & 0x7FFE) & 0xFFFF
 
@@ -130,8 +129,8 @@ class Contents:
         Raises as `peek`; constants in program memory cannot be set.
         """
         address = self.address_of(place)
-        if size < 1 or not 0 <= address <= DATA_BYTES - size:
-            raise ValueError(f"no {size} bytes of data space at {address:#06x}: it ends at {DATA_BYTES:#x}")
+        if size < 1 or not 0 <= address <= self.record.data_end - size:
+            raise ValueError(f"no {size} bytes of data space at {address:#06x}: it ends at {self.record.data_end:#x}")
         if self.strict is not None:
             self.strict.written(address, size)
         self.record.bytes[address : address + size] = (value & (1 << 8 * size) - 1).to_bytes(size, "little")
@@ -142,8 +141,8 @@ class Contents:
         Raises KeyError for an unknown name, ValueError for an address that is no register.
         """
         address = self.address_of(place)
-        if not 0 <= address < SFR_END:
-            raise ValueError(f"{place!r} is no register: they lie below {SFR_END:#x}")
+        if not 0 <= address < self.bus.end:
+            raise ValueError(f"{place!r} is no register: they lie below {self.bus.end:#x}")
         word = address >> 1
         if word not in self._sfr_hooks:
             self._sfr_hooks[word] = tap(self.bus, word)

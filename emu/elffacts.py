@@ -12,8 +12,6 @@ from enum import Enum, IntFlag
 
 EM_DSPIC30F = 118  # abi-elf.md §6.1
 PROCESSOR_MASK = 0xFFFF  # e_flags low 16 bits = processor id, §6.1
-PROCESSOR_30F6014A = 0x1F
-PROCESSOR_30F6014 = 0x18
 GENERIC_PROCESSORS = (0, 90, 91)  # 30Fxxxx, any 16-bit, any DSP part (§6.1)
 
 OCTETS_PER_UNIT = 2  # §6.2: the rule for *every* section

@@ -11,13 +11,12 @@ import sys
 from array import array
 from typing import Final, NamedTuple
 
+from emu.chips import chip_named, chip_of
 from emu.chips.chip import Chip
 from emu.elffacts import (
     EM_DSPIC30F,
     OCTETS_PER_UNIT,
     OCTETS_PER_WORD,
-    PROCESSOR_30F6014,
-    PROCESSOR_30F6014A,
     PROCESSOR_MASK,
     SectionFlag,
 )
@@ -93,14 +92,18 @@ class _Reader:
         return list(row.iter_unpack(self.piece(offset, count * row.size, what)))
 
 
-def read_elf(data: bytes, path: str, chip: Chip) -> Image:
-    """Read the contents of an ELF file. Raises LoadError when it is not a complete dsPIC30F executable."""
+def read_elf(data: bytes, path: str, chip: Chip | None) -> Image:
+    """Read the contents of an ELF file, for `chip` or else for the one it was built for.
+
+    Raises LoadError when it is not a complete dsPIC30F executable.
+    """
     reader = _Reader(data, path)
     (_, _, _, _, entry, phoff, shoff, e_flags, _, phentsize, phnum, shentsize, shnum, shstrndx) = _identify(reader)
     processor = e_flags & PROCESSOR_MASK
-    if processor not in (PROCESSOR_30F6014A, PROCESSOR_30F6014):
+    chip = chip or chip_of(processor) or chip_named()
+    if processor not in chip.processors:
         reader.warnings.append(
-            f"built for processor id {processor:#x}, not {PROCESSOR_30F6014A:#x} ({chip.name}); loaded as if it were"
+            f"built for processor id {processor:#x}, not {chip.processors[0]:#x} ({chip.name}); loaded as if it were"
         )
     headers = [_Header(*row) for row in reader.table(_SECTION, shoff, shnum, shentsize, "the section header table")]
     segments = [_Segment(*row) for row in reader.table(_SEGMENT, phoff, phnum, phentsize, "the program header table")]

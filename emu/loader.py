@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import Final
 
+from emu.chips import chip_named
 from emu.chips.chip import Chip
 from emu.image import Image, LoadError
 
@@ -22,7 +23,9 @@ EXPECTED: Final = "expected an ELF executable for dsPIC30F or an Intel HEX file"
 
 
 def load_image(path: str | os.PathLike[str], chip: Chip | None = None) -> Image:
-    """Read the firmware file at `path`, ELF or Intel HEX by content, for `chip` (default: dsPIC30F6014A).
+    """Read the firmware file at `path`, ELF or Intel HEX by content, for `chip`.
+
+    Without one an ELF file is for the chip it names in its flags, a HEX file for the dsPIC30F6014A.
 
     Raises LoadError for anything that is not a usable image, OSError never.
     """
@@ -32,10 +35,6 @@ def load_image(path: str | os.PathLike[str], chip: Chip | None = None) -> Image:
 
 def parse_image(data: bytes, name: str, chip: Chip | None = None) -> Image:
     """Like `load_image`, for file contents already in memory; `name` is used in messages."""
-    if chip is None:
-        from emu.chips.dspic30f6014a import DSPIC30F6014A
-
-        chip = DSPIC30F6014A
     if data.startswith(b"\x7fELF"):
         from emu.elffile import read_elf
 
@@ -44,7 +43,7 @@ def parse_image(data: bytes, name: str, chip: Chip | None = None) -> Image:
     if stripped.startswith(b":"):
         from emu.hexfile import read_hex
 
-        return read_hex(data, name, chip)
+        return read_hex(data, name, chip or chip_named())
     raise LoadError(name, _what_it_is(data))
 
 

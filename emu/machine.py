@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from emu.boards import epuck
 from emu.bus import Bus
 from emu.chips.chip import Chip, Vector
 from emu.chips.dspic30f6014a import DSPIC30F6014A
@@ -105,9 +104,9 @@ class Machine(Contents, BySource):
         board: Callable[[Peripherals], Any] | None = None,
         strict: bool = False,
     ) -> None:
-        record = Record()
+        record = Record(chip.data["ram"].end)
         self.events: Final = Events(record)
-        bus = Bus(record, self.events)
+        bus = Bus(record, self.events, chip.data["sfr"].end)
         program = ProgramMemory(record, chip)
         wires = Wires()
         self.peripherals: Final = build(chip, bus, program, wires)
@@ -446,13 +445,13 @@ class Machine(Contents, BySource):
     def load(self, image: Image) -> None:
         """Put an image into program memory and reset as after power-on.
 
-        Configuration words the image leaves out are those of the robot (`emu.boards.epuck`). Its symbols become names
-        for `read`, `write`, `peek` and `poke`.
+        Configuration words the image leaves out are those of the board (a bare chip: watchdog off). Its symbols become
+        names for `read`, `write`, `peek` and `poke`.
         """
         self.image = image
         self.program.erase()
-        for name, word in epuck.CONFIG.items():
-            self.program.put(self.chip.config[name].address, word)
+        for address, word in self.peripherals.config.items():
+            self.program.put(address, word)
         for block in image.blocks:
             if block.end <= self.chip.program["flash"].end:
                 self.program.put_flash(block.base, list(block.words))

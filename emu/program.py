@@ -32,6 +32,7 @@ class ProgramMemory:
         self._eeprom: Final = regions["eedata"]
         self._unit: Final = regions["unitid"]
         self._config: Final = regions["config"]
+        self._words: Final = chip.config
         self._device: Final = regions["devid"]
         self._device_words: Final = (chip.device_id, chip.revision)
 
@@ -91,6 +92,10 @@ class ProgramMemory:
         if address in self._device:
             return self._device_words[address - self._device.start >> 1]
         return 0
+
+    def setting(self, name: str) -> int:
+        """The configuration word called `name`, as stored. Raises KeyError if the chip has none."""
+        return self.word(self._words[name].address)
 
     def executable(self, address: int) -> bool:
         """Whether fetching an instruction at `address` is no address error (isa.md §14.4, causes 4 and 5)."""

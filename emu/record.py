@@ -12,9 +12,6 @@ import ctypes
 from dataclasses import dataclass
 from typing import Final
 
-DATA_BYTES: Final = 0x2800
-"""SFRs, X RAM and Y RAM: everything below the first unimplemented data address (isa.md §1.2)."""
-
 CAPACITY: Final = 0x80000
 """Bytes set aside for one record; `Record.used` says how many are taken."""
 
@@ -39,7 +36,9 @@ class Field:
 class Record:
     """Flat little-endian buffer with views of 8, 16, 32 and 64 bits and a directory of named fields."""
 
-    def __init__(self) -> None:
+    def __init__(self, data_end: int) -> None:
+        self.data_end: Final = data_end
+        """First data address behind SFRs and RAM (isa.md §1.2)."""
         self._memory = (ctypes.c_uint8 * CAPACITY)()
         self.address: Final = ctypes.addressof(self._memory)
         self.bytes: Final = memoryview(self._memory).cast("B")
@@ -49,7 +48,7 @@ class Record:
         self.u64: Final = self.bytes.cast("Q")
         self.s64: Final = self.bytes.cast("q")
         self.fields: Final[dict[str, Field]] = {}
-        self.used = DATA_BYTES
+        self.used = data_end
 
     def reserve(self, name: str, kind: str, count: int = 1) -> Field:
         """Set aside `count` elements of `kind` ("B", "H", "I", "Q" unsigned, "q" signed) under `name`, zeroed.
@@ -79,7 +78,7 @@ class Record:
 
     def field_at(self, offset: int) -> str:
         """Name of what lies at a byte offset, for reports of differences between two records."""
-        if offset < DATA_BYTES:
+        if offset < self.data_end:
             return f"data {offset:#06x}"
         for field in self.fields.values():
             size = SIZES[field.kind]

@@ -84,6 +84,7 @@ def link_options(options: CcOptions, objects: list[ObjectFile]) -> LinkOptions:
     """Linker settings from -Wl and -Xlinker words, which are those of `ld`; unused sections are left out by default."""
     result = link_settings(parse_link_words(["--gc-sections", *options.linker]))
     result.undefined += format_parts(objects)
+    result.chip = options.chip
     return result
 
 

@@ -11,12 +11,15 @@ import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from emu.chips import chip_named
+from emu.chips.chip import Chip
+from toolchain.device import device
 from toolchain.errors import ToolError
 
 HELP = """\
 usage: python -m toolchain cc [options] files... [-o out.elf|out.hex|out.o]
 
-C compiler, assembler and linker for the dsPIC30F6014A, used like gcc.
+C compiler, assembler and linker for the dsPIC30F6014A and dsPIC30F4013 (-mcpu=), used like gcc.
   files                 .c  .s (assembly)  .S (preprocessed assembly)  .i  .ll/.bc (LLVM IR)  .o  .a
   -o FILE               output; .hex writes Intel HEX, anything else ELF (default a.elf)
   -c | -S | -E          stop after assembling | compiling | preprocessing
@@ -85,7 +88,6 @@ IGNORED_FLAGS = {
 IGNORED_PREFIXES = ("-msmart-io=", "-msfr-warn=", "-merrata=", "-mreserve=")
 LARGE_DATA = {"-mlarge-data", "-mlarge-scalar", "-mlarge-aggregate"}
 SMALL_DATA = {"-msmall-data", "-msmall-scalar", "-msmall-aggregate"}
-DEVICES = {"30F6014A", "30f6014a", "dsPIC30F6014A", "dspic30f6014a"}
 REFUSED = {
     "-fshort-double": "double is always 64-bit IEEE here; there is no 32-bit double",
     "-mconst-in-data": "constants live in program memory and are read through the PSV window",
@@ -121,6 +123,7 @@ class CcOptions:
     output: Path | None = None
     stage: str = "link"
     level: str = "0"
+    chip: Chip = field(default_factory=chip_named)
     debug: bool = False
     lto: bool | None = None
     emit_llvm: bool = False
@@ -275,9 +278,7 @@ def _code_generation(options: CcOptions, word: str) -> bool:
     elif word == "-fsingle-precision-constant":
         options.single_constants = True
     elif word.startswith(("-mcpu=", "-p")) and word not in ("-pedantic", "-pedantic-errors", "-pipe"):
-        device = word.split("=", 1)[1] if "=" in word else word[2:]
-        if device not in DEVICES:
-            raise ToolError(f"device '{device}' is not supported (expected 30F6014A)")
+        options.chip = device(word.split("=", 1)[1] if "=" in word else word[2:])
     elif word in IGNORED_FLAGS:
         pass
     else:

@@ -14,10 +14,12 @@ import sys
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 from pathlib import Path
 
+from emu.chips import chip_named
+from emu.chips.chip import Chip
 from toolchain import accumulators, config_pragma, name_case
 from toolchain.asm_registers import REFUSED, respell
 from toolchain.cc_options import CcOptions, Input
@@ -45,8 +47,7 @@ LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "
 ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp2", "exp2f", "exp10", "ldexp",
                     "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
 # abi-elf.md §2.9 predefined macros; __XC16__ and __C30__ stay undefined, they select Microchip's attribute spellings.
-PREDEFINED = ["__dsPIC30F6014A__", "__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_CODEGUARD__",
-              "__HAS_5VOLTS__"]  # fmt: skip
+PREDEFINED = ["__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_5VOLTS__"]  # beside the part's own
 FOREIGN_MACROS = ["MSP430", "__MSP430__"]
 CLANG_LEVEL = {"0": "-O0", "1": "-O1", "2": "-O2", "s": "-Oz"}
 
@@ -62,6 +63,7 @@ class Job:
     arguments: list[str]
     source: Path
     printed: Path | None = None  # file for what it says on stdout
+    chip: Chip = field(default_factory=chip_named)
 
 
 def clang_program() -> list[str]:
@@ -82,7 +84,8 @@ def front_end_flags(options: CcOptions) -> list[str]:
     """Flags that give C source the meaning it has on this target, followed by the user's own."""
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
-    flags += [f"-D{name}=1" for name in PREDEFINED]
+    guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
+    flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]
     flags += [f"-fno-builtin-{name}" for name in ABSENT_FUNCTIONS]
     flags += ["-include", str(INCLUDE_DIR / "dspic_builtins.h")]
     if options.single_constants:
@@ -118,7 +121,7 @@ def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
     arguments = [*front_end_flags(options), *_dependency_flags(options, item)]
     arguments += [*LAYOUT_FLAGS, "-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S"]
     arguments += ["-x", item.language, str(item.path)]
-    return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"))
+    return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"), options.chip)
 
 
 def repaired(ir: bytes) -> bytes:
@@ -165,17 +168,17 @@ def _run_changed(
     return subprocess.run([*program, *second], capture_output=True, check=False)
 
 
-def _run_job(program: list[str], arguments: list[str]) -> subprocess.CompletedProcess[bytes]:
+def _run_job(program: list[str], arguments: list[str], chip: Chip) -> subprocess.CompletedProcess[bytes]:
     """One clang run, and another for a source that says what XC16 knows and the front end does not."""
     result = subprocess.run([*program, *arguments], capture_output=True, check=False)
     if result.returncode and name_case.MISSING.search(result.stderr) and "-ivfsoverlay" not in arguments:
         with tempfile.TemporaryDirectory(prefix="dspic-names-") as folder:
             overlay = Path(folder) / "overlay.yaml"
             overlay.write_text(name_case.overlay(arguments))
-            return _run_job(program, ["-ivfsoverlay", str(overlay), *arguments])
+            return _run_job(program, ["-ivfsoverlay", str(overlay), *arguments], chip)
     changes: list[Callable[[str], str]] = []
     if "-emit-llvm" in arguments and config_pragma.PRESENT in result.stderr:
-        changes.append(config_pragma.applied)
+        changes.append(lambda text: config_pragma.applied(text, chip))
     if result.returncode and REFUSED.search(result.stderr):
         changes.append(respell)
     if result.returncode and accumulators.REFUSED.search(result.stderr):
@@ -211,7 +214,7 @@ def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
             print(shlex.join([*program, *job.arguments]), file=sys.stderr)
 
     def run(job: Job) -> subprocess.CompletedProcess[bytes]:
-        return _run_job([*program, *colour], job.arguments)
+        return _run_job([*program, *colour], job.arguments, job.chip)
 
     with ThreadPoolExecutor(max_workers=parallel or os.cpu_count() or 1) as pool:
         results = list(pool.map(run, jobs))

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from emu.chips.dspic30f6014a import CONFIG
+from emu.chips.chip import Chip
 from toolchain.errors import ToolError
 
 PRESENT = b"#pragma config"
@@ -30,14 +30,15 @@ _SETTINGS = {
 }  # fmt: skip
 
 
-def settings() -> dict[str, tuple[str, int]]:
+def settings(chip: Chip) -> dict[str, tuple[str, int]]:
     """Name of a setting -> name of its word, mask of the bits it may change."""
     known = {}
-    for word in CONFIG.values():
+    for word in chip.config.values():
         for field, (lsb, width) in word.fields.items():
             known[field] = (word.name, ((1 << width) - 1) << lsb)
     for name, (register, fields) in _SETTINGS.items():
-        known[name] = (register, sum(known[field][1] for field in fields))
+        if name not in known and known.keys() >= set(fields):
+            known[name] = (register, sum(known[field][1] for field in fields))
     return known
 
 
@@ -46,9 +47,9 @@ def values() -> dict[str, int]:
     return {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
 
 
-def applied(text: str) -> str:
+def applied(text: str, chip: Chip) -> str:
     """`text` with its configuration pragmas made definitions. Raises `ToolError` listing every wrong one by line."""
-    known, codes = settings(), values()
+    known, codes = settings(chip), values()
     words: dict[str, int] = {}
     findings: list[str] = []
     for pragma in _PRAGMA.finditer(text):

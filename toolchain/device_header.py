@@ -1,7 +1,7 @@
-"""Writes `include/dspic30f6014a.h` from the chip's register table: `python -m toolchain.device_header`.
+"""Writes `include/dspic30f6014a.h` and its kin from the chips' register tables: `python -m toolchain.device_header`.
 
-Enters: `emu.chips`. Leaves: one C header that both this compiler and XC16 accept. A test compares the committed file
-with the generator's output.
+Enters: `emu.chips`. Leaves: a C header each that both this compiler and XC16 accept. A test compares the committed
+files with the generator's output.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from emu.chips import NAMES, chip_named
 from emu.chips.chip import Chip, Sfr
-from emu.chips.dspic30f6014a import DSPIC30F6014A
 from toolchain.files import write_outputs
 
-HEADER = Path(__file__).parent / "include" / "dspic30f6014a.h"
+INCLUDE = Path(__file__).parent / "include"
 C_TYPES = {1: "unsigned char", 2: "unsigned int"}
 
 
@@ -70,8 +70,11 @@ def header(chip: Chip) -> str:
         "/* SPDX-License-Identifier: MIT */",
         f"/* Registers of the {chip.name}.",
         " * Written by `python -m toolchain.device_header` from the chip's register table; do not edit. */",
-        "#ifndef DSPIC30F6014A_H",
-        "#define DSPIC30F6014A_H",
+        f"#ifndef {chip.name.upper()}_H",
+        f"#define {chip.name.upper()}_H",
+        f"#ifndef __{chip.name}__",
+        f"#error \"this header is for the {chip.name}: compile with -mcpu={chip.name.removeprefix('dsPIC')}\"",
+        "#endif",
         "",
         "#include \"dspic_compiler.h\"",
         "",
@@ -88,9 +91,14 @@ def header(chip: Chip) -> str:
     return "\n".join(lines)
 
 
+def path_of(chip: Chip) -> Path:
+    """Where a chip's header is committed."""
+    return INCLUDE / f"{chip.name.lower()}.h"
+
+
 def main() -> int:
-    """Rewrite the committed header."""
-    write_outputs([(HEADER, header(DSPIC30F6014A).encode())])
+    """Rewrite the committed headers."""
+    write_outputs([(path_of(chip), header(chip).encode()) for chip in map(chip_named, NAMES)])
     return 0
 
 

@@ -74,9 +74,11 @@ def _print_version() -> None:
 
     import llvmlite
 
+    from emu.chips import NAMES
+
     print(f"dspic cc (openswarm {version('openswarm')}), clang from ziglang {version('ziglang')}, "
           f"llvmlite {llvmlite.__version__}")  # fmt: skip
-    print("Target: dsPIC30F6014A")
+    print(f"Target: {NAMES[0]}")
 
 
 def _run(options: CcOptions, scratch: Path) -> None:
@@ -173,7 +175,7 @@ def _assemble(options: CcOptions, text: str, name: str, relax: bool) -> bytes:
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
     folders += [b for a, b in zip(options.clang, options.clang[1:], strict=False) if a == "-I"]
-    chosen = Options(include=folders, relax=relax, debug=options.debug, prefix_map=options.prefix_map)
+    chosen = Options(folders, relax=relax, debug=options.debug, chip=options.chip, prefix_map=options.prefix_map)
     obj, messages = assemble(text, name, chosen)
     for message in messages:
         print(message, file=sys.stderr)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import re
 
-from emu.chips.dspic30f6014a import VECTORS
+from emu.chips.family import SLOTS
 from toolchain.errors import ToolError
 
 VECTOR_FUNCTIONS = frozenset(
-    ["_DefaultInterrupt", *(prefix + vector.name for vector in VECTORS for prefix in ("_", "_Alt"))]
+    ["_DefaultInterrupt", *(prefix + vector.name for vector in SLOTS for prefix in ("_", "_Alt"))]
 )
 """C names that the linker puts into the vector tables."""
 
@@ -24,7 +24,7 @@ def irq_name(number: int) -> str:
     """Name of the vector of an interrupt number. Raises IndexError for one that the chip has no vector for."""
     if number < 0:
         raise IndexError(number)
-    return VECTORS[number + FIRST_INTERRUPT].name
+    return SLOTS[number + FIRST_INTERRUPT].name
 
 
 _DEFINITION = re.compile(r'^define [^@\n]*@("[^"]+"|[\w$.]+)\(', re.MULTILINE)
@@ -55,7 +55,7 @@ def check(ir_text: str) -> None:
     ]
     findings += [
         f"error: interrupt function '{name}': irq({number}) is not an interrupt number of this chip "
-        f"(expected 0 to {len(VECTORS) - FIRST_INTERRUPT - 1})"
+        f"(expected 0 to {len(SLOTS) - FIRST_INTERRUPT - 1})"
         for name, number in sorted(numbered.items())
         if not _is_irq(number)
     ]

@@ -1,7 +1,7 @@
 """What a chip is, as data: registers, memory, vectors, configuration words, and which device sits on which pins.
 
 Nothing here knows how anything behaves: devices, the CPU, the assembler, the linker and the header generator all read
-the same tables. A second chip is a second table (see `dspic30f6014a.py`), not a subclass.
+the same tables. A second chip is a second folder of tables, not a subclass.
 """
 
 from __future__ import annotations
@@ -119,6 +119,7 @@ class TimerSite:
     number: int
     kind: str
     clock_pin: str
+    """Empty where the timer has no clock input."""
     irq: int
     partner: int
     """Number of the other half of the pair, 0 for type A."""
@@ -204,22 +205,30 @@ class Chip:
     program: Mapping[str, Region]
     device_id: int
     revision: int
+    processors: tuple[int, ...]
+    """Processor ids of ELF files that fit, what a linker writes first (abi-elf.md §6.1)."""
     ports: tuple[str, ...]
     change_pins: tuple[str, ...]
-    """Pin of CN0, CN1, ..."""
+    """Pin of CN0, CN1, ...; empty where the chip has none."""
     external_pins: tuple[tuple[str, int], ...]
     """(pin, irq) of INT0, INT1, ..."""
     timers: tuple[TimerSite, ...]
     uarts: tuple[UartSite, ...]
     spis: tuple[SpiSite, ...]
-    i2c: I2cSite
+    i2c: I2cSite | None
     captures: tuple[CaptureSite, ...]
     compares: tuple[CompareSite, ...]
     adc: AdcSite
-    dci: DciSite
+    dci: DciSite | None
     cans: tuple[CanSite, ...]
     nvm_irq: int
-    lvd_irq: int
+    lvd_irq: int | None
+    """None without low-voltage detect."""
+
+    def __post_init__(self) -> None:
+        sfr, ram, x, y = (self.data[name] for name in ("sfr", "ram", "xram", "yram"))
+        if (sfr.start, sfr.end, ram.start, x.end, ram.end) != (0, ram.start, x.start, y.start, y.end):
+            raise ValueError(f"{self.name}: SFRs, X RAM and Y RAM do not follow each other from address 0")
 
     def __repr__(self) -> str:
         return f"<{self.name}>"

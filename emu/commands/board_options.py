@@ -22,14 +22,17 @@ if TYPE_CHECKING:
 
 SENSORS: Final = ("PO6030K", "PO3030K", "PO8030D", "none")
 SELECTOR_POSITIONS: Final = 16
+MOST_HZ: Final = 40_000_000
+"""Fastest external clock of the family (dspic30f6014a.md §3)."""
 
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:
-    """Add --board, --selector, --camera, --sensor and --stimulus."""
+    """Add --board, --crystal, --selector, --camera, --sensor and --stimulus."""
     board = parser.add_argument_group("robot")
     board.add_argument(
         "--board", choices=BOARDS, default=BOARDS[0], help="what is around the chip (default epuck; none: bare pins)"
     )
+    board.add_argument("--crystal", metavar="HZ", type=_crystal, help="crystal of bare pins (default 7372800)")
     board.add_argument("--selector", metavar="N", type=_selector, default=0, help="position of the selector, 0 to 15")
     board.add_argument("--camera", metavar="FILE.png", help="picture in front of the camera (default: darkness)")
     board.add_argument(
@@ -51,21 +54,34 @@ def _selector(text: str) -> int:
     return int(text)
 
 
+def _crystal(text: str) -> int:
+    if not text.isdecimal() or not 0 < int(text) <= MOST_HZ:
+        raise argparse.ArgumentTypeError(f"expected a frequency in Hz up to {MOST_HZ}, not {text!r}")
+    return int(text)
+
+
 def _topics(text: str) -> list[str]:
     return [topic.strip() for topic in text.split(",") if topic.strip()]
 
 
-def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Epuck] | None:
+def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Epuck | None] | None:
     """What to hand to `Machine(board=...)`."""
     if options.board == "none":
         wanted = [name for name in ("selector", "camera", "stimulus", "watch") if getattr(options, name, None)]
         if wanted:
             raise CommandError(f"--{wanted[0]} needs a robot; leave out --board none")
-        return None
+        return partial(_bare, options.crystal) if options.crystal else None
+    if options.crystal:
+        raise CommandError("--crystal is for bare pins, --board none; a robot has its own")
     from emu.boards.epuck.board import Epuck
 
     sensor = None if options.sensor == "none" else options.sensor
     return partial(Epuck, camera=sensor, selector=options.selector)
+
+
+def _bare(crystal: int, chip: Peripherals) -> None:
+    """Nothing around the chip but a crystal."""
+    chip.fit(crystal=crystal)
 
 
 def set_up(machine: Machine, options: argparse.Namespace) -> None:

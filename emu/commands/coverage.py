@@ -11,9 +11,9 @@ from typing import Final
 
 from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
+from emu.commands.image_option import add_chip_option, image_of
 from emu.coverage import Counts, Report, counting
 from emu.image import Image
-from emu.loader import load_image
 from emu.outfile import whole_text_file
 from emu.status import DONE, FAULT
 
@@ -32,6 +32,7 @@ def parser() -> Parser:
     example = "emu coverage firmware.elf --seconds 1 --lcov out.info && genhtml --branch-coverage -o html out.info"
     made = Parser("coverage", DESCRIPTION, example)
     made.add_argument("image", metavar="IMAGE", help="ELF executable with debug information")
+    add_chip_option(made)
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
     made.add_argument("--lcov", metavar="FILE", help="write an lcov tracefile")
     made.add_argument("--cobertura", metavar="FILE", help="write Cobertura XML")
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
     from emu.machine import Machine
 
-    image = load_image(options.image)
+    image = image_of(options)
     if not len(image.lines):
         raise CommandError(f"{image.path} has no line table; build it with -g")
     machine = Machine(image.chip, engine="plain", board=board_of(options))

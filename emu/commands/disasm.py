@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from emu.command import CommandError, Parser
+from emu.commands.image_option import add_chip_option, image_of
 from emu.disassembly import Item, items
 from emu.image import Image
-from emu.loader import load_image
 from emu.status import DONE
 
 
@@ -22,6 +22,7 @@ def parser() -> Parser:
         "emu disasm firmware.elf --from main --source",
     )
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    add_chip_option(made)
     made.add_argument("--from", dest="start", metavar="SYM|ADDR", help="first address; a function alone is shown whole")
     made.add_argument("--to", dest="end", metavar="SYM|ADDR", help="address behind the last one")
     made.add_argument("--source", action="store_true", help="show the text of source lines that can be found")
@@ -31,7 +32,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status: 0 printed, 2 bad input."""
-    image = load_image(options.image)
+    image = image_of(options)
     start, end = _range(image, options.start, options.end)
     for warning in image.warnings:
         print(f"emu disasm: warning: {image.path}: {warning}", file=sys.stderr)

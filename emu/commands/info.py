@@ -7,21 +7,22 @@ import json
 from typing import Any
 
 from emu.command import Parser
+from emu.commands.image_option import add_chip_option, image_of
 from emu.image import BYTES_PER_WORD, Image
-from emu.loader import load_image
 from emu.status import DONE
 
 
 def parser() -> Parser:
     made = Parser("info", "Print sections, ROM and RAM use, vectors and configuration words.", "emu info firmware.elf")
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    add_chip_option(made)
     made.add_argument("--json", action="store_true", help="print one JSON object")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
     """Exit status: 0 printed, 2 bad input."""
-    facts = describe(load_image(options.image))
+    facts = describe(image_of(options))
     print(json.dumps(facts, indent=2) if options.json else text(facts))
     return DONE
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
-from emu.loader import load_image
+from emu.commands.image_option import add_chip_option, image_of
 from emu.profile import Profile, Profiler
 from emu.status import DONE, FAULT
 
@@ -30,6 +30,7 @@ def parser() -> Parser:
     example = "emu profile firmware.elf --selector 8 --camera room.png --skip 1 --seconds 2 --group 'capture=__T[45]*'"
     made = Parser("profile", DESCRIPTION, example)
     made.add_argument("image", metavar="IMAGE", help="ELF executable")
+    add_chip_option(made)
     made.add_argument(
         "--skip", metavar="S", type=seconds, default=Fraction(0), help="simulated time before (default 0)"
     )
@@ -52,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
     from emu.machine import Machine
 
-    image = load_image(options.image)
+    image = image_of(options)
     machine = Machine(image.chip, board=board_of(options))
     machine.load(image)
     set_up(machine, options)

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from emu.command import CommandError, Parser, cycles, seconds
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
+from emu.commands.image_option import add_chip_option, image_of
 from emu.console import SPECIFICATIONS, Port, open_port
 from emu.image import Image
-from emu.loader import load_image
 from emu.outfile import whole_text_file
 from emu.session import FOREVER, Session
 from emu.stamps import HEADER, Stamp, read_stamps
@@ -48,6 +48,7 @@ With --exit-code: the firmware's own status (main's result, low 8 bits), 124 lim
 def parser() -> Parser:
     made = Parser("run", DESCRIPTION, "emu run firmware.elf --seconds 5 --uart2 log.txt")
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    add_chip_option(made)
     limit = made.add_mutually_exclusive_group()
     limit.add_argument("--seconds", metavar="S", type=seconds, help="stop after S simulated seconds")
     limit.add_argument("--cycles", metavar="N", type=cycles, help="stop after N instruction cycles")
@@ -91,7 +92,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
-    image = load_image(options.image)
+    image = image_of(options)
     for warning in image.warnings:
         print(f"emu run: warning: {image.path}: {warning}", file=sys.stderr)
     machine = _machine(options, image)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
-from emu.loader import load_image
+from emu.commands.image_option import add_chip_option, image_of
 from emu.status import DONE, FAULT
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def parser() -> Parser:
     example = "emu screenshot firmware.elf --camera room.png --seconds 2 --buffer frame --size 20x20 -o frame.png"
     made = Parser("screenshot", DESCRIPTION, example)
     made.add_argument("image", metavar="IMAGE", help="ELF executable or Intel HEX file")
+    add_chip_option(made)
     made.add_argument("-o", "--output", metavar="FILE.png", default="frame.png", help="default frame.png")
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(2), help="simulated time (default 2)")
     made.add_argument("--buffer", metavar="SYM|ADDR", help="variable or data address of the frame")
@@ -66,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         raise CommandError("--buffer and --size belong together")
     if options.board == "none" and options.buffer is None:
         raise CommandError("a bare chip has no sensor; leave out --board none or give --buffer")
-    image = load_image(options.image)
+    image = image_of(options)
     try:
         machine = Machine(image.chip, engine=options.engine, board=board_of(options))
     except ValueError as error:

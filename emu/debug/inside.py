@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
-from emu.bus import SFR_END
 from emu.debug import locate
 from emu.debug.dwarf import DebugInfo, Scope, Variable, debug_of
 from emu.debug.types import UNSIGNED, Type, decode, decode_member, encode, parts_of, text_of
@@ -260,7 +259,7 @@ class FrameView:
     def set_memory(self, address: int, data: bytes) -> None:
         """Change bytes of data space, registers as an instruction would. Raises ValueError."""
         value = int.from_bytes(data, "little")
-        if address < SFR_END and len(data) <= 2:
+        if address < self._machine.bus.end and len(data) <= 2:
             self._machine.write(address, value, len(data))
         else:
             self._machine.poke(address, value, len(data))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.bus import SFR_END, Bus
+from emu.bus import Bus
 from emu.chips.chip import Chip
 from emu.dspic30f.state import PSV, State
 from emu.program import ProgramMemory
@@ -31,6 +31,7 @@ class DataSpace:
         self._u16: Final = state.u16
         self._corcon: Final = state.at["CORCON"]
         self._psvpag: Final = state.at["PSVPAG"]
+        self.sfr_end: Final = bus.end
         self._ram_end: Final = chip.data["ram"].end
         self._y: Final = chip.data["yram"]
 
@@ -46,7 +47,7 @@ class DataSpace:
 
     def read(self, ea: int, size: int) -> int:
         """The byte or (aligned) word at `ea`; 0 where nothing is implemented."""
-        if ea < SFR_END:
+        if ea < self.sfr_end:
             word = self._u16[ea >> 1] if ea < W_END else self._bus.read(ea & ~1)
         elif ea < self._ram_end:
             word = self._u16[ea >> 1]
@@ -70,7 +71,7 @@ class DataSpace:
         """Store the low byte or word of `value` at `ea`; lost where nothing can be written (isa.md §7.8)."""
         if ea < W_END:
             self._write_w(ea, value, size)
-        elif ea < SFR_END:
+        elif ea < self.sfr_end:
             if size == 2:
                 self._bus.write(ea & ~1, value & 0xFFFF)
             elif ea & 1:

@@ -9,16 +9,15 @@ because a data write wins over what the same instruction does to the register (i
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Final
 
-from emu.bus import SFR_END
 from emu.dspic30f import arithmetic
 from emu.dspic30f.data import W_END, DataSpace
 from emu.dspic30f.faults import UninitialisedPointer
 from emu.dspic30f.interrupts import Exceptions
 from emu.dspic30f.isa.builder import Context, Side, Size
 from emu.dspic30f.isa.flow import Value
+from emu.dspic30f.modes import Modes
 from emu.dspic30f.state import FLAGS, OA, OAB, OB, SA, SAB, SB, STACK_POINTER, State
 from emu.events import Events
 from emu.program import ProgramMemory
@@ -26,30 +25,6 @@ from emu.program import ProgramMemory
 ACC_SIGN: Final = 1 << 39
 OVERFLOW_FLAGS: Final = frozenset(("OA", "OB", "SA", "SB"))
 """Flags that OAB and SAB follow."""
-
-
-@lru_cache(maxsize=4096)
-def context_of(corcon: int, modcon: int, bren: int, intcon1: int) -> Context:
-    """The modes a translation may rely on, from the stored registers (isa.md §2.4, §2.5, §14.4)."""
-    return Context(
-        us=corcon >> 12 & 1,
-        if_=corcon & 1,
-        rnd=corcon >> 1 & 1,
-        satdw=corcon >> 5 & 1,
-        sata=corcon >> 7 & 1,
-        satb=corcon >> 6 & 1,
-        accsat=corcon >> 4 & 1,
-        psv=corcon >> 2 & 1,
-        xmod=modcon >> 15,
-        ymod=modcon >> 14 & 1,
-        brev=bren,
-        xwm=modcon & 15,
-        ywm=modcon >> 4 & 15,
-        bwm=modcon >> 8 & 15,
-        ovate=intcon1 >> 10 & 1,
-        ovbte=intcon1 >> 9 & 1,
-        covte=intcon1 >> 8 & 1,
-    )
 
 
 class Interpreter:
@@ -64,12 +39,10 @@ class Interpreter:
         self._events: Final = events
         self._data: Final = data
         self._program: Final = program
+        self._sfr_end: Final = data.sfr_end
         self._exceptions: Final = exceptions
+        self._modes: Final = Modes(state)
         self._accumulators: Final = (state.at["ACCAL"], state.at["ACCBL"])
-        self._corcon: Final = state.at["CORCON"]
-        self._modcon: Final = state.at["MODCON"]
-        self._xbrev: Final = state.at["XBREV"]
-        self._intcon1: Final = state.at["INTCON1"]
         self.context = Context()
         self.pc = 0
         self.last = 0
@@ -89,10 +62,7 @@ class Interpreter:
     def begin(self, pc: int, last: int, loads: int, window_extra: int) -> None:
         """Prepare for the instruction at `pc` whose accesses fall in cycle `last`, or `window_extra` cycles later if
         it reads the PSV window. Of two loads the first is made one cycle earlier (design §4.2)."""
-        u16 = self._u16
-        self.context = context_of(
-            u16[self._corcon], u16[self._modcon], u16[self._xbrev] >> 15, u16[self._intcon1] & 0x700
-        )
+        self.context = self._modes.context
         self.pc = pc
         self.last = last
         self.window = self.faulted = self.math = self.stack_error = False
@@ -109,7 +79,7 @@ class Interpreter:
         if not self.faulted:
             cycle = self.last - len(self._stores) + 1
             for ea, value, size in self._stores:
-                if W_END <= ea < SFR_END:
+                if W_END <= ea < self._sfr_end:
                     self._events.arrive(cycle)
                 data.write(ea, value, size)
                 cycle += 1
@@ -162,7 +132,7 @@ class Interpreter:
         return self._read(ea, size)
 
     def xload(self, ea: Value, ptr: int) -> Value:
-        if self._data.in_window(ea) or ea < SFR_END or self._data.faulty(ea, 2):
+        if self._data.in_window(ea) or ea < self._sfr_end or self._data.faulty(ea, 2):
             return self._read(ea, 2)
         return self._data.read_x(ea)
 
@@ -182,7 +152,7 @@ class Interpreter:
         if self._data.in_window(ea) and not self.window:
             self.window = True
             self.last += self._window_extra
-        if W_END <= ea < SFR_END:
+        if W_END <= ea < self._sfr_end:
             self._events.arrive(self.last - self._loads_ahead)
         if self._loads_ahead:
             self._loads_ahead -= 1

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 from emu.dspic30f.core import Core
-
-MODE_REGISTERS: Final = (
-    "CORCON", "MODCON", "XBREV", "INTCON1", "SPLIM", "SR", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH",
-)  # fmt: skip
+from emu.dspic30f.modes import REGISTERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,5 +36,5 @@ def places_of(core: Core) -> Places:
         (y.start, y.end),
         effects,
         frozenset((at["PCL"], at["PCH"])),
-        frozenset(at[name] for name in MODE_REGISTERS),
+        frozenset(at[name] for name in REGISTERS),
     )

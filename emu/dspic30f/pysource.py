@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
-from emu.bus import SFR_END
 from emu.dspic30f.data import W_END
 from emu.dspic30f.expressions import Expr, Number, choose, interval
 from emu.dspic30f.isa.builder import Context, Side, Size
@@ -318,9 +317,7 @@ class Source:
     def _test(self, ea: Number, size: Size, ptr: int | None) -> None:
         """Leave unless `ea` is in RAM, aligned and, for the stack pointer, within the limit (isa.md §10)."""
         start, end = self.places.ram
-        span = end - start
-        allowed = span - 1 & ~(size - 1)
-        condition = f"{ea} - {start} & {~allowed}"
+        condition = f"not {start} <= {ea} < {end}" + (f" or {ea} & 1" if size == 2 else "")
         if ptr == STACK_POINTER and self._limit_armed:
             condition += f" or {ea} > u16[{self.places.at['SPLIM']}]"
         self.bail(condition)
@@ -333,7 +330,7 @@ class Source:
         """A static address: RAM, a W register, or an SFR through the bus."""
         if self._in_ram(ea, size):
             return self.name(f"u16[{ea >> 1}]" if size == 2 else f"u8[{ea}]", 0, 0xFFFF if size == 2 else 0xFF)
-        if ea >= SFR_END or (size == 2 and ea & 1):
+        if ea >= self.places.ram[0] or (size == 2 and ea & 1):
             raise Unsupported("an address error or the window")
         word = self.w(ea >> 1) if ea < W_END else self._bus_read(ea & ~1)
         if size == 2:
@@ -364,7 +361,7 @@ class Source:
         if self._in_ram(ea, size):
             self._pending.effects.append(f"u16[{ea >> 1}] = {value}" if size == 2 else f"u8[{ea}] = {value}")
             return
-        if ea < W_END or ea >= SFR_END or (size == 2 and ea & 1):
+        if ea < W_END or ea >= self.places.ram[0] or (size == 2 and ea & 1):
             raise Unsupported("a memory-mapped W register, an address error or the window")
         at = self.places.at
         if ea >> 1 == at["CORCON"]:

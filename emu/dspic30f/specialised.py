@@ -14,12 +14,12 @@ from typing import Any, Final
 from emu.dspic30f.arithmetic import ctz16, div_trunc, rem_trunc
 from emu.dspic30f.blocks import LENGTH, Block, BlockWriter, make_function, write_repeat
 from emu.dspic30f.core import Core
-from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.modes import Key, Modes
 from emu.dspic30f.places import places_of
 from emu.dspic30f.pysource import PLAIN, Source, Unsupported
-from emu.dspic30f.state import DA, LAST, RA
+from emu.dspic30f.state import LAST, RA
 
 MODES_KEPT: Final = 64
 """Combinations of processor modes (a DO loop counts as one) whose functions are kept."""
@@ -70,6 +70,8 @@ class SpecialisedEngine:
         self._by_modes: Final[dict[object, _Modes]] = {}
         self._heat: Final[dict[tuple[int, int], int]] = {}
         self._modes = _Modes()
+        self._now: Final = Modes(core.state)
+        self._key: Key = self._now.key()
         core.program.changed.append(self._flash_changed)
 
     def run(self, limit: int) -> None:
@@ -117,30 +119,17 @@ class SpecialisedEngine:
 
     def _select(self) -> None:
         """Make the functions for the present processor modes current."""
-        u16, state = self._core.record.u16, self._state
-        at = state.at
-        loop = (state.pair("DOSTARTL"), state.pair("DOENDL")) if u16[at["SR"]] & DA else None
-        key = (
-            u16[at["CORCON"]] & 0x10F7,
-            u16[at["MODCON"]],
-            u16[at["XBREV"]] >> 15,
-            u16[at["INTCON1"]] & 0x0700,
-            u16[at["cpu.limit_armed"]],
-            u16[at["cpu.initialised"]],
-            loop,
-        )
+        key = self._key = self._now.key()
         modes = self._by_modes.get(key)
         if modes is None:
             if len(self._by_modes) >= MODES_KEPT:
                 self._by_modes.clear()
-            modes = self._by_modes[key] = _Modes(loop=loop)
+            modes = self._by_modes[key] = _Modes(loop=key.loop)
         self._modes = modes
 
     def _source(self) -> Source:
-        u16, at = self._core.record.u16, self._state.at
-        context = context_of(u16[at["CORCON"]], u16[at["MODCON"]], u16[at["XBREV"]] >> 15, u16[at["INTCON1"]] & 0x0700)
-        initialised, armed = u16[at["cpu.initialised"]], bool(u16[at["cpu.limit_armed"]])
-        return Source(self._places, context, initialised, armed)
+        key = self._key
+        return Source(self._places, key.context, key.initialised, bool(key.limit_armed))
 
     def _fetch(self, pc: int) -> Insn | None:
         """Decoded instruction; None where the sequencer must look itself."""

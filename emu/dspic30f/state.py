@@ -34,8 +34,6 @@ STACK_POINTER: Final = 15
 W15_INITIALISED: Final = 1 << STACK_POINTER
 
 PC_MASK: Final = 0x7FFFFE
-RESET_STACK: Final = 0x0800
-"""W15 after reset (isa.md §2.1)."""
 
 
 class _Register:
@@ -114,6 +112,7 @@ class State:
             self.at[name] = record.reserve(name, kind, count).index
         for number, name in enumerate(("W0S", "W1S", "W2S", "W3S", "SRS")):
             self.at[name] = self.at["cpu.shadow"] + number
+        self._reset_stack: Final = chip.data["ram"].start
         self.check_pointers = True
         """Whether a reset leaves W0..W14 uninitialised, so that using one as a pointer resets again (isa.md §2.2)."""
         self._do_registers: Final = [self.at[name] for name in ("DCOUNT", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")]
@@ -174,7 +173,7 @@ class State:
         """Core state after any reset that is not an SFR's reset value (isa.md §9)."""
         for number in range(STACK_POINTER):
             self.u16[number] = 0
-        self.u16[STACK_POINTER] = RESET_STACK
+        self.u16[STACK_POINTER] = self._reset_stack  # isa.md §2.1
         self.pc = 0
         self.mode = RUN
         self.initialised = W15_INITIALISED if self.check_pointers else 0xFFFF

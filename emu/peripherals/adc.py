@@ -23,6 +23,8 @@ from emu.straight import Rule, place_of, slot_of
 
 FULL_SCALE: Final = 0x10000
 """AVDD in units of analog level."""
+CHANNELS: Final = 16
+"""Positions of the multiplexer; those without a pin read 0. UNVERIFIED."""
 _COURSES: Final = 64
 """Register settings remembered; firmware has a handful."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
@@ -52,11 +54,11 @@ class Adc(Peripheral):
             register.written_by(partial(self._setting_written, register))
         self.pcfg.written_by(lambda _old, _new, _lanes: self._route(self.now + 1))
         self._port: Final = parse_pin(site.pins[0])[0]
-        self.source: Final = Inputs(self, len(site.pins))
+        self.source: Final = Inputs(self, CHANNELS)
         """By channel a function of the cycle that replaces its level; call `catch_up` before it changes its course."""
         self.input: Final = self.source.level
         """Analog level of each channel; change it through `set_input`."""
-        self._published: Final = Published(self, len(site.pins))
+        self._published: Final = Published(self, CHANNELS)
         self._vref_high: Final = self.cell("vref_high", "I", FULL_SCALE)
         self._vref_low: Final = self.cell("vref_low", "I", 0)
         self._state: Final = self.cell("state", "B")

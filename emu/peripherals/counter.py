@@ -40,7 +40,7 @@ class Counter(Peripheral):
         self._source: Final = self.cell("source", "B")
         self._phase: Final = self.cell("phase", "H")
         self._before: Final = self.cell("before", "I")
-        self._port, self._pin = parse_pin(site.clock_pin)
+        self._port, self._pin = parse_pin(site.clock_pin) if site.clock_pin else (0, 0)
 
     @property
     def is_wide(self) -> bool:

@@ -20,9 +20,9 @@ _BAND_GAP_SECONDS: Final = 20e-6
 class LowVoltageDetect(Peripheral):
     """LVDIF rises when the supply falls below the chosen threshold; LVDEN and LVDL live in RCON."""
 
-    def __init__(self, kit: Kit, interrupts: Interrupts, rcon: Register) -> None:
+    def __init__(self, kit: Kit, interrupts: Interrupts, rcon: Register, irq: int) -> None:
         super().__init__("lvd", kit)
-        self._line: Final = interrupts.line(kit.chip.lvd_irq)
+        self._line: Final = interrupts.line(irq)
         self._rcon: Final = rcon
         self._supply: Final = self.cell("supply", "H", 5000)
         self._stable: Final = self.slot("stable", self._band_gap_stable)

@@ -83,12 +83,8 @@ class Oscillator(Peripheral):
 
     # -- rates -------------------------------------------------------------------------------------------------------
 
-    @property
-    def _fosc_word(self) -> int:
-        return self.kit.program.config[0]
-
     def _config(self, name: str) -> int:
-        return self.kit.chip.config["FOSC"].field(self._fosc_word, name)
+        return self.kit.chip.config["FOSC"].field(self.kit.program.setting("FOSC"), name)
 
     def _source_hz(self, code: int) -> float:
         tune = self.tun.value & 0xF

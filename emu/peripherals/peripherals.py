@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Final
 
 from emu.bus import Bus
@@ -28,7 +29,10 @@ from emu.peripherals.uart import Uart
 from emu.program import ProgramMemory
 
 CRYSTAL_HZ: Final = 7_372_800
-"""Crystal of the e-puck (§3); other boards pass their own."""
+"""Crystal of a bare chip, in Hz, unless somebody fits another one: UARTs make exact rates of it."""
+CONFIG: Final[Mapping[str, int]] = MappingProxyType({"FWDT": 0x7FFF})
+"""Configuration words of a bare chip for images without: watchdog off. An erased word has it on, and a program that
+sleeps would never come to an end."""
 
 _CHANGE_NOTICE_IRQ: Final = "CN"
 
@@ -45,7 +49,9 @@ class Peripherals:
         self.oscillator: Final = Oscillator(kit)
         self.resets: Final = Resets(kit)
         self.watchdog: Final = Watchdog(kit, self.resets)
-        self.lvd: Final = LowVoltageDetect(kit, self.interrupts, self.resets.rcon)
+        self.lvd: Final = (
+            LowVoltageDetect(kit, self.interrupts, self.resets.rcon, chip.lvd_irq) if chip.lvd_irq is not None else None
+        )
         self.nvm: Final = Nvm(kit, self.interrupts)
         self.ports: Final = {PORTS.index(letter): Port(letter, kit) for letter in chip.ports}
         self.change_notice: Final = ChangeNotice(kit, numbers[_CHANGE_NOTICE_IRQ])
@@ -59,13 +65,14 @@ class Peripherals:
         self.compare: Final = {
             site.number: Compare(site, kit, self.interrupts, self.timer, self.ports) for site in chip.compares
         }
-        self.i2c: Final = I2c(chip.i2c, kit, self.interrupts, self.ports)
-        self.dci: Final = Dci(chip.dci, kit, self.interrupts, self.ports)
+        self.i2c: Final = I2c(chip.i2c, kit, self.interrupts, self.ports) if chip.i2c is not None else None
+        self.dci: Final = Dci(chip.dci, kit, self.interrupts, self.ports) if chip.dci is not None else None
         self.can: Final = {site.number: Can(site, kit, self.interrupts, self.ports) for site in chip.cans}
         for uart in self.uart.values():
-            uart.connect_capture(self.capture[uart.site.autobaud_capture])
+            if uart.site.autobaud_capture in self.capture:
+                uart.connect_capture(self.capture[uart.site.autobaud_capture])
         self.pmd: Final = ModuleDisable(kit, self._modules())
-        self.all: Final[tuple[Peripheral, ...]] = (
+        parts: tuple[Peripheral | None, ...] = (
             self.oscillator,
             self.resets,
             self.watchdog,
@@ -85,6 +92,7 @@ class Peripherals:
             *self.can.values(),
             self.pmd,
         )
+        self.all: Final[tuple[Peripheral, ...]] = tuple(part for part in parts if part is not None)
 
         self._idle_bits: Final = [
             (register.address >> 1, 1 << chip.sfrs[register.name].fields[bit][0])
@@ -92,12 +100,16 @@ class Peripherals:
         ]
         """Word and mask of every SIDL bit: Idle is entered thousands of times a second, mostly with none set."""
         self._stopped: Final = Cell(kit.bus.record, "power.stopped", "B")
+        self.config: Mapping[int, int] = {}
+        """Configuration words that the chip keeps when an image brings none, by program address."""
+        self.fit(crystal=kit.crystal)
         self.on_restored: Final[list[Callable[[], None]]] = []
         """Parts of a board that keep something derived from the record."""
 
     def _modules(self) -> dict[str, Peripheral]:
         """Peripherals by the name their PMD bit carries."""
-        modules: dict[str, Peripheral] = {"ADC": self.adc, "DCI": self.dci, "I2C": self.i2c}
+        modules: dict[str, Peripheral] = {"ADC": self.adc}
+        modules |= {name: device for name, device in (("DCI", self.dci), ("I2C", self.i2c)) if device is not None}
         modules |= {f"T{number}": timer for number, timer in self.timer.items()}
         modules |= {f"SPI{number}": spi for number, spi in self.spi.items()}
         modules |= {f"C{number}": can for number, can in self.can.items()}
@@ -105,6 +117,14 @@ class Peripherals:
         modules |= {f"OC{number}": compare for number, compare in self.compare.items()}
         modules |= {f"U{number}": uart for number, uart in self.uart.items()}
         return modules
+
+    def fit(self, *, crystal: int, config: Mapping[str, int] = CONFIG) -> None:
+        """A board's part of the chip: the frequency at OSC1 in Hz, and configuration words by name for images without.
+
+        To be called before the first reset. Raises KeyError for a word that the chip does not have.
+        """
+        self.kit.crystal = crystal
+        self.config = {self.kit.chip.config[name].address: word for name, word in config.items()}
 
     def reset(self, cause: str) -> None:
         """Every peripheral register to its reset value, every device to its reset state; RCON tells the cause.

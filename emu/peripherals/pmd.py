@@ -46,7 +46,8 @@ class ModuleDisable(Peripheral):
             register.written_by(lambda _old, _new, _lanes: self._written())
             for field in register_fields(kit, name):
                 self._bits.append((lambda register=register, field=field: register[field], field[:-2]))  # type: ignore[misc]
-        self.register("PMD3")
+        if "PMD3" in kit.chip.sfrs:
+            self.register("PMD3")
 
     def stops_in(self, mode: int) -> bool:
         """Never: these are switches."""
@@ -102,12 +103,12 @@ class ModuleDisable(Peripheral):
         bus.on_read[word] = None
         bus.on_write[word] = None
         bus.rules[word] = None
-        bus.off.add(word)
+        bus.off |= {word}
 
     def _mend(self, word: int) -> None:
         access = self._off.pop(word)
         bus = self.bus
-        bus.off.discard(word)
+        bus.off -= {word}
         bus.writable[word], bus.clear_only[word] = access.writable, access.clear_only
         bus.compute[word], bus.on_read[word], bus.on_write[word] = access.compute, access.on_read, access.on_write
         bus.rules[word] = access.rule

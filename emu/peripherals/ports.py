@@ -120,10 +120,10 @@ class ChangeNotice(Peripheral):
             register.written_by(self._pull)
         self._line: Final = self.irq(irq)
         self._flag: Final = self.slot("flag", lambda _due: self._line.request())
-        self._pins: Final = [parse_pin(name) for name in kit.chip.change_pins]
-        self._tris: Final = {port: kit.chip.sfrs["TRIS" + PORTS[port]].address >> 1 for port, _ in self._pins}
+        self._pins: Final = [(number, *parse_pin(name)) for number, name in enumerate(kit.chip.change_pins) if name]
+        self._tris: Final = {port: kit.chip.sfrs["TRIS" + PORTS[port]].address >> 1 for _, port, _ in self._pins}
         for port in self._tris:
-            mask = sum(bit for pin_port, bit in self._pins if pin_port == port)
+            mask = sum(bit for _, pin_port, bit in self._pins if pin_port == port)
             kit.pins.watch_port(port, mask, partial(self._edge, port), inputs_only=True)
 
     def stops_in(self, mode: int) -> bool:
@@ -138,7 +138,7 @@ class ChangeNotice(Peripheral):
         """UNVERIFIED: silicon compares with the level at the last PORT read; here with the level one Tcy earlier."""
         inputs = changed & self.record.u16[self._tris[port]]
         enabled = self._enables[0].value | self._enables[1].value << 16
-        for number, (pin_port, bit) in enumerate(self._pins):
+        for number, pin_port, bit in self._pins:
             if pin_port == port and inputs & bit and enabled >> number & 1:
                 if self.events.due(self._flag) == NEVER:
                     self.events.set(self._flag, cycle + 1)
@@ -148,7 +148,7 @@ class ChangeNotice(Peripheral):
         pulled = self._pullups[0].value | self._pullups[1].value << 16
         for port in self._tris:
             self.kit.pins.pullup[port] = sum(
-                bit for number, (pin_port, bit) in enumerate(self._pins) if pin_port == port and pulled >> number & 1
+                bit for number, pin_port, bit in self._pins if pin_port == port and pulled >> number & 1
             )
             self.kit.pins.apply(port, self.now + 1)
 

@@ -61,13 +61,13 @@ class Watchdog(Peripheral):
     @property
     def is_enabled(self) -> bool:
         """FWDTEN in the configuration word, or SWDTEN."""
-        return bool(self.kit.program.config[1] & self._fwdten or self._resets.rcon.value & self._swdten)
+        return bool(self.kit.program.setting("FWDT") & self._fwdten or self._resets.rcon.value & self._swdten)
 
     @property
     def period(self) -> int:
         """Time-out in Tcy: 2 ms x A x B (§4)."""
         word = self.kit.chip.config["FWDT"]
-        stored = self.kit.program.config[1]
+        stored = self.kit.program.setting("FWDT")
         counts = _COUNTER * _PRESCALE_A[word.field(stored, "FWPSA")] * (word.field(stored, "FWPSB") + 1)
         return round(counts / WDT_HZ * self.kit.fcy())
 

@@ -48,7 +48,8 @@ class Timer(Counter):
         self.tmr.written_by(self._tmr_written)
         self.pr.written_by(self._course_written)
         self.con.written_by(self._con_written)
-        kit.pins.watch(site.clock_pin, self._edge)
+        if site.clock_pin:
+            kit.pins.watch(site.clock_pin, self._edge)
         kit.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
 
     def _places(self) -> TimerPlaces:

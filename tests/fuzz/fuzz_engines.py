@@ -1,6 +1,7 @@
 """Engines against each other: random (instruction, context) pairs and random programs, the whole state compared.
 
-`python tests/fuzz/fuzz_engines.py [--batches N] [--seed S] [--seconds T] [--engine NAME]`. A batch takes every row of
+`python tests/fuzz/fuzz_engines.py [--batches N] [--seed S] [--seconds T] [--engine NAME]
+[--chip NAME]`. A batch takes every row of
 the instruction table through 20 contexts and runs 20 programs. Exits 1 at the first difference.
 """
 
@@ -10,9 +11,10 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "cpu")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "cpu"), str(ROOT / "tests" / "emu" / "chips")]
 
 from engine_fuzz import Difference, check_pairs, check_programs  # noqa: E402
+from made_up import CHIPS  # noqa: E402
 
 from emu.dspic30f.isa.table import ROWS  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
@@ -26,12 +28,14 @@ PROGRAMS = 20
 def main() -> int:
     course = Course(parser(__doc__), "batches", 220, f"batches of {len(ROWS) * CONTEXTS} pairs, {PROGRAMS} programs")
     course.parser.add_argument("--engine", default="interp", help="compared with the plain one (default %(default)s)")
+    course.parser.add_argument("--chip", choices=CHIPS, default="dsPIC30F6014A", help="(default %(default)s)")
     options = course.parse()
+    chip = CHIPS[options.chip]
     pairs = cycles = 0
     try:
         for seed in course:
-            pairs += check_pairs(seed, len(ROWS), CONTEXTS, options.engine)
-            cycles += check_programs(seed, PROGRAMS, options.engine)
+            pairs += check_pairs(seed, len(ROWS), CONTEXTS, options.engine, chip)
+            cycles += check_programs(seed, PROGRAMS, options.engine, chip)
     except Difference as difference:
         return course.failed(difference)
     return course.ended(f"{pairs} pairs and {PROGRAMS * course.done} programs ({cycles} cycles), no difference")

@@ -1,7 +1,8 @@
 """Native code against the interpreters: random legal code, interrupts at odd cycles, the whole record at random stops.
 
 Three campaigns, until their targets are met: `straight` (thousands of distinct instructions per program, in step with
-the plain interpreter, each program also in exact code alone), `wild` (jumps, traps and mode changes at odd places) and
+the plain interpreter, each program also in exact code alone), `wild` (jumps, traps and mode changes at odd places;
+odd seeds on a made-up chip) and
 `long` (loops for millions of instructions, block code beside exact code, a share of it also beside the specialised
 interpreter). Odd seeds run with ipl_slip 1. With --seconds the targets are out of reach: it ends in time.
 
@@ -28,11 +29,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "jit")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "jit"), str(ROOT / "tests" / "emu" / "chips")]
 
 from long_runs import check_long  # noqa: E402
+from made_up import MADE_UP  # noqa: E402
 from twins import Difference, Tally, check_straight, check_wild  # noqa: E402
 
+from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402
 from tests.fuzz.seeds import base_seed  # noqa: E402
 
 SAVE_EVERY = 60.0
@@ -43,7 +46,7 @@ LONG = 10_000_000
 
 CHECKS: dict[str, Callable[[int], Tally]] = {
     "straight": check_straight,
-    "wild": check_wild,
+    "wild": lambda seed: check_wild(seed, chip=(DSPIC30F6014A, MADE_UP)[seed % 2]),
     "long": lambda seed: check_long(seed, LONG),
 }
 

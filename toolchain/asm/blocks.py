@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 
 from toolchain.asm.data import string_argument
-from toolchain.asm.device import FILE_NAMES, include_text
+from toolchain.asm.device import include_text, is_device_file
 from toolchain.asm.expr import ExprError
 from toolchain.asm.macro import (
     CLOSE_MACRO,
@@ -102,9 +102,9 @@ def _include(asm: Assembler, text: str) -> None:
     try:
         path = asm.find_file(name)
     except ExprError:
-        if os.path.basename(name).lower() not in FILE_NAMES:
+        if not is_device_file(os.path.basename(name), asm.options.chip):
             raise
-        asm.source.include(include_text(), name, asm.conditionals.depth)
+        asm.source.include(include_text(asm.options.chip), name, asm.conditionals.depth)
         return
     try:
         content = read_text(path)

@@ -10,9 +10,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from emu.chips.dspic30f6014a import SFRS
+from emu.chips.chip import Chip
 
-FILE_NAMES = frozenset(("p30f6014a.inc", "p30fxxxx.inc"))
 _SETTINGS = Path(__file__).resolve().parents[1] / "include" / "dspic_compiler.h"
 """The C header that lists the configuration settings by name; C and assembly share the numbers."""
 _SETTING = re.compile(r"#define ([A-Z][A-Z0-9_]*) (0x[0-9A-F]{4})$", re.MULTILINE)
@@ -26,9 +25,14 @@ _CONFIG_MACRO = """
 """
 
 
-def _bits() -> Iterator[tuple[str, int]]:
+def is_device_file(name: str, chip: Chip) -> bool:
+    """Whether a file of that name is the include file of the device: p30F6014A.inc, or p30fxxxx.inc."""
+    return name.lower() in (f"p{chip.name.lower().removeprefix('dspic')}.inc", "p30fxxxx.inc")
+
+
+def _bits(chip: Chip) -> Iterator[tuple[str, int]]:
     """Bit names and positions; bits of a wide field are numbered: OC1IP0, OC1IP1, OC1IP2."""
-    for sfr in SFRS.values():
+    for sfr in chip.sfrs.values():
         for name, (lsb, width) in sfr.fields.items():
             if width == 1:
                 yield name, lsb
@@ -36,10 +40,10 @@ def _bits() -> Iterator[tuple[str, int]]:
                 yield from ((f"{name}{bit}", lsb + bit) for bit in range(width))
 
 
-def include_text() -> str:
+def include_text(chip: Chip) -> str:
     """Return the include file.  A bit name that means different positions in two registers is left out."""
     positions: dict[str, set[int]] = {}
-    for name, bit in _bits():
+    for name, bit in _bits(chip):
         positions.setdefault(name, set()).add(bit)
     lines = [f"        .equiv {name}, {bits.pop()}" for name, bits in positions.items() if len(bits) == 1]
     lines += ["        .equiv SLEEP_MODE, 0", "        .equiv IDLE_MODE, 1"]

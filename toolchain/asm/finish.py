@@ -62,7 +62,7 @@ class _Finisher:
             self.asm.file_name or self.asm.source.place.file,
             list(self.sections.values()) + extra,
             self._symbol_table() + symbols,
-            self.asm.options.processor,
+            self.asm.options.chip.processors[0],
         )
 
     # -- fixups --------------------------------------------------------------------------------------------------

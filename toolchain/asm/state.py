@@ -9,7 +9,9 @@ import os
 import re
 from dataclasses import dataclass, field
 
-from emu.elffacts import PROCESSOR_30F6014A, SectionFlag
+from emu.chips import chip_named
+from emu.chips.chip import Chip
+from emu.elffacts import SectionFlag
 from toolchain.asm import expr
 from toolchain.asm.conditionals import Conditionals
 from toolchain.asm.expr import ExprError, Known, Value
@@ -22,15 +24,19 @@ from toolchain.errors import Place, ToolError
 
 MAX_ERRORS = 50
 DEVICE_SYMBOLS = (
-    "__30F6014A",
     "__dsPIC30F",
     "__HAS_DSP",
     "__HAS_EEDATA",
-    "__HAS_CODEGUARD",
     "__HAS_5VOLTS",
     "__C30ELF",
 )
-"""Absolute symbols of value 1, always defined for this part (abi-elf.md §4.3)."""
+"""Absolute symbols of value 1 that are always defined, beside the part's own name (abi-elf.md §4.3)."""
+
+
+def device_symbols(chip: Chip) -> tuple[str, ...]:
+    """Absolute symbols of value 1 that say what the program is for."""
+    guard = ("__HAS_CODEGUARD",) if "FBS" in chip.config else ()
+    return (f"__{chip.name.removeprefix('dsPIC')}", *DEVICE_SYMBOLS, *guard)
 
 _NUMERIC_LABEL = re.compile(r"(\d+)([fb])$")
 
@@ -43,7 +49,7 @@ class Options:
     define: dict[str, int] = field(default_factory=dict)
     relax: bool = False
     debug: bool = False
-    processor: int = PROCESSOR_30F6014A
+    chip: Chip = field(default_factory=chip_named)
     prefix_map: list[tuple[str, str]] = field(default_factory=list)
 
     def recorded(self, path: str) -> str:
@@ -87,7 +93,7 @@ class Assembler:
         ):
             self.sections[name] = AsmSection(name, flags, kind, place)  # always emitted, even if empty (§7 item 8)
         self.section = self.previous = self.sections[".text"]
-        for name in DEVICE_SYMBOLS:
+        for name in device_symbols(options.chip):
             self.symbols[name] = AsmSymbol(name, 1)
         for name, value in options.define.items():
             self.symbols[name] = AsmSymbol(name, value)

@@ -9,11 +9,10 @@ from pathlib import Path
 from toolchain.asm.assemble import assemble
 from toolchain.asm.state import Options
 from toolchain.commands.parser import definition, parser
+from toolchain.device import DEFAULT, DEVICES, device
 from toolchain.elf.write import object_bytes
 from toolchain.errors import ToolError
 from toolchain.files import read_text, write_outputs
-
-PART = "30F6014A"
 
 
 def options_of() -> argparse.ArgumentParser:
@@ -29,7 +28,7 @@ def options_of() -> argparse.ArgumentParser:
     p.add_argument("-g", dest="debug", action="store_true", help="write a DWARF line table for this source")
     p.add_argument("--debug-prefix-map", action="append", default=[], metavar="OLD=NEW", type=_pair,
                    help="paths that begin with OLD are recorded as NEW")  # fmt: skip
-    p.add_argument("-p", dest="part", default=PART, help=f"processor; only {PART} is supported")
+    p.add_argument("-p", dest="part", default=DEFAULT, help=f"processor: {' or '.join(DEVICES)} (default {DEFAULT})")
     p.add_argument("-omf", default="elf", choices=("elf",), help=argparse.SUPPRESS)
     return p
 
@@ -37,8 +36,7 @@ def options_of() -> argparse.ArgumentParser:
 def main(arguments: list[str]) -> int:
     """Assemble; returns 0.  Raises `ToolError` with every finding."""
     options = options_of().parse_args(arguments)
-    if options.part.upper().removeprefix("DSPIC") != PART:
-        raise ToolError(f"-p{options.part}: the only processor supported is {PART}")
+    chip = device(options.part)
     if options.source == "-":
         name, text = "<stdin>", sys.stdin.read()
     else:
@@ -47,7 +45,7 @@ def main(arguments: list[str]) -> int:
     if Path(output) == Path(name):
         raise ToolError(f"the output {output} would overwrite the source")
     asm_options = Options(options.include, dict(map(definition, options.defsym)), options.relax, options.debug,
-                          prefix_map=options.debug_prefix_map)  # fmt: skip
+                          chip=chip, prefix_map=options.debug_prefix_map)  # fmt: skip
     obj, messages = assemble(text, name, asm_options)
     for message in messages:
         print(message, file=sys.stderr)

@@ -11,9 +11,9 @@ from toolchain.elf import constants as c
 from toolchain.elf.model import Section
 from toolchain.elf.read import is_object, read_executable, read_object
 from toolchain.files import read_bytes
-from toolchain.link.memory import config_sections
+from toolchain.link import memory
 
-CONFIG_SECTIONS = {name for word in config_sections() for name in (word, word.removesuffix(".sec"))}
+CONFIG_SECTIONS = {name for word in memory.CONFIG_SECTIONS for name in (word, word.removesuffix(".sec"))}
 """Configuration words have code flags but are no flash (abi-elf.md §6.6)."""
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from emu.elffacts import EM_DSPIC30F, PROCESSOR_30F6014A
+from emu.elffacts import EM_DSPIC30F
 
-__all__ = ["EM_DSPIC30F", "PROCESSOR_30F6014A"]
+__all__ = ["EM_DSPIC30F"]
 
 SIGNATURE_SECTION = "__c30_signature"
 """Info section of every object: three 16-bit words 1, 0, 0 (abi-elf.md §6.7, §7 item 8)."""

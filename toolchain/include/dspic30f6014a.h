@@ -3,6 +3,9 @@
  * Written by `python -m toolchain.device_header` from the chip's register table; do not edit. */
 #ifndef DSPIC30F6014A_H
 #define DSPIC30F6014A_H
+#ifndef __dsPIC30F6014A__
+#error "this header is for the dsPIC30F6014A: compile with -mcpu=30F6014A"
+#endif
 
 #include "dspic_compiler.h"
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from toolchain.commands.parser import definition, integer
+from toolchain.device import DEFAULT, DEVICES, device
 from toolchain.elf.read import read_object
 from toolchain.elf.write import executable_bytes
 from toolchain.errors import ToolError
@@ -27,7 +28,7 @@ IGNORED_WORDS = (
     "--warn-section-align", "--no-warn-section-align",
 )  # fmt: skip
 """Words of Microchip's linker that change nothing here."""
-DEVICE_SCRIPT = re.compile(r"p30f6014a\w*\.gld", re.IGNORECASE)
+DEVICE_SCRIPT = re.compile(r"p(30f\d{4}a?)\w*\.gld", re.IGNORECASE)
 _NUMBERS = {"heap": 0xFFFF, "stack": 0xFFFF, "stackguard": 0xFFFF, "fill_upper": 0xFF}
 
 
@@ -56,7 +57,8 @@ def add_options(p: argparse.ArgumentParser) -> None:
                    help="accepted for the device's own script, p30F6014A.gld: its memory map is built in")  # fmt: skip
     for word in IGNORED_WORDS:
         p.add_argument(word, action="store_true", help=argparse.SUPPRESS)
-    p.add_argument("-p", "--processor", default="30F6014A", help=argparse.SUPPRESS)
+    p.add_argument("-p", "--processor", default=DEFAULT, metavar="NAME",
+                   help=f"the device: {' or '.join(DEVICES)} (default {DEFAULT})")  # fmt: skip
 
 
 def link_options(options: argparse.Namespace) -> LinkOptions:
@@ -64,8 +66,10 @@ def link_options(options: argparse.Namespace) -> LinkOptions:
     for name, most in _NUMBERS.items():
         if not 0 <= getattr(options, name) <= most:
             raise ToolError(f"--{name.replace('_', '-')} {getattr(options, name)} is outside 0..{most}")
+    chip = device(options.processor)
     for script in options.script:
-        if not DEVICE_SCRIPT.fullmatch(Path(script).name):
+        named = DEVICE_SCRIPT.fullmatch(Path(script).name)
+        if named is None or device(named[1]) is not chip:
             raise ToolError(
                 f"linker script '{script}' is not used here: the memory map of the device is built in; "
                 f"place objects with __attribute__((address(N))), define symbols with --defsym"
@@ -83,6 +87,7 @@ def link_options(options: argparse.Namespace) -> LinkOptions:
         fill_upper=options.fill_upper,
         undefined=options.undefined,
         define=dict(map(definition, options.defsym)),
+        chip=chip,
     )
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 
+from emu.chips.family import SLOTS
 from emu.elffacts import SectionFlag
 from toolchain.asm.finish import KEEP_PREFIX
 from toolchain.elf.model import Home, Section
-from toolchain.link.memory import CHIP, config_sections
+from toolchain.link.memory import CONFIG_SECTIONS
 from toolchain.link.resolve import Resolution
 
 SECTION_LIMIT = re.compile(r"\.(startof|sizeof|endof)\.(.+)")
@@ -19,18 +20,17 @@ ROOT_NAMES = frozenset((".reset", ".init", ".user_init", ".ivt", ".aivt"))
 def vector_names() -> set[str]:
     """Symbols that become vectors just by existing (abi-elf.md §2.7)."""
     names = {"__DefaultInterrupt"}
-    for vector in CHIP.vectors:
+    for vector in SLOTS:
         names |= {vector.symbol, vector.alternate_symbol}
     return names
 
 
 def _roots(resolution: Resolution, names: list[str]) -> list[Section]:
     roots: list[Section] = []
-    config = config_sections()
     for obj in resolution.objects:
         kept = {s.name.removeprefix(KEEP_PREFIX) for s in obj.symbols if s.name.startswith(KEEP_PREFIX)}
         for section in obj.sections:
-            always = section.name in ROOT_NAMES or section.name in config or section.name in kept
+            always = section.name in ROOT_NAMES or section.name in CONFIG_SECTIONS or section.name in kept
             fixed = section.flags & (SectionFlag.ABSOLUTE | SectionFlag.EEDATA) and section.units
             if always or fixed or not section.flags & SectionFlag.ALLOC:
                 roots.append(section)

@@ -7,11 +7,10 @@ import re
 from dataclasses import dataclass
 from itertools import pairwise
 
+from emu.chips.chip import Chip
 from emu.elffacts import (
     GENERIC_PROCESSORS,
     OCTETS_PER_UNIT,
-    PROCESSOR_30F6014,
-    PROCESSOR_30F6014A,
     PROCESSOR_MASK,
     PSV_PAGE_UNITS,
     ExtendedAttribute,
@@ -24,7 +23,7 @@ from toolchain.link import dinit, synthesize
 from toolchain.link.archive import Archive
 from toolchain.link.gc import SECTION_LIMIT, live_sections, vector_names
 from toolchain.link.image import Output, build_executable, build_outputs
-from toolchain.link.memory import HANDLE_LIMIT, script_symbols
+from toolchain.link.memory import HANDLE_LIMIT, Memory
 from toolchain.link.options import LinkOptions
 from toolchain.link.place import Layout, Placer, even, is_const, largest_symbols, space_of
 from toolchain.link.relocate import Relocator
@@ -78,15 +77,16 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
         slots = {}
     _adopt(resolution, own)
     live |= set(own.sections)
-    absolute = script_symbols() | options.define
+    memory = Memory(options.chip)
+    absolute = memory.script_symbols() | options.define
     absolute |= dict.fromkeys(_LINKER_SYMBOLS, 0)
     provided = set(absolute) | {n for n in resolution.wanted if SECTION_LIMIT.fullmatch(n)}
     check(resolution, provided, live)
     _check_handlers(resolution, live)
-    messages = _foreign_processors(objects)
+    messages = _foreign_processors(objects, options.chip)
 
     order = [s for obj in resolution.objects for s in obj.sections if s in live and s.name != c.SIGNATURE_SECTION]
-    placer = Placer(resolution, order)
+    placer = Placer(resolution, order, memory)
     placer.place_data()
     records = dinit.plan(placer.layout, options.pack_data) if options.data_init else []
     table = dinit.empty_section(records)
@@ -113,7 +113,7 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
         contents[table] = table.data
     outputs = build_outputs(layout, contents, options.fill_upper)
     entry = relocator.target(synthesize.wanted(options.entry)).address
-    image = build_executable(resolution, outputs, relocator, entry, options.processor)
+    image = build_executable(resolution, outputs, relocator, entry, options.chip.processors[0])
     return Linked(image, resolution, layout, outputs, records, live, stack, messages)
 
 
@@ -252,11 +252,12 @@ def _check_handlers(resolution: Resolution, live: set[Section]) -> None:
         raise ToolError.of(findings)
 
 
-def _foreign_processors(objects: list[ObjectFile]) -> list[str]:
+def _foreign_processors(objects: list[ObjectFile], chip: Chip) -> list[str]:
     """Warn about objects assembled for another part: register addresses may differ (abi-elf.md §6.1)."""
-    fitting = (PROCESSOR_30F6014A, PROCESSOR_30F6014, *GENERIC_PROCESSORS)
+    fitting = (*chip.processors, *GENERIC_PROCESSORS)
+    part = chip.name.removeprefix("dsPIC")
     return [
-        f"{obj.name}: warning: assembled for processor id {obj.processor & PROCESSOR_MASK:#x}, not the 30F6014A"
+        f"{obj.name}: warning: assembled for processor id {obj.processor & PROCESSOR_MASK:#x}, not the {part}"
         for obj in objects
         if obj.processor & PROCESSOR_MASK not in fitting
     ]

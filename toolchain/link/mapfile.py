@@ -8,26 +8,27 @@ from emu.elffacts import OCTETS_PER_UNIT
 from toolchain.elf.model import Section, Symbol
 from toolchain.elf.symbols import symbol_sizes
 from toolchain.link.link import Linked, memory_use
-from toolchain.link.memory import EEPROM, FLASH, RAM
 from toolchain.link.place import memory_bytes, space_of
 
 
 def memory_report(linked: Linked) -> str:
     """Return the used and free bytes of each memory, as `--report-mem` prints them."""
     used = memory_use(linked)
-    flash = FLASH.size // OCTETS_PER_UNIT * 3
+    memory = linked.layout.memory
+    flash = memory.flash.size // OCTETS_PER_UNIT * 3
     rows = (
         ("flash", used["flash"], flash, f"{used['flash'] // 3} of {flash // 3} instruction words"),
-        ("data memory", used["data"], RAM.size, f"stack gets {linked.stack[0]:#x}..{linked.stack[1]:#x}"),
-        ("EEPROM", used["eeprom"], EEPROM.size, ""),
+        ("data memory", used["data"], memory.ram.size, f"stack gets {linked.stack[0]:#x}..{linked.stack[1]:#x}"),
+        ("EEPROM", used["eeprom"], memory.eeprom.size, ""),
     )
     return "\n".join(f"{n:12} {u:6} of {t:6} bytes  {100 * u / t:5.1f} %  {note}".rstrip() for n, u, t, note in rows)
 
 
 def memory_summary(linked: Linked, image: str) -> str:
     """The same as XML, for MPLAB X's memory gauges (`--memorysummary`)."""
-    used = memory_use(linked)
-    rows = (("program", used["flash"], FLASH.size // OCTETS_PER_UNIT * 3), ("data", used["data"], RAM.size))
+    used, place = memory_use(linked), linked.layout.memory
+    flash = place.flash.size // OCTETS_PER_UNIT * 3
+    rows = (("program", used["flash"], flash), ("data", used["data"], place.ram.size))
     project = Element("project")
     executable = SubElement(project, "executable", name=image)
     for name, taken, length in rows:

@@ -3,47 +3,59 @@
 from __future__ import annotations
 
 from bisect import insort
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property
+from typing import Final
 
-from emu.chips.dspic30f6014a import CONFIG, DSPIC30F6014A, UNIT_ID
+from emu.chips import NAMES, chip_named
+from emu.chips.chip import Chip
+from emu.chips.family import UNIT_ID
 from emu.elffacts import UNITS_PER_WORD
 
-CHIP = DSPIC30F6014A
-FLASH, PROGRAM = CHIP.program["flash"], CHIP.program["program"]
-RESET, IVT, AIVT = CHIP.program["reset"], CHIP.program["ivt"], CHIP.program["aivt"]
-EEPROM = CHIP.program["eedata"]
-RAM, NEAR, X_RAM, Y_RAM = CHIP.data["ram"], CHIP.data["near"], CHIP.data["xram"], CHIP.data["yram"]
 HANDLE_LIMIT = 0x10000  # abi-elf.md §1.5: a function pointer is 16 bits
 UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
 
 
-@lru_cache(1)
-def config_sections() -> dict[str, int]:
-    """Input section name -> program address of the configuration and unit-id words (abi-elf.md §6.6)."""
-    places = {f"__{name}.sec": word.address for name, word in CONFIG.items()}
-    for index in range(UNIT_ID_WORDS):
-        places[f"__FUID{index}.sec"] = UNIT_ID.start + index * UNITS_PER_WORD
-    return places
+class Memory:
+    """One chip as a linker sees it."""
+
+    def __init__(self, chip: Chip) -> None:
+        self.chip: Final = chip
+        program, data = chip.program, chip.data
+        self.flash, self.program, self.eeprom = program["flash"], program["program"], program["eedata"]
+        self.reset, self.ivt, self.aivt = program["reset"], program["ivt"], program["aivt"]
+        self.ram, self.near, self.x_ram, self.y_ram = data["ram"], data["near"], data["xram"], data["yram"]
+
+    @cached_property
+    def config_sections(self) -> Mapping[str, int]:
+        """Input section name -> program address of the configuration and unit-id words (abi-elf.md §6.6)."""
+        places = {f"__{name}.sec": word.address for name, word in self.chip.config.items()}
+        for index in range(UNIT_ID_WORDS):
+            places[f"__FUID{index}.sec"] = UNIT_ID.start + index * UNITS_PER_WORD
+        return places
+
+    def script_symbols(self) -> dict[str, int]:
+        """Absolute symbols of a device's linker script (abi-elf.md §3.3): bases, config words, SFRs twice spelt."""
+        symbols = {
+            "__CODE_BASE": self.program.start,
+            "__IVT_BASE": self.ivt.start,
+            "__AIVT_BASE": self.aivt.start,
+            "__DATA_BASE": self.ram.start,
+            "__DATA_LENGTH": self.ram.size,
+            "__YDATA_BASE": self.y_ram.start,
+        }
+        for name, word in self.chip.config.items():
+            symbols[f"__{name}"] = word.address
+        for name, sfr in self.chip.sfrs.items():
+            symbols[name] = symbols[f"_{name}"] = symbols[f"_{name}bits"] = sfr.address
+        for accumulator in ("ACCA", "ACCB"):  # three registers each; `PUSH ACCA` takes the lowest (abi-elf.md §3.3)
+            symbols[accumulator] = symbols[f"_{accumulator}"] = self.chip.sfrs[f"{accumulator}L"].address
+        return symbols
 
 
-def script_symbols() -> dict[str, int]:
-    """Absolute symbols of a device's linker script (abi-elf.md §3.3): bases, config words, SFRs in two spellings."""
-    symbols = {
-        "__CODE_BASE": PROGRAM.start,
-        "__IVT_BASE": IVT.start,
-        "__AIVT_BASE": AIVT.start,
-        "__DATA_BASE": RAM.start,
-        "__DATA_LENGTH": RAM.size,
-        "__YDATA_BASE": Y_RAM.start,
-    }
-    for name, word in CONFIG.items():
-        symbols[f"__{name}"] = word.address
-    for name, sfr in CHIP.sfrs.items():
-        symbols[name] = symbols[f"_{name}"] = symbols[f"_{name}bits"] = sfr.address
-    for accumulator in ("ACCA", "ACCB"):  # three registers each; `PUSH ACCA` takes the lowest (abi-elf.md §3.3)
-        symbols[accumulator] = symbols[f"_{accumulator}"] = CHIP.sfrs[f"{accumulator}L"].address
-    return symbols
+CONFIG_SECTIONS: Final = frozenset(name for chip in map(chip_named, NAMES) for name in Memory(chip).config_sections)
+"""Names of the sections that hold configuration words, of any chip."""
 
 
 @dataclass(slots=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from emu.elffacts import PROCESSOR_30F6014A
+from emu.chips import chip_named
+from emu.chips.chip import Chip
 
 STACK_GUARD = 16  # abi-elf.md §3.3: --stackguard default
 MINIMUM_STACK = 16  # --stack default
@@ -26,4 +27,4 @@ class LinkOptions:
     fill_upper: int = 0
     undefined: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
-    processor: int = PROCESSOR_30F6014A
+    chip: Chip = field(default_factory=chip_named)

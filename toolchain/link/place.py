@@ -13,20 +13,7 @@ from emu.elffacts import PSV_PAGE_UNITS, PSV_WINDOW, ExtendedAttribute, SectionF
 from toolchain.elf.model import Section
 from toolchain.elf.symbols import symbol_sizes
 from toolchain.errors import ToolError
-from toolchain.link.memory import (
-    AIVT,
-    EEPROM,
-    HANDLE_LIMIT,
-    IVT,
-    NEAR,
-    PROGRAM,
-    RAM,
-    RESET,
-    X_RAM,
-    Y_RAM,
-    Pool,
-    config_sections,
-)
+from toolchain.link.memory import CONFIG_SECTIONS, HANDLE_LIMIT, Memory, Pool
 from toolchain.link.resolve import Resolution
 
 _FIRST_CODE = (".init", ".user_init", ".handle", ".isr", ".libc", ".libm", ".libdsp", ".lib")
@@ -46,10 +33,17 @@ class Placed:
 class Layout:
     """The result: places by section, and what is left of the memories."""
 
+    memory: Memory
     placed: dict[Section, Placed] = field(default_factory=dict)
-    data: Pool = field(default_factory=lambda: Pool(RAM.start, RAM.end))
-    program: Pool = field(default_factory=lambda: Pool(PROGRAM.start, PROGRAM.end))
-    eeprom: Pool = field(default_factory=lambda: Pool(EEPROM.start, EEPROM.end))
+    data: Pool = field(init=False)
+    program: Pool = field(init=False)
+    eeprom: Pool = field(init=False)
+
+    def __post_init__(self) -> None:
+        memory = self.memory
+        self.data = Pool(memory.ram.start, memory.ram.end)
+        self.program = Pool(memory.program.start, memory.program.end)
+        self.eeprom = Pool(memory.eeprom.start, memory.eeprom.end)
 
 
 def even(units: int) -> int:
@@ -59,7 +53,7 @@ def even(units: int) -> int:
 
 def space_of(section: Section) -> str:
     """Return "data", "program", "eeprom", "config", or "info" for what is in no memory."""
-    if section.name in config_sections():
+    if section.name in CONFIG_SECTIONS:
         return "config"
     if section.flags & SectionFlag.EEDATA:
         return "eeprom"
@@ -71,8 +65,9 @@ def space_of(section: Section) -> str:
 class Placer:
     """Places sections space by space; largest constraints first."""
 
-    def __init__(self, resolution: Resolution, sections: list[Section]) -> None:
-        self.resolution, self.layout = resolution, Layout()
+    def __init__(self, resolution: Resolution, sections: list[Section], memory: Memory) -> None:
+        self.resolution, self.layout, self.memory = resolution, Layout(memory), memory
+        self.ram, self.near, self.program, self.eeprom = memory.ram, memory.near, memory.program, memory.eeprom
         self.by_space: dict[str, list[Section]] = {}
         for section in sections:
             self.by_space.setdefault(space_of(section), []).append(section)
@@ -93,10 +88,10 @@ class Placer:
         for section in fixed:
             self._fix(section, self.layout.data, section.load, section.load, "data memory")
         groups = (
-            ([s for s in free if s.flags & SectionFlag.YMEM], Y_RAM.start, Y_RAM.end, True),
-            ([s for s in free if s.flags & SectionFlag.XMEM], X_RAM.start, X_RAM.end, False),
-            ([s for s in free if _is_near(s)], RAM.start, NEAR.end, False),
-            ([s for s in free if not _is_near(s) and not s.flags & _XY], RAM.start, RAM.end, False),
+            ([s for s in free if s.flags & SectionFlag.YMEM], self.memory.y_ram.start, self.memory.y_ram.end, True),
+            ([s for s in free if s.flags & SectionFlag.XMEM], self.memory.x_ram.start, self.memory.x_ram.end, False),
+            ([s for s in free if _is_near(s)], self.ram.start, self.near.end, False),
+            ([s for s in free if not _is_near(s) and not s.flags & _XY], self.ram.start, self.ram.end, False),
         )
         for members, low, high, from_top in groups:
             for section in sorted(members, key=_data_order):
@@ -104,7 +99,7 @@ class Placer:
                 take = self._take_top if top else self._take
                 at = take(section, low, high)
                 if at is None:
-                    rivals = sections if high == RAM.end else members
+                    rivals = sections if high == self.ram.end else members
                     raise self._overflow(members, self.layout.data, low, high, section, rivals)
                 self._record(section, at)
 
@@ -125,7 +120,7 @@ class Placer:
 
     def place_fixed_program(self) -> None:
         """Reset, vector tables, `address()` code and constants, configuration words."""
-        starts = {".reset": RESET, ".ivt": IVT, ".aivt": AIVT}
+        starts = {".reset": self.memory.reset, ".ivt": self.memory.ivt, ".aivt": self.memory.aivt}
         for section in self.by_space.get("program", []):
             if section.name in starts:
                 region = starts[section.name]
@@ -141,7 +136,9 @@ class Placer:
             self._config(section)
 
     def _config(self, section: Section) -> None:
-        address = config_sections()[section.name]
+        address = self.memory.config_sections.get(section.name)
+        if address is None:
+            raise ToolError(f"{self._name(section)}: error: the {self.memory.chip.name} has no such configuration word")
         if section.units > 2:
             raise ToolError(f"{self._name(section)} holds {section.units // 2} words, a configuration register is one")
         for other, placed in self.layout.placed.items():
@@ -157,21 +154,21 @@ class Placer:
         const = [s for s in free if s.is_psv and is_const(s)]
         first = sorted((s for s in code if _first_rank(s) < len(_FIRST_CODE)), key=_first_rank)
         for section in first:
-            high = HANDLE_LIMIT if section.name == ".handle" else PROGRAM.end
+            high = HANDLE_LIMIT if section.name == ".handle" else self.program.end
             self._program(section, free, high)
         self._const_group(const, free)
         for section in sorted((s for s in free if s.is_psv and not is_const(s)), key=lambda s: -s.units):
-            self._program(section, free, PROGRAM.end, PSV_PAGE_UNITS)
+            self._program(section, free, self.program.end, PSV_PAGE_UNITS)
         for section in code:
             if section not in self.layout.placed:
                 window = HANDLE_LIMIT if section.name == ".dinit" and section.units <= HANDLE_LIMIT else 0
-                self._program(section, free, PROGRAM.end, window)
+                self._program(section, free, self.program.end, window)
 
     def _program(self, section: Section, everything: list[Section], high: int, window: int = 0) -> None:
         size, align = even(section.units), max(section.align, 2)
-        at = self.layout.program.allocate(size, align, PROGRAM.start, high, window)
+        at = self.layout.program.allocate(size, align, self.program.start, high, window)
         if at is None:
-            raise self._overflow(everything, self.layout.program, PROGRAM.start, high, section)
+            raise self._overflow(everything, self.layout.program, self.program.start, high, section)
         self._record(section, psv_address(at) if section.is_psv else at, at)
 
     def _const_group(self, const: list[Section], everything: list[Section]) -> None:
@@ -189,9 +186,10 @@ class Placer:
             raise ToolError(
                 f"constants (.const) are {size - PSV_PAGE_UNITS} bytes too large for one PSV window of 32 KB{largest}"
             )
-        at = self.layout.program.allocate(size, align, PROGRAM.start, PROGRAM.end, PSV_PAGE_UNITS)
+        first, end = self.program.start, self.program.end
+        at = self.layout.program.allocate(size, align, first, end, PSV_PAGE_UNITS)
         if at is None:
-            raise self._overflow(everything, self.layout.program, PROGRAM.start, PROGRAM.end, const[0])
+            raise self._overflow(everything, self.layout.program, first, end, const[0])
         for section, offset in zip(const, offsets, strict=True):
             self._record(section, psv_address(at + offset), at + offset)
 
@@ -203,9 +201,10 @@ class Placer:
                 self._fix(section, self.layout.eeprom, section.load, psv_address(section.load), "data EEPROM")
         for section in members:
             if section not in self.layout.placed:
-                at = self.layout.eeprom.allocate(even(section.units), max(section.align, 2), EEPROM.start, EEPROM.end)
+                first, end = self.eeprom.start, self.eeprom.end
+                at = self.layout.eeprom.allocate(even(section.units), max(section.align, 2), first, end)
                 if at is None:
-                    raise self._overflow(members, self.layout.eeprom, EEPROM.start, EEPROM.end, section)
+                    raise self._overflow(members, self.layout.eeprom, first, end, section)
                 self._record(section, psv_address(at), at)
 
     def place_info(self) -> None:
@@ -237,9 +236,8 @@ class Placer:
         elif program:
             reason = f"program memory {what} overflows by {missing // 2 * 3} bytes ({missing // 2} instruction words)"
         else:
-            kind = (
-                "EEPROM" if space_of(failed) == "eeprom" else "near data memory" if high == NEAR.end else "data memory"
-            )
+            data = "near data memory" if high == self.near.end else "data memory"
+            kind = "EEPROM" if space_of(failed) == "eeprom" else data
             reason = f"{kind} {what} overflows by {missing} bytes"
         return ToolError(
             f"{self._name(failed)} does not fit: {reason}{largest_symbols(self.resolution, rivals or group)}"

@@ -9,7 +9,7 @@ from toolchain.elf import fields
 from toolchain.elf.fields import FieldError
 from toolchain.elf.model import Bind, Home, Reloc, Section, Symbol
 from toolchain.errors import ToolError
-from toolchain.link.memory import HANDLE_LIMIT, NEAR
+from toolchain.link.memory import HANDLE_LIMIT
 from toolchain.link.place import Layout, space_of
 from toolchain.link.resolve import Resolution
 
@@ -128,8 +128,9 @@ class Relocator:
         signed = target.address + _signed(field, kind.width)
         value = signed if kind.low <= signed <= kind.high else target.address + field
         if kind.number in _NEAR_FORMS and not kind.low <= value <= kind.high:
+            near = self.layout.memory.near.end
             raise FieldError(
-                f"cannot access it at {signed:#x} with near addressing: the address must be below {NEAR.end:#x}"
+                f"cannot access it at {signed:#x} with near addressing: the address must be below {near:#x}"
             )
         return fields.checked(kind, value)
 

@@ -5,11 +5,11 @@ Each is an ordinary section with ordinary relocations, so that placing and reloc
 
 from __future__ import annotations
 
+from emu.chips.family import SLOTS
 from emu.dspic30f.isa import text
 from emu.dspic30f.isa.debug import HALT
 from emu.elffacts import OCTETS_PER_WORD, RELOCATION_BY_NAME, RELOCATIONS, Formula, SectionFlag
 from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
-from toolchain.link.memory import CHIP
 from toolchain.link.resolve import Resolution
 
 CODE = SectionFlag.ALLOC | SectionFlag.EXECINSTR
@@ -56,7 +56,7 @@ def default_interrupt(obj: ObjectFile) -> None:
 def vector_tables(resolution: Resolution, filled: bool) -> tuple[Section, Section]:
     """Return .ivt and .aivt: slot X holds `__X`, the alternate one `__AltX`, else the default (abi-elf.md §2.7)."""
     tables = (Section(".ivt", CODE), Section(".aivt", CODE))
-    for vector in CHIP.vectors:
+    for vector in SLOTS:
         choices = ((vector.symbol,), (vector.alternate_symbol, vector.symbol))
         for table, names in zip(tables, choices, strict=True):
             name = next((n for n in names if n in resolution.globals), "__DefaultInterrupt" if filled else "")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from emu.chips import chip_named, chip_of
+from emu.chips.family import AIVT, SLOTS
+from emu.elffacts import PROCESSOR_MASK
 from toolchain.elf import constants as c
 from toolchain.elf.disassemble import NO_INSTRUCTIONS, Item, Names, items
 from toolchain.elf.model import Bind, Executable
 from toolchain.elf.symbols import is_named
 from toolchain.errors import ToolError
-from toolchain.link.memory import CHIP
 from toolchain.stack.annotations import Annotations
 from toolchain.stack.effects import CALL_BYTES, Flow, effect_of
 from toolchain.stack.totals import Usage, totals
@@ -49,8 +51,9 @@ class Analysis:
     def __init__(self, image: Executable, annotations: Annotations) -> None:
         self.image, self.annotations = image, annotations
         self.code: dict[int, Item] = {}
+        chip = chip_of(image.processor & PROCESSOR_MASK) or chip_named()
         for section in image.sections:
-            if section.is_code and section.name not in TABLES and section.address in CHIP.program["program"]:
+            if section.is_code and section.name not in TABLES and section.address in chip.program["program"]:
                 self.code.update((item.address, item) for item in items(section))
         self.names = Names(image.symbols)
         self.vectors = self._vectors()
@@ -64,10 +67,10 @@ class Analysis:
         """Handler address -> vector names, from the vector tables of the image."""
         words: dict[int, int] = {}
         for section in self.image.sections:
-            if section.is_code and section.address < CHIP.program["aivt"].end:
+            if section.is_code and section.address < AIVT.end:
                 words.update((item.address, item.words[0]) for item in items(section))
         found: dict[int, list[str]] = {}
-        for vector in CHIP.vectors:
+        for vector in SLOTS:
             for address, name in ((vector.ivt, vector.name), (vector.aivt, "Alt" + vector.name)):
                 handler = words.get(address, 0)
                 if handler in self.code and name.removeprefix("Alt") not in found.setdefault(handler, []):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
 from emu.boards.epuck.camera import Camera
+from emu.boards.epuck.config import CHIP, CONFIG, CRYSTAL_HZ
 from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote
 from emu.boards.epuck.simple import Battery, Bluetooth, Codec, Leds, Selector
@@ -23,10 +24,13 @@ class Epuck:
 
     `chip` is `machine.peripherals`. `camera` names the sensor (PO3030K, PO6030K, PO8030D), None leaves it unplugged.
     `seed` chooses noise and radio losses, which are off until asked for (`noise.strength`, `bluetooth.loss`).
-    Raises ValueError for an unknown sensor or selector position.
+    Raises ValueError for an unknown sensor or selector position, and for a chip that no e-puck carries.
     """
 
     def __init__(self, chip: Peripherals, *, camera: str | None = "PO6030K", selector: int = 0, seed: int = 0) -> None:
+        if chip.kit.chip.name != CHIP:
+            raise ValueError(f"an e-puck carries a {CHIP}, not a {chip.kit.chip.name}")
+        chip.fit(crystal=CRYSTAL_HZ, config=CONFIG)
         self.chip: Final = chip
         self.noise: Final = Noise(chip.kit.bus.record, seed)
         self.leds: Final = Leds(chip)

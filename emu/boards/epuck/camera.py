@@ -164,9 +164,11 @@ class Camera(Part, I2cDevice):
                 self.pins.attach(port, mask, wave)
             else:
                 self.pins.detach(port, wave)
-        self.chip.i2c.wire.devices.pop(ADDRESS, None)
+        assert self.chip.i2c is not None
+        wire = self.chip.i2c.wire
+        wire.devices.pop(ADDRESS, None)
         if self.is_plugged:
-            self.chip.i2c.wire.attach(ADDRESS, self)
+            wire.attach(ADDRESS, self)
 
     @property
     def frames_per_second(self) -> float:

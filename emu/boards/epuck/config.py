@@ -1,10 +1,15 @@
-"""The e-puck as data: the configuration words its chip keeps when firmware arrives without any."""
+"""The e-puck as data: its chip, its crystal, and the configuration words kept when firmware arrives without any."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
+
+CHIP: Final = "dsPIC30F6014A"
+
+CRYSTAL_HZ: Final = 7_372_800
+"""Crystal at OSC1 in Hz (dspic30f6014a.md §3)."""
 
 CONFIG: Final[Mapping[str, int]] = MappingProxyType(
     {

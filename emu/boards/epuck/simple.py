@@ -124,6 +124,7 @@ class Codec(Part):
         """What control words have written."""
         self.on_sample: Callable[[int, int], None] | None = None
         """on_sample(sample, cycle), sample -32768..32767: for players and recorders."""
+        assert chip.dci is not None
         chip.dci.on_word = self._take
         chip.dci.source = lambda _slot, _cycle: 0
         self._port, self._pin = parse_pin("RF0")

@@ -228,6 +228,7 @@ def _noise(board: Epuck, words: list[str]) -> Action:
 
 
 def _i2c(board: Epuck, words: list[str]) -> Action:
+    assert board.chip.i2c is not None
     wire = board.chip.i2c.wire
     if words == ["free"]:
         return wire.release

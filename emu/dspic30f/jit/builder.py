@@ -17,11 +17,8 @@ from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import Variables, pointer
 from emu.dspic30f.registers import NSTDIS
 from emu.dspic30f.state import FIRST, FLAGS, LAST, MIDDLE, RA, SA, SAB, SB
-from emu.record import DATA_BYTES
 from emu.straight import Rule
 
-RAM: Final = 0x0800  # first data address behind the SFRs, isa.md §1.2
-Y_RAM: Final = 0x1800
 W_END: Final = 0x20  # W0..W15 are data addresses 0x00..0x1F, isa.md §2.2
 STACK_POINTER: Final = 15
 
@@ -61,6 +58,10 @@ class Surroundings:
     """W registers known to have been written since reset: they need no check as pointers (isa.md §2.2)."""
     limit_armed: bool
     """SPLIM has been written since reset (isa.md §10.2)."""
+    ram: tuple[int, int]
+    """First data address behind the SFRs, first one behind RAM."""
+    y_ram: int
+    """First data address of Y RAM, which is the upper part of RAM."""
     flash_words: int
     flag_words: tuple[tuple[int, int], ...]
     """Addresses of interrupt flag registers, each with that of its enables."""
@@ -280,10 +281,11 @@ class LlvmBuilder:
 
     def _in_ram(self, ea: Value, size: int, ptr: int | None) -> Value:
         """Aligned, in RAM and, for the stack pointer, not above SPLIM: one comparison plus one (design §4.3)."""
-        half = self.e.let(f"trunc i64 {wide(ea - RAM)} to i16").text
+        first, end = self.around.ram
+        half = self.e.let(f"trunc i64 {wide(ea - first)} to i16").text
         if size == 2:
             half = self.e.let(f"call i16 @llvm.fshl.i16(i16 {half}, i16 {half}, i16 15)").text
-        span = (DATA_BYTES - RAM) // size
+        span = (end - first) // size
         ok = self.e.let(f"icmp ult i16 {half}, {span}", bit=True)
         if ptr == STACK_POINTER and self.around.limit_armed:
             limit = self.e.load(pointer(self.e, self.around.offset["SPLIM"]), 16)
@@ -324,7 +326,7 @@ class LlvmBuilder:
         if word_address == self.around.offset["SR"]:
             value = self._sr_word()
             return value if size == 2 else (value >> 8 if ea & 1 else value & 0xFF)
-        self.pending.touches_sfr |= self.around.offset["SR"] < word_address < RAM
+        self.pending.touches_sfr |= self.around.offset["SR"] < word_address < self.around.ram[0]
         rule = self.around.rules.get(word_address)
         if rule is not None and rule.reads is not None and self.repeating is None:
             shown: Number = rule.reads(NativeReader(self), rule.places)
@@ -335,9 +337,10 @@ class LlvmBuilder:
         if place is not None and self.repeating is None:  # block code keeps accumulators out of the record
             part = self.acc(place[0]) >> place[1] & 0xFFFF
             return part if size == 2 else (part >> 8 if ea & 1 else part & 0xFF)
-        if word_address < RAM and (self.around.reads.get(word_address) != "plain" or self.repeating is not None):
+        kept = self.around.reads.get(word_address) == "plain" and self.repeating is None
+        if word_address < self.around.ram[0] and not kept:
             raise NeedsInterpreter
-        if ea >= DATA_BYTES:
+        if ea >= self.around.ram[1]:
             raise NeedsInterpreter
         return self.e.load(pointer(self.e, ea), 8 * size)
 
@@ -355,13 +358,13 @@ class LlvmBuilder:
         self.pending.stores.append(now)
 
     def _store_static(self, ea: int, v: Number, size: Size) -> None:
-        if (size == 2 and ea & 1) or ea >= DATA_BYTES:
+        if (size == 2 and ea & 1) or ea >= self.around.ram[1]:
             raise NeedsInterpreter
         word_address = ea & ~1
         if word_address < W_END:
             self._store_w(word_address >> 1, ea & 1, v, size)
             return
-        if word_address >= RAM:
+        if word_address >= self.around.ram[0]:
             self.pending.stores.append(lambda: self.e.store(pointer(self.e, ea), v, 8 * size))
             return
         self.pending.touches_sfr = True
@@ -425,13 +428,13 @@ class LlvmBuilder:
         """MAC X prefetch: 0 from Y RAM; PSV prefetches are the interpreter's."""
         assert isinstance(ea, Value)
         self.guard(self._in_ram(ea, 2, None))
-        return self.select(ea < Y_RAM, self.e.load(pointer(self.e, ea), 16), 0)
+        return self.select(ea < self.around.y_ram, self.e.load(pointer(self.e, ea), 16), 0)
 
     def yload(self, ea: Number, ptr: int) -> Number:
         """MAC Y prefetch: 0 from outside Y RAM."""
         assert isinstance(ea, Value)
         self.guard(self._in_ram(ea, 2, None))
-        return self.select(ea >= Y_RAM, self.e.load(pointer(self.e, ea), 16), 0)
+        return self.select(ea >= self.around.y_ram, self.e.load(pointer(self.e, ea), 16), 0)
 
     # -- program memory ---------------------------------------------------------------------------------------------
     def prog(self, address: Number) -> Number:

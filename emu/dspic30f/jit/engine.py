@@ -13,10 +13,8 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any, Final, Protocol
 
-from emu.bus import SFR_END
 from emu.dspic30f.core import Core
 from emu.dspic30f.facts import facts_of
-from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
@@ -37,8 +35,8 @@ from emu.dspic30f.jit.region import discover
 from emu.dspic30f.jit.runtime import BLOCKS, BOUNDARY, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
-from emu.dspic30f.state import DA, NOT_REPEATING, RUN
-from emu.straight import Rule
+from emu.dspic30f.modes import REGISTERS, Key, Modes
+from emu.dspic30f.state import NOT_REPEATING, RUN
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM effort for blocks and for single-step code."""
@@ -48,14 +46,6 @@ COLD_CYCLES: Final = 1000
 
 NATIVE_CYCLES: Final = 30_000_000
 """Longest native run before Python can handle signals, in Tcy."""
-
-MODES: Final = ("CORCON", "MODCON", "XBREV", "INTCON1", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")
-"""Registers that decide which code is valid: Python writes them, and chooses anew."""
-
-SELECTORS: Final = (
-    "CORCON", "MODCON", "XBREV", "INTCON1", "SR", "cpu.limit_armed", "cpu.initialised", "PMD1", "PMD2",
-)  # fmt: skip
-"""What decides which tables of code are current (and, while SR.DA is set, the DO loop)."""
 
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -128,7 +118,7 @@ class JitEngine:
         self._u64: Final = core.record.u64
         self._now: Final = core.state.at["cpu.cycle"]
         self._edt: Final = core.state.at["cpu.edt"]
-        self._at: Final = tuple(core.state.at[name] for name in SELECTORS)
+        self._modes: Final = Modes(core.state)
         self._offset: Final = offsets(core)
         self.counts: Final = Counts()
         self.seconds: dict[str, float] | None = None
@@ -277,38 +267,21 @@ class JitEngine:
     # -- modes ------------------------------------------------------------------------------------------------------
     def _select(self) -> None:
         """Make the tables of the present processor modes current."""
-        u16, state = self._u16, self._state
-        corcon, modcon, xbrev, intcon1, sr, limit_armed, initialised, pmd1, pmd2 = self._at
-        loop = (state.pair("DOSTARTL"), state.pair("DOENDL")) if u16[sr] & DA else None
-        key = (u16[corcon] & ~0x0F08, u16[modcon], u16[xbrev] & 0x8000,
-               u16[intcon1] & 0x700, u16[limit_armed], u16[initialised], u16[pmd1], u16[pmd2], loop)
+        key = (self._modes.key(), self._core.bus.off)
         if key == self._key:
             return
         self._key = key
         code = self._codes.get(key)
         if code is None:
-            context = context_of(u16[corcon], u16[modcon], u16[xbrev] >> 15, u16[intcon1] & 0x700)
-            code = self._codes[key] = self._new_code(context, loop)
+            code = self._codes[key] = self._new_code(key[0])
         self._code = code
         self._env[BLOCKS] = ctypes.addressof(code.blocks)
         self._env[STEPS] = ctypes.addressof(code.steps)
 
-    def _new_code(self, context: Context, loop: tuple[int, int] | None) -> Code:
-        core, chip = self._core, self._core.chip
-        words: dict[int, int] = {}
-        for source in chip.interrupts.values():
-            words[chip.sfrs[source.flag[0]].address] = chip.sfrs[source.enable[0]].address
-        reads, writes = access_kinds(core)
-        start, end = loop if loop is not None else (-1, -1)
-        around = Surroundings(self._offset, reads, writes, self._state.initialised, bool(self._state.limit_armed),
-                              self._words, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
-                              latches_of(core), self._rules(), frozenset(self._hooks), start, end)
+    def _new_code(self, key: Key) -> Code:
+        around = surroundings_of(self._core, key, frozenset(self._hooks), self._offset)
         table = ctypes.c_uint64 * self._words
-        return Code(context, around, identity_of(context, around), table(), table())
-
-    def _rules(self) -> dict[int, Rule]:
-        """Of device registers by address; those that somebody watches and those of modules that are off have none."""
-        return {2 * word: rule for word, rule in enumerate(self._core.bus.rules) if rule is not None}
+        return Code(key.context, around, identity_of(key.context, around), table(), table())
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
@@ -381,6 +354,20 @@ def offsets(core: Core) -> dict[str, int]:
     return offset
 
 
+def surroundings_of(core: Core, key: Key, hooks: frozenset[int], offset: Mapping[str, int]) -> Surroundings:
+    """What translations in the modes `key` may rely on, apart from the program."""
+    chip, bus = core.chip, core.bus
+    words = {chip.sfrs[s.flag[0]].address: chip.sfrs[s.enable[0]].address for s in chip.interrupts.values()}
+    reads, writes = access_kinds(core)
+    ram = chip.data["ram"]
+    start, end = key.loop if key.loop is not None else (-1, -1)
+    return Surroundings(
+        offset, reads, writes, key.initialised, bool(key.limit_armed), (ram.start, ram.end), chip.data["yram"].start,
+        chip.program["flash"].end // 2, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
+        latches_of(core), {2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None}, hooks,
+        start, end)  # fmt: skip
+
+
 def latches_of(core: Core) -> Latches:
     """Where table writes go."""
     flash, eeprom = (core.record.fields[f"program.{kind}_latch"] for kind in ("flash", "eeprom"))
@@ -414,10 +401,10 @@ def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access,
         special[sfrs["SR"].address] = "sr"
     if core.state.limit_armed:
         special[sfrs["SPLIM"].address] = "plain"
-    modes = {sfrs[name].address for name in MODES}
+    modes = {sfrs[name].address for name in REGISTERS} - special.keys()
     reads: dict[int, Access] = {}
     writes: dict[int, tuple[Access, int]] = {}
-    for address in range(W_END, SFR_END, 2):
+    for address in range(W_END, bus.end, 2):
         word = address >> 1
         if bus.modelled[word] and bus.on_read[word] is None and bus.compute[word] is None:
             reads[address] = "plain"

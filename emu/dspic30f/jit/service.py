@@ -17,7 +17,6 @@ from emu.dspic30f.jit.converter import ConverterPlaces, converter_of, event_text
 from emu.dspic30f.power import STIR
 from emu.dspic30f.registers import NSTDIS
 from emu.dspic30f.state import IDLE, IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA, RUN
-from emu.record import DATA_BYTES
 
 DONE, PYTHON = 0, 1
 """Results: the boundary has no work left; Python must do it."""
@@ -48,6 +47,8 @@ class Boundary:
     """What the generated function depends on."""
 
     offset: Mapping[str, int]
+    ram: tuple[int, int]
+    """First data address of RAM, first one behind it."""
     slots: int
     """Event slots, up to a multiple of `LANES`: those behind the last one are never due."""
     look: int
@@ -84,8 +85,9 @@ def boundary_of(core: Core, offset: Mapping[str, int]) -> Boundary:
             flags, bit, rise = rises[site.irq]
             matches.append(Match(names.index(f"{name}.match"), offset[f"{name}.period"], flags, bit, rise))
     slots = -(-len(names) // LANES) * LANES
-    return Boundary(offset, slots, names.index("cpu.look"), tuple(matches), tuple(words), core.traps.flags,
-                    tuple(sources), converter_of(core))
+    ram = chip.data["ram"]
+    return Boundary(offset, (ram.start, ram.end), slots, names.index("cpu.look"), tuple(matches), tuple(words),
+                    core.traps.flags, tuple(sources), converter_of(core))
 
 
 def service_text(b: Boundary) -> str:
@@ -351,8 +353,8 @@ def _enter(b: Boundary) -> str:
   %unlimited = icmp eq i16 %armed, 0
   %fits = icmp ule i16 %sp2, %splim
   %below = or i1 %unlimited, %fits
-  %high = icmp uge i16 %sp, 2048
-  %ram = icmp ult i16 %sp, {DATA_BYTES - 2}
+  %high = icmp uge i16 %sp, {b.ram[0]}
+  %ram = icmp ult i16 %sp, {b.ram[1] - 2}
   %a1 = and i1 %below, %high
   %a2 = and i1 %a1, %ram
   %a3 = and i1 %a2, %nest

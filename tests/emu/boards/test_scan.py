@@ -50,7 +50,7 @@ def ticking(course, cycles):
 @given(courses(), st.integers(0, 100))
 def test_closed_forms_equal_a_sensor_that_ticks(course, start):
     """epuck.md §7.4: levels, edge counts, next edges and bytes, in every cycle of three frames."""
-    scan = Scan(Record())
+    scan = Scan(Record(0))
     scan.begin(course, start, running=True)
     cycles = 3 * course.frame_tcy
     levels, bytes_ = ticking(course, cycles)

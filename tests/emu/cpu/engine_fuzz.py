@@ -10,6 +10,8 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
+from emu.chips.chip import Chip
+from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa.codec import EncodeError, decode, encode
 from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Repeat, Reset, Return, Skip, Sleep
@@ -19,9 +21,9 @@ from emu.dspic30f.specialised import SpecialisedEngine
 from emu.machine import Machine, Stop
 
 PC = 0x4000
-RAM_START, RAM_END = 0x0800, 0x2800
 INTERESTING = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFE, 0xFFFF)
-T1_VECTOR, T2_VECTOR = 0x1A, 0x20
+TIMERS = (1, 2)
+RAM_START = DSPIC30F6014A.data["ram"].start
 TRAP_VECTORS = range(0x04, 0x14, 2)
 HANDLER, TRAP_HANDLER, SUBROUTINE = 0x8000, 0x8100, 0x8200
 
@@ -36,15 +38,15 @@ class Difference(Exception):
         return self.text
 
 
-def random_insn(rng: random.Random, row: Row) -> Insn:
-    """A legal instruction of a row."""
+def random_insn(rng: random.Random, row: Row, ram: int = DSPIC30F6014A.data["ram"].start) -> Insn:
+    """A legal instruction of a row; addresses of file operands are mostly behind `ram`."""
     while True:
         fields = {}
         for letter, field in row.fields.items():
             low, high = field.limits
             fields[letter] = rng.randrange(low, high + 1, field.scale)
             if letter == "f" and rng.random() < 0.7:
-                fields[letter] = RAM_START + rng.randrange(0, 0x1000) // field.scale * field.scale
+                fields[letter] = ram + rng.randrange(0, 0x1000) // field.scale * field.scale
         try:
             insn = decode(*encode(row, fields))
         except EncodeError:
@@ -53,11 +55,11 @@ def random_insn(rng: random.Random, row: Row) -> Insn:
             return insn
 
 
-def machines(engine: str, length: int = 48) -> tuple[Machine, Machine]:
+def machines(engine: str, length: int = 48, chip: Chip = DSPIC30F6014A) -> tuple[Machine, Machine]:
     """A plain machine and one to compare with it, whose blocks have at most `length` instructions."""
-    pair = Machine(engine="plain"), Machine(engine=engine)
+    pair = Machine(chip, engine="plain"), Machine(chip, engine=engine)
     for machine in pair:
-        machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
+        machine.program.put(chip.config["FWDT"].address, 0x7FFF)  # FWDT: no watchdog
         machine.reset("POR")
         if isinstance(machine.runner, SpecialisedEngine):
             machine.runner.warm = 1
@@ -79,9 +81,10 @@ def difference(plain: Machine, other: Machine) -> str:
 class Contexts:
     """Random processor states, written straight into a record."""
 
-    def __init__(self, rng: random.Random) -> None:
+    def __init__(self, rng: random.Random, chip: Chip = DSPIC30F6014A) -> None:
         self._rng = rng
-        self._memory = rng.randbytes(4 * (RAM_END - RAM_START))
+        self._ram = chip.data["ram"]
+        self._memory = rng.randbytes(4 * self._ram.size)
 
     def modes(self, machine: Machine) -> None:
         """CORCON, MODCON, XBREV, stack limit, traps: what translations depend on."""
@@ -91,7 +94,7 @@ class Contexts:
         )
         modulo = rng.random() < 0.4
         machine.poke("MODCON", rng.randrange(0x10000) & 0xCFFF if modulo else 0)
-        start = RAM_START + rng.randrange(0x800) * 2
+        start = self._ram.start + rng.randrange(self._ram.size // 4) * 2
         for name in ("XMODSRT", "YMODSRT"):
             machine.poke(name, start)
         for name in ("XMODEND", "YMODEND"):
@@ -99,17 +102,19 @@ class Contexts:
         machine.poke("XBREV", rng.choice((0, 0x8008, 0x8010, 0x0008)))
         machine.poke("INTCON1", rng.choice((0, 0, 0, 0x0700)))
         machine.state.limit_armed = rng.random() < 0.5
-        machine.poke("SPLIM", rng.choice((0x27F0, 0x1800, RAM_START + rng.randrange(0x1FFE) & ~1)))
+        anywhere = self._ram.start + rng.randrange(self._ram.size - 2) & ~1
+        machine.poke("SPLIM", rng.choice((self._ram.end - 16, 0x1800, anywhere)))
         machine.state.initialised = 0xFFFF if rng.random() < 0.8 else rng.randrange(0x10000) | 0x8000
 
     def data(self, machine: Machine) -> None:
         """Registers, flags, memory."""
         rng = self._rng
-        offset = rng.randrange(3 * (RAM_END - RAM_START))
-        machine.record.bytes[RAM_START:RAM_END] = self._memory[offset : offset + RAM_END - RAM_START]
+        ram = self._ram
+        offset = rng.randrange(3 * ram.size)
+        machine.record.bytes[ram.start : ram.end] = self._memory[offset : offset + ram.size]
         for number in range(16):
             machine.record.u16[number] = self.word()
-        stack = RAM_START + rng.randrange(0x1FF0) & ~1 if rng.random() < 0.9 else self.word() & ~1
+        stack = ram.start + rng.randrange(ram.size - 16) & ~1 if rng.random() < 0.9 else self.word() & ~1
         machine.record.u16[15] = stack
         machine.poke("SR", rng.randrange(0x10000) & 0xFDEF)
         for accumulator in ("ACCA", "ACCB"):
@@ -126,27 +131,29 @@ class Contexts:
         rng = self._rng
         kind = rng.random()
         if kind < 0.6:
-            return RAM_START + rng.randrange(RAM_END - RAM_START) & (~1 if rng.random() < 0.9 else ~0)
+            return self._ram.start + rng.randrange(self._ram.size) & (~1 if rng.random() < 0.9 else ~0)
         if kind < 0.8:
             return rng.choice(INTERESTING)
         return rng.randrange(0x10000)
 
 
-def check_pairs(seed: int, instructions: int, contexts: int, engine: str = "interp") -> int:
+def check_pairs(
+    seed: int, instructions: int, contexts: int, engine: str = "interp", chip: Chip = DSPIC30F6014A
+) -> int:
     """Run `instructions` random instructions, each in `contexts` contexts of the same modes. Returns the pairs run.
 
     Each instruction is a generated function of its own. Rows take turns, so every row is met equally often.
     Raises Difference.
     """
     rng = random.Random(seed)
-    plain, other = machines(engine, length=1)
+    plain, other = machines(engine, length=1, chip=chip)
     used = plain.record.used
     base = plain.record.snapshot()
-    source = Contexts(rng)
+    source = Contexts(rng, chip)
     pairs = 0
     for number in range(instructions):
         row = ROWS[number % len(ROWS)]
-        insn = random_insn(rng, row)
+        insn = random_insn(rng, row, chip.data["ram"].start)
         repeated = row.repeat_ok and rng.random() < 0.3
         for machine in (plain, other):
             machine.record.bytes[:used] = base
@@ -283,11 +290,11 @@ def _subroutine() -> list[int]:
     ]
 
 
-def _handler(bits: tuple[tuple[int, int], ...]) -> list[int]:
+def _handler(bits: list[tuple[int, int]]) -> list[int]:
     """Clear flags (byte address, bit) and return."""
     words = [*encode(BY_TEXT["PUSH.S"], {})]
     for address, bit in bits:
-        words += encode(BY_TEXT["BCLR{.B} f, #bit4"], {"f": address, "b": bit})
+        words += encode(BY_TEXT["BCLR{.B} f, #bit4"], {"f": address + bit // 8, "b": bit % 8, "B": 1})
     return [*words, *encode(BY_TEXT["POP.S"], {}), *encode(BY_TEXT["RETFIE"], {})]
 
 
@@ -295,36 +302,39 @@ def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) ->
     """Load one random program and context into both machines; returns the cycles to compare at."""
     program = Program(rng, rng.randrange(10, 80))
     slip = rng.randrange(2)
+    chip = plain.chip
+    irqs = [timer.irq for timer in chip.timers if timer.number in TIMERS]
+    flags, enables = ([getattr(chip.interrupts[irq], kind) for irq in irqs] for kind in ("flag", "enable"))
     for machine in (plain, other):
         machine.restore(start)
         machine.core.exceptions.ipl_slip = slip
         machine.program.put_flash(0, [*encode(BY_TEXT["GOTO Expr"], {"n": PC})])
         machine.program.put_flash(PC, program.words)
         machine.program.put_flash(SUBROUTINE, _subroutine())
-        machine.program.put_flash(HANDLER, _handler(((0x84, 3), (0x84, 6))))
-        machine.program.put_flash(TRAP_HANDLER, _handler(((0x80, 1), (0x80, 2), (0x80, 3), (0x80, 4))))
-        for vector in (T1_VECTOR, T2_VECTOR):
-            machine.program.put(vector, HANDLER)
+        machine.program.put_flash(HANDLER, _handler([(chip.sfrs[name].address, bit) for name, bit in flags]))
+        machine.program.put_flash(TRAP_HANDLER, _handler([(chip.sfrs["INTCON1"].address, bit) for bit in (1, 2, 3, 4)]))
+        for irq in irqs:
+            machine.program.put(chip.vectors[irq + 8].ivt, HANDLER)
         for vector in TRAP_VECTORS:
             machine.program.put(vector, TRAP_HANDLER)
         machine.stop_on_fault = False
-    contexts = Contexts(rng)
+    contexts = Contexts(rng, chip)
     contexts.modes(plain)
     contexts.data(plain)
     plain.state.stall = 0
-    plain.record.u16[15] = 0x0900
+    plain.record.u16[15] = chip.data["ram"].start + 0x100
     if rng.random() < 0.7:
         plain.state.initialised = 0xFFFF
-        plain.poke("SPLIM", 0x2700)
+        plain.poke("SPLIM", chip.data["ram"].end - 0x100)
     other.record.bytes[: plain.record.used] = plain.record.bytes[: plain.record.used]
     for machine in (plain, other):
         machine.program.announce_all()
     periods = [rng.randrange(20, 300) for _ in range(2)]
     for machine in (plain, other):
-        for (timer, bit), period in zip((("1", 3), ("2", 6)), periods, strict=True):
+        for timer, (register, bit), period in zip(TIMERS, enables, periods, strict=True):
             machine.write(f"PR{timer}", period)
             machine.write(f"T{timer}CON", 0x8000)
-            machine.write("IEC0", machine.peek("IEC0") | 1 << bit)
+            machine.write(register, machine.peek(register) | 1 << bit)
     stops, cycle = [], 0
     for _ in range(rng.randrange(3, 10)):
         cycle += rng.choice((1, 2, 3, rng.randrange(1, 40), rng.randrange(1, 400)))
@@ -332,10 +342,10 @@ def prepare(rng: random.Random, start: bytes, plain: Machine, other: Machine) ->
     return stops
 
 
-def check_programs(seed: int, count: int, engine: str = "interp") -> int:
+def check_programs(seed: int, count: int, engine: str = "interp", chip: Chip = DSPIC30F6014A) -> int:
     """Run `count` random programs; returns the cycles simulated on each engine. Raises Difference."""
     rng = random.Random(seed)
-    plain, other = machines(engine)
+    plain, other = machines(engine, chip=chip)
     start = plain.snapshot()
     total = 0
     for number in range(count):

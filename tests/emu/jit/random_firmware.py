@@ -8,6 +8,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field
 
+from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.isa import codec, table
 from emu.dspic30f.isa.fields import Operands
@@ -18,6 +19,7 @@ CODE, ISR, HANDLER, LEAF = 0x200, 0x1000, 0x1100, 0x1180
 """Program addresses of the body, the interrupt handlers, the trap handler and a callee."""
 BODY_WORDS = 60
 STACK = 0x2000
+"""Where RAM reaches that far."""
 TRAP_COUNT = 0x1FF0
 """Word in RAM: after 32 traps the trap handler begins anew instead of returning, in case PC got lost."""
 
@@ -44,9 +46,9 @@ def literal(value: int, register: int) -> list[int]:
     return words_of("MOV{.W} #lit16, Wnd", k=value, d=register)
 
 
-def to_sfr(name: str, value: int) -> list[int]:
+def to_sfr(name: str, value: int, chip: Chip = DSPIC30F6014A) -> list[int]:
     """Write a register through W0."""
-    return literal(value, 0) + words_of("MOV{.W} Wns, f", s=0, f=DSPIC30F6014A.sfrs[name].address)
+    return literal(value, 0) + words_of("MOV{.W} Wns, f", s=0, f=chip.sfrs[name].address)
 
 
 @dataclass
@@ -68,7 +70,7 @@ class Firmware:
         return address
 
 
-def random_words(row: Row, generator: random.Random, at: int, end: int) -> list[int] | None:
+def random_words(row: Row, generator: random.Random, at: int, end: int, ram: range) -> list[int] | None:
     """A legal instruction of `row` at address `at`, whose static targets lie in the body; None if it fits badly."""
     mask, value = row.pattern.mask, row.pattern.value
     words = [v | generator.getrandbits(24) & ~m & 0xFFFFFF for m, v in zip(mask, value, strict=True)]
@@ -77,7 +79,8 @@ def random_words(row: Row, generator: random.Random, at: int, end: int) -> list[
         x.v = generator.randrange(0, 14, 2)
         x.t = x.v + 1
     if "f" in row.fields and generator.random() < 0.8:
-        x.f = generator.choice((generator.randrange(0, 0x20), generator.randrange(0x800, 0x1FFE))) & ~1
+        near = generator.randrange(ram.start, min(ram.stop, 0x1FFE))
+        x.f = generator.choice((generator.randrange(0, 0x20), near)) & ~1
     if "n" in row.fields:
         if row.mnemonic in ("CALL", "GOTO"):
             x.n = LEAF if row.mnemonic == "CALL" else generator.randrange(CODE, end, 2)
@@ -96,18 +99,24 @@ def random_words(row: Row, generator: random.Random, at: int, end: int) -> list[
     return list(codec.encode(row, x))
 
 
-def interrupt_words(generator: random.Random) -> list[int]:
+def timer_bits(chip: Chip, kind: str) -> list[tuple[int, int]]:
+    """Data address of the byte and bit of "flag" or "enable" of timers 1 to 3."""
+    bits = [getattr(chip.interrupts[timer.irq], kind) for timer in chip.timers[:3]]
+    return [(chip.sfrs[name].address + bit // 8, bit % 8) for name, bit in bits]
+
+
+def interrupt_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
     """An instruction that changes what is acceptable: IPL, flags or enables."""
-    sfrs = DSPIC30F6014A.sfrs
-    register, bits = generator.choice((("SR", (5, 6, 7)), ("IFS0", (3, 6, 7)), ("IEC0", (3, 6, 7))))
+    status = [(chip.sfrs["SR"].address, bit) for bit in (5, 6, 7)]
+    address, bit = generator.choice(generator.choice((status, timer_bits(chip, "flag"), timer_bits(chip, "enable"))))
     syntax = generator.choice(("BSET{.B} f, #bit4", "BCLR{.B} f, #bit4", "BTG{.B} f, #bit4"))
-    return words_of(syntax, f=sfrs[register].address, b=generator.choice(bits))
+    return words_of(syntax, f=address, b=bit, B=1)
 
 
-def device_words(generator: random.Random) -> list[int]:
+def device_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
     """An access to a timer or port that native code makes by itself."""
     name = generator.choice(DEVICE_REGISTERS)
-    address = DSPIC30F6014A.sfrs[name].address
+    address = chip.sfrs[name].address
     if generator.random() < 0.4:
         return words_of("MOV{.W} f, Wnd", f=address, d=generator.randrange(8))
     if name.startswith(("TMR", "PR")) or generator.random() < 0.5:
@@ -116,64 +125,80 @@ def device_words(generator: random.Random) -> list[int]:
     return words_of(syntax, f=address + generator.randrange(2), b=generator.randrange(8))
 
 
-def mode_words(generator: random.Random) -> list[int]:
+def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
     """A write to a register that decides which native code is valid, or to the state of a DO loop."""
     name = generator.choice(("CORCON", "MODCON", "XBREV", "DOENDL", "DOSTARTL", "DCOUNT", "PSVPAG", "SPLIM"))
-    value = {"DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2), "DOSTARTL": CODE, "DCOUNT": 2, "SPLIM": 0x2600,
-             "CORCON": generator.getrandbits(16) & 0x10F7}.get(name, generator.getrandbits(16))
-    return literal(value, 7) + words_of("MOV{.W} Wns, f", s=7, f=DSPIC30F6014A.sfrs[name].address)
+    values = {"DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2), "DOSTARTL": CODE, "DCOUNT": 2,
+             "SPLIM": chip.data["ram"].end - 0x200, "CORCON": generator.getrandbits(16) & 0x10F7}
+    value = values.get(name, generator.getrandbits(16))
+    return literal(value, 7) + words_of("MOV{.W} Wns, f", s=7, f=chip.sfrs[name].address)
 
 
-def random_firmware(seed: int) -> Firmware:
+def _enabled(chip: Chip, generator: random.Random) -> list[tuple[str, int]]:
+    """Registers and values that let timers 1 to 3 interrupt, at any priorities."""
+    sources = [chip.interrupts[timer.irq] for timer in chip.timers[:3]]
+    groups = sorted({source.priority[0] for source in sources})
+    enables: dict[str, int] = {}
+    for source in sources:
+        enables[source.enable[0]] = enables.get(source.enable[0], 0) | 1 << source.enable[1]
+    return [(name, generator.getrandbits(16)) for name in groups] + sorted(enables.items())
+
+
+def random_firmware(seed: int, chip: Chip = DSPIC30F6014A) -> Firmware:
     """A program that never ends by itself, except through a reset for a fault."""
     generator = random.Random(seed)
     firmware = Firmware(seed)
+    whole, y = chip.data["ram"], chip.data["yram"].start
+    ram = range(whole.start, whole.end)
+    stack = min(STACK, whole.end - 0x600)
+    traps = stack - 0x10
     firmware.put(0, words_of("GOTO Expr", n=0x100))
-    for vector in DSPIC30F6014A.vectors:
+    for vector in chip.vectors:
         target = HANDLER if vector.level or vector.irq is None else ISR + 0x20 * (vector.irq % 4)
         firmware.put(vector.ivt, [target])
         firmware.put(vector.aivt, [target])
     at = 0x100
     for sfr, value in (
         ("PR1", generator.randrange(20, 900)), ("PR2", generator.randrange(30, 400)), ("PR3", generator.randrange(300)),
-        ("IPC0", generator.getrandbits(16)), ("IPC1", generator.getrandbits(16)), ("IEC0", 0x00C8),
+        *_enabled(chip, generator),
         ("T1CON", 0x8000), ("T2CON", 0x8000 | generator.choice((0, 0x10))), ("T3CON", 0x8000),
         ("CORCON", generator.getrandbits(16) & 0x10F7), ("PSVPAG", 0), ("TBLPAG", 0),
     ):
-        at = firmware.put(at, to_sfr(sfr, value))
+        at = firmware.put(at, to_sfr(sfr, value, chip))
     if generator.random() < 0.2:
-        for sfr, value in (("XMODSRT", 0x1000), ("XMODEND", 0x103F), ("YMODSRT", 0x1800), ("YMODEND", 0x181F),
+        for sfr, value in (("XMODSRT", 0x1000), ("XMODEND", 0x103F), ("YMODSRT", y), ("YMODEND", y + 0x1F),
                            ("XBREV", generator.choice((0x8008, 0))), ("MODCON", generator.getrandbits(16))):
-            at = firmware.put(at, to_sfr(sfr, value))
+            at = firmware.put(at, to_sfr(sfr, value, chip))
     if generator.random() < 0.5:
-        at = firmware.put(at, to_sfr("SPLIM", 0x2600))
+        at = firmware.put(at, to_sfr("SPLIM", whole.end - 0x200, chip))
     firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40))
     at = CODE - 0x40
     for n in range(15):
-        value = generator.randrange(0x1000, 0x2600) & ~1 if generator.random() < 0.7 else generator.getrandbits(16)
+        value = generator.randrange(0x1000, whole.end - 0x200) & ~1
+        value = value if generator.random() < 0.7 else generator.getrandbits(16)
         at = firmware.put(at, literal(value, n))
-    firmware.put(at, literal(STACK, 15))
+    firmware.put(at, literal(stack, 15))
     at = CODE
     end = CODE + 2 * BODY_WORDS
     while at < end:
         row = generator.choice(ROWS)
-        words = random_words(row, generator, at, end)
+        words = random_words(row, generator, at, end, ram)
         if generator.random() < 0.2:
-            words = generator.choice((interrupt_words, device_words, mode_words))(generator)
+            words = generator.choice((interrupt_words, device_words, mode_words))(generator, chip)
         if words is not None:
             at = firmware.put(at, words)
     firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40 if generator.random() < 0.8 else CODE - 2))
     for number in range(4):
         at = ISR + 0x20 * number
         for _ in range(generator.randrange(3)):
-            at = firmware.put(at, random_words(BY_SYNTAX["INC{.B} f"], generator, at, end) or [0])
-        for flag in (3, 6, 7):
-            at = firmware.put(at, words_of("BCLR{.B} f, #bit4", f=DSPIC30F6014A.sfrs["IFS0"].address, b=flag))
+            at = firmware.put(at, random_words(BY_SYNTAX["INC{.B} f"], generator, at, end, ram) or [0])
+        for address, bit in timer_bits(chip, "flag"):
+            at = firmware.put(at, words_of("BCLR{.B} f, #bit4", f=address, b=bit, B=1))
         firmware.put(at, words_of("RETFIE"))
-    at = firmware.put(HANDLER, words_of("CLR{.B} f", B=0, f=DSPIC30F6014A.sfrs["INTCON1"].address))
-    at = firmware.put(at, words_of("INC{.B} f", B=0, f=TRAP_COUNT) + words_of("BTSS{.B} f, #bit4", f=TRAP_COUNT, b=5))
-    at = firmware.put(at, words_of("RETFIE") + words_of("CLR{.B} f", B=0, f=TRAP_COUNT))
-    at = firmware.put(at, literal(STACK, 15))
+    at = firmware.put(HANDLER, words_of("CLR{.B} f", B=0, f=chip.sfrs["INTCON1"].address))
+    at = firmware.put(at, words_of("INC{.B} f", B=0, f=traps) + words_of("BTSS{.B} f, #bit4", f=traps, b=5))
+    at = firmware.put(at, words_of("RETFIE") + words_of("CLR{.B} f", B=0, f=traps))
+    at = firmware.put(at, literal(stack, 15))
     firmware.put(at, words_of("GOTO Expr", n=0x100))
     firmware.put(LEAF, words_of("RETURN"))
     return firmware
@@ -190,7 +215,7 @@ def load(machine: Machine, firmware: Firmware) -> None:
     machine.program.put_flash(start, words)
     machine.reset("POR")
     generator = random.Random(firmware.seed + 1)
-    for address in range(0x800, 0x2800, 2):
+    for address in range(machine.chip.data["ram"].start, machine.chip.data["ram"].end, 2):
         machine.poke(address, generator.getrandbits(16))
     for address, word in firmware.ram.items():
         machine.poke(address, word)

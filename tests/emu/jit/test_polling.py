@@ -13,13 +13,12 @@ from random_firmware import Firmware, difference, literal, load, to_sfr, words_o
 from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.interp import context_of
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.builder import Surroundings
-from emu.dspic30f.jit.engine import access_kinds, latches_of, offsets
+from emu.dspic30f.jit.engine import offsets, surroundings_of
 from emu.dspic30f.jit.polling import empty_loops
 from emu.dspic30f.jit.region import discover
+from emu.dspic30f.modes import Modes
 from emu.machine import Machine
 
 IFS0, TMR1 = (DSPIC30F6014A.sfrs[name].address for name in ("IFS0", "TMR1"))
@@ -72,11 +71,9 @@ def loops_of(words: list[int]) -> int:
         flash = machine.program.flash
         return decode_for_execution(flash[pc >> 1], flash[(pc >> 1) + 1])
 
-    reads, writes = access_kinds(machine.core)
-    rules = {2 * word: rule for word, rule in enumerate(machine.core.bus.rules) if rule is not None}
-    around = Surroundings(offsets(machine.core), reads, writes, 0xFFFF, False, 0x10000, (), 0, (), 0, (), 0, 0,
-                          latches_of(machine.core), rules)
-    return len(empty_loops(discover(START, fetch), around, context_of(0x20, 0, 0, 0)))
+    key = Modes(machine.state).key()
+    around = surroundings_of(machine.core, key, frozenset(), offsets(machine.core))
+    return len(empty_loops(discover(START, fetch), around, key.context))
 
 
 @pytest.mark.parametrize("words", EMPTY.values(), ids=EMPTY)

@@ -18,6 +18,8 @@ from random_firmware import BODY_WORDS, CODE, Firmware, difference, load, random
 from straight_body import BODY, Shape
 from straight_firmware import straight_firmware
 
+from emu.chips.chip import Chip
+from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.faults import Breakpoint, IllegalOpcode
 from emu.dspic30f.isa.flow import Branch, Return, Skip, Sleep
 from emu.dspic30f.jit.compiler import Compiler
@@ -266,9 +268,11 @@ class Hooks:
         other.clear()
 
 
-def twins(firmware: Firmware, ipl_slip: int, block_level: int) -> tuple[Machine, Machine]:
+def twins(
+    firmware: Firmware, ipl_slip: int, block_level: int, chip: Chip = DSPIC30F6014A
+) -> tuple[Machine, Machine]:
     """A plain machine, and a native one that compiles every address before it runs it."""
-    plain, native = (Machine(engine=engine, ipl_slip=ipl_slip) for engine in ("plain", "jit"))
+    plain, native = (Machine(chip, engine=engine, ipl_slip=ipl_slip) for engine in ("plain", "jit"))
     runner = native.runner
     assert isinstance(runner, JitEngine)
     runner.threshold, runner.wait, runner.compiler = 1, True, QuickCompiler(block_level)
@@ -327,10 +331,10 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
     return watch.close("straight")
 
 
-def check_wild(seed: int, stops: int = 20) -> Tally:
+def check_wild(seed: int, stops: int = 20, chip: Chip = DSPIC30F6014A) -> Tally:
     """A short wild program with jumps, traps and mode changes at odd places; every third one with hooks."""
     generator = random.Random(seed)
-    plain, native = twins(random_firmware(seed), seed & 1, 2 if seed % 4 == 1 else 0)
+    plain, native = twins(random_firmware(seed, chip), seed & 1, 2 if seed % 4 == 1 else 0, chip)
     watch = Watch(plain, native)
     hooks = Hooks((plain, native), range(CODE, CODE + 2 * BODY_WORDS, 2), generator) if seed % 3 == 0 else None
     for _ in range(stops):

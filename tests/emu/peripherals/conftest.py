@@ -21,9 +21,9 @@ class Rig:
     """Time only moves by `at`; everything else happens in the current cycle."""
 
     def __init__(self, fosc: int = XT_PLL8, fwdt: int = 0x7FFF) -> None:
-        self.record = Record()
+        self.record = Record(DSPIC30F6014A.data["ram"].end)
         self.events = Events(self.record)
-        self.bus = Bus(self.record, self.events)
+        self.bus = Bus(self.record, self.events, DSPIC30F6014A.data["sfr"].end)
         self.program = ProgramMemory(self.record, DSPIC30F6014A)
         self.program.config[0] = fosc
         self.program.config[1] = fwdt

@@ -1,0 +1,111 @@
+"""What the tables of all dsPIC30F members have in common: vectors, where interrupts live, the map of both spaces.
+
+A member's own folder says how much of it there is. Sources: dspic30f6014a.md §1, §2, §5, abi-elf.md §2.7, isa.md §14.
+Program addresses are in PC units (2 per 24-bit word).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from emu.chips.chip import ConfigWord, InterruptSource, Region, Sfr, Vector
+
+IVT: Final = Region("ivt", 0x000004, 0x000080)
+AIVT: Final = Region("aivt", 0x000084, 0x000100)
+UNIT_ID: Final = Region("unitid", 0x8005C0, 0x800600)
+CONFIG_SPACE: Final = Region("config", 0xF80000, 0xF80010)
+_SFR_END: Final = 0x0800
+_EEPROM_END: Final = 0x800000
+
+_TRAPS: Final = ("ReservedTrap0", "OscillatorFail", "AddressError", "StackError", "MathError",
+                 "ReservedTrap5", "ReservedTrap6", "ReservedTrap7")  # fmt: skip
+_TRAP_LEVELS: Final = (0, 14, 13, 12, 11, 0, 0, 0)
+_NATURAL_ORDER: Final = (
+    "INT0 IC1 OC1 T1 IC2 OC2 T2 T3 SPI1 U1RX U1TX ADC NVM SI2C MI2C CN "
+    "INT1 IC7 IC8 OC3 OC4 T4 T5 INT2 U2RX U2TX SPI2 C1 IC3 IC4 IC5 IC6 "
+    "OC5 OC6 OC7 OC8 INT3 INT4 C2 PWM QEI DCI LVD FLTA FLTB"
+)
+"""Interrupt sources by number, as the vendor's linker script spells them (abi-elf.md §2.7)."""
+_SOURCES: Final = _NATURAL_ORDER.split()
+_SLOTS: Final = 62
+_FLAG_NAMES: Final = {"ADC": "AD"}
+"""Bit names are source + IF, IE, IP, but ADIF for ADC (§5.2)."""
+
+
+def interrupts_of(sfrs: Mapping[str, Sfr]) -> Mapping[int, InterruptSource]:
+    """The sources a chip has, by number: those whose flag its registers name."""
+    table = {}
+    for irq, source in enumerate(_SOURCES):
+        flag, enable, group = f"IFS{irq // 16}", f"IEC{irq // 16}", f"IPC{irq // 4}"
+        stem = _FLAG_NAMES.get(source, source)
+        if stem + "IF" not in sfrs[flag].fields:
+            continue
+        flag_bit, _ = sfrs[flag].fields[stem + "IF"]
+        enable_bit, _ = sfrs[enable].fields[stem + "IE"]
+        lsb, _ = sfrs[group].fields[stem + "IP"]
+        table[irq] = InterruptSource(irq, source, (flag, flag_bit), (enable, enable_bit), (group, lsb))
+    return MappingProxyType(table)
+
+
+def vectors_of(interrupts: Mapping[int, InterruptSource]) -> tuple[Vector, ...]:
+    """All 62 slots in order (§5.1, §5.2)."""
+    names = [*_TRAPS, *(source + "Interrupt" for source in _SOURCES)]
+    names += [f"Interrupt{irq}" for irq in range(len(_SOURCES), _SLOTS - len(_TRAPS))]
+    return tuple(
+        Vector(
+            slot=slot,
+            name=name,
+            ivt=IVT.start + 2 * slot,
+            aivt=AIVT.start + 2 * slot,
+            level=_TRAP_LEVELS[slot] if slot < len(_TRAPS) else 0,
+            implemented=_TRAP_LEVELS[slot] > 0 if slot < len(_TRAPS) else slot - len(_TRAPS) in interrupts,
+        )
+        for slot, name in enumerate(names)
+    )
+
+
+def _by_name(*regions: Region) -> Mapping[str, Region]:
+    return MappingProxyType({region.name: region for region in regions})
+
+
+def data_space(y_start: int, ram_end: int) -> Mapping[str, Region]:
+    """Data space in bytes (§1.1): RAM follows the SFRs, Y RAM is its upper part."""
+    return _by_name(
+        Region("sfr", 0x0000, _SFR_END),
+        Region("ram", _SFR_END, ram_end),
+        Region("xram", _SFR_END, y_start),
+        Region("yram", y_start, ram_end),
+        Region("near", 0x0000, 0x2000),
+        Region("psv", 0x8000, 0x10000),
+    )
+
+
+def program_space(flash_end: int, eeprom_bytes: int) -> Mapping[str, Region]:
+    """Program space in PC units (§1.2); a word of EEPROM takes two."""
+    return _by_name(
+        Region("flash", 0x000000, flash_end),
+        Region("reset", 0x000000, IVT.start),
+        IVT,
+        AIVT,
+        Region("program", AIVT.end, flash_end),
+        Region("eedata", _EEPROM_END - eeprom_bytes, _EEPROM_END),
+        UNIT_ID,
+        CONFIG_SPACE,
+        Region("devid", 0xFF0000, 0xFF0004),
+    )
+
+
+def config_word(name: str, address: int, mask: int, **fields: tuple[int, int]) -> ConfigWord:
+    """A configuration word; `mask`: the bits that read back as written."""
+    return ConfigWord(name, address, mask, MappingProxyType(fields))
+
+
+def config_words(*words: ConfigWord) -> Mapping[str, ConfigWord]:
+    """By name."""
+    return MappingProxyType({word.name: word for word in words})
+
+
+SLOTS: Final = vectors_of({})
+"""Names and places of all vectors, which every member shares; which are implemented differs."""

@@ -1,0 +1,122 @@
+"""Engines take the chip from `Chip`: memory edges, vectors, interrupt numbers. Shown on a chip nobody makes."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("chips", "cpu", "jit", "")]
+
+from cpu_rig import assemble  # noqa: E402
+from engine_fuzz import check_pairs, check_programs  # noqa: E402
+from made_up import FLASH_END, MADE_UP, RAM_END, SFR_END, Y_START  # noqa: E402
+from twins import QuickCompiler, check_wild  # noqa: E402
+
+from emu.chips.chip import Region  # noqa: E402
+from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402
+from emu.dspic30f.engines import NAMES  # noqa: E402
+from emu.dspic30f.isa.table import ROWS  # noqa: E402
+from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
+from emu.dspic30f.specialised import SpecialisedEngine  # noqa: E402
+from emu.machine import Machine  # noqa: E402
+
+ENGINES = [name for name in NAMES if name != "auto"]
+NO_WATCHDOG = 0x7FFF
+
+
+def machine_with(engine: str, text: str, **registers: int) -> Machine:
+    """A made-up chip at the first instruction of `text`, whose code the engine makes before it runs it."""
+    machine = Machine(MADE_UP, engine=engine)
+    if isinstance(machine.runner, SpecialisedEngine):
+        machine.runner.warm = 1
+    if isinstance(machine.runner, JitEngine):
+        machine.runner.threshold, machine.runner.wait, machine.runner.compiler = 1, True, QuickCompiler(0)
+    machine.program.put(MADE_UP.config["FWDT"].address, NO_WATCHDOG)
+    machine.stop_on_fault = False
+    machine.reset("POR")
+    words, labels = assemble(text)
+    for address, word in words.items():
+        machine.program.put(address, word)
+    for vector in MADE_UP.vectors:
+        if vector.name in labels:
+            machine.program.put(vector.ivt, labels[vector.name])
+    machine.pc = min(words)
+    for number in range(15):
+        machine.w[number] = registers.get(f"w{number}", 0)
+    return machine
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("store", ["mov w1, [w0]", "mov.b w1, [w0]", "push w1"])
+@pytest.mark.parametrize(("address", "inside"), [(RAM_END - 2, True), (RAM_END, False), (0x2000, False)])
+def test_ram_ends_where_the_chip_says(engine: str, store: str, address: int, inside: bool) -> None:
+    """isa.md §14.4 cause 3: a store behind RAM is an address error and writes nothing."""
+    text = f"{store}\nend: bra end\nAddressError: bra AddressError"
+    states = []
+    for name in ("plain", engine):
+        machine = machine_with(name, text, w0=address, w1=0x55AA)
+        machine.w[15] = address if store.startswith("push") else SFR_END + 0x100
+        machine.run_until(machine.cycle + 12)
+        assert (machine.peek("INTTREG") & 0x3F == 2) is not inside
+        assert not inside or machine.peek(address, 1) == 0xAA
+        states.append(machine.snapshot())
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("address", [SFR_END, Y_START - 2, Y_START, RAM_END - 2])
+def test_prefetches_know_where_y_ram_begins(engine: str, address: int) -> None:
+    """isa.md §1.2: X prefetches read 0 from Y RAM, Y prefetches 0 from elsewhere."""
+    machine = machine_with(engine, "movsac a, [w8], w4, [w10], w5\nend: bra end", w8=address, w10=address)
+    machine.poke(address, 0x1111)
+    machine.run_until(machine.cycle + 4)
+    in_y = address >= Y_START
+    assert (machine.w[4], machine.w[5]) == ((0, 0x1111) if in_y else (0x1111, 0))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_stack_pointer_at_the_end_of_ram_cannot_take_an_interrupt_natively(engine: str) -> None:
+    """Both words of an exception frame must fit below the end of RAM; else an address error (isa.md §14.4)."""
+    text = "inc w2, w2\nloop: bra loop\nT1Interrupt: bra T1Interrupt\nAddressError: bra AddressError"
+    states = []
+    for name in ("plain", engine):
+        machine = machine_with(name, text)
+        source = next(source for source in MADE_UP.interrupts.values() if source.name == "T1")
+        machine.w[15] = RAM_END - 2
+        machine.write("PR1", 20)
+        machine.write(source.enable[0], 1 << source.enable[1])
+        machine.write("T1CON", 0x8000)
+        machine.run_until(60)
+        states.append(machine.snapshot())
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_reset_puts_the_stack_at_the_start_of_ram_and_fetches_end_with_flash(engine: str) -> None:
+    """isa.md §2.1, and §14.4 cause 5."""
+    machine = machine_with(engine, "AddressError: bra AddressError")
+    assert machine.w[15] == SFR_END
+    machine.pc = FLASH_END
+    machine.run_until(machine.cycle + 8)
+    assert machine.peek("INTTREG") & 0x3F == 2
+
+
+def test_a_chip_whose_memory_does_not_fit_together_is_refused() -> None:
+    """Y RAM is the upper part of RAM, RAM follows the SFRs: engines rely on it."""
+    with pytest.raises(ValueError, match="do not follow each other"):
+        replace(DSPIC30F6014A, data=dict(DSPIC30F6014A.data) | {"yram": Region("yram", 0x1A00, 0x2800)})
+
+
+def test_a_sample_of_the_instruction_campaign() -> None:
+    """tests/fuzz/fuzz_engines.py --chip."""
+    assert check_pairs(7, len(ROWS), 2, "interp", MADE_UP)
+    assert check_programs(7, 4, "interp", MADE_UP)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 5])
+def test_a_sample_of_the_native_campaign(seed: int) -> None:
+    """tests/fuzz/fuzz_jit.py."""
+    assert check_wild(seed, stops=8, chip=MADE_UP).stops == 8

@@ -1,0 +1,89 @@
+"""Every chip there are tables of: they fit together, and a machine can be made of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu.chips import NAMES, chip_named, chip_of
+from emu.chips.chip import Chip
+from emu.machine import Machine
+from emu.peripherals.pins import parse_pin
+
+CHIPS = [chip_named(name) for name in NAMES]
+
+
+def pins_of(chip: Chip) -> set[str]:
+    """Every pin the tables name."""
+    sites = (*chip.uarts, *chip.spis, *chip.captures, *chip.compares, *chip.cans, chip.i2c, chip.dci)
+    named = {getattr(site, field) for site in sites if site is not None
+             for field in site.__dataclass_fields__ if field.endswith("pin")}  # fmt: skip
+    named |= {*chip.change_pins, *(pin for pin, _ in chip.external_pins), *chip.adc.pins}
+    return (named | {timer.clock_pin for timer in chip.timers}) - {""}
+
+
+@pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
+def test_registers_do_not_overlap_and_fields_lie_in_their_masks(chip: Chip) -> None:
+    """A word has one owner; byte rows name halves of words; what a field names is implemented."""
+    words = [sfr.address for sfr in chip.sfrs.values() if sfr.size == 2]
+    assert len(set(words)) == len(words)
+    for sfr in chip.sfrs.values():
+        assert sfr.address in chip.data["sfr"]
+        covered = 0
+        for lsb, width in sfr.fields.values():
+            covered |= (1 << width) - 1 << lsb
+        assert not covered & ~sfr.mask, sfr.name
+        assert not (sfr.reset | sfr.hw_owned | sfr.clear_only) & ~sfr.mask, sfr.name
+
+
+@pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
+def test_pins_exist(chip: Chip) -> None:
+    """Every pin a device uses is a bit of a port."""
+    for pin in pins_of(chip):
+        _port, mask = parse_pin(pin)
+        assert mask & chip.sfrs[f"PORT{pin[1]}"].mask, pin
+        assert pin[1] in chip.ports
+
+
+@pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
+def test_every_interrupt_has_flag_enable_and_priority(chip: Chip) -> None:
+    """The three places are fields of the registers, three bits wide for the priority."""
+    for source in chip.interrupts.values():
+        stem = "AD" if source.name == "ADC" else source.name
+        places = ((source.flag, "IF", 1), (source.enable, "IE", 1), (source.priority, "IP", 3))
+        for (register, bit), suffix, width in places:
+            assert chip.sfrs[register].fields[stem + suffix] == (bit, width)
+        assert chip.vectors[source.irq + 8].implemented
+
+
+@pytest.mark.parametrize("chip", CHIPS, ids=NAMES)
+def test_a_program_runs_in_every_engine(chip: Chip) -> None:
+    """Timer 1 interrupts a loop at the end of flash; the same state in the same cycle."""
+    states = []
+    for engine in ("plain", "interp", "jit"):
+        machine = Machine(chip, engine=engine)
+        machine.program.put(chip.config["FWDT"].address, 0x7FFF)
+        machine.reset("POR")
+        end = chip.program["flash"].end
+        for address, word in ((0, 0x040000 | end - 16), (2, 0), (end - 16, 0x37FFFF), (chip.vectors[11].ivt, end - 8),
+                              (end - 8, 0xEC2000 | 0x900), (end - 6, 0xA96084), (end - 4, 0x064000)):  # fmt: skip
+            machine.program.put(address, word)
+        machine.program.put(2, end - 16 >> 16)
+        machine.program.put(0, 0x040000 | end - 16 & 0xFFFF)
+        machine.write("PR1", 40)
+        machine.write("IEC0", 8)
+        machine.write("T1CON", 0x8000)
+        machine.run_until(1000)
+        assert machine.peek(0x900) > 10
+        states.append(machine.snapshot())
+    assert states[0] == states[1] == states[2]
+
+
+def test_chips_are_found_by_name_and_by_processor_id() -> None:
+    """As command lines spell them, and as the flags of ELF files number them."""
+    for chip in CHIPS:
+        short = chip.name.removeprefix("dsPIC")
+        assert chip_named(short).name == chip_named(short.lower()).name == chip.name
+        assert all(found is not None and found.name == chip.name for found in map(chip_of, chip.processors))
+    assert chip_of(0xFFFF) is None
+    with pytest.raises(ValueError, match="expected one of dsPIC30F6014A"):
+        chip_named("PIC16F84")

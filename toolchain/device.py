@@ -1,0 +1,20 @@
+"""The device a program is for, as command lines name it: `30F6014A`, `dsPIC30F4013`, in any case."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.chips import NAMES, chip_named
+from emu.chips.chip import Chip
+from toolchain.errors import ToolError
+
+DEVICES: Final = tuple(name.removeprefix("dsPIC") for name in NAMES)
+DEFAULT: Final = DEVICES[0]
+
+
+def device(name: str) -> Chip:
+    """The chip of that name. Raises `ToolError` for one that there are no tables of."""
+    try:
+        return chip_named(name)
+    except ValueError:
+        raise ToolError(f"device '{name}' is not supported (expected {' or '.join(DEVICES)})") from None
