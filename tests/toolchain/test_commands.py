@@ -104,7 +104,7 @@ def test_libraries(files, capsys):
         (["as", "bad.s"], "bad.s:2: error: unknown instruction 'frob'"),
         (["as", "bad.s", "--defsym", "x=y"], "not a number"),
         (["as", "hello.s", "-o", "hello.s"], "overwrite the source"),
-        (["as", "hello.s", "-p", "33FJ"], "only processor supported"),
+        (["as", "hello.s", "-p", "33FJ"], "is not supported (expected"),
         (["as", "hello.s", "-o", "no/such/dir.o"], "cannot write"),
         (["ld"], "no input files"),
         (["ld", "-T", "boot.gld", "undefined.o"], "linker script 'boot.gld' is not used here"),
