@@ -117,7 +117,7 @@ class Threads:
         frames = tuple(self._frames(pcb, is_running))
         state = "running" if is_running and not blocked else "ready"
         if blocked:
-            state = "blocked" if _number(pcb, "awaited") else "sleeping"
+            state = "blocked" if pcb["on"]["awaited"].get() else "sleeping"
         stack, free = self._stack(pcb)
         name = self._name(pid, frames)
         return Thread(pid, name, state, _number(pcb, "priority"), pcb.address or 0, stack, free, frames)

@@ -39,8 +39,13 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
  *   void hal_unlock(hal_lock_state before);   restore, never lower than before; takes what became due meanwhile
  *   bool hal_in_thread(void);                 level is below slice: a thread outside critical sections
  *   bool hal_in_isr(void);                    level is device or above
- *   void hal_slice_restart(void);             a full slice starts now; a pending slice interrupt is withdrawn
- *   void hal_slice_force(void);               the slice ends as soon as the level allows; any context
+ *   void hal_slice_restart(uint16_t spent);   a slice starts now, of which that much is spent; a pending interrupt of the one
+ *                                             before is withdrawn, a forced one is not
+ *   uint16_t hal_slice_spent(void);           how much of the slice is over, in units of the port's choice
+ *   bool hal_slice_is_over(void);             its time has come to its end since it was restarted
+ *   void hal_slice_force(void);               the slice interrupt comes as soon as the level allows, although the slice may
+ *                                             not be over; any context. One too many does no harm
+ *   void hal_slice_unforce(void);             unless it was forced in vain: withdraws what has not come yet
  *   void hal_guard_kernel_stack(void);        with HAL_STACK_TRAPS: kernel stack, slice level; until a thread is resumed the
  *                                             limit is the kernel stack's. ISRs, which move there, set and restore it
  */
@@ -73,6 +78,24 @@ typedef sys_pcb *(*hal_pick)(void); /* kernel stack, slice level; returns the th
     } while (0)
 #endif
 
+/* A change of a word or byte as a single act, if the CPU has an instruction for it: otherwise under a lock. */
+#ifndef HAL_ADD
+#define HAL_ADD(object, member, amount)                                                       \
+    do {                                                                                      \
+        hal_lock_state hal_lock_ = hal_lock_devices();                                        \
+        (object).member = (uint16_t)((object).member + (amount));                             \
+        hal_unlock(hal_lock_);                                                                \
+    } while (0)
+#endif
+#ifndef HAL_CLEAR_BIT
+#define HAL_CLEAR_BIT(variable, bit)                                                          \
+    do {                                                                                      \
+        hal_lock_state hal_lock_ = hal_lock_devices();                                        \
+        (variable) &= (uint16_t)~(1u << (bit));                                               \
+        hal_unlock(hal_lock_);                                                                \
+    } while (0)
+#endif
+
 /* Before any other call. No interrupt is enabled until hal_start() and the level is slice until then, so that what may
  * block is refused. Adopts the running context as process's; fills its sp and limit. */
 void hal_init(sys_pcb *process);
@@ -92,8 +115,8 @@ static inline void hal_stack_release(const sys_pcb *process)
     (void)process;
 }
 #endif
-/* Save the calling thread, run os_slice_end() or os_schedule() on the kernel stack at level slice and resume the thread
- * it returns. Both come back when the caller is resumed, at thread level. */
+/* Save the calling thread, run os_yield() or os_schedule() on the kernel stack at level slice and resume the thread
+ * it returns. Both come back when the caller is resumed, at thread level. The slice interrupt does so with os_slice_end(). */
 void hal_yield(void); /* called at thread level */
 void hal_block(void); /* called at level slice */
 /* The caller's context is given up: resume what pick() returns. Called at level slice. */

@@ -11,7 +11,8 @@ struct sys_scheduler {
     /* Kernel stack, slice locked. first is the ready thread whose turn it is by round robin; the ring through
      * Sys_Next_Ready comes back to it. Returns the thread to run, which must be on the ring. NULL = round robin. */
     sys_pcb *(*pick)(sys_pcb *first);
-    bool eager; /* a message ends the running slice at once, so that a thread it wakes can preempt */
+    bool eager; /* asked also when something becomes due within a slice. Who was running is first then, and keeps the
+                 * rest of its slice if it is not picked */
 };
 
 sys_pcb *Sys_Next_Ready(const sys_pcb *process);

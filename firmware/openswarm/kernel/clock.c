@@ -32,9 +32,9 @@ void os_clock_tick(void)
     }
     if (now == alarm) {
         os_pending |= OS_ALARM;
-        if (os_eager) {
-            hal_slice_force();
-        }
+    }
+    if (OS_HAS_WORK) {
+        os_preempt();
     }
     (void)Sys_Send_IntEvent(SYS_1ms_TIMER, now);
     board_tick();

@@ -50,7 +50,7 @@ static HAL_INLINE event *find(uint16 id)
 static HAL_OUTLINE const sys_pcb *first_waiter(const event *e)
 {
     const sys_pcb *p = os_blocked;
-    while (p != NULL && p->awaited != e) {
+    while (p != NULL && p->on.awaited != e) {
         p = p->next;
     }
     return p;
@@ -103,7 +103,7 @@ static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
     sys_pcb *next;
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
-        if (p->awaited == e && (m == NULL || p->wait.condition == NULL)) {
+        if (p->on.awaited == e && (m == NULL || p->wait.condition == NULL)) {
             process_wake(p, m);
             p->own.error = m != NULL ? SYS_OK : SYS_ERROR_EVENT;
             any = true;
@@ -213,7 +213,8 @@ bool Sys_Unsubscribe_Handler(uint16 id, uint16 pid, sys_handler handler)
     }
     event *e = event_find(id);
     bool done = e != NULL && unsubscribe(e, pid, handler);
-    return os_leave(e != NULL ? SYS_OK : SYS_ERROR_EVENT) && done;
+    (void)os_leave(e != NULL ? SYS_OK : SYS_ERROR_EVENT);
+    return done;
 }
 
 bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)
@@ -241,7 +242,7 @@ static HAL_INLINE void enqueue(message *m)
     os_pending |= OS_MESSAGES;
     hal_unlock(lock);
     if (os_eager) {
-        hal_slice_force();
+        os_preempt();
     }
 }
 
@@ -332,7 +333,7 @@ static void ask_waiters(const event *e, sys_event_data *data)
     sys_pcb *p;
     process_scan = &os_blocked;
     while ((p = *process_scan) != NULL) {
-        bool holds = p->awaited == e && p->wait.condition != NULL && p->wait.condition(data);
+        bool holds = p->on.awaited == e && p->wait.condition != NULL && p->wait.condition(data);
         if (*process_scan == p) { /* else the condition ended its own wait */
             if (holds) {
                 p->wait.condition = NULL;
@@ -380,7 +381,7 @@ void event_deliver_queued(void)
 
 static bool holds(const sys_pcb *p, const message *m)
 {
-    return p->awaited == NULL && p->wait.result == m;
+    return p->wait.result == m && (!(p->status & OS_OFF_RING) || p->on.awaited == NULL);
 }
 
 void event_release_result(sys_pcb *process)
@@ -432,8 +433,7 @@ void Sys_Clear_EventData(sys_event_data **data)
         return;
     }
     if (os_enter() == SYS_OK) {
-        message *m = os_running->wait.result;
-        if (m != NULL && *data == &m->data && !os_in_kernel) {
+        if ((message *)*data == os_running->wait.result && !os_in_kernel) {
             event_release_result(os_running);
         }
         Sys_End_CriticalSection();

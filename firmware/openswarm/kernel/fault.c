@@ -34,9 +34,10 @@ static HAL_NORETURN void stop(void)
  * stack of its own choice, with everything masked. */
 void os_trap(uint16 cause, uint16 pc, uint16 pc_high)
 {
-    static const char names[5][11] = {"oscillator", "address", "math", "interrupt", "stack"};
+    static const char names[] = "oscillator\0address\0math\0interrupt\0stack";
+    static const uint8 at[] = {0, 11, 19, 24, 34};
     board_failsafe();
-    board_report(names[cause]);
+    board_report(names + at[cause]);
     report_number(" trap at 0x", pc_high, 16);
     report_number(":", pc, 16);
     stop();

@@ -47,7 +47,10 @@ union message {
 struct sys_pcb {
     void *sp;
     hal_limit limit;
-    event *awaited; /* blocked: what it waits for; otherwise NULL, as while it waits for time only */
+    union {
+        event *awaited; /* while blocked: NULL if it waits for time only */
+        uint16 spent;   /* while ready: of the slice in which it was preempted, in the port's units */
+    } on;
     union {
         uint16 wake;          /* while blocked with OS_TIMED: low word of the system time */
         volatile uint8 error; /* while ready: the thread's last error */
@@ -66,7 +69,8 @@ struct sys_pcb {
 enum {
     OS_STATE = 0x03, /* SYS_NEW..SYS_ZOMBIE; OS_OFF_RING is set in the last two */
     OS_OFF_RING = 0x02,
-    OS_TIMED = 0x04,
+    OS_TIMED = 0x04, /* while blocked */
+    OS_WOKEN = 0x04, /* while ready: it has not run since; for sys_woken_first, which clears it */
     OS_MISSED = 0x20, /* this period's miss is reported */
     OS_DRIVES = 0x40 /* it uses a bus (io/bus.h) */
     /* 0x08 SYS_PERIODIC, 0x10 SYS_DSP */
@@ -87,12 +91,13 @@ static inline periodic *process_periodic(const sys_pcb *process) /* of a SYS_PER
 enum { OS_MESSAGES = 0x01, OS_ALARM = 0x02, OS_WORK = 0xFF, OS_CHOICE = 0x100 };
 
 extern volatile uint16 os_pending;
+#define OS_HAS_WORK (*(const volatile uint8 *)&os_pending != 0) /* the low byte, which comes first */
 extern sys_pcb *os_running;   /* &os_system while idle */
 extern sys_pcb os_system;     /* PID 0 */
 extern sys_pcb *os_ring;      /* ring member before the running one (or before the next, if it blocked); NULL = empty */
 extern sys_pcb *os_blocked;   /* in order of blocking */
 extern volatile uint16 critical_depth; /* of the running thread; while os_in_kernel, of the handler that runs */
-extern bool os_eager;         /* a message ends the slice */
+extern bool os_eager;         /* what becomes due preempts the running thread */
 extern volatile bool os_in_kernel; /* handlers, conditions, wake-ups and schedulers are at work on the kernel stack */
 extern sys_statistics os_statistics;
 extern sys_process_config os_plain; /* all defaults: zeros, for which RAM is cheaper than flash */
@@ -144,9 +149,11 @@ HAL_OUTLINE sys_error os_enter(void);          /* not from ISRs */
 HAL_OUTLINE sys_error os_enter_blocking(void); /* from threads only; process_block() unlocks as well */
 HAL_OUTLINE bool os_leave(sys_error error);    /* true, or false and the last error */
 
-/* scheduler.c: the two ways into the kernel stack; both pick the next thread */
-HAL_USED sys_pcb *os_slice_end(sys_pcb *running); /* the running thread stays ready */
-HAL_USED sys_pcb *os_schedule(void);              /* it does not */
+/* scheduler.c: the ways into the kernel stack; all pick the next thread */
+HAL_USED sys_pcb *os_yield(sys_pcb *running);     /* the running thread stays ready, others come first */
+HAL_USED sys_pcb *os_slice_end(sys_pcb *running); /* the same; or it was preempted and keeps turn and rest of its slice */
+HAL_USED sys_pcb *os_schedule(void);              /* it is not ready any more */
+void os_preempt(void); /* if the scheduler is eager, it has something to decide as soon as the level allows; any context */
 
 /* clock.c */
 void clock_set_wake(sys_pcb *process, uint16 ms); /* process is on the blocked list; slice locked */

@@ -227,9 +227,7 @@ void *heap_keep(uint16 size)
     if (HAL_ALLOCATION_FAILS()) {
         return NULL;
     }
-    hal_lock_state lock = hal_lock_devices();
-    os_statistics.heap_used += size;
-    hal_unlock(lock);
+    HAL_ADD(os_statistics, heap_used, size);
     hole *h = pull_hole(link);
     uint16 rest = (uint16)(h->size - size);
     put_hole(h, rest);
@@ -240,9 +238,7 @@ void heap_give_later(void *freed, uint16 size)
 {
     size = round_up(size);
     heap_note_use();
-    hal_lock_state lock = hal_lock_devices();
-    os_statistics.heap_used -= size;
-    hal_unlock(lock);
+    HAL_ADD(os_statistics, heap_used, -size);
     if (freed != run_end) {
         join_run();
         run = freed;

@@ -28,9 +28,7 @@ static HAL_OUTLINE void ring_append(sys_pcb *p)
         os_ring->next = p;
     }
     os_ring = p;
-    if (os_eager) {
-        hal_slice_force();
-    }
+    os_preempt();
 }
 
 static HAL_OUTLINE void ring_remove(const sys_pcb *p)
@@ -64,12 +62,12 @@ static HAL_OUTLINE void unlink_blocked(sys_pcb *p, message *m)
     if (process_scan == &p->next) {
         process_scan = link;
     }
-    if (p->awaited != NULL) {
+    if (p->on.awaited != NULL) {
         p->wait.result = m; /* it was the condition */
     }
 }
 
-static void set_state(sys_pcb *p, sys_state state)
+static void set_state(sys_pcb *p, uint8 state)
 {
     p->status = (uint8)((p->status & ~(OS_STATE | OS_TIMED)) | state);
 }
@@ -80,7 +78,7 @@ static HAL_OUTLINE sys_pcb *leave_ring(event *awaited)
     sys_pcb *self = os_running;
     critical_depth = 0;
     ring_remove(self);
-    self->awaited = awaited;
+    self->on.awaited = awaited;
     set_state(self, SYS_BLOCKED);
     self->next = NULL;
     sys_pcb **end = link_to(NULL);
@@ -92,8 +90,8 @@ static HAL_OUTLINE sys_pcb *leave_ring(event *awaited)
 void process_wake(sys_pcb *p, message *m)
 {
     unlink_blocked(p, m);
-    set_state(p, SYS_READY);
-    p->awaited = NULL;
+    set_state(p, SYS_READY | OS_WOKEN);
+    p->on.awaited = NULL;
     p->own.error = SYS_OK;
     ring_append(p);
 }
@@ -180,7 +178,7 @@ static HAL_OUTLINE uint16 start(const sys_process_config *config, void (*entry)(
                 p->block = block;
                 p->own.error = SYS_OK;
                 p->wait.result = NULL;
-                p->awaited = NULL;
+                p->on.awaited = NULL;
                 if (extra != 0) {
                     set_period(process_periodic(p), config);
                 }
@@ -279,11 +277,7 @@ sys_error os_enter(void)
 
 sys_error os_enter_blocking(void)
 {
-    if (!hal_in_thread()) {
-        return os_refuse();
-    }
-    Sys_Start_CriticalSection();
-    return SYS_OK;
+    return hal_in_thread() ? os_enter() : os_refuse();
 }
 
 bool os_leave(sys_error error)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The two ways into the kernel stack, and the schedulers. */
+/* The ways into the kernel stack, and the schedulers. */
 #include "kernel.h"
 
 volatile uint16 os_pending;
@@ -10,14 +10,12 @@ static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
 
 /* ---- Dispatch: kernel stack, slice level ------------------------------------------------------------------------ */
 
-static void work(void)
+static HAL_OUTLINE void work(void)
 {
     event_deliver_queued();
     HAL_STORE(critical_depth, 0); /* a section that a handler left open ends with the handlers */
     if (os_pending & OS_ALARM) {
-        hal_lock_state lock = hal_lock_devices();
-        os_pending &= (uint16)~OS_ALARM;
-        hal_unlock(lock);
+        HAL_CLEAR_BIT(os_pending, 1);
         clock_wake_due();
     }
 #if !HAL_STACK_TRAPS
@@ -27,10 +25,10 @@ static void work(void)
 #endif
 }
 
-static HAL_INLINE sys_pcb *dispatch(sys_pcb *next)
+static HAL_INLINE sys_pcb *dispatch(sys_pcb *next, uint16 spent)
 {
     HAL_STORE(os_running, next);
-    hal_slice_restart(); /* handlers are over: the whole slice belongs to next */
+    hal_slice_restart(spent); /* handlers are over: the slice belongs to next */
     return next;
 }
 
@@ -38,13 +36,16 @@ sys_pcb *os_schedule(void)
 {
     hal_guard_kernel_stack();
     os_in_kernel = true;
-    if ((os_pending & OS_WORK) != 0) {
-        work();
-    }
-    while (os_ring == NULL) {
+    for (;;) {
+        hal_slice_unforce(); /* what comes from here on calls the kernel back */
+        if (OS_HAS_WORK) {
+            work();
+        }
+        if (os_ring != NULL) {
+            break;
+        }
         HAL_STORE(os_running, &os_system);
         hal_idle(&os_pending);
-        work();
     }
     sys_pcb *(*pick)(sys_pcb *) = HAL_LOAD(pick_thread);
     if (pick != NULL) {
@@ -54,16 +55,41 @@ sys_pcb *os_schedule(void)
         }
     }
     os_in_kernel = false;
-    return dispatch(os_ring->next);
+    sys_pcb *next = os_ring->next;
+    uint16 spent = next->on.spent;
+    next->on.spent = 0;
+    return dispatch(next, spent);
+}
+
+sys_pcb *os_yield(sys_pcb *running)
+{
+    os_ring = running; /* it was os_ring->next: the ring turns by one */
+    if (HAL_LIKELY(os_pending == 0)) {
+        return dispatch(running->next, 0);
+    }
+    return os_schedule();
 }
 
 sys_pcb *os_slice_end(sys_pcb *running)
 {
-    os_ring = running; /* it was os_ring->next: the ring turns by one */
     if (HAL_LIKELY(os_pending == 0)) {
-        return dispatch(running->next);
+        os_ring = running;
+        return dispatch(running->next, 0);
     }
+    uint16 spent = hal_slice_spent();
+    if (hal_slice_is_over()) { /* asked second: the slice may end in between */
+        return os_yield(running);
+    }
+    running->on.spent = spent; /* and the ring stays, so that its turn comes again when no better thread is ready */
     return os_schedule();
+}
+
+/* What handlers send waits for the next tick: one that resends for ever shall not keep threads from running. */
+void os_preempt(void)
+{
+    if (os_eager && (!os_in_kernel || hal_in_isr())) {
+        hal_slice_force();
+    }
 }
 
 void Sys_Yield(void)
@@ -126,27 +152,22 @@ static void report_miss(sys_pcb *p)
     (void)Sys_Send_IntEvent(SYS_DEADLINE_MISSED, p->pid);
 }
 
-static bool is_late(const periodic *timing, uint16 now)
-{
-    return (sint16)(now - timing->due) > 0;
-}
-
 /* A job that is late has no deadline to meet any more: it takes turns with the threads without a period, which run when
  * no job is on time. So whatever it does, it starves nobody. */
 static sys_pcb *earliest_deadline(sys_pcb *first)
 {
     uint16 now = clock_now();
-    sys_pcb *best = first;
-    const periodic *earliest = NULL;
-    sys_pcb *p = first;
+    sint16 least = INT16_MAX;
+    sys_pcb *best = first, *p = first;
     do {
         if ((p->status & (SYS_PERIODIC | OS_MISSED)) == SYS_PERIODIC) {
-            const periodic *timing = process_periodic(p);
-            if (is_late(timing, now)) {
+            sint16 left = (sint16)(process_periodic(p)->due - now);
+            if (left < 0) {
                 report_miss(p);
-            } else if (earliest == NULL || (sint16)(timing->due - earliest->due) < 0) {
-                earliest = timing;
+            } else if (left < least) {
+                least = left;
                 best = p;
+                hal_barrier(); /* a branch is shorter than two conditional moves */
             }
         }
         p = p->next;
@@ -165,7 +186,7 @@ bool Sys_Wait_for_Period(void)
         return os_leave(SYS_ERROR_PROCESS);
     }
     uint16 now = clock_now();
-    bool met = !is_late(timing, now);
+    bool met = (sint16)(timing->due - now) >= 0;
     if (!met && !(self->status & OS_MISSED)) {
         report_miss(self);
     }

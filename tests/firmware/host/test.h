@@ -68,6 +68,10 @@ void boot(void);                 /* virtual time, Sys_Init_Kernel, Sys_Start_Ker
 uint16 heap_now(void);           /* bytes in use */
 bool lists_are_well_formed(void); /* ring, blocked list, states */
 
+extern int deliveries; /* to count_delivery */
+bool count_delivery(uint16 pid, uint16 id, sys_event_data *data);
+void yield_for_ever(void); /* a thread */
+
 /* What happened, in order: a short text both threads and handlers append to. */
 extern char trace[];
 void note(char c);

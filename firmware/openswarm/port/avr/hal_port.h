@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* AVR: the level is two bits. "Open", in GPIOR0: threads may be switched; the slice interrupt and device interrupts test it
- * when they would switch, and note the end of the slice in "due" if it is clear. I, in SREG: clear = level device.
+ * when they would switch, and note that in "due" if it is clear; "over" says that the slice's time is. I, in SREG: clear =
+ * level device.
  * GPIOR0 is changed by SBI and CBI, one instruction each, so no bit of it needs a lock. */
 #ifndef HAL_PORT_H
 #define HAL_PORT_H
@@ -17,7 +18,7 @@
 typedef uint8_t hal_lock_state; /* I of SREG; CPU_WAS_OPEN: a slice lock that the matching unlock ends */
 typedef uint8_t *hal_limit;     /* lowest byte of the stack */
 
-enum { CPU_WAS_OPEN = 1 << 0, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_I = 1 << SREG_I }; /* switch.S has the numbers */
+enum { CPU_WAS_OPEN = 1 << 0, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_OVER = 1 << 3, CPU_FORCED = 1 << 4, CPU_I = 1 << SREG_I }; /* switch.S has the numbers */
 
 void cpu_open(void); /* level slice ends: takes a slice end that became due meanwhile */
 
@@ -56,16 +57,38 @@ static inline __attribute__((always_inline)) bool hal_in_thread(void)
     return (GPIOR0 & CPU_OPEN) && !hal_in_isr();
 }
 
-static inline __attribute__((always_inline)) void hal_slice_restart(void)
+static inline __attribute__((always_inline)) void hal_slice_restart(uint16_t spent)
 {
-    TCNT0 = 0;
+    TCNT0 = (uint8_t)spent;
     TIFR0 = 1 << OCF0A;
     GPIOR0 &= (uint8_t)~CPU_DUE;
+    GPIOR0 &= (uint8_t)~CPU_OVER;
+    if (GPIOR0 & CPU_FORCED) {
+        GPIOR0 |= CPU_DUE;
+    }
+}
+
+/* Not up to the last: a compare match right behind a store of TCNT0 would be missed. */
+static inline __attribute__((always_inline)) uint16_t hal_slice_spent(void)
+{
+    uint8_t spent = TCNT0, most = (uint8_t)(OCR0A - 2u);
+    return spent < most ? spent : most;
+}
+
+static inline __attribute__((always_inline)) bool hal_slice_is_over(void)
+{
+    return GPIOR0 & CPU_OVER;
 }
 
 static inline __attribute__((always_inline)) void hal_slice_force(void)
 {
+    GPIOR0 |= CPU_FORCED;
     GPIOR0 |= CPU_DUE;
+}
+
+static inline __attribute__((always_inline)) void hal_slice_unforce(void)
+{
+    GPIOR0 &= (uint8_t)~CPU_FORCED;
 }
 
 #endif

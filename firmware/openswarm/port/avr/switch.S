@@ -14,6 +14,7 @@
 #define OPEN 0                          /* bits of GPIOR0, hal_port.h */
 #define DUE 1
 #define KERNEL 2
+#define OVER 3
 #define PCB_STATUS 8                    /* offsets in sys_pcb (0: sp, 2: limit) and bits, checked by cpu.c */
 #define STATUS_READY 1
 #define PAINT 0xA5
@@ -25,6 +26,7 @@
 
 ; ---- Preemption: end of slice, or a device interrupt made it due -----------------------------------------------
 TIMER0_COMPA_vect:
+        sbi     GPIOR0, OVER
         sbis    GPIOR0, OPEN
         rjmp    later
 preempt:                                ; level thread, I = 0, all registers the thread's
@@ -80,11 +82,17 @@ hal_block:
         ldi     r31, hi8(gs(os_schedule))
         rjmp    1f
 
-; ---- void hal_yield(void): thread stack, level thread -----------------------------------------------------------
-hal_yield:
+take_due:
         cbi     GPIOR0, OPEN
         ldi     r30, lo8(gs(os_slice_end))
         ldi     r31, hi8(gs(os_slice_end))
+        rjmp    1f
+
+; ---- void hal_yield(void): thread stack, level thread -----------------------------------------------------------
+hal_yield:
+        cbi     GPIOR0, OPEN
+        ldi     r30, lo8(gs(os_yield))
+        ldi     r31, hi8(gs(os_yield))
 1:      rcall   leave_thread
 
 ; ---- void cpu_open(void): to level thread, unless interrupts are off -------------------------------------------
@@ -92,9 +100,8 @@ cpu_open:
         sbi     GPIOR0, OPEN
         sbis    GPIOR0, DUE
         ret
-        brid    1f                      ; the exit of the interrupt will see it
-        rjmp    hal_yield
-1:      ret
+        brie    take_due                ; otherwise the exit of the interrupt will see it
+        ret
 
 ; ---- Saves the running thread, runs Z on the kernel stack, resumes the thread it returns; level slice ------------
 leave_thread:

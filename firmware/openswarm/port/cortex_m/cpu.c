@@ -15,6 +15,7 @@ typedef struct { /* what PendSV restores, and behind it the hardware */
 } frame;
 
 volatile uint8 cpu_slice_ms = CPU_SLICE_MS;
+volatile bool cpu_forced;
 hal_pick cpu_pick; /* PendSV's next task; NULL = end of slice */
 
 extern uint32_t main_stack_bottom[];
@@ -27,8 +28,8 @@ static uint32_t guard_of(const void *stack)
 HAL_USED void SysTick_Handler(void)
 {
     os_clock_tick();
-    if (--cpu_slice_ms == 0) {
-        hal_slice_force();
+    if (cpu_slice_ms == 0 || --cpu_slice_ms == 0) {
+        SCB_ICSR = SCB_ICSR_PENDSVSET;
     }
 }
 
@@ -97,9 +98,14 @@ static void pend_and_open(hal_pick pick)
     __asm__ volatile("dsb\n\tisb" ::: "memory"); /* the switch is here */
 }
 
+static sys_pcb *turn(void)
+{
+    return os_yield(os_running);
+}
+
 void hal_yield(void)
 {
-    pend_and_open(NULL);
+    pend_and_open(turn);
 }
 
 void hal_block(void)

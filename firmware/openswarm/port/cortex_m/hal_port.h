@@ -17,6 +17,7 @@ typedef uint32_t hal_limit;      /* MPU_RBAR of the guard: its address, CPU_GUAR
 enum { CPU_PRIORITY_DEVICE = 0x50, CPU_PRIORITY_SLICE = 0xF0, CPU_SLICE_MS = 10, CPU_PENDSV = 14 };
 
 extern volatile uint8_t cpu_slice_ms; /* left of the slice */
+extern volatile bool cpu_forced;      /* PendSV is pending for another reason */
 
 /* BASEPRI_MAX only raises, and takes effect with the next instruction. */
 static HAL_INLINE hal_lock_state cpu_raise(uint32_t priority)
@@ -66,15 +67,34 @@ static HAL_INLINE bool hal_in_isr(void)
     return (exception != 0 && exception != CPU_PENDSV) || cpu_masked_from() - 1u < CPU_PRIORITY_DEVICE;
 }
 
-static HAL_INLINE void hal_slice_restart(void)
+static HAL_INLINE void hal_slice_restart(uint16_t spent)
 {
-    cpu_slice_ms = CPU_SLICE_MS;
+    cpu_slice_ms = (uint8_t)(CPU_SLICE_MS - spent);
     SCB_ICSR = SCB_ICSR_PENDSVCLR;
+    if (cpu_forced) {
+        SCB_ICSR = SCB_ICSR_PENDSVSET;
+    }
+}
+
+static HAL_INLINE uint16_t hal_slice_spent(void)
+{
+    return (uint16_t)(CPU_SLICE_MS - cpu_slice_ms);
+}
+
+static HAL_INLINE bool hal_slice_is_over(void)
+{
+    return cpu_slice_ms == 0;
 }
 
 static HAL_INLINE void hal_slice_force(void)
 {
+    cpu_forced = true;
     SCB_ICSR = SCB_ICSR_PENDSVSET;
+}
+
+static HAL_INLINE void hal_slice_unforce(void)
+{
+    cpu_forced = false;
 }
 
 #endif

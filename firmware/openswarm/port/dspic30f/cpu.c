@@ -4,7 +4,6 @@
 
 /* 1 ms is 14,745.6 Tcy at 14.7456 MHz: five periods are exactly 5 ms (README.md). */
 #define PR(period) ((period) - 1u)
-static const uint16 next_period[5] = {PR(14746), PR(14746), PR(14745), PR(14746), PR(14745)};
 enum { SLICE_PERIOD = 18432 /* counts of 8 Tcy: 10 ms */ };
 
 /* What switch.S assumes. */
@@ -13,13 +12,17 @@ HAL_ASSUME(sizes_and_bits, sizeof(sys_pcb) == 18 && SYS_DSP == 1 << 4 && SYS_REA
 HAL_ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
 
 extern void os_resume_yielded(void), os_thread_start(void);
-static uint16 clock_phase;
+static volatile sint16 clock_phase; /* fifths of a cycle by which the clock is late */
 
 HAL_USED void cpu_clock_isr(void)
 {
     IFS0bits.T1IF = 0;
-    PR1 = next_period[clock_phase]; /* of the period that has just begun */
-    clock_phase = clock_phase == 4 ? 0 : clock_phase + 1u;
+    PR1 = PR(14745); /* of the period that has just begun */
+    clock_phase = (sint16)(clock_phase + 3);
+    if (clock_phase > 0) {
+        PR1 = PR(14746);
+        clock_phase = (sint16)(clock_phase - 5);
+    }
     os_clock_tick();
 }
 
@@ -33,11 +36,13 @@ void hal_start(void)
 {
     PR1 = PR(14745); /* after a reset both timers are 0, T1's flag is clear and its priority is 4 (dspic30f6014a.md §5) */
     PR2 = PR(SLICE_PERIOD);
-    IPC1bits.T2IP = 1;
+    IPC1bits.T2IP0 = IPC9bits.C2IP0 = 1; /* 4 becomes 1 */
+    IPC1bits.T2IP2 = IPC9bits.C2IP2 = 0;
     T2CON = 0x8010; /* on, 1:8 */
     T1CON = 0x8000; /* on, 1:1 */
     IEC0bits.T1IE = 1;
     IEC0bits.T2IE = 1;
+    IEC2bits.C2IE = 1;
     CPU_SRL = 0; /* level thread; a slice end that was forced before comes now, another thread may go first */
 }
 

@@ -12,6 +12,12 @@
 #define HAL_STACK_TRAPS 1
 #define HAL_WORD_IS_ONE_ACT 1 /* no instruction is interrupted (isa.md §14.2) */
 
+/* Of global variables in near data memory. */
+#define HAL_ADD(object, member, amount)                                                                               \
+    __asm__ volatile("mov %0, w0\n\tadd _" #object "+%1" : : "r"((uint16_t)(amount)),                                  \
+                     "i"(offsetof(__typeof__(object), member)) : "w0", "cc", "memory")
+#define HAL_CLEAR_BIT(variable, bit) __asm__ volatile("bclr.b _" #variable ", #" #bit : : : "memory")
+
 typedef uint16_t hal_lock_state; /* SR */
 typedef uint16_t hal_limit;
 
@@ -59,15 +65,16 @@ static HAL_INLINE bool hal_in_isr(void)
     return (CPU_SRL & CPU_IPL_DEVICE) != 0;
 }
 
-static HAL_INLINE void hal_slice_restart(void)
+/* Forced ends have an interrupt of their own, CAN2's, whose entry forgets it: so T2IF tells that the slice is over. */
+static HAL_INLINE void hal_slice_restart(uint16_t spent)
 {
-    TMR2 = 0; /* also clears the prescaler */
+    TMR2 = spent; /* also clears the prescaler */
     IFS0bits.T2IF = 0;
 }
 
-static HAL_INLINE void hal_slice_force(void)
-{
-    IFS0bits.T2IF = 1;
-}
+#define hal_slice_spent() TMR2
+#define hal_slice_is_over() IFS0bits.T2IF
+#define hal_slice_force() ((void)(IFS2bits.C2IF = 1))
+#define hal_slice_unforce() ((void)(IFS2bits.C2IF = 0))
 
 #endif

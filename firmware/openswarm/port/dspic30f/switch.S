@@ -16,8 +16,11 @@
         .equ    STKERR, 2               ; bits of INTCON1, CORCON and IEC0 (dspic30f6014a.md §5, isa.md §2.4)
         .equ    IPL3, 3
         .equ    T2IE, 6
+        .equ    C2IF, 6
+        .equ    ACCUMULATORS, 6         ; words of both, one behind the other
+        .equ    LOOP, 5                 ; words of a DO loop, DCOUNT to DOENDH, the same
 
-        .global __T2Interrupt, _hal_yield, _hal_block, _hal_abandon, _os_resume_yielded, _os_thread_start
+        .global __T2Interrupt, __C2Interrupt, _hal_yield, _hal_block, _hal_abandon, _os_resume_yielded, _os_thread_start
         .global _hal_idle, __StackError, os_isr_exit
         .text
 
@@ -33,7 +36,9 @@
         mov     #_os_memory, w15
         .endm
 
-; ---- Preemption: 10 ms timer, IPL 1 -----------------------------------------------------------------------------
+; ---- Preemption: 10 ms timer, or hal_slice_force(); IPL 1 ------------------------------------------------------------
+__C2Interrupt:
+        bclr    IFS2, #C2IF
 __T2Interrupt:
         bset    SR, #7                  ; IPL 5: only the camera may still stack on this thread
         push.d  w0
@@ -80,7 +85,7 @@ _hal_block:
 ; ---- void hal_yield(void): thread stack, IPL 0 ---------------------------------------------------------------------
 _hal_yield:
         bset    SR, #5                  ; IPL 1; an interrupt that slips in finds nothing half-done
-        mov     #handle(_os_slice_end), w1
+        mov     #handle(_os_yield), w1
 1:      push.d  w8
         push.d  w10
         push.d  w12
@@ -121,17 +126,18 @@ _os_thread_start:
 save_dsp:
         pop.d   w4                      ; return address
         push    w2
-        .irp    register, ACCAL, ACCAH, ACCAU, ACCBL, ACCBH, ACCBU, CORCON
-        push    \register
-        .endr
+        mov     #ACCAL, w6
+        repeat  #ACCUMULATORS-1
+        mov     [w6++], [w15++]
+        push    CORCON
         clr     w6                      ; levels
         mov     #0x0700, w7             ; CORCON.DL
 1:      mov     CORCON, w3
         and     w3, w7, w3
         bra     z, 2f
-        .irp    register, DCOUNT, DOSTARTL, DOSTARTH, DOENDL, DOENDH
-        push    \register
-        .endr
+        mov     #DCOUNT, w3
+        repeat  #LOOP-1
+        mov     [w3++], [w15++]
         clr     DCOUNT
         mov     #tbloffset(leave_loop), w3
         mov     w3, DOENDL
@@ -153,15 +159,17 @@ resume_dsp:
 1:      cp0     w6
         bra     z, 3f
         do      #0, 2f                  ; DL + 1
-        .irp    register, DOENDH, DOENDL, DOSTARTH, DOSTARTL, DCOUNT
-        pop     \register
-        .endr
+        mov     #DCOUNT+2*LOOP, w3
+        repeat  #LOOP-1
+        mov     [--w15], [--w3]
         dec     w6, w6
 2:      nop
         bra     1b
-3:      .irp    register, CORCON, ACCBU, ACCBH, ACCBL, ACCAU, ACCAH, ACCAL, w1
-        pop     \register
-        .endr
+3:      pop     CORCON
+        mov     #ACCAL+2*ACCUMULATORS, w6
+        repeat  #ACCUMULATORS-1
+        mov     [--w15], [--w6]
+        pop     w1
         goto    w1
 
 ; ---- void hal_idle(const volatile uint16_t *pending): kernel stack, IPL 1 -------------------------------------------

@@ -20,7 +20,8 @@ typedef struct {
 } context; /* what sys_pcb.sp points to */
 
 static volatile sig_atomic_t level;
-static volatile sig_atomic_t slice_pending;
+static volatile sig_atomic_t slice_over, slice_forced;
+static volatile sig_atomic_t slice_ms; /* of the slice are over */
 static volatile sig_atomic_t ticks_pending;
 static void (*volatile waiting[DEVICES_WAITING])(void);
 static volatile unsigned first_waiting, last_waiting;
@@ -74,16 +75,18 @@ static void take_devices(void)
     }
 }
 
+static void end_slice(void);
+
 static void take_interrupts(void)
 {
     while ((level < DEVICE && (ticks_pending > 0 || first_waiting != last_waiting)) ||
-           (level < SLICE && slice_pending)) {
+           (level < SLICE && (slice_over || slice_forced))) {
         int before = level;
         if (ticks_pending > 0 || first_waiting != last_waiting) {
             take_devices();
             level = before;
         } else {
-            hal_yield();
+            end_slice();
         }
     }
 }
@@ -108,24 +111,38 @@ bool hal_in_isr(void)
     return level >= DEVICE;
 }
 
-void hal_slice_restart(void)
+void hal_slice_restart(uint16_t spent)
 {
-    slice_pending = 0;
+    slice_over = 0;
+    slice_ms = spent;
+}
+
+uint16_t hal_slice_spent(void)
+{
+    return (uint16_t)slice_ms;
+}
+
+bool hal_slice_is_over(void)
+{
+    return slice_over;
 }
 
 void hal_slice_force(void)
 {
-    slice_pending = 1;
+    slice_forced = 1;
+}
+
+void hal_slice_unforce(void)
+{
+    slice_forced = 0;
 }
 
 static void on_alarm(int signal)
 {
-    static int slice_ms;
     (void)signal;
     __atomic_fetch_add(&ticks_pending, 1, __ATOMIC_SEQ_CST);
     if (++slice_ms >= SLICE_MS) {
-        slice_ms = 0;
-        slice_pending = 1;
+        slice_over = 1;
     }
     take_interrupts();
 }
@@ -200,9 +217,14 @@ void hal_stack_release(sys_pcb *process)
     free(c);
 }
 
-static sys_pcb *end_slice(void)
+static sys_pcb *preempted(void)
 {
     return os_slice_end(os_running);
+}
+
+static sys_pcb *yielded(void)
+{
+    return os_yield(os_running);
 }
 
 static void save_and(hal_pick pick)
@@ -213,10 +235,16 @@ static void save_and(hal_pick pick)
     hal_unlock(THREAD);
 }
 
+static void end_slice(void)
+{
+    level = SLICE;
+    save_and(preempted);
+}
+
 void hal_yield(void)
 {
     level = SLICE;
-    save_and(end_slice);
+    save_and(yielded);
 }
 
 void hal_block(void)
@@ -272,12 +300,13 @@ void host_at_idle(void (*hook)(uint32_t))
 void host_tick(void)
 {
     __atomic_fetch_add(&ticks_pending, 1, __ATOMIC_SEQ_CST);
+    slice_ms++;
     take_interrupts();
 }
 
 void host_slice(void)
 {
-    slice_pending = 1;
+    slice_over = 1;
     take_interrupts();
 }
 

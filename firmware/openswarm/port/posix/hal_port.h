@@ -3,7 +3,6 @@
 #ifndef HAL_PORT_H
 #define HAL_PORT_H
 
-
 typedef int hal_lock_state;
 typedef void *hal_limit;
 
@@ -17,7 +16,10 @@ hal_lock_state hal_lock_devices(void);
 void hal_unlock(hal_lock_state before);
 bool hal_in_thread(void);
 bool hal_in_isr(void);
-void hal_slice_restart(void);
+void hal_slice_restart(uint16_t spent); /* ms */
+uint16_t hal_slice_spent(void);
+bool hal_slice_is_over(void);
 void hal_slice_force(void);
+void hal_slice_unforce(void);
 
 #endif

@@ -19,11 +19,23 @@ typedef struct {
 } context;
 
 static int level;
-static bool started, slice_due;
+static bool started, slice_forced;
 static unsigned unlocks, ms_of_slice;
 static ucontext_t kernel;
 static context main_context;
 static hal_pick kernel_pick;
+
+static void save_and(hal_pick pick);
+
+static sys_pcb *end_slice(void)
+{
+    return os_slice_end(os_running);
+}
+
+static sys_pcb *yield(void)
+{
+    return os_yield(os_running);
+}
 
 /* ---- Levels: replace by your interrupt mask. slice < device < whatever must never wait for the kernel
  * ----------------- */
@@ -53,9 +65,7 @@ static void clock_interrupt(void)
     int before = raise_to(DEVICE);
     os_clock_tick();
     level = before;
-    if (++ms_of_slice >= MS_PER_SLICE) {
-        slice_due = true; /* replace: a second timer, restarted by hal_slice_restart() */
-    }
+    ms_of_slice++; /* replace: a second timer, restarted by hal_slice_restart() */
 }
 
 void hal_unlock(hal_lock_state before)
@@ -67,8 +77,9 @@ void hal_unlock(hal_lock_state before)
     if (++unlocks % UNLOCKS_PER_MS == 0) {
         clock_interrupt();
     }
-    if (slice_due) { /* replace: the slice timer's ISR saves the thread's registers and does the same */
-        hal_yield();
+    if (slice_forced || hal_slice_is_over()) { /* replace: the slice timer's ISR saves the thread's registers and does the same */
+        level = SLICE;
+        save_and(end_slice);
     }
 }
 
@@ -82,15 +93,29 @@ bool hal_in_isr(void)
     return level >= DEVICE;
 }
 
-void hal_slice_restart(void)
+void hal_slice_restart(uint16_t spent)
 {
-    slice_due = false;
-    ms_of_slice = 0;
+    ms_of_slice = spent;
+}
+
+uint16_t hal_slice_spent(void)
+{
+    return (uint16_t)ms_of_slice;
+}
+
+bool hal_slice_is_over(void)
+{
+    return ms_of_slice >= MS_PER_SLICE;
 }
 
 void hal_slice_force(void)
 {
-    slice_due = true;
+    slice_forced = true;
+}
+
+void hal_slice_unforce(void)
+{
+    slice_forced = false;
 }
 
 /* ---- Contexts: replace by frames on the threads' own stacks and a dozen lines of assembly
@@ -169,11 +194,6 @@ void hal_stack_release(sys_pcb *process)
     free(c);
 }
 
-static sys_pcb *end_slice(void)
-{
-    return os_slice_end(os_running);
-}
-
 static void save_and(hal_pick pick)
 {
     context *self = os_running->sp;
@@ -185,7 +205,7 @@ static void save_and(hal_pick pick)
 void hal_yield(void)
 {
     level = SLICE;
-    save_and(end_slice);
+    save_and(yield);
 }
 
 void hal_block(void)

@@ -14,7 +14,10 @@ hal_lock_state hal_lock_devices(void);
 void hal_unlock(hal_lock_state before);
 bool hal_in_thread(void);
 bool hal_in_isr(void);
-void hal_slice_restart(void);
+void hal_slice_restart(uint16_t spent); /* replace: in counts of your slice timer, say */
+uint16_t hal_slice_spent(void);
+bool hal_slice_is_over(void);
 void hal_slice_force(void);
+void hal_slice_unforce(void);
 
 #endif

@@ -170,6 +170,46 @@ static void priorities_preempt(void)
     CHECK(heap_now() == heap);
 }
 
+static volatile uint16 turns, rounds;
+static const uint8 *volatile latest;
+static void take_turns(void *me)
+{
+    for (;;) {
+        (void)Sys_Get_SystemTime();
+        if (latest != me) {
+            latest = me;
+            turns++;
+        }
+    }
+}
+
+static void wait_for_ticks(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        sys_event_data *data = Sys_Wait_for_Event(SYS_1ms_TIMER);
+        rounds++;
+        Sys_Clear_EventData(&data);
+    }
+}
+
+/* Equal threads change every 10 ms, however often a better one preempts them. */
+static void preempted_threads_keep_their_slice(void)
+{
+    static const uint8 both[2];
+    Sys_Set_Scheduler(&sys_fixed_priority);
+    uint16 waiter = start(wait_for_ticks, NULL, 2);
+    uint16 a = start(take_turns, (void *)&both[0], 0), b = start(take_turns, (void *)&both[1], 0);
+    turns = rounds = 0;
+    Sys_Sleep(200);
+    uint16 turned = turns, waited = rounds;
+    CHECK(waiter != 0 && a != 0 && b != 0);
+    CHECK(waited >= 150);
+    CHECK(turned >= 5 && turned <= 40);
+    Sys_Set_Scheduler(&sys_round_robin);
+    CHECK(Sys_Kill_Process(waiter) && Sys_Kill_Process(a) && Sys_Kill_Process(b));
+}
+
 static volatile uint16 met, missed;
 static uint8 late_ones;
 static void job(void *late)
@@ -218,5 +258,6 @@ void check_threads(void)
     pids_are_not_reused_while_alive();
     bad_configurations_are_refused();
     priorities_preempt();
+    preempted_threads_keep_their_slice();
     deadlines_are_met_and_missed();
 }

@@ -1,0 +1,213 @@
+/* Delivery: subscriptions that change under it, and when it happens (kernel.md §2, openswarm.h). */
+#include "test.h"
+
+static bool once(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)id, (void)data;
+    deliveries++;
+    return false;
+}
+
+static bool unregister_in_handler(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)data;
+    deliveries++;
+    CHECK(Sys_Unregister_Event(id));
+    return true;
+}
+static void wait_for_gone(void)
+{
+    CHECK(Sys_Wait_for_Event(E1) == NULL);
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
+    note('g');
+}
+
+TEST(an_event_may_be_unregistered_by_its_own_handler, "openswarm.h: messages are dropped, waiters wake with NULL")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Start_Process(wait_for_gone);
+    Sys_Yield();
+    Sys_Subscribe_to_Event(E1, 0, unregister_in_handler, NULL);
+    Sys_Subscribe_to_Event(E1, 0, count_delivery, NULL);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Send_IntEvent(E1, 2);
+    Sys_Yield();
+    Sys_Yield();
+    CHECK_EQ(deliveries, 1);
+    CHECK_EQ(trace[0], 'g');
+    CHECK(!Sys_Send_IntEvent(E1, 3));
+    CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_EVENT);
+}
+
+TEST(a_handler_that_returns_false_is_unsubscribed, "kernel.md §1: false = unsubscribe me")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, once, NULL);
+    Sys_Subscribe_to_Event(E1, 0, count_delivery, NULL);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(deliveries, 3);
+}
+
+static int rounds_of_two[2];
+static bool resubscribe(uint16 pid, uint16 id, int which, sys_handler self)
+{
+    CHECK(++rounds_of_two[which] < 100);
+    CHECK(Sys_Unsubscribe_Handler(id, pid, self));
+    CHECK(Sys_Subscribe_to_Event(id, pid, self, NULL));
+    return true;
+}
+static bool resubscribe_one(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    return resubscribe(pid, id, 0, resubscribe_one);
+}
+static bool resubscribe_two(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    return resubscribe(pid, id, 1, resubscribe_two);
+}
+
+TEST(a_delivery_reaches_those_that_had_subscribed_when_it_began, "openswarm.h: Sys_Subscribe_to_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    uint16 empty = heap_now();
+    Sys_Subscribe_to_Event(E1, 0, resubscribe_one, NULL);
+    Sys_Subscribe_to_Event(E1, 0, resubscribe_two, NULL);
+    Sys_Subscribe_to_Event(E1, 0, count_delivery, NULL);
+    for (int i = 1; i <= 3; i++) {
+        Sys_Send_IntEvent(E1, 1);
+        Sys_Yield();
+        CHECK_EQ(rounds_of_two[0], i);
+        CHECK_EQ(rounds_of_two[1], i);
+        CHECK_EQ(deliveries, i);
+    }
+    Sys_Unsubscribe_from_Event(E1, 0);
+    CHECK_EQ(heap_now(), empty);
+}
+
+static bool subscribe_another(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    CHECK(Sys_Subscribe_to_Event(id, pid, count_delivery, NULL));
+    return true;
+}
+
+TEST(who_subscribes_during_a_delivery_hears_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, subscribe_another, NULL);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(deliveries, 0);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(deliveries, 1);
+}
+
+static bool register_anew(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)data;
+    CHECK(Sys_Unregister_Event(id) && Sys_Register_Event(id));
+    CHECK(Sys_Subscribe_to_Event(id, pid, register_anew, NULL));
+    CHECK(Sys_Subscribe_to_Event(id, pid, count_delivery, NULL));
+    CHECK(++rounds_of_two[0] < 100);
+    return true;
+}
+
+TEST(an_event_registered_anew_by_its_handler_begins_anew, "openswarm.h: Sys_Unregister_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, register_anew, NULL);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(rounds_of_two[0], 1);
+    CHECK_EQ(deliveries, 0);
+}
+
+static bool resubscribe_and_hold(sys_event_data *data)
+{
+    (void)data;
+    CHECK(++rounds_of_two[0] < 100);
+    CHECK(Sys_Unsubscribe_Handler(E1, 0, count_delivery));
+    CHECK(Sys_Subscribe_to_Event(E1, 0, count_delivery, resubscribe_and_hold));
+    return true;
+}
+
+TEST(a_condition_that_subscribes_its_handler_anew_hears_the_next_message, "openswarm.h: Sys_Subscribe_to_Event")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, count_delivery, resubscribe_and_hold);
+    Sys_Send_IntEvent(E1, 1);
+    Sys_Yield();
+    CHECK_EQ(deliveries, 0);
+    CHECK_EQ(rounds_of_two[0], 1);
+}
+
+TEST(an_event_nobody_listens_to_allocates_nothing, "kernel.md §2")
+{
+    boot();
+    Sys_Register_Event(E1);
+    unsigned long before = host_allocations();
+    for (int i = 0; i < 100; i++) {
+        CHECK(Sys_Send_IntEvent(E1, 1));
+        host_tick();
+    }
+    CHECK_EQ(host_allocations(), before);
+}
+
+static bool resend(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid;
+    deliveries++;
+    Sys_Send_IntEvent(id, data->value);
+    return true;
+}
+
+TEST(a_handler_that_resends_for_ever_starves_no_thread, "kernel.md §2: a drain handles what was queued when it began")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, resend, NULL);
+    Sys_Send_IntEvent(E1, 1);
+    for (int i = 1; i <= 50; i++) {
+        Sys_Yield();
+        CHECK_EQ(deliveries, i);
+    }
+}
+
+static uint32 handled_at;
+static bool when(uint16 pid, uint16 id, sys_event_data *data)
+{
+    (void)pid, (void)id, (void)data;
+    handled_at = Sys_Get_SystemTime();
+    return true;
+}
+static void send_from_isr(void)
+{
+    Sys_Send_IntEvent(E1, 1);
+}
+static void send_in_idle(uint32_t idle)
+{
+    if (idle == 4) {
+        host_device(send_from_isr);
+    }
+}
+
+TEST(an_event_is_handled_at_once_when_only_idle_is_ready, "kernel.md §2: not at the end of the slice")
+{
+    boot();
+    Sys_Register_Event(E1);
+    Sys_Subscribe_to_Event(E1, 0, when, NULL);
+    host_at_idle(send_in_idle);
+    Sys_Sleep(20);
+    CHECK_EQ(handled_at, 3);
+}
