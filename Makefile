@@ -25,6 +25,16 @@ campaigns: SECONDS = 300
 campaigns: $(STAMP)
 	$(PY) -m tests.fuzz --seconds $(SECONDS)
 
+site: $(STAMP)
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(PY) docs/site.py --out build/site
+
+# every package of this environment with version and licence, as CycloneDX
+sbom: $(STAMP)
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	mkdir -p build
+	$(PY) -m cyclonedx_py environment --pyproject pyproject.toml --output-reproducible -o build/sbom.json $(PY)
+
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; set PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
@@ -35,4 +45,4 @@ clean:
 	rm -rf firmware.elf firmware/build
 
 FORCE:
-.PHONY: run test bench campaigns clean FORCE
+.PHONY: run test bench campaigns site sbom clean FORCE

@@ -1,11 +1,11 @@
 """A cycle-exact emulator of the dsPIC30F6014A, by default on an e-puck.
 
->>> import emu
->>> machine = emu.load("firmware.elf")                          # doctest: +SKIP
->>> machine.uart[1].listen(lambda byte, cycle: print(chr(byte), end=""))  # doctest: +SKIP
->>> stop = machine.run(seconds=2)                               # doctest: +SKIP
->>> stop.reason, stop.fault                                     # doctest: +SKIP
-('limit', None)
+    >>> import emu
+    >>> machine = emu.load("firmware.elf")                          # doctest: +SKIP
+    >>> machine.uart[1].listen(lambda byte, cycle: print(chr(byte), end=""))  # doctest: +SKIP
+    >>> stop = machine.run(seconds=2)                               # doctest: +SKIP
+    >>> stop.reason, stop.fault                                     # doctest: +SKIP
+    ('limit', None)
 
 `load` gives a `Machine` from a firmware file, `Machine` has everything else: run it, look into it, be told, take
 snapshots. A run ends with a `Stop`; if the firmware did something wrong, `Stop.fault` says what, where, in which thread

@@ -6,11 +6,12 @@ import pytest
 
 from tests.fuzz.csmith_campaign import available, examine
 
-FIRST_SEED, COUNT = 9000, 30
+SEEDS = [seed for seed in range(9000, 9032) if seed not in (9001, 9012)]
+"""Without two whose programs run on for more than 15,000,000 cycles at -O0."""
 
 
 @pytest.mark.skipif(not available(), reason="csmith is not installed (Debian package csmith)")
-@pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + COUNT))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_random_program_gives_one_checksum_at_every_level(seed: int) -> None:
     """Issue B, csmith campaign: -O0 and -Os agree, and agree with avr-gcc on simavr where installed."""
     verdict = examine(seed)
