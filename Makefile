@@ -5,6 +5,7 @@ PY     := $(VENV)/bin/python
 STAMP  := $(VENV)/.installed
 APP    ?= listing1
 SECONDS ?= 5
+EXTRAS ?= arena,film,test
 
 firmware.elf: $(STAMP) FORCE
 	$(MAKE) -C firmware APP=$(APP) PYTHON=$(abspath $(PY))
@@ -38,7 +39,7 @@ sbom: $(STAMP)
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; set PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
-	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[arena,film,test]'
+	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
 	touch $@
 
 clean:
