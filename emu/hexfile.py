@@ -1,8 +1,8 @@
 """Intel HEX into program words: byte address = 2 x PC, four bytes per word, the fourth one phantom (abi-elf.md §6.8).
 
 What enters: file contents. What leaves: an `Image` without symbols. Words may lack their fourth byte or more;
-missing bytes read as erased. The package intelhex, which the tests compare with, reads the format too, but forgets where
-in the file a byte was, which the message about one outside the chip's memory needs.
+missing bytes read as erased. The package intelhex, with which the tests compare, reads the format too, but forgets
+where in the file a byte was, which the message about one outside the chip's memory needs.
 """
 
 from __future__ import annotations
