@@ -123,7 +123,8 @@ def main() -> int:
         return 0
     told = [NUMBERS.sub("", text).splitlines() for text in (old, new)]
     difference = list(difflib.unified_diff(*told, "docs/first-steps.md", "now", lineterm="", n=1))
-    print("\n".join(difference))
+    for line in difference:
+        print(line)
     return 1 if difference else 0
 
 
