@@ -23,6 +23,7 @@ from emu.stamps import HEADER, Stamp, read_stamps
 from emu.status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
 
 if TYPE_CHECKING:
+    from emu.dspic30f.isa.row import Insn
     from emu.machine import Machine, Stop
     from emu.waves import Waves
 
@@ -85,6 +86,11 @@ def parser() -> Parser:
         help="null pointers, uninitialised reads and stores into another thread's stack are faults (slow)",
     )
     made.add_argument("--stats", action="store_true", help="print what the engine did")
+    made.add_argument(
+        "--dump-native",
+        metavar="PLACE",
+        help="print the native code made for a function or address (0x...), with the instructions it comes from",
+    )
     add_board_options(made)
     add_watch_option(made)
     return made
@@ -139,7 +145,32 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(facts | {"status": status}))
     else:
         _print_end(facts, stop)
+    if options.dump_native:
+        _dump_native(machine, image, options.dump_native)
     return status
+
+
+def _dump_native(machine: Machine, image: Image, text: str) -> None:
+    """Print what native code was made for a place. Raises CommandError if there is no such place or no such code."""
+    from emu.disassembly import instruction
+    from emu.dspic30f.jit.dump import dump
+    from emu.dspic30f.jit.engine import JitEngine
+
+    if not isinstance(machine.runner, JitEngine):
+        raise CommandError(f"--dump-native: the engine {machine.engine} makes no native code")
+    try:
+        address = machine.program_address(int(text, 16) if text.lower().startswith("0x") else text)
+    except (KeyError, ValueError) as error:
+        raise CommandError(f"--dump-native: {error.args[0]}") from None
+
+    def naming(pc: int, insn: Insn) -> str:
+        item = instruction(image, pc, insn.word1, insn.word2)
+        return "" if item is None else item.text
+
+    stretches = list(dump(machine.runner, address, naming))
+    if not stretches:
+        raise CommandError(f"--dump-native: no native code was made for {text}: it was reached too seldom")
+    print("\n".join(stretches))
 
 
 def _refused_before_start(machine: Machine, image: Image) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any, Final, Protocol
@@ -31,7 +31,7 @@ from emu.dspic30f.jit.builder import (
     Surroundings,
 )
 from emu.dspic30f.jit.compiler import shared_compiler
-from emu.dspic30f.jit.region import discover
+from emu.dspic30f.jit.region import Region, discover
 from emu.dspic30f.jit.runtime import BLOCKS, BOUNDARY, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
@@ -70,8 +70,8 @@ class Code:
     """Hash of all that code depends on apart from program words."""
     blocks: Any
     steps: Any
-    regions: dict[int, set[int]] = field(default_factory=dict)
-    """Start of each requested region to the program words it was made from."""
+    regions: dict[int, Region] = field(default_factory=dict)
+    """Requested regions by where they start."""
     entries: set[int] = field(default_factory=set)
     """Leaders of all requested regions."""
     heat: dict[int, int] = field(default_factory=dict)
@@ -240,6 +240,10 @@ class JitEngine:
         self._key = None
         self._cold.forget()
 
+    def translated(self) -> Iterable[Code]:
+        """What was requested so far, for each set of processor modes."""
+        return self._codes.values()
+
     @property
     def interrupts(self) -> int:
         """Interrupts entered natively so far."""
@@ -303,10 +307,9 @@ class JitEngine:
     def _request(self, code: Code, pc: int) -> None:
         """Get native code for the region at `pc`, from disk or from the compile process."""
         region = discover(pc, self._fetch, code.entries, self._hooks)
-        code.regions[pc] = set()
+        code.regions[pc] = region
         if not region.steps:
             return
-        code.regions[pc] = {word for at, step in region.steps.items() for word in (at >> 1, (at >> 1) + 1)}
         code.entries |= region.leaders
         self.counts.regions += 1
         hooked = sorted(code.around.hooks & region.steps.keys())

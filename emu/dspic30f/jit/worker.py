@@ -39,6 +39,18 @@ class Backend:
 
     def compile(self, text: str, level: int) -> bytes:
         """Object code for a module. Level 0 is for code that runs once; level 2 runs the short pass list."""
+        code: bytes = self.machine(level).emit_object(self._optimised(text, level))
+        return code
+
+    def assembly(self, text: str, level: int) -> str:
+        """The same as the host's assembly, blocks named in comments."""
+        machine = self.machine(level)
+        machine.set_asm_verbosity(True)
+        code: str = machine.emit_assembly(self._optimised(text, level))
+        return code
+
+    def _optimised(self, text: str, level: int) -> Any:
+        """The module behind the passes of `level`."""
         llvm = self._llvm
         module = llvm.parse_assembly(text)
         machine = self.machine(level)
@@ -57,8 +69,7 @@ class Backend:
             passes.add_sinking_pass()
             passes.add_aggressive_dce_pass()
         passes.run(module, builder)
-        code: bytes = machine.emit_object(module)
-        return code
+        return module
 
 
 def _exactly(stream: BinaryIO, count: int) -> bytes:

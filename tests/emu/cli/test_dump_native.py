@@ -1,0 +1,47 @@
+"""`emu run --dump-native`: generated code with the guest's addresses and instructions."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from programs import SPIN, executable
+
+from emu.cli import main
+
+
+@pytest.fixture
+def spin(tmp_path: Path) -> str:
+    """A program that counts for ever from 0x102 on."""
+    path = tmp_path / "spin.elf"
+    path.write_bytes(executable(SPIN))
+    return str(path)
+
+
+@pytest.mark.parametrize("place", ["_spin", "0x104"])
+def test_the_code_of_a_place_shows_guest_addresses(spin: str, place: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """By function and by address: the IR has each instruction of the loop, the host's assembly names its blocks."""
+    assert main(["run", spin, "--engine", "jit", "--cycles", "200000", "--dump-native", place]) == 0
+    text = capsys.readouterr().out
+    ir, host = text.split("; host code", 1)
+    for address, start in ((0x102, "inc.w w0"), (0x104, "mov.w w0"), (0x106, "bra _spin")):
+        assert re.search(rf"^ *; {address:06x}  {re.escape(start)}", ir, re.MULTILINE)
+    assert "define i64 @entry" in ir
+    assert re.search(r"# %b102\b", host)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--dump-native", "_nobody"], "no function or label '_nobody'"),
+        (["--dump-native", "0x4000"], "no native code was made for 0x4000"),
+        (["--dump-native", "_spin", "--engine", "interp"], "interp makes no native code"),
+    ],
+)
+def test_what_cannot_be_shown_is_said(
+    spin: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line, status 2."""
+    assert main(["run", spin, "--cycles", "20000", *arguments]) == 2
+    assert message in capsys.readouterr().err
