@@ -5,7 +5,8 @@ BOARD := kilobot
 GCC := avr-gcc
 GCC_PACKAGES := gcc-avr avr-libc
 GCC_NEEDS := crtatmega328p.o
-GCC_FLAGS := -mmcu=atmega328p -DF_CPU=8000000UL -mcall-prologues -mrelax -flto
+GCC_FLAGS := -mmcu=atmega328p -DF_CPU=8000000UL -mcall-prologues -mrelax -flto -mstrict-X \
+    -fno-tree-phiprop -fno-tree-forwprop -fno-partial-inlining -fno-move-loop-invariants
 GCC_LINK := $(OS)/port/avr/ram.ld
 else
 PORT := cortex_m

@@ -8,6 +8,7 @@
 #define HAL_LIKELY(condition) __builtin_expect(condition, 1)
 #define HAL_INLINE inline __attribute__((always_inline)) /* hot, although the rest is optimised for size */
 #define HAL_OUTLINE __attribute__((noinline))            /* cold */
+#define HAL_ZEROS /* an object of zeros that nobody writes: cleared RAM is cheaper than flash */
 
 /* The value of a macro as text; a condition without which the file is not compiled. */
 #define HAL_TEXT(value) HAL_TEXT_(value)

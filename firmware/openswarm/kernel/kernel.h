@@ -100,7 +100,7 @@ extern volatile uint16 critical_depth; /* of the running thread; while os_in_ker
 extern bool os_eager;         /* what becomes due preempts the running thread */
 extern volatile bool os_in_kernel; /* handlers, conditions, wake-ups and schedulers are at work on the kernel stack */
 extern sys_statistics os_statistics;
-extern sys_process_config os_plain; /* all defaults: zeros, for which RAM is cheaper than flash */
+extern HAL_ZEROS sys_process_config os_plain; /* all defaults */
 
 /* memory.c: one array, so that the kernel stack lies below the heap and with it below every thread stack */
 typedef union {

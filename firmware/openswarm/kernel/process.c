@@ -9,7 +9,7 @@ sys_pcb os_system;
 sys_pcb *os_running;
 sys_pcb *os_ring;
 sys_pcb *os_blocked;
-sys_process_config os_plain;
+HAL_ZEROS sys_process_config os_plain;
 
 sys_pcb **process_scan;
 

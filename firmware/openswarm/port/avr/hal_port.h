@@ -12,6 +12,8 @@
 #undef HAL_OUTLINE
 #define HAL_INLINE inline /* flash is scarcer than cycles: the compiler decides */
 #define HAL_OUTLINE
+#undef HAL_ZEROS
+#define HAL_ZEROS const /* whoever reads it is compiled for zeros, and no object is left */
 #define HAL_STACK_GROWS_DOWN
 #define HAL_WORD_IS_ONE_ACT 0
 
