@@ -24,6 +24,12 @@ def cache() -> Path:
     return user_cache_path("openswarm", appauthor=False)
 
 
+def use_cache(folder: str) -> Path:
+    """Keep everything below another folder from now on, in this process and those it starts: `--cache DIR`."""
+    os.environ["OPENSWARM_CACHE"] = os.path.abspath(folder)
+    return cache()
+
+
 def native_code() -> Path:
     """Machine code that the emulator's compiler has made of firmware; at most 128 MB."""
     return cache() / "jit"

@@ -19,6 +19,7 @@ from arena.experiments import experiment_file
 from arena.firmware import image_for
 from arena.record import EXPERIMENT, Trial, trials_in, write_bytes
 from arena.scene import Scene, load_scene, scripted
+from emu.places import use_cache
 
 EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/os-A"
 
@@ -40,6 +41,7 @@ def parser() -> argparse.ArgumentParser:
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
     )
     made.add_argument("--out", type=Path, metavar="FOLDER", help="default results/SCENE-BRAIN-CONTROLLER")
+    made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep images and native code there")
     made.add_argument("--json", action="store_true", help="results as JSON on standard output")
     return made
 

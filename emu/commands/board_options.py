@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from emu.boards import BOARDS
 from emu.command import CommandError
+from emu.places import use_cache
 
 if TYPE_CHECKING:
     from emu.boards.epuck.board import Epuck
@@ -27,7 +28,8 @@ MOST_HZ: Final = 40_000_000
 
 
 def add_board_options(parser: argparse.ArgumentParser) -> None:
-    """Add --board, --crystal, --selector, --camera, --sensor and --stimulus."""
+    """Add --board, --crystal, --selector, --camera, --sensor and --stimulus, and where the machine's code is kept."""
+    parser.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code there, not in the cache")
     board = parser.add_argument_group("robot")
     board.add_argument(
         "--board", choices=BOARDS, default=BOARDS[0], help="what is around the chip (default epuck; none: bare pins)"

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from importlib.metadata import requires, version
 from pathlib import Path
 
@@ -64,6 +65,16 @@ def test_the_cache_is_where_the_environment_says(monkeypatch, tmp_path):
     monkeypatch.delenv("OPENSWARM_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     assert places.cache() == tmp_path / "xdg" / "openswarm"
+
+
+def test_a_command_may_have_a_cache_of_its_own(monkeypatch, tmp_path):
+    """`--cache DIR`, for this process and those it starts."""
+    monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path))
+    for number, module in enumerate(("emu.commands.run", "emu.commands.profile", "arena.commands.run")):
+        folder = tmp_path / str(number)
+        options = import_module(module).parser().parse_args(["x", "--cache", str(folder)])
+        assert options.cache == places.cache() == folder
+        assert os.environ["OPENSWARM_CACHE"] == str(folder)
 
 
 def test_clean_takes_what_is_ours_and_nothing_else(monkeypatch, tmp_path, capsys):
