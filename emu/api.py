@@ -29,7 +29,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from emu.boards import BOARDS
+from emu.boards import board_named
 from emu.chips import chip_named
 from emu.loader import load_image
 from emu.machine import Machine, Stop
@@ -55,21 +55,10 @@ def load(
     Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine, board or chip.
     """
     image = load_image(path, None if chip is None else chip_named(chip))
-    machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip, board=_board(board), strict=strict)
+    maker = board_named(board) if isinstance(board, str) else board
+    machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip, board=maker, strict=strict)
     machine.load(image)
     return machine
-
-
-def _board(board: Callable[[Peripherals], Any] | str | None) -> Callable[[Peripherals], Any] | None:
-    if not isinstance(board, str):
-        return board
-    if board not in BOARDS:
-        raise ValueError(f"there is no board {board!r}; expected one of {', '.join(BOARDS)}")
-    if board == "none":
-        return None
-    from emu.boards.epuck.board import Epuck
-
-    return Epuck
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from emu.boards import BOARDS
+from emu.boards import BOARDS, board_named
 from emu.command import CommandError
 from emu.places import use_cache
 
@@ -66,15 +66,15 @@ def _topics(text: str) -> list[str]:
     return [topic.strip() for topic in text.split(",") if topic.strip()]
 
 
-def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Epuck | None] | None:
+def board_of(options: argparse.Namespace) -> Callable[[Peripherals], Any] | None:
     """What to hand to `Machine(board=...)`."""
-    if options.board == "none":
+    if options.crystal and options.board != "none":
+        raise CommandError("--crystal is for bare pins, --board none; a robot has its own")
+    if options.board != BOARDS[0]:
         wanted = [name for name in ("selector", "camera", "stimulus", "watch") if getattr(options, name, None)]
         if wanted:
-            raise CommandError(f"--{wanted[0]} needs a robot; leave out --board none")
-        return partial(_bare, options.crystal) if options.crystal else None
-    if options.crystal:
-        raise CommandError("--crystal is for bare pins, --board none; a robot has its own")
+            raise CommandError(f"--{wanted[0]} needs a robot; leave out --board {options.board}")
+        return partial(_bare, options.crystal) if options.crystal else board_named(options.board)
     from emu.boards.epuck.board import Epuck
 
     sensor = None if options.sensor == "none" else options.sensor
@@ -111,7 +111,8 @@ def set_up(machine: Machine, options: argparse.Namespace) -> None:
 
 def links_of(machine: Machine) -> dict[int, Any]:
     """What lies between UARTs and the host: Bluetooth on UART1 of a robot."""
-    return {1: machine.board.bluetooth} if machine.board is not None else {}
+    bluetooth = getattr(machine.board, "bluetooth", None)
+    return {} if bluetooth is None else {1: bluetooth}
 
 
 def start_watch(machine: Machine, options: argparse.Namespace) -> Callable[[], None]:
