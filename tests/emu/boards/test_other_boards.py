@@ -1,0 +1,70 @@
+"""What a board brings from outside the CPU package: crystal, configuration words, parts on the pins."""
+
+from __future__ import annotations
+
+import pytest
+
+from emu.boards import BOARDS, board_named
+from emu.boards.epuck.board import Epuck
+from emu.boards.part import Part
+from emu.chips import chip_named
+from emu.image import Image
+from emu.loader import parse_image
+from emu.machine import Machine
+from emu.peripherals import Peripherals
+
+EMPTY_HEX = b":020000040000FA\n:0400000000020400F6\n:00000001FF\n"
+WATCHDOG_ON = 0xFFFF
+
+
+class Bench(Part):
+    """A slow crystal, the watchdog on, a lamp on RD0."""
+
+    def __init__(self, chip: Peripherals) -> None:
+        super().__init__("bench", chip)
+        chip.fit(crystal=4_000_000, config={"FWDT": WATCHDOG_ON})
+        self.lit = self.cell("lit")
+        chip.pins.watch("RD0", self._edge, lazy=True)
+
+    def _edge(self, _cycle: int, changed: int, levels: int) -> None:
+        self.lit.value += bool(changed & levels)
+
+
+def image() -> Image:
+    """A program without configuration words, for the 30F4013."""
+    return parse_image(EMPTY_HEX, "empty.hex", chip_named("30F4013"))
+
+
+def test_a_board_brings_its_crystal_and_its_configuration_words() -> None:
+    """XT with PLL 8 from 4 MHz gives 8 MIPS; the words are those the board says, where the image has none."""
+    machine = Machine(chip_named("30F4013"), engine="plain", board=Bench)
+    machine.load(image())
+    assert machine.hz == 8_000_000
+    assert machine.program.setting("FWDT") == WATCHDOG_ON
+    machine.write("TRISD", 0)
+    for level in (1, 0, 1):
+        machine.write("LATD", level)
+        machine.run_until(machine.cycle + 4)
+    machine.pins.flush()
+    assert machine.board.lit.value == 2
+
+
+def test_bare_pins_have_the_watchdog_off_and_nothing_of_a_robot() -> None:
+    """All other words stay erased."""
+    machine = Machine(chip_named("30F4013"), engine="plain")
+    machine.load(image())
+    assert machine.program.setting("FWDT") == 0x7FFF
+    assert {machine.program.setting(name) for name in machine.chip.config} == {0x7FFF, 0xFFFF}
+
+
+def test_an_epuck_refuses_a_chip_it_does_not_carry() -> None:
+    """Its parts are soldered to pins the other does not have."""
+    with pytest.raises(ValueError, match="an e-puck carries a dsPIC30F6014A, not a dsPIC30F4013"):
+        Machine(chip_named("30F4013"), engine="plain", board=Epuck)
+
+
+def test_boards_are_found_by_name() -> None:
+    """As the command line and `emu.load` do."""
+    assert [board_named(name) for name in BOARDS] == [Epuck, None]
+    with pytest.raises(ValueError, match="expected one of epuck, none"):
+        board_named("kilobot")
