@@ -14,6 +14,7 @@ import pytest
 
 from openswarm.cli import main
 
+ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
 
 
@@ -61,6 +62,16 @@ def test_make_builds_and_its_test_tells_right_from_wrong(project):
     assert (project / errors[0][1]).samefile(source)
     assert errors[0][2] == "11"
     source.write_text(right)
+
+
+def test_the_editor_finds_the_line_of_a_fault(project):
+    """Faults as docs/debugging.md and docs/tour.md show them."""
+    task = json.loads((project / ".vscode" / "tasks.json").read_text())["tasks"][1]
+    pattern = re.compile(task["problemMatcher"]["pattern"]["regexp"])
+    pages = [(ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("debugging.md", "tour.md")]
+    lines = [line for page in pages for line in page.splitlines() if line.startswith("emu run: firmware fault")]
+    found = [pattern.match(line) for line in lines]
+    assert [(one[2], one[3]) for one in found] == [("main.c", "8"), ("docs/examples/bad.c", "7")]
 
 
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no CMake here (Debian package cmake)")
