@@ -13,7 +13,8 @@ from emu.loader import parse_image
 from emu.machine import Machine
 from emu.peripherals import Peripherals
 
-EMPTY_HEX = b":020000040000FA\n:0400000000020400F6\n:00000001FF\n"
+LOOP_HEX = b":020000040000FA\n:04000000FFFF3700C7\n:00000001FF\n"
+"""`bra` to itself at address 0."""
 WATCHDOG_ON = 0xFFFF
 
 
@@ -32,7 +33,7 @@ class Bench(Part):
 
 def image() -> Image:
     """A program without configuration words, for the 30F4013."""
-    return parse_image(EMPTY_HEX, "empty.hex", chip_named("30F4013"))
+    return parse_image(LOOP_HEX, "loop.hex", chip_named("30F4013"))
 
 
 def test_a_board_brings_its_crystal_and_its_configuration_words() -> None:
