@@ -42,7 +42,7 @@ class Thread:
     name: str
     """The function it runs; "main" for the system thread."""
     state: str
-    """"running", "ready", "sleeping" (for a time) or "blocked" (on an event)."""
+    """"running", "ready", "sleeping" (for a time), "blocked" (on an event) or "zombie"."""
     priority: int
     address: int
     """Of its process control block."""
@@ -114,10 +114,11 @@ class Threads:
         pid = _number(pcb, "pid")
         runs = self._pointer(RUNNING)
         is_running = runs is not None and runs.address == pcb.address
-        frames = tuple(self._frames(pcb, is_running))
+        is_zombie = _number(pcb, "block") == pcb.address  # its stack is given back
+        frames = () if is_zombie else tuple(self._frames(pcb, is_running))
         state = "running" if is_running and not blocked else "ready"
         if blocked:
-            state = "blocked" if pcb["on"]["awaited"].get() else "sleeping"
+            state = "zombie" if is_zombie else "blocked" if pcb["on"]["awaited"].get() else "sleeping"
         stack, free = self._stack(pcb)
         name = self._name(pid, frames)
         return Thread(pid, name, state, _number(pcb, "priority"), pcb.address or 0, stack, free, frames)

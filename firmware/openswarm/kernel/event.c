@@ -12,15 +12,16 @@
 
 enum { BUCKETS = 8 };                        /* a power of two */
 static event *events[BUCKETS];               /* by the low bits of the identifier */
-static message *queue;                       /* devices locked */
+message *event_queue;                        /* devices locked */
 message **queue_end;                         /* the same */
 static message *undelivered;                 /* the rest of the batch in delivery */
+event *(*os_at_sending)(uint16 id, const void *data, uint16 size);
 static subscription *const nobody;
 static subscription *const *place;           /* where the delivery stands among the subscribers, moved with them */
 
 void event_init(void)
 {
-    queue_end = &queue;
+    queue_end = &event_queue;
 }
 
 /* ---- Registration ------------------------------------------------------------------------------------------- */
@@ -41,10 +42,13 @@ event *event_find(uint16 id)
 }
 
 /* The same for senders: the event that was registered last in its bucket is found without a call. */
-static HAL_INLINE event *find(uint16 id)
+static HAL_INLINE event *find(uint16 id, const void *data, uint16 size)
 {
     event *first = events[id % BUCKETS];
-    return first != NULL && first->id == id ? first : event_find(id);
+    if (first != NULL && first->id == id) {
+        return first;
+    }
+    return os_at_sending == NULL ? event_find(id) : os_at_sending(id, data, size);
 }
 
 static HAL_OUTLINE const sys_pcb *first_waiter(const event *e)
@@ -64,6 +68,15 @@ bool Sys_IsEventRegistered(uint16 id)
     return found;
 }
 
+void event_put_first(event *e, uint16 id)
+{
+    event **first = &events[id % BUCKETS];
+    e->next = *first;
+    e->subscribers = NULL;
+    hal_barrier();
+    HAL_STORE(*first, e);
+}
+
 bool Sys_Register_Event(uint16 id)
 {
     sys_error error = SYS_OK;
@@ -71,14 +84,10 @@ bool Sys_Register_Event(uint16 id)
         return false;
     }
     if (event_find(id) == NULL) {
-        event **first = &events[id % BUCKETS];
         event *e = heap_keep(sizeof *e);
         if (e != NULL) {
             e->id = id;
-            e->next = *first; /* the application's events are found before the system's */
-            e->subscribers = NULL;
-            hal_barrier();
-            HAL_STORE(*first, e);
+            event_put_first(e, id); /* the application's events are found before the system's */
         } else {
             error = SYS_ERROR_MEMORY;
         }
@@ -139,7 +148,7 @@ bool Sys_Unregister_Event(uint16 id)
         place = &nobody;
     }
     (void)wake_waiters(e, NULL);
-    disown_messages(HAL_LOAD(queue), e);
+    disown_messages(HAL_LOAD(event_queue), e);
     disown_messages(undelivered, e);
     heap_give(e, sizeof *e);
     return os_leave(SYS_OK);
@@ -275,7 +284,7 @@ bool Sys_Send_Event(uint16 id, const void *data, uint16 size)
         return os_fail(SYS_ERROR_ARGUMENT);
     }
     hal_lock_state lock = hal_lock_slice();
-    event *e = find(id);
+    event *e = find(id, data, size);
     if (e == NULL) {
         error = SYS_ERROR_EVENT;
     } else if (e->subscribers != NULL || first_waiter(e) != NULL) {
@@ -364,9 +373,9 @@ static void deliver(message *m)
 void event_deliver_queued(void)
 {
     hal_lock_state lock = hal_lock_devices();
-    undelivered = queue;
-    queue = NULL;
-    queue_end = &queue;
+    undelivered = event_queue;
+    event_queue = NULL;
+    queue_end = &event_queue;
     os_pending &= (uint16)~OS_MESSAGES;
     hal_unlock(lock);
     while (undelivered != NULL) {

@@ -72,7 +72,8 @@ enum {
     OS_TIMED = 0x04, /* while blocked */
     OS_WOKEN = 0x04, /* while ready: it has not run since; for sys_woken_first, which clears it */
     OS_MISSED = 0x20, /* this period's miss is reported */
-    OS_DRIVES = 0x40 /* it uses a bus (io/bus.h) */
+    OS_DRIVES = 0x40, /* it uses a bus (io/bus.h) */
+    OS_JOINABLE = 0x80 /* its control block stays until somebody has waited for its end (option/join.c) */
     /* 0x08 SYS_PERIODIC, 0x10 SYS_DSP */
 };
 
@@ -121,8 +122,14 @@ void heap_note_use(void);
 void stack_paint(void *begin, const void *end); /* whole words */
 bool kernel_stack_is_intact(void); /* its last byte was never written; asked where the CPU does not trap */
 
+/* What an application uses of option/ puts itself here; NULL otherwise. Chains: who comes later calls who was there. */
+typedef bool (*os_burial)(sys_pcb *p);
+extern os_burial os_at_burial; /* slice locked; p is on no list any more. True: its block has been seen to */
+extern event *(*os_at_sending)(uint16 id, const void *data, uint16 size); /* to whom a sender sends, instead of event_find() */
+
 /* event.c */
 void event_init(void);
+void event_put_first(event *e, uint16 id); /* into the bucket of id */
 void event_deliver_queued(void);           /* kernel stack: all messages queued when it began */
 void event_drop_subscriptions(uint16 pid);
 void event_release_result(sys_pcb *process); /* it gives up its wait result; the last holder frees it */
@@ -130,6 +137,7 @@ event *event_find(uint16 id);                /* any context */
 /* The link behind the last queued message; devices locked, and OS_MESSAGES follows. A device may hang a block of its own
  * there, with event NULL and its size: the kernel stack frees it with the next messages. */
 extern message **queue_end;
+extern message *event_queue; /* what is not yet being delivered */
 
 /* process.c */
 void process_init(void);

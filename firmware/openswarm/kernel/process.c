@@ -12,6 +12,7 @@ sys_pcb *os_blocked;
 HAL_ZEROS sys_process_config os_plain;
 
 sys_pcb **process_scan;
+os_burial os_at_burial;
 
 static uint16 newest_pid;
 volatile uint16 critical_depth;
@@ -149,7 +150,7 @@ static bool is_valid(const sys_process_config *c, uint16 stack)
         return false;
     }
     return stack >= SYS_MINIMUM_STACK && (stack & (HEAP_STEP - 1u)) == 0 && stack <= 0x7FFFu &&
-           (c->flags & ~(SYS_DSP | SYS_PERIODIC)) == 0;
+           (c->flags & ~(SYS_DSP | SYS_PERIODIC | OS_JOINABLE)) == 0;
 }
 
 static HAL_OUTLINE uint16 start(const sys_process_config *config, void (*entry)(void *))
@@ -302,9 +303,11 @@ static HAL_OUTLINE void bury(sys_pcb *p)
     if (os_running == p) {
         HAL_STORE(os_running, &os_system);
     }
-    hal_stack_release(p);
     uint16 pid = p->pid;
-    heap_give(p->block, (uint16)((uint8 *)(p + 1) - p->block));
+    if (os_at_burial == NULL || !os_at_burial(p)) {
+        hal_stack_release(p);
+        heap_give(p->block, (uint16)((uint8 *)(p + 1) - p->block));
+    }
     (void)Sys_Send_IntEvent(SYS_EVENT_TERMINATION, pid);
 }
 

@@ -32,7 +32,7 @@ bool lists_are_well_formed(void)
         }
     }
     for (const sys_pcb *p = os_blocked; p != NULL; p = p->next) {
-        if (++members > 1000 || (p->status & OS_STATE) != SYS_BLOCKED) {
+        if (++members > 1000 || (p->status & OS_STATE) < SYS_BLOCKED) {
             return false;
         }
     }

@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: MIT */
+/* Mutexes with immediate priority ceiling (openswarm_mutex.h).
+ *
+ * A mutex without owner is on no list and knows no waiters. Waiters are nodes on the stacks of who waits. */
+#include "kernel.h"
+#include "openswarm_mutex.h"
+
+typedef struct sys_mutex_waiter waiter;
+struct sys_mutex_waiter {
+    waiter *next;
+    sys_pcb *thread;
+};
+
+static sys_mutex *held; /* all that have an owner; slice locked */
+static os_burial before;
+static bool buries;
+
+static uint8 base_priority(const sys_pcb *thread)
+{
+    for (const sys_mutex *m = held; m != NULL; m = m->next) {
+        if (m->owner == thread) {
+            return m->base;
+        }
+    }
+    return thread->priority;
+}
+
+static void own(sys_mutex *m, sys_pcb *thread)
+{
+    m->base = base_priority(thread);
+    m->owner = thread;
+    m->next = held;
+    held = m;
+    if (thread->priority < m->ceiling) {
+        thread->priority = m->ceiling;
+    }
+}
+
+static void forget_waiter(sys_mutex *m, const sys_pcb *thread)
+{
+    for (waiter **link = &m->waiters; *link != NULL; link = &(*link)->next) {
+        if ((*link)->thread == thread) {
+            *link = (*link)->next;
+            return;
+        }
+    }
+}
+
+/* To the best waiter, of equal ones to the first. One whose time is up, but which has not run since, is no longer blocked. */
+static void hand_over(sys_mutex *m)
+{
+    sys_pcb *best = NULL;
+    for (const waiter *w = m->waiters; w != NULL; w = w->next) {
+        if (best == NULL || w->thread->priority > best->priority) {
+            best = w->thread;
+        }
+    }
+    if (best != NULL) {
+        forget_waiter(m, best);
+        own(m, best);
+        if (best->status & OS_OFF_RING) {
+            process_wake(best, NULL);
+        }
+    }
+}
+
+static void release(sys_mutex *m)
+{
+    sys_pcb *thread = m->owner;
+    sys_mutex **link = &held;
+    while (*link != m) {
+        link = &(*link)->next;
+    }
+    *link = m->next;
+    m->owner = NULL;
+    thread->priority = m->base;
+    for (const sys_mutex *other = held; other != NULL; other = other->next) {
+        if (other->owner == thread && other->ceiling > thread->priority) {
+            thread->priority = other->ceiling;
+        }
+    }
+    hand_over(m);
+}
+
+static bool on_burial(sys_pcb *thread)
+{
+    sys_mutex *m;
+    for (m = held; m != NULL; m = m->next) {
+        forget_waiter(m, thread);
+    }
+    for (m = held; m != NULL;) {
+        if (m->owner == thread) {
+            release(m);
+            m = held;
+        } else {
+            m = m->next;
+        }
+    }
+    return before != NULL && before(thread);
+}
+
+bool Sys_Lock_MutexTimeout(sys_mutex *m, uint16 ms)
+{
+    sys_pcb *self = os_running;
+    waiter own_node = {NULL, self};
+    if (os_enter_blocking() != SYS_OK) {
+        return false;
+    }
+    if (m->owner == self) {
+        return os_leave(SYS_ERROR_PROCESS);
+    }
+    if (base_priority(self) > m->ceiling) {
+        return os_leave(SYS_ERROR_ARGUMENT);
+    }
+    if (!buries) {
+        buries = true;
+        before = os_at_burial;
+        os_at_burial = on_burial;
+    }
+    if (m->owner == NULL) {
+        own(m, self);
+        return os_leave(SYS_OK);
+    }
+    waiter **end = &m->waiters;
+    while (*end != NULL) {
+        end = &(*end)->next;
+    }
+    *end = &own_node;
+    process_block(NULL, ms);
+    Sys_Start_CriticalSection();
+    bool mine = m->owner == self; /* it was handed over */
+    if (!mine) {
+        forget_waiter(m, self);
+    }
+    Sys_End_CriticalSection();
+    return mine;
+}
+
+bool Sys_Lock_Mutex(sys_mutex *m)
+{
+    return Sys_Lock_MutexTimeout(m, 0);
+}
+
+bool Sys_Unlock_Mutex(sys_mutex *m)
+{
+    if (os_enter() != SYS_OK) {
+        return false;
+    }
+    if (os_in_kernel) {
+        return os_leave(os_refuse());
+    }
+    if (m->owner != os_running) {
+        return os_leave(SYS_ERROR_PROCESS);
+    }
+    uint8 raised = os_running->priority;
+    release(m);
+    if (os_running->priority < raised) {
+        os_preempt(); /* somebody between both may be ready */
+    }
+    return os_leave(SYS_OK);
+}

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: MIT */
+/* Bounds of what may wait for delivery (openswarm_quota.h).
+ *
+ * Senders find the newest event of a bucket without a call. A gate in front of an event with a quota, an event without number
+ * of the bucket, makes them call; only they pay. What waits is counted in the queue itself. */
+#include "kernel.h"
+#include "openswarm_quota.h"
+
+#include <string.h>
+
+static sys_quota *quotas;
+static event nobody; /* has no listeners: what is sent to it is not stored */
+
+/* The newest undelivered message of e, and how many there are. Messages are only appended meanwhile. */
+static message *newest_of(const event *e, uint16 *count)
+{
+    message *newest = NULL;
+    for (message *m = HAL_LOAD(event_queue); m != NULL; m = HAL_LOAD(m->queued.next)) {
+        if (m->queued.event == e) {
+            newest = m;
+            ++*count;
+        }
+    }
+    return newest;
+}
+
+static event *admit(uint16 id, const void *data, uint16 size)
+{
+    event *e = event_find(id);
+    sys_quota *q = quotas;
+    while (q != NULL && q->event != id) {
+        q = q->next;
+    }
+    if (e == NULL || q == NULL) {
+        return e;
+    }
+    uint16 waiting = 0;
+    message *newest = newest_of(e, &waiting);
+    if (waiting < (q->most != 0 ? q->most : 1u)) {
+        return e;
+    }
+    if (q->most == 0 && size == newest->queued.size && size <= SYS_LATEST_PAYLOAD) {
+        hal_lock_state lock = hal_lock_devices();
+        memcpy((uint8 *)newest + sizeof *newest, data, size);
+        hal_unlock(lock);
+    } else {
+        os_count(&q->dropped);
+    }
+    return &nobody;
+}
+
+static bool add(sys_quota *q, uint16 id, uint16 most)
+{
+    sys_error error = SYS_ERROR_EVENT;
+    if (os_enter() != SYS_OK) {
+        return false;
+    }
+    if (event_find(id) != NULL) {
+        event *gate = heap_keep(sizeof *gate);
+        error = SYS_ERROR_MEMORY;
+        if (gate != NULL) {
+            error = SYS_OK;
+            *q = (sys_quota){quotas, id, most, 0};
+            hal_barrier();
+            HAL_STORE(quotas, q);
+            HAL_STORE(os_at_sending, admit);
+            gate->id = (uint16)(id + 1u);
+            event_put_first(gate, id);
+        }
+    }
+    return os_leave(error);
+}
+
+bool Sys_Limit_Event(sys_quota *q, uint16 event, uint16 most)
+{
+    return most != 0 ? add(q, event, most) : os_fail(SYS_ERROR_ARGUMENT);
+}
+
+bool Sys_Keep_Latest(sys_quota *q, uint16 event)
+{
+    return add(q, event, 0);
+}

@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: MIT */
+/* Threads that are watched and started anew (openswarm_service.h). */
+#include "kernel.h"
+#include "openswarm_service.h"
+
+static sys_service *services; /* slice locked */
+static os_burial before;
+static bool buries;
+
+static bool on_burial(sys_pcb *p)
+{
+    for (sys_service *s = services; s != NULL; s = s->next) {
+        if (s->pid == p->pid) {
+            s->pid = 0;
+        }
+    }
+    return before != NULL && before(p);
+}
+
+static void start(sys_service *s)
+{
+    s->pid = Sys_Start_ProcessWith(s->config);
+    s->fed = clock_now();
+}
+
+static bool look_after(uint16 unused, uint16 event, sys_event_data *tick)
+{
+    (void)unused, (void)event;
+    for (sys_service *s = services; s != NULL; s = s->next) {
+        if (s->pid != 0 && s->limit_ms != 0 && (sint16)(tick->value - s->fed - s->limit_ms) > 0) {
+            (void)Sys_Kill_Process(s->pid);
+            os_count(&s->bitten);
+        }
+        if (s->pid == 0 && s->restarts != 0) {
+            start(s);
+            if (s->pid != 0 && s->restarts != SYS_ALWAYS) {
+                s->restarts--;
+            }
+        }
+    }
+    return true;
+}
+
+bool Sys_Start_Service(sys_service *s)
+{
+    sys_error error = SYS_OK;
+    if (os_enter() != SYS_OK) {
+        return false;
+    }
+    if (!buries) {
+        buries = true;
+        before = os_at_burial;
+        os_at_burial = on_burial;
+    }
+    s->pid = 0;
+    if (Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, look_after, NULL)) {
+        start(s);
+    }
+    if (s->pid != 0) {
+        s->next = services;
+        services = s;
+    } else {
+        error = SYS_ERROR_MEMORY;
+    }
+    return os_leave(error);
+}
+
+bool Sys_Feed_Watchdog(void)
+{
+    sys_error error = SYS_ERROR_PROCESS;
+    if (os_enter() != SYS_OK) {
+        return false;
+    }
+    for (sys_service *s = services; s != NULL; s = s->next) {
+        if (s->pid == os_running->pid && !os_in_kernel) {
+            s->fed = clock_now();
+            error = SYS_OK;
+        }
+    }
+    return os_leave(error);
+}
