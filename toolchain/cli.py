@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "size": ("toolchain.commands.size", "show flash and RAM use"),
     "nm": ("toolchain.commands.names", "list symbols with addresses and sizes"),
     "hex": ("toolchain.commands.hex", "convert an ELF executable to Intel HEX"),
+    "bounds": ("toolchain.commands.bounds", "worst-case time, stack and interrupt response"),
     "stack": ("toolchain.commands.stack", "worst-case stack use from the call graph"),
     "completion": ("toolchain.commands.completion", "print what makes a shell complete these commands"),
 }

@@ -30,7 +30,7 @@ SKIPPED_SECTIONS = ("llvm.metadata",)
 WEAK = ("weak", "weak_odr", "linkonce", "linkonce_odr", "extern_weak", "common")
 SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near", ".bss": "bss", ".data": "data",
                  ".xbss": "bss,xmemory,near", ".xdata": "data,xmemory,near", ".ybss": "bss,ymemory",
-                 ".ydata": "data,ymemory",
+                 ".ydata": "data,ymemory", ".note": "info",
                  ".pbss": "persist", ".eedata": "eedata", ".prog": "code", ".psv": "psv,page"}  # fmt: skip
 # Sections that dspic_attributes.h names; the first word, bss or data, depends on the initialiser.
 PLACES = {".near": ",near", ".far": "", ".xmemory": ",xmemory", ".ymemory": ",ymemory"}

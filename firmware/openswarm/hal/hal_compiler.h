@@ -10,6 +10,25 @@
 #define HAL_OUTLINE __attribute__((noinline))            /* cold */
 #define HAL_ZEROS /* an object of zeros that nobody writes: cleared RAM is cheaper than flash */
 
+/* What bounds of time and stack take from the source (toolchain/include/bounds.h); nothing to other compilers. n threads,
+ * m events, b newer events in the same bucket, s subscriptions of one event, q queued messages, i times idle, u bytes of a
+ * stack never used. */
+#if defined(__clang__) && defined(__dsPIC30F__)
+#include <bounds.h>
+#else
+#define LOOP_BOUND(rounds)
+#define CALL_TARGETS(...)
+#define PRIVATE_VALUE(variable, value)
+#define KNOWN_VALUE(variable, value)
+#define ARGUMENT_BOUND(function, n, most)
+#define INTERRUPT_LEVEL(vector, level)
+#define STACK_AREA(variable, bytes)
+#define THREADS(...)
+#define COMES_BACK(function, level)
+#define RESUMED_BY(...)
+#define LINKS_IN_RAM()
+#endif
+
 /* The value of a macro as text; a condition without which the file is not compiled. */
 #define HAL_TEXT(value) HAL_TEXT_(value)
 #define HAL_TEXT_(text) #text

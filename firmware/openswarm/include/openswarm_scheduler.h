@@ -7,10 +7,12 @@
 
 typedef struct sys_pcb sys_pcb;
 
+/* Kernel stack, slice locked. first is the ready thread whose turn it is by round robin; the ring through Sys_Next_Ready
+ * comes back to it. Returns the thread to run, which must be on the ring. */
+typedef sys_pcb *(*sys_pick)(sys_pcb *first);
+
 struct sys_scheduler {
-    /* Kernel stack, slice locked. first is the ready thread whose turn it is by round robin; the ring through
-     * Sys_Next_Ready comes back to it. Returns the thread to run, which must be on the ring. NULL = round robin. */
-    sys_pcb *(*pick)(sys_pcb *first);
+    sys_pick pick; /* NULL = round robin */
     bool eager; /* asked also when something becomes due within a slice. Who was running is first then, and keeps the
                  * rest of its slice if it is not picked */
 };

@@ -34,6 +34,7 @@ void selector_tick(void)
         equal_ms++;
     } else if (position != accepted) {
         accepted = position;
+        CALL_TARGETS(sys_selector_processor);
         if (processor(&position)) {
             (void)Sys_Send_Event(SYS_IO_SELECTOR, &position, sizeof position);
         }

@@ -60,6 +60,7 @@ static struct {
 
 static void discard(void)
 {
+    LOOP_BOUND(d);
     while (building.first != NULL) {
         message *block = building.first;
         building.first = block->queued.next;
@@ -110,6 +111,7 @@ static HAL_OUTLINE bool write_message(uint8 uart, const void *message, uint16 si
     building.taken = 0;
     building.error = SYS_ERROR_ARGUMENT;
     building.limit = (uint16)(SYS_UART_TX - HAL_LOAD(c->taken));
+    CALL_TARGETS(sys_tx_processor);
     bool sound = c->encode(message, size, put) && building.to == c; /* not if the processor has written to a UART */
     building.to = NULL;
     hal_lock_state lock = hal_lock_devices();
@@ -161,6 +163,7 @@ sint16 uart_next_byte(uint8 uart)
 /* ISR. Without memory for the event the next tick tries again. */
 static HAL_OUTLINE void tell_ready(void)
 {
+    LOOP_BOUND(SYS_UARTS);
     for (uint8 uart = 0; uart < SYS_UARTS; uart++) {
         if ((refused & 1u << uart) && channels[uart].first == NULL &&
             Sys_Send_IntEvent(event_of(uart, SYS_UART1_READY), SYS_UART_TX)) {
@@ -188,7 +191,9 @@ bool Sys_Write_UART2(const void *message, uint16 size)
 
 bool Sys_Raw_Tx(const uint8 *message, uint16 size, sys_put put_byte)
 {
+    LOOP_BOUND(d);
     for (uint16 i = 0; i < size; i++) {
+        CALL_TARGETS(sys_put);
         if (!put_byte(message[i])) {
             return false;
         }
@@ -210,6 +215,7 @@ void uart_received(uint8 uart, uint8 byte)
     channel *c = &channels[uart];
     uint16 used = c->used;
     c->quiet = false;
+    CALL_TARGETS(sys_rx_processor);
     uint16 size = c->decode(byte, c->received, &c->used);
     if (size != 0) {
         c->used = 0;
@@ -234,6 +240,7 @@ uint16 Sys_Chunk_Rx(uint8 byte, uint8 *buffer, uint16 *used)
 /* A chunk also ends when the line was quiet from one tick to the next. */
 void uart_tick(void)
 {
+    LOOP_BOUND(SYS_UARTS);
     for (uint8 uart = 0; uart < SYS_UARTS; uart++) {
         channel *c = &channels[uart];
         if (c->quiet && c->used != 0 && c->decode == Sys_Chunk_Rx) {

@@ -6,6 +6,8 @@
  * alarm that is not behind base rings a whole wrap later, in vain. */
 #include "kernel.h"
 
+LINKS_IN_RAM();
+
 static volatile uint16 now_ms, wraps; /* low and high word of the system time */
 static uint16 base;
 static uint16 alarm;
@@ -60,6 +62,7 @@ void clock_wake_due(void)
     uint16 elapsed = (uint16)(now - base);
     sys_pcb *next;
     base = now;
+    LOOP_BOUND(n);
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
         if (!(p->status & OS_TIMED)) {

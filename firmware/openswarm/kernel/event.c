@@ -6,6 +6,8 @@
  * last of them. */
 #include "kernel.h"
 
+LINKS_IN_RAM();
+
 #include <string.h>
 
 #define PAYLOAD(m) ((uint8 *)(m) + sizeof(message))
@@ -30,6 +32,7 @@ void event_init(void)
 static HAL_OUTLINE event **link_of(uint16 id)
 {
     event **link = &events[id % BUCKETS];
+    LOOP_BOUND(b);
     while (*link != NULL && (*link)->id != id) {
         link = &(*link)->next;
     }
@@ -54,6 +57,7 @@ static HAL_INLINE event *find(uint16 id, const void *data, uint16 size)
 static HAL_OUTLINE const sys_pcb *first_waiter(const event *e)
 {
     const sys_pcb *p = os_blocked;
+    LOOP_BOUND(n);
     while (p != NULL && p->on.awaited != e) {
         p = p->next;
     }
@@ -110,6 +114,7 @@ static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
 {
     bool any = false;
     sys_pcb *next;
+    LOOP_BOUND(n);
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
         if (p->on.awaited == e && (m == NULL || p->wait.condition == NULL)) {
@@ -123,6 +128,7 @@ static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
 
 static HAL_OUTLINE void disown_messages(message *m, const event *e)
 {
+    LOOP_BOUND(q);
     for (; m != NULL; m = HAL_LOAD(m->queued.next)) {
         if (m->queued.event == e) {
             m->queued.event = NULL;
@@ -141,6 +147,7 @@ bool Sys_Unregister_Event(uint16 id)
         return os_leave(SYS_ERROR_EVENT);
     }
     HAL_STORE(*link, e->next); /* from here on ISRs queue nothing for it */
+    LOOP_BOUND(s);
     while (e->subscribers != NULL) {
         unlink_subscription(&e->subscribers);
     }
@@ -160,6 +167,7 @@ bool Sys_Unregister_Event(uint16 id)
 static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condition condition)
 {
     subscription *s = e->subscribers, **link = &e->subscribers;
+    LOOP_BOUND(s);
     while (s != NULL && (s->pid != pid || s->handler != handler)) {
         s = s->next;
     }
@@ -168,6 +176,7 @@ static sys_error subscribe(event *e, uint16 pid, sys_handler handler, sys_condit
         if (s == NULL) {
             return SYS_ERROR_MEMORY;
         }
+        LOOP_BOUND(s);
         while (*link != NULL && link != place) { /* in front of a delivery it would be heard this time already */
             link = &(*link)->next;
         }
@@ -204,6 +213,7 @@ static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
 {
     bool found = false;
     subscription **link = &e->subscribers;
+    LOOP_BOUND(s);
     while (*link != NULL) {
         if ((*link)->pid == pid && (handler == NULL || (*link)->handler == handler)) {
             unlink_subscription(link);
@@ -234,6 +244,7 @@ bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)
 void event_drop_subscriptions(uint16 pid)
 {
     for (event **bucket = events; bucket != events + BUCKETS; bucket++) {
+        LOOP_BOUND(m);
         for (event *e = *bucket; e != NULL; e = e->next) {
             (void)unsubscribe(e, pid, NULL);
         }
@@ -262,6 +273,8 @@ static HAL_OUTLINE bool refuse_message(uint16 id, sys_error error)
     }
     return os_fail(error);
 }
+
+ARGUMENT_BOUND(Sys_Send_Event, 2, d);
 
 typedef uint16 __attribute__((may_alias)) any_word;
 
@@ -321,10 +334,13 @@ static void run_handlers(const event *e, sys_event_data *data)
     uint16 id = e->id;
     const subscription *s;
     place = &e->subscribers;
+    LOOP_BOUND(s);
     while ((s = *place) != NULL) {
+        CALL_TARGETS(sys_condition);
         if ((s->condition == NULL || s->condition(data)) && *place == s) {
             sys_handler handler = s->handler;
             uint16 pid = s->pid;
+            CALL_TARGETS(sys_handler);
             if (!handler(pid, id, data)) {
                 (void)Sys_Unsubscribe_Handler(id, pid, handler);
             }
@@ -341,7 +357,9 @@ static void ask_waiters(const event *e, sys_event_data *data)
 {
     sys_pcb *p;
     process_scan = &os_blocked;
+    LOOP_BOUND(n);
     while ((p = *process_scan) != NULL) {
+        CALL_TARGETS(sys_condition);
         bool holds = p->on.awaited == e && p->wait.condition != NULL && p->wait.condition(data);
         if (*process_scan == p) { /* else the condition ended its own wait */
             if (holds) {
@@ -378,6 +396,7 @@ void event_deliver_queued(void)
     queue_end = &event_queue;
     os_pending &= (uint16)~OS_MESSAGES;
     hal_unlock(lock);
+    LOOP_BOUND(q);
     while (undelivered != NULL) {
         message *m = undelivered;
         undelivered = m->queued.next;
@@ -401,6 +420,7 @@ void event_release_result(sys_pcb *process)
     if (m == NULL) {
         return;
     }
+    LOOP_BOUND(n);
     while ((p = process_next(p)) != NULL) {
         if (holds(p, m)) {
             return;

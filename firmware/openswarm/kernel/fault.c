@@ -11,6 +11,7 @@ static HAL_OUTLINE char *put_number(char *end, uint16 number, uint16 radix)
         uint16 digit = number % radix;
         number /= radix;
         *--end = (char)(digit < 10 ? '0' + digit : 'a' - 10 + digit);
+        LOOP_BOUND(4);
     } while (number != 0);
     return end;
 }

@@ -14,6 +14,8 @@
  * reason for this and the figures. */
 #include "kernel.h"
 
+LINKS_IN_RAM();
+
 typedef struct hole hole;
 struct hole { /* the beginning of a free piece; its size stands in its last HEAP_STEP bytes once more */
     hole *side[2];
@@ -77,6 +79,7 @@ static HAL_OUTLINE hole **find_hole(uintptr_t at)
 {
     hole **link = &holes;
     uint16 offset = (uint16)(at - (uintptr_t)os_memory.bytes);
+    LOOP_BOUND(10); /* a path has at most 10 nodes (README.md) */
     for (uint16 bit = TOP_BIT; *link != &no_hole && (uintptr_t)*link != at; bit >>= 1) {
         link = offset & bit ? &(*link)->side[1] : &(*link)->side[0];
     }
@@ -101,6 +104,7 @@ static HAL_OUTLINE void put_hole(void *at, uint16 size)
         }
         link = offset_of(h) & bit ? &stays->side[1] : &stays->side[0];
         bit >>= 1;
+        LOOP_BOUND(9);
     } while (h != &no_hole);
 }
 
@@ -108,6 +112,7 @@ static HAL_OUTLINE void put_hole(void *at, uint16 size)
 static HAL_OUTLINE hole *pull_hole(hole **link)
 {
     hole *gone = *link, *left = gone->side[0], *right = gone->side[1];
+    LOOP_BOUND(9);
     while (left != right) { /* not both nothing */
         hole *next;
         if (left->size >= right->size) {
@@ -209,6 +214,7 @@ void *heap_take(uint16 size)
             return block;
         }
         hal_unlock(lock);
+        LOOP_BOUND(1); /* the reserve is the largest piece then */
     } while (!hal_in_isr() && renew_reserve());
     return NULL;
 }
@@ -217,6 +223,7 @@ void *heap_take(uint16 size)
 void *heap_keep(uint16 size)
 {
     hole **link = NULL, **next = &holes;
+    LOOP_BOUND(10);
     while ((*next)->size >= size + sizeof(hole)) {
         link = next;
         next = &(*link)->side[0];

@@ -5,6 +5,8 @@
  * slice, and a thread that becomes ready enters behind everyone else, all in O(1). */
 #include "kernel.h"
 
+LINKS_IN_RAM();
+
 sys_pcb os_system;
 sys_pcb *os_running;
 sys_pcb *os_ring;
@@ -17,6 +19,8 @@ os_burial os_at_burial;
 static uint16 newest_pid;
 volatile uint16 critical_depth;
 static volatile hal_lock_state critical_before;
+PRIVATE_VALUE(critical_depth, 0);
+PRIVATE_VALUE(critical_before, 0);
 
 /* ---- Ring and blocked list: slice locked ---------------------------------------------------------------------- */
 
@@ -35,6 +39,7 @@ static HAL_OUTLINE void ring_append(sys_pcb *p)
 static HAL_OUTLINE void ring_remove(const sys_pcb *p)
 {
     sys_pcb *before = os_ring;
+    LOOP_BOUND(n);
     while (before->next != p) {
         before = before->next;
     }
@@ -49,6 +54,7 @@ static HAL_OUTLINE void ring_remove(const sys_pcb *p)
 static HAL_OUTLINE sys_pcb **link_to(const sys_pcb *p)
 {
     sys_pcb **link = &os_blocked;
+    LOOP_BOUND(n);
     while (*link != p) {
         link = &(*link)->next;
     }
@@ -114,6 +120,7 @@ sys_pcb *process_find(uint16 pid)
     sys_pcb *p = NULL;
     do {
         p = process_next(p);
+        LOOP_BOUND(n);
     } while (p != NULL && p->pid != pid);
     return p;
 }
@@ -132,6 +139,7 @@ static uint16 unused_pid(void)
 {
     do {
         newest_pid++;
+        LOOP_BOUND(n);
     } while (process_find(newest_pid) != NULL); /* 0 is always there */
     return newest_pid;
 }

@@ -2,11 +2,14 @@
 /* The ways into the kernel stack, and the schedulers. */
 #include "kernel.h"
 
+LINKS_IN_RAM();
+
 volatile uint16 os_pending;
 bool os_eager;
 volatile bool os_in_kernel;
+PRIVATE_VALUE(os_in_kernel, 0);
 
-static sys_pcb *(*pick_thread)(sys_pcb *first); /* NULL = round robin */
+static sys_pick pick_thread; /* NULL = round robin */
 
 /* ---- Dispatch: kernel stack, slice level ------------------------------------------------------------------------ */
 
@@ -41,15 +44,18 @@ sys_pcb *os_schedule(void)
         if (OS_HAS_WORK) {
             work();
         }
+        LOOP_BOUND(i); /* idle; with i = 0 there is a thread to run */
         if (os_ring != NULL) {
             break;
         }
         HAL_STORE(os_running, &os_system);
         hal_idle(&os_pending);
     }
-    sys_pcb *(*pick)(sys_pcb *) = HAL_LOAD(pick_thread);
+    sys_pick pick = HAL_LOAD(pick_thread);
     if (pick != NULL) {
+        CALL_TARGETS(sys_pick, -os_slice_end);
         const sys_pcb *next = pick(os_ring->next);
+        LOOP_BOUND(n);
         while (os_ring->next != next) {
             os_ring = os_ring->next;
         }
@@ -137,6 +143,7 @@ uint8 Sys_Priority_Of(const sys_pcb *process)
 static sys_pcb *highest_priority(sys_pcb *first)
 {
     sys_pcb *best = first;
+    LOOP_BOUND(n);
     for (sys_pcb *p = first->next; p != first; p = p->next) {
         if (p->priority > best->priority) {
             best = p;
@@ -171,6 +178,7 @@ static sys_pcb *earliest_deadline(sys_pcb *first)
             }
         }
         p = p->next;
+        LOOP_BOUND(n);
     } while (p != first);
     return best;
 }

@@ -11,6 +11,7 @@ HAL_OUTLINE void stack_paint(void *begin, const void *end)
     volatile uint16 *word = begin; /* volatile: as a call of memset it takes more room */
     do {
         *word++ = PAINT * 0x101u;
+        LOOP_BOUND(SYS_DEFAULT_STACK / 2);
     } while (word != end);
 }
 
@@ -24,6 +25,7 @@ static uint16 unused(const uint8 *stack, uint16 bytes)
     return (uint16)(p - stack);
 #else
     const uint8 *p = stack + bytes;
+    LOOP_BOUND(u);
     while (p != stack && p[-1] == PAINT) {
         p--;
     }

@@ -62,11 +62,14 @@ void board_failsafe(void)
 
 void board_report(const char *text)
 {
+    LOOP_BOUND(40);
     while (*text != '\0') {
+        LOOP_BOUND(320); /* 1,280 Tcy are a byte */
         while (U1STAbits.UTXBF) {
         }
         U1TXREG = (uint8)*text++;
     }
+    LOOP_BOUND(1600); /* five bytes */
     while (!U1STAbits.TRMT) {
     }
 }

@@ -9,6 +9,7 @@
 #include "pins.h"
 
 enum { TICK_PERIOD = 1536, RATE_PER_MM_S = 5, PRIORITY = 5 };
+INTERRUPT_LEVEL(T3, 5);
 
 /* Low nibble: phases A-D of the coils now; right rotation by a nibble = next index (epuck.md §3). */
 enum { PHASES = 0x956A };

@@ -59,6 +59,7 @@ void hal_uart_transmit(uint8_t uart)
 static HAL_OUTLINE uint16 fill(uint8 uart)
 {
     volatile registers *r = registers_of(uart);
+    LOOP_BOUND(5); /* four places, and the byte that leaves meanwhile */
     while (!(r->status & FIFO_FULL)) {
         sint16 byte = uart_next_byte(uart);
         if (byte < 0) {
@@ -73,6 +74,7 @@ static HAL_OUTLINE void empty(uint8 uart)
 {
     volatile registers *r = registers_of(uart);
     uint16 status;
+    LOOP_BOUND(6); /* four places, the shift register, and a byte that comes meanwhile */
     while ((status = r->status) & HAS_BYTE) {
         uint8 byte = (uint8)r->receive;
         if (status & FRAMING_ERROR) {

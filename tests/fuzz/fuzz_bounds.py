@@ -1,0 +1,146 @@
+"""Random C at every level: nothing runs longer, uses more stack or masks longer than `toolchain.bounds` says.
+
+`python tests/fuzz/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
+a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts.
+Prints how tight the bounds of `main` are.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+import emu  # noqa: E402
+from emu.events import NEVER  # noqa: E402
+from tests.fuzz import c_shapes  # noqa: E402
+from tests.fuzz.fuzz_compiler import NO_ROOM  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.toolchain.c_programs import build  # noqa: E402
+from toolchain.bounds.notes import read_notes  # noqa: E402
+from toolchain.bounds.program import Program  # noqa: E402
+from toolchain.bounds.report import Analyst, Bound  # noqa: E402
+from toolchain.elf.read import read_executable  # noqa: E402
+from toolchain.stack.annotations import Annotations  # noqa: E402
+
+LEVELS = ("-Os", "-O0", "-O2", "-O1")
+CYCLES = 400_000
+"""Longest run that is measured."""
+HANDLER = "__T1Interrupt"
+
+
+@dataclass
+class Seen:
+    """The worst of one function or handler: cycles from its first instruction to behind its return, without those of
+    interrupts; bytes of stack above the return address."""
+
+    cycles: int = 0
+    stack: int = 0
+
+
+def measure(image: Path) -> dict[str, Seen] | str:
+    """`main` and the interrupt handler as they ran."""
+    machine = emu.load(image, engine="plain")
+    assert machine.image is not None
+    main, handler = (machine.image.symbols.find(name) for name in ("_main", HANDLER))
+    assert main is not None
+    return _follow(machine, main.address, handler.address if handler is not None else None)
+
+
+def _follow(machine: emu.Machine, main: int, handler: int | None) -> dict[str, Seen] | str:
+    while machine.pc != main:
+        if machine.step() is not None:
+            return "main is not reached"
+    seen = {"_main": Seen(), HANDLER: Seen()}
+    base = machine.w[15]
+    inside: tuple[int, int] | None = None  # stack pointer and cycle at the handler's first instruction
+    start, away = machine.cycle, 0
+    while True:
+        before = machine.pc, machine.cycle, machine.w[15]
+        if machine.approach(NEVER) is not None or machine.cycle - start > CYCLES:
+            return "it runs too long"
+        if machine.pc != before[0]:
+            if inside is None and machine.pc == handler:
+                inside = before[2] + 4, machine.cycle
+                away += machine.cycle - before[1]
+            else:
+                return "a trap"
+        if machine.step() is not None:
+            return "it stops"
+        if inside is not None:
+            found = seen[HANDLER]
+            found.stack = max(found.stack, machine.w[15] - inside[0])
+            if machine.w[15] == inside[0] - 4:
+                found.cycles = max(found.cycles, machine.cycle - inside[1])
+                away += machine.cycle - inside[1]
+                inside = None
+            continue
+        seen["_main"].stack = max(seen["_main"].stack, machine.w[15] - base)
+        if machine.w[15] < base:
+            seen["_main"].cycles = machine.cycle - start - away
+            return seen
+
+
+def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]]:
+    """One program at one level: what became of it, and what was seen beside what was said."""
+    level = LEVELS[seed % len(LEVELS)]
+    files = c_shapes.Program(seed).files
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    image = folder / "program.elf"
+    options = (level, "-w", "-g", "-std=gnu11", *(["-fno-lto"] if seed // 8 % 3 == 2 else []))
+    built = build([folder / name for name in files if name.endswith(".c")], image, *options)
+    if built.status:
+        if NO_ROOM.search(built.messages):
+            return "too large", {}
+        raise AssertionError(f"{level}: {built.first_error}")
+    seen = measure(image)
+    if isinstance(seen, str):
+        return seen, {}
+    executable = read_executable(image.read_bytes(), str(image))
+    program = Program(executable, Annotations(), read_notes(executable, {}))
+    analyst = Analyst(program)
+    pairs = {}
+    for name, what in seen.items():
+        address = program.address(name)
+        if what.cycles and address is not None:
+            pairs[name] = what, analyst.bound(name, address, *(("call", 0) if name == "_main" else ("interrupt", 4)))
+    open_ends = {reason for _, bound in pairs.values() for reason in bound.open.values()}
+    for name, (what, bound) in pairs.items():
+        if bound.cycles is not None:
+            assert what.cycles <= bound.cycles, f"{level} {name}: {what.cycles} cycles, bound {bound.cycles}"
+        if bound.stack_is_known:
+            assert what.stack <= bound.bytes, f"{level} {name}: {what.stack} bytes of stack, bound {bound.bytes}"
+    return (f"not bounded: {', '.join(sorted(open_ends))}" if open_ends else "bounded"), pairs
+
+
+def main() -> int:
+    """Command line."""
+    course = Course(parser(__doc__), "programs", 300, "programs")
+    course.parse()
+    outcomes: Counter[str] = Counter()
+    ratios: list[float] = []
+    for seed in course:
+        with tempfile.TemporaryDirectory(prefix="bounds-") as folder:
+            try:
+                outcome, pairs = examine(seed, Path(folder))
+            except AssertionError as error:
+                return course.failed(error)
+        outcomes[outcome] += 1
+        found = pairs.get("_main")
+        if found is not None and found[1].cycles is not None:
+            ratios.append(found[1].cycles / found[0].cycles)
+    ratios.sort()
+    told = ", ".join(f"{count} {what}" for what, count in outcomes.most_common())
+    if ratios:
+        told += f"; main: bound / measured {ratios[len(ratios) // 2]:.2f} in the middle, {ratios[-1]:.2f} at most"
+    return course.ended(told)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""Bounds of finished images: never below what the emulator takes, exact where nothing is unknown."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.fuzz_bounds import examine, measure
+from tests.toolchain.c_programs import build
+from toolchain.cli import main
+from toolchain.elf.read import read_executable
+
+COUNTED = """
+int a[20];
+__attribute__((noinline)) int sum(int n) { int s = 0; for (int i = 0; i < n; i++) s += a[i]; return s; }
+__attribute__((noinline)) int fib(int n) { return n < 2 ? n : fib(n - 1) + fib(n - 2); }
+int main(void) { for (int i = 0; i < 20; i++) a[i] = i * i; volatile int x = sum(20) + fib(6) + sum(7) / 3; return x; }
+"""
+LIST = """
+#include <bounds.h>
+struct item { struct item *next; } items[8], *volatile head;
+__attribute__((noinline)) int count(struct item *p)
+{
+    int c = 0;
+    NOTE
+    for (; p; p = p->next) c++;
+    return c;
+}
+int main(void)
+{
+    for (int i = 0; i < 7; i++) items[i].next = &items[i + 1];
+    head = items;
+    return count(head);
+}
+"""
+MASKS = """
+#include <dspic30f6014a.h>
+int main(void) { SRbits.IPL = 5; __asm__ volatile("repeat #29\\n nop"); SRbits.IPL = 0; return 0; }
+"""
+
+
+def built(folder: Path, text: str, *options: str) -> Path:
+    (folder / "program.c").write_text(text)
+    made = build([folder / "program.c"], folder / "program.elf", *(options or ("-Os",)), "-g")
+    assert made.status == 0, made.messages
+    return folder / "program.elf"
+
+
+def report(capsys: pytest.CaptureFixture[str], image: Path, *options: str) -> dict:
+    """What --json says of main, as one row."""
+    assert main(["bounds", str(image), "--json", *options]) == 0
+    row: dict = json.loads(capsys.readouterr().out)["calls"][0]
+    return row
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
+def test_counted_loops_recursion_and_division_are_bounded_closely(tmp_path, capsys, level: str) -> None:
+    """At least what was measured, at most a twentieth more."""
+    image = built(tmp_path, COUNTED, level)
+    seen = measure(image)
+    assert isinstance(seen, dict)
+    row = report(capsys, image)
+    assert seen["_main"].cycles <= row["cycles"] <= 1.05 * seen["_main"].cycles
+    assert max(row["stack"].values()) >= seen["_main"].stack
+
+
+@pytest.mark.parametrize("seed", [2, 7])
+def test_random_programs_stay_within_their_bounds(tmp_path: Path, seed: int) -> None:
+    """A sample of tests/fuzz/fuzz_bounds.py."""
+    outcome, pairs = examine(seed, tmp_path)
+    assert outcome == "bounded"
+    seen, bound = pairs["_main"]
+    assert seen.cycles <= bound.cycles <= 1.05 * seen.cycles
+    assert seen.stack <= bound.bytes
+
+
+def test_a_loop_over_a_list_is_named_with_its_line(tmp_path, capsys) -> None:
+    """Its length is data."""
+    image = built(tmp_path, LIST.replace("NOTE", ""))
+    row = report(capsys, image)
+    assert row["cycles"] is None
+    (place,) = row["open"]
+    assert "program.c:8 " in place
+    assert main(["bounds", str(image)]) == 0
+    assert "program.c:8 " in capsys.readouterr().out
+
+
+def test_an_annotated_loop_is_bounded_by_its_note(tmp_path, capsys) -> None:
+    """Eight rounds here; each round more that the note allows costs the same."""
+    image = built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(n + 1);"))
+    seen = measure(image)
+    assert isinstance(seen, dict)
+    assert report(capsys, image)["cycles"] is None
+    seven, eight, nine = (report(capsys, image, "--let", f"n={n}")["cycles"] for n in (7, 8, 9))
+    assert seen["_main"].cycles <= seven
+    assert nine - eight == eight - seven > 0
+    assert report(capsys, image, "--let", "n=2")["cycles"] < seen["_main"].cycles  # the note is what counts
+
+
+def test_a_note_costs_neither_code_nor_memory(tmp_path: Path) -> None:
+    """bounds.h promises it."""
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    without = read_executable(built(tmp_path / "a", LIST.replace("NOTE", "")).read_bytes(), "a")
+    noted = read_executable(built(tmp_path / "b", LIST.replace("NOTE", "LOOP_BOUND(8);")).read_bytes(), "b")
+    for image in (without, noted):
+        image.sections = [s for s in image.sections if s.is_code or s.is_ram or s.is_psv]
+    assert [(s.name, s.address, s.data) for s in without.sections] == [
+        (s.name, s.address, s.data) for s in noted.sections
+    ]
+
+
+def test_the_longest_masked_stretch_is_told(tmp_path, capsys) -> None:
+    """REPEAT #29, NOP: 1 + 30 cycles at level 5, and the instructions that write SR."""
+    row = report(capsys, built(tmp_path, MASKS))
+    cycles, place = row["masked"]["5"]
+    assert 31 < cycles <= 40
+    assert "program.c:3" in place
+    assert "6" not in row["masked"]
+
+
+def test_a_limit_that_can_be_exceeded_fails(tmp_path, capsys) -> None:
+    """So does one that cannot be compared."""
+    image = built(tmp_path, COUNTED)
+    cycles = report(capsys, image)["cycles"]
+    assert main(["bounds", str(image), "--limit", f"main={cycles}"]) == 0
+    assert main(["bounds", str(image), "--limit", f"main={cycles - 1}"]) == 1
+    assert f"main: {cycles:,} cycles, the limit is {cycles - 1}" in capsys.readouterr().out
+    assert main(["bounds", str(image), "--stack-limit", "main=2"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--let", "n"], "--let n: expected NAME=NUMBER"),
+        (["--function", "nothing"], "no function is called nothing"),
+        (["--limit", "nothing=3"], "no function that was looked at is called nothing"),
+    ],
+)
+def test_bad_arguments_are_told(tmp_path, capsys, options: list[str], message: str) -> None:
+    """Status 2 and a sentence."""
+    assert main(["bounds", str(built(tmp_path, COUNTED)), *options]) == 2
+    assert message in capsys.readouterr().err

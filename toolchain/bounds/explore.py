@@ -1,0 +1,567 @@
+"""Abstract execution: a function is run once on all its inputs, loop by loop and call by call.
+
+Paths that meet are joined, with the greater time, so that the time of the state at a function's end is its worst case;
+loops are followed round by round, so counts that follow from constants are found, and rounds, branches and calls whose
+conditions cannot hold are not walked (Gustafsson et al., "Automatic derivation of loop bounds and infeasible paths for
+WCET analysis using abstract execution", 2006).  A loop whose state repeats goes on for as long as an annotation says.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from emu.dspic30f.isa.flow import Branch, Call, Disi, Do, Flow, Goto, Repeat, Reset, Return, Skip, Sleep
+from toolchain.bounds.builder import Abstract, World, exact
+from toolchain.bounds.compare import refined
+from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step
+from toolchain.bounds.state import INHERITED, LEVELS, NOWHERE, State, widened
+from toolchain.bounds.values import Value, ends, span
+
+MAX_TURNS: Final = 5_000
+HOPELESS_TURNS: Final = 6
+"""Rounds granted to a loop that has shown no end before."""
+MAX_DEPTH: Final = 60
+MAX_STEPS: Final = 60_000
+REPEATS: Final = 600
+"""Iterations of REPEAT run one by one; behind that only their number counts."""
+
+
+EXPOSED: Final = 40
+"""The same while the called function may reach into its caller's frame, whose contents are given up then."""
+MARGIN: Final = 64
+"""Bytes that a function may look at below the beginning of its own stack."""
+VARIANTS: Final = 8
+"""Calls of one function that are told apart."""
+RESULTS: Final = frozenset((0, 1))
+"""Results by which the ways through a function are told apart."""
+CHOICE: Final = 6
+"""Most instructions of a block that tells them apart."""
+EPILOGUE: Final = 12
+"""Most instructions of a block that returns and is run for every way there."""
+LOOP: Final = "no bound of this loop is known"
+"""The one reason that leaves the stack bounded: its rounds have been followed until nothing new came of them."""
+
+
+class TooMuch(Exception):
+    """The budget of steps is used up."""
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What a run of one function found.  Addresses are program addresses, times cycles."""
+
+    ends: dict[int | None, State] = field(default_factory=dict)
+    """At its return, by the number in W0 where it is small and known; without any it never returns."""
+    peak: dict[tuple[int, int], tuple[int, tuple[int, ...]]] = field(default_factory=dict)
+    """By stack and CPU priority: the highest address used, and the functions on the way there."""
+    masked: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """By level: longest time it was held back, and where it ended; complete stretches only."""
+    prefix: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """The same for stretches that began before the call, from the call on."""
+    open: dict[int, str] = field(default_factory=dict)
+    """What has no bound: address -> why."""
+    forever: set[int] = field(default_factory=set)
+    """Heads of loops without a way out."""
+    left: int | None = None
+    """Longest time to a change to another stack, from which it does not return by itself."""
+    wild: bool = False
+    """It stores where the address says nothing."""
+    visited: set[int] = field(default_factory=set)
+    """Functions run."""
+
+    def take(self, other: Outcome, start: int, since: list[int | None], caller: tuple[int, ...]) -> None:
+        """Add what a call, made at time `start`, found."""
+        for stack, (top, chain) in other.peak.items():
+            if top > self.peak.get(stack, (-1,))[0]:
+                self.peak[stack] = top, caller + chain
+        for level, (cycles, where) in other.masked.items():
+            self.longer(self.masked, level, cycles, where)
+        for level, (cycles, where) in other.prefix.items():
+            began = since[level]
+            if began == INHERITED:
+                self.longer(self.prefix, level, start + cycles, where)
+            elif began is not None:
+                self.longer(self.masked, level, start + cycles - began, where)
+        self.open.update(other.open)
+        self.forever |= other.forever
+        self.visited |= other.visited
+        self.wild |= other.wild
+        if other.left is not None:
+            self.left = max(self.left or 0, start + other.left)
+
+    def moved(self, stack: int, distance: int) -> Outcome:
+        """The same, entered that many bytes further up a stack."""
+        peak = {k: (top + distance if k[0] == stack else top, chain) for k, (top, chain) in self.peak.items()}
+        return replace(self, peak=peak)
+
+    @staticmethod
+    def longer(table: dict[int, tuple[int, int]], level: int, cycles: int, where: int) -> None:
+        """Keep the longest."""
+        if cycles > table.get(level, (-1, 0))[0]:
+            table[level] = cycles, where
+
+
+@dataclass(slots=True)
+class Rules:
+    """What annotations answer."""
+
+    loop: Callable[[Code, Loop], int | None] = lambda _code, _loop: None
+    """Most rounds of a loop beyond its first, per entry."""
+    calls: Callable[[int, State], list[int] | None] = lambda _pc, _state: None
+    """Targets of a call through a pointer whose value is not known."""
+    recursion: Callable[[int], int | None] = lambda _entry: None
+    """Activations of a function that exist at once."""
+    resumed: Callable[[], list[int]] = list
+    """Where code goes on that has moved to a stack of somebody else."""
+    back: Callable[[int], int | None] = lambda _entry: None
+    """Level at which a function that changes stacks comes back, None: it is none."""
+
+
+class Explorer:
+    """Runs functions of one image; results of equal calls are kept."""
+
+    def __init__(self, world: World, graph: Builder, rules: Rules) -> None:
+        self.world, self.graph, self.rules = world, graph, rules
+        self.abstract: Final = Abstract(world)
+        self.codes: Final[dict[int, Code]] = {}
+        self.known: Final[dict[object, Outcome]] = {}
+        self.hopeless: Final[set[int]] = set()
+        self.variants: Final[Counter[int]] = Counter()
+        self.closed: Final[Counter[int]] = Counter()
+        """How many of them left nothing open."""
+        self.sees: Final = world.area.inside
+        self.active: list[int] = []
+        self.steps = 0
+
+    def code(self, entry: int) -> Code:
+        """The blocks of a function."""
+        if entry not in self.codes:
+            self.codes[entry] = self.graph.code(entry)
+        return self.codes[entry]
+
+    def run(self, entry: int, state: State) -> Outcome:
+        """Run from the first instruction of `entry`; the outcome's times count from there."""
+        state.shift(-state.time)
+        state.since = [None if s is None else INHERITED for s in state.since]
+        key = entry, state.key()
+        found = self.known.get(key)
+        if found is None:
+            self.variants[entry] += 1
+            self.active.append(entry)
+            found = _Run(self, self.code(entry)).run(state)
+            self.active.pop()
+            self.known[key] = found
+            self.closed[entry] += not found.open
+        return found
+
+    def call(self, entry: int, state: State, one_of_many: bool) -> tuple[Outcome, bool]:
+        """Run a called function; True: from a state that stands for all its calls, because there are many, or because a
+        pointer may lead to many functions.
+
+        That is done only where it leaves nothing open, or all of them do.
+        """
+        key = entry, state.key()
+        exposed = state.leaked < NOWHERE or any(map(self.sees, state.w[:8]))
+        if (
+            not exact(state.w[15])
+            or key in self.known
+            or (not one_of_many and self.variants[entry] < (EXPOSED if exposed else VARIANTS))
+        ):
+            return self.run(entry, state), False
+        stack = next((i for i, (lo, hi) in enumerate(self.world.area.ranges) if lo <= state.w[15] < hi), None)
+        if stack is None:
+            return self.run(entry, state), False
+        every = State()
+        every.w[15] = self.world.area.ranges[stack][0] + MARGIN
+        every.ipl, every.stall = state.ipl, state.stall
+        every.since, every.loops = state.since.copy(), state.loops
+        every.disi, every.time = state.disi, state.time
+        every.mem = {a: v for a, v in state.mem.items() if (a if a >= 0 else ~a) & ~1 in self.world.private}
+        found = self.run(entry, every)
+        if found.open and self.closed[entry]:
+            return self.run(entry, state), False
+        return found.moved(stack, state.w[15] - self.world.area.ranges[stack][0] - MARGIN), True
+
+
+class _Run:
+    """One function, once."""
+
+    def __init__(self, explorer: Explorer, code: Code) -> None:
+        self.explorer, self.code = explorer, code
+        self.area: Final = explorer.world.area
+        self.outcome: Final = Outcome(visited={code.entry})
+        self.pending: dict[int, State] = {}
+
+    def run(self, state: State) -> Outcome:
+        self._peak(state)
+        for lost in self.code.lost:
+            self.outcome.open[lost] = "no instruction is here"
+        if self.code.entry in self.code.blocks:
+            self.pending[self.code.entry] = state.copy()
+            self._visit(self.code.order)
+        return self.outcome
+
+    def _visit(self, order: list[Order]) -> None:
+        for part in order:
+            if isinstance(part, Loop):
+                self._loop(part)
+            else:
+                state = self.pending.pop(part, None)
+                if state is not None:
+                    self._block(self.code.blocks[part], state)
+
+    def _arrive(self, target: int, state: State) -> None:
+        block = self.code.blocks[target]
+        if block.steps[-1].flow is Return and len(block.steps) <= EPILOGUE and target not in self.code.heads:
+            self._block(block, state)  # not joined, so that results are told apart
+            return
+        waiting = self.pending.get(target)
+        self.pending[target] = state if waiting is None else self.area.join(waiting, state)
+
+    # -- loops ---------------------------------------------------------------------------------------------------
+
+    def _loop(self, loop: Loop) -> None:
+        """Round by round, until no path leads back or the annotated number of rounds is over."""
+        explorer, pending = self.explorer, self.pending
+        if loop.members.isdisjoint(pending):
+            return
+        bound = explorer.rules.loop(self.code, loop)
+        limit = HOPELESS_TURNS if loop.head in explorer.hopeless else MAX_TURNS
+        before: State | None = None
+        turns = 0
+        while True:
+            state = pending.get(loop.head)
+            if state is None:
+                if loop.members.isdisjoint(pending):
+                    return
+            elif before is not None:
+                if bound is not None and turns > bound:
+                    break
+                if turns > limit:
+                    explorer.hopeless.add(loop.head)
+                    state = pending[loop.head] = widened(before, state)
+                    if exact(before.w[15]) and not exact(state.w[15]):
+                        self.outcome.open[self.code.blocks[loop.head].steps[-1].pc] = "the stack grows in this loop"
+                if state.key() == before.key():
+                    if bound is not None:
+                        self._rounds(before, state, bound - turns)
+                        turns = bound
+                    else:
+                        explorer.hopeless.add(loop.head)
+                        self._endless(loop)
+                        break
+            before = None if state is None else state.copy()
+            if state is not None:
+                self._block(self.code.blocks[loop.head], pending.pop(loop.head))
+            self._visit(loop.body)
+            turns += 1
+        pending.pop(loop.head, None)
+
+    @staticmethod
+    def _rounds(before: State, state: State, count: int) -> None:
+        """As many rounds more as the one from `before` to `state`, which changed nothing but the time."""
+        cycles = (state.time - before.time) * count
+        state.time += cycles
+        state.disi += cycles
+        for level, (was, now) in enumerate(zip(before.since, state.since, strict=True)):
+            if was is not None and now is not None and was != now:
+                state.since[level] = now + cycles
+
+    def _endless(self, loop: Loop) -> None:
+        exits = any(t not in loop.members for m in loop.members for t in self.code.blocks[m].following)
+        returns = any(self.code.blocks[m].steps[-1].flow is Return for m in loop.members)
+        if exits or returns:
+            self.outcome.open[loop.head] = LOOP
+        else:
+            self.outcome.forever.add(loop.head)
+
+    # -- instructions --------------------------------------------------------------------------------------------
+
+    def _block(self, block: Block, state: State) -> None:
+        """Run a block and hand its state on."""
+        explorer = self.explorer
+        explorer.steps += len(block.steps)
+        if explorer.steps > MAX_STEPS:
+            raise TooMuch
+        flow: Flow = None
+        for step in block.steps:
+            flow = self._step(step, state)
+        last = block.steps[-1]
+        if state.loops and last.pc == state.loops[-1][1] and not isinstance(flow, Branch | Goto | Return):
+            self._loop_end(state, last)
+            return
+        self._follow(block, flow, state)
+
+    def _step(self, step: Step, state: State) -> Flow:
+        if state.repeat is not None:
+            return self._repeated(step, state)
+        abstract = self.explorer.abstract
+        level = state.ipl
+        state.time += step.cycles + (state.stall & step.pointers != 0)
+        abstract.begin(step.pc, state)
+        flow: Flow = step.insn.row.does(abstract, step.insn.x)
+        abstract.commit()
+        state.stall = step.writes
+        if abstract.window:
+            state.time += step.window
+        if abstract.wild:
+            self.outcome.wild, abstract.wild = True, False
+        self._peak(state)
+        match flow:
+            case Repeat(count):
+                state.repeat = count
+            case Do(count, end):
+                state.loops = (*state.loops, (step.after, end, count))
+            case Disi(count):
+                state.disi = max(state.disi, state.time + count)
+                level = (-1, -1)
+        if level != state.ipl or state.disi:
+            self._levels(state, step.pc)
+        return flow
+
+    def _repeated(self, step: Step, state: State) -> Flow:
+        """The target of REPEAT (isa.md §7.5, §13.3): an access to the window costs in its first and last iteration."""
+        abstract, count = self.explorer.abstract, state.repeat
+        state.repeat = None
+        least, most = ends(count)
+        again = int(step.writes & step.pointers != 0)
+        state.time += step.cycles + (state.stall & step.pointers != 0) + most * (step.cycles + again)
+        window = False
+        result: State | None = None
+        current = state
+        for turn in range(min(most, REPEATS) + 1):
+            abstract.begin(step.pc, current)
+            step.insn.row.does(abstract, step.insn.x)
+            abstract.commit()
+            window |= abstract.window
+            self.outcome.wild |= abstract.wild
+            self._peak(current)
+            if turn >= least and turn < most:
+                result = current.copy() if result is None else self.area.join(result, current)
+        if most > REPEATS:
+            current = self._many(step, current, most)
+        final = current if result is None else self.area.join(result, current)
+        state.w, state.flags, state.mem = final.w, final.flags, final.mem
+        state.regs, state.leaked = final.regs, final.leaked
+        state.stall = step.writes
+        if window:
+            state.time += step.window if not most else max(step.window if not least else 0, 4)
+        return None
+
+    def _many(self, step: Step, state: State, most: int) -> State:
+        """Registers a long REPEAT has changed, and what it may have stored."""
+        before = state.copy()
+        abstract = self.explorer.abstract
+        for _ in range(2):
+            abstract.begin(step.pc, state)
+            step.insn.row.does(abstract, step.insn.x)
+            abstract.commit()
+        wide = widened(before, state)
+        if not exact(wide.w[15]):
+            self.outcome.open[step.pc] = "pushes an unknown number of times"
+        wide.mem.clear()
+        wide.leaked = 0
+        return wide
+
+    def _loop_end(self, state: State, last: Step) -> None:
+        """Behind the last instruction of a DO loop (isa.md §7.6)."""
+        start, end, remaining = state.loops[-1]
+        least, most = ends(remaining)
+        if most > 0:
+            again = state.copy()
+            again.loops = (*state.loops[:-1], (start, end, span(max(least, 1) - 1, most - 1)))
+            self._arrive(start, again)
+        if least == 0:
+            state.loops = state.loops[:-1]
+            self._arrive(last.after, state)
+
+    def _follow(self, block: Block, flow: Flow, state: State) -> None:
+        """Where control goes behind a block."""
+        last = block.steps[-1]
+        match flow:
+            case Branch(cond, target):
+                if exact(cond):
+                    state.time += int(cond)
+                    self._arrive(target if cond else last.after, state)
+                    return
+                taken = state.copy()
+                taken.time += 1
+                if refined(block.steps, taken, True):
+                    self._arrive(target, taken)
+                if refined(block.steps, state, False):
+                    self._arrive(last.after, state)
+            case Skip(cond):
+                if not exact(cond) or cond:
+                    item = self.explorer.graph.items.get(last.after)
+                    words = len(item.words) if item else 1
+                    skipped = state.copy() if not exact(cond) else state
+                    skipped.time += words
+                    self._arrive(last.after + 2 * words, skipped)
+                if not exact(cond) or not cond:
+                    self._arrive(last.after, state)
+            case Goto(target):
+                self._goto(last, target, state)
+            case Call(target):
+                self._call(last, target, state)
+            case Return(_, target):
+                self._return(target, state)
+            case Reset():
+                return
+            case Sleep():
+                self._arrive(last.after, state)
+            case _:
+                self._arrive(last.after, state)
+
+    def _goto(self, last: Step, target: Value, state: State) -> None:
+        inside = self.code.blocks
+        if exact(target) and target in inside and last.pc not in self.code.tails:
+            self._arrive(target, state)
+            return
+        if last.insn.row.mnemonic == "BRA" and not exact(target):
+            for place in self.code.blocks[self._head(last)].following:
+                self._arrive(place, state.copy())
+            return
+        targets = [target] if exact(target) else self._unknown(last.pc, state)
+        for place in targets:
+            self._enter(last, place, state.copy(), tail=True)
+
+    def _head(self, last: Step) -> int:
+        return next(head for head, block in self.code.blocks.items() if block.steps[-1] is last)
+
+    def _call(self, last: Step, target: Value, state: State) -> None:
+        targets = [target] if exact(target) else self._unknown(last.pc, state)
+        if not targets:
+            returned = state.copy()
+            self._lose_registers(returned)
+            returned.w[15] = state.w[15] - 4 & 0xFFFF
+            self._arrive(last.after, returned)
+        for place in targets:
+            self._enter(last, place, state.copy(), tail=False, many=len(targets) > 1)
+
+    def _unknown(self, pc: int, state: State) -> list[int]:
+        if not exact(state.w[15]):
+            self.outcome.left = max(self.outcome.left or 0, state.time)
+            return self.explorer.rules.resumed()
+        found = self.explorer.rules.calls(pc, state)
+        if found is None:
+            self.outcome.open[pc] = "the targets of this call through a pointer are not known"
+            return []
+        return found
+
+    def _enter(self, last: Step, target: int, state: State, tail: bool, many: bool = False) -> None:
+        """Call a function, or jump to it, and go on behind it."""
+        explorer = self.explorer
+        if target == 0:  # a weak function that is not linked
+            if not tail:
+                state.w[15] = state.w[15] - 4 & 0xFFFF
+                self._arrive(last.after, state)
+            return
+        depth = explorer.active.count(target)
+        allowed = explorer.rules.recursion(target)
+        if depth >= (MAX_DEPTH if allowed is None else allowed) or len(explorer.active) > 8 * MAX_DEPTH:
+            if allowed is None:
+                self.outcome.open[last.pc] = "recursion"
+            return
+        start, since, stack = state.time, state.since.copy(), state.w[15]
+        if not tail:
+            state.flags = State().flags
+        before = state.copy()
+        found, general = explorer.call(target, state, many)
+        self.outcome.take(found, start, since, (self.code.entry,))
+        level = explorer.rules.back(target)
+        if level is not None and found.left is not None:
+            back = state.copy()
+            self._lose_registers(back)
+            back.time, back.ipl = found.left, (level, level)
+            back.w[15] = stack - 4 & 0xFFFF
+            ends = [back]
+        else:
+            ends = [self._behind(before, end, found.wild) if general else end.copy() for end in found.ends.values()]
+        for end in ends:
+            end.shift(start)
+            end.since = [since[k] if s == INHERITED else s for k, s in enumerate(end.since)]
+            self._levels(end, last.pc)
+            if tail:
+                self._finish(end)
+            elif len(ends) > 1 and self._decides(last.after):
+                self._block(self.code.blocks[last.after], end)
+            else:
+                self._arrive(last.after, end)
+
+    def _behind(self, before: State, end: State, wild: bool) -> State:
+        """The caller's state behind a call that was run for all its calls: W8-W14 are preserved (abi-elf.md §2.1)."""
+        private = self.explorer.world.private
+        new = end.copy()
+        new.w = [*end.w[:8], *before.w[8:15], before.w[15] - 4 & 0xFFFF]
+        kept = {a: v for a, v in before.mem.items() if (a if a >= 0 else ~a) & ~1 not in private}
+        if wild and (before.leaked < NOWHERE or any(self.area.inside(value) for value in before.w[:8])):
+            kept = {}
+        new.mem = kept | {a: v for a, v in end.mem.items() if (a if a >= 0 else ~a) & ~1 in private}
+        new.leaked = min(before.leaked, *(ends(v)[0] if self.area.inside(v) else NOWHERE for v in before.w[:8]))
+        return new
+
+    def _decides(self, head: int) -> bool:
+        """Whether a block does nothing but choose a way: results of a call are kept apart until then."""
+        block = self.code.blocks[head]
+        short = len(block.steps) <= CHOICE and block.steps[-1].flow in (Branch, Skip)
+        return short and head not in self.code.heads
+
+    @staticmethod
+    def _lose_registers(state: State) -> None:
+        """What a call may change (abi-elf.md §2.1)."""
+        fresh = State()
+        state.w[:8] = fresh.w[:8]
+        state.flags = fresh.flags
+
+    def _return(self, target: Value, state: State) -> None:
+        if not exact(state.w[15]):
+            self.outcome.left = max(self.outcome.left or 0, state.time)
+            state.ipl, state.disi = (0, 0), 0  # whatever level it is, this stack is done with it
+            self._levels(state, self.code.entry)
+            return
+        self._finish(state)
+
+    def _finish(self, state: State) -> None:
+        top = state.w[15]
+        above = (
+            {k for k in state.mem if (at := k if k >= 0 else ~k) >= top and self.area.holds(at)} if exact(top) else ()
+        )
+        for key in above:
+            del state.mem[key]
+        state.w[4:8], state.flags = State().w[4:8], State().flags  # not preserved (abi-elf.md §2.1)
+        if exact(top) and state.leaked >= top:
+            state.leaked = NOWHERE  # what has leaked is gone
+        result = state.w[0]
+        shown = result if exact(result) and result in RESULTS else None
+        end = self.outcome.ends.get(shown)
+        self.outcome.ends[shown] = state if end is None else self.area.join(end, state)
+
+    # -- what is measured ----------------------------------------------------------------------------------------
+
+    def _peak(self, state: State) -> None:
+        top = state.w[15]
+        if exact(top):
+            for number, (lo, hi) in enumerate(self.area.ranges):
+                key = number, state.ipl[0]
+                if lo <= top <= hi and top > self.outcome.peak.get(key, (-1,))[0]:
+                    self.outcome.peak[key] = top, (self.code.entry,)
+
+    def _levels(self, state: State, pc: int) -> None:
+        """Begin and end the stretches in which levels are held back."""
+        blocked = state.disi > state.time
+        if not blocked:
+            state.disi = 0
+        for level in range(1, LEVELS):
+            since = state.since[level]
+            if state.ipl[1] >= level or (blocked and level < LEVELS - 1):
+                if since is None:
+                    state.since[level] = state.time
+            elif since is not None:
+                if since == INHERITED:
+                    Outcome.longer(self.outcome.prefix, level, state.time, pc)
+                else:
+                    Outcome.longer(self.outcome.masked, level, state.time - since, pc)
+                state.since[level] = None

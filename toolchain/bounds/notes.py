@@ -1,0 +1,80 @@
+"""Annotations: lines of the section .note.bounds (include/bounds.h), and values for the names in them."""
+
+from __future__ import annotations
+
+import ast
+import operator
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from toolchain.elf.model import Executable
+from toolchain.errors import ToolError
+
+SECTION = ".note.bounds"
+_LINE = re.compile(r"(\w+) (.*)@(.+):(\d+)")
+_OPERATORS: dict[type[ast.operator], Callable[[int, int], int]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.floordiv,
+    ast.FloorDiv: operator.floordiv,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """One annotation: loop, calls, argument, back, private or ram; what it says and where it stands."""
+
+    kind: str
+    text: str
+    file: str
+    line: int
+
+
+@dataclass(slots=True)
+class Notes:
+    """All annotations of an image, and the values of names."""
+
+    all: list[Note] = field(default_factory=list)
+    values: Mapping[str, int] = field(default_factory=dict)
+    missing: set[str] = field(default_factory=set)
+    """Names that were needed and have no value."""
+
+    def of(self, kind: str) -> list[Note]:
+        """Those of one kind."""
+        return [note for note in self.all if note.kind == kind]
+
+    def number(self, text: str, where: Note) -> int | None:
+        """Value of an expression; None if a name in it has none. Raises `ToolError` for what is no expression."""
+        try:
+            tree = ast.parse(text.strip(), mode="eval").body
+        except SyntaxError:
+            raise ToolError(f"{where.file}:{where.line}: expected a number or an expression, got {text!r}") from None
+        return self._value(tree, where)
+
+    def _value(self, tree: ast.expr, where: Note) -> int | None:
+        match tree:
+            case ast.Constant(value=int(value)):
+                return value
+            case ast.Name(id=name):
+                if name not in self.values:
+                    self.missing.add(name)
+                return self.values.get(name)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                a, b = self._value(left, where), self._value(right, where)
+                return None if a is None or b is None else _OPERATORS[type(op)](a, b)
+        raise ToolError(f"{where.file}:{where.line}: expected integers, names, + - * /, got {ast.unparse(tree)!r}")
+
+
+def read_notes(image: Executable, values: Mapping[str, int]) -> Notes:
+    """The notes of an image; raises `ToolError` for a line that is none."""
+    result = Notes(values=values)
+    for section in image.sections:
+        if section.name == SECTION:
+            for line in bytes(section.data[::2]).replace(b"\0", b"").decode("utf-8", "replace").splitlines():
+                match = _LINE.fullmatch(line)
+                if match is None:
+                    raise ToolError(f"section {SECTION}: expected `kind text@file:line`, got {line!r}")
+                result.all.append(Note(match[1], match[2].strip(), match[3], int(match[4])))
+    return result

@@ -1,0 +1,212 @@
+"""One image, ready to be explored: its code, constants and annotations."""
+
+from __future__ import annotations
+
+import sys
+from typing import Final
+
+from emu.lines import Lines
+from toolchain.bounds.graph import Builder, Code, Loop, loops_in
+from toolchain.bounds.notes import Note, Notes
+from toolchain.bounds.signatures import Signatures
+from toolchain.bounds.state import State
+from toolchain.bounds.values import WINDOW
+from toolchain.elf.disassemble import items
+from toolchain.elf.model import Executable
+from toolchain.errors import ToolError
+from toolchain.link.memory import CHIP
+from toolchain.stack.analyse import Analysis
+from toolchain.stack.annotations import Annotations
+
+PAGE = 0x8000
+UNUSED = "__DefaultInterrupt"
+"""Handler of vectors without one: it does not come back."""
+RESET_LEVEL = 4
+"""Priority of every interrupt after a reset (isa.md §2.1)."""
+PYTHON_DEPTH = 20_000
+"""Frames of Python that deep calls of the firmware may take."""
+
+
+def tail(file: str) -> str:
+    """Folder and name: notes and debug information name the same file from different folders on."""
+    return "/".join(file.replace("\\", "/").split("/")[-2:])
+
+
+class Program:
+    """What an image says about itself, and what its notes answer (explore.Rules)."""
+
+    def __init__(self, image: Executable, annotations: Annotations, notes: Notes) -> None:
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), PYTHON_DEPTH))
+        self.image, self.notes = image, notes
+        self.calls: Final = Analysis(image, annotations)
+        self.graph: Final = Builder(self.calls.code, self.calls.entries)
+        self.words: Final = {
+            item.address + 2 * i: word
+            for section in image.sections
+            if section.is_code
+            for item in items(section)
+            for i, word in enumerate(item.words)
+        }
+        self.window: Final = self._window()
+        debug = {s.name: bytes(s.data) for s in image.sections if s.name.startswith(".debug_")}
+        self.lines: Final = Lines(debug)
+        self.signatures: Final = Signatures(debug)
+        self._ram = {tail(note.file) for note in notes.of("ram")}
+        self._at: dict[str, dict[tuple[str, int], list[Note]]] = {}
+        for note in notes.all:
+            table = self._at.setdefault(note.kind, {})
+            for line in (note.line, note.line + 1):
+                table.setdefault((tail(note.file), line), []).append(note)
+        self._loops: dict[int, dict[int, int | None]] = {}
+
+    def _window(self) -> dict[int, int] | None:
+        """Bytes of the PSV window; None if no section lies in it, nothing if its page changes."""
+        sections = [s for s in self.image.sections if s.is_psv and s.data]
+        if not sections:
+            return None
+        if len({s.load // PAGE for s in sections}) > 1:
+            return {}
+        found: dict[int, int] = {}
+        for section in sections:
+            base = WINDOW | section.address & PAGE - 1
+            found.update((base + i, octet) for i, octet in enumerate(section.data[::2]))
+        return found
+
+    def place(self, pc: int) -> str:
+        """Source line of an address, or its symbol."""
+        line = self.lines.find(pc)
+        return f"{line} ({self.calls.name(pc)})" if line else self.calls.name(pc)
+
+    def line(self, pc: int) -> tuple[str, int]:
+        """File and line of an address."""
+        found = self.lines.find(pc)
+        return (tail(found.file), found.line) if found else ("", 0)
+
+    def address(self, name: str) -> int | None:
+        """Value of a symbol in C or assembly spelling."""
+        for symbol in self.image.symbols:
+            if symbol.name in (name, "_" + name):
+                return symbol.value
+        sfr = CHIP.sfrs.get(name)
+        return None if sfr is None else sfr.address
+
+    def interesting(self, prefix: str) -> list[str]:
+        """Functions of that prefix, else main."""
+        entries = self.calls.entries
+        found = {s.name for s in self.image.symbols if s.name.startswith(prefix) and s.value in entries}
+        return sorted(found) or [name for name in ("_main",) if self.address(name) in entries]
+
+    # -- what notes answer ---------------------------------------------------------------------------------------
+
+    def links_in_ram(self, pc: int) -> bool:
+        """Whether the code there finds only RAM behind pointers it loads."""
+        return bool(self._ram) and self.line(pc)[0] in self._ram
+
+    def rounds(self, code: Code, loop: Loop) -> int | None:
+        """Rounds of a loop by its LOOP_BOUND, the line in front of its condition."""
+        if code.entry not in self._loops:
+            self._loops[code.entry] = self._bind(code)
+        return self._loops[code.entry].get(loop.head)
+
+    def _bind(self, code: Code) -> dict[int, int | None]:
+        """Innermost loops first: the lines of an inner loop's beginning belong to the outer one as well."""
+        table, bound = self._at.get("loop", {}), {}
+        taken: dict[int, set[Note]] = {}
+        if not table:
+            return {}
+        for loop in reversed(loops_in(code.order)):
+            inner = loops_in(loop.body)
+            own = loop.members - {m for part in inner for m in part.members}
+            below = {note for part in inner for note in taken.get(part.head, ())}
+            claimed = {note for note in below if not self._leaves(code, loop, note)}
+            lines = {self.line(step.pc) for head in own for step in code.blocks[head].steps}
+            found = {note for line in lines for note in table.get(line, ())} - claimed
+            if not found:  # one loop of the source that has become two, one within the other
+                found = below - claimed
+            taken[loop.head] = found | claimed
+            numbers = [self.notes.number(note.text, note) for note in found]
+            if numbers:
+                bound[loop.head] = None if None in numbers else max(n for n in numbers if n is not None)
+        return bound
+
+    def _leaves(self, code: Code, loop: Loop, note: Note) -> bool:
+        """Whether the condition behind a note leads out of this loop."""
+        wanted = {(tail(note.file), note.line), (tail(note.file), note.line + 1)}
+        return any(
+            self.line(code.blocks[member].steps[-1].pc) in wanted
+            and any(target not in loop.members for target in code.blocks[member].following)
+            for member in loop.members
+        )
+
+    def targets(self, pc: int, state: State) -> list[int] | None:
+        """Where a call through a pointer can lead, by CALL_TARGETS in front of it or by an annotation file."""
+        found: set[int] = set()
+        for note in self._at.get("calls", {}).get(self.line(pc), ()):
+            for name in (part.strip() for part in note.text.split(",")):
+                if name.startswith("-"):
+                    found.discard(self.address(name[1:].strip()) or 0)
+                elif name in self.signatures.types:
+                    wanted = self.signatures.types[name]
+                    found |= {a for a in self._taken() if self.signatures.functions.get(a) == wanted}
+                else:
+                    address = self.address(name)
+                    if address is None:
+                        raise ToolError(f"{note.file}:{note.line}: {name} is neither a function nor a type of one")
+                    found.add(address)
+            return sorted(found)
+        owner = self.calls.name(pc).partition("+")[0]
+        names = self.calls.annotations.calls
+        listed = names.get(owner) or names.get(owner.removeprefix("_"))
+        return [self.calls._named(name) for name in listed] if listed else None
+
+    def threads(self) -> list[int]:
+        """Functions that become threads: of a type THREADS names, or annotated."""
+        found = {self.calls._named(name) for name in self.calls.annotations.threads}
+        for note in self.notes.of("threads"):
+            for name in note.text.split(","):
+                wanted = self.signatures.types.get(name.strip())
+                found |= {a for a in self._taken() if wanted is not None and self.signatures.functions.get(a) == wanted}
+        return sorted(found)
+
+    def interrupts(self) -> dict[int, int]:
+        """Level by handler: of traps above 7, told by INTERRUPT_LEVEL or `os_level_of_`, else that after a reset."""
+        told: dict[str, int] = {}
+        for note in self.notes.of("level"):
+            name, _, text = note.text.partition(" ")
+            number = self.notes.number(text, note)
+            if number is not None:
+                told[name] = number
+        for symbol in self.image.symbols:
+            if symbol.name.startswith("os_level_of_"):
+                told[symbol.name.removeprefix("os_level_of_")] = symbol.value
+        traps = {vector.name: vector.level for vector in CHIP.vectors if vector.irq is None}
+        found: dict[int, int] = {}
+        for handler, names in self.calls.vectors.items():
+            if self.calls.name(handler) == UNUSED:
+                continue
+            for name in names.split():
+                plain = name.removeprefix("Alt")
+                level = traps.get(plain, told.get(plain.removesuffix("Interrupt"), RESET_LEVEL))
+                found[handler] = max(found.get(handler, 0), level)
+        return found
+
+    def _taken(self) -> set[int]:
+        """Functions whose address is taken."""
+        return self.calls.handles
+
+    def comes_back(self, entry: int) -> int | None:
+        """Level at which a function that changes stacks returns, by COMES_BACK."""
+        for note in self.notes.of("back"):
+            name, _, level = note.text.partition(" ")
+            if self.address(name) == entry:
+                return self.notes.number(level, note)
+        return None
+
+    def resumed(self) -> list[int]:
+        """Functions of RESUMED_BY."""
+        names = [name.strip() for note in self.notes.of("resumed") for name in note.text.split(",")]
+        return [a for name in names if (a := self.address(name)) is not None]
+
+    def recursion(self, entry: int) -> int | None:
+        """Activations of a function that exist at once, by annotation."""
+        return self.calls.annotation(self.calls.annotations.recursion, entry)

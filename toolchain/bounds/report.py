@@ -1,0 +1,258 @@
+"""Bounds of the functions and entries of an image: what each costs alone, then together by interrupt priority."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import partial
+
+from toolchain.bounds.builder import World
+from toolchain.bounds.explore import LOOP, Explorer, Outcome, Rules, TooMuch
+from toolchain.bounds.program import Program
+from toolchain.bounds.state import LEVELS, Area, State
+from toolchain.bounds.values import Value, span
+from toolchain.errors import ToolError
+from toolchain.stack.effects import CALL_BYTES
+
+RAM = (0x0800, 0x2800)
+STACK_END = 0x8000
+"""Where the stack that functions are tried on ends: behind all RAM, so that none is too deep."""
+LATENCY = 5
+"""Cycles from a request to the handler's first instruction: 4, and one more behind an instruction of two
+(isa.md §14.3)."""
+TRAP_LEVEL = 8
+
+
+@dataclass(slots=True)
+class Bound:
+    """One function or entry, looked at by itself.
+
+    cycles  worst case from its first instruction to behind its return, or to the end of the switch to another thread;
+            None without a bound
+    stack   most bytes above the return address, by CPU priority at that depth
+    other   the same on the other stack, from its beginning
+    masked  by level, the longest time in which that level is held back
+    """
+
+    name: str
+    kind: str
+    level: int = 0
+    cycles: int | None = None
+    stack: dict[int, int] = field(default_factory=dict)
+    other: dict[int, int] = field(default_factory=dict)
+    path: list[str] = field(default_factory=list)
+    masked: dict[int, tuple[int, str]] = field(default_factory=dict)
+    open: dict[str, str] = field(default_factory=dict)
+    """What is not known: source line -> why."""
+    forever: bool = False
+
+    @property
+    def stack_is_known(self) -> bool:
+        """Whether nothing is open but rounds of loops."""
+        return all(why == LOOP for why in self.open.values())
+
+    @property
+    def bytes(self) -> int:
+        """Most bytes on the stack it was entered on."""
+        return max(self.stack.values(), default=0)
+
+
+class Analyst:
+    """Looks at functions of one program."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.other = self._other_stack()
+        self.base = self._base()
+        areas = [(self.base, STACK_END)]
+        if self.other is not None:
+            areas.append(self.other)
+        self.private, self.known = self._values("private"), self._values("known")
+        kept = {a for a, _ in (*self.private, *self.known)}
+        self.world = World(Area(areas), program.words, program.window, kept, program.links_in_ram)
+        self.rules = Rules(
+            loop=program.rounds,
+            calls=program.targets,
+            recursion=program.recursion,
+            resumed=program.resumed,
+            back=program.comes_back,
+        )
+
+    def _other_stack(self) -> tuple[int, int] | None:
+        """The stack interrupts move to, by STACK_AREA."""
+        for note in self.program.notes.of("stack"):
+            name, _, text = note.text.partition(" ")
+            start, size = self.program.address(name), self.program.notes.number(text, note)
+            if start is not None and size is not None:
+                return start, start + size
+        return None
+
+    def _base(self) -> int:
+        """An address for stacks of functions, behind all that has a name and behind the other stack."""
+        sections = [s for s in self.program.image.sections if s.is_ram]
+        end = max((s.address + s.units for s in sections), default=RAM[0])
+        return end + 1 & ~1
+
+    def _values(self, kind: str) -> list[tuple[int, Value]]:
+        found: list[tuple[int, Value]] = []
+        for note in self.program.notes.of(kind):
+            name, _, text = note.text.partition(" ")
+            address, value = self.program.address(name), self.program.notes.number(text, note)
+            if address is not None and value is not None:
+                found.append((address & ~1, value))
+        return found
+
+    def explore(self, entry: int, level: int, on_other: bool, thread: bool) -> Outcome:
+        """Run a function from one state of entry; raises `TooMuch`."""
+        state = State()
+        level = min(level, LEVELS - 1)
+        state.ipl = level, level
+        state.since = [0 if 0 < k <= level else None for k in range(LEVELS)]
+        state.mem.update(self.known)
+        state.w[15] = self.base + CALL_BYTES if not on_other or self.other is None else self.other[0] + CALL_BYTES
+        if thread:
+            state.mem.update(self.private)
+        for note in self.program.notes.of("argument"):
+            name, number, text = note.text.split(None, 2)
+            most = self.program.notes.number(text, note)
+            if self.program.address(name) == entry and most is not None:
+                state.w[int(number)] = span(0, most)
+        return Explorer(self.world, self.program.graph, self.rules).run(entry, state)
+
+    def bound(self, name: str, entry: int, kind: str, level: int = 0, on_other: bool = False) -> Bound:
+        """The bound of one function."""
+        result = Bound(name.removeprefix("_"), kind, level)
+        try:
+            found = self.explore(entry, level, on_other, kind in ("call", "thread"))
+        except TooMuch:
+            result.open[self.program.place(entry)] = "too many paths; bound its loops"
+            return result
+        self._fill(result, found, on_other)
+        return result
+
+    def _fill(self, result: Bound, found: Outcome, on_other: bool) -> None:
+        place = self.program.place
+        result.open = {place(pc): why for pc, why in found.open.items()}
+        result.forever = not found.ends and found.left is None and bool(found.forever)
+        times = [end.time for end in found.ends.values()] + ([] if found.left is None else [found.left])
+        if times and not found.open:
+            result.cycles = max(times)
+        start = CALL_BYTES + (self.other[0] if on_other and self.other is not None else self.base)
+        deepest = -1
+        for (stack, level), (top, chain) in found.peak.items():
+            own = stack == (1 if on_other else 0)
+            base = start if own else self.other[0] if self.other is not None else 0
+            table = result.stack if own else result.other
+            table[level] = max(table.get(level, 0), top - base)
+            if top - base > deepest:
+                deepest, result.path = top - base, [self.program.calls.name(e).removeprefix("_") for e in chain]
+        for table_ in (found.masked, found.prefix):
+            for level, (cycles, where) in table_.items():
+                if cycles > result.masked.get(level, (-1, ""))[0]:
+                    result.masked[level] = cycles, place(where)
+        for end in found.ends.values():
+            for level in range(1, LEVELS):
+                since = end.since[level]
+                if since is not None:
+                    cycles = end.time - max(since, 0)
+                    if cycles > result.masked.get(level, (-1, ""))[0]:
+                        result.masked[level] = cycles, "its end"
+
+
+@dataclass(slots=True)
+class Response:
+    """An interrupt: cycles from the request to its handler's first instruction if every other interrupt comes once
+    meanwhile."""
+
+    name: str
+    level: int
+    masked: int | None
+    where: str
+    cycles: int | None
+
+
+@dataclass(slots=True)
+class Report:
+    """Everything about one image."""
+
+    calls: list[Bound]
+    threads: list[Bound]
+    interrupts: list[Bound]
+    nested: list[Bound]
+    """The same interrupts, entered on the other stack."""
+    responses: list[Response] = field(default_factory=list)
+    stacks: dict[str, int | None] = field(default_factory=dict)
+    """Bytes by stack: of each thread with everything that interrupts it, and of the other stack."""
+
+
+def report_of(program: Program, functions: Iterable[str]) -> Report:
+    """Bounds of the named functions, of all threads and interrupts, and what follows for stacks and responses.
+
+    Raises `ToolError` for a name that is no function.
+    """
+    analyst = Analyst(program)
+    calls, threads, interrupts, nested = [], [], [], []
+    for name in functions:
+        address = program.address(name)
+        if address not in program.calls.entries:
+            raise ToolError(f"no function is called {name}")
+        calls.append(analyst.bound(name, address, "call"))
+    for entry in program.threads():
+        threads.append(analyst.bound(program.calls.name(entry), entry, "thread"))
+    for entry, level in program.interrupts().items():
+        name = program.calls.name(entry)
+        interrupts.append(analyst.bound(name, entry, "interrupt", level))
+        if analyst.other is not None:
+            nested.append(analyst.bound(name, entry, "interrupt", level, on_other=True))
+    report = Report(calls, threads, interrupts, nested)
+    report.responses = [_response(report, one) for one in interrupts if one.level < TRAP_LEVEL]
+    _stacks(report, analyst)
+    return report
+
+
+def _response(report: Report, one: Bound) -> Response:
+    """Held back by the longest stretch of anything else, then by every interrupt of a higher level once, and by those
+    of its own level that come first."""
+    level = one.level
+    longest, where = 0, ""
+    open_ended = False
+    for other in (*report.calls, *report.threads, *report.interrupts):
+        if other is one:
+            continue
+        if other.level < level:
+            cycles, place = other.masked.get(level, (0, ""))
+            if cycles > longest:
+                longest, where = cycles, f"{place} in {other.name}"
+            open_ended |= bool(other.open)
+    others = [o for o in report.interrupts if o is not one and level <= o.level < TRAP_LEVEL]
+    if any(o.cycles is None for o in others):
+        return Response(one.name, level, None if open_ended else longest, where, None)
+    more = sum((o.cycles or 0) + LATENCY for o in others)
+    return Response(one.name, level, longest, where, None if open_ended else longest + more + LATENCY)
+
+
+def _stacks(report: Report, analyst: Analyst) -> None:
+    """Each stack with the deepest chain of interrupts of rising priority on top."""
+
+    def known(*parts: Bound) -> bool:
+        return all(part.stack_is_known for part in parts)
+
+    on_thread = partial(_on_top, report.interrupts)
+    on_other = partial(_on_top, report.nested)
+    for thread in report.threads:
+        total = max((depth + on_thread(level) for level, depth in thread.stack.items()), default=0)
+        report.stacks[thread.name] = CALL_BYTES + total if known(thread, *report.interrupts) else None
+    if analyst.other is not None:
+        users = [*report.calls, *report.threads, *report.interrupts]
+        depths = [depth + on_other(level) for user in users for level, depth in user.other.items()]
+        report.stacks["kernel stack"] = max(depths, default=0) if known(*users, *report.nested) else None
+
+
+def _on_top(interrupts: list[Bound], level: int) -> int:
+    """Bytes that interrupts above a level can put on a stack, one within the other."""
+    best = 0
+    for one in interrupts:
+        if level < one.level < TRAP_LEVEL:
+            for at, depth in one.stack.items():
+                best = max(best, CALL_BYTES + depth + _on_top(interrupts, max(at, one.level)))
+    return best

@@ -1,0 +1,64 @@
+"""Which functions a pointer of a type can call: those of the same signature, from the debug information."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from emu.lines import dwarf_of
+
+_STRIPPED = frozenset(("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"))
+
+Signature = tuple[str, ...]
+
+
+class Signatures:
+    """`functions`: signature by address; `types`: by name of a typedef of a function or of a pointer to one."""
+
+    def __init__(self, sections: Mapping[str, bytes]) -> None:
+        self.functions: dict[int, Signature] = {}
+        self.types: dict[str, Signature] = {}
+        if not sections.get(".debug_info"):
+            return
+        for unit in dwarf_of(sections).iter_CUs():
+            for die in unit.iter_DIEs():
+                if die.tag == "DW_TAG_subprogram" and "DW_AT_low_pc" in die.attributes:
+                    self.functions[die.attributes["DW_AT_low_pc"].value] = self._signature(die)
+                elif die.tag == "DW_TAG_typedef":
+                    self._typedef(die)
+
+    def _typedef(self, die: Any) -> None:
+        target = _target(die)
+        if target is not None and target.tag == "DW_TAG_pointer_type":
+            target = _target(target)
+        if target is not None and target.tag == "DW_TAG_subroutine_type" and "DW_AT_name" in die.attributes:
+            self.types[die.attributes["DW_AT_name"].value.decode()] = self._signature(target)
+
+    @staticmethod
+    def _signature(die: Any) -> Signature:
+        if "DW_AT_abstract_origin" in die.attributes:
+            die = die.get_DIE_from_attribute("DW_AT_abstract_origin")
+        parameters = [child for child in die.iter_children() if child.tag == "DW_TAG_formal_parameter"]
+        return (_kind(_target(die)), *(_kind(_target(parameter)) for parameter in parameters))
+
+
+def _target(die: Any) -> Any:
+    """What a type or an object is of, behind its qualifiers and other names; None for void."""
+    while die is not None and "DW_AT_type" in die.attributes:
+        die = die.get_DIE_from_attribute("DW_AT_type")
+        if die.tag not in _STRIPPED:
+            return die
+    return None
+
+
+def _kind(die: Any) -> str:
+    """What matters of a type in a call: pointers are alike, integers differ by size."""
+    if die is None:
+        return "void"
+    if die.tag == "DW_TAG_pointer_type":
+        return "pointer"
+    if die.tag in ("DW_TAG_base_type", "DW_TAG_enumeration_type"):
+        size = die.attributes.get("DW_AT_byte_size")
+        return f"scalar {size.value if size is not None else 2}"
+    name = die.attributes.get("DW_AT_name")
+    return f"{die.tag} {name.value.decode() if name is not None else ''}"

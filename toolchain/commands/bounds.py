@@ -1,0 +1,103 @@
+"""`bounds`: worst-case time, stack, masking and response."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+from toolchain.bounds.notes import Notes, read_notes
+from toolchain.bounds.program import Program
+from toolchain.bounds.report import Bound, Report, report_of
+from toolchain.commands.parser import parser
+from toolchain.elf.read import read_executable
+from toolchain.errors import ToolError
+from toolchain.files import read_bytes, read_text
+from toolchain.stack.annotations import Annotations, add_symbols, read_annotations
+
+EXIT_OVER_LIMIT = 1
+KERNEL = "_Sys_"
+DESCRIPTION = """Bounds of a finished image: cycles, stack, longest time interrupts are held back, response of each
+interrupt.  Every function is run on all its inputs at once; what cannot be bounded is named with the source line to
+annotate (bounds.h).  Cycles are of the code alone: interrupts in between count in their own rows.
+
+Names in annotations get their values by --let; for our kernel n threads, m events, b newer events in the same bucket,
+s subscriptions of one event, q queued messages, i times idle, u bytes of a stack never used."""
+
+
+def main(arguments: list[str]) -> int:
+    """Print the report; returns 0, or 1 when a --limit is exceeded or there is no bound to compare."""
+    p = parser("bounds", DESCRIPTION, "python -m toolchain bounds firmware.elf --let n=4 --limit Sys_Yield=90")
+    p.add_argument("image")
+    p.add_argument("-a", "--annotations", metavar="FILE", help="annotation file of `stack`")
+    p.add_argument("--let", action="append", default=[], metavar="NAME=N", help="value of a name in annotations")
+    p.add_argument("--function", action="append", default=[], metavar="NAME",
+                   help="look at this function (default: the kernel's calls, or main)")  # fmt: skip
+    p.add_argument("--limit", action="append", default=[], metavar="NAME=CYCLES", help="fail when NAME can take longer")
+    p.add_argument("--stack-limit", action="append", default=[], metavar="NAME=BYTES", help="fail when NAME needs more")
+    p.add_argument("--json", action="store_true", help="machine-readable output")
+    options = p.parse_args(arguments)
+    file = options.annotations
+    annotations = read_annotations(read_text(file), file) if file else Annotations()
+    image = read_executable(read_bytes(options.image), options.image)
+    add_symbols(annotations, image.symbols)
+    notes = read_notes(image, dict(_pair("--let", text) for text in options.let))
+    program = Program(image, annotations, notes)
+    report = report_of(program, options.function or program.interesting(KERNEL))
+    print(json.dumps(asdict(report), indent=1) if options.json else as_text(report, notes))
+    limits = [(_pair("--limit", text), "cycles") for text in options.limit]
+    limits += [(_pair("--stack-limit", text), "bytes of stack") for text in options.stack_limit]
+    return max([_check(report, *limit, what) for limit, what in limits], default=0)
+
+
+def _pair(option: str, text: str) -> tuple[str, int]:
+    name, equals, value = text.partition("=")
+    if not equals or not value.isdigit():
+        raise ToolError(f"{option} {text}: expected NAME=NUMBER")
+    return name, int(value)
+
+
+def as_text(report: Report, notes: Notes) -> str:
+    """The report as tables."""
+    rows = [*report.calls, *report.threads, *report.interrupts]
+    width = max((len(row.name) for row in rows), default=8)
+    lines = [f"{'':9} {'':{width}}   cycles  stack  held back: level 1    4    5    6  deepest path"]
+    lines += [_row(row, width) for row in rows]
+    if report.responses:
+        lines += ["", f"{'interrupt':{width}}  level  held back  response  by"]
+        lines += [
+            f"{one.name:{width}}  {one.level:5}  {_number(one.masked):>9}  {_number(one.cycles):>8}  {one.where}"
+            for one in report.responses
+        ]
+    if report.stacks:
+        lines += ["", "stack with all that interrupts it, by priority:"]
+        lines += [f"  {name:{width}} {_number(size):>6}" for name, size in report.stacks.items()]
+    unknown = {place: why for row in rows for place, why in row.open.items()}
+    if unknown:
+        lines += ["", "not bounded; annotate (bounds.h):"]
+        lines += [f"  {place}: {why}" for place, why in sorted(unknown.items())]
+    if notes.missing:
+        lines += [f"names without a value (--let): {', '.join(sorted(notes.missing))}"]
+    return "\n".join(lines)
+
+
+def _row(row: Bound, width: int) -> str:
+    cycles = "for ever" if row.forever else _number(row.cycles)
+    held = " ".join(f"{row.masked[k][0] if k in row.masked else '-':>4}" for k in (1, 4, 5, 6))
+    path = " > ".join(row.path)
+    more = " " if row.stack_is_known else "+"
+    return f"{row.kind:9} {row.name:{width}} {cycles:>8} {row.bytes:6}{more}{'':16} {held}  {path}"
+
+
+def _number(value: int | None) -> str:
+    return "?" if value is None else f"{value:,}"
+
+
+def _check(report: Report, name: str, limit: int, what: str) -> int:
+    rows = [row for row in (*report.calls, *report.threads, *report.interrupts) if row.name == name.removeprefix("_")]
+    if not rows:
+        raise ToolError(f"no function that was looked at is called {name}")
+    value = rows[0].cycles if what == "cycles" else rows[0].bytes if rows[0].stack_is_known else None
+    if value is not None and value <= limit:
+        return 0
+    print(f"{name}: {_number(value)} {what}, the limit is {limit}")
+    return EXIT_OVER_LIMIT

@@ -1,0 +1,39 @@
+/* What `python -m toolchain bounds` cannot find out by itself, told beside the code.  Each is a declaration: no instruction
+ * and no byte of memory comes of it; in the image it is a line of the section .note.bounds.
+ *
+ * Numbers are expressions of integers and names; a name gets its value on the command line (--let n=4).
+ */
+#ifndef _BOUNDS_H_
+#define _BOUNDS_H_
+
+/* In front of a loop, or of the `while` that ends one: it goes round at most `rounds` times. */
+#define LOOP_BOUND(rounds) _BOUNDS_NOTE("loop", rounds)
+/* In front of a call through a pointer: its targets are the functions named, of a type named all whose address is taken,
+ * without those behind a minus. */
+#define CALL_TARGETS(...) _BOUNDS_NOTE("calls", __VA_ARGS__)
+/* Anywhere: looked at by itself, the function finds in register Wn at most `most`. */
+#define ARGUMENT_BOUND(function, n, most) _BOUNDS_NOTE("argument", function n most)
+/* Anywhere: the function leaves its stack to another, and comes back to its caller at this interrupt level. */
+#define COMES_BACK(function, level) _BOUNDS_NOTE("back", function level)
+/* Anywhere: where code goes on that has just moved to a stack of somebody else. */
+#define RESUMED_BY(...) _BOUNDS_NOTE("resumed", __VA_ARGS__)
+/* Anywhere: the first bytes of this variable are the stack that interrupts and the kernel move to. */
+#define STACK_AREA(variable, bytes) _BOUNDS_NOTE("stack", variable bytes)
+/* Anywhere: functions of these types whose address is taken are entries of threads. */
+#define THREADS(...) _BOUNDS_NOTE("threads", __VA_ARGS__)
+/* Anywhere: the priority this interrupt is given, where it is not that after a reset, 4. */
+#define INTERRUPT_LEVEL(vector, level) _BOUNDS_NOTE("level", vector level)
+/* In a file: what a call keeps in this variable it finds again; threads enter with this value. */
+#define PRIVATE_VALUE(variable, value) _BOUNDS_NOTE("private", variable value)
+/* Anywhere: this variable or register has this value whenever anything looked at is entered. */
+#define KNOWN_VALUE(variable, value) _BOUNDS_NOTE("known", variable value)
+/* In a file: its pointers that are kept in memory lead to RAM, so that following them never takes the cycles of a constant. */
+#define LINKS_IN_RAM() _BOUNDS_NOTE("ram", .)
+
+#define _BOUNDS_NOTE(kind, ...) _BOUNDS_LINE(__COUNTER__, __LINE__, kind, __VA_ARGS__)
+#define _BOUNDS_LINE(number, line, kind, ...) _BOUNDS_TEXT(number, line, kind, __VA_ARGS__)
+#define _BOUNDS_TEXT(number, line, kind, ...)                                                                       \
+    static const char _bounds_##number[] __attribute__((used, section(".note.bounds"))) =                           \
+        kind " " #__VA_ARGS__ "@" __FILE__ ":" #line "\n"
+
+#endif
