@@ -164,6 +164,8 @@ class Explorer:
         That is done only where it leaves nothing open, or all of them do.
         """
         key = entry, state.key()
+        if entry in self.active:
+            return self.run(entry, state), False  # recursion ends by its arguments
         exposed = state.leaked < NOWHERE or any(map(self.sees, state.w[:8]))
         if (
             not exact(state.w[15])

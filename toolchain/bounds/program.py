@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from typing import Final
 
+from emu.chips import chip_named, chip_of
+from emu.elffacts import PROCESSOR_MASK
 from emu.lines import Lines
 from toolchain.bounds.graph import Builder, Code, Loop, loops_in
 from toolchain.bounds.notes import Note, Notes
@@ -14,7 +16,6 @@ from toolchain.bounds.values import WINDOW
 from toolchain.elf.disassemble import items
 from toolchain.elf.model import Executable
 from toolchain.errors import ToolError
-from toolchain.link.memory import CHIP
 from toolchain.stack.analyse import Analysis
 from toolchain.stack.annotations import Annotations
 
@@ -38,6 +39,7 @@ class Program:
     def __init__(self, image: Executable, annotations: Annotations, notes: Notes) -> None:
         sys.setrecursionlimit(max(sys.getrecursionlimit(), PYTHON_DEPTH))
         self.image, self.notes = image, notes
+        self.chip: Final = chip_of(image.processor & PROCESSOR_MASK) or chip_named()
         self.calls: Final = Analysis(image, annotations)
         self.graph: Final = Builder(self.calls.code, self.calls.entries)
         self.words: Final = {
@@ -87,7 +89,7 @@ class Program:
         for symbol in self.image.symbols:
             if symbol.name in (name, "_" + name):
                 return symbol.value
-        sfr = CHIP.sfrs.get(name)
+        sfr = self.chip.sfrs.get(name)
         return None if sfr is None else sfr.address
 
     def interesting(self, prefix: str) -> list[str]:
@@ -179,7 +181,7 @@ class Program:
         for symbol in self.image.symbols:
             if symbol.name.startswith("os_level_of_"):
                 told[symbol.name.removeprefix("os_level_of_")] = symbol.value
-        traps = {vector.name: vector.level for vector in CHIP.vectors if vector.irq is None}
+        traps = {vector.name: vector.level for vector in self.chip.vectors if vector.irq is None}
         found: dict[int, int] = {}
         for handler, names in self.calls.vectors.items():
             if self.calls.name(handler) == UNUSED:
