@@ -109,7 +109,7 @@ def told(one: Finding) -> str:
     """A finding as one or two lines."""
     if one.found:
         return f"  ok       {one.name:18} {one.found}"
-    lost = f"needed for {one.purpose}" if one.is_needed else f"without it: no {one.purpose}"
+    lost = f"needed for {one.purpose}" if one.is_needed else f"not without it: {one.purpose}"
     remedy = f"\n{'':30}{one.remedy}" if one.remedy else ""
     return f"  {'MISSING' if one.is_needed else 'absent':8} {one.name:18} {lost}{remedy}"
 
