@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What `python -m toolchain bounds` cannot find out by itself, told beside the code.  Each is a declaration: no instruction
  * and no byte of memory comes of it; in the image it is a line of the section .note.bounds.
  *
