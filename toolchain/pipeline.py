@@ -15,6 +15,7 @@ from .ir.read import read_module
 from .lower import (
     bindings,
     branches,
+    by_value,
     cfg,
     combine,
     constants,
@@ -124,6 +125,11 @@ def _schedule(c: Context) -> None:
         schedule.run(c.m)
 
 
+def _by_value(c: Context) -> None:
+    if c.options.level != "0":
+        by_value.run(c.function)
+
+
 def _combine(c: Context) -> None:
     if c.options.level != "0":
         combine.combine(c.function, c.for_size)
@@ -148,6 +154,7 @@ FUNCTION_PASSES = [
     Pass("legalize", _legalize, ("ssa", "reachable"), ("legal",)),
     Pass("unreachable-again", lambda c: cfg.remove_unreachable(c.function), ("legal",)),
     Pass("dead-code", lambda c: cfg.dead_code(c.function), ("legal",)),
+    Pass("by-value", _by_value, ("legal",)),
     Pass("combine", _combine, ("legal",)),
     Pass("dead-code-again", lambda c: cfg.dead_code(c.function), ("legal",)),
     Pass("split-logical", lambda c: cfg.split_logical_branches(c.function), ("legal",), ("no-logical-branches",)),

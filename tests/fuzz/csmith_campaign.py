@@ -1,4 +1,5 @@
-"""Random C programs: -O0 and -Os must give one checksum on the emulator, and avr-gcc with simavr the same one.
+"""Random C programs: every level, with and without -fno-lto, must give one checksum on the emulator, and avr-gcc with
+simavr the same one.
 
 `python tests/fuzz/csmith_campaign.py [--count N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`.
 Needs Debian's `csmith`; the AVR, another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are there.
@@ -16,6 +17,7 @@ import argparse
 import atexit
 import functools
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -35,7 +37,8 @@ from tests.toolchain.c_programs import build, run  # noqa: E402
 
 RUNTIME = Path(__file__).parent / "csmith_runtime"
 HEADERS = Path("/usr/include/csmith")
-LEVELS = ("-O0", "-Os")
+Shape = tuple[str, str]
+SHAPES: tuple[Shape, ...] = tuple((level, alone) for level in ("-O0", "-O1", "-Os", "-O2") for alone in ("", "-fno-lto"))
 CYCLES = 15_000_000
 PLATFORM = "integer size = 2\npointer size = 2\n"
 GENERATOR = [
@@ -100,10 +103,10 @@ def flags() -> list[str]:
     return ["-std=gnu11", f"-I{RUNTIME}", f"-I{headers()}", f"-I{HEADERS}"]
 
 
-def ours(source: Path, level: str, folder: Path) -> tuple[str, str]:
+def ours(source: Path, level: str, alone: str, folder: Path) -> tuple[str, str]:
     """(checksum, "") or ("", why there is none)."""
-    image = folder / f"{source.stem}{level}.elf"
-    built = build([source], image, level, "-w", *flags())
+    image = folder / f"{source.stem}{level}{alone}.elf"
+    built = build([source], image, level, *alone.split(), "-w", *flags())
     if built.status != 0:
         return "", f"memory: {built.first_error}" if MEMORY.search(built.messages) else f"build: {built.first_error}"
     ran = run(image, CYCLES, engine="interp")
@@ -130,36 +133,39 @@ def on_avr(source: Path, folder: Path) -> str:
     return found[0] if found else ""
 
 
-def examine(seed: int, keep: Path | None = None) -> Verdict:
+def examine(seed: int, keep: Path | None = None, shapes: tuple[Shape, ...] = SHAPES) -> Verdict:
     """Generate, build and run one program everywhere."""
     with tempfile.TemporaryDirectory(prefix="csmith-") as name:
         folder = Path(name)
         source = generate(seed, folder)
-        verdict = compare(seed, source, folder)
+        verdict = compare(seed, source, folder, shapes)
         if verdict.kind == "failed" and keep is not None:
             keep.mkdir(parents=True, exist_ok=True)
             shutil.copy(source, keep / source.name)
         return verdict
 
 
-def compare(seed: int, source: Path, folder: Path) -> Verdict:
-    """Checksums of one program at both levels and on the AVR."""
+def compare(seed: int, source: Path, folder: Path, shapes: tuple[Shape, ...] = SHAPES) -> Verdict:
+    """Checksums of one program in all shapes, -O0 first, and on the AVR. The compiler verifies its machine code."""
+    os.environ["DSPIC_VERIFY_MACHINE"] = "1"
     sums = {}
-    for level in LEVELS:
-        sums[level], why = ours(source, level, folder)
+    for level, alone in shapes:
+        shape = f"{level} {alone}".strip()
+        sums[shape], why = ours(source, level, alone, folder)
         if why.startswith("memory"):
             return Verdict(seed, "skipped", "does not fit into the device's memory")
         if why == "trap: stack error":
             return Verdict(seed, "skipped", "needs more stack than there is RAM")
-        if why.startswith("limit") and level == LEVELS[0]:
-            return Verdict(seed, "skipped", f"still running after {CYCLES} cycles at -O0")
+        if why.startswith("limit") and len(sums) == 1:
+            return Verdict(seed, "skipped", f"still running after {CYCLES} cycles at {shape}")
         if why:
-            return Verdict(seed, "failed", f"{level}: {why}")
+            return Verdict(seed, "failed", f"{shape}: {why}")
     reference = on_avr(source, folder) if avr_available() else ""
+    first = next(iter(sums.values()))
     if len(set(sums.values())) != 1:
         return Verdict(seed, "failed", f"{sums}, avr {reference or 'unknown'}")
-    if reference and reference != sums[LEVELS[0]]:
-        return Verdict(seed, "failed", f"{sums[LEVELS[0]]} at every level, avr {reference}")
+    if reference and reference != first:
+        return Verdict(seed, "failed", f"{first} at every level, avr {reference}")
     return Verdict(seed, "agreed", "with avr" if reference else "levels only")
 
 

@@ -126,8 +126,27 @@ class AddressSelector(ValueSelector):
             plain = not self.is_leaf(base) and offset == 0
             if plain and not (isinstance(base, Instr) and base.op == "add" and self.address_only(base)):
                 self.folded.add(id(load))
-                return Mem("ind", self.reg(base))
+                return self._stepping(base, load, user) or Mem("ind", self.reg(base))
         return self.reg(v)
+
+    def _stepping(self, p: Value, load: Instr, user: Instr) -> Mem | None:
+        """[Wn++] for a comparison at a branch, where p + size goes on from here and p does not.
+
+        Elsewhere the step finds its place later (`peephole`); here it would stand between comparison and branch."""
+        if user.op != "br" or not isinstance(p, Instr):
+            return None
+        others = [u for u in self.users[id(p)] if u is not load]
+        step = others[0] if len(others) == 1 else None
+        if step is None or step.op != "add" or step.args[0] is not p or not self.same_block(step):
+            return None
+        k = step.args[1]
+        inside = [u for u in self.users.get(id(step), ()) if u.op != "phi" and self.same_block(u)]
+        if not isinstance(k, ConstInt) or k.signed != load.type.bits // 8 or inside or id(step) not in self.needed:
+            return None
+        self.folded.add(id(step))
+        d = self.value_regs(step)[0]
+        self.copy(self.reg(p), d)
+        return Mem("++", d)
 
     def near_operand(self, v: Value, user: Instr) -> File | None:
         """Near address of a load that may fold into `user` as a file-register operand."""

@@ -22,6 +22,8 @@ def _words(v: Value) -> int:
 
 def select_binary(s: Selector, i: Instr) -> None:
     """One word: rule table, then register form with a folded load. Several words: a carry chain."""
+    if _into_low_byte(s, i):
+        return
     if _words(i) > 1:
         _wide_binary(s, i)
         return
@@ -51,6 +53,26 @@ def select_binary(s: Selector, i: Instr) -> None:
         s.emit(op, left, right, d, byte=byte)
         return
     s.emit(op, s.reg(a), right, d, byte=byte)
+
+
+def _into_low_byte(s: Selector, i: Instr) -> bool:
+    """a | b and a ^ b for a byte b: only the low byte changes, so b is not extended."""
+    if i.op not in ("or", "xor") or i.type.bits < 16:
+        return False
+    for a, b in (i.args, i.args[::-1]):
+        narrow = b.args[0] if isinstance(b, Instr) and b.op == "zext" else None
+        if narrow is None or narrow.type.bits != 8 or s.is_leaf(narrow) or s.is_leaf(a):
+            continue
+        assert isinstance(b, Instr)
+        if not s.single_use(b) or id(b) in s.wanted or not s.same_block(b):
+            continue
+        d = s.value_regs(i)
+        source = s.source(narrow, i)
+        for x, r in zip(s.value_regs(a), d, strict=True):
+            s.copy(x, r)
+        s.emit(REGISTER_OP[i.op] + "low", d[0], source, byte=True)
+        return True
+    return False
 
 
 def _file_logic(s: Selector, i: Instr, a: Value, b: ConstInt, d: int, byte: bool) -> bool:

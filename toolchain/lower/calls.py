@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ..ir.model import Arg, ConstInt, GlobalRef, Instr, Type, Undef, Value, align_of, size_of
+from ..ir.model import Arg, ConstInt, Function, GlobalRef, Instr, Type, Undef, Value, align_of, size_of
 from ..record_shapes import ATTRIBUTE
 from ..target import CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
 from . import asm_inline, builtins
@@ -37,10 +37,21 @@ def _shape(v: Value, attrs: dict[str, object]) -> Shape:
 # function entry
 
 
+def is_struct(a: Arg) -> bool:
+    """Whether a parameter is the address of a copy the caller makes."""
+    return _byval(a.attrs) is not None
+
+
+def parameter_places(f: Function) -> list[Place]:
+    """Where every parameter travels."""
+    return place_arguments([_shape(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
+
+
 def incoming(s: Selector) -> None:
     """Decide where every parameter lives before any code is selected."""
     f = s.f
-    s.places = place_arguments([_shape(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
+    s.places = parameter_places(f)
+    read = [i.extra["argument"] for i in f.blocks[0].instrs if i.op == "argword"]
     low = RETURN_ADDRESS_BYTES
     for a, place in zip(f.args, s.places, strict=True):
         t = _byval(a.attrs)
@@ -50,7 +61,7 @@ def incoming(s: Selector) -> None:
             s.arg_slots[id(a)] = slot
             if t is not None:
                 s.slots[id(a)] = slot
-        elif t is not None:
+        elif t is not None and a not in read:
             s.slots[id(a)] = s.new_slot(max(2 * place.words, 1))
     s.variadic_anchor = s.new_slot(2, -low) if f.vararg else 0
 
@@ -65,6 +76,10 @@ def receive(s: Selector) -> None:
         if id(a) in s.slots:
             for k in range(place.words):
                 s.emit("mov", place.register + k, Slot(s.slots[id(a)], 2 * k))
+        elif is_struct(a):
+            for word in s.f.blocks[0].instrs:
+                if word.op == "argword" and word.extra["argument"] is a and id(word) in s.needed:
+                    s.copy(place.register + int(str(word.extra["word"])), s.value_regs(word)[0])
         elif id(a) in s.needed:
             for k, r in enumerate(s.value_regs(a)):
                 s.copy(place.register + k, r)
@@ -234,6 +249,10 @@ def select_entryword(s: Selector, i: Instr) -> None:
     s.emit("lea" if i.extra["address"] else "mov", Slot(slot), s.value_regs(i)[0])
 
 
+def select_argword(s: Selector, i: Instr) -> None:
+    """Nothing: the entry code puts the word into its register."""
+
+
 def select_callresult(s: Selector, i: Instr) -> None:
     """Nothing: the call copies all parts of its result."""
 
@@ -243,6 +262,7 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "ret": select_ret,
     "callresult": select_callresult,
     "entryword": select_entryword,
+    "argword": select_argword,
     "builtin": builtins.select_builtin,
     "asm": asm_inline.select_asm,
     "asmresult": asm_inline.select_asmresult,

@@ -241,6 +241,7 @@ PURE = frozenset((
     "icmp", "select", "phi", "load", "slot", "bits", "ff1l", "ff1r", "swap", "getsp", "vastart", "divother",
     "callresult",
     "entryword",
+    "argword",
 ))  # fmt: skip
 
 

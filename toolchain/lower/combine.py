@@ -1,6 +1,9 @@
 """Small rewrites of legal IR that the middle end cannot know are good here.
 
+quotients    x < c with x / c at hand is x / c == 0, so that x need not outlive the division
 remainders   x - x/c*c back to x % c, and quotient and remainder of one division from one DIV (isa.md §6.7)
+conditional  x op (c ? y : 0) is c ? x op y : x, where the operation stands under a skip
+selects      those on one condition stand together and share the test
 increments   pointer and counter steps next to the last use of the old value, so both share a register and the step can
              become a post-increment
 countdowns   `n-- != 0`: the decrement moves to the test, whose carry answers it
@@ -8,9 +11,9 @@ countdowns   `n-- != 0`: the decrement moves to the test, whose carry answers it
 
 from __future__ import annotations
 
-from ..ir.model import Block, ConstInt, Function, Instr, Value
+from ..ir.model import Block, ConstInt, Function, GlobalRef, Instr, Value
 from . import induction, magic
-from .cfg import loop_depths, predecessors, reverse_postorder
+from .cfg import dead_code, loop_depths, predecessors, reverse_postorder, use_counts
 
 COUNTED = ("eq", "ne", "sle", "sgt")  # tests against 0 that the flags of the decrement answer
 REMAINDER = {"udiv": "urem", "sdiv": "srem"}
@@ -29,13 +32,82 @@ def users_of(f: Function) -> dict[int, list[Instr]]:
 
 def combine(f: Function, for_size: bool) -> None:
     """Needs: legal IR. Ensures: the rewrites above, where they apply."""
+    quotients(f)
+    conditional(f)
+    selects(f)
     remainders(f)
-    if not for_size:
-        magic.run(f)
+    magic.run(f, for_size)
     pair_divisions(f)
     induction.run(f)
     increments(f)
     countdowns(f)
+
+
+def quotients(f: Function) -> None:
+    """icmp x, c -> icmp x udiv c, 0 in the block of that division, when the division is needed anyway."""
+    for b in f.blocks:
+        divided: dict[tuple[int, int], Instr] = {}
+        for i in b.instrs:
+            if i.op == "udiv" and isinstance(i.args[1], ConstInt):
+                divided[id(i.args[0]), i.args[1].value] = i
+            if i.op != "icmp" or not isinstance(i.args[1], ConstInt) or i.pred not in ("ult", "ugt", "ule", "uge"):
+                continue
+            below = i.args[1].value + (i.pred in ("ugt", "ule"))  # x < below, or not
+            quotient = divided.get((id(i.args[0]), below))
+            if quotient is not None:
+                i.args = [quotient, ConstInt(quotient.type, 0)]
+                i.extra["pred"] = "eq" if i.pred in ("ult", "ule") else "ne"
+
+
+NEUTRAL_RIGHT = ("add", "sub", "or", "xor")  # x op 0 is x
+
+
+def conditional(f: Function) -> None:
+    """x op select(c, y, 0) -> select(c, x op y, x) and its mirror image, for a select nobody else wants."""
+    counts = use_counts(f)
+    for b in f.blocks:
+        made: list[Instr] = []
+        here: set[int] = set()
+        for i in b.instrs:
+            here.add(id(i))
+            new = _conditional(i, counts, here) if i.op in NEUTRAL_RIGHT and i.type.bits in (8, 16, 32) else None
+            if new is not None:
+                made.append(new)
+            made.append(i)
+        b.instrs = made
+    dead_code(f)
+
+
+def _conditional(i: Instr, counts: dict[int, int], here: set[int]) -> Instr | None:
+    """Make `i` the select; returns the operation in front of it."""
+    a, b = i.args
+    for x, chosen in ((a, b), (b, a)) if i.op != "sub" else ((a, b),):
+        if not isinstance(chosen, Instr) or chosen.op != "select" or counts[id(chosen)] != 1 or id(chosen) not in here:
+            continue
+        c, yes, no = chosen.args
+        zero = next((k for k, v in enumerate((yes, no)) if isinstance(v, ConstInt) and not v.value), None)
+        if zero is None or isinstance(x, ConstInt | GlobalRef):
+            continue
+        operation = Instr(i.op, i.type, [x, yes if zero else no])
+        operation.line = i.line
+        i.op, i.extra = "select", {}
+        i.args = [c, operation, x] if zero else [c, x, operation]
+        return operation
+    return None
+
+
+def selects(f: Function) -> None:
+    """Move a select down to the next one of its block on the same condition, when nothing in between wants it."""
+    for b in f.blocks:
+        last: dict[int, Instr] = {}
+        for i in [x for x in b.instrs if x.op == "select"]:
+            earlier = last.get(id(i.args[0]))
+            last[id(i.args[0])] = i
+            if earlier is None:
+                continue
+            at, to = b.instrs.index(earlier), b.instrs.index(i)
+            if not any(earlier in x.args for x in b.instrs[at + 1 : to + 1]):
+                b.instrs.insert(to - 1, b.instrs.pop(at))
 
 
 def remainders(f: Function) -> None:
@@ -182,7 +254,7 @@ def _dominates(idom: dict[str, str], a: Block, b: Block) -> bool:
 
 
 def countdowns(f: Function) -> None:
-    """For a branch on x == 0, bring y = x - 1 of the block or of its only-reached successor to the branch."""
+    """For a branch on x == 0 or x == 1, bring y = x - 1 of the block or of its only-reached successor to the branch."""
     preds = predecessors(f)
     blocks = {b.name: b for b in f.blocks}
     users = users_of(f)
@@ -192,7 +264,7 @@ def countdowns(f: Function) -> None:
         if not isinstance(c, Instr) or c.op != "icmp" or c.pred not in COUNTED or c not in b.instrs:
             continue
         x, zero = c.args
-        if not isinstance(zero, ConstInt) or zero.value or x.type.bits not in (8, 16) or not isinstance(x, Instr):
+        if not isinstance(zero, ConstInt) or zero.value > 1 or x.type.bits not in (8, 16) or not isinstance(x, Instr):
             continue
         for source in [b, *(blocks[s] for s in br.blocks if preds[s] == [b.name])]:
             step = next((i for i in source.instrs if _is_decrement(i, x)), None)

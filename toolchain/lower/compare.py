@@ -1,4 +1,4 @@
-"""Selection of comparisons, conditional values and select."""
+"""Selection of comparisons and truth values."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..ir.model import I1, ConstInt, Instr, Undef, Value
 from .build import SWAPPED
 from .mir import CC_INVERSE, MI, Imm
-from .rules import CONDITION, immediate_rule
+from .rules import CONDITION
 
 if TYPE_CHECKING:
     from .select import Selector
@@ -18,7 +18,8 @@ ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "
 
 
 # Tests of x against 0 by the flags of x - 1: DEC borrows exactly for 0, and N^OV is the sign of the true difference.
-COUNTED = {"eq": "nc", "ne": "c", "sle": "lt", "sgt": "ge"}
+# Against 1 they say what they say of the result.
+COUNTED = ({"eq": "nc", "ne": "c", "sle": "lt", "sgt": "ge"}, {"eq": "z", "ne": "nz", "sle": "le", "sgt": "gt"})
 
 
 def condition(s: Selector, c: Value, user: Instr) -> str:
@@ -28,7 +29,9 @@ def condition(s: Selector, c: Value, user: Instr) -> str:
         if step is not None:
             s.folded.add(id(step))
             s.emit("dec", s.reg(step.args[0]), s.value_regs(step)[0], byte=step.type.bits == 8)
-            return COUNTED[c.pred]
+            against = c.args[1]
+            assert isinstance(against, ConstInt)
+            return COUNTED[against.value][c.pred]
         return compare(s, c, user)
     if isinstance(c, Instr) and c.op == "xor" and c.type is I1 and isinstance(c.args[1], ConstInt):
         inner = condition(s, c.args[0], user)
@@ -38,9 +41,9 @@ def condition(s: Selector, c: Value, user: Instr) -> str:
 
 
 def _countdown(s: Selector, c: Instr) -> Instr | None:
-    """y = x - 1 of this block, wanted only after it, for a test of x against 0."""
-    x, zero = c.args
-    if c.pred not in COUNTED or not isinstance(zero, ConstInt) or zero.value or c.type is not I1:
+    """y = x - 1 of this block, wanted only after it, for a test of x against 0 or 1."""
+    x, against = c.args
+    if c.pred not in COUNTED[0] or not isinstance(against, ConstInt) or against.value > 1 or c.type is not I1:
         return None
     if x.type.bits not in (8, 16):
         return None
@@ -231,89 +234,4 @@ def _sign_bit(s: Selector, a: Value, d: int) -> None:
     s.emit("lsr", top, Imm(15), d)
 
 
-def select_select(s: Selector, i: Instr) -> None:
-    """d = a; when the condition fails, d = b. The second value is loaded under a skip."""
-    c, a, b = i.args
-    d = s.value_regs(i)
-    if isinstance(a, Undef) or isinstance(b, Undef):
-        _assign(s, b if isinstance(a, Undef) else a, d)
-        return
-    outer, s.out = s.out, []
-    cc = condition(s, c, i)
-    test, s.out = s.out, outer
-    if _select_operation(s, i, a, b, cc, test) or _select_operation(s, i, b, a, CC_INVERSE[cc], test):
-        return
-    if (s.is_leaf(a) and not s.is_leaf(b)) or (not s.is_leaf(a) and not s.is_leaf(b) and _dies_here(s, b, i, a)):
-        a, b, cc = b, a, CC_INVERSE[cc]
-    right = None if s.is_leaf(b) else s.value_regs(b)
-    _assign(s, a, d)
-    s.out += test
-    skip = s.emit("skip", "", cc=cc)
-    start = len(s.out)
-    if right is not None:
-        for x, r in zip(right, d, strict=True):
-            if x != r:
-                s.emit("mov", x, r)
-    else:
-        for k, r in enumerate(d):
-            s.load_leaf(b, k, r)
-    for mi in s.out[start:]:
-        mi.pred = True
-    if len(s.out) == start:
-        s.out.remove(skip)
-
-
-CONDITIONAL = {"add": "add", "sub": "sub", "and": "and", "or": "ior", "xor": "xor"}
-
-
-def _select_operation(s: Selector, i: Instr, a: Value, b: Value, cc: str, test: list[MI]) -> bool:
-    """cond ? a : (a op x): start with a, do the operation under the skip. One word, no second value."""
-    if not isinstance(b, Instr) or b.op not in CONDITIONAL or not s.single_use(b) or not s.same_block(b):
-        return False
-    if b.args[0] is not a or s.is_leaf(a) or id(b) in s.needed or i.type.bits not in (8, 16):
-        return False
-    d, x = s.result(i), b.args[1]
-    byte = i.type.bits == 8
-    rule = None
-    if isinstance(x, ConstInt):
-        k = -x.value & ((1 << x.type.bits) - 1) if b.op == "sub" else x.value
-        rule = immediate_rule("add" if b.op == "sub" else b.op, k, i.type.bits)
-    operand: int | Imm
-    if rule is None:
-        operand = s.reg(x)
-    s.copy(s.reg(a), d)
-    s.out += test
-    s.emit("skip", "", cc=cc)
-    if rule is None:
-        mi = s.emit(CONDITIONAL[b.op], d, operand, d, byte=byte)
-    else:
-        literal = Imm(rule.literal(k, i.type.bits))
-        if rule.form == "unary":
-            mi = s.emit(rule.op, d, d, byte=byte and rule.op != "ze")
-        elif rule.form == "lit5":
-            mi = s.emit(rule.op, d, literal, d, byte=byte)
-        elif rule.form == "tied":
-            mi = s.emit(rule.op, literal, d, byte=byte)
-        else:
-            mi = s.emit(rule.op, d, literal, byte=byte)
-    mi.pred = True
-    s.folded.add(id(b))
-    return True
-
-
-def _dies_here(s: Selector, b: Value, i: Instr, a: Value) -> bool:
-    """Whether starting from `b` saves the copy that starting from `a` needs."""
-    return s.single_use(b) and not s.single_use(a)
-
-
-def _assign(s: Selector, v: Value, d: tuple[int, ...]) -> None:
-    """d = v, as copies or constant loads."""
-    if s.is_leaf(v):
-        for k, r in enumerate(d):
-            s.load_leaf(v, k, r)
-    else:
-        for x, r in zip(s.value_regs(v), d, strict=True):
-            s.copy(x, r)
-
-
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {"icmp": select_icmp, "select": select_select}
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {"icmp": select_icmp}

@@ -236,6 +236,13 @@ class Emitter:
         r = operand_text(mi.args[0])
         self._out(f"subb {r},{r},{r}")
 
+    def _low_move(self, mi: MI) -> None:
+        self._out(f"mov.b {operand_text(mi.args[0])},{operand_text(mi.args[1])}")
+
+    def _low_logic(self, mi: MI) -> None:
+        r, source = map(operand_text, mi.args)
+        self._out(f"{mi.op.removesuffix('low')}.b {r},{source},{r}")
+
     def _plain_text(self, mi: MI) -> None:
         self._out(str(mi.args[0]))
 
@@ -263,4 +270,7 @@ SPECIAL: dict[str, Callable[[Emitter, MI], None]] = {
     "hold": Emitter._hold,
     "release": Emitter._release,
     "text": Emitter._plain_text,
+    "movlow": Emitter._low_move,
+    "iorlow": Emitter._low_logic,
+    "xorlow": Emitter._low_logic,
 }

@@ -2,6 +2,7 @@
 
     a[i] with i += c    ->  a pointer stepped by c elements, which addressing turns into [Wn++]
     i == n as the exit  ->  n - i == 0, which the decrement's own flags answer
+    i == max(n, start)  ->  i >= n: the middle end's trip count of `i < n`
 
 Needs: legal IR. Touches loops with one entry. The middle end leaves this to us (design §5: it runs no LSR).
 """
@@ -53,7 +54,9 @@ def run(f: Function) -> None:
     dead_code(f)
     for loop, _ in _loops(f):
         for counter in _counters(loop):
+            _unclamp(loop, counter)
             _count_down(loop, counter)
+    dead_code(f)
 
 
 def _loops(f: Function) -> list[tuple[Loop, bool]]:
@@ -200,19 +203,43 @@ def _leaves_at(loop: Loop, test: Instr) -> bool:
     br = loop.header.instrs[-1]
     if br.op != "br" or not br.args or br.args[0] is not test:
         return False
-    return br.blocks[0 if test.pred == "eq" else 1] not in {b.name for b in loop.body}
+    return br.blocks[0 if test.pred in ("eq", "sge") else 1] not in {b.name for b in loop.body}
 
 
-def _unclamped(v: Value) -> Value | None:
-    """n when a value is max(n, 0), signed: the middle end's trip count of `i < n`."""
+def _unclamped(v: Value, start: Value) -> Value | None:
+    """n when a value is max(n, start), signed, for a constant start."""
     if not isinstance(v, Instr) or v.op != "select" or not isinstance(v.args[0], Instr) or v.args[0].op != "icmp":
         return None
     test, a, b = v.args
     assert isinstance(test, Instr)
-    n, zero = (a, b) if test.pred in ("sgt", "sge") else (b, a)
-    if test.pred not in ("sgt", "sge", "slt", "sle") or not isinstance(zero, ConstInt) or zero.value:
+    n, least = (a, b) if test.pred in ("sgt", "sge") else (b, a)
+    if test.pred not in ("sgt", "sge", "slt", "sle") or not all(_equal(x, start) for x in (least, test.args[1])):
         return None
-    return n if test.args[0] is n and isinstance(test.args[1], ConstInt) and not test.args[1].value else None
+    return n if test.args[0] is n else None
+
+
+def _equal(a: Value, b: Value) -> bool:
+    return isinstance(a, ConstInt) and isinstance(b, ConstInt) and a.value == b.value
+
+
+def _unclamp(loop: Loop, counter: Counter) -> None:
+    """From start on in steps of one, i is max(n, start) when it is n or more for the first time."""
+    test = _exit_test(loop)
+    if counter.amount != 1 or test is None or test.args[0] is not counter.phi or not _leaves_at(loop, test):
+        return
+    n = _unclamped(test.args[1], counter.start)
+    if n is not None:
+        test.args = [counter.phi, n]
+        test.extra["pred"] = "sge" if test.pred == "eq" else "slt"
+
+
+def _exit_test(loop: Loop) -> Instr | None:
+    """The comparison for equality at the end of the header that nobody else wants."""
+    br = loop.header.instrs[-1]
+    test = br.args[0] if br.op == "br" and br.args else None
+    if not isinstance(test, Instr) or test.op != "icmp" or test.pred not in ("eq", "ne"):
+        return None
+    return test if len(_users(loop.f, test)) == 1 else None
 
 
 def _count_down(loop: Loop, counter: Counter) -> None:
@@ -225,7 +252,12 @@ def _count_down(loop: Loop, counter: Counter) -> None:
     if len(tests) != 1:
         return
     test = next(iter(tests.values()))
-    if test.op != "icmp" or test.pred not in ("eq", "ne") or test.args[0] not in (counter.phi, counter.step):
+    if test.op != "icmp" or test.args[0] not in (counter.phi, counter.step):
+        return
+    if test.pred in ("sge", "slt"):
+        _count_down_signed(loop, counter, test)
+        return
+    if test.pred not in ("eq", "ne"):
         return
     limit = test.args[1]
     if not loop.invariant(limit) or limit.type is not I16:
@@ -235,15 +267,26 @@ def _count_down(loop: Loop, counter: Counter) -> None:
     b.line = last.line
     distance = b.binary("sub", limit, counter.start)
     loop.entry.instrs.append(last)
-    unclamped = _unclamped(distance)
-    pred = test.pred
-    if unclamped is not None and test.args[0] is counter.phi and _leaves_at(loop, test):
-        distance, pred = unclamped, "sle" if pred == "eq" else "sgt"
-    counter.phi.args = [distance if v is counter.start and n == loop.entry.name else v
+    _start_at(loop, counter, distance)
+    test.args = [test.args[0], const(I16, 0)]
+
+
+def _count_down_signed(loop: Loop, counter: Counter, test: Instr) -> None:
+    """i >= n for i from 0 or 1 on: from n down to there. The difference of n and i might not fit into a word."""
+    n, start = test.args[1], counter.start
+    if test.args[0] is not counter.phi or not _leaves_at(loop, test) or not loop.invariant(n):
+        return
+    if isinstance(start, ConstInt) and start.value in (0, 1):
+        _start_at(loop, counter, n)
+        test.args = [counter.phi, start]
+        test.extra["pred"] = "sle" if test.pred == "sge" else "sgt"
+
+
+def _start_at(loop: Loop, counter: Counter, start: Value) -> None:
+    """Let the counter begin there and go down."""
+    counter.phi.args = [start if n == loop.entry.name else v
                         for v, n in zip(counter.phi.args, counter.phi.blocks, strict=True)]  # fmt: skip
     counter.step.args = [counter.phi, const(I16, -1)]
-    test.args = [test.args[0], const(I16, 0)]
-    test.extra["pred"] = pred
     for record in loop.f.dbg_records:
         if record.value is counter.phi or record.value is counter.step:
             record.value = None  # the source variable counts the other way

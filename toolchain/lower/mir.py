@@ -93,6 +93,8 @@ def opaque(roles: str, writes: str = "", words: int = 1) -> OpInfo:
 ARITH, LOGIC, SHIFT1 = "cznv", "zn", "czn"
 OPS: dict[str, OpInfo] = {
     "mov": OpInfo("sd"),
+    "movlow": OpInfo("sb"),  # byte into the low byte of a register, whose upper byte stays
+    **{n: OpInfo("bs", LOGIC) for n in ("iorlow", "xorlow")},  # the same of a result
     "lea": OpInfo("nd", ARITH, words=2),
     **{n: OpInfo("ssd", ARITH) for n in ("add", "sub", "subr")},
     **{n: OpInfo("ssd", ARITH, "cz") for n in ("addc", "subb", "subbr")},

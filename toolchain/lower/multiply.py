@@ -83,13 +83,25 @@ def _narrow_reg(s: Selector, kind: str, v: Value) -> int:
     return r
 
 
+def _extended_load(s: Selector, v: Value, i: Instr) -> Instr | None:
+    """The load of a word behind an extension that nobody else wants, if it may move to the product."""
+    if not isinstance(v, Instr) or not s.single_use(v) or id(v) in s.wanted or v.args[0].type.bits != 16:
+        return None
+    return s.foldable_load(v.args[0], i)
+
+
 def _mul_extended(s: Selector, i: Instr, ka: tuple[str, Value], kb: tuple[str, Value] | None) -> None:
     low, high = s.value_regs(i)
-    x = _narrow_reg(s, *ka)
+    a, b = i.args
     if kb is not None:
-        _product(s, ka[0] + kb[0], x, _narrow_reg(s, *kb), low, high)
+        if _extended_load(s, a, i) is not None and _extended_load(s, b, i) is None:
+            a, b, ka, kb = b, a, kb, ka
+        load = _extended_load(s, b, i)
+        right = s.source(load, i) if load is not None else _narrow_reg(s, *kb)
+        assert isinstance(right, int | Mem)
+        _product(s, ka[0] + kb[0], _narrow_reg(s, *ka), right, low, high)
         return
-    b = i.args[1]
+    x = _narrow_reg(s, *ka)
     assert isinstance(b, ConstInt)
     if b.value <= 31:
         _product(s, ka[0] + "u", x, Imm(b.value), low, high)
@@ -106,7 +118,8 @@ def _mul_wide(s: Selector, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str
     d = s.value_regs(i)
     zero_a, zero_b = _zero_words(i.args[0], ka), _zero_words(i.args[1], kb)
     total: list[int | None] = [None] * n
-    for k in range(n):
+    # Of two words the upper comes first: the last product is then the one that stays in its registers.
+    for k in range(n) if n > 2 else (1, 0):
         for j in range(k + 1):
             if j in zero_a or k - j in zero_b:
                 continue

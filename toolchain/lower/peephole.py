@@ -205,6 +205,8 @@ def _step_amount(mi: MI) -> int | None:
         return None
     if mi.op in STEPS and isinstance(mi.args[0], int) and mi.args[0] == mi.args[1]:
         return STEPS[mi.op]
+    if mi.op in ("add", "sub") and isinstance(mi.args[0], int) and mi.args[0] == mi.args[2] and mi.args[1] == Imm(4):
+        return 4 if mi.op == "add" else -4  # MOV.D
     return None
 
 

@@ -19,7 +19,8 @@ def run(m: MFunction) -> None:
     """Both rewrites."""
     _return_early(m)
     if not m.interrupt:
-        for b in m.blocks:
+        for b in list(m.blocks):
+            _return_either(m, b)
             _load_while_returning(b)
 
 
@@ -35,6 +36,33 @@ def _return_early(m: MFunction) -> None:
     remove_unreached(m)
 
 
+def _return_either(m: MFunction, b: MBlock) -> None:
+    """MOV #k,W0; skip; MOV #j,W0; RETURN -> BRA to a RETLW #k,W0; RETLW #j,W0."""
+    if len(b.insts) < 4 or b.insts[-1].op != "ret" or b.insts[-1].text:
+        return
+    first, skip, second, end = b.insts[-4:]
+    if skip.op != "skip" or first.pred or not second.pred:
+        return
+    second = second.clone()
+    second.pred = False
+    values = _constant(first), _constant(second)
+    if None in values:
+        return
+    other = MBlock(f"{b.name}.either", [end.clone()], [], b.depth)
+    for ret, value in ((other.insts[0], values[0]), (end, values[1])):
+        assert value is not None
+        _load(ret, value)
+    b.insts[-4:] = [MI("bra", other.name, cc=skip.cc, line=skip.line), end]
+    b.succs = [other.name]
+    m.blocks.append(other)
+
+
+def _load(ret: MI, value: int) -> None:
+    """Make a return load the result."""
+    ret.text = f"retlw #{value},w{RESULT}"
+    ret.also_uses = tuple(r for r in ret.also_uses if r != RESULT)
+
+
 def _load_while_returning(b: MBlock) -> None:
     """MOV #k,W0; epilogue; RETURN -> epilogue; RETLW #k,W0."""
     if not b.insts or b.insts[-1].op != "ret" or b.insts[-1].text:
@@ -43,8 +71,7 @@ def _load_while_returning(b: MBlock) -> None:
         mi = b.insts[k]
         value = _constant(mi)
         if value is not None:
-            b.insts[-1].text = f"retlw #{value},w{RESULT}"
-            b.insts[-1].also_uses = tuple(r for r in b.insts[-1].also_uses if r != RESULT)
+            _load(b.insts[-1], value)
             del b.insts[k]
             return
         if RESULT in mi.defs() or RESULT in mi.uses() or mi.pred or mi.op in ("call", "callr", "asm", "text", "bra"):

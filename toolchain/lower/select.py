@@ -16,7 +16,7 @@ from ..ir.model import (
     UnsupportedError,
     Value,
 )
-from . import arith, calls, compare, memory, multiply, shifts
+from . import arith, calls, choose, compare, memory, multiply, shifts
 from .address import AddressSelector
 from .cfg import loop_depths, predecessors
 from .mir import MI, MBlock, MFunction
@@ -199,6 +199,7 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     **arith.SELECT,
     **multiply.SELECT,
     **shifts.SELECT,
+    **choose.SELECT,
     **compare.SELECT,
     **memory.SELECT,
     **calls.SELECT,

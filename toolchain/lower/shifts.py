@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from .select import Selector
 
 
+MULTIPLIED = 4  # MUL has literals below 32
+
+
 def _words(v: Value) -> int:
     return max(1, v.type.bits // 16)
 
@@ -77,6 +80,10 @@ def _shift_wide_constant(s: Selector, op: str, a: tuple[int, ...], n: int, d: tu
         _move_words(s, op, a, jump, d)
     elif bits == 1 and jump == 0:
         _shift_by_one(s, op, a, d)
+    elif count == 2 and op == "shl" and bits <= MULTIPLIED and jump == 0:
+        _shift_by_product(s, a, bits, d)
+    elif count == 2 and op != "shl" and n == 8:
+        _shift_by_byte(s, op, a, d)
     elif op == "shl":
         for k in range(count - 1, -1, -1):
             if k < jump:
@@ -94,6 +101,23 @@ def _shift_wide_constant(s: Selector, op: str, a: tuple[int, ...], n: int, d: tu
                 s.emit(SHIFT_OP[op], a[top], Imm(bits), d[k])
             else:
                 _combine(s, "lsr", a[k + jump], bits, "sl", a[k + jump + 1], d[k])
+
+
+def _shift_by_product(s: Selector, a: tuple[int, ...], bits: int, d: tuple[int, ...]) -> None:
+    """The product of the low word and 2^bits has the bits that cross over in its upper word."""
+    upper, crossing, p = s.temp(), s.temp(), s.m.new_pair()
+    s.emit("sl", a[1], Imm(bits), upper)
+    s.emit("mul.uu", a[0], Imm(1 << bits), p)
+    s.emit("split", d[0], crossing, p)
+    s.emit("ior", crossing, upper, d[1])
+
+
+def _shift_by_byte(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
+    """The low byte of the upper word takes the place of the low byte of the lower, then both bytes change places."""
+    s.copy(a[0], d[0])
+    s.emit("movlow", a[1], d[0], byte=True)
+    s.emit("swap", d[0])
+    s.emit(SHIFT_OP[op], a[1], Imm(8), d[1])
 
 
 def _combine(s: Selector, op: str, main: int, bits: int, other_op: str, other: int, d: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..mir import CC_INVERSE, MBlock, MFunction
+from ..mir import CC_INVERSE, READS_FLAGS, MBlock, MFunction
 from .error import MachineError, fail
 
 Source = tuple[str, str, str]  # reader, flag, writer
@@ -27,7 +27,8 @@ def _walk(b: MBlock) -> list[Source]:
         for flag in mi.flags_read():
             if flag not in writer:
                 fail(f"flag {flag.upper()} is read but was not set in the block", b.name, mi)
-            reader = f"{mi.op} {min(mi.cc, CC_INVERSE.get(mi.cc, mi.cc))}".strip()
+            op = "bra" if mi.op in READS_FLAGS else mi.op  # a skip is a branch over what it covers
+            reader = f"{op} {min(mi.cc, CC_INVERSE.get(mi.cc, mi.cc))}".strip()
             out.append((reader, flag, writer[flag]))
         for flag in mi.flags_written():
             writer[flag] = mi.op if not mi.pred else f"conditional {mi.op}"
