@@ -38,7 +38,8 @@ from tests.toolchain.c_programs import build, run  # noqa: E402
 RUNTIME = Path(__file__).parent / "csmith_runtime"
 HEADERS = Path("/usr/include/csmith")
 Shape = tuple[str, str]
-SHAPES: tuple[Shape, ...] = tuple((level, alone) for level in ("-O0", "-O1", "-Os", "-O2") for alone in ("", "-fno-lto"))
+LEVELS = ("-O0", "-O1", "-Os", "-O2")
+SHAPES: tuple[Shape, ...] = tuple((level, alone) for level in LEVELS for alone in ("", "-fno-lto"))
 CYCLES = 15_000_000
 PLATFORM = "integer size = 2\npointer size = 2\n"
 GENERATOR = [

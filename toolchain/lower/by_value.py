@@ -8,7 +8,6 @@ the frame has no copy. Needs: legal IR. Ensures: what `argword` reads has no add
 from __future__ import annotations
 
 from ..ir.model import I8, I16, Arg, ConstInt, Function, Instr, Value, int_type
-from .abi import Place
 from .build import Builder
 from .calls import is_struct, parameter_places
 
@@ -19,7 +18,7 @@ def run(f: Function) -> None:
         if is_struct(a) and place.register is not None:
             loads = _loads(f, a, place.words)
             if loads:
-                _read_words(f, a, place, loads)
+                _read_words(f, a, loads)
 
 
 def _loads(f: Function, a: Arg, words: int) -> list[tuple[Instr, int]] | None:
@@ -47,10 +46,10 @@ def _loads(f: Function, a: Arg, words: int) -> list[tuple[Instr, int]] | None:
 
 def _inside(at: int, bits: int, words: int) -> bool:
     """Whether a load takes one byte or whole words of the copy."""
-    return 0 <= at and at + bits // 8 <= 2 * words and (bits == 8 or (at % 2 == 0 and bits in (16, 32, 64)))
+    return at >= 0 and at + bits // 8 <= 2 * words and (bits == 8 or (at % 2 == 0 and bits in (16, 32, 64)))
 
 
-def _read_words(f: Function, a: Arg, place: Place, loads: list[tuple[Instr, int]]) -> None:
+def _read_words(f: Function, a: Arg, loads: list[tuple[Instr, int]]) -> None:
     """Put the words at the entry, their combinations where the loads were."""
     words: dict[int, Instr] = {}
     for load, at in loads:

@@ -217,7 +217,8 @@ def _shifted_out(s: Selector, i: Instr, when: bool) -> str | None:
         return None
     if base.op == "shl" and tested is x and (c.pred, zero.signed) in (("slt", 0), ("sgt", -1)):
         return "c" if c.pred == "slt" else "nc"
-    if c.pred in ("eq", "ne") and not zero.value and _only_bit(tested, x, base.type.bits - 1 if base.op == "shl" else 0):
+    lost = base.type.bits - 1 if base.op == "shl" else 0
+    if c.pred in ("eq", "ne") and not zero.value and _only_bit(tested, x, lost):
         return "c" if c.pred == "ne" else "nc"
     return None
 

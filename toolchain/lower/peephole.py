@@ -45,6 +45,7 @@ def clear_pairs(b: MBlock) -> None:
             if isinstance(r, int) and isinstance(q, int) and r ^ q == 1 and min(r, q) < FP:
                 pair = MI("clrd", min(r, q), line=one.line)
                 pair.variables = two.variables
+                pair.holds, pair.holds_before = one.holds | two.holds, one.holds_before | two.holds_before
                 b.insts[k : k + 2] = [pair]
         k += 1
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 
@@ -39,7 +40,11 @@ unsigned long bits(unsigned long v) { unsigned long r = 0;
 PASSES: dict[str, Callable[[Function], None]] = {
     "dead code": cfg.dead_code,
     "remainders": combine.remainders,
-    "magic": magic.run,
+    "quotients": combine.quotients,
+    "conditional": combine.conditional,
+    "selects": combine.selects,
+    "magic": partial(magic.run, for_size=False),
+    "magic for size": partial(magic.run, for_size=True),
     "paired divisions": combine.pair_divisions,
     "induction": induction.run,
     "increments": combine.increments,
