@@ -219,15 +219,15 @@ TEST(odd_sized_struct, "abi-elf.md 1.2")
     CHECK(c.g == 5 && a[2].r == 4 && a[2].b == 6 && sizeof a == 9);
 }
 
-struct mixed { int a; char b, c; long d; };
-NOINLINE long read_only(struct mixed m) { return m.a + m.b * 3 + m.c * 5 + m.d; }
-NOINLINE long across_a_call(struct mixed m) { long first = read_only(m); return first + m.c + m.d; }
-NOINLINE int changed(struct mixed m, int n) { while (n--) m.a += m.b; return m.a; }
-NOINLINE int walked(struct mixed m) { int s = 0; for (unsigned k = 0; k < sizeof m; k++) s += ((unsigned char *)&m)[k]; return s; }
+struct mixture { int a; char b, c; long d; };
+NOINLINE long read_only(struct mixture m) { return m.a + m.b * 3 + m.c * 5 + m.d; }
+NOINLINE long across_a_call(struct mixture m) { long first = read_only(m); return first + m.c + m.d; }
+NOINLINE int changed(struct mixture m, int n) { while (n--) m.a += m.b; return m.a; }
+NOINLINE int walked(struct mixture m) { int s = 0; for (unsigned k = 0; k < sizeof m; k++) s += ((unsigned char *)&m)[k]; return s; }
 
 TEST(struct_parameters_in_registers, "6.9.1p10: a parameter is an object of its own, however it is used")
 {
-    struct mixed m = {(int)I(1000), (char)I(-3), (char)I(7), L(70000)};
+    struct mixture m = {(int)I(1000), (char)I(-3), (char)I(7), L(70000)};
     CHECK(read_only(m) == 1000 - 9 + 35 + 70000);
     CHECK(across_a_call(m) == 71026 + 7 + 70000);
     CHECK(changed(m, (int)I(4)) == 988 && m.a == 1000);
