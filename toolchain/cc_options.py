@@ -20,7 +20,7 @@ HELP = """\
 usage: python -m toolchain cc [options] files... [-o out.elf|out.hex|out.o]
 
 C compiler, assembler and linker for the dsPIC30F6014A and dsPIC30F4013 (-mcpu=), used like gcc.
-  files                 .c  .s (assembly)  .S (preprocessed assembly)  .i  .ll/.bc (LLVM IR)  .o  .a
+  files                 .c  .cpp .cc (C++)  .s (assembly)  .S (preprocessed assembly)  .i  .ll/.bc (LLVM IR)  .o  .a
   -o FILE               output; .hex writes Intel HEX, anything else ELF (default a.elf)
   -c | -S | -E          stop after assembling | compiling | preprocessing
   -emit-llvm            with -S: optimised LLVM IR instead of assembly
@@ -38,7 +38,7 @@ C compiler, assembler and linker for the dsPIC30F6014A and dsPIC30F4013 (-mcpu=)
   -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000), at the place that does it
   -finstrument-functions  call __cyg_profile_func_enter and _exit
   -I -D -U -include -isystem -iquote -std= -W... -w -pedantic   as in gcc; without -std= the language is gnu17
-                        with XC16's meaning of `inline` (gnu89: it defines the function)
+                        with XC16's meaning of `inline` (gnu89: it defines the function); C++: gnu++17 without exceptions and RTTI
   -MD -MMD -MF -MT -MQ -MP -M -MM                               dependency files, as in gcc
   -L DIR -l NAME        libraries; the run-time library is always searched last
   -nostdlib -nostartfiles -nodefaultlibs                        leave out run-time library, crt0
@@ -100,9 +100,10 @@ REFUSED = {
     "-pg": "use the emulator's profiler",
 }
 LEVELS = {"-O": "1", "-O0": "0", "-O1": "1", "-O2": "2", "-O3": "2", "-Os": "s", "-Oz": "s", "-Og": "1"}
-LANGUAGES = {"none", "c", "cpp-output", "assembler", "assembler-with-cpp", "ir"}
+LANGUAGES = {"none", "c", "cpp-output", "c++", "c++-cpp-output", "assembler", "assembler-with-cpp", "ir"}
 SUFFIX_LANGUAGE = {
-    ".c": "c", ".i": "cpp-output", ".s": "assembler", ".asm": "assembler", ".S": "assembler-with-cpp", ".ll": "ir",
+    ".c": "c", ".i": "cpp-output", ".cpp": "c++", ".cc": "c++", ".cxx": "c++", ".C": "c++", ".ii": "c++-cpp-output",
+    ".s": "assembler", ".asm": "assembler", ".S": "assembler-with-cpp", ".ll": "ir",
     ".bc": "ir", ".o": "object", ".obj": "object", ".a": "archive", ".elf": "object",
 }  # fmt: skip
 

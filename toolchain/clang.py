@@ -48,6 +48,17 @@ ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp2", "exp2f", "exp10", "ldex
                     "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
 # abi-elf.md §2.9 predefined macros; __XC16__ and __C30__ stay undefined, they select Microchip's attribute spellings.
 PREDEFINED = ["__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_5VOLTS__"]  # beside the part's own
+# Freestanding C++: no exceptions, no run-time types, no threads that could meet in a guard, nothing to do at the end.
+CXX_FLAGS = ["-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics", "-fno-c++-static-destructors", "-nostdinc++"]
+# libc++ is told by macros what there is.
+LIBCXX_SETTINGS = {"ABI_VERSION": "1", "ABI_NAMESPACE": "__1", "HARDENING_MODE_DEFAULT": "_LIBCPP_HARDENING_MODE_NONE",
+                   "ASSERTION_SEMANTIC_DEFAULT": "_LIBCPP_ASSERTION_SEMANTIC_IGNORE",
+                   "DISABLE_VISIBILITY_ANNOTATIONS": "1", "PSTL_BACKEND_SERIAL": "1", **dict.fromkeys(
+    ("HAS_THREADS", "HAS_MONOTONIC_CLOCK", "HAS_TERMINAL", "HAS_FILESYSTEM", "HAS_RANDOM_DEVICE", "HAS_LOCALIZATION",
+     "HAS_UNICODE", "HAS_WIDE_CHARACTERS", "HAS_TIME_ZONE_DATABASE", "HAS_VENDOR_AVAILABILITY_ANNOTATIONS",
+     "HAS_MUSL_LIBC"), "0")}  # fmt: skip
+CXX_FLAGS += [f"-D_LIBCPP_{name}={value}" for name, value in LIBCXX_SETTINGS.items()]
+C_ONLY = {"-fgnu89-inline", "-fno-gnu89-inline"}
 FOREIGN_MACROS = ["MSP430", "__MSP430__"]
 CLANG_LEVEL = {"0": "-O0", "1": "-O1", "2": "-O2", "s": "-Oz"}
 
@@ -80,8 +91,13 @@ def builtin_include_dir() -> Path:
     return Path(clang_program()[0]).parent / "lib" / "include"
 
 
-def front_end_flags(options: CcOptions) -> list[str]:
-    """Flags that give C source the meaning it has on this target, followed by the user's own."""
+def library_include_dir() -> Path:
+    """libc++'s headers, of which C++ sources can use what needs no library behind it."""
+    return Path(clang_program()[0]).parent / "lib" / "libcxx" / "include"
+
+
+def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
+    """Flags that give C or C++ source the meaning it has on this target, followed by the user's own."""
     flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
     flags += [f"-U{name}" for name in FOREIGN_MACROS]
     guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
@@ -96,10 +112,21 @@ def front_end_flags(options: CcOptions) -> list[str]:
         flags += ["-g", "-gdwarf-2", *(f"-fdebug-prefix-map={path}={name}" for path, name in own)]
     if any(word.startswith("-fsanitize=") for word in options.clang):
         flags.append("-fsanitize-trap=all")  # there is no sanitizer run-time library
-    if not any(word.startswith("-std=") or word == "-ansi" for word in options.clang):
+    named = any(word.startswith("-std=") or word == "-ansi" for word in options.clang)
+    if is_cxx(language):
+        flags += CXX_FLAGS if named else [*CXX_FLAGS, "-std=gnu++17"]
+        flags += [word for word in options.clang if word not in C_ONLY]
+        folders = (library_include_dir(), INCLUDE_DIR, builtin_include_dir())
+        return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
+    if not named:
         flags.append("-fgnu89-inline")  # XC16 takes C for gnu89, where plain `inline` defines the function
     flags += options.clang
     return [*flags, "-isystem", str(INCLUDE_DIR), "-isystem", str(builtin_include_dir())]
+
+
+def is_cxx(language: str) -> bool:
+    """Whether a language of `-x` is C++."""
+    return language.startswith("c++")
 
 
 def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
@@ -118,7 +145,7 @@ def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
 
 def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
     """Job that turns one C file into unoptimised IR text carrying the level's attributes."""
-    arguments = [*front_end_flags(options), *_dependency_flags(options, item)]
+    arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
     arguments += [*LAYOUT_FLAGS, "-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S"]
     arguments += ["-x", item.language, str(item.path)]
     return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"), options.chip)
@@ -133,7 +160,7 @@ def repaired(ir: bytes) -> bytes:
 
 def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
     """Job for -E, -M and -fsyntax-only; output None is stdout."""
-    arguments = [*front_end_flags(options), *_dependency_flags(options, item)]
+    arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
     if item.language == "assembler-with-cpp":
         arguments.append("-D__ASSEMBLER__=1")
     if "-fsyntax-only" not in options.clang and not {"-M", "-MM"} & set(options.dependency):
@@ -155,16 +182,18 @@ def _run_changed(
     program: list[str], arguments: list[str], change: Callable[[str], str]
 ) -> subprocess.CompletedProcess[bytes]:
     """Once more, by way of preprocessed text that `change` puts into the front end's words."""
-    *options, _, _, source, _, output = arguments  # ... -x LANGUAGE SOURCE -o OUTPUT
+    *options, _, language, source, _, output = arguments  # ... -x LANGUAGE SOURCE -o OUTPUT
     text = Path(output).with_suffix(".changed.i")
     emit = {"-emit-llvm", "-S"}
     first = [option for option in options if option not in emit]
-    made = subprocess.run([*program, *first, "-E", source, "-o", str(text)], capture_output=True, check=False)
+    made = subprocess.run(
+        [*program, *first, "-E", "-x", language, source, "-o", str(text)], capture_output=True, check=False
+    )
     if made.returncode:
         return made
     text.write_text(change(text.read_text(errors="surrogateescape")), errors="surrogateescape")
     second = [*without_preprocessing(options), "-Wno-unused-command-line-argument"]
-    second += ["-x", "cpp-output", str(text), "-o", output]
+    second += ["-x", "c++-cpp-output" if is_cxx(language) else "cpp-output", str(text), "-o", output]
     return subprocess.run([*program, *second], capture_output=True, check=False)
 
 

@@ -17,6 +17,7 @@ from toolchain.errors import ToolError
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "cc": ("toolchain.driver", "compile, assemble and link C and assembly, gcc-like"),
+    "c++": ("toolchain.commands.cxx", "the same for freestanding C++17"),
     "as": ("toolchain.commands.assembler", "assemble one file (pic30-as syntax)"),
     "ld": ("toolchain.commands.linker", "link objects and libraries to ELF or Intel HEX"),
     "ar": ("toolchain.commands.archiver", "make, list and extract static libraries"),

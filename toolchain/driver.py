@@ -21,17 +21,23 @@ from toolchain.files import read_bytes, read_text, write_outputs
 if TYPE_CHECKING:
     from toolchain.cc_link import Program
 
-IR_SOURCES = {"c", "cpp-output"}
+IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
+CXX_OF = {"c": "c++", "cpp-output": "c++-cpp-output"}
 STANDARD_OUTPUT = Path("-")
 MAX_INVENTIONS = 4  # runs of the middle end; each forbids what the one before made up
 
 
-def main(argv: list[str]) -> int:
-    """Run the compiler driver on `argv` (without program name); return the exit status, never raise on bad input."""
+def main(argv: list[str], cxx: bool = False) -> int:
+    """Run the compiler driver on `argv` (without program name); return the exit status, never raise on bad input.
+
+    With `cxx` C sources are compiled as C++.
+    """
     from toolchain.clang import CompileError
 
     try:
         options = parse(argv)
+        if cxx:
+            options.inputs = [Input(i.path, CXX_OF.get(i.language, i.language)) for i in options.inputs]
         if options.action == "help":
             sys.stdout.write(HELP)
         elif options.action == "version":

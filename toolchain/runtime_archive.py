@@ -23,6 +23,7 @@ PACKAGE_DIRS = ("toolchain", "emu/dspic30f/isa", "emu/chips")
 """What the compiled library depends on, relative to the folder that holds `toolchain`."""
 UNRELATED = ("toolchain/link", "toolchain/cli.py", "toolchain/README.md")
 LEVEL = "s"
+LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
 
 
 def library(jobs: int = 0) -> bytes:
@@ -52,7 +53,7 @@ def _dependencies(root: Path) -> Iterator[Path]:
     for folder in PACKAGE_DIRS:
         for path in (root / folder).rglob("*"):
             name = path.relative_to(root).as_posix()
-            if path.suffix in (".py", ".c", ".h", ".s", ".inc", ".csv") and not name.startswith(UNRELATED):
+            if path.suffix in (".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv") and not name.startswith(UNRELATED):
                 yield path
 
 
@@ -60,7 +61,7 @@ def build(jobs: int = 0) -> bytes:
     """Compile and assemble every file of `runtime/`, one archive member each."""
     from toolchain.link.archive import Member, archive_bytes
 
-    sources = sorted(path for path in RUNTIME_DIR.iterdir() if path.suffix in (".c", ".s"))
+    sources = sorted(path for path in RUNTIME_DIR.iterdir() if path.suffix in LANGUAGES)
     with ProcessPoolExecutor(max_workers=jobs or os.cpu_count() or 1) as pool:
         members = [
             Member(path.stem + ".o", data) for path, data in zip(sources, pool.map(_member, sources), strict=True)
@@ -71,14 +72,14 @@ def build(jobs: int = 0) -> bytes:
 def _member(source: Path) -> bytes:
     from toolchain import driver
 
-    item = Input(source, "c" if source.suffix == ".c" else "assembler")
+    item = Input(source, LANGUAGES[source.suffix])
     options = CcOptions(
         inputs=[item],
         stage="assemble",
         level=LEVEL,
         stack_check=True,  # a program's own checks are worth nothing if the functions it calls have none
         runtime=False,
-        clang=["-std=c11", "-ffreestanding", "-Wall"],
+        clang=["-std=c11" if item.language == "c" else "-std=c++17", "-ffreestanding", "-Wall"],
     )
     with tempfile.TemporaryDirectory(prefix="dspic-rt-") as scratch:
         return _weakened(driver.object_of(options, item, Path(scratch)), source.name)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import binascii
+import math
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+import emu
 from emu.cli import main
 from tests.firmware.conftest import FIRMWARE, Build, run_make
 from tests.firmware.test_on_target import FCY, load
@@ -171,3 +174,61 @@ int main(void) {
     command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *includes, str(source)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+# ---- tone, commands, patrol -----------------------------------------------------------------------------------------
+
+
+def on_both_engines(folder: Path, ask: Callable[[emu.Machine], str]) -> str:
+    """What `ask` gets from a program, the same from the interpreter and from native code."""
+    first, second = (ask(emu.load(folder, engine=engine)) for engine in ("interp", "jit"))
+    assert first == second
+    return first
+
+
+def sines(*tones: tuple[int, int]) -> Callable[[int], float]:
+    """Sum of (Hz, counts)."""
+    return lambda cycle: sum(a * math.sin(2 * math.pi * hz * cycle / FCY) for hz, a in tones)
+
+
+def test_tone_hears_what_its_filter_lets_through(image: Build) -> None:
+    """firmware/apps/tone/README.md: 200 Hz below a cut-off at 400 Hz, and nine times louder 560 Hz."""
+
+    def ask(machine: emu.Machine) -> str:
+        said = bytearray()
+        machine.uart[1].listen(lambda byte, _: said.append(byte))
+        machine.run(seconds=0.2)
+        machine.board.microphones.play(0, sines((200, 100), (560, 900)))
+        machine.run(seconds=0.42)
+        return said.decode()
+
+    lines = on_both_engines(image("tone"), ask).split()
+    assert lines[0] == "silence"
+    assert lines[-4:] == ["200", "Hz"] * 2
+
+
+def test_commands_are_read_with_sscanf(image: Build) -> None:
+    """firmware/apps/commands/README.md."""
+
+    def ask(machine: emu.Machine) -> str:
+        said = bytearray()
+        machine.uart[1].listen(lambda byte, _: said.append(byte))
+        for line in ("speed 50, -30", "get speed", "sum 0x10 010", "speed 1", "get lost", "speed 1,2 3"):
+            machine.uart[1].feed(line.encode() + b"\r\n")
+            machine.run(seconds=0.05)
+        return said.decode()
+
+    assert on_both_engines(image("commands"), ask).split() == ["ok", "50,-30", "24", "?", "?", "?"]
+
+
+def test_patrol_runs_its_behaviours_in_turn(image: Build) -> None:
+    """firmware/apps/patrol/README.md: C++ on the kernel."""
+
+    def ask(machine: emu.Machine) -> str:
+        said = bytearray()
+        machine.uart[1].listen(lambda byte, _: said.append(byte))
+        machine.run(seconds=1.7)
+        return said.decode()
+
+    lines = on_both_engines(image("patrol"), ask).splitlines()
+    assert lines == ["1 straight 60 60", "2 spin 30 -30", "3 straight 60 60", "4 spin -30 30"]

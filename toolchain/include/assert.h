@@ -4,7 +4,12 @@
 #ifdef NDEBUG
 #define assert(condition) ((void)0)
 #else
-_Noreturn void __assert_fail(const char *condition, const char *file, int line);
+#ifdef __cplusplus
+extern "C"
+#endif
+__attribute__((__noreturn__)) void __assert_fail(const char *condition, const char *file, int line);
 #define assert(condition) ((condition) ? (void)0 : __assert_fail(#condition, __FILE__, __LINE__))
 #endif
+#ifndef __cplusplus
 #define static_assert _Static_assert
+#endif

@@ -3,6 +3,10 @@
 #ifndef CTYPE_H
 #define CTYPE_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 int isalnum(int character);
 int isalpha(int character);
 int isblank(int character);
@@ -17,5 +21,9 @@ int isupper(int character);
 int isxdigit(int character);
 int tolower(int character);
 int toupper(int character);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

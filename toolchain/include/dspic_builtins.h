@@ -6,6 +6,10 @@
 #pragma GCC system_header
 #include "dspic_attributes.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define __builtin_nop() __asm__ volatile("nop")
 #define __builtin_clrwdt() __asm__ volatile("clrwdt")
 #define __builtin_pwrsav(mode) __asm__ volatile("pwrsav #%0" ::"i"(mode) : "memory")
@@ -125,5 +129,8 @@ void __dspic_set_isr_state(unsigned int level);
 #define __builtin_disable_interrupts() __dspic_set_isr_state(7)
 #define __builtin_enable_interrupts() __dspic_set_isr_state(0)
 
+#ifdef __cplusplus
+}
+#endif
 #endif
 #endif

@@ -3,10 +3,18 @@
 #ifndef LIBPIC30_H
 #define LIBPIC30_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Waits for that many instruction cycles, or up to 3 more, call and return included; at least 9. */
 void __delay32(unsigned long cycles);
 
 #define __delay_ms(milliseconds) __delay32((unsigned long)((milliseconds) * (FCY) / 1000ULL))
 #define __delay_us(microseconds) __delay32((unsigned long)((microseconds) * (FCY) / 1000000ULL))
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

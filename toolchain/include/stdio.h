@@ -8,6 +8,10 @@
 #include <stdarg.h>
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define EOF (-1)
 
 typedef struct __stream FILE;
@@ -38,9 +42,16 @@ int snprintf(char *__restrict to, size_t size, const char *__restrict format, ..
 int vsnprintf(char *__restrict to, size_t size, const char *__restrict format, va_list arguments)
     __attribute__((__format__(__printf__, 3, 0)));
 
+int remove(const char *name); /* there are no files: always -1 */
+int rename(const char *from, const char *to);
+
 /* Conversions: d i u o x X p c s [ n %, with *, width and hh h l ll j z t L; a e f g too. There is no standard input. */
 int sscanf(const char *__restrict text, const char *__restrict format, ...) __attribute__((__format__(__scanf__, 2, 3)));
 int vsscanf(const char *__restrict text, const char *__restrict format, va_list arguments)
     __attribute__((__format__(__scanf__, 2, 0)));
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

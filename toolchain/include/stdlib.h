@@ -6,6 +6,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define EXIT_SUCCESS 0
 #define EXIT_FAILURE 1
 #define RAND_MAX 32767
@@ -51,5 +55,9 @@ void *bsearch(const void *key, const void *base, size_t count, size_t size,
 _Noreturn void exit(int status);
 _Noreturn void _Exit(int status);
 _Noreturn void abort(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

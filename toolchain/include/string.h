@@ -5,6 +5,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 void *memcpy(void *__restrict to, const void *__restrict from, size_t count);
 void *memmove(void *to, const void *from, size_t count);
 void *memset(void *to, int value, size_t count);
@@ -26,5 +30,9 @@ char *strtok(char *__restrict in, const char *__restrict separators);
 size_t strlen(const char *in);
 size_t strnlen(const char *in, size_t limit);
 char *strerror(int number);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -6,6 +6,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define CLOCKS_PER_SEC 1000L
 
 typedef long time_t; /* seconds since 1970-01-01 00:00:00 UTC */
@@ -27,5 +31,9 @@ struct tm *gmtime(const time_t *seconds);
 struct tm *localtime(const time_t *seconds);
 char *asctime(const struct tm *calendar); /* "Sun Nov 22 11:15:27 2026\n" */
 char *ctime(const time_t *seconds);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -4,6 +4,20 @@
 
         .include "dsp.inc"
 
+        ; W5:W4 = b, W10 at a: a becomes (a+b)/2, W5:W4 (a-b)/2 = (a+b)/2 - b
+        .macro  halves
+        lac     [w10],#1,A
+        add     w4,#1,A
+        sac.r   A,w0
+        mov     w0,[w10++]
+        sub     w0,w4,w4
+        lac     [w10],#1,A
+        add     w5,#1,A
+        sac.r   A,w0
+        mov     w0,[w10++]
+        sub     w0,w5,w5
+        .endm
+
 ; fractcomplex *FFTComplexIP(int log2n, fractcomplex *data, fractcomplex *factors, int page): result in bit-reversed order.
 ; A butterfly makes (a+b)/2 and ((a-b)/2) * W in 16 cycles; the last stage, where W is 1, in 14.
         .section .text._FFTComplexIP,code
@@ -31,23 +45,21 @@ _FFTComplexIP:
         movsac  A,[w8]+=2,w6,[w11]+=2,w4
         movsac  A,[w8],w7,[w11]+=2,w5
         add     w8,w12,w8               ; at the imaginary part of the next factor
-        do      w3,3f
-        lac     [w10],#1,A
-        add     w4,#1,A
-        sac.r   A,w0
-        mov     w0,[w10++]
-        sub     w0,w4,w4                ; (a-b)/2 = (a+b)/2 - b
-        lac     [w10],#1,A
-        add     w5,#1,A
-        sac.r   A,w0
-        mov     w0,[w10++]
-        sub     w0,w5,w5
+        dec     w3,w0
+        do      w0,3f
+        halves
         mpy     w4*w6,B
         msc     w5*w7,B
         mpy     w4*w7,A,[w8]-=2,w7,[w11]+=2,w4
         mac     w5*w6,A,[w8]+=2,w6,[w11]+=2,w5,[w13]+=2
         sac.r   A,[w13++]
 3:      add     w8,w12,w8
+        halves                          ; the last one, with nothing to read behind it
+        mpy     w4*w6,B
+        msc     w5*w7,B
+        mpy     w4*w7,A
+        mac     w5*w6,A,[w13]+=2
+        sac.r   A,[w13++]
         cp      w13,w14
         bra     nz,2b
         lsr     w9,w9
@@ -61,16 +73,7 @@ _FFTComplexIP:
         do      w3,6f
         mov     [w10+4],w4
         mov     [w10+6],w5
-        lac     [w10],#1,A
-        add     w4,#1,A
-        sac.r   A,w0
-        mov     w0,[w10++]
-        sub     w0,w4,w4
-        lac     [w10],#1,A
-        add     w5,#1,A
-        sac.r   A,w0
-        mov     w0,[w10++]
-        sub     w0,w5,w5
+        halves
         mov     w4,[w10++]
 6:      mov     w5,[w10++]
         pop     _PSVPAG
@@ -157,14 +160,18 @@ _IFFTComplexIP:
 _SquareMagnitudeCplx:
         mov     w10,[w15++]
         fractional w3
-        dec     w0,w3
+        sub     w0,#2,w3
         mov     w1,w10
         mov     w2,w0
         movsac  A,[w10]+=2,w4
+        bra     n,2f
         do      w3,1f
         mpy     w4*w4,A,[w10]+=2,w5
         mac     w5*w5,A,[w10]+=2,w4
 1:      sac.r   A,[w2++]
+2:      mpy     w4*w4,A,[w10]+=2,w5     ; nothing is read behind the last one
+        mac     w5*w5,A
+        sac.r   A,[w2++]
         pop     _CORCON
         mov     [--w15],w10
         return

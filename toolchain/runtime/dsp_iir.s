@@ -39,7 +39,7 @@ _IIRLatticeInit:
 
 ; fractional *IIRCanonic(int n, fractional *dst, fractional *src, IIRCanonicStruct *filter): direct form II.
 ; {int sections less 1; coeffsBase {a2, a1, b2, b1, b0}; int coeffsPage; delayBase {w[-2], w[-1]}, in Y; int initialGain,
-; finalShift}. The accumulator carries the sum from section to section. 8 cycles a section.
+; finalShift}. The accumulator carries the sum from section to section. 9 cycles a section.
         .section .text._IIRCanonic,code
         .global _IIRCanonic
 _IIRCanonic:
@@ -60,8 +60,9 @@ _IIRCanonic:
         mov     w13,w10
         mov     [w2++],w4
         mov     w9,w5
-        mpy     w4*w5,A,[w8]+=2,w4,[w10]+=2,w5
+        mpy     w4*w5,A,[w8]+=2,w4
         do      w12,2f
+        mov     [w10++],w5
         mac     w4*w5,A,[w8]+=2,w4,[w10]-=2,w6
         mac     w4*w6,A,[w8]+=2,w4
         sac.r   A,#-1,w7
@@ -69,7 +70,7 @@ _IIRCanonic:
         mac     w4*w6,A,[w8]+=2,w4
         mov     w6,[w10++]
         mov     w7,[w10++]
-2:      mac     w4*w7,A,[w8]+=2,w4,[w10]+=2,w5
+2:      mac     w4*w7,A,[w8]+=2,w4
         sftac   A,w3
         sac.r   A,#-1,[w1++]
         dec     w0,w0

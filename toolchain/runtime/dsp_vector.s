@@ -141,10 +141,12 @@ _VectorDotProduct:
         mov     w10,[w15++]
         mov     w1,w8
         mov     w2,w10
-        dec     w0,w0
+        sub     w0,#2,w0
         clr     A,[w8]+=2,w4,[w10]+=2,w5
+        bra     n,4f
         repeat  w0
         mac     w4*w5,A,[w8]+=2,w4,[w10]+=2,w5
+4:      mac     w4*w5,A                 ; nothing is read behind the last one
         mov     [--w15],w10
         mov     [--w15],w8
         sac.r   A,w0

@@ -23,6 +23,10 @@
 
 #include "openswarm_config.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef uint8_t uint8;
 typedef uint16_t uint16;
 typedef uint32_t uint32;
@@ -214,5 +218,9 @@ sint16 Sys_Get_MotorSpeed_Right(void);
 /* Stops the motors, reports "file:line" over the board's report channel and stops the system. */
 void Sys_Assertion_Failed(const char *file, uint16 line);
 #define SYS_ASSERT(condition) ((condition) ? (void)0 : Sys_Assertion_Failed(__FILE__, __LINE__))
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -6,6 +6,10 @@
 #include "openswarm.h"
 #include "openswarm_io.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef sys_function pFunction;
 typedef sys_handler pEventHandlerFunction;
 typedef sys_condition pConditionFunction;
@@ -30,5 +34,9 @@ typedef sys_event_data Sys_event_data;
 #define SYS_EVENT_IO_TO_BLUETOOTH SYS_SEND_UART1
 #define SYS_EVENT_IO_SELECTOR_CHANGE SYS_IO_SELECTOR
 #define SYS_EVENT_1ms_CLOCK SYS_1ms_TIMER
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

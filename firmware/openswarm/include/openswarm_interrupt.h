@@ -24,6 +24,10 @@
 #include "hal_compiler.h"
 #include "hal_interrupt.h" /* from the port */
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define SYS_INTERRUPT(vector, level, function)                                                                        \
     HAL_ASSUME(sys_level_of_##vector##_is_4_5_or_6, (level) >= 4 && (level) <= 6);                                      \
     HAL_USED void sys_isr_##vector(void);                                                                             \
@@ -52,5 +56,9 @@
 #define Sys_Disable_Interrupt(vector) HAL_INTERRUPT_DISABLE(vector)
 /* Any context, also levels 5 and 6 | no | 1 | 0 | none.  It comes as soon as its level allows, once however often raised. */
 #define Sys_Raise_Interrupt(vector) HAL_INTERRUPT_RAISE(vector)
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -12,6 +12,10 @@
 
 #include "openswarm.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* ---- Motors: SYS_LEFTMOTOR_SPEED, SYS_RIGHTMOTOR_SPEED --------------------------------------------------------- */
 
 enum { SYS_MAXIMUM_SPEED = 129 }; /* mm/s at 1000 steps/s (epuck.md §3, openswarm-original.md §5.2) */
@@ -79,5 +83,9 @@ bool Sys_Toggle_LED(uint8 led);
 typedef bool (*sys_selector_processor)(uint8 *position);
 sys_selector_processor Sys_Set_SelectorProcessor(sys_selector_processor processor); /* MTHI */
 uint8 Sys_Get_Selector(void); /* MTHI.  0-15, debounced */
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

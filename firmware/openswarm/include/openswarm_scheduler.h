@@ -5,6 +5,10 @@
 
 #include "openswarm.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct sys_pcb sys_pcb;
 
 /* Kernel stack, slice locked. first is the ready thread whose turn it is by round robin; the ring through Sys_Next_Ready
@@ -20,5 +24,9 @@ struct sys_scheduler {
 sys_pcb *Sys_Next_Ready(const sys_pcb *process);
 uint16 Sys_Pid_Of(const sys_pcb *process);
 uint8 Sys_Priority_Of(const sys_pcb *process);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,0 +1,1 @@
+override DEFINES += -DSYS_DEFAULT_STACK=320 # snprintf, and the interrupts
