@@ -38,7 +38,7 @@ C compiler, assembler and linker for the dsPIC30F6014A and dsPIC30F4013 (-mcpu=)
   -fsanitize=undefined  undefined behaviour stops at a breakpoint (word DA4000), at the place that does it
   -finstrument-functions  call __cyg_profile_func_enter and _exit
   -I -D -U -include -isystem -iquote -std= -W... -w -pedantic   as in gcc; without -std= the language is gnu17
-                        with XC16's meaning of `inline` (gnu89: it defines the function); C++: gnu++17 without exceptions and RTTI
+                        with XC16's meaning of `inline` (gnu89: it defines the function); C++ is gnu++17, freestanding
   -MD -MMD -MF -MT -MQ -MP -M -MM                               dependency files, as in gcc
   -L DIR -l NAME        libraries; the run-time library is always searched last
   -nostdlib -nostartfiles -nodefaultlibs                        leave out run-time library, crt0

@@ -28,7 +28,8 @@ def test_program(program: str, level: str, lto: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "header",
     ["array", "algorithm", "atomic", "chrono", "functional", "limits", "memory", "numeric", "optional", "ratio",
-     "string", "string_view", "tuple", "type_traits", "utility", "variant", "vector", "cassert", "cctype", "cfloat", "cinttypes",
+     "string", "string_view", "tuple", "type_traits", "utility", "variant", "vector", "cassert", "cctype",
+     "cfloat", "cinttypes",
      "climits", "cmath", "csetjmp", "cstdarg", "cstddef", "cstdint", "cstdio", "cstdlib", "cstring", "ctime", "new",
      "initializer_list", "iterator"],
 )  # fmt: skip
