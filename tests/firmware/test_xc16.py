@@ -21,7 +21,7 @@ from tests.firmware.conftest import FIRMWARE, ROOT
 
 APPS = ["hello", "listing1", "processors", "footprint", "latency", "stress"]
 OPTIONS = (
-    r"-mcpu=30F6014A|-omf=elf|-std=gnu99|-Os|-g|-fno-short-double|-Wall|-Wextra|-o|-D\w+(=.*)?|-I\S+"
+    r"-mcpu=30F6014A|-omf=elf|-std=gnu99|-Os|-g|-fno-short-double|-Wall|-Wextra|-o|-D\w+(=.*)?|-I\S+|-Wa,-I\S+"
     r"|-Wl(,(--script=p30F6014A\.gld|-Map=\S+?))+"
 )
 STAND_IN = f'''#!{sys.executable}
@@ -31,7 +31,7 @@ words = sys.argv[1:]
 for word in words:
     if word.startswith("-") and not known.fullmatch(word):
         sys.exit("xc16-gcc: unknown option " + word)
-kept = [w for w in words if not re.match("-mcpu|-omf|-std|-fno-short-double|-Wl", w)]
+kept = [w for w in words if not re.match("-mcpu|-omf|-std|-fno-short-double|-W[la],", w)]
 sys.exit(subprocess.run([sys.executable, "-m", "toolchain", "cc", *kept]).returncode)
 '''
 DIRECTIVES = {".equ", ".global", ".text", ".bss", ".space", ".macro", ".endm", ".ifndef", ".endif", ".irp", ".endr"}
@@ -82,6 +82,14 @@ def test_it_builds_and_the_measuring_commands_find_their_symbols(stand_in: Path,
     assert main(["footprint", str(make(stand_in, "footprint", tmp_path / "footprint"))]) == 0
     assert "exact for all" in capsys.readouterr().out
     assert main(["run", str(make(stand_in, "listing1", tmp_path / "listing1")), "--seconds", "0.4"]) == 0
+
+
+def test_the_assembler_is_told_where_interrupt_entries_are() -> None:
+    """openswarm_interrupt.h includes isr.inc in assembly within C, and a GCC of that age gives its assembler no -I."""
+    command = ["make", "-n", "-C", str(FIRMWARE), "APP=spi", "TOOLCHAIN=xc16", "OUT=build/never"]
+    words = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    folders = [word.removeprefix("-Wa,-I") for word in words if word.startswith("-Wa,-I")]
+    assert any((FIRMWARE / folder / "isr.inc").exists() for folder in folders)
 
 
 def test_an_option_of_ours_is_none_of_theirs(stand_in: Path) -> None:
