@@ -12,7 +12,7 @@ from arena import bodies
 from arena.controllers import steps_per_second
 from arena.look import NOTHING, OBJECT
 from arena.scene import FCY, Scene
-from arena.vision import Eye, sensor_of
+from arena.sight import Sight
 from arena.world import STREAM_SENSORS, STREAM_START, Poses, generator, traits_of
 
 LATENCY_TCY: Final = 258_484
@@ -109,29 +109,28 @@ class ScriptedBrain:
         self._quantum = scene.clock.quantum_tcy
         self._next_look = switched_on(scene, seed, robot) + FIRST_LOOK_TCY
         self._goes_at = told_at(scene) + OK_DECODED_TCY if scene.start_of(robot).remote else 0
-        self._traits = traits_of(scene, seed, robot)
+        self._sight = Sight(scene, robot, traits_of(scene, seed, robot))
         self._rng = generator(seed, STREAM_SENSORS, robot)
         self._missing = scene.camera.false_negative
         self._inventing = scene.camera.false_positive
         self._reading = Reading()
         self._wheels = self._wanted = (0.0, 0.0)
         self._change_at = NEVER
-        self._before: tuple[float, float, float] | None = None
+        self._before: Poses | None = None
 
     def think(self, tick: int, poses: Poses) -> tuple[float, float]:
         """As `Brain.think`. A change in the middle of the quantum counts with its share."""
         start = tick * self._quantum
         end = start + self._quantum
-        pose = poses.robots[self._robot]
         if self._next_look < end:
-            ahead = max(self._next_look - start, 0) / self._quantum
-            self._reading.seen = seen = self._look(poses, extrapolated(self._before or pose, pose, ahead))
+            self._sight.look(poses, self._before, max(self._next_look - start, 0) / self._quantum)
+            self._reading.seen = seen = self._sensed()
             if self._next_look + LATENCY_TCY >= self._goes_at:
                 left, right = steps_per_second(self._controller, seen)
                 self._wanted = left * bodies.CM_PER_STEP, right * bodies.CM_PER_STEP
                 self._change_at = self._next_look + LATENCY_TCY
             self._next_look += self._scene.camera.frame_tcy
-        self._before = pose
+        self._before = poses
         if self._change_at >= end:
             return self._wheels
         old, new = self._wheels, self._wanted
@@ -139,8 +138,8 @@ class ScriptedBrain:
         self._wheels, self._change_at = new, NEVER
         return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])
 
-    def _look(self, poses: Poses, pose: tuple[float, float, float]) -> int:
-        seen = sensor_of(Eye(self._scene, poses, self._robot, pose, self._traits))
+    def _sensed(self) -> int:
+        seen = self._sight.sensor()
         if seen != NOTHING and self._missing and self._rng.random() < self._missing:
             return NOTHING
         if seen == NOTHING and self._inventing and self._rng.random() < self._inventing:
@@ -164,14 +163,3 @@ class ScriptedBrain:
 
     def close(self) -> None:
         """Nothing to give back."""
-
-
-def extrapolated(
-    before: tuple[float, float, float], pose: tuple[float, float, float], quanta: float
-) -> tuple[float, float, float]:
-    """Where a robot will be after a share of a quantum if it goes on as in the last one."""
-    return (
-        pose[0] + quanta * (pose[0] - before[0]),
-        pose[1] + quanta * (pose[1] - before[1]),
-        pose[2] + quanta * (pose[2] - before[2]),
-    )

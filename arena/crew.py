@@ -17,15 +17,17 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from typing import Any, Final
 
+import numpy as np
+
 from arena.brain import Brain, Lights, Line, Reading
 from arena.ether import Ether, Switch
-from arena.world import Poses, Table
+from arena.world import Poses
 
 THINK, SAMPLE, TELL, ANSWER, FAILED = b"t", b"s", b"m", b"a", b"f"
 """First byte of a message: a quantum begins; what is to be recorded is asked for; something for a robot, which is not
 answered; what a crew answers."""
-_HEAD: Final = struct.Struct("<qqqqq")
-"""Tick, numbers of robots and objects, bytes of their table, number of switches."""
+_HEAD: Final = struct.Struct("<qqqq")
+"""Tick, number of robots, of the numbers that say where everything is, and of switches."""
 _SWITCH: Final = struct.Struct("<qqqq")
 LOOKS: Final = 3_000
 """How often a reader looks for the next message before it sleeps until one comes: about 0.15 ms, in which the other
@@ -36,27 +38,16 @@ Make = Callable[[Sequence[int], Ether | None], list[Brain]]
 
 def packed(tick: int, poses: Poses, switches: Sequence[Switch]) -> bytes:
     """The message that begins a quantum."""
-    values, robots, objects = poses.table or _table_of(poses)
-    head = _HEAD.pack(tick, len(robots), len(objects), len(values), len(switches))
-    places = struct.pack(f"<{len(robots) + len(objects)}q", *robots, *objects)
-    return THINK + head + places + values + _packed_switches(switches)
+    head = _HEAD.pack(tick, poses.counts[0], len(poses.values), len(switches))
+    return THINK + head + poses.values.tobytes() + _packed_switches(switches)
 
 
 def unpacked(message: bytes) -> tuple[int, Poses, list[Switch]]:
     """The inverse of `packed`."""
-    tick, robots, objects, size, switches = _HEAD.unpack_from(message, 1)
+    tick, robots, count, switches = _HEAD.unpack_from(message, 1)
     start = 1 + _HEAD.size
-    places = struct.unpack_from(f"<{robots + objects}q", message, start)
-    start += 8 * len(places)
-    table = Table(message[start : start + size], places[:robots], places[robots:])
-    return tick, Poses.of(table), _unpacked_switches(message, start + size, switches)
-
-
-def _table_of(poses: Poses) -> Table:
-    numbers = [value for place in (*poses.robots, *poses.objects) for value in place]
-    end = 24 * len(poses.robots)
-    objects = range(end, end + 16 * len(poses.objects), 16)
-    return Table(struct.pack(f"{len(numbers)}d", *numbers), tuple(range(0, end, 24)), tuple(objects))
+    values = np.frombuffer(message, np.float64, count, start)
+    return tick, Poses.of(values, robots), _unpacked_switches(message, start + values.nbytes, switches)
 
 
 def _packed_switches(switches: Sequence[Switch]) -> bytes:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,12 +19,12 @@ from numpy.typing import NDArray
 
 import emu
 from arena import bodies
-from arena.brain import STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, extrapolated, switched_on, told_at
+from arena.brain import STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, switched_on, told_at
 from arena.ether import Ether
 from arena.infrared import Ring
 from arena.look import colours_of
 from arena.scene import FCY, BatterySetting, Scene
-from arena.vision import Eye
+from arena.sight import Sight
 from arena.world import STREAM_SENSORS, Poses, generator, traits_of
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.remote import REPEAT_SECONDS
@@ -52,6 +53,10 @@ _NOISE: Final = 1 << 14
 """Values of pixel noise drawn once per robot; each line of pixels starts at a random one."""
 
 
+LookAt = Callable[[int], tuple[Poses, Poses]]
+"""look_at(tick): poses at the beginning of a quantum, and a quantum before."""
+
+
 class EmulatedBrain:
     """A machine with `image` (ELF or HEX), switched on at its own moment; `selector` is the switch's position, `ether`
     what the robots of a trial share to see each other's infrared emitters.
@@ -67,15 +72,11 @@ class EmulatedBrain:
         self._quantum = scene.clock.quantum_tcy
         self._on_at = switched_on(scene, seed, robot)
         self._rng = generator(seed, STREAM_SENSORS, robot)
-        self._traits = traits_of(scene, seed, robot)
+        self._sight = Sight(scene, robot, traits_of(scene, seed, robot))
         self._colours = colours_of(scene).astype(np.int16)
         noise = self._rng.normal(0.0, scene.camera.pixel_noise, _NOISE + 3 * 640)
         self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
-        self._shown: Final = [
-            np.stack([_noisy(np.resize(np.roll(one, phase), len(noise)), self._noise) for one in self._colours])
-            for phase in range(3)
-        ]
-        """Values of a pixel of each class with each noise; by where in the noise a red one is, modulo 3."""
+        self._noise_at: Final = self._noise.ctypes.data
         board = partial(Epuck, camera=scene.camera.sensor, selector=selector, seed=seed * 1000 + robot)
         self.machine = emu.load(image, board=board)
         self._board: Epuck = self.machine.board
@@ -86,12 +87,19 @@ class EmulatedBrain:
         self.machine.uart[1].on_byte = self._byte
         ether = ether or Ether(scene.robots.count, self._quantum)
         self._ring = Ring(scene, self._board, ether, robot, self._on_at)
-        self._poses = Poses([], [])
-        self._pose = (0.0, 0.0, 0.0)
-        self._before = self._pose
+        self._poses = self._before = Poses([], [])
         self._start = 0
+        self._looked = -1
+        self._look_at: LookAt | None = None
+        self.lived = 0
+        """Quanta that are over for this robot."""
+        self._cuts: list[int] = []
+        self._told_cuts = 0
+        self._speeds: dict[int, tuple[float, float]] = {}
         window = max(round(WINDOW_S / (self._quantum / FCY)), 1)
         self._counts: deque[tuple[int, int]] = deque([(0, 0)], maxlen=window + 1)
+        self._rates = [0.0, *(bodies.CM_PER_STEP * FCY / (self._quantum * count) for count in range(1, window + 1))]
+        self._board.motors.remember()
         self._lights: list[Lights] = []
         self._leds = 0
         for bit, pin in enumerate(LED_PINS.values()):
@@ -128,33 +136,92 @@ class EmulatedBrain:
 
     def think(self, tick: int, poses: Poses) -> tuple[float, float]:
         """As `Brain.think`."""
-        end = (tick + 1) * self._quantum - self._on_at
-        if end <= 0 or self._fault:
-            return 0.0, 0.0
-        self._look_around(tick, poses)
-        machine = self.machine
-        reached = 0
-        while reached < end:
-            stop = machine.run_until(min(self._probe_at, end))
-            if stop is not None:
-                place = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}"
-                said = f"stopped: {place}: {stop.fault.cause if stop.fault else stop.detail}".rstrip(":, ")
-                self._fault = self._told if self._told and machine.is_asleep else said
-                return 0.0, 0.0
-            reached = machine.cycle
-            if reached >= self._probe_at:
-                self._probes += 1
-                self._busy += not machine.is_asleep
-                self._watch()
-                self._probe_at = reached + 1 + int(self._rng.integers(2 * PROBE_TCY))
-        return self._speeds()
+        self.lived = tick
+        if self._end_of(tick) > 0 and not self._fault:
+            self._see(tick, poses, self._poses if self._poses.counts[0] else poses)
+        self.live(tick + 1)
+        return self.speed(tick)
 
-    def _look_around(self, tick: int, poses: Poses) -> None:
-        pose = poses.robots[self._robot]
-        self._before = self._pose if self._poses.robots else pose
-        self._poses, self._pose = poses, pose
-        self._start = tick * self._quantum - self._on_at
+    def join(self, look_at: LookAt) -> None:
+        """Ask for poses from now on, when they are looked at, instead of being told them by `think`."""
+        self._look_at = look_at
+        self._ring.look = self._sense_first
+
+    def speed(self, tick: int) -> tuple[float, float]:
+        """Wheel speeds (left, right) in cm/s during a quantum that is over; asked for once."""
+        return self._speeds.pop(tick)
+
+    def live(self, ticks: int) -> None:
+        """Live until so many quanta are over. A robot whose infrared sensors are read sees every one of them begin."""
+        while self.lived < ticks:
+            if self._fault or self._end_of(self.lived) <= 0:
+                self._speeds[self.lived] = 0.0, 0.0
+                self.lived += 1
+            elif self._look_at is not None and self._ring.is_read:
+                self._see(self.lived, *self._look_at(self.lived))
+                self._run(self.lived + 1)
+            else:
+                self._run(ticks)
+
+    def _end_of(self, tick: int) -> int:
+        """Cycle of the machine in which a quantum ends."""
+        return (tick + 1) * self._quantum - self._on_at
+
+    def _run(self, ticks: int) -> None:
+        """Run until so many quanta are over, or to the next probe."""
+        machine = self.machine
+        self._cuts, self._told_cuts = [], 0
+        last = min(self._probe_at, self._end_of(ticks - 1))
+        stop = machine.run_past(self._end_of(self.lived), self._quantum, last, self._cuts)
+        self._settle()
+        if stop is not None:
+            place = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}"
+            said = f"stopped: {place}: {stop.fault.cause if stop.fault else stop.detail}".rstrip(":, ")
+            self._fault = self._told if self._told and machine.is_asleep else said
+            return
+        reached = machine.cycle
+        if reached >= self._probe_at:
+            self._probes += 1
+            self._busy += not machine.is_asleep
+            self._watch()
+            self._probe_at = reached + 1 + int(self._rng.integers(2 * PROBE_TCY))
+
+    def _settle(self) -> None:
+        """Speeds of the quanta that have ended in this run, by the steps made when they did."""
+        new = self._cuts[self._told_cuts :]
+        if not new:
+            return
+        self._told_cuts += len(new)
+        counts, rates, speeds = self._counts, self._rates, self._speeds
+        for left, right in self._board.motors.steps_by(new):
+            counts.append((left, right))
+            left0, right0 = counts[0]
+            rate = rates[len(counts) - 1]
+            speeds[self.lived] = (left - left0) * rate, (right - right0) * rate
+            self.lived += 1
+
+    def _see(self, tick: int, poses: Poses, before: Poses) -> None:
+        """A quantum begins with `poses`; `before` are those a quantum ago."""
+        self._looked, self._start = tick, tick * self._quantum - self._on_at
+        self._poses, self._before = poses, before if self._end_of(tick - 1) > 0 else poses
         self._ring.move(poses)
+
+    def _sense_first(self) -> Poses:
+        """The firmware reads its infrared sensors for the first time: from now on every quantum is seen to begin."""
+        self.machine.end_at_cut()
+        return self._look_now()
+
+    def _look_now(self) -> Poses:
+        """Poses of the quantum in which the firmware looks at something, in the middle of a run."""
+        if self._look_at is not None:
+            self.machine.cuts_so_far()
+            tick = self.lived - self._told_cuts + len(self._cuts)
+            if tick != self._looked:
+                self._settle()
+                poses, before = self._look_at(tick)
+                self._looked, self._start = tick, tick * self._quantum - self._on_at
+                self._poses, self._before = poses, before if self._end_of(tick - 1) > 0 else poses
+        return self._poses
 
     def _watch(self) -> None:
         """Notice firmware that does nothing more: it sits in a trap's handler, or sleeps and nothing can wake it."""
@@ -185,27 +252,16 @@ class EmulatedBrain:
             since = (self._active_at + self._on_at) / FCY
             self._told = f"is silent: no motor step, LED or byte since {since:.1f} s"
 
-    def _speeds(self) -> tuple[float, float]:
-        left, right = self._board.motors.steps()
-        self._counts.append((left, right))
-        left0, right0 = self._counts[0]
-        rate = bodies.CM_PER_STEP * FCY / (self._quantum * (len(self._counts) - 1))
-        return (left - left0) * rate, (right - right0) * rate
-
     # -- what the firmware reads and says ----------------------------------------------------------------------------
 
     def _pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
-        pose = extrapolated(self._before, self._pose, (cycle - self._start) / self._quantum)
-        eye = Eye(self._scene, self._poses, self._robot, pose, self._traits)
-        seen = eye.classes(y, columns)
-        first, count = int(self._rng.integers(_NOISE)), len(columns)
-        if self._scene.camera.vignetting:
-            bright = eye.lens.vignetting(y, columns, self._scene.camera.vignetting)
-            colours = np.rint(self._colours[seen] * bright[:, None]).astype(np.int16)
-            pixels = _noisy(colours, self._noise[first : first + 3 * count].reshape(-1, 3))
-        else:
-            shown = self._shown[first % 3][:, first : first + 3 * count].reshape(-1, count, 3)
-            pixels = shown[seen] if isinstance(seen, int) else shown[seen, np.arange(count)]
+        self._look_now()
+        self._sight.look(self._poses, self._before, (cycle - self._start) / self._quantum)
+        first = int(self._rng.integers(_NOISE))
+        dark = self._scene.camera.vignetting
+        bright = self._sight.lens.vignetting(y, columns, dark) if dark else None
+        colours, noise = self._colours.ctypes.data, self._noise_at + self._noise.itemsize * first
+        pixels = self._sight.pixels(y, columns, colours, noise, bright)
         if y in _STRIP_ROWS:
             self._strip = columns, pixels
         return pixels
@@ -256,12 +312,6 @@ class EmulatedBrain:
 
     def close(self) -> None:
         """Memory goes with the object."""
-
-
-def _noisy(colours: NDArray[np.int16], noise: NDArray[np.int16]) -> NDArray[np.uint8]:
-    """Red, green and blue as the sensor tells them."""
-    values: NDArray[np.uint8] = np.minimum(np.maximum(colours + noise, 0), 255).astype(np.uint8)
-    return values
 
 
 def volts_after(battery: BatterySetting, seconds: float) -> float:

@@ -22,8 +22,8 @@ from arena.emulated import EmulatedBrain
 from arena.ether import Ether
 from arena.experiments import Experiment, Moments, experiment_of
 from arena.scene import FCY, Scene, load_scene, scripted
+from arena.sight import Sight
 from arena.stage import Stage, Supervised
-from arena.vision import Eye, sensor_of
 from arena.world import World, traits_of
 from emu.boards.epuck.analog import reflection_at
 
@@ -110,7 +110,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         else:
             self._brains = [EmulatedBrain(self.scene, chosen, robot, self._image, 0, ether) for robot in range(count)]
         self._supervised = Supervised(self.experiment, Stage(self._world, self._brains, chosen))
-        self._traits = [traits_of(self.scene, chosen, robot) for robot in range(count)]
+        self._sights = [Sight(self.scene, robot, traits_of(self.scene, chosen, robot)) for robot in range(count)]
         self._speeds = [(0.0, 0.0)] * count
         self._value = self._metric()
         return self._observed(), {agent: {} for agent in self.agents}
@@ -174,7 +174,8 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         found = {}
         for robot, agent in enumerate(self.agents):
             sensed = [0.0] * SENSED
-            sensed[sensor_of(Eye(self.scene, poses, robot, None, self._traits[robot]))] = 1.0
+            self._sights[robot].look(poses)
+            sensed[self._sights[robot].sensor()] = 1.0
             near = [share * reflection_at(distance) / FULL_REFLECTION if math.isfinite(distance) else 0.0
                     for distance, share in infrared.surfaces(self.scene, poses, robot)]  # fmt: skip
             light = [counts / FULL_LIGHT for counts in infrared.ambient(self.scene, poses.robots[robot])]

@@ -27,6 +27,8 @@ class Ether:
 
     robots: int
     quantum: int
+    slowest: int = 1 << 62
+    """Cycle of the trial before which nobody asks any more than four quanta, where robots run ahead of each other."""
     _cycles: list[list[int]] = field(init=False)
     _lines: list[list[int]] = field(init=False)
     _news: list[Switch] = field(init=False)
@@ -44,7 +46,7 @@ class Ether:
         robot, cycle, line, lit = switch
         cycles, lines = self._cycles[robot], self._lines[robot]
         state = lines[-1] | 1 << line if lit else lines[-1] & ~(1 << line)
-        if len(cycles) > _KEPT and cycles[_KEPT // 2] < cycle - 4 * self.quantum:
+        if len(cycles) > _KEPT and cycles[_KEPT // 2] < min(cycle, self.slowest) - 4 * self.quantum:
             del cycles[: _KEPT // 2], lines[: _KEPT // 2]
         cycles.append(cycle)
         lines.append(state)

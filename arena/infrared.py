@@ -48,7 +48,10 @@ class Ring:
         self._on_at = on_at
         self._poses = Poses([], [])
         self._is_stale = True
-        self._is_read = False
+        self.is_read = False
+        """Whether the firmware has ever converted one of the sensors."""
+        self.look: Callable[[], Poses] | None = None
+        """Where poses come from before that; later `move` tells them."""
         self._heard: list[list[tuple[int, int, float]]] = [[] for _ in range(SENSORS)]
         for line, pin in enumerate(PULSE_PINS):
             board.chip.pins.watch(pin, partial(self._switched, line))
@@ -59,7 +62,7 @@ class Ring:
 
     def move(self, poses: Poses) -> None:
         """A quantum begins. What was sampled before it is made final first."""
-        if self._is_read:
+        if self.is_read:
             self._board.chip.adc.catch_up(self._board.chip.adc.now)
         self._poses = poses
         self._is_stale = True
@@ -67,7 +70,7 @@ class Ring:
     @property
     def readings(self) -> list[int] | None:
         """Counts by which the own emitters lower the sensors when lit; None if none was ever converted."""
-        return list(self._board.ir.reflection) if self._is_read else None
+        return list(self._board.ir.reflection) if self.is_read else None
 
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
         self._ether.switch(self._robot, self._on_at + cycle, line, bool(levels & changed))
@@ -83,7 +86,9 @@ class Ring:
         return max(level - (round(min(light, SATURATION)) << 4), 0)
 
     def _sense(self) -> None:
-        self._is_stale, self._is_read = False, True
+        if self.look is not None and not self.is_read:
+            self._poses = self.look()
+        self._is_stale, self.is_read = False, True
         ir = self._board.ir
         for sensor, (distance, share) in enumerate(surfaces(self._scene, self._poses, self._robot)):
             ir.reflection[sensor] = round(reflection_at(distance) * share)

@@ -18,26 +18,6 @@ from arena.scene import CameraSetting
 
 _LAST_COLUMN, _LAST_ROW = 639, 479
 Floats = NDArray[np.float64]
-ROWS_KEPT: Final = 2048
-"""Rows whose rays are remembered: more than any setting of a sensor has."""
-
-
-class Rays:
-    """The rays through some columns of a row, and what is derived from them once."""
-
-    def __init__(self, left: Floats, up: Floats) -> None:
-        self.left: Final = left
-        self.up: Final = up
-        self.length2: Final = 1 + left * left
-        """Squares of lengths over the floor, per depth."""
-        self.length: Final = np.sqrt(self.length2)
-        self.longest: Final = float(self.length.max())
-        self.basis: Final = np.stack([np.ones_like(left), left])
-        """What is linear in the slope is two numbers times this."""
-        self.right_most, self.left_most = float(left.min()), float(left.max())
-        self.lowest, self.highest = float(up.min()), float(up.max())
-
-
 class Lens:
     """A camera as it is mounted: `pitch_deg` up positive, `mirrored` as if the sensor stood on its head, `distortion`
     k: a pixel at distance r (in focal lengths) from the axis shows what is at r (1 + k r^2); positive is a barrel."""
@@ -49,7 +29,6 @@ class Lens:
         edges = [self.line(v, np.array([0, _LAST_COLUMN])) for v in (0, _LAST_ROW)]
         self.widest: Final = max(float(np.abs(left).max()) for left, _ in edges) + 0.01
         """No ray of the picture has a larger slope to the side."""
-        self._rows: dict[tuple[float, bytes], Rays] = {}
         self._columns: dict[tuple[float, tuple[int, ...]], list[tuple[float, float]]] = {}
 
     def column(self, u: float, rows: tuple[int, ...]) -> list[tuple[float, float]]:
@@ -73,16 +52,6 @@ class Lens:
             ahead = self._cos - up * self._sin
             left, up = left / ahead, (up * self._cos + self._sin) / ahead
         return left, up
-
-    def row(self, v: float, columns: NDArray[np.intp]) -> Rays:
-        """As `line`; a camera asks for the same rows and columns again and again."""
-        key = v, columns.tobytes()
-        rays = self._rows.get(key)
-        if rays is None:
-            if len(self._rows) >= ROWS_KEPT:
-                self._rows.clear()
-            rays = self._rows[key] = Rays(*self.line(v, columns))
-        return rays
 
     def vignetting(self, v: float, columns: NDArray[np.intp], share: float) -> Floats:
         """Brightness of some pixels of a row if the corners of the picture are darker by `share`."""

@@ -19,7 +19,7 @@ from arena.look import colours_of
 from arena.record import Trial
 from arena.scene import Scene
 from arena.scenery import NAMED, Obstacle, Patch
-from arena.vision import Eye, sensor_of
+from arena.sight import Sight
 from arena.world import Poses, traits_of
 
 TEMPLATE: Final = Path(__file__).with_name("page.html")
@@ -116,14 +116,15 @@ def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     for robot in range(count):
         seen, strips = list(map(int, trial.columns[f"r{robot}_seen"])), list(trial.columns[f"r{robot}_strip"])
         is_script = not any(strips)
+        sight = Sight(scene, robot, traits_of(scene, seed, robot))
         for sample, (places, things) in enumerate(zip(robots, objects, strict=True)):
             if seen[sample] >= 0 and not is_script:
                 continue
             poses = Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(places)], things)
-            eye = Eye(scene, poses, robot, None, traits_of(scene, seed, robot))
+            sight.look(poses)
             if seen[sample] < 0:
-                seen[sample] = sensor_of(eye)
+                seen[sample] = sight.sensor()
             if is_script:
-                strips[sample] = colours[np.broadcast_to(eye.classes(_MIDDLE_ROW, _STRIP), len(_STRIP))].tobytes()
+                strips[sample] = colours[sight.classes(_MIDDLE_ROW, _STRIP)].tobytes()
         views.append((seen, strips))
     return views

@@ -44,6 +44,15 @@ class Stage:
         return self._world.seconds
 
     @property
+    def ticks(self) -> int:
+        """Quanta that are over."""
+        return self._world.ticks
+
+    def seconds_at(self, tick: int) -> float:
+        """Time after so many quanta."""
+        return self._world.seconds_at(tick)
+
+    @property
     def robots(self) -> NDArray[np.float64]:
         """n x 3: cm, cm, rad."""
         return np.array(self._world.poses.robots, dtype=float).reshape(-1, 3)
@@ -89,9 +98,13 @@ class Supervised:
         if self._experiment is not None:
             self._call("init", self._experiment.init)
 
+    def is_due(self, tick: int) -> bool:
+        """Whether there is something to do after so many quanta."""
+        return self._experiment is not None and self.stage.seconds_at(tick) >= self._steps * STEP_S - 1e-9
+
     def is_over(self) -> bool:
         """After a quantum: step if it is time to; whether the trial is done."""
-        if self._experiment is None or self.stage.seconds < self._steps * STEP_S - 1e-9:
+        if self._experiment is None or not self.is_due(self.stage.ticks):
             return False
         self._steps += 1
         self._call("step", self._experiment.step)

@@ -14,6 +14,7 @@ from arena.brain import Brain
 from arena.crew import Crew
 from arena.ether import Ether
 from arena.experiments import Experiment
+from arena.lockstep import LockStep, Runner
 from arena.scene import Scene
 from arena.stage import Stage, Supervised
 from arena.world import World
@@ -69,24 +70,52 @@ def run_trial(
     wheels: list[tuple[float, float]] = [STOPPED] * len(brains)
     recorder.sample(wheels)
     samples = 1
-    for tick in range(quanta):
-        poses = world.poses
-        if crews:
-            switches = ether.take() if ether is not None else []
-            for crew in crews:
-                crew.begin(tick, poses, switches)
-        wheels = [brain.think(tick, poses) for brain in brains]
-        world.step(wheels)
+
+    def is_sample(tick: int) -> bool:
+        """A sample is the end of the quantum nearest to the time asked."""
+        return world.seconds_at(tick) >= samples * scene.clock.sample_s - world.dt / 2
+
+    ahead = None if crews else _together(world, brains, ether)
+    while world.ticks < quanta:
+        tick = world.ticks
+        if ahead is not None:
+            until = tick + 1
+            while until < quanta and not (until % per_second == 0 or is_sample(until) or supervised.is_due(until)):
+                until += 1
+            wheels = ahead.advance(until)
+        else:
+            wheels = _quantum(world, brains, crews, ether)
         is_over = supervised.is_over()
-        # a sample is the end of the quantum nearest to the time asked
-        if is_over or world.seconds >= samples * scene.clock.sample_s - world.dt / 2:
+        if ahead is not None:
+            ahead.moved()
+        if is_over or is_sample(world.ticks):
             recorder.sample(wheels)
             samples += 1
-        if progress is not None and (tick + 1) % per_second == 0:
+        if progress is not None and world.ticks % per_second == 0:
             progress(world.seconds)
         if is_over:
             break
     return Result(recorder.rows, recorder.faults)
+
+
+def _together(world: World, brains: Sequence[Brain], ether: Ether | None) -> LockStep | None:
+    """Demand lock-step, if all robots can run ahead."""
+    robots = [brain for brain in brains if isinstance(brain, Runner)]
+    return LockStep(world, robots, ether) if brains and len(robots) == len(brains) else None
+
+
+def _quantum(
+    world: World, brains: Sequence[Brain], crews: Sequence[Crew], ether: Ether | None
+) -> list[tuple[float, float]]:
+    """Think, act, physics; wheel speeds."""
+    tick, poses = world.ticks, world.poses
+    if crews:
+        switches = ether.take() if ether is not None else []
+        for crew in crews:
+            crew.begin(tick, poses, switches)
+    wheels = [brain.think(tick, poses) for brain in brains]
+    world.step(wheels)
+    return wheels
 
 
 class _Recorder:

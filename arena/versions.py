@@ -20,7 +20,7 @@ LIBRARIES: Final = ("pymunk", "numpy", "pyarrow", "llvmlite")
 SHOWING: Final = ("commands/", "cli.py", "plots.py", "film.py", "movie.py", "page.py", "report.py", "live.py",
                   "statistics.py", "bundle.py", "env.py", "README.md", "scenes/")  # fmt: skip
 """Of the arena: what only looks at records. A scene is in the key by its values."""
-_KINDS: Final = {".py", ".csv", ".toml"}
+_KINDS: Final = {".py", ".c", ".csv", ".toml"}
 
 
 @cache

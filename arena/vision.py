@@ -1,30 +1,23 @@
 """What a robot's camera sees: rays through pixel columns, with heights (epuck.md §7.6).
 
 A ray through column u hits discs and a wall; a pixel's row says at which height it passes each of them. What is
-nearest and tall enough is seen. `Eye.classes` answers for many columns of one row at once, `Eye.column` for one
-column: two ways to the same answer, compared in the tests. Lengths cm; rows and columns are those of the upright
-640 x 480 picture.
+nearest and tall enough is seen. This is the plain text of it, one column at a time; trials ask `sight.py`, which is
+compiled, and the tests compare the two. Lengths cm; rows and columns are those of the upright 640 x 480 picture.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any, Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Final
 
 from arena import bodies
-from arena.lens import Floats, Rays, lens_of
+from arena.lens import lens_of
 from arena.look import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL, Look, look_of
 from arena.scene import Scene
 from arena.world import Poses, Traits
 
-_NEAREST: Final = 0.05
+NEAREST: Final = 0.05
 """Depth of what touches the lens."""
-_SURE: Final = 1e-9
-"""More than rounding can make of a length or a slope."""
 Disc = tuple[float, float, float, float, int]
 """Ahead and left of the camera, radius, height, class."""
 
@@ -101,7 +94,7 @@ class Eye:
             root = b * b - a * c
             if root <= 0 or b <= 0:
                 continue
-            depth = max((b - math.sqrt(root)) / a, _NEAREST)
+            depth = max((b - math.sqrt(root)) / a, NEAREST)
             if depth <= reach:
                 found.append((depth, height, kind))
         for ax, ay, bx, by, height, kind in self._sides:
@@ -109,7 +102,7 @@ class Eye:
             if across:
                 depth, part = (ax * (by - ay) - ay * (bx - ax)) / across, (ax * slope - ay) / across
                 if depth > 0 and 0 <= part <= 1:
-                    found.append((max(depth, _NEAREST), height, kind))
+                    found.append((max(depth, NEAREST), height, kind))
         if self._look is not None:
             found += self._fixed(slope)
         found.sort()
@@ -125,7 +118,7 @@ class Eye:
             b, c = ahead + slope * left, ahead * ahead + left * left - radius * radius
             root = b * b - a * c
             if root > 0 and b > 0:
-                found.append((max((b - math.sqrt(root)) / a, _NEAREST), height, kind))
+                found.append((max((b - math.sqrt(root)) / a, NEAREST), height, kind))
         return found
 
     def _seen_from(self, x: float, y: float) -> tuple[float, float]:
@@ -148,7 +141,7 @@ class Eye:
         north = self._sin + slope * self._cos
         to_x = (self._width - self._x) / east if east > 0 else -self._x / east if east < 0 else math.inf
         to_y = (self._height - self._y) / north if north > 0 else -self._y / north if north < 0 else math.inf
-        return max(min(to_x, to_y), _NEAREST)
+        return max(min(to_x, to_y), NEAREST)
 
     def column(self, u: float, rows: tuple[int, ...], discs: list[Disc] | None = None) -> list[int]:
         """Classes of the pixels of one column in some rows."""
@@ -182,121 +175,6 @@ class Eye:
             for disc in self.discs
             if disc[1] - 1.1 * disc[2] <= left * disc[0] and disc[1] + 1.1 * disc[2] >= right * disc[0]
         ]
-
-    def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.intp] | int:
-        """Classes of the pixels of one row in some columns; one number if all are the same."""
-        rays = self.lens.row(v, columns)
-        if self._look is not None:
-            return self._furnished(rays)
-        seen = self._background(rays)
-        discs = [disc for disc in self.within(rays.right_most, rays.left_most) if _matters(disc, rays)]
-        if len(discs) == 1 and _is_plain(discs[0], rays, self._range):
-            ahead, left, radius, _, kind = discs[0]
-            b = ahead + rays.left * left
-            return np.where(b * b > rays.length2 * (ahead * ahead + left * left - radius * radius), kind, seen)
-        return self._with(discs, rays, seen) if discs else seen
-
-    def _furnished(self, rays: Rays) -> NDArray[np.intp]:
-        """Classes where there is more than discs between four walls: everything asked for every ray, nearest first."""
-        assert self._look is not None
-        slopes, rise = rays.left, rays.up
-        background = self._background(rays)
-        seen = np.full(len(slopes), background) if isinstance(background, int) else background.copy()
-        near = np.minimum((np.array(self._walls()) @ rays.basis).max(axis=0), 1 / _NEAREST)
-        blocked = 1 / np.maximum(near, 1e-12)
-        for depth, meets, height, kind in self._layers(rays):
-            z = bodies.CAMERA_HEIGHT + rise * depth
-            shows = meets & (z <= height) & (depth < blocked)
-            seen[shows] = np.where(z < 0, FLOOR, kind)[shows]
-            blocked = np.where(shows, depth, blocked)
-        if self._look.patches:
-            for place in np.flatnonzero(seen == FLOOR):
-                seen[place] = self._floor(float(slopes[place]), float(rise[place]))
-        return seen
-
-    def _layers(self, rays: Rays) -> Iterator[tuple[Floats, NDArray[np.bool_], float, int]]:
-        """Depth, whether met, height and class of every disc and side for all rays."""
-        assert self._look is not None
-        slopes, a = rays.left, rays.length2
-        fixed = [(*self._seen_from(x, y), radius, height, kind) for x, y, radius, height, kind in self._look.discs]
-        for number, (ahead, left, radius, height, kind) in enumerate((*self.discs, *fixed)):
-            b = ahead + slopes * left
-            root = b * b - a * (ahead * ahead + left * left - radius * radius)
-            depth = np.maximum((b - np.sqrt(np.maximum(root, 0.0))) / a, _NEAREST)
-            limit = self._range if number < len(self.discs) else math.inf
-            yield depth, (root > 0) & (b > 0) & (depth * rays.length <= limit), height, kind
-        for ax, ay, bx, by, height, kind in self._sides:
-            across = (by - ay) - slopes * (bx - ax)
-            across = np.where(across == 0, np.nan, across)
-            depth, part = (ax * (by - ay) - ay * (bx - ax)) / across, (ax * slopes - ay) / across
-            meets = (depth > 0) & (part >= 0) & (part <= 1)
-            yield np.maximum(np.where(meets, depth, math.inf), _NEAREST), meets, height, kind
-
-    def _with(self, discs: list[Disc], rays: Rays, background: NDArray[np.intp] | int) -> NDArray[np.intp]:
-        """Classes with discs in any order at any distance."""
-        slopes, rise, a = rays.left, rays.up, rays.length2
-        seen = np.full(len(slopes), background) if isinstance(background, int) else background
-        blocked: Any = math.inf
-        for ahead, left, radius, height, kind in discs:
-            b = ahead + slopes * left
-            root = b * b - a * (ahead * ahead + left * left - radius * radius)
-            meets = root > 0
-            depth = np.maximum((b - np.sqrt(np.maximum(root, 0.0))) / a, _NEAREST)
-            z = bodies.CAMERA_HEIGHT + rise * depth
-            shows = meets & (b > 0) & (depth * rays.length <= self._range) & (z <= height) & (depth < blocked)
-            seen[shows] = np.where(z < 0, FLOOR, kind)[shows]
-            blocked = np.where(shows, depth, blocked)
-        return seen
-
-    def _background(self, rays: Rays) -> NDArray[np.intp] | int:
-        """Classes without discs. Most rows show nothing but wall, or nothing but floor: two rays then tell it."""
-        walls = self._walls()
-        right = [across + along * rays.right_most for across, along in walls]
-        left = [across + along * rays.left_most for across, along in walls]
-        least = min(max(map(min, right, left)), 1 / _NEAREST)  # closeness to a wall is convex in the slope
-        most = min(max(*right, *left), 1 / _NEAREST)
-        over = bodies.WALL_HEIGHT - bodies.CAMERA_HEIGHT
-        if rays.lowest > -bodies.CAMERA_HEIGHT * least + _SURE and rays.highest < over * least - _SURE:
-            return WALL
-        if rays.highest < -bodies.CAMERA_HEIGHT * most - _SURE:
-            return FLOOR
-        near = np.minimum((np.array(walls) @ rays.basis).max(axis=0), 1 / _NEAREST)
-        seen = np.where(rays.up < -bodies.CAMERA_HEIGHT * near, FLOOR, WALL)
-        seen[rays.up > over * near] = ABOVE
-        return seen
-
-    def _walls(self) -> list[tuple[float, float]]:
-        """1 / depth at which rays meet each wall, as (a, b) in a + b slope. The largest of the four counts."""
-        cos, sin = self._cos, self._sin
-        right, top = 1 / max(self._width - self._x, _NEAREST), 1 / max(self._height - self._y, _NEAREST)
-        lower, bottom = -1 / max(self._x, _NEAREST), -1 / max(self._y, _NEAREST)
-        return [
-            (cos * right, -sin * right),
-            (cos * lower, -sin * lower),
-            (sin * top, cos * top),
-            (sin * bottom, cos * bottom),
-        ]
-
-
-def _heights(disc: Disc, rays: Rays) -> tuple[float, float]:
-    """Between which heights all rays are where they may meet a disc."""
-    near, far = max(disc[0] - disc[2], _NEAREST), max(disc[0] + disc[2], _NEAREST)
-    low, high = min(rays.lowest * near, rays.lowest * far), max(rays.highest * near, rays.highest * far)
-    return bodies.CAMERA_HEIGHT + low, bodies.CAMERA_HEIGHT + high
-
-
-def _matters(disc: Disc, rays: Rays) -> bool:
-    """False if all rays pass over a disc, or all meet the floor before it."""
-    low, high = _heights(disc, rays)
-    return low <= disc[3] + _SURE and high >= -_SURE
-
-
-def _is_plain(disc: Disc, rays: Rays, sight: float) -> bool:
-    """Whether every ray that is not led past a disc's side shows it: ahead, within sight, neither over nor under it."""
-    ahead, _, radius, height, _ = disc
-    low, high = _heights(disc, rays)
-    seen = ahead > radius + _NEAREST and (ahead + radius) * rays.longest < sight - _SURE
-    return seen and low > _SURE and high < height - _SURE
 
 
 # -- the sensor of the clustering firmware (openswarm-original.md §8, revision A) ------------------------------------

@@ -7,29 +7,27 @@ steps is only the wheel speeds given to it. The same calls give the same numbers
 from __future__ import annotations
 
 import math
-import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
+from functools import cache
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pymunk
-import pymunk.batch
 from numpy.typing import NDArray
+from pymunk._chipmunk_cffi import ffi, lib
 
 from arena import bodies, geometry
 from arena.placement import place_all
 from arena.scene import Scene
 from arena.scenery import ObjectKind
+from emu.hostcode import ADDRESS, functions
 
 ITERATIONS: Final = 20
 """Of the constraint solver (epuck.md §4)."""
 WALL_THICKNESS: Final = 20.0
 """Half thickness of the walls' segments in cm: nothing tunnels through."""
-_FIELDS: Final = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
-_POSE, _PLACE = struct.Struct("3d"), struct.Struct("2d")
-_set_velocity: Final[Any] = vars(pymunk.Body)["velocity"].fset
-_set_turning: Final[Any] = vars(pymunk.Body)["angular_velocity"].fset
-"""The setters behind the attributes, whose names are checked at a tenth of the cost of the physics."""
 STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT = range(6)
 """Independent generators of a trial: `generator(seed, stream, robot)`."""
 
@@ -59,40 +57,79 @@ def traits_of(scene: Scene, seed: int, robot: int) -> Traits:
 class Poses:
     """Where everything is, never changed. Robots: x, y, heading; objects: x, y. cm and rad."""
 
-    __slots__ = ("_objects", "robots", "table")
+    __slots__ = ("_objects", "_robots", "address", "counts", "values")
 
-    def __init__(
-        self,
-        robots: list[tuple[float, float, float]],
-        objects: list[tuple[float, float]] | None,
-        table: Table | None = None,
-    ) -> None:
-        self.robots: Final = robots
-        self._objects = objects
-        self.table: Final = table
-        """The same as bytes, if that is where they come from: the cheapest way to another process."""
+    def __init__(self, robots: Sequence[tuple[float, float, float]], objects: Sequence[tuple[float, float]]) -> None:
+        numbers = [value for place in (*robots, *objects) for value in place]
+        self._begin(np.array(numbers, dtype=np.float64), len(robots))
+
+    def _begin(self, values: NDArray[np.float64], robots: int) -> None:
+        self.values = values
+        """Robots, then objects, number after number."""
+        self.counts = robots, (len(values) - 3 * robots) // 2
+        self.address: int = values.ctypes.data
+        self._robots: list[tuple[float, float, float]] | None = None
+        self._objects: list[tuple[float, float]] | None = None
 
     @classmethod
-    def of(cls, table: Table) -> Poses:
-        """Objects are read when first asked for: most quanta end before anybody looks."""
-        return cls([_POSE.unpack_from(table.values, place) for place in table.robots], None, table)
+    def of(cls, values: NDArray[np.float64], robots: int) -> Poses:
+        """What is in `values`, which is not copied, of so many robots."""
+        poses = cls.__new__(cls)
+        poses._begin(values, robots)
+        return poses
+
+    @property
+    def robots(self) -> list[tuple[float, float, float]]:
+        """Poses of the robots."""
+        if self._robots is None:
+            count = 3 * self.counts[0]
+            numbers = self.values[:count].tolist()
+            self._robots = list(zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True))
+        return self._robots
 
     @property
     def objects(self) -> list[tuple[float, float]]:
         """Places of the objects."""
         if self._objects is None:
-            assert self.table is not None
-            values = self.table.values
-            self._objects = [_PLACE.unpack_from(values, place) for place in self.table.objects]
+            numbers = self.values[3 * self.counts[0] :].tolist()
+            self._objects = list(zip(numbers[::2], numbers[1::2], strict=True))
         return self._objects
 
 
-class Table(NamedTuple):
-    """Doubles of any bodies as bytes: at which offsets those of robots (x, y, heading) and objects (x, y) are."""
+class _Chipmunk(Structure):
+    """The physics library's functions that `world.c` calls, by their names there."""
 
-    values: bytes
-    robots: tuple[int, ...]
-    objects: tuple[int, ...]
+    NAMES: Final = ("cpSpaceStep", "cpBodySetVelocity", "cpBodySetAngularVelocity", "cpBodyGetPosition",
+                    "cpBodyGetAngle", "cpConstraintSetMaxForce")  # fmt: skip
+    _fields_ = [(name, c_void_p) for name in NAMES]
+
+
+class _Robot(Structure):
+    _fields_ = [
+        *((name, c_void_p) for name in ("body", "moved", "push", "turn")),
+        ("bias", c_double * 2), ("noise", c_double * 2), ("rests", c_int64),
+    ]  # fmt: skip
+
+
+class _World(Structure):
+    _fields_ = [
+        ("chipmunk", _Chipmunk), ("space", c_void_p),
+        *((name, c_double) for name in ("dt", "axle", "thrust", "thrust_turning", "brake", "brake_turning")),
+        ("robot_count", c_int64), ("object_count", c_int64),
+        ("robots", POINTER(_Robot)), ("objects", POINTER(c_void_p)),
+    ]  # fmt: skip
+
+
+@cache
+def _code() -> dict[str, Callable[..., Any]]:
+    return functions(Path(__file__).with_name("world.c"), {
+        "quantum": (None, (ADDRESS, ADDRESS)), "poses": (None, (ADDRESS, ADDRESS)),
+    })  # fmt: skip
+
+
+def _address(thing: Any) -> int:
+    """Where an object or a function of the physics library is."""
+    return int(ffi.cast("intptr_t", thing))
 
 
 class World:
@@ -131,18 +168,37 @@ class World:
         self.space.collision_slop = 0.01
         self._add_walls()
         self._add_obstacles()
-        self._bias = [traits_of(scene, seed, robot).bias for robot in range(len(robots))]
         self.robots = [self._add_robot(*pose) for pose in robots]
-        self._grips: list[tuple[pymunk.PivotJoint, pymunk.GearJoint] | None] = []
-        self._drives = [self._add_drive(body) for body in self.robots]
-        self._rests = [False] * len(robots)
+        self._joints: list[tuple[pymunk.PivotJoint, pymunk.GearJoint] | None] = []
+        drives = [self._add_drive(body) for body in self.robots]
         self.objects = [self._add_object(scene.kind_of(number), x, y) for number, (x, y) in enumerate(objects)]
         self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
-        self._noise = [(1.0, 1.0)] * len(robots)
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
-        self._buffer = pymunk.batch.Buffer()
-        self._robot_places, self._object_places = self._find_places()
+        self._hand_over(seed, drives)
         self.poses = self._read()
+
+    def _hand_over(self, seed: int, drives: Sequence[pymunk.Body | None]) -> None:
+        """Tell `world.c` what it moves. The bodies stay as long as the world does."""
+        code = _code()
+        self._quantum, self._tell_poses = code["quantum"], code["poses"]
+        self._robots = (_Robot * len(self.robots))()
+        parts = zip(self._robots, self.robots, drives, self._joints, strict=True)
+        for number, (robot, body, drive, joints) in enumerate(parts):
+            robot.body, robot.moved = _address(body._body), _address((drive or body)._body)
+            if joints is not None:
+                robot.push, robot.turn = (_address(joint._constraint) for joint in joints)
+            robot.bias[:] = traits_of(self.scene, seed, number).bias
+            robot.noise[:] = 1.0, 1.0
+        setting = self.scene.robots
+        forces = [force for newtons in (setting.thrust_n, setting.brake_n) for force in self._grip(newtons)]
+        self._objects = (c_void_p * len(self.objects))(*(_address(body._body) for body in self.objects))
+        self._world = _World(
+            _Chipmunk(*(_address(ffi.addressof(lib, name)) for name in _Chipmunk.NAMES)), _address(self.space._space),
+            self.dt, setting.axle_cm, *forces, len(self._robots), len(self._objects), self._robots, self._objects,
+        )  # fmt: skip
+        self._at = addressof(self._world)
+        self._wheels = np.zeros((len(self.robots), 2))
+        self._wheels_at = self._wheels.ctypes.data
 
     # -- building ----------------------------------------------------------------------------------------------------
 
@@ -182,26 +238,22 @@ class World:
     def _add_drive(self, robot: pymunk.Body) -> pymunk.Body | None:
         """The wheels: a body that moves as commanded and pulls the robot along with at most the tyres' grip."""
         if math.isinf(self.scene.robots.thrust_n):
-            self._grips.append(None)
+            self._joints.append(None)
             return None
         wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         push = pymunk.PivotJoint(wheels, robot, (0, 0), (0, 0))
         turn = pymunk.GearJoint(wheels, robot, 0.0, 1.0)
-        self._grips.append((push, turn))
-        self._hold(len(self._grips) - 1, self.scene.robots.thrust_n)
+        self._joints.append((push, turn))
+        push.max_force, turn.max_force = self._grip(self.scene.robots.thrust_n)
         for joint in (push, turn):
             joint.max_bias = 0.0
             self.space.add(joint)
         self.space.add(wheels)
         return wheels
 
-    def _hold(self, robot: int, force_n: float) -> None:
-        """How hard the wheels of a robot pull or hold it."""
-        joints = self._grips[robot]
-        if joints is not None:
-            push, turn = joints
-            push.max_force = bodies.newton(force_n)
-            turn.max_force = bodies.newton(force_n) * self.scene.robots.axle_cm / 2
+    def _grip(self, force_n: float) -> tuple[float, float]:
+        """Greatest force and torque with which wheels pull or hold a robot."""
+        return bodies.newton(force_n), bodies.newton(force_n) * self.scene.robots.axle_cm / 2
 
     def _add_object(self, setting: ObjectKind, x: float, y: float) -> pymunk.Body:
         """Its friction on the floor is two joints of limited force that want it to stand still."""
@@ -221,21 +273,8 @@ class World:
     def step(self, wheels: Sequence[tuple[float, float]]) -> None:
         """Act and physics: wheel speeds (left, right) in cm/s as commanded, for one quantum."""
         self._draw_noise()
-        axle, dt = self.scene.robots.axle_cm, self.dt
-        for index, (left, right) in enumerate(wheels):
-            noise = self._noise[index]
-            if (not left and not right) is not self._rests[index]:
-                self._rests[index] = not self._rests[index]
-                self._hold(index, self.scene.robots.brake_n if self._rests[index] else self.scene.robots.thrust_n)
-            left, right = left * noise[0] * self._bias[index][0], right * noise[1] * self._bias[index][1]
-            body, drive = self.robots[index], self._drives[index]
-            turn = (right - left) / axle
-            ahead = (left + right) / 2
-            heading = self.poses.robots[index][2] + turn * dt / 2
-            moved = drive if drive is not None else body
-            _set_velocity(moved, (ahead * math.cos(heading), ahead * math.sin(heading)))
-            _set_turning(moved, turn)
-        self.space.step(dt)
+        self._wheels[:] = wheels
+        self._quantum(self._at, self._wheels_at)
         self.ticks += 1
         self.poses = self._read()
 
@@ -251,31 +290,22 @@ class World:
         share = self.scene.robots.wheel_noise
         if not share or self.ticks % self._noise_ticks:
             return
-        for index, rng in enumerate(self._wheel_rng):
-            left, right = rng.uniform(1 - share, 1 + share, 2).tolist()
-            self._noise[index] = left, right
-
-    def _find_places(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Where the poses of robots and objects are in the bytes of pymunk's list of all bodies, which stays as it is
-        while none is removed."""
-        self._buffer.clear()
-        pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._buffer)
-        found = np.frombuffer(self._buffer.int_buf(), dtype=np.int64).tolist()
-        robots, objects = (
-            tuple(_POSE.size * found.index(body.id) for body in some) for some in (self.robots, self.objects)
-        )
-        return robots, objects
+        for robot, rng in zip(self._robots, self._wheel_rng, strict=True):
+            robot.noise[:] = rng.uniform(1 - share, 1 + share, 2).tolist()
 
     def _read(self) -> Poses:
-        """All poses in one call: asking body by body costs more than the physics."""
-        self._buffer.clear()
-        pymunk.batch.get_space_bodies(self.space, _FIELDS, self._buffer)
-        return Poses.of(Table(bytes(self._buffer.float_buf()), self._robot_places, self._object_places))
+        poses = Poses.of(np.empty(3 * len(self.robots) + 2 * len(self.objects)), len(self.robots))
+        self._tell_poses(self._at, poses.address)
+        return poses
 
     @property
     def seconds(self) -> float:
         """Time since the start."""
-        return self.ticks * self.scene.clock.quantum_tcy / 14_745_600
+        return self.seconds_at(self.ticks)
+
+    def seconds_at(self, tick: int) -> float:
+        """Time of the beginning of a quantum."""
+        return tick * self.scene.clock.quantum_tcy / 14_745_600
 
     def object_places(self) -> NDArray[np.float64]:
         """Objects' centres, n x 2, cm."""

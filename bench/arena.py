@@ -21,6 +21,7 @@ from arena.brain import Brain, ScriptedBrain
 from arena.campaign import Plan, brains_of
 from arena.emulated import EmulatedBrain
 from arena.firmware import image_for
+from arena.lockstep import LockStep
 from arena.scene import Scene, load_scene, scripted
 from arena.trial import run_trial
 from arena.world import World
@@ -53,12 +54,21 @@ def measure(scene: Scene, brains: list[Brain], seconds: float, warm_up: float) -
     for brain in brains:
         if isinstance(brain, EmulatedBrain):
             brain.machine.board.camera.sample(rendering.around(brain._pixels))
-    for tick in range(round((warm_up + seconds) / world.dt)):
-        if tick == round(warm_up / world.dt):
+    world.step = step  # type: ignore[method-assign]
+    robots = [brain for brain in brains if isinstance(brain, EmulatedBrain)]
+    lockstep = LockStep(world, robots) if robots else None
+    sample = round(scene.clock.sample_s / world.dt)
+    for tick in range(0, round((warm_up + seconds) / world.dt), sample):
+        if tick <= round(warm_up / world.dt) < tick + sample:
             physics.seconds = rendering.seconds = 0.0
             start = time.process_time(), time.perf_counter()
-        poses = world.poses
-        step([brain.think(tick, poses) for brain in brains])
+        if lockstep is not None:
+            lockstep.advance(tick + sample)
+        else:
+            for one in range(tick, tick + sample):
+                world.step([brain.think(one, world.poses) for brain in brains])
+        for brain in brains:
+            brain.reading(), brain.lines(), brain.lights()
     cpu, wall = time.process_time() - start[0], time.perf_counter() - start[1]
     return {
         "cpu_s": cpu / seconds,

@@ -127,6 +127,8 @@ class Machine(Contents, BySource):
         self._stopped_at: tuple[int, int] | None = None
         self._last_reset = ("", 0, 0, 0)
         self._interrupt = False
+        self._last = 0
+        self._cuts: list[int] = []
         self.scout: Callable[[], bool] | None = None
         """Called instead of the hooks of a hooked address while what was told before is run again."""
         self._no_restart: Callable[[], None] | None = None
@@ -252,6 +254,34 @@ class Machine(Contents, BySource):
             self._interrupt = False
             stop = stop or self.stopped("interrupted")
         return self._arrive() or stop
+
+    def run_past(self, first: int, period: int, last: int, cuts: list[int]) -> Stop | None:
+        """As `run_until(last)`, and `cuts` gets the cycle of the first boundary at or after `first`, `first` + `period`
+        and so on: where runs to each of them would have ended. `end_at_cut` ends it earlier."""
+        self._last, self._cuts, runner, began = last, cuts, self.runner, len(cuts)
+        while True:
+            limit = first + period * (len(cuts) - began)
+            runner.pass_limits(period, self._last)
+            stop = self.run_until(min(limit, self._last))
+            runner.pass_limits(0, 0)
+            cuts += runner.passed()
+            now = self.state.cycle
+            if stop is not None:
+                return stop
+            while first + period * (len(cuts) - began) <= now:
+                cuts.append(now)
+            if now >= self._last:
+                return None
+
+    def end_at_cut(self) -> None:
+        """Let the `run_past` in which this is called end at its next cut, or before."""
+        self._last = 0
+        self.runner.pass_limits(0, 0)
+
+    def cuts_so_far(self) -> list[int]:
+        """What a `run_past` in which this is called has found up to here."""
+        self._cuts += self.runner.passed()
+        return self._cuts
 
     def run(
         self,

@@ -27,6 +27,13 @@ class Engine(Protocol):
     def forget(self) -> None:
         """Hooks have changed: whatever was prepared for them is stale."""
 
+    def pass_limits(self, period: int, last: int) -> None:
+        """From now on, a limit that is reached without Python may be passed: the next one is `period` later, `last` at
+        most. 0: no limit is."""
+
+    def passed(self) -> list[int]:
+        """The first boundaries at or after the limits that were passed since the last call, in Tcy."""
+
 
 class PlainEngine:
     """One instruction at a time through the sequencer."""
@@ -46,6 +53,13 @@ class PlainEngine:
 
     def forget(self) -> None:
         """Nothing is prepared."""
+
+    def pass_limits(self, period: int, last: int) -> None:
+        """No limit is passed."""
+
+    def passed(self) -> list[int]:
+        """None."""
+        return []
 
 
 def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:

@@ -107,6 +107,13 @@ class SpecialisedEngine:
         """Nothing is native."""
         return False
 
+    def pass_limits(self, period: int, last: int) -> None:
+        """As `Engine.pass_limits`: no limit is passed."""
+
+    def passed(self) -> list[int]:
+        """As `Engine.passed`."""
+        return []
+
     def forget(self) -> None:
         """Hooks have changed: write everything anew."""
         self._places = places_of(self._core)

@@ -27,6 +27,8 @@ PORTS: Final = "ABCDEFG"
 RING: Final = 256
 """Changes native code can leave behind before it must call Python."""
 
+RingReader = Callable[[int, int], None]
+"""Called as reader(address, count) with so many changes as native code leaves them in `Pins.ring`, of any port."""
 Watcher = Callable[[int, int, int], None]
 """Called as watcher(cycle, changed, levels): pins in `changed` have the given levels from `cycle` on."""
 
@@ -103,6 +105,11 @@ class Pins:
         self._eager_before_log: list[int] = []
         self._watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
         self._lazy_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
+        self._ring_watchers: Final[list[list[tuple[int, Watcher]]]] = [[] for _ in PORTS]
+        """Lazy watchers that are told what is in the ring; the others read it."""
+        self._readers: Final[list[RingReader]] = []
+        self._clean: Final = memoryview(bytes(8 * RING)).cast("Q")
+        self._ring_address: Final = record.address + 8 * ring
         self._waveforms: Final[list[list[tuple[int, Waveform]]]] = [[] for _ in PORTS]
         self._on_waveform: Final[list[tuple[Callable[[int], None], Callable[[], None]]]] = []
 
@@ -129,15 +136,26 @@ class Pins:
         self.watch_port(port, mask, watcher, lazy=lazy)
 
     def watch_port(
-        self, port: int, mask: int, watcher: Watcher, *, lazy: bool = False, inputs_only: bool = False
+        self,
+        port: int,
+        mask: int,
+        watcher: Watcher,
+        *,
+        lazy: bool = False,
+        inputs_only: bool = False,
+        reader: RingReader | None = None,
     ) -> None:
         """Tell `watcher` of every edge on the pins in `mask` of a port.
 
-        `inputs_only`: it ignores edges on pins the port drives, so latch writes need not come by.
+        `inputs_only`: it ignores edges on pins the port drives, so latch writes need not come by. A lazy watcher may
+        have a `reader`, which is given what native code has done instead.
         """
         (self._lazy_watchers if lazy else self._watchers)[port].append((mask, watcher))
         if lazy:
             self._told[port] = self.level[port]
+            self._ring_watchers[port] += [(mask, watcher)] if reader is None else []
+            if reader is not None:
+                self._readers.append(reader)
         table = self.lazy if lazy else self.eager
         table[port] |= 0 if inputs_only else mask
 
@@ -147,17 +165,22 @@ class Pins:
         if not count:
             return
         self._u64[self._count] = 0
-        ring = self.ring
-        entries = ring[:count].tolist()
-        for place in range(count):
-            ring[place] = 0
+        for reader in self._readers:
+            reader(self._ring_address, count)
+        entries = self.ring[:count].tolist()
+        self.ring[:count] = self._clean[:count]
         for entry in entries:
-            self._tell_lazy(entry >> 24, entry >> 16 & 0xFF, entry & 0xFFFF)
+            port = entry >> 16 & 0xFF
+            watchers = self._ring_watchers[port]
+            if watchers:
+                self._tell_lazy(entry >> 24, port, entry & 0xFFFF, watchers)
+            else:
+                self._told[port] = entry & 0xFFFF
 
-    def _tell_lazy(self, cycle: int, port: int, level: int) -> None:
+    def _tell_lazy(self, cycle: int, port: int, level: int, watchers: list[tuple[int, Watcher]]) -> None:
         changed = self._told[port] ^ level
         self._told[port] = level
-        for mask, watcher in self._lazy_watchers[port]:
+        for mask, watcher in watchers:
             if changed & mask:
                 watcher(cycle, changed & mask, level)
 
@@ -267,7 +290,7 @@ class Pins:
             self._edges.append((cycle, port, level))
         if self._lazy_watchers[port]:
             self.flush()
-            self._tell_lazy(cycle, port, level)
+            self._tell_lazy(cycle, port, level, self._lazy_watchers[port])
         for mask, watcher in self._watchers[port]:
             if changed & mask:
                 watcher(cycle, changed & mask, level)

@@ -19,7 +19,8 @@ from arena.look import FLOOR, OBJECT, WALL, colours_of, look_of
 from arena.record import read_trial
 from arena.scene import FCY, Scene, SceneError, load_scene, scene_of
 from arena.scenery import NAMED
-from arena.vision import Eye
+from arena.sight import Sight
+from arena.vision import Eye, sensor_of
 from arena.world import Poses, World, traits_of
 
 FULL = """name = "yard"
@@ -154,12 +155,15 @@ def test_two_ways_to_see_a_furnished_scene_agree(yard: Scene, pitch: float) -> N
     kinds: set[int] = set()
     for seed in range(60):
         poses = World(scene, seed).poses
-        pose = poses.robots[seed % 4]
-        eye = Eye(scene, poses, seed % 4, (pose[0], pose[1], float(rng.uniform(-math.pi, math.pi))))
+        x, y, _ = poses.robots[seed % 4]
+        pose = x, y, float(rng.uniform(-math.pi, math.pi))
+        turned = Poses([pose if robot == seed % 4 else one for robot, one in enumerate(poses.robots)], poses.objects)
+        eye, sight = Eye(scene, poses, seed % 4, pose), Sight(scene, seed % 4)
+        sight.look(turned)
+        assert sight.sensor() == sensor_of(eye)
         for row in (30, 208, 216, 238, 245, 255, 262, 300, 420):
-            fast = np.broadcast_to(eye.classes(row, columns), len(columns))
             slow = [eye.column(int(u), (row,))[0] for u in columns]
-            assert fast.tolist() == slow, f"seed {seed}, row {row}"
+            assert sight.classes(row, columns).tolist() == slow, f"seed {seed}, row {row}"
             kinds |= set(slow)
     assert kinds >= {OBJECT, WALL, FLOOR} | set(range(6, len(colours_of(scene))))
 

@@ -6,18 +6,18 @@ counts once it has stood for `SETTLE` Tcy. Nothing is posted for that; what is d
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from ctypes import POINTER, Structure, addressof, c_int64, c_void_p, pointer
+from functools import cache
+from pathlib import Path
 from typing import Final
 
 from emu.boards.part import Part
+from emu.hostcode import ADDRESS, INT, functions
 from emu.peripherals import Peripherals
 
 PORT: Final = 3
 """Port D: left motor on bits 3:0, right motor on bits 7:4 (epuck.md §2)."""
-PHASES: Final = {0xA: 0, 0x6: 1, 0x5: 2, 0x9: 3}
-"""Port nibble to index of the phase table (epuck.md §3); 0 is off, everything else is no valid pattern."""
-SETTLE: Final = 15
-"""Tcy a pattern must stand to count: about 1 us (epuck.md §3)."""
 STEPS_PER_TURN: Final = 1000
 """Motor steps per turn of the wheel: 20 steps, gear 50:1 (epuck.md §3)."""
 MM_PER_STEP: Final = 0.128
@@ -25,13 +25,26 @@ MM_PER_STEP: Final = 0.128
 
 _NOWHERE: Final = 4
 """Index before the first pattern."""
-_ILLEGAL: Final = -1
-
-_MEANING: Final = tuple(_NOWHERE if nibble == 0 else PHASES.get(nibble, _ILLEGAL) for nibble in range(16))
-"""Phase index of a nibble; _NOWHERE for all coils off, _ILLEGAL for what is no phase."""
-
 _STEPS, _LOST, _ILLEGALS, _INDEX, _NIBBLE, _SINCE, _SETTLED, _ON_TIME = range(8)
-"""Places in `motor.<side>.state`."""
+"""Places in `motor.<side>.state`: `struct state` of motors.c."""
+
+
+class _History(Structure):
+    _fields_ = [("before", c_int64), ("count", c_int64), ("cycle", c_int64 * 4096), ("steps", c_int64 * 4096)]
+
+
+class _Motor(Structure):
+    _fields_ = [("state", c_void_p), ("shift", c_int64), ("forward", c_int64), ("history", POINTER(_History))]
+
+
+@cache
+def _code() -> dict[str, Callable[..., None]]:
+    return functions(Path(__file__).with_name("motors.c"), {
+        "settle_by": (None, (ADDRESS, INT)),
+        "change": (None, (ADDRESS, INT, INT)),
+        "decode": (None, (ADDRESS, ADDRESS, INT, INT)),
+        "steps_by": (None, (ADDRESS, ADDRESS, INT, ADDRESS)),
+    })  # fmt: skip
 
 
 class Stepper(Part):
@@ -44,12 +57,18 @@ class Stepper(Part):
         super().__init__(name, chip)
         self._shift: Final = shift
         self._forward: Final = forward
-        first = self.record.reserve(f"{name}.state", "q", 8).index
-        self._state: Final = self.record.s64[first : first + 8]
+        field = self.record.reserve(f"{name}.state", "q", 8)
+        self._state: Final = self.record.s64[field.index : field.index + 8]
         self._state[_INDEX] = _NOWHERE
         self._state[_SETTLED] = 1
         self._on_step: Callable[[int, int], None] | None = None
-        self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True)
+        code = _code()
+        self._settle_by, self._change = code["settle_by"], code["change"]
+        self._decode, self._steps_by = code["decode"], code["steps_by"]
+        self._motor: Final = _Motor(self.record.address + field.offset, shift, forward)
+        self._history: _History | None = None
+        self._at: Final = addressof(self._motor)
+        self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True, reader=self._read)
 
     @property
     def steps(self) -> int:
@@ -89,6 +108,20 @@ class Stepper(Part):
         self._on_step = on_step
         self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)  # so that edges come by as they happen
 
+    def remember(self) -> None:
+        """Keep from now on when steps were made, for `steps_by`."""
+        self._catch_up()
+        self._history = _History(self._state[_STEPS], 0)
+        self._motor.history = pointer(self._history)
+
+    def steps_by(self, cycles: Sequence[int]) -> list[int]:
+        """`steps` as they were in some cycles, which rise from call to call; see `remember`."""
+        self._catch_up()
+        count = len(cycles)
+        asked, steps = (c_int64 * count)(*cycles), (c_int64 * count)()
+        self._steps_by(self._at, asked, count, steps)
+        return list(steps)
+
     def _catch_up(self) -> None:
         self.pins.flush()
         self.settled_steps(self.now)
@@ -96,42 +129,25 @@ class Stepper(Part):
     def settled_steps(self, now: int) -> int:
         """Steps up to cycle `now`, once the pins have told all edges."""
         state = self._state
-        if not state[_SETTLED] and now - state[_SINCE] >= SETTLE:
-            self._settle()
+        if not state[_SETTLED]:
+            self._telling(self._settle_by, now)
         return state[_STEPS]
 
     def _changed(self, cycle: int, _changed: int, levels: int) -> None:
         """A new pattern: what the last one was is known now."""
-        state = self._state
-        stood = cycle - state[_SINCE]
-        if stood >= SETTLE and not state[_SETTLED]:
-            self._settle()
-        if state[_NIBBLE]:
-            state[_ON_TIME] += stood
-        state[_NIBBLE] = levels >> self._shift & 0xF
-        state[_SINCE] = cycle
-        state[_SETTLED] = 0
+        self._telling(self._change, cycle, levels)
 
-    def _settle(self) -> None:
-        """The present pattern has stood long enough to count."""
+    def _telling(self, work: Callable[..., None], *arguments: int) -> None:
+        """Do what may find that a step was made, and tell."""
         state = self._state
-        state[_SETTLED] = 1
-        index = _MEANING[state[_NIBBLE]]
-        if index == _NOWHERE:
-            return  # all off: friction in the gear keeps the rotor where it is
-        if index == _ILLEGAL:
-            state[_ILLEGALS] += 1
-            return
-        before = state[_INDEX]
-        state[_INDEX] = index
-        moved = (index - before) & 3 if before != _NOWHERE else 0
-        if moved == 2:
-            state[_LOST] += 1
-        elif moved:
-            direction = self._forward if moved == 1 else -self._forward
-            state[_STEPS] += direction
-            if self._on_step is not None and not self.events.quiet:
-                self._on_step(state[_SINCE], direction)
+        before, since = state[_STEPS], state[_SINCE]
+        work(self._at, *arguments)
+        if state[_STEPS] != before and self._on_step is not None and not self.events.quiet:
+            self._on_step(since, state[_STEPS] - before)
+
+    def _read(self, changes: int, count: int) -> None:
+        """What native code has done; nobody listens for steps then."""
+        self._decode(self._at, changes, count, PORT)
 
 
 class Motors:
@@ -147,3 +163,12 @@ class Motors:
         left.pins.flush()
         now = left.events.now
         return left.settled_steps(now), self.right.settled_steps(now)
+
+    def remember(self) -> None:
+        """As `Stepper.remember`."""
+        self.left.remember()
+        self.right.remember()
+
+    def steps_by(self, cycles: Sequence[int]) -> list[tuple[int, int]]:
+        """As `Stepper.steps_by`, of both."""
+        return list(zip(self.left.steps_by(cycles), self.right.steps_by(cycles), strict=True))

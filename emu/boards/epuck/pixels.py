@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 
 from emu.boards.epuck.scan import course_of
 from emu.boards.epuck.sensors import GREY, HEIGHT, RGB565, WIDTH, YUV, Picture, Timing
+from emu.hostcode import ADDRESS, INT, functions
 
 Pixels = NDArray[np.uint8]
 """n x 3 values, red, green, blue."""
@@ -34,11 +38,17 @@ def darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
 
 
 def encode(pixels: Pixels, form: str, gains: tuple[float, float, float]) -> bytes:
-    """The bytes a sensor sends for a line of `pixels` after its gains."""
-    values = pixels.astype(np.int32)
-    if gains != (1.0, 1.0, 1.0):
-        values = np.minimum(values * np.array(gains), 255.0).astype(np.int32)
-    return _ENCODERS[form](values)
+    """The bytes a sensor sends for a line of `pixels` after its gains (`line.c`)."""
+    whole = np.ascontiguousarray(pixels, dtype=np.uint8)
+    sent = ctypes.create_string_buffer(len(whole) * _SIZES[form])
+    _encoder()(whole.ctypes.data, len(whole), _FORMS.index(form), (ctypes.c_double * 3)(*gains), sent)
+    return sent.raw
+
+
+@cache
+def _encoder() -> Callable[..., None]:
+    arguments = (ADDRESS, INT, INT, ADDRESS, ADDRESS)
+    return functions(Path(__file__).with_name("line.c"), {"encode": (None, arguments)})["encode"]
 
 
 def decode(data: bytes, form: str) -> Pixels:
@@ -69,13 +79,10 @@ def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image[rows][:, columns, :3], dtype=np.uint8)
 
 
-_RGB565_LOST: Final = np.array([3, 2, 3], dtype=np.int32)
-_RGB565_PLACE: Final = np.array([1 << 11, 1 << 5, 1], dtype=np.int32)
-
-
-def _rgb565(pixels: NDArray[np.int32]) -> bytes:
-    """High byte first: R4..R0 G5..G3, G2..G0 B4..B0 (§7.4)."""
-    return ((pixels >> _RGB565_LOST) @ _RGB565_PLACE).astype(">u2").tobytes()
+_FORMS: Final = (RGB565, GREY, YUV)
+"""In the order of the numbers in `line.c`."""
+_SIZES: Final = {RGB565: 2, GREY: 1, YUV: 2}
+"""Bytes of a pixel."""
 
 
 def _from_rgb565(data: NDArray[np.uint8]) -> Pixels:
@@ -83,26 +90,8 @@ def _from_rgb565(data: NDArray[np.uint8]) -> Pixels:
     return np.stack([words >> 8 & 0xF8, words >> 3 & 0xFC, words << 3 & 0xF8], axis=1).astype(np.uint8)
 
 
-def _luma(pixels: NDArray[np.int32]) -> NDArray[np.int32]:
-    weighted = 77 * pixels[:, 0] + 150 * pixels[:, 1] + 29 * pixels[:, 2]  # ITU-R BT.601 in 1/256
-    return (weighted + 128) >> 8
-
-
-def _grey(pixels: NDArray[np.int32]) -> bytes:
-    return _luma(pixels).astype(np.uint8).tobytes()
-
-
 def _from_grey(data: NDArray[np.uint8]) -> Pixels:
     return np.repeat(data[:, None], 3, axis=1)
-
-
-def _yuv(pixels: NDArray[np.int32]) -> bytes:
-    """U Y V Y, chroma of the first pixel of each pair. UNVERIFIED order (§7.4)."""
-    luma = _luma(pixels)
-    chroma = np.clip(128 + ((pixels[:, 2] - luma) * 145 >> 8), 0, 255)
-    red_difference = np.clip(128 + ((pixels[:, 0] - luma) * 183 >> 8), 0, 255)
-    chroma[1::2] = red_difference[: len(chroma) - len(chroma) % 2 : 2]
-    return np.stack([chroma, luma], axis=1).astype(np.uint8).tobytes()
 
 
 def _from_yuv(data: NDArray[np.uint8]) -> Pixels:
@@ -114,7 +103,6 @@ def _from_yuv(data: NDArray[np.uint8]) -> Pixels:
     return np.clip(np.stack([red, green, blue], axis=1), 0, 255).astype(np.uint8)
 
 
-_ENCODERS: Final[dict[str, Callable[[NDArray[np.int32]], bytes]]] = {RGB565: _rgb565, GREY: _grey, YUV: _yuv}
 _DECODERS: Final[dict[str, Callable[[NDArray[np.uint8]], Pixels]]] = {
     RGB565: _from_rgb565,
     GREY: _from_grey,

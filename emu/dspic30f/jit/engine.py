@@ -32,7 +32,19 @@ from emu.dspic30f.jit.builder import (
 )
 from emu.dspic30f.jit.compiler import shared_compiler
 from emu.dspic30f.jit.region import Region, discover
-from emu.dspic30f.jit.runtime import BLOCKS, BOUNDARY, ENTERED, ENV_WORDS, LIMIT, STEPS, dispatch_text
+from emu.dspic30f.jit.runtime import (
+    BLOCKS,
+    BOUNDARY,
+    ENTERED,
+    ENV_WORDS,
+    LAST,
+    LIMIT,
+    NOTED,
+    NOTES,
+    PERIOD,
+    STEPS,
+    dispatch_text,
+)
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.modes import REGISTERS, Key, Modes
@@ -169,6 +181,7 @@ class JitEngine:
         env[LIMIT] = min(limit, start + NATIVE_CYCLES)
         env[BOUNDARY] = 1
         why = native(record, surroundings)
+        limit = max(limit, env[LIMIT]) if env[LAST] else limit
         while before != (cycle := u64[now]) < limit:
             before = cycle
             if why == SERVICE:  # most often some device's event is due
@@ -179,6 +192,7 @@ class JitEngine:
                 break
             why = native(record, surroundings)
             env[BOUNDARY] = 1
+            limit = max(limit, env[LIMIT]) if env[LAST] else limit
             self.counts.runs += 1
         env[BOUNDARY] = 0
         self.counts.runs += 1
@@ -190,6 +204,18 @@ class JitEngine:
             self._core.sequencer.after_retfie()
             return True
         return cycle >= limit or (why != SERVICE and cycle != start)
+
+    def pass_limits(self, period: int, last: int) -> None:
+        """As `Engine.pass_limits`."""
+        self._env[PERIOD], self._env[LAST] = period, last
+
+    def passed(self) -> list[int]:
+        """As `Engine.passed`."""
+        count = self._env[NOTED]
+        if not count:
+            return []
+        self._env[NOTED] = 0
+        return list(self._env[NOTES : NOTES + count])
 
     def _refresh(self, pc: int, cycle: int) -> bool:
         """Have a device bring up to date what native code reads from the record, if that is what the instruction at

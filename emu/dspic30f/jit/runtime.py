@@ -13,7 +13,11 @@ from emu.dspic30f.jit.service import DONE, Boundary, service_text
 LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
 steps; interrupts entered so far; whether to begin with the boundary before PC."""
-ENV_WORDS: Final = 8
+PERIOD, LAST, NOTED, NOTES = range(6, 10)
+"""A limit before the last one is noted instead: the next is a period later. How many are noted, and the cycles."""
+ROOM: Final = 1024
+"""Notes that are kept until Python takes them."""
+ENV_WORDS: Final = NOTES + ROOM
 
 DISPATCH: Final = """
 declare i64 @llvm.cttz.i64(i64, i1)
@@ -95,7 +99,33 @@ serve:
   %served = icmp eq i64 %rest, {done}
   br i1 %served, label %loop, label %boundary
 boundary:
+  %limit_now = load i64, ptr %env
+  %cycle_place2 = getelementptr i8, ptr %rec, i64 {cycle}
+  %cycle5 = load i64, ptr %cycle_place2
+  %reached = icmp uge i64 %cycle5, %limit_now
+  %last_place = getelementptr i64, ptr %env, i64 {last}
+  %last_limit = load i64, ptr %last_place
+  %further = icmp ult i64 %limit_now, %last_limit
+  %noted_place = getelementptr i64, ptr %env, i64 {noted}
+  %noted = load i64, ptr %noted_place
+  %room = icmp ult i64 %noted, {rooms}
+  %further_room = and i1 %further, %room
+  %goes_on = and i1 %reached, %further_room
+  br i1 %goes_on, label %note, label %handed
+handed:
   ret i64 {service}
+note:
+  %notes = getelementptr i64, ptr %env, i64 {notes}
+  %note_place = getelementptr i64, ptr %notes, i64 %noted
+  store i64 %cycle5, ptr %note_place
+  %noted1 = add i64 %noted, 1
+  store i64 %noted1, ptr %noted_place
+  %period_place = getelementptr i64, ptr %env, i64 {period}
+  %period = load i64, ptr %period_place
+  %limit_next = add i64 %limit_now, %period
+  %limit_new = call i64 @llvm.umin.i64(i64 %limit_next, i64 %last_limit)
+  store i64 %limit_new, ptr %env
+  br label %serve
 back:
   ret i64 %why
 back2:
@@ -112,4 +142,5 @@ def dispatch_text(boundary: Boundary, flash_end: int) -> str:
     return service_text(boundary) + DISPATCH.format(
         pc=boundary.offset["cpu.pc"], repeat=boundary.offset["cpu.repeat"], flash_end=flash_end,
         cycle=boundary.offset["cpu.cycle"], blocks=BLOCKS, steps=STEPS, entered=ENTERED, begin=BOUNDARY,
-        next=NEXT, retfie=RETFIE, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE)
+        next=NEXT, retfie=RETFIE, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE,
+        period=PERIOD, last=LAST, noted=NOTED, notes=NOTES, rooms=ROOM)

@@ -1,0 +1,79 @@
+"""Demand lock-step: robots run ahead until they look at something, the world follows the slowest of them.
+
+A robot whose firmware reads a line of its camera needs poses of that quantum; the world can only tell them when all
+robots have lived until then. So the others are run first, which may look at something themselves, but only earlier.
+Nothing that is recorded can tell this from quantum after quantum: a robot sees the same poses either way.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol, runtime_checkable
+
+from arena.ether import Ether
+from arena.world import Poses, World
+
+FRAMES: Final = 40
+"""Most calls of Python inside each other between a robot that looks and the next one that is run for it."""
+
+
+@runtime_checkable
+class Runner(Protocol):
+    """A robot that can run ahead: `arena.emulated.EmulatedBrain`."""
+
+    lived: int
+    """Quanta that are over for it."""
+
+    def live(self, ticks: int) -> None:
+        """Live until so many quanta are over."""
+
+    def speed(self, tick: int) -> tuple[float, float]:
+        """Wheel speeds in cm/s during a quantum that is over; asked for once, quantum after quantum."""
+
+    def join(self, look_at: Callable[[int], tuple[Poses, Poses]]) -> None:
+        """Get poses from `look_at` from now on: those at the beginning of a quantum, and a quantum before."""
+
+
+class LockStep:
+    """`world`, the robots that are in it, all of them, and what carries their infrared light."""
+
+    def __init__(self, world: World, robots: Sequence[Runner], ether: Ether | None = None) -> None:
+        self._world: Final = world
+        self._robots: Final = robots
+        self._ether: Final = ether or Ether(len(robots), world.scene.clock.quantum_tcy)
+        self._ether.slowest = 0
+        self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), 1000 + FRAMES * len(robots)))
+        for robot in robots:
+            robot.join(self.look_at)
+
+    def advance(self, ticks: int) -> list[tuple[float, float]]:
+        """Let so many quanta be over for everybody; wheel speeds of the last of them."""
+        wheels = self._follow(ticks)
+        for tick in [tick for tick in self._past if tick < ticks - 1]:
+            del self._past[tick]
+        return wheels
+
+    def look_at(self, tick: int) -> tuple[Poses, Poses]:
+        """Poses at the beginning of a quantum, and a quantum before."""
+        self._follow(tick)
+        poses = self._past[tick]
+        return poses, self._past.get(tick - 1, poses)
+
+    def moved(self) -> None:
+        """Something was put somewhere else between two quanta."""
+        self._past[self._world.ticks] = self._world.poses
+
+    def _follow(self, ticks: int) -> list[tuple[float, float]]:
+        world, wheels = self._world, []
+        if world.ticks < ticks:
+            for robot in self._robots:
+                if robot.lived < ticks:
+                    robot.live(ticks)
+        while world.ticks < ticks:
+            wheels = [robot.speed(world.ticks) for robot in self._robots]
+            world.step(wheels)
+            self._past[world.ticks] = world.poses
+        self._ether.slowest = world.ticks * self._ether.quantum
+        return wheels

@@ -1,0 +1,333 @@
+// What a robot's camera sees, as vision.py defines it: the same arithmetic in the same order. Lengths cm.
+//
+// A view is collected once for a pose (what is near enough and ahead, in the camera's axes), then asked for rays.
+
+#include <stdint.h>
+
+typedef int64_t i64;
+typedef double f64;
+
+extern f64 sin(f64);
+extern f64 cos(f64);
+extern f64 fabs(f64);
+extern f64 sqrt(f64);
+extern f64 rint(f64);
+
+enum kind { NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE }; // as in look.py
+
+struct disc {
+    f64 ahead, left, radius, height; // in a scene's list: x and y for the first two
+    i64 kind;
+};
+
+struct side {
+    f64 ax, ay, bx, by, height;
+    i64 kind;
+};
+
+struct patch {
+    f64 x, y, radius; // no radius: a polygon
+    const f64 *corners;
+    i64 count, kind;
+};
+
+// A camera in a scene. The second half is what `collect` leaves.
+struct view {
+    f64 camera_ahead, camera_height, wall_height, nearest;
+    f64 width, height, range, widest, yaw;
+    i64 own, robots, objects, is_furnished;
+    struct disc robot;
+    const struct disc *things;
+    const struct disc *fixed;
+    i64 fixed_count;
+    const struct side *outlines;
+    i64 outline_count;
+    const struct patch *patches;
+    i64 patch_count;
+    struct disc *discs;
+    i64 disc_count;
+    struct side *sides;
+    i64 side_count;
+    f64 x, y, cos, sin;
+};
+
+struct rays {
+    const f64 *left, *up;
+    i64 count;
+    f64 right_most, left_most;
+};
+
+static int is_before(const struct disc *one, const struct disc *other)
+{
+    if (one->ahead != other->ahead)
+        return one->ahead < other->ahead;
+    if (one->left != other->left)
+        return one->left < other->left;
+    if (one->radius != other->radius)
+        return one->radius < other->radius;
+    if (one->height != other->height)
+        return one->height < other->height;
+    return one->kind < other->kind;
+}
+
+static void sort(struct disc *discs, i64 count)
+{
+    i64 gap = 1;
+    while (gap < count / 3)
+        gap = 3 * gap + 1;
+    for (; gap; gap /= 3)
+        for (i64 i = gap; i < count; i++) {
+            struct disc one = discs[i];
+            i64 place = i;
+            for (; place >= gap && is_before(&one, &discs[place - gap]); place -= gap)
+                discs[place] = discs[place - gap];
+            discs[place] = one;
+        }
+}
+
+// Keep a disc that the picture's widest ray can touch within range.
+static void keep(struct view *v, f64 x, f64 y, const struct disc *like)
+{
+    f64 dx = x - v->x, dy = y - v->y, radius = like->radius;
+    f64 ahead = dx * v->cos + dy * v->sin;
+    if (!(-radius < ahead && ahead < v->range + radius))
+        return;
+    f64 left = dy * v->cos - dx * v->sin;
+    if (fabs(left) - 1.2 * radius < v->widest * (ahead + radius)) // 1.2: the ray's slope to the rim
+        v->discs[v->disc_count++] = (struct disc){ahead, left, radius, like->height, like->kind};
+}
+
+// Look from a pose extrapolated by `quanta` beyond that in `poses`; both tables hold x, y, heading of the robots, then
+// x, y of the objects.
+void collect(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
+{
+    const f64 *now = poses + 3 * v->own, *then = before + 3 * v->own;
+    f64 x = now[0] + quanta * (now[0] - then[0]), y = now[1] + quanta * (now[1] - then[1]);
+    f64 heading = now[2] + quanta * (now[2] - then[2]);
+    v->cos = cos(heading), v->sin = sin(heading);
+    v->x = x + v->camera_ahead * v->cos, v->y = y + v->camera_ahead * v->sin;
+    if (v->yaw != 0)
+        v->cos = cos(heading + v->yaw), v->sin = sin(heading + v->yaw);
+    v->disc_count = v->side_count = 0;
+    const f64 *objects = poses + 3 * v->robots;
+    for (i64 i = 0; i < v->objects; i++)
+        keep(v, objects[2 * i], objects[2 * i + 1], &v->things[i]);
+    for (i64 i = 0; i < v->robots; i++)
+        if (i != v->own)
+            keep(v, poses[3 * i], poses[3 * i + 1], &v->robot);
+    sort(v->discs, v->disc_count);
+    for (i64 i = 0; i < v->outline_count; i++) {
+        const struct side *one = &v->outlines[i];
+        f64 x1 = one->ax - v->x, y1 = one->ay - v->y, x2 = one->bx - v->x, y2 = one->by - v->y;
+        struct side turned = {x1 * v->cos + y1 * v->sin, y1 * v->cos - x1 * v->sin, x2 * v->cos + y2 * v->sin,
+                              y2 * v->cos - x2 * v->sin, one->height,               one->kind};
+        if (turned.ax > 0 || turned.bx > 0)
+            v->sides[v->side_count++] = turned;
+    }
+}
+
+static int contains(const struct patch *patch, f64 x, f64 y)
+{
+    int inside = 0;
+    for (i64 i = 0; i < patch->count; i++) {
+        const f64 *one = patch->corners + 2 * i, *other = patch->corners + 2 * ((i + 1) % patch->count);
+        if ((one[1] > y) != (other[1] > y) && x < one[0] + (y - one[1]) / (other[1] - one[1]) * (other[0] - one[0]))
+            inside = !inside;
+    }
+    return inside;
+}
+
+// The floor a ray meets: the last patch that covers the place.
+static i64 floor_of(const struct view *v, f64 ray, f64 rise)
+{
+    i64 found = FLOOR;
+    if (!v->patch_count)
+        return found;
+    f64 depth = -v->camera_height / rise;
+    f64 x = v->x + depth * (v->cos - ray * v->sin), y = v->y + depth * (v->sin + ray * v->cos);
+    for (i64 i = 0; i < v->patch_count; i++) {
+        const struct patch *one = &v->patches[i];
+        f64 dx = x - one->x, dy = y - one->y;
+        if (one->count ? contains(one, x, y) : sqrt(dx * dx + dy * dy) < one->radius)
+            found = one->kind;
+    }
+    return found;
+}
+
+static f64 most(f64 one, f64 other)
+{
+    return one > other ? one : other;
+}
+
+static f64 least(f64 one, f64 other)
+{
+    return one < other ? one : other;
+}
+
+// Depth at which a ray meets a disc, negative if it does not; `a` is 1 + slope squared.
+static f64 disc_depth(const struct view *v, const struct disc *disc, f64 slope, f64 a)
+{
+    f64 b = disc->ahead + slope * disc->left;
+    f64 c = disc->ahead * disc->ahead + disc->left * disc->left - disc->radius * disc->radius;
+    f64 root = b * b - a * c;
+    if (!(root > 0) || !(b > 0))
+        return -1;
+    return most((b - sqrt(root)) / a, v->nearest);
+}
+
+static f64 side_depth(const struct view *v, const struct side *side, f64 slope)
+{
+    f64 across = (side->by - side->ay) - slope * (side->bx - side->ax);
+    if (across == 0)
+        return -1;
+    f64 depth = (side->ax * (side->by - side->ay) - side->ay * (side->bx - side->ax)) / across;
+    f64 part = (side->ax * slope - side->ay) / across;
+    return depth > 0 && 0 <= part && part <= 1 ? most(depth, v->nearest) : -1;
+}
+
+static struct disc seen_from(const struct view *v, const struct disc *fixed)
+{
+    f64 dx = fixed->ahead - v->x, dy = fixed->left - v->y;
+    struct disc found = *fixed;
+    found.ahead = dx * v->cos + dy * v->sin, found.left = dy * v->cos - dx * v->sin;
+    return found;
+}
+
+static int may_meet(const struct disc *disc, f64 right, f64 left)
+{
+    return disc->left - 1.1 * disc->radius <= left * disc->ahead &&
+           disc->left + 1.1 * disc->radius >= right * disc->ahead;
+}
+
+// What of a ray is not hidden yet.
+struct pixel {
+    f64 rise, blocked;
+    i64 seen;
+};
+
+static void meet(const struct view *v, struct pixel *p, f64 depth, f64 height, i64 kind)
+{
+    f64 z = v->camera_height + p->rise * depth;
+    if (z <= height && depth < p->blocked) {
+        p->seen = z < 0 ? FLOOR : kind;
+        p->blocked = depth;
+    }
+}
+
+// Classes of the pixels of some rays.
+void classes(const struct view *v, const struct rays *rays, uint8_t *seen)
+{
+    f64 east = 1 / most(v->width - v->x, v->nearest), west = -1 / most(v->x, v->nearest);
+    f64 north = 1 / most(v->height - v->y, v->nearest), south = -1 / most(v->y, v->nearest);
+    f64 over = v->wall_height - v->camera_height;
+    for (i64 i = 0; i < rays->count; i++) {
+        f64 slope = rays->left[i], a = 1 + slope * slope, length = sqrt(a);
+        f64 near = most(most(v->cos * east + -v->sin * east * slope, v->cos * west + -v->sin * west * slope),
+                        most(v->sin * north + v->cos * north * slope, v->sin * south + v->cos * south * slope));
+        near = least(near, 1 / v->nearest);
+        struct pixel p = {rays->up[i], v->is_furnished ? 1 / most(near, 1e-12) : __builtin_inf(), WALL};
+        if (p.rise > over * near)
+            p.seen = ABOVE;
+        else if (p.rise < -v->camera_height * near)
+            p.seen = FLOOR;
+        for (i64 d = 0; d < v->disc_count; d++) {
+            if (!may_meet(&v->discs[d], rays->right_most, rays->left_most))
+                continue;
+            f64 depth = disc_depth(v, &v->discs[d], slope, a);
+            if (depth > 0 && depth * length <= v->range)
+                meet(v, &p, depth, v->discs[d].height, v->discs[d].kind);
+        }
+        for (i64 d = 0; d < v->fixed_count; d++) {
+            struct disc disc = seen_from(v, &v->fixed[d]);
+            f64 depth = disc_depth(v, &disc, slope, a);
+            if (depth > 0)
+                meet(v, &p, depth, disc.height, disc.kind);
+        }
+        for (i64 s = 0; s < v->side_count; s++) {
+            f64 depth = side_depth(v, &v->sides[s], slope);
+            if (depth > 0)
+                meet(v, &p, depth, v->sides[s].height, v->sides[s].kind);
+        }
+        seen[i] = (uint8_t)(p.seen == FLOOR ? floor_of(v, slope, p.rise) : p.seen);
+    }
+}
+
+static f64 wall_depth(const struct view *v, f64 slope)
+{
+    f64 east = v->cos - slope * v->sin, north = v->sin + slope * v->cos, inf = __builtin_inf();
+    f64 to_x = east > 0 ? (v->width - v->x) / east : east < 0 ? -v->x / east : inf;
+    f64 to_y = north > 0 ? (v->height - v->y) / north : north < 0 ? -v->y / north : inf;
+    return most(least(to_x, to_y), v->nearest);
+}
+
+// The first thing a ray meets that is not lower than the ray is there, or that lies behind where it meets the floor.
+struct hit {
+    f64 depth, height;
+    i64 kind;
+};
+
+static void offer(const struct view *v, struct hit *best, f64 rise, f64 depth, f64 height, i64 kind)
+{
+    f64 z = v->camera_height + rise * depth;
+    if (z >= 0 && z > height)
+        return;
+    if (depth < best->depth || (depth == best->depth && (height < best->height ||
+                                                         (height == best->height && kind < best->kind))))
+        *best = (struct hit){depth, height, kind};
+}
+
+// As `Eye.column` for every ray.
+static i64 ray_class(const struct view *v, const struct rays *rays, f64 slope, f64 rise)
+{
+    f64 a = 1 + slope * slope, reach = v->range / sqrt(a), inf = __builtin_inf();
+    struct hit best = {inf, inf, 0};
+    for (i64 d = 0; d < v->disc_count; d++) {
+        if (!may_meet(&v->discs[d], rays->right_most, rays->left_most))
+            continue;
+        f64 depth = disc_depth(v, &v->discs[d], slope, a);
+        if (depth > 0 && depth <= reach)
+            offer(v, &best, rise, depth, v->discs[d].height, v->discs[d].kind);
+    }
+    for (i64 s = 0; s < v->side_count; s++) {
+        f64 depth = side_depth(v, &v->sides[s], slope);
+        if (depth > 0)
+            offer(v, &best, rise, depth, v->sides[s].height, v->sides[s].kind);
+    }
+    for (i64 d = 0; d < v->fixed_count; d++) {
+        struct disc disc = seen_from(v, &v->fixed[d]);
+        f64 depth = disc_depth(v, &disc, slope, a);
+        if (depth > 0)
+            offer(v, &best, rise, depth, disc.height, disc.kind);
+    }
+    f64 z = v->camera_height + rise * (best.depth < inf ? best.depth : wall_depth(v, slope));
+    if (z < 0)
+        return floor_of(v, slope, rise);
+    return best.depth < inf ? best.kind : z <= v->wall_height ? WALL : ABOVE;
+}
+
+// Votes of the sensor's window: pixels that show an object times 256, and those that show a robot. `sensed` says what
+// each class is taken for.
+i64 votes(const struct view *v, const struct rays *rays, const uint8_t *sensed)
+{
+    i64 found = 0;
+    for (i64 i = 0; i < rays->count; i++) {
+        i64 seen = sensed[ray_class(v, rays, rays->left[i], rays->up[i])];
+        found += seen == OBJECT ? 256 : seen == ROBOT;
+    }
+    return found;
+}
+
+// Red, green and blue of pixels of some classes: `noise` goes on from value to value. `bright` darkens each pixel, null
+// for no vignetting.
+void paint(const uint8_t *seen, i64 count, const int16_t *colours, const int16_t *noise, const f64 *bright,
+           uint8_t *pixels)
+{
+    for (i64 i = 0; i < count; i++)
+        for (i64 c = 0; c < 3; c++) {
+            i64 value = colours[3 * seen[i] + c];
+            if (bright)
+                value = (i64)rint((f64)value * bright[i]);
+            value += noise[3 * i + c];
+            pixels[3 * i + c] = (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
+        }
+}

@@ -1,0 +1,190 @@
+"""`Sight`: what a robot's camera sees, by compiled code (`sight.c`). What it computes, `vision.Eye` defines; the tests
+compare the two. Poses in; classes of pixels, colours, votes of the sensor out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arena import bodies
+from arena.lens import Floats, lens_of
+from arena.look import COLOURS, NOTHING, OBJECT, ROBOT, look_of
+from arena.scene import Scene
+from arena.vision import NEAREST, VOTES, WINDOW_COLUMNS, WINDOW_ROWS
+from arena.world import Poses, Traits
+from emu.hostcode import ADDRESS, DOUBLE, INT, functions
+
+ROWS_KEPT: Final = 2048
+"""Rows whose rays are remembered: more than any setting of a sensor has."""
+
+
+class _Disc(Structure):
+    _fields_ = [(name, c_double) for name in ("ahead", "left", "radius", "height")] + [("kind", c_int64)]
+
+
+class _Side(Structure):
+    _fields_ = [(name, c_double) for name in ("ax", "ay", "bx", "by", "height")] + [("kind", c_int64)]
+
+
+class _Patch(Structure):
+    _fields_ = [("x", c_double), ("y", c_double), ("radius", c_double), ("corners", c_void_p), ("count", c_int64),
+                ("kind", c_int64)]  # fmt: skip
+
+
+class _View(Structure):
+    _fields_ = [
+        *((name, c_double) for name in ("camera_ahead", "camera_height", "wall_height", "nearest", "width", "height",
+                                        "range", "widest", "yaw")),
+        *((name, c_int64) for name in ("own", "robots", "objects", "is_furnished")),
+        ("robot", _Disc), ("things", POINTER(_Disc)),
+        ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("outlines", POINTER(_Side)), ("outline_count", c_int64),
+        ("patches", POINTER(_Patch)), ("patch_count", c_int64),
+        ("discs", POINTER(_Disc)), ("disc_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
+        ("x", c_double), ("y", c_double), ("cos", c_double), ("sin", c_double),
+    ]  # fmt: skip
+
+
+class _Rays(Structure):
+    _fields_ = [("left", c_void_p), ("up", c_void_p), ("count", c_int64), ("right_most", c_double),
+                ("left_most", c_double)]  # fmt: skip
+
+
+@cache
+def _code() -> dict[str, Callable[..., Any]]:
+    return functions(Path(__file__).with_name("sight.c"), {
+        "collect": (None, (ADDRESS, ADDRESS, ADDRESS, DOUBLE)),
+        "classes": (None, (ADDRESS, ADDRESS, ADDRESS)),
+        "votes": (INT, (ADDRESS, ADDRESS, ADDRESS)),
+        "paint": (None, (ADDRESS, INT, ADDRESS, ADDRESS, ADDRESS, ADDRESS)),
+    })  # fmt: skip
+
+
+class _Things:
+    """What all cameras of a scene share: what things look like, and room for what one of them collects."""
+
+    def __init__(self, scene: Scene) -> None:
+        look = look_of(scene) if scene.is_furnished else None
+        count = scene.objects.count
+        plain = (scene.objects.radius_cm, bodies.OBJECT_HEIGHT, OBJECT)
+        objects = look.objects if look is not None else [plain] * count
+        self.things: Final = (_Disc * count)(*(_Disc(0.0, 0.0, *one) for one in objects))
+        fixed, sides, patches = (look.discs, look.sides, look.patches) if look is not None else ([], [], [])
+        self.fixed: Final = (_Disc * len(fixed))(*(_Disc(*one) for one in fixed))
+        self.outlines: Final = (_Side * len(sides))(*(_Side(*ends, height, kind) for ends, height, kind in sides))
+        self.corners: Final = [np.array(patch.polygon or [], dtype=np.float64).reshape(-1, 2) for patch, _ in patches]
+        self.patches: Final = (_Patch * len(patches))(*(
+            _Patch(patch.x_cm, patch.y_cm, patch.radius_cm, corners.ctypes.data, len(corners), kind)
+            for (patch, kind), corners in zip(patches, self.corners, strict=True)
+        ))  # fmt: skip
+        self.discs: Final = (_Disc * (count + scene.robots.count))()
+        self.sides: Final = (_Side * len(sides))()
+        sensed = look.sensed if look is not None else range(len(COLOURS))
+        self.sensed: Final = np.array(sensed, dtype=np.uint8)
+
+
+_kept: dict[int, tuple[Scene, _Things]] = {}
+
+
+def _things_of(scene: Scene) -> _Things:
+    kept = _kept.get(id(scene))
+    if kept is None or kept[0] is not scene:
+        if len(_kept) > 16:
+            _kept.clear()
+        kept = _kept[id(scene)] = scene, _Things(scene)
+    return kept[1]
+
+
+class _Fan:
+    """Rays in the form the code wants, with room for the class of each."""
+
+    def __init__(self, left: Floats, up: Floats) -> None:
+        self._arrays: Final = np.ascontiguousarray(left), np.ascontiguousarray(up)
+        self.count: Final = len(left)
+        self._rays: Final = _Rays(self._arrays[0].ctypes.data, self._arrays[1].ctypes.data, self.count,
+                                  float(left.min()), float(left.max()))  # fmt: skip
+        self.address: Final = addressof(self._rays)
+        self.seen: Final = np.zeros(self.count, dtype=np.uint8)
+        self.seen_address: Final = self.seen.ctypes.data
+
+
+class Sight:
+    """The camera of robot `own` in a scene; `traits` say how it is mounted."""
+
+    def __init__(self, scene: Scene, own: int, traits: Traits = Traits()) -> None:  # noqa: B008 - never changes
+        code = _code()
+        self._collect, self._classes = code["collect"], code["classes"]
+        self._votes, self._paint = code["votes"], code["paint"]
+        self.lens: Final = lens_of(scene.camera, traits.pitch_deg)
+        things = _things_of(scene)
+        self._things: Final = things
+        self._view: Final = _View(
+            bodies.CAMERA_AHEAD, bodies.CAMERA_HEIGHT, bodies.WALL_HEIGHT, NEAREST,
+            scene.arena.width_cm, scene.arena.height_cm, scene.camera.range_cm, self.lens.widest, traits.yaw,
+            own, scene.robots.count, len(things.things), scene.is_furnished,
+            _Disc(0.0, 0.0, bodies.ROBOT_RADIUS, bodies.ROBOT_HEIGHT, ROBOT), things.things,
+            things.fixed, len(things.fixed), things.outlines, len(things.outlines),
+            things.patches, len(things.patches), things.discs, 0, things.sides, 0,
+        )  # fmt: skip
+        self._address: Final = addressof(self._view)
+        self._counts = scene.robots.count, len(things.things)
+        self._sensed: Final = things.sensed.ctypes.data
+        self._fans: Final[dict[tuple[float, bytes], _Fan]] = {}
+        self._window: _Fan | None = None
+
+    def look(self, poses: Poses, before: Poses | None = None, quanta: float = 0.0) -> None:
+        """Look at `poses` from the own one, extrapolated by `quanta` of the way it has come since `before`."""
+        if poses.counts != self._counts:
+            self._adapt(poses)
+        address = poses.address
+        self._collect(self._address, address, address if before is None else before.address, quanta)
+
+    def _adapt(self, poses: Poses) -> None:
+        """Fewer robots or objects than the scene has: tests, and moments of a record."""
+        robots, objects = poses.counts
+        if objects > len(self._things.things) or robots + objects > len(self._things.discs):
+            raise ValueError(f"{robots} robots and {objects} objects are more than the scene has")
+        self._counts = poses.counts
+        self._view.robots, self._view.objects = poses.counts
+
+    def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.uint8]:
+        """Classes of the pixels of one row in some columns, until the next call for that row."""
+        fan = self._fan(v, columns)
+        self._classes(self._address, fan.address, fan.seen_address)
+        return fan.seen
+
+    def pixels(self, v: int, columns: NDArray[np.intp], colours: int, noise: int,
+               bright: Floats | None = None) -> NDArray[np.uint8]:  # fmt: skip
+        """Red, green and blue of the pixels: `colours` is where 16-bit numbers for each class are, `noise` where those
+        are that are added to one value after the other."""
+        fan = self._fan(v, columns)
+        self._classes(self._address, fan.address, fan.seen_address)
+        painted = np.empty((fan.count, 3), dtype=np.uint8)
+        self._paint(fan.seen_address, fan.count, colours, noise, None if bright is None else bright.ctypes.data,
+                    painted.ctypes.data)  # fmt: skip
+        return painted
+
+    def sensor(self) -> int:
+        """OBJECT, ROBOT or NOTHING by the votes of the window's pixels with perfect colours (`vision.sensor_of`)."""
+        if self._window is None:
+            rays = [ray for u in WINDOW_COLUMNS for ray in self.lens.column(u, WINDOW_ROWS)]
+            left, up = np.array(rays).T
+            self._window = _Fan(left, up)
+        objects, robots = divmod(self._votes(self._address, self._window.address, self._sensed), 256)
+        return OBJECT if objects >= VOTES else ROBOT if robots >= VOTES else NOTHING
+
+    def _fan(self, v: int, columns: NDArray[np.intp]) -> _Fan:
+        """A camera asks for the same rows and columns again and again."""
+        key = v, columns.tobytes()
+        fan = self._fans.get(key)
+        if fan is None:
+            if len(self._fans) >= ROWS_KEPT:
+                self._fans.clear()
+            fan = self._fans[key] = _Fan(*self.lens.line(v, columns))
+        return fan

@@ -1,0 +1,70 @@
+"""C for the host: inner loops of boards and of the arena, compiled when first used and kept on disk like native code.
+
+In: a C file that needs no library but libm, whose functions it declares itself. Out: functions to call. The compiler is
+the clang of the `ziglang` package; it never contracts a multiplication and an addition, so a result is the same on
+every host, to the bit, and the one Python's own arithmetic gives.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import os
+import subprocess
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+from emu.dspic30f.jit.compiler import shared_compiler
+
+FLAGS: Final = ("-std=c11", "-O2", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-ffreestanding", "-fPIC",
+                "-fno-stack-protector", "-Wall", "-Wextra", "-Werror")  # fmt: skip
+DOUBLE, INT, ADDRESS = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
+Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
+"""Type of the result and types of the arguments of functions by name."""
+
+_libraries: Final[list[Any]] = []
+"""Code is unloaded with the object that stands for it."""
+
+
+class HostCodeError(RuntimeError):
+    """The C compiler is missing or refused a file of this package."""
+
+
+def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., Any]]:
+    """The functions of a C file. They keep Python's global lock: each is to be short. Raises HostCodeError."""
+    import llvmlite.binding as llvm
+
+    compiler = shared_compiler()
+    text = source.read_bytes()
+    key = compiler.key(2, version("ziglang").encode(), repr(FLAGS).encode(), text)
+    code = compiler.cache.get(key)
+    if code is None:
+        code = _compiled(source)
+        compiler.cache.put(key, code)
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    builder = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
+    for name in signatures:
+        builder.export_symbol(name)
+    library = builder.link(llvm.create_lljit_compiler(), source.stem)
+    _libraries.append(library)
+    return {name: ctypes.PYFUNCTYPE(result, *arguments)(int(library[name]))
+            for name, (result, arguments) in signatures.items()}  # fmt: skip
+
+
+def _compiled(source: Path) -> bytes:
+    """The object file of a C file."""
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or spec.origin is None:
+        raise HostCodeError("the C compiler is missing: install the Python package 'ziglang' (pip install ziglang)")
+    clang = Path(spec.origin).parent / ("zig.exe" if os.name == "nt" else "zig")
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "made.o"
+        command = [str(clang), "clang", *FLAGS, "-c", str(source), "-o", str(made)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise HostCodeError(f"{source}: {done.stderr.strip()}")
+        return made.read_bytes()
