@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from emu.chips.dspic30f6014a import Y_RAM
 from tests.toolchain.runtime import dsp_model as model
 from tests.toolchain.runtime.dsp_target import Target
 
@@ -76,7 +75,7 @@ def test_sums_of_products(places: str, target: Target, rng: random.Random) -> No
 
 def test_nothing_is_read_behind_the_end_of_memory(target: Target, rng: random.Random) -> None:
     """Behind Y RAM is no memory: a prefetch too many there is an address error."""
-    y_end = Y_RAM.end
+    y_end = target.machine.chip.data["yram"].end
     for n in (1, 2, 8):
         a, b = vector(rng, n), vector(rng, n)
         at = target.put(y_end - 2 * n, b)
