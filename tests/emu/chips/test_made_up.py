@@ -99,6 +99,7 @@ def test_reset_puts_the_stack_at_the_start_of_ram_and_fetches_end_with_flash(eng
     """isa.md §2.1, and §14.4 cause 5."""
     machine = machine_with(engine, "AddressError: bra AddressError")
     assert machine.w[15] == SFR_END
+    machine.run_until(4)
     machine.pc = FLASH_END
     machine.run_until(machine.cycle + 8)
     assert machine.peek("INTTREG") & 0x3F == 2
