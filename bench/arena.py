@@ -53,7 +53,9 @@ def measure(scene: Scene, brains: list[Brain], seconds: float, warm_up: float) -
     step = physics.around(world.step)
     for brain in brains:
         if isinstance(brain, EmulatedBrain):
-            brain.machine.board.camera.sample(rendering.around(brain._pixels))
+            sight = brain._sight  # not `_pixels`: other robots are run inside it
+            sight.look = rendering.around(sight.look)  # type: ignore[method-assign]
+            sight.pixels = rendering.around(sight.pixels)  # type: ignore[method-assign]
     world.step = step  # type: ignore[method-assign]
     robots = [brain for brain in brains if isinstance(brain, EmulatedBrain)]
     lockstep = LockStep(world, robots) if robots else None

@@ -195,7 +195,8 @@ def test_the_scenes_light_reaches_the_camera(talking_image: Path, alone: Scene) 
     pictures = []
     for brightness in (1.0, 0.5):
         brain = EmulatedBrain(alone.with_values(light__brightness=brightness), 1, 0, talking_image)
-        brain._look_around(0, World.of(alone, 1, [(200, 150, 0.0)], []).poses)
+        poses = World.of(alone, 1, [(200, 150, 0.0)], []).poses
+        brain._see(0, poses, poses)
         pictures.append(brain.machine.board.camera.frame(cycle=0).astype(int))
     lit, dim = (picture[:, :, 0].mean() for picture in pictures)
     assert dim == pytest.approx(lit / 2, rel=0.1)
