@@ -10,7 +10,7 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 ROOT = Path(__file__).resolve().parent
-SUFFIXES = {".c", ".h", ".S", ".inc", ".ld", ".mk", ".md", ".json", ".py"}
+SUFFIXES = {".c", ".cpp", ".h", ".S", ".inc", ".ld", ".mk", ".md", ".json", ".py"}
 
 
 def firmware_files() -> list[Path]:

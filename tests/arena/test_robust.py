@@ -80,8 +80,10 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     long = ["run", "clustering", "--brain", "scripted", "--minutes", "2", "--trials", "3", "--jobs", "1"]
     first = started(*long, "--out", tmp_path)
     wait_for(tmp_path / "manifest.json")
+    first.send_signal(signal.SIGSTOP)  # or it is through before the second has begun
     second = started(*SHORT, "--seed", 99, "--out", tmp_path)
     said = second.communicate(timeout=120)[1]
+    first.send_signal(signal.SIGCONT)
     assert second.returncode == 3
     assert said.count("\n") == 1
     assert "another run is writing here" in said

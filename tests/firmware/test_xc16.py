@@ -131,6 +131,7 @@ def check_gnu99(source: Path) -> None:
     ]
     # Addresses of 16 bits only: pointers do not fit into integers on a host.
     layout = ["-DSYS_DEFAULT_STACK=256", "-include", "stddef.h", "-Wno-type-limits", "-Wno-attributes"]
+    layout += ["-D__dsPIC30F6014A__"]  # as -mcpu does
     command = ["gcc", *flags, *layout, *includes, str(source)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     found = [line for line in done.stderr.splitlines() if re.search(r"(error|warning):", line)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from dataclasses import asdict
 
@@ -24,8 +25,8 @@ Names in annotations get their values by --let; for our kernel n threads, m even
 s subscriptions of one event, q queued messages, i times idle, u bytes of a stack never used."""
 
 
-def main(arguments: list[str]) -> int:
-    """Print the report; returns 0, or 1 when a --limit is exceeded or there is no bound to compare."""
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
     p = parser("bounds", DESCRIPTION, "python -m toolchain bounds firmware.elf --let n=4 --limit Sys_Yield=90")
     p.add_argument("image")
     p.add_argument("-a", "--annotations", metavar="FILE", help="annotation file of `stack`")
@@ -35,7 +36,12 @@ def main(arguments: list[str]) -> int:
     p.add_argument("--limit", action="append", default=[], metavar="NAME=CYCLES", help="fail when NAME can take longer")
     p.add_argument("--stack-limit", action="append", default=[], metavar="NAME=BYTES", help="fail when NAME needs more")
     p.add_argument("--json", action="store_true", help="machine-readable output")
-    options = p.parse_args(arguments)
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Print the report; returns 0, or 1 when a --limit is exceeded or there is no bound to compare."""
+    options = options_of().parse_args(arguments)
     file = options.annotations
     annotations = read_annotations(read_text(file), file) if file else Annotations()
     image = read_executable(read_bytes(options.image), options.image)

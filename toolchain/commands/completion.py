@@ -24,7 +24,7 @@ def main(arguments: list[str]) -> int:
     options = options_of().parse_args(arguments)
     commands = {}
     for name, (module, text) in COMMANDS.items():
-        commands[name] = (_compiler() if name == "cc" else import_module(module).options_of(), text)
+        commands[name] = (_compiler() if name in ("cc", "c++") else import_module(module).options_of(), text)
     print(script("toolchain", commands, options.shell))
     return 0
 

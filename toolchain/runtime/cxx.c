@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What C++ code calls by itself (Itanium C++ ABI, 3.3 and 5.1.5): new and delete on the C heap, which is there when the
  * linker is told one (--heap=BYTES). Nothing can be thrown, so plain `new` that finds no room ends the program. */
 #include <stdlib.h>

@@ -18,15 +18,15 @@
 #else
 #define LOOP_BOUND(rounds)
 #define CALL_TARGETS(...)
-#define PRIVATE_VALUE(variable, value)
-#define KNOWN_VALUE(variable, value)
-#define ARGUMENT_BOUND(function, n, most)
-#define INTERRUPT_LEVEL(vector, level)
-#define STACK_AREA(variable, bytes)
-#define THREADS(...)
-#define COMES_BACK(function, level)
-#define RESUMED_BY(...)
-#define LINKS_IN_RAM()
+#define PRIVATE_VALUE(variable, value) struct no_note
+#define KNOWN_VALUE(variable, value) struct no_note
+#define ARGUMENT_BOUND(function, n, most) struct no_note
+#define INTERRUPT_LEVEL(vector, level) struct no_note
+#define STACK_AREA(variable, bytes) struct no_note
+#define THREADS(...) struct no_note
+#define COMES_BACK(function, level) struct no_note
+#define RESUMED_BY(...) struct no_note
+#define LINKS_IN_RAM() struct no_note
 #endif
 
 /* The value of a macro as text; a condition without which the file is not compiled. */
