@@ -38,3 +38,16 @@ def test_a_wrong_instruction_in_inline_assembly_names_its_line(
     assert driver.main([*options, str(source), "-o", str(tmp_path / "x")]) == 2
     assert f"{source}:4: error: unknown instruction 'frob'" in capsys.readouterr().err
     assert sorted(p.name for p in tmp_path.iterdir()) == ["main.c"]
+
+
+def test_a_source_beside_the_present_folder_is_named_in_full(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Clang takes what the two paths share off the name."""
+    (tmp_path / "here").mkdir()
+    (tmp_path / "there").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    source = tmp_path / "there" / "main.c"
+    source.write_text("int main(void) { extern int missing(void); return missing(); }\n")
+    assert driver.main([str(source), "-o", "x.elf"]) == 2
+    assert capsys.readouterr().err.startswith(f"{source}:1: error: undefined symbol _missing")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 
 from ..ir.model import Module
@@ -65,11 +66,13 @@ class DebugInfo:
         return self._files[ref]
 
     def position(self, ref: str | None) -> tuple[str, int] | None:
-        """(file name, line) of a DILocation or DISubprogram; None without one."""
-        if ref is None:
+        """(file name, line) of a DILocation or DISubprogram; None without one. The name leads there from the present
+        folder: clang takes what a file's path shares with that folder's off the name."""
+        if ref is None or not (line := self.number(ref, "line")):
             return None
-        line = self.number(ref, "line")
-        return (self.file(ref)[1], line) if line else None
+        directory, name = self.file(ref)
+        elsewhere = os.path.isabs(directory) and directory != os.getcwd()
+        return (os.path.join(directory, name) if elsewhere else name), line
 
     def subprogram(self, ref: str) -> str:
         """The DISubprogram a scope lies in."""
