@@ -321,7 +321,7 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
 def _queued(machine: Machine) -> Counter[int]:
     """Identifiers of the messages in the queue, whose last element its end must point to."""
     found: Counter[int] = Counter()
-    link = machine.address_of("queue")
+    link = machine.address_of("event_queue")
     while machine.peek(link):
         link = machine.peek(link)
         found[machine.peek(machine.peek(link + 2))] += 1
