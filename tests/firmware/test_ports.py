@@ -235,10 +235,11 @@ int main(void)
 def test_an_overflow_of_the_kernel_stack_stops_the_system(target: str, tmp_path: Path) -> None:
     """The MPU traps where it happens; the AVR sees it behind the handlers, by the paint of the stack's last byte.
 
-    There only if what lies below the stack lets it come so far: the kernel's own variables (port/avr/README.md)."""
+    There only if what lies below the stack lets it come so far, the kernel's own variables (port/avr/README.md): so the
+    handler leaves the stack's last bytes to the tick above it."""
     (tmp_path / "handler").mkdir()
     (tmp_path / "handler" / "main.c").write_text(IN_A_HANDLER)
-    bytes_of = {"kilobot": "(SYS_KERNEL_STACK-28)", "epuck2": "SYS_KERNEL_STACK"}
+    bytes_of = {"kilobot": "(SYS_KERNEL_STACK-32)", "epuck2": "SYS_KERNEL_STACK"}
     image = make(target, "handler", tmp_path / "out", f"DEFINES=-DBYTES='{bytes_of[target]}'", apps=tmp_path)
     if target == "epuck2":
         assert said_by_epuck2(image, rb" in thread \d+\r\n").startswith(b"stack trap at 0x")
