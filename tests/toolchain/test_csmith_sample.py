@@ -1,4 +1,4 @@
-"""Some thirty programs of the csmith campaign (`tests/fuzz/csmith_campaign.py`, which `make campaigns` runs at length)."""
+"""Some thirty programs of the csmith campaign (`tests/fuzz/csmith_campaign.py`; `make campaigns` runs it at length)."""
 
 from __future__ import annotations
 
