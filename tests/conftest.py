@@ -17,8 +17,6 @@ from emu.dspic30f.engines import NAMES, make_engine
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--vectors", default=None, help="folder with encodings.csv and semantics*.jsonl.gz to run")
     parser.addoption("--engine", default=None, help="run what names no engine with this one only")
-
-
     parser.addoption("--allowed-skips", default=None, type=Path, help="a file; any other skip is a failure")
 
 

@@ -132,7 +132,7 @@ def test_a_new_scene_needs_no_code(tmp_path: Path) -> None:
 def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path) -> None:
     """/dev/full answers every write with ENOSPC, through a link where the part file would be."""
     if not Path("/dev/full").exists():
-        pytest.skip("this system has no /dev/full")
+        pytest.skip("only Linux has /dev/full; without it a full disk takes a mount, and that takes root")
     (tmp_path / "trial-0001.parquet.part").symlink_to("/dev/full")
     rows = Rows()
     rows.add({"t": 0.0, "log": []})
@@ -276,7 +276,7 @@ def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
 ) -> None:
     """Issue "Must show" 7: the second of three trials cannot be written; with room again the run goes on."""
     if not Path("/dev/full").exists():
-        pytest.skip("this system has no /dev/full")
+        pytest.skip("only Linux has /dev/full; without it a full disk takes a mount, and that takes root")
     part = tmp_path / "trial-0002.parquet.part"
     part.symlink_to("/dev/full")
     assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 2
@@ -333,7 +333,7 @@ def alive(process: str) -> bool:
     return stat.rpartition(")")[2].split()[0] != "Z"  # a container without init may leave the dead unburied
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="lists processes through /proc")
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only /proc tells a process's children")
 def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
     """SIGKILL cannot be handled by the run itself; its workers would compute on for nobody."""
     command = [sys.executable, "-m", "arena", "run", "clustering", "--brain", "scripted", "--minutes", "600"]

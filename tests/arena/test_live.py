@@ -110,7 +110,7 @@ def test_a_disk_too_full_for_the_rows_does_not_stop_the_trial(
 ) -> None:
     """/dev/full answers every write with ENOSPC."""
     if not Path("/dev/full").exists():
-        pytest.skip("this system has no /dev/full")
+        pytest.skip("only Linux has /dev/full; without it a full disk takes a mount, and that takes root")
     live_path(tmp_path, 1).symlink_to("/dev/full")
     about, rows = recorded
     live = LiveFile(live_path(tmp_path, 1), about)
