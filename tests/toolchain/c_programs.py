@@ -64,3 +64,14 @@ def run(image: Path, cycles: int = 30_000_000, engine: str = "auto") -> Ran:
         traps = [name for bit, name in INTCON1_TRAPS.items() if flags >> bit & 1]
         why = f"trap: {', '.join(traps) or 'unexpected interrupt'}"
     return Ran(None, why, bytes(said), stop.cycle)
+
+
+def run_both(folder: Path, level: str, c_text: str, s_text: str) -> int:
+    """Status of a program of one C and one assembly file."""
+    (folder / "a.c").write_text(c_text)
+    (folder / "b.s").write_text("        .section .text,code\n" + s_text)
+    built = build([folder / "a.c", folder / "b.s"], folder / "a.elf", level, "-std=gnu11", "-Wall")
+    assert built.status == 0, built.messages
+    ran = run(folder / "a.elf", engine="interp")
+    assert ran.status is not None, ran
+    return ran.status

@@ -114,11 +114,7 @@ _FIR:
 5:      sac.r   A,[w1++]
 6:      mov     w10,[w3+12]
         uncircular
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished
 
 ; fractional *FIRDecimate(int n, fractional *dst, fractional *src, FIRStruct *filter, int rate): n outputs of n*rate inputs
         .section .text._FIRDecimate,code
@@ -152,11 +148,7 @@ _FIRDecimate:
         bra     nn,1b
         mov     w10,[w3+12]
         uncircular
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished
 
 ; fractional *FIRInterpolate(int n, fractional *dst, fractional *src, FIRStruct *filter, int rate): n*rate outputs;
 ; output n*rate+r is the sum of h[r+k*rate] and sample n-k. 3 cycles a product.
@@ -199,11 +191,7 @@ _FIRInterpolate:
         bra     nz,1b
         mov     w10,[w3+12]
         uncircular
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished
 
 ; fractional *FIRLattice(int n, fractional *dst, fractional *src, FIRStruct *filter): M coefficients, M words of delay,
 ; not circular. f0 = g0 = x; f[m+1] = f[m] - k[m] * g[m] of the sample before; g[m+1] = g[m] of the sample before - k[m] *
@@ -238,11 +226,7 @@ _FIRLattice:
         mov     w5,[w1++]
         dec     w0,w0
         bra     nn,1b
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished
 
 ; fractional *FIRLMS(int n, fractional *dst, fractional *src, FIRStruct *filter, fractional *reference, fractional mu):
 ; each coefficient, in RAM, gains mu * (reference - y) * its sample.
@@ -317,11 +301,7 @@ _FIRLattice:
         bra     nz,1b
         mov     w10,[w3+12]
         uncircular
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished
         .endm
         adaptive _FIRLMS,0
         adaptive _FIRLMSNorm,1

@@ -75,11 +75,7 @@ _IIRCanonic:
         sac.r   A,#-1,[w1++]
         dec     w0,w0
         bra     nn,1b
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished
 
 ; fractional *IIRTransposed(int n, fractional *dst, fractional *src, IIRTransposedStruct *filter): transposed form II.
 ; {int sections less 1; coeffsBase {b0, b1, a1, b2, a2}; int coeffsPage; delayBase1, delayBase2, a word a section each; int
@@ -122,11 +118,7 @@ _IIRTransposed:
         sac.r   A,[w1++]
         dec     w0,w0
         bra     nn,1b
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished
 
 ; fractional *IIRLattice(int n, fractional *dst, fractional *src, IIRLatticeStruct *filter)
 ; {int order M; kappaVals, gammaVals or 0; int coeffsPage; delay of M+1 words in Y}. From the last coefficient to the first:
@@ -177,8 +169,4 @@ _IIRLattice:
 3:      mov     w7,[w1++]
         dec     w0,w0
         bra     nn,1b
-        pop     _PSVPAG
-        pop     _CORCON
-        mov     [--w15],w0
-        popall
-        return
+        finished

@@ -1,0 +1,55 @@
+"""What the compiler makes of interrupt functions (abi-elf.md §2.5)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.toolchain.c_programs import build
+
+
+def assembly_of(folder: Path, c_text: str, level: str = "-Os") -> str:
+    """Our compiler's output for one file."""
+    (folder / "x.c").write_text("#include <dspic30f6014a.h>\n" + c_text)
+    built = build([folder / "x.c"], folder / "x.s", level, "-S")
+    assert built.status == 0, built.messages
+    return (folder / "x.s").read_text()
+
+
+def body_of(text: str, name: str) -> list[str]:
+    """Instructions of one function, labels and directives left out."""
+    part = text.split(f"\n{name}:", 1)[1].split(".size", 1)[0]
+    lines = [line.strip() for line in part.splitlines() if line.startswith("\t")]
+    return [line for line in lines if line and not line.startswith(".")]
+
+
+def test_minimal_handler_is_two_words(tmp_path: Path) -> None:
+    """abi-elf.md §2.5: one INC f and RETFIE, nothing saved."""
+    text = assembly_of(tmp_path, "volatile int n; OS_ISR(_T1Interrupt) { n++; }")
+    assert body_of(text, "__T1Interrupt") == ["inc _n", "retfie"]
+
+
+def test_handler_that_calls_saves_rcount_and_w0_to_w7(tmp_path: Path) -> None:
+    """abi-elf.md §2.5 items 2 and 3, mirrored at the end."""
+    body = body_of(assembly_of(tmp_path, "void f(void); OS_ISR(_T1Interrupt) { f(); }"), "__T1Interrupt")
+    assert body[:5] == ["push _RCOUNT", "mov.d w0,[w15++]", "mov.d w2,[w15++]", "mov.d w4,[w15++]", "mov.d w6,[w15++]"]
+    assert body[-6:] == [
+        "mov.d [--w15],w6", "mov.d [--w15],w4", "mov.d [--w15],w2", "mov.d [--w15],w0", "pop _RCOUNT", "retfie",
+    ]  # fmt: skip
+
+
+def test_shadow_handler_uses_the_shadow_registers(tmp_path: Path) -> None:
+    """abi-elf.md §2.5, attribute `shadow`."""
+    text = assembly_of(tmp_path, "volatile int a, b; OS_ISR_SHADOW(_T1Interrupt) { a = b + 3; }")
+    body = body_of(text, "__T1Interrupt")
+    assert body[0] == "push.s"
+    assert body[-2:] == ["pop.s", "retfie"]
+
+
+def test_auto_psv_handler_loads_and_restores_psvpag(tmp_path: Path) -> None:
+    """abi-elf.md §2.5 item 6."""
+    source = "volatile int a; OS_ISR_AUTO_PSV(_T1Interrupt) { static const int t[3] = {5, 6, 7}; a = t[a]; }"
+    body = "\n".join(body_of(assembly_of(tmp_path, source), "__T1Interrupt"))
+    assert "push _PSVPAG" in body
+    assert "#__const_psvpage" in body
+    assert body.endswith("retfie")
+    assert body.index("pop _PSVPAG") > body.index("#__const_psvpage")
