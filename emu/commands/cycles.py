@@ -7,13 +7,14 @@ import json
 
 from emu.command import CommandError, Parser
 from emu.loader import load_image
-from emu.openswarm import baseline
-from emu.openswarm.latency import APPLICATION, run_measures
+from emu.openswarm import baseline, latency
+from emu.openswarm import options as kernel_options
 from emu.openswarm.target import MeasureError
 from emu.status import DONE, FAULT
 
 DESCRIPTION = """\
-Run the scenarios of the `latency` application and print how many cycles the kernel's operations take.
+Run the scenarios of the `latency` application and print how many cycles the kernel's operations take, or those of
+`options` for the calls of its options.
 
 The numbers are exact and repeat exactly, so --check has no tolerance: any increase over the baseline is printed with
 the source lines that grew, and ends with status 1."""
@@ -21,7 +22,7 @@ the source lines that grew, and ends with status 1."""
 
 def parser() -> Parser:
     made = Parser("cycles", DESCRIPTION, "emu cycles firmware/build/latency/firmware.elf --check firmware/cycles.json")
-    made.add_argument("image", metavar="IMAGE", help="ELF executable of the application `latency`")
+    made.add_argument("image", metavar="IMAGE", help="ELF executable of the application `latency` or `options`")
     made.add_argument("--engine", metavar="NAME", default="interp", help="auto, jit, interp or plain (default interp)")
     made.add_argument("--json", action="store_true", help="print one JSON object")
     add_baseline_arguments(made)
@@ -38,10 +39,12 @@ def add_baseline_arguments(parser: Parser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Exit status: 0 printed or nothing grew, 1 something grew, 2 bad input."""
     image = load_image(options.image)
-    if image.symbols.find(APPLICATION) is None:
-        raise CommandError(f"{image.path} is not the application `latency`: it has no symbol {APPLICATION!r}")
+    known = [each for each in (latency, kernel_options) if image.symbols.find(each.APPLICATION)]
+    if not known:
+        wanted = f"no symbol {latency.APPLICATION!r} or {kernel_options.APPLICATION!r}"
+        raise CommandError(f"{image.path} is not the application `latency` or `options`: it has {wanted}")
     try:
-        windows = run_measures(image, options.engine)
+        windows = known[0].run_measures(image, options.engine)
     except (MeasureError, ValueError) as error:
         raise CommandError(str(error)) from None
     sources = baseline.Sources(image.path)

@@ -21,7 +21,8 @@ DESCRIPTION = """\
 Print what an image costs in ROM and RAM (bytes; 3 per program word), by part, source file and symbol.
 
 Of the application `footprint` also what threads, events, subscriptions and messages take: it is run with 60 loads, the
-heap is read from the running image, and the memory equation RAM = A + B n + C m + D s + sum (E + d) is fitted."""
+heap is read from the running image, and the memory equation RAM = A + B n + C m + D s + sum (E + d) is fitted. Of the
+application `options` what each option of the kernel takes, which is all that --check then looks at."""
 
 
 def parser() -> Parser:
@@ -51,6 +52,10 @@ def run(options: argparse.Namespace) -> int:
         numbers |= {f"{name} of the memory equation": Number(ceil(equation[name])) for name in "ABCDE"}
         for owner, words in (("kernel", "of the kernel alone"), ("devices", "of kernel and devices")):
             numbers |= {f"{key} {words}": Number(equation["sizes"][owner][name]) for key, name in _SIZES}
+    option_sizes = _options(image)
+    if option_sizes is not None:
+        facts["options"] = option_sizes
+        numbers = {name: Number(size) for name, size in option_sizes.items()}
     if options.update:
         save(options.update, numbers)
     if options.json:
@@ -59,6 +64,8 @@ def run(options: argparse.Namespace) -> int:
         print(static_text(facts, options.symbols))
         if equation is not None:
             print("\n" + equation_text(equation))
+        if option_sizes is not None:
+            print("\n" + "\n".join(f"{name:48} {size:7,}" for name, size in option_sizes.items()))
     return verdict(options, numbers, "bytes") if options.check else DONE
 
 
@@ -93,6 +100,19 @@ def _equation(image: Image) -> dict[str, Any] | None:
         "largest_residual": float(equation.residual),
         "cases": [asdict(case) for case in equation.cases],
     }
+
+
+def _options(image: Image) -> dict[str, int] | None:
+    """Bytes of the kernel's options, None for an image that is not the application `options`."""
+    from emu.openswarm.options import APPLICATION, sizes
+    from emu.openswarm.target import MeasureError
+
+    if image.symbols.find(APPLICATION) is None:
+        return None
+    try:
+        return sizes(image)
+    except MeasureError as error:
+        raise CommandError(str(error)) from None
 
 
 def equation_text(equation: dict[str, Any]) -> str:

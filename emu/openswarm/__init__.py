@@ -1,1 +1,1 @@
-"""What the measuring commands know of our kernel: symbols of the `footprint` and `latency` applications."""
+"""What the measuring commands know of our kernel: symbols of the `footprint`, `latency` and `options` applications."""

@@ -46,7 +46,7 @@ def shares(image: Image) -> dict[str, Share]:
             owner = _owner(piece.module) if not piece.module.endswith(".h") else homes.get(piece.name, KERNEL)
             rom[owner] += piece.rom
             ram[owner] += piece.ram
-    for file, size in _handles(image):
+    for file, size in handles(image):
         rom[_owner(file)] += size
     return {owner: Share(rom[owner], ram[owner]) for owner in (KERNEL, DEVICES, APPLICATION)}
 
@@ -66,7 +66,7 @@ def _homes(found: list[Piece]) -> dict[str, str]:
     return {name: count.most_common(1)[0][0] for name, count in sizes.items()}
 
 
-def _handles(image: Image) -> list[tuple[str, int]]:
+def handles(image: Image) -> list[tuple[str, int]]:
     """(source file of its target, bytes) of every slot of `.handle`."""
     symbol = image.symbols.find(_HANDLES)
     section = next((s for s in image.sections if s.name == _HANDLES), None)

@@ -35,8 +35,13 @@ def test_the_memory_equation_fits_every_load_exactly(footprint, capsys):
 
 def test_footprint_and_cycles_have_not_grown(image, capsys):
     """The baselines are exact: refresh them with --update when a number fell, or with a reason when it rose."""
-    for command, app in (("footprint", "footprint"), ("cycles", "latency")):
-        status = main([command, str(image(app)), "--check", str(BASELINES / f"{command}.json")])
+    for command, app, name in (
+        ("footprint", "footprint", "footprint"),
+        ("cycles", "latency", "cycles"),
+        ("footprint", "options", "options-footprint"),
+        ("cycles", "options", "options-cycles"),
+    ):
+        status = main([command, str(image(app)), "--check", str(BASELINES / f"{name}.json")])
         assert status == 0, capsys.readouterr().out
 
 

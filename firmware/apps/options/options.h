@@ -1,0 +1,27 @@
+/* What a measuring program sets and where it looks. README.md lists the scenes. */
+#ifndef OPTIONS_H
+#define OPTIONS_H
+
+#include <openswarm.h>
+
+enum { OPTIONS_EVENT = SYS_FIRST_USER_EVENT, OPTIONS_ELSEWHERE, OPTIONS_NEIGHBOUR = SYS_FIRST_USER_EVENT + 8 };
+
+/* emu/openswarm/options.py has the same names in the same order. */
+enum {
+    LOCK, LOCK_SECOND, LOCK_TAKEN, UNLOCK, UNLOCK_SECOND, UNLOCK_ONE_WAITS, UNLOCK_TWO_WAIT,
+    UNLOCK_SECOND_ONE_WAITS, UNLOCK_PRIORITIES, UNLOCK_TO_BETTER, START, START_JOINABLE, JOIN_ZOMBIE, JOIN_LIVING, END, END_JOINED,
+    PUSH, POP, POP_AND_RUN, POP_BEHIND_TWO, END_CLEANED,
+    LIMIT, SEND, SEND_LIMITED, SEND_LIMITED_BEHIND_FOUR, SEND_DROPPED, SEND_REPLACED, SEND_SECOND_QUOTA, SEND_NEIGHBOUR,
+    SEND_ELSEWHERE,
+    START_SERVICE, FEED, FEED_BEHIND_TWO, TICK, TICK_SERVICE
+};
+
+extern volatile uint16 options_wanted;
+
+void options_begin(void); /* a stop: set options_wanted here */
+void options_ready(void); /* a stop: the scene's call comes next, and nothing interrupts it */
+void options_done(void);  /* a stop: the call has returned */
+void options_woken(void); /* a stop: so has that of a thread it waited for, or which waited */
+void options_spin(void);  /* another thread, without end */
+
+#endif

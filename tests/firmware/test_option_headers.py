@@ -1,0 +1,141 @@
+"""Numbers in the headers of the kernel's options and in their README, against what `emu` and `toolchain` measure."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from emu.cli import main as emu
+from tests.firmware.conftest import FIRMWARE, Build
+from toolchain.cli import main as toolchain
+
+INCLUDE = FIRMWARE / "openswarm" / "include"
+CONTRACT = re.compile(r"/\* [MTHI]+(?:, [\w ]+)? \| [^|]* \| (?P<cycles>[^|]*) \| (?P<stack>\d+)")
+CALL = 4
+"""Bytes of a return address: `toolchain stack` counts them to the caller, the contract lines to the call."""
+
+
+@pytest.fixture(scope="module")
+def path(image: Build) -> Path:
+    return image("options")
+
+
+@pytest.fixture
+def cycles(path: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, int]:
+    assert emu(["cycles", str(path), "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
+def contract(option: str, call: str) -> tuple[list[int], int]:
+    """The numbers of the field of cycles, and the bytes of stack."""
+    text = (INCLUDE / f"openswarm_{option}.h").read_text()
+    declared = re.search(rf"^\w+ {call}\(", text, re.M)
+    assert declared, f"{call} is not declared"
+    found = CONTRACT.match(text, text.rindex("/* ", 0, declared.start()))
+    assert found, f"{call} has no contract line"
+    return [int(number) for number in re.findall(r"\d+", found["cycles"])], int(found["stack"])
+
+
+def sentence(option: str, begin: str) -> list[int]:
+    """The numbers of a sentence, which ends with a full stop."""
+    text = re.sub(r"\s+\*?\s*", " ", (INCLUDE / f"openswarm_{option}.h").read_text())
+    found = re.search(re.escape(begin) + r"([^.]*)\.", text)
+    assert found, begin
+    return [int(number) for number in re.findall(r"\d+", re.sub(r"\([^)]*\)|\d+ (?:bytes|ms)", "", found[1]))]
+
+
+def test_the_cycles_in_the_headers_are_the_measured_ones(cycles: dict[str, int]) -> None:
+    lock, unlock = cycles["Sys_Lock_Mutex"], cycles["Sys_Unlock_Mutex"]
+    start = cycles["Sys_Start_ProcessWith, for comparison"]
+    waited = cycles["Sys_Unlock_Mutex, one thread waits"]
+    assert contract("mutex", "Sys_Lock_Mutex")[0] == [
+        lock,
+        cycles["Sys_Lock_Mutex, another thread owns another"] - lock,
+        cycles["Sys_Lock_Mutex of another thread's, to the next thread"],
+    ]
+    assert contract("mutex", "Sys_Unlock_Mutex")[0] == [
+        unlock,
+        cycles["Sys_Unlock_Mutex, another thread owns another"] - unlock,
+        cycles["Sys_Unlock_Mutex, fixed priorities"],
+        waited,
+        cycles["Sys_Unlock_Mutex, two threads wait"] - waited,
+        cycles["Sys_Unlock_Mutex, one waits, another owns another"] - waited,
+        cycles["Sys_Unlock_Mutex, a better thread waits, to that"],
+        cycles["Sys_Unlock_Mutex, a better thread locks, unlocks, sleeps"],
+    ]
+    assert contract("join", "Sys_Start_Joinable")[0] == [cycles["Sys_Start_Joinable"] - start]
+    assert contract("join", "Sys_Join")[0] == [
+        cycles["Sys_Join of a zombie"],
+        cycles["Sys_Join of a living thread, to the next thread"],
+    ]
+    pop = cycles["Sys_Pop_Cleanup"]
+    behind_two = cycles["Sys_Pop_Cleanup, two of others are newer"] - pop
+    assert contract("cleanup", "Sys_Push_Cleanup")[0] == [cycles["Sys_Push_Cleanup"]]
+    assert contract("cleanup", "Sys_Pop_Cleanup")[0] == [
+        pop,
+        behind_two // 2,
+        cycles["Sys_Pop_Cleanup, an empty function is run"] - pop,
+    ]
+    assert contract("quota", "Sys_Limit_Event")[0] == [cycles["Sys_Limit_Event"]]
+    send, limited = cycles["send 2 bytes, for comparison"], cycles["send 2 bytes, limited"]
+    assert sentence("quota", "Sending the event then takes") == [
+        limited - send,
+        cycles["send 2 bytes, limited, dropped"] - send,
+        cycles["send 2 bytes, the latest is replaced"] - send,
+        (cycles["send 2 bytes, limited, four wait"] - limited) // 4,
+        cycles["send 2 bytes, limited, a newer quota"] - limited,
+    ]
+    neighbour = cycles["send 2 bytes, another event of the bucket is limited"] - send
+    assert sentence("quota", "Other events of the same bucket") == [neighbour]
+    assert cycles["send 2 bytes, an event elsewhere is limited"] == send
+    feed = cycles["Sys_Feed_Watchdog"]
+    assert contract("service", "Sys_Start_Service")[0] == [cycles["Sys_Start_Service"] - start]
+    behind_two = cycles["Sys_Feed_Watchdog, two services are newer"] - feed
+    assert contract("service", "Sys_Feed_Watchdog")[0] == [feed, behind_two // 2]
+    looking = cycles["1 ms clock, idle, one service"] - cycles["1 ms clock, idle, for comparison"]
+    assert sentence("service", "which also costs its message:") == [looking]
+
+
+def test_the_stack_in_the_headers_is_the_worst_case(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`toolchain stack`, up to the switch, whose frame comes on top (openswarm.h)."""
+    annotations = tmp_path / "stack"
+    annotations.write_text("depth _hal_block 0\n")
+    assert toolchain(["stack", str(path), "-a", str(annotations), "--functions", "--json"]) == 0
+    functions = json.loads(capsys.readouterr().out)["functions"]
+    depth = {function["name"]: function["total"] for function in functions}
+    for option, calls in {
+        "mutex": ("Sys_Lock_Mutex", "Sys_Unlock_Mutex"),
+        "join": ("Sys_Start_Joinable", "Sys_Join"),
+        "cleanup": ("Sys_Push_Cleanup", "Sys_Pop_Cleanup"),
+        "quota": ("Sys_Limit_Event",),
+        "service": ("Sys_Start_Service", "Sys_Feed_Watchdog"),
+    }.items():
+        for call in calls:
+            assert contract(option, call)[1] == depth[f"_{call}"] + CALL, call
+
+
+def test_the_readme_has_the_measured_bytes(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert emu(["footprint", str(path), "--json"]) == 0
+    sizes = json.loads(capsys.readouterr().out)["options"]
+    rows = re.findall(
+        r"^\| `(\w+)\.c` \|[^|]*\|[^|]*\| (\d+) \| (\d+) \| ?([^|]*)\|$",
+        (FIRMWARE / "openswarm" / "option" / "README.md").read_text(),
+        re.M,
+    )
+    assert {name for name, *_ in rows} == {name.partition(":")[0] for name in sizes if name.endswith(": ROM")}
+    objects = {
+        "mutex": [sizes["sys_mutex: RAM of one"]],
+        "quota": [sizes["sys_quota: RAM of one"], sizes["a quota: heap"]],
+        "join": [sizes["a zombie: heap"]],
+        "cleanup": [sizes["sys_cleanup: RAM of one"]],
+        "service": [sizes["sys_service: RAM of one"]],
+        "woken_first": [],
+    }
+    for name, rom, ram, each in rows:
+        assert (int(rom), int(ram)) == (sizes[f"{name}: ROM"], sizes[f"{name}: RAM"]), name
+        assert [int(number) for number in re.findall(r"\d+", each)] == objects[name], name
