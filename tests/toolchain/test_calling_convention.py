@@ -1,4 +1,4 @@
-"""The calling convention of abi-elf.md §2, arguments rule by rule, in both directions: C calls assembly and assembly calls C.
+"""The calling convention of abi-elf.md §2, arguments rule by rule: C calls assembly and assembly calls C.
 
 From each row of SIGNATURES a C caller, an assembly callee that records registers and stack, an assembly caller and a C
 callee that checks its parameters are generated; all rows run in one image per level.

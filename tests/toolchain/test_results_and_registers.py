@@ -1,4 +1,4 @@
-"""Results, preserved registers, names and function pointers between C and assembly (abi-elf.md §2), in both directions."""
+"""Results, preserved registers, names and function pointers between C and assembly (abi-elf.md §2), both ways."""
 
 from __future__ import annotations
 
