@@ -6,12 +6,18 @@ import argparse
 import json
 import sys
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, Final
 
 from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
-from emu.profile import Profile, Profiler
+from emu.image import Image
+from emu.outfile import whole_text_file
+from emu.profile import callgrind
+from emu.profile.shares import Profile, Profiler
+from emu.profile.timelines import perfetto, speedscope
+from emu.profile.tracks import Tracks
 from emu.status import DONE, FAULT
 
 DESCRIPTION: Final = """\
@@ -22,6 +28,10 @@ its handler. --group adds up code by function or source file (shell patterns) un
 its file:
 
     --group "capture=__T[45]Interrupt" --group "vision=*/line_of_sight.c"
+
+--callgrind is for callgrind_annotate and KCachegrind: cycles by line, calls with their inclusive cycles.
+--speedscope and --perfetto are timelines: threads, interrupt levels, calls. In all of them time in interrupts, asleep
+and in other threads is nobody's.
 
 Exit status: 0 done, 1 firmware fault (what was counted is printed), 2 bad input."""
 
@@ -37,6 +47,9 @@ def parser() -> Parser:
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
     made.add_argument("--group", metavar="NAME=PATTERN,...", action="append", default=[], type=_group, help="see above")
     made.add_argument("--top", metavar="N", type=int, default=20, help="functions to print (default 20; 0: all)")
+    made.add_argument("--callgrind", metavar="FILE", help="write calls and lines in Callgrind's format")
+    made.add_argument("--speedscope", metavar="FILE", help="write a timeline for speedscope")
+    made.add_argument("--perfetto", metavar="FILE", help="write a timeline for Perfetto (Trace Event Format)")
     made.add_argument("--json", action="store_true", help="print one JSON object: cycles and percent")
     add_board_options(made)
     return made
@@ -57,11 +70,11 @@ def run(options: argparse.Namespace) -> int:
     machine = Machine(image.chip, board=board_of(options))
     machine.load(image)
     set_up(machine, options)
-    fcy = Fraction(machine.peripherals.fcy)
-    if options.skip:
-        machine.run_until(int(options.skip * fcy))
-    profile = Profiler(machine, image).run(machine.cycle + max(1, int(options.seconds * fcy)))
+    skip = int(options.skip * machine.hz)
+    profiler = Profiler(machine, image, timed=bool(options.speedscope or options.perfetto))
+    profile = profiler.run(skip + machine.cycles_in(options.seconds), skip)
     _check_groups(profile, options.group)
+    _write(profile, profiler, image, options)
     fault = profile.stop.fault if profile.stop is not None else None
     if options.json:
         print(json.dumps(_facts(profile, options.group), indent=2))
@@ -71,6 +84,23 @@ def run(options: argparse.Namespace) -> int:
         print(f"emu profile: {fault.report()}", file=sys.stderr)
         return FAULT
     return DONE
+
+
+def _write(profile: Profile, profiler: Profiler, image: Image, options: argparse.Namespace) -> None:
+    """The files that were asked for."""
+    if options.callgrind:
+        with whole_text_file(options.callgrind) as stream:
+            stream.writelines(f"{line}\n" for line in callgrind.lines(profile, str(image.path), profiler.place))
+    if not (options.speedscope or options.perfetto):
+        return
+    tracks = Tracks(profile.turns, lambda pc: profiler.place(pc)[0], profile.start, profile.end, profile.entry)
+    name = Path(image.path).name
+    if options.speedscope:
+        with whole_text_file(options.speedscope) as stream:
+            json.dump(speedscope(tracks, profiler.place, name, profile.start, profile.end), stream)
+    if options.perfetto:
+        with whole_text_file(options.perfetto) as stream:
+            json.dump(perfetto(tracks, profiler.place, name, float(profiler.hz), profiler.inside), stream)
 
 
 def _check_groups(profile: Profile, groups: list[tuple[str, list[str]]]) -> None:

@@ -138,6 +138,8 @@ class LlvmBuilder:
         """The count of a REPEAT whose state is not in the record."""
         self.dsp_region = False
         """Some instruction of the function writes accumulator flags, so SR in the record may lack them."""
+        self.before_slow: Callable[[], None] = lambda: None
+        """Writes what goes into a slow exit first."""
         self._slow: str | None = None
 
     # -- instruction frame ------------------------------------------------------------------------------------------
@@ -178,6 +180,7 @@ class LlvmBuilder:
             self._slow = self.e.fresh("slow")
             current = self.e.block
             self.e.start(self._slow)
+            self.before_slow()
             if self.repeating is not None and self.left_count is not None:
                 self._leave_repeat(self.left_count, self.repeating)
             self.v.leave(self.pc, INTERPRET)

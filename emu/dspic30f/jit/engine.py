@@ -31,6 +31,7 @@ from emu.dspic30f.jit.builder import (
     Surroundings,
 )
 from emu.dspic30f.jit.compiler import shared_compiler
+from emu.dspic30f.jit.counting import LEDGER, BoundaryCounting, Counting, RowOf
 from emu.dspic30f.jit.region import Region, discover
 from emu.dspic30f.jit.runtime import (
     BLOCKS,
@@ -47,6 +48,7 @@ from emu.dspic30f.jit.runtime import (
 )
 from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
+from emu.dspic30f.ledger import STRETCH, Ledger
 from emu.dspic30f.modes import REGISTERS, Key, Modes
 from emu.dspic30f.state import NOT_REPEATING, RUN
 
@@ -113,6 +115,9 @@ class JitEngine:
         """Times an address without code is reached before code is made for it."""
         self.wait = False
         """Let code be compiled before it is run (tests, benchmarks)."""
+        self._longest = NATIVE_CYCLES
+        self._ledger: Ledger | None = None
+        self._row_of: RowOf = lambda pc: pc
         self._state: Final = core.state
         self._u16: Final = core.record.u16
         self._words: Final = core.chip.program["flash"].end // 2
@@ -151,7 +156,7 @@ class JitEngine:
                 self._miss(limit)
                 return
             self._prepare()
-        self._env[LIMIT] = min(limit, state.cycle + NATIVE_CYCLES)
+        self._env[LIMIT] = min(limit, state.cycle + self._longest)
         self._env[RESUME] = state.pc
         start = state.cycle
         why = self._native(self._core.record.address, self._env_address)
@@ -178,7 +183,7 @@ class JitEngine:
             return False
         self._select()
         env, native, record, surroundings = self._env, self._native, self._core.record.address, self._env_address
-        env[LIMIT] = min(limit, start + NATIVE_CYCLES)
+        env[LIMIT] = min(limit, start + self._longest)
         env[BOUNDARY] = 1
         why = native(record, surroundings)
         limit = max(limit, env[LIMIT]) if env[LAST] else limit
@@ -239,6 +244,32 @@ class JitEngine:
             return 0
         words = [address >> 1 for address in facts_of(insn).reads]
         return words[0] if words and 2 * words[0] in self._code.around.rules else 0
+
+    def keep(self, ledger: Ledger, row_of: RowOf) -> Callable[[], None]:
+        """Have all that is run counted in `ledger`, lines by their first address; returns how to stop. All code is
+        compiled before it is run meanwhile, and what is not compiled is run by the sequencer."""
+        kept = self._interpret, self._run_cold, self.wait, self._native
+
+        def run(record: int, env: int) -> Any:
+            why = self._dispatch(record, env)
+            if why != RETFIE:  # else the cycle of the last note is not sure
+                ledger.drain()
+            return why
+
+        ledger.open()
+        execute = self._core.sequencer.execute
+        self._interpret, self._run_cold, self.wait, self._native = execute, lambda _limit: execute(), True, run
+        self._ledger, self._row_of, self._longest, self._dispatch = ledger, row_of, STRETCH, None
+        self._env[LEDGER] = ledger.address
+        self.forget()
+
+        def stop() -> None:
+            ledger.close()
+            self._interpret, self._run_cold, self.wait, self._native = kept
+            self._ledger, self._longest, self._dispatch = None, NATIVE_CYCLES, None
+            self.forget()
+
+        return stop
 
     def measure_time(self) -> None:
         """Note from now on where host time goes (`emu run --stats`); costs a little itself."""
@@ -315,11 +346,13 @@ class JitEngine:
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
-        text = dispatch_text(boundary_of(self._core, self._offset), 2 * self._words)
+        ledger = self._ledger
+        counts = None if ledger is None else BoundaryCounting(ledger.words, ledger.tail, ENTERED)
+        text = dispatch_text(boundary_of(self._core, self._offset), 2 * self._words, counts)
         key = self.compiler.key(BLOCK_LEVEL, text.encode())
         kept = self.compiler.from_disk(key)
         self._dispatch = Call(kept[0] if kept is not None else self.compiler.now(text, BLOCK_LEVEL, key))
-        if self.seconds is None:
+        if self.seconds is None and ledger is None:
             self._native = self._dispatch
 
     def _fetch(self, pc: int) -> Insn | None:
@@ -339,7 +372,9 @@ class JitEngine:
         code.entries |= region.leaders
         self.counts.regions += 1
         hooked = sorted(code.around.hooks & region.steps.keys())
-        identity = repr((region.words(), sorted(region.leaders), pc, hooked)).encode()
+        ledger = self._ledger
+        rows = [self._row_of(at) for at in sorted(region.steps)] if ledger is not None else None
+        identity = repr((region.words(), sorted(region.leaders), pc, hooked, rows)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
             key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
             kept = self.compiler.from_disk(key)
@@ -347,7 +382,8 @@ class JitEngine:
                 address, entries = kept
                 self._install((code, entries, exact), address)
                 continue
-            translator = Translator(region, code.around, code.context, exact)
+            count = None if ledger is None else Counting(ledger.words, ledger.tail, self._row_of)
+            translator = Translator(region, code.around, code.context, exact, count)
             text, entries = translator.text(), translator.entries
             if self.wait:
                 self._install((code, entries, exact), self.compiler.now(text, level, key, entries))

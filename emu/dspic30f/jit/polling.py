@@ -27,8 +27,13 @@ class Loop:
 
     head: int
     back: int
-    cycles: int
-    """Tcy of an iteration."""
+    costs: tuple[tuple[int, int], ...]
+    """Its instructions and the Tcy of each."""
+
+    @property
+    def cycles(self) -> int:
+        """Tcy of an iteration."""
+        return sum(cycles for _, cycles in self.costs)
 
 
 def empty_loops(region: Region, around: Surroundings, context: Context) -> dict[int, Loop]:
@@ -52,10 +57,10 @@ def _empty_loop(region: Region, back: Step, around: Surroundings, context: Conte
     if any(step.target in inside for step in region.steps.values()):
         return None  # it can be entered behind its head
     try:
-        cycles = _cycles(path, around, context)
+        costs = _costs(path, around, context)
     except NeedsInterpreter:
         return None
-    return Loop(head, back.pc, cycles)
+    return Loop(head, back.pc, costs)
 
 
 def _path(region: Region, head: int, back: int) -> list[Step] | None:
@@ -71,22 +76,22 @@ def _path(region: Region, head: int, back: int) -> list[Step] | None:
     return path if path[-1].pc == back else None
 
 
-def _cycles(path: list[Step], around: Surroundings, context: Context) -> int:
-    """Tcy of an iteration. Raises NeedsInterpreter if iterations may differ."""
+def _costs(path: list[Step], around: Surroundings, context: Context) -> tuple[tuple[int, int], ...]:
+    """Tcy of each instruction of an iteration. Raises NeedsInterpreter if iterations may differ."""
     probe = _Probe(around, context)
-    total, written = 0, path[-1].facts.writes
+    costs, written = [], path[-1].facts.writes
     for step in path:
         last = step is path[-1]
         flow = probe.run(step)
         allowed = (Branch, Goto) if last else (type(None), Branch, Skip)
         if not isinstance(flow, allowed) or (flow is not None and not last and step.target is None):
             raise NeedsInterpreter
-        total += step.insn.row.cycles + (written & step.facts.source_pointers != 0)
-        total += last and isinstance(flow, Branch)
+        stall = written & step.facts.source_pointers != 0
+        costs.append((step.pc, step.insn.row.cycles + stall + (last and isinstance(flow, Branch))))
         written = step.facts.writes
     if probe.notes.carried & probe.notes.changed:
         raise NeedsInterpreter
-    return total
+    return tuple(costs)
 
 
 class _Notes(Variables):

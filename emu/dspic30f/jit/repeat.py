@@ -39,6 +39,7 @@ class Repeats:
             raise NeedsInterpreter
         count = flow.count
         if isinstance(count, Value):
+            t.count.settle()
             some, none = e.fresh("some"), e.fresh("none")
             e.end(f"br i1 {truth(count)}, label %{some}, label %{none}")
             e.start(none)
@@ -91,6 +92,7 @@ class Repeats:
         e.end(f"br i1 {t.fits(total).text}, label %{go}, label %{t.exit(step.pc, DEADLINE)}, !prof !0")
         e.start(go)
         t.advance(stall + 1, step.facts.writes)
+        t.at = target.pc
         if isinstance(count, int) and count == DIVIDE_COUNT and target.insn.row.mnemonic.startswith("DIV"):
             self._divide(target)
         else:
@@ -114,6 +116,7 @@ class Repeats:
     def _loop(self, target: Step, count: Number, cycles: int, again: int) -> None:
         """A counted loop; an iteration that cannot be native leaves with the REPEAT state as it is then."""
         t, e, b = self._t, self._t.e, self._t.b
+        t.count.settle()
         before, loop, done = e.fresh("before"), e.fresh("loop"), e.fresh("done")
         e.end(f"br label %{before}")
         e.start(before)
@@ -130,6 +133,7 @@ class Repeats:
         extra = b.select(left == count, 0, again) if again else 0
         b.repeating = b.left_count = None
         t.advance(cycles + extra, target.facts.writes | b.pending.mapped)
+        t.count.settle()
         fewer, more = left - 1, left != 0
         first = str(count) if isinstance(count, int) else count.text
         block.lines[phi] = f"{left.text} = phi i64 [ {first}, %{before} ], [ {fewer.text}, %{e.block.label} ]"
@@ -147,6 +151,7 @@ class Repeats:
         status = pointer(e, offset["SR"])
         e.store(status, e.load(status, 16) | RA, 16)
         t.advance(stall + 1, step.facts.writes)
+        t.count.settle()
         known = target.pc in self.resumes
         label = self.resumes.setdefault(target.pc, f"r{target.pc:x}")
         e.end(f"br label %{label}")
@@ -163,6 +168,7 @@ class Repeats:
         go, on, done = e.fresh("go"), e.fresh("on"), e.fresh("done")
         e.end(f"br i1 {early.text}, label %{go}, label %{t.exit(target.pc, SERVICE)}")
         e.start(go)
+        t.at = target.pc
         stall: Number = 0
         if target.facts.source_pointers:
             stall = (t.v.get("stall") & target.facts.source_pointers) != 0
@@ -175,6 +181,7 @@ class Repeats:
         b.commit()
         b.repeating = None
         t.advance(target.insn.row.cycles + stall, target.facts.writes | b.pending.mapped)
+        t.count.settle()
         word = e.load(status, 16)
         more = ((word & RA) != 0) & (left != 0)
         e.end(f"br i1 {truth(more)}, label %{on}, label %{done}")

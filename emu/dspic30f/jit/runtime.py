@@ -8,12 +8,13 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT, RETFIE, SERVICE
+from emu.dspic30f.jit.counting import BoundaryCount
 from emu.dspic30f.jit.service import DONE, Boundary, service_text
 
 LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
 steps; interrupts entered so far; whether to begin with the boundary before PC."""
-PERIOD, LAST, NOTED, NOTES = range(6, 10)
+PERIOD, LAST, NOTED, NOTES = range(7, 11)
 """A limit before the last one is noted instead: the next is a period later. How many are noted, and the cycles."""
 ROOM: Final = 1024
 """Notes that are kept until Python takes them."""
@@ -87,6 +88,7 @@ third:
 unsure:
   ret i64 {retfie}
 last:
+{third}
   %cycle_place = getelementptr i8, ptr %rec, i64 {cycle}
   %cycle3 = load i64, ptr %cycle_place
   %cycle4 = add i64 %cycle3, 1
@@ -137,9 +139,11 @@ miss:
 """
 
 
-def dispatch_text(boundary: Boundary, flash_end: int) -> str:
+def dispatch_text(boundary: Boundary, flash_end: int, counts: BoundaryCount | None = None) -> str:
     """The dispatch loop, with what it does at boundaries; flash ends at `flash_end` (PC units)."""
-    return service_text(boundary) + DISPATCH.format(
+    counts = counts if counts is not None else BoundaryCount()
+    return service_text(boundary, counts) + DISPATCH.format(
+        third=counts.third_cycle(),
         pc=boundary.offset["cpu.pc"], repeat=boundary.offset["cpu.repeat"], flash_end=flash_end,
         cycle=boundary.offset["cpu.cycle"], blocks=BLOCKS, steps=STEPS, entered=ENTERED, begin=BOUNDARY,
         next=NEXT, retfie=RETFIE, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE,

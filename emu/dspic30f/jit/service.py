@@ -14,6 +14,7 @@ from typing import Final
 from emu.dspic30f.core import Core
 from emu.dspic30f.interrupts import ALTIVT, UNMASKABLE
 from emu.dspic30f.jit.converter import ConverterPlaces, converter_of, event_text
+from emu.dspic30f.jit.counting import BoundaryCount
 from emu.dspic30f.power import STIR
 from emu.dspic30f.registers import NSTDIS
 from emu.dspic30f.state import IDLE, IPL3, IPL_MASK, NOT_REPEATING, PC_MASK, RA, RUN
@@ -90,13 +91,13 @@ def boundary_of(core: Core, offset: Mapping[str, int]) -> Boundary:
                     core.traps.flags, tuple(sources), converter_of(core))
 
 
-def service_text(b: Boundary) -> str:
+def service_text(b: Boundary, counts: BoundaryCount) -> str:
     """IR of `i64 @service(ptr %rec, i64 %limit, ptr %entered)`."""
     lanes = f"<{LANES} x i64>"
     declared = f"""declare i64 @llvm.vector.reduce.umin.v{LANES}i64({lanes})
 declare {lanes} @llvm.umin.v{LANES}i64({lanes}, {lanes})
 declare i128 @llvm.cttz.i128(i128, i1)"""
-    return "\n".join([declared, _tables(b), _head(b), _events(b), _accept(b), _enter(b), "}"])
+    return "\n".join([declared, _tables(b), _head(b, counts), _events(b), _accept(b, counts), _enter(b, counts), "}"])
 
 
 def _tables(b: Boundary) -> str:
@@ -111,7 +112,7 @@ def _at(name: str, offset: int) -> str:
     return f"  %{name} = getelementptr i8, ptr %rec, i64 {offset}"
 
 
-def _head(b: Boundary) -> str:
+def _head(b: Boundary, counts: BoundaryCount) -> str:
     o = b.offset
     places = {"p.cycle": o["cpu.cycle"], "p.deadline": o["events.deadline"], "p.hold": o["cpu.hold"],
               "p.due": o["events.due"], "p.intcon1": o["INTCON1"], "p.intcon2": o["INTCON2"], "p.sr": o["SR"],
@@ -173,9 +174,11 @@ nap:
 doze:
   %until = call i64 @llvm.umax.i64(i64 %cycle, i64 %limit)
   store i64 %until, ptr %p.cycle
+{counts.idle("doze", "%until")}
   ret i64 {PYTHON}
 jump:
   store i64 %deadline, ptr %p.cycle
+{counts.idle("jump", "%deadline")}
   br label %again"""])
 
 
@@ -238,7 +241,7 @@ def _i16(value: int) -> int:
     return value - 0x10000 if value & 0x8000 else value
 
 
-def _accept(b: Boundary) -> str:
+def _accept(b: Boundary, counts: BoundaryCount) -> str:
     lines = [f"""accept:
   %intcon1 = load i16, ptr %p.intcon1
   %traps = and i16 %intcon1, {_i16(b.trap_flags)}
@@ -294,6 +297,7 @@ rouse:
   %wrise1 = add i64 %wrise, 1
   %wcycle = call i64 @llvm.umax.i64(i64 %cycle, i64 %wrise1)
   store i64 %wcycle, ptr %p.cycle
+{counts.idle("rouse", "%wcycle")}
   store i16 {RUN}, ptr %p.mode
   store i8 {RUN}, ptr %p.power
   store i64 0, ptr %p.deadline
@@ -341,7 +345,7 @@ picked:
     return "\n".join(lines)
 
 
-def _enter(b: Boundary) -> str:
+def _enter(b: Boundary, counts: BoundaryCount) -> str:
     table = f"[{len(b.sources)} x i64]"
     return f"""enter:
   %nstdis = and i16 %intcon1, {_i16(NSTDIS)}
@@ -402,6 +406,7 @@ push:
   %vector = load i32, ptr %p.vector
   %handler = and i32 %vector, {PC_MASK}
   store i32 %handler, ptr %p.pc
+{counts.entered()}
   store i16 0, ptr %p.stall
   store i16 {NOT_REPEATING}, ptr %p.repeat
   %pv = getelementptr {table}, ptr @vector, i64 0, i64 %win

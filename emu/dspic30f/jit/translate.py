@@ -23,6 +23,7 @@ from emu.dspic30f.jit.builder import (
     NeedsInterpreter,
     Surroundings,
 )
+from emu.dspic30f.jit.counting import Count
 from emu.dspic30f.jit.polling import empty_loops
 from emu.dspic30f.jit.region import Region, Step
 from emu.dspic30f.jit.repeat import Repeats
@@ -50,19 +51,26 @@ class Translator:
     record. Such code is compiled quickly and runs the few instructions up to the next event, or cold code.
     """
 
-    def __init__(self, region: Region, around: Surroundings, context: Context, exact: bool) -> None:
+    def __init__(
+        self, region: Region, around: Surroundings, context: Context, exact: bool, count: Count | None = None
+    ) -> None:
         self.region: Final = region
         self.around: Final = around
         self.exact: Final = exact
         self.e: Final = Emitter()
         self.v: Final = (MemoryVariables if exact else Variables)(self.e, around.offset)
         self.b: Final = LlvmBuilder(self.e, self.v, around, context)
+        self.count: Final[Count] = count if count is not None else Count()
+        self.count.begin(self.e, around.offset)
+        self.b.before_slow = self.count.carry
+        self.at = 0
+        """The instruction whose cycles pass."""
         self.b.dsp_region = any("OA" in step.insn.row.flags for step in region.steps.values())
         self._psv: Final = bool(context.psv)
         self._repeats: Final = Repeats(self)
         self._labels: dict[int, str] = {}
         self._todo: list[int] = []
-        self._exits: dict[tuple[int, int], str] = {}
+        self._exits: dict[tuple[object, ...], str] = {}
         self._requested: Value
         self._polling: Final = {} if exact else empty_loops(region, around, context)
         self._heads: Final = {loop.head for loop in self._polling.values()}
@@ -91,6 +99,7 @@ class Translator:
             head.line(f"%passed.{pc:x} = alloca i1")
             head.line(f"store i1 false, ptr %passed.{pc:x}")
         self._deadline(head)
+        self.count.head(head)
         head.end(f"switch i64 {here.text}, label %exit [ {entries} ]")
         tail = Emitter(head.last_name)
         tail.start("exit")
@@ -125,17 +134,20 @@ class Translator:
 
     def exit(self, pc: int, reason: int) -> str:
         """Label of a block that leaves for `reason` with PC = `pc`."""
-        if (pc, reason) not in self._exits:
-            label = f"out{reason}.{pc:x}"
-            self._exits[pc, reason] = label
+        key = (pc, reason, *self.count.unsettled)
+        if key not in self._exits:
+            label = f"out{reason}.{pc:x}" + (f".{len(self._exits)}" if len(key) > 2 else "")
+            self._exits[key] = label
             current = self.e.block
             self.e.start(label)
+            self.count.carry()
             self.v.leave(pc, reason)
             self.e.block = current
-        return self._exits[pc, reason]
+        return self._exits[key]
 
     def jump(self, pc: int) -> None:
         """Go on at `pc`; exact code hands over where better code may exist."""
+        self.count.settle()
         hand_over = self.exact and pc in self.region.leaders
         self.e.end(f"br label %{self.exit(pc, NEXT) if hand_over else self._label(pc)}")
 
@@ -150,7 +162,10 @@ class Translator:
             left = e.let(f"sub i64 %stop, {cycle.text}")
             whole = e.let(f"sdiv i64 {left.text}, {loop.cycles}") - 1
             some = passed & (whole > 0)
-            self.v.set("cycle", cycle + self.b.select(some, whole, 0) * loop.cycles)
+            skipped = self.b.select(some, whole, 0)
+            self.v.set("cycle", cycle + skipped * loop.cycles)
+            for place, cycles in loop.costs:
+                self.count.spend(place, skipped * cycles)
         self.jump(pc)
 
     # -- blocks -----------------------------------------------------------------------------------------------------
@@ -199,6 +214,7 @@ class Translator:
             try:
                 ended, written = self._instruction(step, written)
             except NeedsInterpreter:
+                self.count.settle()
                 e.end(f"br label %{self.exit(pc, INTERPRET)}")
                 self._label(step.next_pc)
                 return
@@ -229,6 +245,7 @@ class Translator:
             stall = (1 if hit else 0) if isinstance(hit, int) else hit != 0
         psv_cycles = 1 if row.psv_class == "mov" else 2
         b.begin(step.pc, psv_cycles)
+        self.at = step.pc
         b.now = self.v.get("cycle") + stall + (1 if step.facts.flow is Return else row.cycles - 1)
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
         if flow is not None and step.pc == self.around.do_end:
@@ -261,10 +278,13 @@ class Translator:
         mask = step.facts.writes | b.pending.mapped
         if flow is None:
             self.advance(cycles, mask)
+            if b.pending.sr is not None:
+                self.count.level_changed()
             if step.pc == self.around.do_end:
                 self._loop_again()
                 return True, mask
             if b.pending.replanned:
+                self.count.settle()
                 self.e.end(f"br label %{self.exit(step.next_pc, NEXT)}")
                 return True, mask
             if b.pending.stop:
@@ -284,23 +304,27 @@ class Translator:
     def advance(self, cycles: Number, mask: int) -> None:
         self.v.set("cycle", self.v.get("cycle") + cycles)
         self.v.set("stall", mask)
+        self.count.spend(self.at, cycles)
 
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:
         e = self.e
         if isinstance(flow, (Branch, Skip)):
             taken, other = e.fresh("taken"), e.fresh("fall")
             self.advance(cycles, mask)
+            self.count.settle()
             e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{other}")
             assert step.target is not None
             e.start(taken)
             self.v.new_block()
             extra = 1 if isinstance(flow, Branch) else (step.target - step.next_pc) // 2
             self.v.set("cycle", self.v.get("cycle") + extra)
+            self.count.spend(step.pc, extra)
             self._jump_back(step.pc, step.target)
             e.start(other)
             self.jump(step.next_pc)
             return
         self.advance(cycles, mask)
+        self.count.settle()
         if isinstance(flow, ClearWatchdog):
             self._clear_watchdog()
             self.jump(step.next_pc)
@@ -314,16 +338,20 @@ class Translator:
         if isinstance(flow, Sleep):
             self._idle(step.next_pc)
             return
+        if isinstance(flow, Call):
+            self.count.called(step.pc, flow.target, self.v.get("W15") - 4, self.v.get("cycle"))
         if isinstance(flow.target, int):
             self._jump_back(step.pc, flow.target)
             return
         if isinstance(flow, Return) and flow.kind == "retfie":
             repeats = (flow.srl & RA) != 0
             self.e.store(pointer(e, self.around.offset["cpu.repeat"]), self.b.select(repeats, FIRST, NOT_REPEATING), 16)
-            self._leave_if_requested(flow)
+            self._leave_if_requested(step, flow)
+        if isinstance(flow, Return):
+            self.count.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), self.v.get("cycle"))
         self.v.leave(flow.target & PC_MASK, NEXT)
 
-    def _leave_if_requested(self, flow: Return) -> None:
+    def _leave_if_requested(self, step: Step, flow: Return) -> None:
         """RETFIE with something requested ends after two cycles if that is accepted: the boundary decides."""
         e = self.e
         some, none = e.fresh("some"), e.fresh("none")
@@ -332,6 +360,8 @@ class Translator:
         e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
         cycle = self.v.get("cycle")
         self.v.set("cycle", cycle - 1)
+        self.count.shortened(step.pc)
+        self.count.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), cycle - 1)
         self.v.leave(flow.target & PC_MASK, RETFIE)
         e.start(none)
         self.v.new_block()
@@ -387,6 +417,7 @@ class Translator:
     def _look(self, next_pc: int) -> None:
         """The instruction before may have made an interrupt acceptable: look if any is requested at all."""
         e = self.e
+        self.count.settle()
         some = e.fresh("some")
         e.end(f"br i1 {self._requests().text}, label %{some}, label %{self._label(next_pc)}")
         e.start(some)
