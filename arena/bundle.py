@@ -10,6 +10,7 @@ import hashlib
 import json
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -24,6 +25,9 @@ CONTENTS: Final = "bundle.json"
 KEPT: Final = (MANIFEST, EXPERIMENT, "trial-*.parquet", "firmware*")
 LIMIT: Final = 1 << 32
 """Bytes of everything unpacked: more is no study of ours."""
+DAMAGE: Final = (OSError, zipfile.BadZipFile, zlib.error, LookupError, TypeError, ValueError, AttributeError,
+                 NotImplementedError, EOFError)  # fmt: skip
+"""What reading an archive that is none, or another one, can end in."""
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 
 
@@ -83,9 +87,9 @@ def unpack(bundle: Path, folder: Path) -> list[Path]:
                     raise RecordError(f"{bundle}: {name} is not what it was (its hash differs)")
                 (folder / parts[0]).mkdir(parents=True, exist_ok=True)
                 (folder / parts[0] / parts[1]).write_bytes(data)
-    except (OSError, zipfile.BadZipFile, KeyError, TypeError, ValueError, NotImplementedError, EOFError) as error:
-        if isinstance(error, RecordError):
-            raise
+    except RecordError:
+        raise
+    except DAMAGE as error:
         raise RecordError(f"{bundle}: is no bundle: {error}") from None
     return sorted({folder / PurePosixPath(name).parts[0] for name in hashes})
 

@@ -37,6 +37,17 @@ class FolderInUseError(RecordError):
     """Another run writes into the same folder."""
 
 
+class Columns(dict[str, Any]):
+    """Columns of a trial by name. One that is not there raises RecordError: the file is damaged."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path: Final = path
+
+    def __missing__(self, name: str) -> Any:
+        raise RecordError(f"{self._path}: is no whole trial: there is no column {name}")
+
+
 @dataclass(frozen=True)
 class Trial:
     """One recorded trial. `columns` as in docs/experiment.md; `about` is its metadata."""
@@ -143,7 +154,8 @@ def read_trial(path: Path) -> Trial:
         about = json.loads((table.schema.metadata or {})[b"arena"])
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise RecordError(f"{path}: is no recorded trial: {error}") from None
-    columns = {name: _values(table[name]) for name in table.column_names}
+    columns = Columns(path)
+    columns.update({name: _values(table[name]) for name in table.column_names})
     return Trial(path, columns, about)
 
 

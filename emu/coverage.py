@@ -55,7 +55,10 @@ class Counts:
             raise ValueError("expected counts of an earlier run")
         if facts["image"] != fingerprint(image):
             raise ValueError("these are counts of another image")
-        return cls(*(Counter({int(pc): int(n) for pc, n in facts[key].items()}) for key in ("executed", "taken")))
+        try:
+            return cls(*(Counter({int(pc): int(n) for pc, n in facts[key].items()}) for key in ("executed", "taken")))
+        except (TypeError, AttributeError):
+            raise ValueError("expected counts of an earlier run") from None
 
 
 def fingerprint(image: Image) -> str:

@@ -191,7 +191,13 @@ def _expand_response_files(argv: list[str], depth: int = 0) -> list[str]:
             text = Path(word[1:]).read_text()
         except (OSError, UnicodeDecodeError) as error:
             raise ToolError(f"cannot read response file '{word[1:]}': {error}") from error
-        words += _expand_response_files(shlex.split(text), depth + 1)
+        if "\0" in text:
+            raise ToolError(f"response file '{word[1:]}': holds a zero byte at offset {text.index(chr(0))}")
+        try:
+            inside = shlex.split(text)
+        except ValueError as error:
+            raise ToolError(f"response file '{word[1:]}': {str(error).lower()}") from None
+        words += _expand_response_files(inside, depth + 1)
     return words
 
 

@@ -48,8 +48,19 @@ an expression of C; NAME = VALUE; or
 """
 
 
+MOST_ROWS: Final = 1 << 16
+"""Instructions, or bytes of memory, that one request may ask for: as many as there are of either on a chip."""
+
+
 class Refused(Exception):
     """A request that cannot be done; the text is for the user."""
+
+
+MISTAKES: Final = (
+    Refused, ExpressionError, Unavailable, ValueError, LookupError, ArithmeticError, TypeError, AttributeError,
+    RecursionError, OSError,
+)  # fmt: skip
+"""What a request with arguments of the wrong kind, size or meaning can end in."""
 
 
 class Server:
@@ -59,8 +70,7 @@ class Server:
         self._wire: Final = wire
         self._make: Final = make
         self._target: Debuggee | None = None
-        self._sights: Sights | None = None
-        self._sources: Sources | None = None
+        self._views: tuple[Sights, Sources] | None = None
         self._launch: Row = {}
         self._configured = self._over = False
         self._halt = Halt("entry")
@@ -80,24 +90,28 @@ class Server:
                 self._answer(message)
 
     def _answer(self, message: Message) -> None:
-        command = str(message.get("command", ""))
+        """Respond to one request. Whatever is wrong with it, the session goes on."""
+        command = str(message.get("command"))
         arguments = message.get("arguments") or {}
         method = getattr(self, f"_do_{command}", None)
         after: Callable[[], None] | None = None
         try:
             if method is None:
                 raise Refused(f"{command} is not supported")
+            if not isinstance(arguments, dict):
+                raise Refused(f"{command}: arguments must be an object")
             result = method(arguments)
             body, after = result if isinstance(result, tuple) else (result, None)
             self._respond(message, True, body or {})
-        except (Refused, ExpressionError, Unavailable, ValueError, KeyError, OSError, TypeError) as error:
+        except MISTAKES as error:
             text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
             self._respond(message, False, {"error": {"id": 1, "format": text}}, text)
         if after is not None:
             after()
 
     def _respond(self, message: Message, success: bool, body: Row, text: str = "") -> None:
-        reply = {"type": "response", "request_seq": message["seq"], "success": success, "command": message["command"]}
+        reply = {"type": "response", "request_seq": message.get("seq", 0), "success": success}
+        reply["command"] = str(message.get("command"))
         self._wire.send(reply | {"body": body} | ({"message": text} if text else {}))
 
     def _event(self, name: str, body: Row | None = None) -> None:
@@ -112,6 +126,18 @@ class Server:
             raise Refused("nothing is being debugged")
         return self._target
 
+    @property
+    def _sights(self) -> Sights:
+        if self._views is None:
+            raise Refused("nothing is being debugged")
+        return self._views[0]
+
+    @property
+    def _sources(self) -> Sources:
+        if self._views is None:
+            raise Refused("nothing is being debugged")
+        return self._views[1]
+
     # Life
 
     def _do_initialize(self, _arguments: Row) -> Row:
@@ -125,8 +151,8 @@ class Server:
         program = Path(machine.image.path).resolve()
         roots = [Path(root) for root in arguments.get("sourceRoots", [])] + [Path.cwd(), *program.parents]
         self._target = Debuggee(machine, self._wanted, self._say)
-        self._sources = Sources(machine.inside, roots)
-        self._sights = Sights(machine.inside, self._sources)
+        sources = Sources(machine.inside, roots)
+        self._views = Sights(machine.inside, sources), sources
         for number in machine.uart:
             machine.uart[number].listen(partial(self._heard, number))
         return {}, lambda: self._event("initialized")
@@ -147,10 +173,11 @@ class Server:
                 text.clear()
 
     def _do_configurationDone(self, _arguments: Row) -> Any:
+        target = self._debuggee
         self._configured = True
         if self._launch.get("stopOnEntry"):
             return {}, lambda: self._stopped(Halt("entry"))
-        return {}, lambda: self._go(lambda: self._debuggee.go_on())
+        return {}, lambda: self._go(target.go_on)
 
     def _do_disconnect(self, _arguments: Row) -> Any:
         return {}, self._leave
@@ -190,7 +217,6 @@ class Server:
         return {}
 
     def _go(self, act: Callable[[], Halt]) -> None:
-        assert self._sights is not None
         self._sights.forget()
         self._pause = False
         halt = act()
@@ -261,13 +287,11 @@ class Server:
         return {"breakpoints": [one.facts for one in made]}
 
     def _do_setBreakpoints(self, arguments: Row) -> Row:
-        assert self._sources is not None or self._debuggee
-        sources = self._sources
         path = str(arguments["source"].get("path", arguments["source"].get("name", "")))
         wanted = arguments.get("breakpoints") or [{"line": line} for line in arguments.get("lines", [])]
         made = []
         for one in wanted:
-            line, places = sources.places(path, int(one["line"])) if sources is not None else (0, ())
+            line, places = self._sources.places(path, int(one["line"]))
             more: Row = {"line": line or one["line"], "source": {"path": path}}
             if places:
                 more["instructionReference"] = f"{places[0]:#08x}"
@@ -314,7 +338,6 @@ class Server:
         return {"dataId": f"{address:04x}/{size}", "description": text, "accessTypes": kinds, "canPersist": True}
 
     def _named(self, arguments: Row) -> Any:
-        assert self._sights is not None
         reference = arguments.get("variablesReference")
         if reference:
             return self._sights.find(int(reference), str(arguments["name"]))
@@ -332,7 +355,7 @@ class Server:
     def _do_breakpointLocations(self, arguments: Row) -> Row:
         first = int(arguments["line"])
         last = int(arguments.get("endLine", first))
-        rows = self._sources.lines(str(arguments["source"].get("path", ""))) if self._sources is not None else []
+        rows = self._sources.lines(str(arguments["source"].get("path", "")))
         lines = sorted({row.line for row in rows if first <= row.line <= last})
         return {"breakpoints": [{"line": line} for line in lines]}
 
@@ -348,7 +371,6 @@ class Server:
         return running[0].pid + 1 if running else 1
 
     def _do_stackTrace(self, arguments: Row) -> Row:
-        assert self._sights is not None
         wanted = int(arguments["threadId"])
         frames = self._debuggee.frames()
         if wanted != self._thread:
@@ -358,12 +380,10 @@ class Server:
         return {"stackFrames": self._sights.stack(frames[first : first + levels]), "totalFrames": len(frames)}
 
     def _do_scopes(self, arguments: Row) -> Row:
-        assert self._sights is not None
         frame = self._sights.frame(int(arguments["frameId"]))
         return {"scopes": self._sights.scopes(frame) if frame is not None else []}
 
     def _do_variables(self, arguments: Row) -> Row:
-        assert self._sights is not None
         start, count = int(arguments.get("start") or 0), int(arguments.get("count") or 0)
         return {"variables": self._sights.variables(int(arguments["variablesReference"]), start, count)}
 
@@ -377,7 +397,6 @@ class Server:
         return self._result(text, arguments)
 
     def _result(self, text: str, arguments: Row) -> Row:
-        assert self._sights is not None
         found = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
         if not isinstance(found, Value):
             return {"result": str(found), "variablesReference": 0}
@@ -387,7 +406,6 @@ class Server:
         return {"result": row.pop("value"), **row}
 
     def _assigned(self, name: str, text: str, arguments: Row) -> Row:
-        assert self._sights is not None
         inside, frame = self._debuggee.inside, self._sights.frame(arguments.get("frameId"))
         place = evaluate(inside, name, frame)
         if not isinstance(place, Value):
@@ -396,12 +414,10 @@ class Server:
         return self._result(name, arguments)
 
     def _write(self, place: Value, text: str, arguments: Row) -> None:
-        assert self._sights is not None
         value = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
         place.set(value.get() if isinstance(value, Value) else value)
 
     def _do_setVariable(self, arguments: Row) -> Row:
-        assert self._sights is not None
         place = self._sights.find(int(arguments["variablesReference"]), str(arguments["name"]))
         if place is None:
             raise Refused(f"{arguments['name']} cannot be set")
@@ -420,16 +436,15 @@ class Server:
         return {"exceptionId": "fault", "description": stop.fault.report(), "breakMode": "always", "details": details}
 
     def _do_disassemble(self, arguments: Row) -> Row:
-        assert self._sources is not None
         address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
         address += 2 * int(arguments.get("instructionOffset") or 0)
         symbols = bool(arguments.get("resolveSymbols"))
-        count = int(arguments["instructionCount"])
+        count = _size(arguments, "instructionCount")
         return {"instructions": disassembled(self._debuggee.inside, self._sources, address & ~1, count, symbols)}
 
     def _do_readMemory(self, arguments: Row) -> Row:
         address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
-        count = int(arguments["count"])
+        count = _size(arguments, "count")
         data = b""
         for at in range(address, address + count):
             try:
@@ -462,7 +477,7 @@ class Server:
             cycle = int(rest.replace(",", ""), 0)
             return {"result": "", "variablesReference": 0}, lambda: self._go(lambda: self._sought(cycle))
         if word == "lastwrite":
-            place = evaluate(target.inside, rest, self._sights.frame(None) if self._sights else None)
+            place = evaluate(target.inside, rest, self._sights.frame(None))
             at = address_of(place.pieces) if isinstance(place, Value) else None
             if at is None or not isinstance(place, Value):
                 raise Refused(f"{rest} is not in memory")
@@ -481,3 +496,11 @@ class Server:
             return Halt("goto", "nothing has changed it since the recording began")
         where = self._debuggee.inside.where(found.pc)
         return Halt("goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {where}")
+
+
+def _size(arguments: Row, name: str) -> int:
+    """A number of rows or bytes. Raises Refused, KeyError, ValueError."""
+    count = int(arguments[name])
+    if not 0 <= count <= MOST_ROWS:
+        raise Refused(f"{name} {count} is not within 0 to {MOST_ROWS}")
+    return count

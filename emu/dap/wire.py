@@ -82,6 +82,6 @@ class Wire:
         del self._unread[: end + 4 + size]
         try:
             message = json.loads(body)
-        except ValueError:
+        except (ValueError, RecursionError):
             return None
         return message if isinstance(message, dict) else None

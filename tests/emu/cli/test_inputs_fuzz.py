@@ -1,0 +1,90 @@
+"""A sample of the fuzz campaign `tests/fuzz/fuzz_inputs.py`, with the inputs that made it fail before."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from arena.record import Columns, RecordError
+from emu.coverage import Counts
+from emu.loader import load_image
+from tests.fuzz.fuzz_inputs import call, campaign, converse
+
+HELLO = Path(__file__).with_name("hello.hex")
+
+
+def test_damaged_files_are_refused_or_read() -> None:
+    outcomes = campaign(range(2026, 2146))
+    assert sum(outcomes.values()) == 120
+    assert sum(count for name, count in outcomes.items() if name.endswith("refused")) > 50
+    assert sum(count for name, count in outcomes.items() if name.endswith("done")) > 10
+
+
+def requests(*asked: tuple[str, object]) -> bytes:
+    """Messages of the debug protocol, a line each."""
+    lines = [
+        {"seq": n, "type": "request", "command": name, "arguments": given} for n, (name, given) in enumerate(asked)
+    ]
+    return "\n".join(map(json.dumps, [*lines, {"seq": 99, "type": "request", "command": "disconnect"}])).encode()
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ("configurationDone", {}),
+        ("stackTrace", {"threadId": 1}),
+        ("launch", ["no object"]),
+        ("setBreakpoints", {"source": None, "breakpoints": 3}),
+    ],
+)
+def test_a_request_out_of_order_or_shape_is_answered(asked: tuple[str, object]) -> None:
+    assert converse(requests(asked)) == "answered"
+
+
+def test_a_message_nested_too_deeply_ends_the_session() -> None:
+    """json gives up with RecursionError; the thread that reads must say that there is nothing more."""
+    assert converse(b'{"arguments": ' + b"[" * 100_000) == "answered"
+
+
+@pytest.mark.parametrize(
+    ("command", "key"), [("disassemble", "instructionCount"), ("readMemory", "count")]
+)  # fmt: skip
+def test_a_request_for_more_than_there_is_is_refused(command: str, key: str) -> None:
+    """10^20 rows ate all memory."""
+    many = {"memoryReference": "0", key: 10**20}
+    asked = requests(("launch", {"program": str(HELLO), "board": "none", "stopOnEntry": True}), (command, many))
+    code = (
+        "import resource, sys\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))\n"
+        "from tests.fuzz.fuzz_inputs import converse\n"
+        "print(converse(sys.stdin.buffer.read()))"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], input=asked, capture_output=True, check=False, timeout=60)
+    assert ended.stdout == b"answered\n", ended.stderr.decode()
+
+
+@pytest.mark.parametrize(("text", "words"), [("-O2 'x", "no closing quotation"), ("-O2 \0", "zero byte at offset 4")])
+def test_a_bad_file_of_options_is_named(text: str, words: str, tmp_path: Path) -> None:
+    options = tmp_path / "options"
+    options.write_text(text)
+    status, said = call(["toolchain", "cc", f"@{options}"])
+    assert status == 2
+    assert f"response file '{options}': " in said
+    assert words in said
+
+
+def test_a_record_without_a_column_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match="there is no column r0_x"):
+        Columns(tmp_path)["r0_x"]
+
+
+def test_counts_that_are_no_numbers_are_refused() -> None:
+    from emu.coverage import fingerprint
+
+    image = load_image(HELLO)
+    with pytest.raises(ValueError, match="expected counts of an earlier run"):
+        Counts.of({"image": fingerprint(image), "executed": {"0": None}, "taken": {}}, image)

@@ -1,0 +1,328 @@
+"""Damaged files of every other kind the commands read: each command ends with a status it documents and a sentence.
+
+`python tests/fuzz/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits 1 with the first input
+that made something else happen. Scenes, stimuli, recorded input, pictures, baselines, counts, records, manifests,
+bundles, annotations, linker scripts, archives, C sources, option files and messages of the debug protocol; ELF, HEX and
+assembly have `fuzz_loader.py` and `fuzz_asm.py`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import random
+import re
+import resource
+import shutil
+import sys
+import tempfile
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT)]
+
+from PIL import Image  # noqa: E402
+
+import arena.cli  # noqa: E402
+import emu.cli  # noqa: E402
+import toolchain.cli  # noqa: E402
+from emu.commands.debug import machine_of  # noqa: E402
+from emu.dap.server import Server  # noqa: E402
+from emu.dap.wire import Wire  # noqa: E402
+from emu.status import BAD_INPUT, MEANING  # noqa: E402
+from tests.fuzz.fuzz_loader import mutate  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+
+PROGRAM = """
+#include <p30F6014A.h>
+struct { int speed[2]; long total; } robot;
+__attribute__((noinline)) int step(int by) { robot.speed[1] += by; return robot.speed[1]; }
+int main(void)
+{
+    U1MODEbits.UARTEN = 1;
+    U1STAbits.UTXEN = 1;
+    for (;;) {
+        U1TXREG = 'a' + (step(3) & 7);
+        robot.total += robot.speed[1];
+    }
+}
+"""
+STIMULUS = """0.5ms selector 3
+1ms remote ok   # OK
+1ms ir 0 20
+1ms light 3 2500
+2ms battery 3.3
+2ms tilt 0.1 0 0.98
+0.1ms uart1 "hello\\r"
+300 uart1 "x" framing
+4us pin RF6 0
+5us camera unplug
+6us lamp 0.5
+7us bluetooth down
+8us i2c sda 5
+0 noise 1
+"""
+SCENE = """name = "small"
+description = "two robots, an object of each kind, walls, a patch and a lamp"
+[arena]
+width_cm = 120.0
+height_cm = 100.0
+[[robots]]
+count = 1
+selector = 1
+[[robots]]
+place = "poses"
+poses = [[30.0, 40.0, 90.0]]
+[[objects]]
+count = 2
+radius_cm = 5.0
+[[obstacles]]
+polygon = [[60.0, 60.0], [70.0, 60.0], [65.0, 70.0]]
+[[patches]]
+polygon = [[10.0, 10.0], [30.0, 10.0], [30.0, 30.0]]
+colour = "#202020"
+[[lamps]]
+x_cm = 100.0
+counts = 500.0
+[camera]
+range_cm = 150.0
+[start]
+remote = "ok"
+"""
+NUMBERS = (
+    "nan", "inf", "-inf", "1e308", "-1", "0", "1e-300", "99999999999999999999", "-0.0", "7", "0.5", "1000", "65536",
+)  # fmt: skip
+ODD = (
+    *NUMBERS, "true", '""', "[]", "{}", "null", "'", '"', "\\", "[[", "]]", "../../x", "\u0000", "\ud7ff", "é", "=",
+    "#", "\n\n", "0x", "1s", "[" * 600, "{" * 600,
+)  # fmt: skip
+STAMPS = b"# cycle uart bytes\n100 1 616263\n900 1 0d\n2000 2 ff00\n"
+ANNOTATIONS = b"calls main: step, *\ndepth step 40\nrecursion step 3\nthread step\n"
+MOST_MEMORY = 8 << 30
+"""Bytes of address space: an input that makes a command want more fails."""
+LONGEST = 20_000
+"""Characters of a refusal: more is nothing anybody reads."""
+TOKEN = re.compile(r"[A-Za-z_][\w.]*|-?[\d.]+|\"[^\"]*\"|\s+|.", re.DOTALL)
+
+
+def mutate_text(data: bytes, rng: random.Random) -> bytes:
+    """Numbers replaced by others, so that the form stays, or tokens replaced, dropped, doubled, so that it goes."""
+    tokens = TOKEN.findall(data.decode(errors="replace"))
+    numbers = [at for at, token in enumerate(tokens) if token[-1].isdigit()]
+    if numbers and rng.random() < 0.6:
+        for _ in range(rng.choice((1, 1, 2, 3))):
+            tokens[rng.choice(numbers)] = rng.choice(NUMBERS)
+        return "".join(tokens).encode()
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        if not tokens:
+            break
+        place, choice = rng.randrange(len(tokens)), rng.randrange(4)
+        if choice == 0:
+            tokens[place] = rng.choice(ODD)
+        elif choice == 1:
+            tokens[place] = rng.choice(tokens)
+        elif choice == 2:
+            del tokens[place : place + rng.randint(1, 4)]
+        else:
+            tokens[place:place] = tokens[place : place + rng.randint(1, 12)]
+    return "".join(tokens).encode()
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file: a valid one, its name, and the command that reads it, as arguments with {} for its path."""
+
+    name: str
+    sample: bytes
+    file: str
+    command: tuple[str, ...]
+    is_text: bool = True
+
+
+class Bench:
+    """A folder with valid files of every kind and the image they belong to."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.image = folder / "program.elf"
+        (folder / "program.c").write_text(PROGRAM)
+        self._must("toolchain", "cc", "-g", "-Os", str(folder / "program.c"), "-o", str(self.image))
+        self._must("toolchain", "cc", "-c", str(folder / "program.c"), "-o", str(folder / "program.o"))
+        self._must("toolchain", "ar", "rcs", str(folder / "library.a"), str(folder / "program.o"))
+        self._must("emu", "footprint", str(self.image), "--update", str(folder / "footprint.json"))
+        self._must("emu", "coverage", str(self.image), "--seconds", "0.0003", "--counts", str(folder / "counts.json"))
+        self.run = folder / "run"
+        picture = io.BytesIO()
+        Image.new("RGB", (8, 6), (200, 30, 40)).save(picture, "PNG")
+        run = ("emu", "run", str(self.image), "--cycles", "3000", "--engine", "interp", "--uart1", "null")
+        short = ("--brain", "scripted", "--trials", "1", "--jobs", "1", "--out")
+        small = ("--robots", "2", "--objects", "2", "--minutes", "0.005", *short)
+        self._must("arena", "run", "clustering", *small, str(self.run))
+        self._must("arena", "bundle", str(folder / "study.zip"), str(self.run))
+        manifest = ((self.run / "manifest.json").read_bytes(), "run/manifest.json")
+        self.formats = (
+            Format("scene", SCENE.encode(), "scene.toml",
+                   ("arena", "run", "{}", "--minutes", "0.02", *short, str(folder / "out"))),
+            Format("stimulus", STIMULUS.encode(), "stimulus.txt", (*run, "--stimulus", "{}")),
+            Format("stamps", STAMPS, "input.rec", (*run, "--replay", "{}")),
+            Format("picture", picture.getvalue(), "picture.png", (*run, "--camera", "{}"), is_text=False),
+            Format("baseline", (folder / "footprint.json").read_bytes(), "footprint.json",
+                   ("emu", "footprint", str(self.image), "--check", "{}")),
+            Format("counts", (folder / "counts.json").read_bytes(), "counts.json",
+                   ("emu", "coverage", str(self.image), "--seconds", "0.0001", "--counts", "{}")),
+            Format("annotations", ANNOTATIONS, "stack.txt", ("toolchain", "stack", str(self.image), "-a", "{}")),
+            Format("archive", (folder / "library.a").read_bytes(), "library.a", ("toolchain", "ar", "t", "{}"),
+                   is_text=False),
+            Format("options", b"-Os -g \"-DX=1\" '-DY' -Wall\n", "options",
+                   ("toolchain", "cc", "@{}", "-c", str(folder / "program.c"), "-o", str(folder / "again.o"))),
+            Format("record", (self.run / "trial-0001.parquet").read_bytes(), "trial-0001.parquet",
+                   ("arena", "replay", "{}", "--out", str(folder / "page.html")), is_text=False),
+            Format("manifest", *manifest, ("arena", "bundle", str(folder / "again.zip"), str(self.run))),
+            Format("manifest again", *manifest, ("arena", "run", "clustering", *small, str(self.run))),
+            Format("manifest reported", *manifest, ("arena", "report", str(self.run))),
+            Format("bundle", (folder / "study.zip").read_bytes(), "study.zip", ("arena", "verify", "{}"),
+                   is_text=False),
+            Format("protocol", _conversation(self.image), "messages", ()),
+        )  # fmt: skip
+
+    def _must(self, *words: str) -> None:
+        status, said = call(words)
+        if status:
+            raise RuntimeError(f"{' '.join(words)} ended with {status}: {said}")
+
+    def attempt(self, kind: Format, data: bytes) -> str:
+        """Give a damaged file to its command; "done", "refused" or what else the table of statuses has."""
+        if kind.name == "protocol":
+            return converse(data)
+        path = self.folder / kind.file
+        path.write_bytes(data)
+        shutil.rmtree(self.folder / "out", ignore_errors=True)
+        try:
+            status, said = call([word.replace("{}", str(path)) for word in kind.command])
+        finally:
+            path.write_bytes(kind.sample)
+        assert status in MEANING, f"status {status}"
+        assert "Traceback" not in said, said
+        assert not status or said.strip(), f"status {status} without a word"
+        if status == BAD_INPUT:
+            assert len(said) < LONGEST, f"{len(said)} characters of message"
+        return {0: "done", 2: "refused"}.get(status, f"status {status}")
+
+
+MAINS: dict[str, Callable[[list[str]], int]] = {
+    "emu": emu.cli.main, "arena": arena.cli.main, "toolchain": toolchain.cli.main,
+}  # fmt: skip
+
+
+def call(words: Iterable[str]) -> tuple[int, str]:
+    """Run a command in this process: its status and what it said."""
+    program, *rest = words
+    main = MAINS[program]
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+        try:
+            status = main(rest)
+        except SystemExit as ended:
+            status = ended.code if isinstance(ended.code, int) else 1
+    return status, said.getvalue()
+
+
+def _conversation(image: Path) -> bytes:
+    """Requests of a whole session; the bodies only, a line each, so that damage keeps the frames."""
+    source = str(image.with_suffix(".c"))
+    asked = [
+        ("initialize", {"adapterID": "x", "linesStartAt1": True}),
+        ("launch", {"program": str(image), "stopOnEntry": True, "board": "none"}),
+        ("setBreakpoints", {"source": {"path": source}, "breakpoints": [
+            {"line": 4, "condition": "by == 3", "hitCondition": ">2"}]}),
+        ("setFunctionBreakpoints", {"breakpoints": [{"name": "step"}]}),
+        ("setInstructionBreakpoints", {"breakpoints": [{"instructionReference": "0x200", "offset": 2}]}),
+        ("setDataBreakpoints", {"breakpoints": [{"dataId": "2048:2", "accessType": "write"}]}),
+        ("configurationDone", {}),
+        ("threads", {}),
+        ("stackTrace", {"threadId": 1, "startFrame": 0, "levels": 20}),
+        ("scopes", {"frameId": 1}),
+        ("variables", {"variablesReference": 1, "start": 0, "count": 5}),
+        ("evaluate", {"expression": "robot.speed[1] + 3 * W0", "frameId": 1, "context": "watch"}),
+        ("evaluate", {"expression": "/goto 20", "context": "repl"}),
+        ("setVariable", {"variablesReference": 1, "name": "robot", "value": "3"}),
+        ("setExpression", {"expression": "robot.total", "value": "0x7fff"}),
+        ("readMemory", {"memoryReference": "0x800", "offset": -2, "count": 64}),
+        ("writeMemory", {"memoryReference": "0x900", "data": "AAEC"}),
+        ("disassemble", {"memoryReference": "0x200", "instructionOffset": -4, "instructionCount": 16}),
+        ("stepIn", {"threadId": 1, "granularity": "instruction"}),
+        ("stepBack", {"threadId": 1}),
+        ("dataBreakpointInfo", {"name": "robot", "variablesReference": 1}),
+        ("breakpointLocations", {"source": {"path": source}, "line": 1, "endLine": 30}),
+        ("exceptionInfo", {"threadId": 1}),
+        ("disconnect", {"terminateDebuggee": True}),
+    ]  # fmt: skip
+    lines = [
+        json.dumps({"seq": number, "type": "request", "command": command, "arguments": arguments})
+        for number, (command, arguments) in enumerate(asked, start=1)
+    ]
+    return "\n".join(lines).encode()
+
+
+def converse(data: bytes) -> str:
+    """Send every line as a message to a server; it answers to the end of the conversation."""
+    reading, writing = os.pipe()
+    told = io.BytesIO()
+    wire = Wire(reading, told)
+    try:
+        with os.fdopen(writing, "wb") as sender, contextlib.suppress(BrokenPipeError):
+            for line in data.split(b"\n"):
+                sender.write(b"Content-Length: %d\r\n\r\n%s" % (len(line), line))
+        Server(wire, machine_of).serve()
+    finally:
+        wire.close()
+        os.close(reading)
+    assert b"Traceback" not in told.getvalue()
+    return "answered"
+
+
+def campaign(seeds: Iterable[int], only: str | None = None) -> Counter[str]:
+    """Outcomes by format. Raises whatever escapes a command, with the format and the input in a note."""
+    outcomes: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory(prefix="inputs-") as name:
+        bench = Bench(Path(name))
+        chosen = [kind for kind in bench.formats if only in (None, kind.name)]
+        before = Path.cwd()
+        os.chdir(name)
+        try:
+            for seed in seeds:
+                rng = random.Random(seed)
+                kind = chosen[seed % len(chosen)]
+                change = mutate_text if kind.is_text and rng.random() < 0.7 else mutate
+                data = change(kind.sample, rng)
+                try:
+                    outcomes[f"{kind.name} {bench.attempt(kind, data)}"] += 1
+                except Exception as error:
+                    error.add_note(f"{kind.name}: {data[:4000]!r}")
+                    raise
+        finally:
+            os.chdir(before)
+    return outcomes
+
+
+def main() -> int:
+    made = parser(__doc__)
+    made.add_argument("--format", metavar="NAME", help="this kind of file only")
+    course = Course(made, "inputs", 15_000, "files")
+    options = course.parse()
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    try:
+        outcomes = campaign(course, options.format)
+    except Exception:
+        return course.failed(traceback.format_exc())
+    return course.ended(", ".join(f"{kind} {count}" for kind, count in sorted(outcomes.items())))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
