@@ -188,24 +188,34 @@ class History:
         now = self.machine.cycle
         if now <= self.start:
             return False
-        window = FIRST_WINDOW
-        while True:
-            from_cycle = max(self.start, now - window)
-            with self._silence():
-                base = self._restore(from_cycle)
-                if self.machine.cycle < from_cycle:
-                    self.machine.run_until(from_cycle)
-                began_asleep = self.machine.is_asleep and self.machine.cycle != base
-                before = None
-                while self.machine.cycle < now:
-                    before = self.machine.cycle if before is not None or not began_asleep else None
-                    began_asleep = False
-                    self.machine.step()
-            if before is not None or from_cycle <= self.start or window > WIDEST:
+        window, before = FIRST_WINDOW, None
+        while before is None and window <= WIDEST:
+            begin = max(self.start, now - window)
+            for before, _ in self._steps(begin, now):
+                pass
+            if begin == self.start:
                 break
             window *= WIDER
         self._go(self.start if before is None else before)
         return True
+
+    def _steps(self, begin: int, now: int) -> Iterator[tuple[int, int]]:
+        """(cycle, PC) of the steps from `begin` to `now`, run again with their input. A sleep that began before `begin`
+        is no step of its own."""
+        machine = self.machine
+        inputs = [kept for kept in self._kept if kept.is_input and begin < kept.cycle < now]
+        with self._silence():
+            base = self._restore(begin)
+            if machine.cycle < begin:
+                machine.run_until(begin)
+            began_asleep = machine.is_asleep and machine.cycle != base
+            while machine.cycle < now:
+                if not began_asleep:
+                    yield machine.cycle, machine.pc
+                began_asleep = False
+                machine.step()
+                if inputs and inputs[0].cycle <= machine.cycle:  # between two steps, or while the CPU sleeps
+                    machine.put_back(self._state(inputs.pop(0)))
 
     def before(self) -> Iterator[list[tuple[int, int]]]:
         """(cycle, PC) of the steps before now, oldest first, in longer and longer lists; the last begins where the
@@ -215,14 +225,7 @@ class History:
         window = FIRST_WINDOW
         while True:
             begin = max(self.start, now - window)
-            positions = []
-            with self._silence():
-                self._restore(begin)
-                if self.machine.cycle < begin:
-                    self.machine.run_until(begin)
-                while self.machine.cycle < now:
-                    positions.append((self.machine.cycle, self.machine.pc))
-                    self.machine.step()
+            positions = list(self._steps(begin, now))
             self._ended = self.machine.snapshot()
             yield positions
             if begin <= self.start or window > WIDEST:

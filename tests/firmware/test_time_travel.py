@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 from functools import partial
 
 import numpy as np
@@ -13,6 +14,7 @@ from emu.boards.epuck.board import Epuck
 from emu.debug.history import History
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_drivers_on_target import START
+from tests.fuzz.fuzz_reverse import APPS, walk
 
 
 def walked(
@@ -59,6 +61,15 @@ def test_every_state_is_had_again_to_the_bit(image: Build, engine: str) -> None:
     assert history.advance(end) is None
     assert machine.snapshot() == present
     assert history.size < 20 * len(history._kept) * 1024 + (1 << 18)
+
+
+@pytest.mark.parametrize("seed", [7, 10])
+def test_random_walks_back_meet_what_was_there(image: Build, seed: int) -> None:
+    """Two of the campaign. In the first, input comes while the CPU sleeps, and a step back passes it."""
+    app = list(APPS)[seed % 5 == 0]
+    tally: Counter[str] = Counter()
+    walk(image(app), APPS[app], seed, tally)
+    assert min(tally["steps"], tally["input"]) > 0
 
 
 def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:

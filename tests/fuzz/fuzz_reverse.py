@@ -1,0 +1,128 @@
+"""Steps back against steps forward: `python tests/fuzz/fuzz_reverse.py [--walks N] [--seed N] [--seconds S] [--json]`.
+
+The campaign behind tests/firmware/test_time_travel.py, which samples. A walk runs the clustering firmware or Listing 1
+to a random time, with bytes for UART1 now and then, steps forward some hundred times and notes a hash of the whole
+state before every step; then it steps back all the way, and every state must be the one that was there. It tells how
+many of the steps entered an interrupt, saw an I2C register change, ran the camera's code, or began with input.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import random
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+import emu  # noqa: E402
+from emu.boards.epuck.board import Epuck  # noqa: E402
+from emu.debug.history import History  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+
+APPS = {"clustering": 8, "listing1": 0}
+"""Applications and the position of the selector at which they start."""
+PIXELS, FRAME = "_T4Interrupt", 4_000_000
+"""What runs for every line of the camera, and about the cycles from frame to frame."""
+PERIOD = 2_000
+"""Cycles between kept states: short, since every step back runs again from the one before it."""
+
+
+def hashed(machine: emu.Machine) -> bytes:
+    """Of the whole state."""
+    return hashlib.blake2b(machine.snapshot(), digest_size=16).digest()
+
+
+def kinds_of(machine: emu.Machine, before: tuple[int, int, bytes], handlers: set[int]) -> set[str]:
+    """What the step from `before` (PC, depth of the stack, I2C registers) was."""
+    found = set()
+    where = machine.inside.image.lines
+    entered = machine.inside.start_of(machine.pc) in handlers and machine.w[15] >= before[1] + 4
+    if entered and machine.inside.start_of(before[0]) != machine.inside.start_of(machine.pc):
+        found.add("interrupts")
+    if i2c(machine) != before[2]:
+        found.add("i2c")
+    line = where.find(machine.pc)
+    if line is not None and "/camera/" in line.file:
+        found.add("camera")
+    return found
+
+
+def i2c(machine: emu.Machine) -> bytes:
+    """The I2C registers as they stand."""
+    return machine.peek_bytes(machine.chip.sfrs["I2CRCV"].address, 12)
+
+
+def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
+    """One walk. Raises AssertionError."""
+    rng = random.Random(seed)
+    machine = emu.load(image, engine=rng.choice(["jit", "jit", "interp"]), board=partial(Epuck, selector=selector))
+    picture = np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
+    machine.board.camera.show(picture)
+    machine.run_until(rng.randrange(rng.choice([400_000, 12_000_000])))  # the camera is set up by I2C in the beginning
+    app_has_camera = machine.image.symbols.find(PIXELS) is not None
+    history = History(machine, period=PERIOD)
+    handlers = {machine.image.word(vector.ivt) for vector in machine.chip.vectors}
+    states: list[tuple[int, bytes]] = []
+    for _ in range(rng.randrange(2, 6)):
+        history.advance(machine.cycle + rng.randrange(20_000))
+        if app_has_camera and rng.random() < 0.4:
+            remove = machine.hook_pc(PIXELS, lambda: True)
+            history.advance(machine.cycle + FRAME)
+            remove()
+        fed = rng.random() < 0.7
+        if fed:
+            machine.uart[1].feed(rng.randbytes(rng.randrange(1, 6)))
+        elif machine.is_asleep:
+            history.step()  # the middle of a sleep is no place a step leads to
+        start = len(states)
+        for number in range(rng.randrange(20, 150)):
+            states.append((machine.cycle, hashed(machine)))
+            before = machine.pc, machine.w[15], i2c(machine)
+            assert history.step() is None
+            tally.update(kinds_of(machine, before, handlers))
+            tally["input"] += fed and not number
+        states.append((machine.cycle, hashed(machine)))
+        tally["steps"] += len(states) - start - 1
+        for cycle, expected in reversed(states[start:-1]):
+            assert history.step_back()
+            assert (machine.cycle, hashed(machine)) == (cycle, expected), f"cycle {cycle} of seed {seed}"
+        cycle, expected = rng.choice(states)
+        history.seek(cycle)
+        assert hashed(machine) == expected, f"going to cycle {cycle} of seed {seed}"
+        history.seek(history.end)
+        assert hashed(machine) == states[-1][1]
+
+
+def main() -> int:
+    course = Course(parser(__doc__), "walks", 40, "walks")
+    course.parser.add_argument("--json", action="store_true", help="print the tally as one JSON object")
+    options = course.parse()
+    tally: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        for app in APPS:
+            words = [f"APP={app}", f"OUT={folder}/{app}", f"PYTHON={sys.executable}"]
+            subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True, stdout=subprocess.DEVNULL)
+        for seed in course:
+            app = list(APPS)[seed % 5 == 0]
+            try:
+                walk(Path(folder) / app / "firmware.elf", APPS[app], seed, tally)
+            except AssertionError as error:
+                return course.failed(error)
+    if options.json:
+        print(json.dumps(tally))
+        return 0
+    told = ", ".join(f"{tally[kind]:,} {kind}" for kind in ("interrupts", "i2c", "camera", "input"))
+    return course.ended(f"{tally['steps']:,} steps back, among them {told}: every state as before")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
