@@ -188,11 +188,12 @@ class History:
         now = self.machine.cycle
         if now <= self.start:
             return False
-        window, before = FIRST_WINDOW, None
+        window = FIRST_WINDOW
+        before: int | None = None
         while before is None and window <= WIDEST:
             begin = max(self.start, now - window)
-            for before, _ in self._steps(begin, now):
-                pass
+            steps = list(self._steps(begin, now))
+            before = steps[-1][0] if steps else None
             if begin == self.start:
                 break
             window *= WIDER

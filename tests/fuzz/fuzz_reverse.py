@@ -67,7 +67,7 @@ def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
     machine = emu.load(image, engine=rng.choice(["jit", "jit", "interp"]), board=partial(Epuck, selector=selector))
     picture = np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
     machine.board.camera.show(picture)
-    machine.run_until(rng.randrange(rng.choice([400_000, 12_000_000])))  # the camera is set up by I2C in the beginning
+    machine.run_until(rng.randrange(rng.choice([120_000, 12_000_000])))  # the camera is set up by I2C in the beginning
     app_has_camera = machine.image.symbols.find(PIXELS) is not None
     history = History(machine, period=PERIOD)
     handlers = {machine.image.word(vector.ivt) for vector in machine.chip.vectors}
