@@ -20,7 +20,17 @@ APPLICATION: Final = "options_wanted"
 SCENES: Final = (
     *("LOCK", "LOCK_SECOND", "LOCK_TAKEN", "UNLOCK", "UNLOCK_SECOND", "UNLOCK_ONE_WAITS", "UNLOCK_TWO_WAIT"),
     *("UNLOCK_SECOND_ONE_WAITS", "UNLOCK_PRIORITIES", "UNLOCK_TO_BETTER", "START", "START_JOINABLE"),
-    *("JOIN_ZOMBIE", "JOIN_LIVING", "END", "END_JOINED", "PUSH", "POP", "POP_AND_RUN", "POP_BEHIND_TWO"),
+    *(
+        "JOIN_ZOMBIE",
+        "JOIN_LIVING",
+        "END",
+        "END_JOINED",
+        "PUSH",
+        "PUSH_BEHIND_TWO",
+        "POP",
+        "POP_AND_RUN",
+        "POP_BEHIND_TWO",
+    ),
     *("END_CLEANED", "LIMIT", "SEND", "SEND_LIMITED", "SEND_LIMITED_BEHIND_FOUR", "SEND_DROPPED"),
     *("SEND_REPLACED", "SEND_SECOND_QUOTA", "SEND_NEIGHBOUR", "SEND_ELSEWHERE", "START_SERVICE", "FEED"),
     *("FEED_BEHIND_TWO", "TICK", "TICK_SERVICE"),
@@ -80,6 +90,7 @@ def measures() -> Iterator[tuple[str, str, Taken]]:
     yield "end of a thread, to the next, for comparison", "END", reaching("os_thread_returned", "options_spin")
     yield "end of a thread, to the one that joins it", "END_JOINED", reaching("os_thread_returned", "options_woken")
     yield "Sys_Push_Cleanup", "PUSH", returning("Sys_Push_Cleanup")
+    yield "Sys_Push_Cleanup, two of others are there", "PUSH_BEHIND_TWO", returning("Sys_Push_Cleanup")
     yield "Sys_Pop_Cleanup", "POP", returning("Sys_Pop_Cleanup")
     yield "Sys_Pop_Cleanup, an empty function is run", "POP_AND_RUN", returning("Sys_Pop_Cleanup")
     yield "Sys_Pop_Cleanup, two of others are newer", "POP_BEHIND_TWO", returning("Sys_Pop_Cleanup")

@@ -29,10 +29,10 @@ def run_make(folder: Path, *words: str) -> None:
 @pytest.fixture(scope="session")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Build:
     """`image("listing1")` builds an application for the e-puck; `apps=` names another folder of applications."""
-    built: dict[tuple[str, ...], Path] = {}
+    built: dict[tuple[str | Path | None, ...], Path] = {}
 
     def build(app: str, apps: Path | None = None, *words: str) -> Path:
-        key = (app, *words)
+        key = (app, apps, *words)
         if key not in built:
             out = tmp_path_factory.mktemp(app)
             folder = [f"APPS={os.path.relpath(apps, FIRMWARE)}"] if apps else []

@@ -18,8 +18,10 @@ from tests.firmware.conftest import FIRMWARE, TARGET_APPS, Build, run_make
 from tests.firmware.test_on_target import run_to
 
 CONFORMS = re.compile(rb"conforms: (\d+) checks")
-CHECKS = 275
-"""Of the conformance suite; a check that is not reached would be missed otherwise."""
+CHECKS, CHECKS_OF_OPTIONS = 275, 376
+"""Of the conformance suite and of its part about options; a check that is not reached would be missed otherwise."""
+OPTIONS = "DEFINES=-DSUITE_OF_OPTIONS"
+"""For `make`: the second image."""
 
 
 def make(target: str, app: str, out: Path, *words: str, apps: Path | None = None) -> Path:
@@ -56,20 +58,23 @@ def said_by_epuck2(image: Path, text: bytes) -> bytes:
 # ---- The conformance suite: one text --------------------------------------------------------------------------------
 
 
-def check_conforms(said: bytes) -> None:
+def check_conforms(said: bytes, checks: int = CHECKS) -> None:
     found = CONFORMS.search(said)
     assert found, said.decode(errors="replace")
-    assert int(found[1]) == CHECKS
+    assert int(found[1]) == checks
 
 
+@pytest.mark.parametrize(
+    ("words", "checks"), [((), CHECKS), ((OPTIONS,), CHECKS_OF_OPTIONS)], ids=["kernel", "options"]
+)
 @pytest.mark.parametrize("target", ["posix", "template"])
-def test_a_host_conforms(target: str, tmp_path: Path) -> None:
+def test_a_host_conforms(target: str, words: tuple[str, ...], checks: int, tmp_path: Path) -> None:
     """docs/porting.md: the template compiles as it stands and conforms; so does the port with real signals."""
     flags = "-O1 -g -fsanitize=undefined -fno-sanitize-recover=undefined"
     run_make(FIRMWARE, f"TARGET={target}", "APPS=../tests/firmware/target", "APP=conformance", f"OUT={tmp_path}",
-             f"HOST_FLAGS={flags}")  # fmt: skip
+             f"HOST_FLAGS={flags}", *words)  # fmt: skip
     done = subprocess.run([tmp_path / "firmware"], capture_output=True, timeout=120, check=False)
-    check_conforms(done.stdout)
+    check_conforms(done.stdout, checks)
     assert done.returncode == 0
 
 
@@ -115,6 +120,25 @@ def test_the_epuck2_conforms(case: str, tmp_path: Path) -> None:
     """The same text on a Cortex-M4 with its FPU and MPU at work."""
     image = make("epuck2", "conformance", tmp_path, *words_of(case), apps=TARGET_APPS)
     check_conforms(said_by_epuck2(image, b" checks"))
+
+
+def test_the_options_of_the_dspic30f_conform(image: Build) -> None:
+    """Mutex, join, cleanup, quota, services, and what hostile programs do to them."""
+    machine = emu.load(image("conformance", TARGET_APPS, OPTIONS), engine="jit")
+    said = bytearray()
+    machine.uart[1].on_byte = lambda byte, _: said.append(byte)
+    machine.run(cycles=5 * 14_745_600)
+    check_conforms(bytes(said), CHECKS_OF_OPTIONS)
+
+
+def test_the_options_of_the_kilobot_conform(tmp_path: Path) -> None:
+    image = make("kilobot", "conformance", tmp_path, OPTIONS, apps=TARGET_APPS)
+    check_conforms(said_by_kilobot(image, 5), CHECKS_OF_OPTIONS)
+
+
+def test_the_options_of_the_epuck2_conform(tmp_path: Path) -> None:
+    image = make("epuck2", "conformance", tmp_path, OPTIONS, apps=TARGET_APPS)
+    check_conforms(said_by_epuck2(image, b" checks"), CHECKS_OF_OPTIONS)
 
 
 # ---- Listing 1 and stress -------------------------------------------------------------------------------------------

@@ -192,16 +192,16 @@ static void with_end(uint16 scene)
 static void with_cleanup(uint16 scene)
 {
     static sys_process_config others = {push_and_rest, NULL, 0, 3, 0, 0, 0};
-    if (scene != PUSH) {
+    if (scene > PUSH_BEHIND_TWO) {
         (void)push(&options_cleanup, clean, NULL);
     }
-    for (uint16 i = 0; i < 2 && scene == POP_BEHIND_TWO; i++) {
+    for (uint16 i = 0; i < 2 && (scene == PUSH_BEHIND_TWO || scene == POP_BEHIND_TWO); i++) {
         others.arg = &other_cleanups[i];
         (void)start(&others);
     }
     settle_under_round_robin();
     options_ready();
-    if (scene == PUSH) {
+    if (scene <= PUSH_BEHIND_TWO) {
         (void)push(&options_cleanup, clean, NULL);
     } else {
         (void)pop(scene == POP_AND_RUN);

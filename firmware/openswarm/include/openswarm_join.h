@@ -9,7 +9,7 @@
  * PID and 18 bytes of the heap, until Sys_Join has returned for it; if somebody is waiting there already, it is gone at
  * once. Sys_Kill_Process of a zombie takes it away too, and tells its termination again. */
 uint16 Sys_Start_Joinable(const sys_process_config *config);
-/* T | until the thread has ended | 327 for a zombie; 269 to the next thread if it blocks | 48 | CONTEXT, PROCESS: there is none of this PID, it is the caller's or the
+/* T | until the thread has ended | 786 for a zombie beside the events of the system; 271 to the next thread if it blocks | 58 | CONTEXT, PROCESS: there is none of this PID, it is the caller's or the
  * system's.  Of any living thread, and of zombies. Several may wait for the same. */
 bool Sys_Join(uint16 pid);
 

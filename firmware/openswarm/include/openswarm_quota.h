@@ -8,8 +8,9 @@
  *     Sys_Keep_Latest(&ticks, SYS_1ms_TIMER);       one message waits at most, with the newest payload
  *     Sys_Limit_Event(&commands, COMMAND, 8);       eight wait at most; what comes then is dropped
  *
- * It holds for all listeners of the event, which share its messages, and until the event is unregistered. A message that is
- * dropped is as one to which nobody listens: the call returns true. While a message is being delivered the next may wait. */
+ * It holds for all listeners of the event, which share its messages, until the event is unregistered or has another quota; the
+ * same object may be used again. A message that is dropped is as one to which nobody listens: the call returns true. While a
+ * message is being delivered the next may wait. */
 #ifndef OPENSWARM_QUOTA_H
 #define OPENSWARM_QUOTA_H
 
@@ -24,9 +25,9 @@ typedef struct sys_quota {
     uint16 dropped; /* messages; saturates */
 } sys_quota;
 
-/* MTH | no | 181 | 36 | EVENT, MEMORY, ARGUMENT: most is 0.  Takes 6 bytes of the heap.  Sending the event then takes 79 more,
- * 82 if it is dropped, 95 if the payload of 2 bytes is replaced; 11 more per message of any event that waits and 7 per newer
- * quota. Other events of the same bucket (identifier modulo 8) that were registered before take 77 more. */
+/* MTH | no | 225 | 42 | EVENT, MEMORY, ARGUMENT: most is 0.  Takes 6 bytes of the heap, which also serve the event's next
+ * quota.  Sending the event then takes 71 more, 72 if it is dropped, 83 if the payload of 2 bytes is replaced; 11 more per
+ * message of any event that waits and 7 per newer quota. Other events of the same bucket (identifier modulo 8) that were registered before take 74 more. */
 bool Sys_Limit_Event(sys_quota *quota, uint16 event, uint16 most);
 /* As above, for a queue of one: the newest payload replaces the one that waits. */
 bool Sys_Keep_Latest(sys_quota *quota, uint16 event);

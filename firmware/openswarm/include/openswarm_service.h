@@ -25,7 +25,8 @@ typedef struct sys_service {
     uint16 bitten;                    /* times it was killed for not feeding; saturates */
 } sys_service;
 
-/* MTH | no | 330 more than Sys_Start_ProcessWith | 46 | MEMORY.  Starts the thread, and watches over it from now on. */
+/* MTH | no | 342 more than Sys_Start_ProcessWith | 48 | MEMORY, PROCESS: it
+ * lives.  Starts the thread, and watches over it from now on. One that has ended for good may be started again. */
 bool Sys_Start_Service(sys_service *service);
 /* T | no | 85, 8 more per service that began later | 22 | PROCESS: the caller is no service.  It is alive. */
 bool Sys_Feed_Watchdog(void);

@@ -72,6 +72,11 @@ bool Sys_IsEventRegistered(uint16 id)
     return found;
 }
 
+event **event_bucket(uint16 id)
+{
+    return &events[id % BUCKETS];
+}
+
 void event_put_first(event *e, uint16 id)
 {
     event **first = &events[id % BUCKETS];

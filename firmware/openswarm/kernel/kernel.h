@@ -129,6 +129,7 @@ extern event *(*os_at_sending)(uint16 id, const void *data, uint16 size); /* to 
 
 /* event.c */
 void event_init(void);
+event **event_bucket(uint16 id);           /* the first link of those that share a bucket with it; slice locked */
 void event_put_first(event *e, uint16 id); /* into the bucket of id */
 void event_deliver_queued(void);           /* kernel stack: all messages queued when it began */
 void event_drop_subscriptions(uint16 pid);

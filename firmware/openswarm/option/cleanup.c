@@ -6,6 +6,7 @@
 static sys_cleanup *cleanups; /* of all threads, newest first; slice locked */
 static os_burial before;
 static bool buries;
+static const sys_pcb *dying; /* its cleanups run */
 
 /* The link behind which the newest of a thread hangs; NULL: it has none. */
 static sys_cleanup **newest_of(uint16 pid)
@@ -18,14 +19,29 @@ static sys_cleanup **newest_of(uint16 pid)
     return NULL;
 }
 
+/* Whatever sections it begins or ends, the caller's stays. */
+static void call(const sys_cleanup *c)
+{
+    enum { FAR = 0x4000 };
+    Sys_Start_CriticalSection();
+    uint16 depth = critical_depth;
+    HAL_STORE(critical_depth, (uint16)(depth + FAR));
+    c->run(c->arg);
+    HAL_STORE(critical_depth, depth);
+    Sys_End_CriticalSection();
+}
+
 static bool on_burial(sys_pcb *p)
 {
     sys_cleanup **link;
+    const sys_pcb *outer = dying; /* a cleanup may end other threads */
+    dying = p;
     while ((link = newest_of(p->pid)) != NULL) {
         const sys_cleanup *c = *link;
         *link = c->next;
-        c->run(c->arg);
+        call(c);
     }
+    dying = outer;
     return before != NULL && before(p);
 }
 
@@ -34,8 +50,13 @@ bool Sys_Push_Cleanup(sys_cleanup *c, void (*run)(void *), void *arg)
     if (os_enter() != SYS_OK) {
         return false;
     }
-    if (os_in_kernel) {
+    if (os_in_kernel || dying != NULL) {
         return os_leave(os_refuse());
+    }
+    for (const sys_cleanup *other = cleanups; other != NULL; other = other->next) {
+        if (other == c) {
+            return os_leave(SYS_ERROR_ARGUMENT);
+        }
     }
     if (!buries) {
         buries = true;
@@ -62,7 +83,7 @@ bool Sys_Pop_Cleanup(bool run)
     const sys_cleanup *c = *link;
     *link = c->next;
     if (run) {
-        c->run(c->arg);
+        call(c);
     }
     return os_leave(SYS_OK);
 }

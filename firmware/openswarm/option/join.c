@@ -37,7 +37,7 @@ static bool tell_joiners(const sys_pcb *gone)
 static bool on_burial(sys_pcb *p)
 {
     bool stays = before != NULL && before(p);
-    bool is_zombie = p->block == (uint8 *)p;
+    bool is_zombie = p->block == NULL;
     if (is_zombie) {
         heap_give(p, sizeof *p);
         return true;
@@ -47,7 +47,7 @@ static bool on_burial(sys_pcb *p)
     }
     hal_stack_release(p);
     heap_give(p->block, (uint16)((uint8 *)p - p->block));
-    p->block = (uint8 *)p;
+    p->block = NULL;
     p->on.awaited = NULL;
     p->next = NULL;
     sys_pcb **end = &os_blocked;
@@ -93,7 +93,8 @@ bool Sys_Join(uint16 pid)
             link = &(*link)->next;
         }
         HAL_STORE(*link, p->next);
-        heap_give((void *)p->block, sizeof *p);
+        event_drop_subscriptions(pid); /* it may have been given some since its end */
+        heap_give((void *)(uintptr_t)p, sizeof *p);
         return os_leave(SYS_OK);
     }
     begin();

@@ -26,12 +26,17 @@ static message *newest_of(const event *e, uint16 *count)
 
 static event *admit(uint16 id, const void *data, uint16 size)
 {
-    event *e = event_find(id);
+    event *e = *event_bucket(id);
+    bool limited = false; /* not without the gate in front: a quota ends with its event, which may be registered anew */
+    while (e != NULL && e->id != id) {
+        limited |= e->id == (uint16)(id + 1u);
+        e = e->next;
+    }
     sys_quota *q = quotas;
     while (q != NULL && q->event != id) {
         q = q->next;
     }
-    if (e == NULL || q == NULL) {
+    if (e == NULL || q == NULL || !limited) {
         return e;
     }
     uint16 waiting = 0;
@@ -49,6 +54,26 @@ static event *admit(uint16 id, const void *data, uint16 size)
     return &nobody;
 }
 
+/* Slice locked. A quota holds for one event, an event has one quota and one gate. */
+static void forget(const sys_quota *again, uint16 id)
+{
+    for (sys_quota **link = &quotas; *link != NULL;) {
+        if (*link == again || (*link)->event == id) {
+            HAL_STORE(*link, (*link)->next);
+        } else {
+            link = &(*link)->next;
+        }
+    }
+    for (event **link = event_bucket(id); *link != NULL; link = &(*link)->next) {
+        event *gate = *link;
+        if (gate->id == (uint16)(id + 1u)) {
+            HAL_STORE(*link, gate->next);
+            heap_give(gate, sizeof *gate);
+            return;
+        }
+    }
+}
+
 static bool add(sys_quota *q, uint16 id, uint16 most)
 {
     sys_error error = SYS_ERROR_EVENT;
@@ -56,6 +81,7 @@ static bool add(sys_quota *q, uint16 id, uint16 most)
         return false;
     }
     if (event_find(id) != NULL) {
+        forget(q, id);
         event *gate = heap_keep(sizeof *gate);
         error = SYS_ERROR_MEMORY;
         if (gate != NULL) {

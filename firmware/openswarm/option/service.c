@@ -47,6 +47,13 @@ bool Sys_Start_Service(sys_service *s)
     if (os_enter() != SYS_OK) {
         return false;
     }
+    sys_service *known = services;
+    while (known != NULL && known != s) {
+        known = known->next;
+    }
+    if (known != NULL && s->pid != 0) {
+        return os_leave(SYS_ERROR_PROCESS);
+    }
     if (!buries) {
         buries = true;
         before = os_at_burial;
@@ -56,11 +63,11 @@ bool Sys_Start_Service(sys_service *s)
     if (Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, look_after, NULL)) {
         start(s);
     }
-    if (s->pid != 0) {
+    if (s->pid == 0) {
+        error = SYS_ERROR_MEMORY;
+    } else if (known == NULL) {
         s->next = services;
         services = s;
-    } else {
-        error = SYS_ERROR_MEMORY;
     }
     return os_leave(error);
 }

@@ -131,10 +131,14 @@ int main(void)
     Sys_Sleep(2);
     CHECK(noted("e"));
     Sys_Set_Scheduler(&sys_round_robin);
+#ifdef SUITE_OF_OPTIONS
+    check_options();
+#else
     check_threads();
     check_events();
     check_attacks();
     check_registers();
+#endif
     tell();
     leave();
     return 0;

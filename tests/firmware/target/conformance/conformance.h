@@ -24,6 +24,7 @@ uint16 start(void (*entry)(void *), void *arg, uint8 priority); /* PID, or 0 */
 void check_threads(void);   /* threads.c: switching, sleeping, killing, critical sections, schedulers */
 void check_events(void);    /* events.c: registration to delivery, waits, memory */
 void check_attacks(void);   /* attacks.c: floods, deaths, unbalanced calls, numbers that wrap */
+void check_options(void);   /* options.c: mutex, join, cleanup, quota, service; with -DSUITE_OF_OPTIONS, alone */
 void check_registers(void); /* registers.c: what a thread computes survives preemption */
 
 #endif

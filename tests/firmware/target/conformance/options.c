@@ -1,0 +1,449 @@
+/* The options: mutex, join, cleanup, quota, service, and what hostile programs do to them. An image of its own, built
+ * with -DSUITE_OF_OPTIONS: beside the kernel's checks it would be more than a small robot holds. */
+#include "conformance.h"
+
+#include <openswarm_cleanup.h>
+#include <openswarm_join.h>
+#include <openswarm_mutex.h>
+#include <openswarm_quota.h>
+#include <openswarm_service.h>
+
+#define FILE_LETTER 'o'
+
+static sys_mutex mutex = SYS_MUTEX(3), second = SYS_MUTEX(5);
+static volatile uint16 spins;
+static uint16 own_pid;
+
+static void spin(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        (void)Sys_Get_SystemTime(); /* on some hosts time passes in calls only */
+        spins++;
+    }
+}
+
+static void spend(uint16 ms)
+{
+    uint32 before = Sys_Get_SystemTime();
+    for (uint16 i = 0; i < 60000 && Sys_Get_SystemTime() - before < ms; i++) { /* on some hosts it stands still in a section */
+    }
+}
+
+static bool listen(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid, (void)event, (void)data;
+    return true;
+}
+
+static bool refused_as(bool done, sys_error error)
+{
+    return !done && Sys_Get_LastError() == error;
+}
+
+/* ---- Mutex ------------------------------------------------------------------------------------------------------- */
+
+static void lock_and_tell(void *letter)
+{
+    bool mine = Sys_Lock_Mutex(&mutex);
+    note(mine ? *(const char *)letter : '?');
+    Sys_Sleep(3);
+    note(mine ? *(const char *)letter : '?');
+    if (mine && !Sys_Unlock_Mutex(&mutex)) {
+        note('!');
+    }
+}
+
+static void mutexes_refuse_what_they_cannot_do(void)
+{
+    uint16 refused = Sys_Get_Statistics()->refused;
+    CHECK(refused_as(Sys_Unlock_Mutex(&mutex), SYS_ERROR_PROCESS));
+    CHECK(Sys_Lock_Mutex(&mutex) && refused_as(Sys_Lock_Mutex(&mutex), SYS_ERROR_PROCESS));
+    Sys_Start_CriticalSection();
+    CHECK(refused_as(Sys_Lock_Mutex(&second), SYS_ERROR_CONTEXT));
+    CHECK(Sys_Unlock_Mutex(&mutex)); /* that it may */
+    Sys_End_CriticalSection();
+    CHECK(Sys_Get_Statistics()->refused == refused + 1u && Sys_Lock_Mutex(&second) && Sys_Unlock_Mutex(&second));
+}
+
+static void a_mutex_excludes_and_goes_on_in_turn(void)
+{
+    static const char letters[] = "ab";
+    forget();
+    CHECK(Sys_Lock_Mutex(&mutex));
+    CHECK(start(lock_and_tell, (void *)&letters[0], 0) != 0 && start(lock_and_tell, (void *)&letters[1], 0) != 0);
+    Sys_Sleep(2);
+    CHECK(noted("") && Sys_Unlock_Mutex(&mutex));
+    Sys_Sleep(20);
+    CHECK(noted("aabb") && Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex));
+}
+
+static void hold_for_ever(void *unused)
+{
+    (void)unused;
+    note(Sys_Lock_Mutex(&mutex) && Sys_Lock_Mutex(&second) ? 'h' : '?');
+    for (;;) {
+        Sys_Sleep(1000);
+    }
+}
+
+static void owners_and_waiters_die(void)
+{
+    static const char letters[] = "abc";
+    forget();
+    uint16 heap = heap_now();
+    uint16 owner = start(hold_for_ever, NULL, 0);
+    Sys_Sleep(1);
+    uint16 a = start(lock_and_tell, (void *)&letters[0], 0), b = start(lock_and_tell, (void *)&letters[1], 0);
+    Sys_Sleep(2);
+    CHECK(refused_as(Sys_Lock_MutexTimeout(&mutex, 2), SYS_OK) && noted("h"));
+    CHECK(Sys_Kill_Process(a) && Sys_Kill_Process(owner)); /* a waiter, then who holds two */
+    CHECK(Sys_Lock_Mutex(&second) && Sys_Unlock_Mutex(&second));
+    Sys_Sleep(10);
+    CHECK(noted("hbb") && Sys_Get_ProcessState(b) == SYS_UNKNOWN);
+    CHECK(Sys_Lock_MutexTimeout(&mutex, 1));
+    a = start(lock_and_tell, (void *)&letters[2], 0);
+    Sys_Sleep(2);
+    Sys_Start_CriticalSection();
+    CHECK(Sys_Unlock_Mutex(&mutex) && Sys_Kill_Process(a)); /* it owns it, and has not run since */
+    Sys_End_CriticalSection();
+    CHECK(noted("hbb") && Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex) && heap_now() == heap);
+}
+
+static void low(void *unused)
+{
+    (void)unused;
+    note(Sys_Lock_Mutex(&mutex) ? '(' : '?');
+    spend(8);
+    note(')');
+    (void)Sys_Unlock_Mutex(&mutex);
+}
+
+static void middle(void *unused)
+{
+    (void)unused;
+    Sys_Sleep(3);
+    spend(60);
+    note('m');
+}
+
+static void high(void *unused)
+{
+    (void)unused;
+    Sys_Sleep(3);
+    note(Sys_Lock_Mutex(&mutex) ? 'H' : '?');
+    (void)Sys_Unlock_Mutex(&mutex);
+}
+
+static void a_ceiling_bounds_inversion(void)
+{
+    forget();
+    Sys_Set_Scheduler(&sys_fixed_priority);
+    CHECK(start(low, NULL, 1) != 0 && start(middle, NULL, 2) != 0 && start(high, NULL, 3) != 0);
+    Sys_Sleep(150);
+    CHECK(noted("()Hm"));
+    sys_process_config above = {lock_and_tell, NULL, 0, 4, 0, 0, 0};
+    above.arg = &above;
+    forget();
+    CHECK(Sys_Start_ProcessWith(&above) != 0);
+    Sys_Sleep(10);
+    CHECK(noted("??")); /* its priority is above the ceiling */
+    Sys_Set_Scheduler(&sys_round_robin);
+}
+
+/* Every scheduler is set while a mutex has an owner and a waiter. */
+static void schedulers_change_under_a_mutex(void)
+{
+    static const sys_scheduler *const all[] = {&sys_fixed_priority, &sys_woken_first, &sys_earliest_deadline, &sys_round_robin};
+    static const char letters[] = "ab";
+    for (uint8 i = 0; i < 4; i++) {
+        forget();
+        CHECK(Sys_Lock_Mutex(&mutex));
+        CHECK(start(lock_and_tell, (void *)&letters[0], 1) != 0);
+        Sys_Sleep(2);
+        Sys_Set_Scheduler(all[i]);
+        CHECK(start(lock_and_tell, (void *)&letters[1], 2) != 0);
+        Sys_Sleep(2);
+        CHECK(Sys_Unlock_Mutex(&mutex));
+        Sys_Sleep(12);
+        CHECK(noted("bbaa"));
+        CHECK(Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex));
+    }
+}
+
+/* ---- Join and cleanup ---------------------------------------------------------------------------------------------- */
+
+static void brief(void *unused)
+{
+    (void)unused;
+    Sys_Sleep(2);
+    note('e');
+}
+
+static uint16 start_joinable(void (*entry)(void *))
+{
+    sys_process_config config = {entry, NULL, 0, 0, 0, 0, 0};
+    return Sys_Start_Joinable(&config);
+}
+
+static void join_it(void *pid)
+{
+    note(Sys_Join(*(const uint16 *)pid) ? 'j' : '?');
+}
+
+static void zombies_wait_to_be_joined(void)
+{
+    uint16 heap = heap_now();
+    forget();
+    uint16 pid = start_joinable(brief);
+    Sys_Sleep(5);
+    CHECK(Sys_Get_ProcessState(pid) == SYS_ZOMBIE && heap_now() > heap && Sys_Get_UnusedStack(pid) == 0);
+    CHECK(Sys_Subscribe_to_Event(SYS_1ms_TIMER, pid, listen, NULL)); /* a zombie may be given one: it goes with it */
+    CHECK(Sys_Join(pid) && Sys_Get_ProcessState(pid) == SYS_UNKNOWN);
+    Sys_Yield();
+    CHECK(heap_now() == heap && refused_as(Sys_Join(pid), SYS_ERROR_PROCESS) && refused_as(Sys_Join(0), SYS_ERROR_PROCESS));
+    pid = start_joinable(brief);
+    CHECK(Sys_Join(pid) && Sys_Get_ProcessState(pid) == SYS_UNKNOWN && noted("ee"));
+    pid = start_joinable(brief);
+    Sys_Sleep(5);
+    CHECK(Sys_Kill_Process(pid) && Sys_Get_ProcessState(pid) == SYS_UNKNOWN);
+    Sys_Yield();
+    CHECK(heap_now() == heap);
+}
+
+static void joiners_die(void)
+{
+    uint16 heap = heap_now();
+    forget();
+    own_pid = start(spin, NULL, 0);
+    uint16 a = start(join_it, &own_pid, 0), b = start(join_it, &own_pid, 0);
+    CHECK(own_pid != 0 && a != 0 && b != 0);
+    Sys_Sleep(30);
+    CHECK(Sys_Kill_Process(a) && Sys_Kill_Process(own_pid)); /* the first of two on the list, then whom they wait for */
+    Sys_Sleep(2);
+    CHECK(noted("j") && Sys_Get_ProcessState(b) == SYS_UNKNOWN && heap_now() == heap);
+}
+
+static sys_cleanup cleanups[3];
+static void tell(void *letter)
+{
+    note(*(const char *)letter);
+}
+
+static void push_three(void *ms)
+{
+    static const char letters[] = "abc";
+    for (uint8 i = 0; i < 3; i++) {
+        note(Sys_Push_Cleanup(&cleanups[i], tell, (void *)&letters[i]) ? '+' : '?');
+    }
+    note(Sys_Pop_Cleanup(false) ? '-' : '?');
+    Sys_Sleep(*(const uint16 *)ms);
+}
+
+static void cleanups_run_whatever_ends_the_thread(void)
+{
+    static const uint16 soon = 1, never = 60000;
+    forget();
+    CHECK(start(push_three, (void *)&soon, 0) != 0);
+    Sys_Sleep(3);
+    CHECK(noted("+++-ba"));
+    forget();
+    uint16 pid = start(push_three, (void *)&never, 0);
+    Sys_Sleep(1);
+    CHECK(Sys_Kill_Process(pid) && noted("+++-ba"));
+    CHECK(refused_as(Sys_Pop_Cleanup(true), SYS_ERROR_PROCESS));
+}
+
+static void again(void *self)
+{
+    note(Sys_Push_Cleanup(self, again, self) ? '?' : 'r');
+    Sys_Sleep(1);
+    note(Sys_Lock_Mutex(&mutex) ? '?' : 'r');
+    Sys_End_CriticalSection();
+    Sys_End_CriticalSection();
+    Sys_Start_CriticalSection();
+    (void)Sys_Kill_Process(own_pid);
+}
+
+static void push_again(void *ms)
+{
+    own_pid = Sys_Get_ProcessID();
+    note(Sys_Push_Cleanup(&cleanups[0], again, &cleanups[0]) ? '+' : '?');
+    note(refused_as(Sys_Push_Cleanup(&cleanups[0], again, NULL), SYS_ERROR_ARGUMENT) ? 'r' : '?');
+    Sys_Sleep(*(const uint16 *)ms);
+}
+
+/* One that pushes itself anew, blocks, ends sections that are not its own, kills the thread that is dying. */
+static void hostile_cleanups(void)
+{
+    static const uint16 soon = 1, never = 60000;
+    uint16 heap = heap_now();
+    for (uint8 i = 0; i < 2; i++) {
+        forget();
+        uint16 pid = start(push_again, (void *)(i == 0 ? &soon : &never), 0);
+        uint16 other = start(spin, NULL, 0);
+        Sys_Sleep(12);
+        spins = 0;
+        Sys_Start_CriticalSection();
+        CHECK(i == 0 || Sys_Kill_Process(pid));
+        spend(12);
+        CHECK(spins == 0); /* the section is still there */
+        Sys_End_CriticalSection();
+        Sys_Sleep(12);
+        CHECK(noted("+rrr") && spins != 0 && Sys_Kill_Process(other));
+        Sys_Yield();
+        CHECK(heap_now() == heap);
+    }
+}
+
+/* ---- Quota ------------------------------------------------------------------------------------------------------- */
+
+static sys_quota quota, quota_too;
+static uint16 heard, last;
+
+static bool hear(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid, (void)event;
+    heard++;
+    last = data->value;
+    return true;
+}
+
+static uint16 delivered(uint16 event, uint16 messages)
+{
+    heard = 0;
+    Sys_Start_CriticalSection();
+    for (uint16 i = 1; i <= messages; i++) {
+        CHECK(Sys_Send_IntEvent(event, i));
+    }
+    Sys_End_CriticalSection();
+    Sys_Yield();
+    return heard;
+}
+
+static void quotas_bound_what_waits(void)
+{
+    CHECK(refused_as(Sys_Limit_Event(&quota, E1, 2), SYS_ERROR_EVENT));
+    CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, hear, NULL));
+    CHECK(refused_as(Sys_Limit_Event(&quota, E1, 0), SYS_ERROR_ARGUMENT) && delivered(E1, 5) == 5);
+    CHECK(Sys_Limit_Event(&quota, E1, 2) && delivered(E1, 5) == 2 && last == 2 && quota.dropped == 3);
+    CHECK(Sys_Keep_Latest(&quota_too, E1) && delivered(E1, 5) == 1 && last == 5 && quota_too.dropped == 0);
+    Sys_Start_CriticalSection();
+    CHECK(Sys_Send_IntEvent(E1, 7) && Sys_Send_Event(E1, "text", 4)); /* of another size: dropped */
+    Sys_End_CriticalSection();
+    Sys_Yield();
+    CHECK(last == 7 && quota_too.dropped == 1 && Sys_Unregister_Event(E1));
+}
+
+/* Set twice, its event unregistered and registered anew between two others of the same bucket. */
+static void quotas_come_and_go(void)
+{
+    uint16 heap = heap_now();
+    for (uint8 i = 0; i < 20; i++) {
+        CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, hear, NULL));
+        CHECK(Sys_Limit_Event(&quota, E1, 1) && Sys_Limit_Event(&quota, E1, 2) && delivered(E1, 4) == 2);
+        CHECK(Sys_Unregister_Event(E1) && Sys_Register_Event(E1) && Sys_Register_Event(E1 + 8));
+        CHECK(Sys_Subscribe_to_Event(E1, 0, hear, NULL) && delivered(E1, 4) == 4); /* it went with the event */
+        CHECK(Sys_Unregister_Event(E1) && Sys_Unregister_Event(E1 + 8));
+    }
+    CHECK(heap_now() <= heap + 4 * sizeof(void *)); /* what the event's next quota uses */
+}
+
+static bool leave(uint16 pid, uint16 event, sys_event_data *data)
+{
+    heard++;
+    CHECK(Sys_Send_IntEvent(event, data->value) && Sys_Send_IntEvent(event, data->value));
+    return Sys_Unsubscribe_Handler(event, pid, leave) && Sys_Unregister_Event(event);
+}
+
+static void a_handler_ends_its_limited_event(void)
+{
+    uint16 heap = heap_now();
+    CHECK(Sys_Register_Event(E1) && Sys_Subscribe_to_Event(E1, 0, leave, NULL) && Sys_Keep_Latest(&quota, E1));
+    CHECK(delivered(E1, 3) == 1 && !Sys_IsEventRegistered(E1) && heap_now() <= heap + 4 * sizeof(void *));
+}
+
+/* ---- Services ---------------------------------------------------------------------------------------------------- */
+
+static volatile uint16 begins;
+static void end_at_once(void *unused)
+{
+    (void)unused;
+    begins++;
+}
+
+static void never_yield(void *unused)
+{
+    begins++;
+    CHECK(Sys_Feed_Watchdog());
+    spin(unused);
+}
+
+static void live_well(void *unused)
+{
+    (void)unused;
+    begins++;
+    for (;;) {
+        Sys_Sleep(4);
+        (void)Sys_Feed_Watchdog();
+    }
+}
+
+static void services_are_started_anew(void)
+{
+    static const sys_process_config brief_one = {end_at_once, NULL, 0, 0, 0, 0, 0};
+    static const sys_process_config busy_one = {never_yield, NULL, 0, 0, 0, 0, 0};
+    static const sys_process_config good_one = {live_well, NULL, 0, 0, 0, 0, 0};
+    static sys_service few = {.config = &brief_one, .restarts = 3}, busy = {.config = &busy_one, .limit_ms = 20, .restarts = 2};
+    static sys_service good = {.config = &good_one, .limit_ms = 20, .restarts = SYS_ALWAYS};
+    static sys_service storm = {.config = &brief_one, .restarts = SYS_ALWAYS};
+    CHECK(refused_as(Sys_Feed_Watchdog(), SYS_ERROR_PROCESS));
+    begins = 0;
+    CHECK(Sys_Start_Service(&few));
+    Sys_Sleep(100);
+    CHECK(begins == 4 && few.pid == 0);
+    begins = 0;
+    CHECK(Sys_Start_Service(&busy) && refused_as(Sys_Start_Service(&busy), SYS_ERROR_PROCESS));
+    Sys_Sleep(200);
+    CHECK(begins == 3 && busy.bitten == 3 && busy.pid == 0);
+    begins = 0;
+    few.restarts = 1;
+    CHECK(Sys_Start_Service(&few)); /* again, after its end */
+    Sys_Sleep(60);
+    CHECK(begins == 2);
+    begins = 0;
+    CHECK(Sys_Start_Service(&good));
+    Sys_Sleep(100);
+    CHECK(begins == 1 && good.bitten == 0 && Sys_Kill_Process(good.pid));
+    Sys_Sleep(20);
+    CHECK(begins == 2 && good.bitten == 0);
+    begins = 0;
+    CHECK(Sys_Start_Service(&storm));
+    uint16 heap = heap_now();
+    Sys_Sleep(200); /* it ends and begins all the time, and others go on */
+    uint16 pid = start(spin, NULL, 0);
+    spins = 0;
+    Sys_Sleep(50);
+    CHECK(begins > 5 && spins != 0 && Sys_Kill_Process(pid));
+    storm.restarts = good.restarts = 0;
+    CHECK(Sys_Kill_Process(good.pid));
+    Sys_Sleep(30);
+    CHECK(storm.pid == 0 && good.pid == 0 && heap_now() <= heap);
+}
+
+void check_options(void)
+{
+    mutexes_refuse_what_they_cannot_do();
+    a_mutex_excludes_and_goes_on_in_turn();
+    owners_and_waiters_die();
+    a_ceiling_bounds_inversion();
+    schedulers_change_under_a_mutex();
+    zombies_wait_to_be_joined();
+    joiners_die();
+    cleanups_run_whatever_ends_the_thread();
+    hostile_cleanups();
+    quotas_bound_what_waits();
+    quotas_come_and_go();
+    a_handler_ends_its_limited_event();
+    services_are_started_anew();
+}
