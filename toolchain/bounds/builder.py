@@ -28,8 +28,12 @@ from toolchain.bounds.values import (
     union,
 )
 
-SR, TBLPAG = 0x42, 0x32
+SR, CORCON, TBLPAG = 0x42, 0x44, 0x32
+IPL3 = TRAP = 8
+"""Bit of CORCON that a trap sets and code can only clear, and what it adds to the priority (isa.md §2.4)."""
 W_END = 0x20
+STACK = 15
+"""W15, which leads into RAM wherever it is not known."""
 TABLE = 64
 """Most places of a constant table that one load looks at."""
 IPL_BITS = 0xE0
@@ -177,7 +181,7 @@ class Abstract:
     # -- memory --------------------------------------------------------------------------------------------------
 
     def load(self, ea: Value, size: Size, side: Side = "src", ptr: int | None = None) -> Value:
-        value = self._read(ea, size)
+        value = (BYTE if size == 1 else WORD) if ptr == STACK and not exact(ea) else self._read(ea, size)
         if self.world.area.inside(value):
             self._saw = min(self._saw, ends(value)[0])
         return value
@@ -245,6 +249,8 @@ class Abstract:
     def _write(self, ea: Value, value: Value, size: Size) -> None:
         state, area = self.state, self.world.area
         if exact(ea):
+            if ea == CORCON and known(~value)[1] & known(value)[0] & IPL3:
+                state.ipl = state.ipl[0] & ~TRAP, state.ipl[1] & ~TRAP
             if ea < W_END:
                 (self.set_w if size == 2 else self.set_wb)(ea >> 1, value if size == 2 or not ea & 1 else BYTE)
             elif ea & ~1 == SR:
@@ -291,6 +297,7 @@ class Abstract:
     def _set_status(self, value: Value) -> None:
         mask, bits = known(value)
         low = (bits & mask & IPL_BITS) >> 5
-        self.state.ipl = low, low | (~mask & IPL_BITS) >> 5
+        high = low | (~mask & IPL_BITS) >> 5
+        self.state.ipl = self.state.ipl[0] & TRAP | low, self.state.ipl[1] & TRAP | high
         for name, bit in (("C", 0), ("Z", 1), ("OV", 2), ("N", 3)):
             self.state.flags[name] = bits >> bit & 1 if mask >> bit & 1 else EITHER

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from toolchain.bounds.graph import Step
 from toolchain.bounds.state import State
 from toolchain.bounds.values import Span, Value, ends, span
@@ -12,14 +14,95 @@ _OPPOSITE |= {b: a for a, b in _OPPOSITE.items()}
 _NAMES = {"C": "GEU", "NC": "LTU"}
 
 
-def refined(steps: list[Step], state: State, taken: bool) -> bool:
-    """Narrow registers in `state`, which went one way behind the branch that ends `steps`; False: none can go there."""
+_WIDTH = 0x10000
+_WAYS = {
+    "Z": [(0, 0)],
+    "NZ": [(-_WIDTH, -1), (1, _WIDTH)],
+    "N": [(-_SIGN, -1), (_SIGN, _WIDTH - 1)],
+    "NN": [(-_WIDTH, -_SIGN - 1), (0, _SIGN - 1)],
+    "GEU": [(0, _WIDTH)],
+    "GTU": [(1, _WIDTH)],
+    "LTU": [(-_WIDTH, -1)],
+    "LEU": [(-_WIDTH, 0)],
+}
+"""Where a difference lies for a condition; those that take OV are left alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What an instruction has written to a register and its flags tell of: one of lo..hi, modulo 2**16.
+
+    borrows  whether it is a difference, below zero where C is clear
+    """
+
+    register: int
+    lo: int
+    hi: int
+    borrows: bool
+
+    @classmethod
+    def of(cls, step: Step, before: list[Value], after: list[Value]) -> Result:
+        """The result of a step that `tested` found, from the registers on both sides of it."""
+        row, x = step.insn.row, step.insn.x
+        less = _LESS.get(row.mnemonic)
+        source = x.s if less is not None else 0
+        if row.mnemonic == "SUB" and "k" in row.fields:
+            less, source = x.k, x.w if "w" in row.fields else x.d
+        if less is None or ("p" in row.fields and x.p):
+            return cls(x.d, *ends(after[x.d]), False)
+        lo, hi = ends(before[source])
+        return cls(x.d, lo - less, hi - less, True)
+
+    def where(self, condition: str, now: Value) -> Value | None:
+        """The members of `now`, the register, for which a condition can hold; None: there are none."""
+        if condition not in _WAYS or (condition.endswith("U") and not self.borrows):
+            return now
+        parts = [(max(self.lo, a), min(self.hi, b)) for a, b in _WAYS[condition]]
+        parts = [(a, b) for a, b in parts if a <= b]
+        if not parts:
+            return None
+        if any(a // _WIDTH != b // _WIDTH for a, b in parts):
+            return now  # on both sides of zero
+        low, high = ends(now)
+        least = max(low, min(a % _WIDTH for a, _ in parts))
+        most = min(high, max(b % _WIDTH for _, b in parts))
+        return _cut(now, least, most) if least <= most else now
+
+
+_RESULTS = {"ADD", "SUB", "INC", "INC2", "DEC", "DEC2", "AND", "IOR", "XOR", "LSR", "ASR", "SL", "NEG", "COM"}
+"""Instructions whose Z and N tell of what they write."""
+_LESS = {"DEC": 1, "DEC2": 2}
+
+
+def tested(steps: list[Step]) -> int | None:
+    """Which of the steps leaves in a register, until the end, the result that its flags tell of."""
+    written = 0
+    for index in range(len(steps) - 1, -1, -1):
+        row, x = steps[index].insn.row, steps[index].insn.x
+        if row.flags:
+            if row.mnemonic not in _RESULTS or "d" not in row.fields or x.B or ("q" in row.fields and x.q):
+                return None
+            return None if written >> x.d & 1 else index
+        written |= steps[index].writes
+    return None
+
+
+def refined(steps: list[Step], state: State, taken: bool, result: Result | None = None) -> bool:
+    """Narrow registers in `state`, which went one way behind the branch that ends `steps`; False: none can go there.
+
+    result  what the instruction that set the flags wrote, where that still stands
+    """
     condition = steps[-1].insn.row.syntax.partition(" ")[2].partition(",")[0]
     condition = _NAMES.get(condition, condition)
     if condition not in _OPPOSITE:
         return True
     if not taken:
         condition = _OPPOSITE[condition]
+    if result is not None:
+        left_over = result.where(condition, state.w[result.register])
+        if left_over is None:
+            return False
+        state.w[result.register] = left_over
     compared = _compared(steps)
     if compared is None:
         return True

@@ -15,10 +15,10 @@ from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Call, Disi, Do, Flow, Goto, Repeat, Reset, Return, Skip, Sleep
 from toolchain.bounds.builder import Abstract, World, exact
-from toolchain.bounds.compare import refined
-from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step
+from toolchain.bounds.compare import Result, refined, tested
+from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step, joined
 from toolchain.bounds.state import INHERITED, LEVELS, NOWHERE, State, widened
-from toolchain.bounds.values import Value, ends, span
+from toolchain.bounds.values import WORD, Value, ends, span
 
 MAX_TURNS: Final = 5_000
 HOPELESS_TURNS: Final = 6
@@ -35,6 +35,8 @@ MARGIN: Final = 64
 """Bytes that a function may look at below the beginning of its own stack."""
 VARIANTS: Final = 8
 """Calls of one function that are told apart."""
+SMALL: Final = 0x800
+"""What is less is no address of RAM: a number."""
 RESULTS: Final = frozenset((0, 1))
 """Results by which the ways through a function are told apart."""
 CHOICE: Final = 6
@@ -110,8 +112,12 @@ class Rules:
 
     loop: Callable[[Code, Loop], int | None] = lambda _code, _loop: None
     """Most rounds of a loop beyond its first, per entry."""
+    same: Callable[[Code], set[int]] = lambda _code: set()
+    """Heads of loops that are one with the loop around them."""
     calls: Callable[[int, State], list[int] | None] = lambda _pc, _state: None
     """Targets of a call through a pointer whose value is not known."""
+    without: frozenset[int] = frozenset()
+    """Functions that are not called: paths that lead into them are left out."""
     recursion: Callable[[int], int | None] = lambda _entry: None
     """Activations of a function that exist at once."""
     resumed: Callable[[], list[int]] = list
@@ -139,7 +145,11 @@ class Explorer:
     def code(self, entry: int) -> Code:
         """The blocks of a function."""
         if entry not in self.codes:
-            self.codes[entry] = self.graph.code(entry)
+            self.codes[entry] = code = self.graph.code(entry)
+            code.order = joined(code.order, self.rules.same(code))
+            for block in code.blocks.values():
+                if block.steps[-1].flow is Branch:
+                    block.tested = tested(block.steps)
         return self.codes[entry]
 
     def run(self, entry: int, state: State) -> Outcome:
@@ -177,6 +187,7 @@ class Explorer:
         if stack is None:
             return self.run(entry, state), False
         every = State()
+        every.w[:8] = map(magnitude, state.w[:8])
         every.w[15] = self.world.area.ranges[stack][0] + MARGIN
         every.ipl, every.stall = state.ipl, state.stall
         every.since, every.loops = state.since.copy(), state.loops
@@ -186,6 +197,12 @@ class Explorer:
         if found.open and self.closed[entry]:
             return self.run(entry, state), False
         return found.moved(stack, state.w[15] - self.world.area.ranges[stack][0] - MARGIN), True
+
+
+def magnitude(value: Value) -> Value:
+    """Numbers below a power of two; a set that could be an address says nothing."""
+    high = ends(value)[1]
+    return span(0, (1 << high.bit_length()) - 1) if high < SMALL else WORD
 
 
 class _Run:
@@ -232,35 +249,39 @@ class _Run:
             return
         bound = explorer.rules.loop(self.code, loop)
         limit = HOPELESS_TURNS if loop.head in explorer.hopeless else MAX_TURNS
-        before: State | None = None
+        before: dict[int, State] = {}
         turns = 0
-        while True:
-            state = pending.get(loop.head)
-            if state is None:
-                if loop.members.isdisjoint(pending):
-                    return
-            elif before is not None:
+        while not loop.members.isdisjoint(pending):
+            now = {head: pending[head] for head in loop.heads if head in pending}
+            if now and before:
                 if bound is not None and turns > bound:
                     break
                 if turns > limit:
                     explorer.hopeless.add(loop.head)
-                    state = pending[loop.head] = widened(before, state)
-                    if exact(before.w[15]) and not exact(state.w[15]):
-                        self.outcome.open[self.code.blocks[loop.head].steps[-1].pc] = "the stack grows in this loop"
-                if state.key() == before.key():
-                    if bound is not None:
-                        self._rounds(before, state, bound - turns)
-                        turns = bound
-                    else:
+                    self._widen(before, now)
+                if {h: s.key() for h, s in now.items()} == {h: s.key() for h, s in before.items()}:
+                    if bound is None:
                         explorer.hopeless.add(loop.head)
                         self._endless(loop)
                         break
-            before = None if state is None else state.copy()
-            if state is not None:
+                    if len(loop.heads) == 1:
+                        self._rounds(before[loop.head], now[loop.head], bound - turns)
+                        turns = bound
+            before = {head: state.copy() for head, state in now.items()}
+            if loop.head in now:
                 self._block(self.code.blocks[loop.head], pending.pop(loop.head))
             self._visit(loop.body)
             turns += 1
-        pending.pop(loop.head, None)
+        for head in loop.heads:
+            pending.pop(head, None)
+
+    def _widen(self, before: dict[int, State], now: dict[int, State]) -> None:
+        """Give up what differs from the round before."""
+        for head in before.keys() & now.keys():
+            was, state = before[head], now[head]
+            now[head] = self.pending[head] = widened(was, state)
+            if exact(was.w[15]) and not exact(state.w[15]):
+                self.outcome.open[self.code.blocks[head].steps[-1].pc] = "the stack grows in this loop"
 
     @staticmethod
     def _rounds(before: State, state: State, count: int) -> None:
@@ -289,13 +310,19 @@ class _Run:
         if explorer.steps > MAX_STEPS:
             raise TooMuch
         flow: Flow = None
-        for step in block.steps:
-            flow = self._step(step, state)
+        result: Result | None = None
+        for index, step in enumerate(block.steps):
+            if index == block.tested:
+                before = state.w.copy()
+                flow = self._step(step, state)
+                result = Result.of(step, before, state.w)
+            else:
+                flow = self._step(step, state)
         last = block.steps[-1]
         if state.loops and last.pc == state.loops[-1][1] and not isinstance(flow, Branch | Goto | Return):
             self._loop_end(state, last)
             return
-        self._follow(block, flow, state)
+        self._follow(block, flow, state, result)
 
     def _step(self, step: Step, state: State) -> Flow:
         if state.repeat is not None:
@@ -364,7 +391,7 @@ class _Run:
         wide = widened(before, state)
         if not exact(wide.w[15]):
             self.outcome.open[step.pc] = "pushes an unknown number of times"
-        wide.mem.clear()
+        wide.mem = {a: v for a, v in wide.mem.items() if (a if a >= 0 else ~a) & ~1 in self.explorer.world.private}
         wide.leaked = 0
         return wide
 
@@ -380,7 +407,7 @@ class _Run:
             state.loops = state.loops[:-1]
             self._arrive(last.after, state)
 
-    def _follow(self, block: Block, flow: Flow, state: State) -> None:
+    def _follow(self, block: Block, flow: Flow, state: State, result: Result | None) -> None:
         """Where control goes behind a block."""
         last = block.steps[-1]
         match flow:
@@ -391,9 +418,9 @@ class _Run:
                     return
                 taken = state.copy()
                 taken.time += 1
-                if refined(block.steps, taken, True):
+                if refined(block.steps, taken, True, result):
                     self._arrive(target, taken)
-                if refined(block.steps, state, False):
+                if refined(block.steps, state, False, result):
                     self._arrive(last.after, state)
             case Skip(cond):
                 if not exact(cond) or cond:
@@ -446,7 +473,7 @@ class _Run:
     def _unknown(self, pc: int, state: State) -> list[int]:
         if not exact(state.w[15]):
             self.outcome.left = max(self.outcome.left or 0, state.time)
-            return self.explorer.rules.resumed()
+            return [entry for entry in self.explorer.rules.resumed() if entry not in self.explorer.active]
         found = self.explorer.rules.calls(pc, state)
         if found is None:
             self.outcome.open[pc] = "the targets of this call through a pointer are not known"
@@ -456,6 +483,8 @@ class _Run:
     def _enter(self, last: Step, target: int, state: State, tail: bool, many: bool = False) -> None:
         """Call a function, or jump to it, and go on behind it."""
         explorer = self.explorer
+        if target in explorer.rules.without:
+            return
         if target == 0:  # a weak function that is not linked
             if not tail:
                 state.w[15] = state.w[15] - 4 & 0xFFFF
@@ -482,7 +511,9 @@ class _Run:
             ends = [back]
         else:
             ends = [self._behind(before, end, found.wild) if general else end.copy() for end in found.ends.values()]
-        for end in ends:
+        for end in ends:  # W8-W14 are preserved (abi-elf.md §2.1)
+            if not tail and level is None:
+                end.w[8:15] = before.w[8:15]
             end.shift(start)
             end.since = [since[k] if s == INHERITED else s for k, s in enumerate(end.since)]
             self._levels(end, last.pc)
@@ -494,10 +525,10 @@ class _Run:
                 self._arrive(last.after, end)
 
     def _behind(self, before: State, end: State, wild: bool) -> State:
-        """The caller's state behind a call that was run for all its calls: W8-W14 are preserved (abi-elf.md §2.1)."""
+        """The caller's state behind a call that was run for all its calls."""
         private = self.explorer.world.private
         new = end.copy()
-        new.w = [*end.w[:8], *before.w[8:15], before.w[15] - 4 & 0xFFFF]
+        new.w = [*end.w[:15], before.w[15] - 4 & 0xFFFF]
         kept = {a: v for a, v in before.mem.items() if (a if a >= 0 else ~a) & ~1 not in private}
         if wild and (before.leaked < NOWHERE or any(self.area.inside(value) for value in before.w[:8])):
             kept = {}

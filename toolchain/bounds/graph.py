@@ -34,6 +34,8 @@ class Block:
 
     steps: list[Step]
     following: list[int]
+    tested: int | None = None
+    """Which step left the result that the branch at the end asks about (compare.tested)."""
 
 
 @dataclass(slots=True)
@@ -43,6 +45,8 @@ class Loop:
     head: int
     body: list[Order]
     members: set[int]
+    heads: set[int] = field(default_factory=set)
+    """Where its rounds begin: its head, and those of loops within that are the same loop of the source."""
 
 
 Order = int | Loop
@@ -198,10 +202,11 @@ def ordered(entry: int, graph: Mapping[int, list[int]]) -> list[Order]:
         members = {node}
         for part in body:
             members |= part.members if isinstance(part, Loop) else {part}
-        return Loop(node, body, members)
+        return Loop(node, body, members, {node})
 
     order: list[Order] = []
-    visit(entry, order)
+    if entry in graph:
+        visit(entry, order)
     return order
 
 
@@ -214,4 +219,21 @@ def loops_in(order: list[Order]) -> list[Loop]:
     return found
 
 
-__all__ = ["Block", "Builder", "Code", "Loop", "Order", "Step", "loops_in", "ordered", "step_at"]
+def joined(order: list[Order], same: set[int]) -> list[Order]:
+    """The order with each loop whose head is in `same` made one with the loop around it."""
+    result: list[Order] = []
+    for part in order:
+        if isinstance(part, Loop):
+            body: list[Order] = []
+            for inner in joined(part.body, same):
+                if isinstance(inner, Loop) and inner.head in same:
+                    part.heads |= inner.heads
+                    body += [inner.head, *inner.body]
+                else:
+                    body.append(inner)
+            part.body = body
+        result.append(part)
+    return result
+
+
+__all__ = ["Block", "Builder", "Code", "Loop", "Order", "Step", "joined", "loops_in", "ordered", "step_at"]

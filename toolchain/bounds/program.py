@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from typing import Final
 
 from emu.chips import chip_named, chip_of
@@ -33,12 +34,17 @@ def tail(file: str) -> str:
     return "/".join(file.replace("\\", "/").split("/")[-2:])
 
 
+def _beside(file: str, name: str) -> str:
+    """The file of that name in the same folder; without a name the file itself."""
+    return file.rpartition("/")[0] + "/" + name if name else file
+
+
 class Program:
     """What an image says about itself, and what its notes answer (explore.Rules)."""
 
-    def __init__(self, image: Executable, annotations: Annotations, notes: Notes) -> None:
+    def __init__(self, image: Executable, annotations: Annotations, notes: Notes, left_out: Iterable[str] = ()) -> None:
         sys.setrecursionlimit(max(sys.getrecursionlimit(), PYTHON_DEPTH))
-        self.image, self.notes = image, notes
+        self.image, self.notes, self.left_out = image, notes, left_out
         self.chip: Final = chip_of(image.processor & PROCESSOR_MASK) or chip_named()
         self.calls: Final = Analysis(image, annotations)
         self.graph: Final = Builder(self.calls.code, self.calls.entries)
@@ -53,13 +59,13 @@ class Program:
         debug = {s.name: bytes(s.data) for s in image.sections if s.name.startswith(".debug_")}
         self.lines: Final = Lines(debug)
         self.signatures: Final = Signatures(debug)
-        self._ram = {tail(note.file) for note in notes.of("ram")}
+        self._ram = {_beside(tail(note.file), note.text[1:].strip()) for note in notes.of("ram")}
         self._at: dict[str, dict[tuple[str, int], list[Note]]] = {}
         for note in notes.all:
             table = self._at.setdefault(note.kind, {})
             for line in (note.line, note.line + 1):
                 table.setdefault((tail(note.file), line), []).append(note)
-        self._loops: dict[int, dict[int, int | None]] = {}
+        self._loops: dict[tuple[str, int], dict[int, set[Note]]] = {}
 
     def _window(self) -> dict[int, int] | None:
         """Bytes of the PSV window; None if no section lies in it, nothing if its page changes."""
@@ -106,39 +112,35 @@ class Program:
 
     def rounds(self, code: Code, loop: Loop) -> int | None:
         """Rounds of a loop by its LOOP_BOUND, the line in front of its condition."""
-        if code.entry not in self._loops:
-            self._loops[code.entry] = self._bind(code)
-        return self._loops[code.entry].get(loop.head)
+        numbers = [
+            self.notes.number(note.text, note) for head in loop.heads for note in self._bound(code, "loop", head)
+        ]
+        for note in self.notes.of("loops"):
+            name, _, text = note.text.partition(" ")
+            if self.address(name) == code.entry:
+                numbers.append(self.notes.number(text, note))
+        return None if None in numbers else max((n for n in numbers if n is not None), default=None)
 
-    def _bind(self, code: Code) -> dict[int, int | None]:
-        """Innermost loops first: the lines of an inner loop's beginning belong to the outer one as well."""
-        table, bound = self._at.get("loop", {}), {}
-        taken: dict[int, set[Note]] = {}
-        if not table:
-            return {}
-        for loop in reversed(loops_in(code.order)):
+    def same(self, code: Code) -> set[int]:
+        """Heads of loops that are one with the loop around them, by SAME_LOOP."""
+        return {loop.head for loop in loops_in(code.order) if self._bound(code, "same", loop.head)}
+
+    def _bound(self, code: Code, kind: str, head: int) -> set[Note]:
+        if (kind, code.entry) not in self._loops:
+            self._loops[kind, code.entry] = self._bind(code, kind)
+        return self._loops[kind, code.entry].get(head, set())
+
+    def _bind(self, code: Code, kind: str) -> dict[int, set[Note]]:
+        """Notes by the head of their loop: the innermost one with code of their line, and no loop around that."""
+        table = self._at.get(kind, {})
+        bound: dict[int, set[Note]] = {}
+        for loop in reversed(loops_in(code.order)) if table else ():
             inner = loops_in(loop.body)
             own = loop.members - {m for part in inner for m in part.members}
-            below = {note for part in inner for note in taken.get(part.head, ())}
-            claimed = {note for note in below if not self._leaves(code, loop, note)}
+            below = {note for part in inner for note in bound[part.head]}
             lines = {self.line(step.pc) for head in own for step in code.blocks[head].steps}
-            found = {note for line in lines for note in table.get(line, ())} - claimed
-            if not found:  # one loop of the source that has become two, one within the other
-                found = below - claimed
-            taken[loop.head] = found | claimed
-            numbers = [self.notes.number(note.text, note) for note in found]
-            if numbers:
-                bound[loop.head] = None if None in numbers else max(n for n in numbers if n is not None)
+            bound[loop.head] = {note for line in lines for note in table.get(line, ())} - below
         return bound
-
-    def _leaves(self, code: Code, loop: Loop, note: Note) -> bool:
-        """Whether the condition behind a note leads out of this loop."""
-        wanted = {(tail(note.file), note.line), (tail(note.file), note.line + 1)}
-        return any(
-            self.line(code.blocks[member].steps[-1].pc) in wanted
-            and any(target not in loop.members for target in code.blocks[member].following)
-            for member in loop.members
-        )
 
     def targets(self, pc: int, state: State) -> list[int] | None:
         """Where a call through a pointer can lead, by CALL_TARGETS in front of it or by an annotation file."""
@@ -191,6 +193,21 @@ class Program:
                 level = traps.get(plain, told.get(plain.removesuffix("Interrupt"), RESET_LEVEL))
                 found[handler] = max(found.get(handler, 0), level)
         return found
+
+    def outside(self) -> set[int]:
+        """Handlers of OUTSIDE_ONLY."""
+        names = {name.strip() + "Interrupt" for note in self.notes.of("outside") for name in note.text.split(",")}
+        return {handler for handler, found in self.calls.vectors.items() if names & set(found.split())}
+
+    def without(self) -> frozenset[int]:
+        """Functions to leave out, by name; raises `ToolError` for one that is not there."""
+        found = set()
+        for name in self.left_out:
+            address = self.address(name)
+            if address not in self.calls.entries:
+                raise ToolError(f"no function is called {name}")
+            found.add(address)
+        return frozenset(found)
 
     def _taken(self) -> set[int]:
         """Functions whose address is taken."""

@@ -72,6 +72,8 @@ class Analyst:
         self.world = World(Area(areas), program.words, program.window, kept, program.links_in_ram)
         self.rules = Rules(
             loop=program.rounds,
+            same=program.same,
+            without=program.without(),
             calls=program.targets,
             recursion=program.recursion,
             resumed=program.resumed,
@@ -105,7 +107,6 @@ class Analyst:
     def explore(self, entry: int, level: int, on_other: bool, thread: bool) -> Outcome:
         """Run a function from one state of entry; raises `TooMuch`."""
         state = State()
-        level = min(level, LEVELS - 1)
         state.ipl = level, level
         state.since = [0 if 0 < k <= level else None for k in range(LEVELS)]
         state.mem.update(self.known)
@@ -123,7 +124,8 @@ class Analyst:
         """The bound of one function."""
         result = Bound(name.removeprefix("_"), kind, level)
         try:
-            found = self.explore(entry, level, on_other, kind in ("call", "thread"))
+            outside = kind != "interrupt" or entry in self.program.outside()
+            found = self.explore(entry, level, on_other, outside)
         except TooMuch:
             result.open[self.program.place(entry)] = "too many paths; bound its loops"
             return result

@@ -17,7 +17,7 @@ class State:
     """One abstract state.  `time` is the greatest number of cycles of any path that leads here.
 
     mem      tracked data: word address -> word, ~byte address -> byte; what is missing may be anything
-    ipl      least and greatest CPU priority
+    ipl      least and greatest CPU priority; 8 more while a trap is served (IPL3)
     since    by level, the time from which an interrupt of that level has been held back; None: it has not been
     disi     time up to which DISI blocks
     loops    open DO loops, outermost first: (start, end, remaining)

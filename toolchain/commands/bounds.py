@@ -33,6 +33,8 @@ def options_of() -> argparse.ArgumentParser:
     p.add_argument("--let", action="append", default=[], metavar="NAME=N", help="value of a name in annotations")
     p.add_argument("--function", action="append", default=[], metavar="NAME",
                    help="look at this function (default: the kernel's calls, or main)")  # fmt: skip
+    p.add_argument("--without", action="append", default=[], metavar="NAME",
+                   help="leave out paths on which this function is called")  # fmt: skip
     p.add_argument("--limit", action="append", default=[], metavar="NAME=CYCLES", help="fail when NAME can take longer")
     p.add_argument("--stack-limit", action="append", default=[], metavar="NAME=BYTES", help="fail when NAME needs more")
     p.add_argument("--json", action="store_true", help="machine-readable output")
@@ -47,7 +49,7 @@ def main(arguments: list[str]) -> int:
     image = read_executable(read_bytes(options.image), options.image)
     add_symbols(annotations, image.symbols)
     notes = read_notes(image, dict(_pair("--let", text) for text in options.let))
-    program = Program(image, annotations, notes)
+    program = Program(image, annotations, notes, options.without)
     report = report_of(program, options.function or program.interesting(KERNEL))
     print(json.dumps(asdict(report), indent=1) if options.json else as_text(report, notes))
     limits = [(_pair("--limit", text), "cycles") for text in options.limit]

@@ -7,8 +7,13 @@
 #ifndef _BOUNDS_H_
 #define _BOUNDS_H_
 
-/* In front of a loop, or of the `while` that ends one: it goes round at most `rounds` times. */
+/* In front of a loop, or of the `while` that ends one: it goes round at most `rounds` times. It counts for the innermost
+ * loop of the machine code with an instruction of that line. Where one loop of the source has become two, one within the
+ * other, SAME_LOOP in front of a line of the inner one says so: they share their rounds. */
 #define LOOP_BOUND(rounds) _BOUNDS_NOTE("loop", rounds)
+#define SAME_LOOP() _BOUNDS_NOTE("same", .)
+/* Anywhere: the loops of this function, which may be assembly, go round at most `rounds` times. */
+#define LOOPS_OF(function, rounds) _BOUNDS_NOTE("loops", function rounds)
 /* In front of a call through a pointer: its targets are the functions named, of a type named all whose address is taken,
  * without those behind a minus. */
 #define CALL_TARGETS(...) _BOUNDS_NOTE("calls", __VA_ARGS__)
@@ -16,7 +21,7 @@
 #define ARGUMENT_BOUND(function, n, most) _BOUNDS_NOTE("argument", function n most)
 /* Anywhere: the function leaves its stack to another, and comes back to its caller at this interrupt level. */
 #define COMES_BACK(function, level) _BOUNDS_NOTE("back", function level)
-/* Anywhere: where code goes on that has just moved to a stack of somebody else. */
+/* Anywhere: where code goes on that has just moved to a stack of somebody else, each at most once. */
 #define RESUMED_BY(...) _BOUNDS_NOTE("resumed", __VA_ARGS__)
 /* Anywhere: the first bytes of this variable are the stack that interrupts and the kernel move to. */
 #define STACK_AREA(variable, bytes) _BOUNDS_NOTE("stack", variable bytes)
@@ -26,10 +31,13 @@
 #define INTERRUPT_LEVEL(vector, level) _BOUNDS_NOTE("level", vector level)
 /* In a file: what a call keeps in this variable it finds again; threads enter with this value. */
 #define PRIVATE_VALUE(variable, value) _BOUNDS_NOTE("private", variable value)
+/* Anywhere: these interrupts come only where PRIVATE_VALUEs are what threads enter with. */
+#define OUTSIDE_ONLY(...) _BOUNDS_NOTE("outside", __VA_ARGS__)
 /* Anywhere: this variable or register has this value whenever anything looked at is entered. */
 #define KNOWN_VALUE(variable, value) _BOUNDS_NOTE("known", variable value)
-/* In a file: its pointers that are kept in memory lead to RAM, so that following them never takes the cycles of a constant. */
-#define LINKS_IN_RAM() _BOUNDS_NOTE("ram", .)
+/* In a file: its pointers that are kept in memory lead to RAM, so that following them never takes the cycles of a constant.
+ * With a name, said of that file of the same folder, which may be assembly. */
+#define LINKS_IN_RAM(...) _BOUNDS_NOTE("ram", . __VA_ARGS__)
 
 #define _BOUNDS_NOTE(kind, ...) _BOUNDS_LINE(__COUNTER__, __LINE__, kind, __VA_ARGS__)
 #define _BOUNDS_LINE(number, line, kind, ...) _BOUNDS_TEXT(number, line, kind, __VA_ARGS__)

@@ -1,7 +1,9 @@
 /* Stepper motors from T3 at 9,600 Hz. v mm/s are v * 1000 / 129 steps/s (epuck.md §3), that is 5 v / 6192 of a step per tick. */
 #include "bare.h"
+#include "hal_compiler.h"
 
 enum { TICK_TCY = 1536, STEP = 6192, RATE = 5, PRIORITY = 5, TIMER_ON = 0x8000 };
+INTERRUPT_LEVEL(T3, 5);
 
 /* Coils A-D by index, on the low nibble; forward is the next index on the right, the previous on the left. */
 static const uint8_t phases[4] = {0xA, 0x6, 0x5, 0x9};

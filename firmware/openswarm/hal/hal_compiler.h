@@ -17,16 +17,19 @@
 #include <bounds.h>
 #else
 #define LOOP_BOUND(rounds)
+#define SAME_LOOP()
+#define LOOPS_OF(function, rounds) struct no_note
 #define CALL_TARGETS(...)
 #define PRIVATE_VALUE(variable, value) struct no_note
 #define KNOWN_VALUE(variable, value) struct no_note
 #define ARGUMENT_BOUND(function, n, most) struct no_note
 #define INTERRUPT_LEVEL(vector, level) struct no_note
+#define OUTSIDE_ONLY(...) struct no_note
 #define STACK_AREA(variable, bytes) struct no_note
 #define THREADS(...) struct no_note
 #define COMES_BACK(function, level) struct no_note
 #define RESUMED_BY(...) struct no_note
-#define LINKS_IN_RAM() struct no_note
+#define LINKS_IN_RAM(...) struct no_note
 #endif
 
 /* The value of a macro as text; a condition without which the file is not compiled. */

@@ -350,6 +350,7 @@ static void run_handlers(const event *e, sys_event_data *data)
                 (void)Sys_Unsubscribe_Handler(id, pid, handler);
             }
         }
+        SAME_LOOP();
         if (*place == s) {
             place = &s->next;
         }
@@ -366,6 +367,7 @@ static void ask_waiters(const event *e, sys_event_data *data)
     while ((p = *process_scan) != NULL) {
         CALL_TARGETS(sys_condition);
         bool holds = p->on.awaited == e && p->wait.condition != NULL && p->wait.condition(data);
+        SAME_LOOP();
         if (*process_scan == p) { /* else the condition ended its own wait */
             if (holds) {
                 p->wait.condition = NULL;

@@ -53,7 +53,7 @@ sys_pcb *os_schedule(void)
     }
     sys_pick pick = HAL_LOAD(pick_thread);
     if (pick != NULL) {
-        CALL_TARGETS(sys_pick, -os_slice_end);
+        CALL_TARGETS(sys_pick, -os_slice_end, -os_yield);
         const sys_pcb *next = pick(os_ring->next);
         LOOP_BOUND(n);
         while (os_ring->next != next) {

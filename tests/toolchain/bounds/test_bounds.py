@@ -35,6 +35,55 @@ int main(void)
     return count(head);
 }
 """
+NESTED = """
+#include <bounds.h>
+struct item { struct item *next; int key; } items[8], *volatile head;
+__attribute__((noinline)) int pairs(struct item *q, int key)
+{
+    for (; q; q = q->next) {
+        LOOP_BOUND(7);
+        for (struct item *p = q; p; p = p->next) if (p->key == key) return 1;
+    }
+    return 0;
+}
+int main(void) { return pairs(head, 3); }
+"""
+SPLIT = """
+#include <bounds.h>
+struct item { struct item *next; int key; } items[8], *head, **volatile place;
+__attribute__((noinline)) void visit(struct item *p) { __asm__ volatile("repeat #99\\n nop" :: "r"(p)); }
+__attribute__((noinline)) void walk(void)
+{
+    const struct item *s;
+    place = &head;
+    LOOP_BOUND(n);
+    while ((s = *place) != 0) {
+        if (s->key)
+            visit((struct item *)s);
+        SAME_LOOP();
+        if (*place == s)
+            place = &((struct item *)s)->next;
+    }
+}
+int main(void) { walk(); return 0; }
+"""
+COPY = """
+#include <bounds.h>
+#include <string.h>
+char to[40], from[40] = {1, 2};
+volatile unsigned size = 20;
+ARGUMENT_BOUND(copy, 2, 20);
+__attribute__((noinline)) void copy(char *a, const char *b, unsigned n)
+{
+    memcpy(a, b, n);
+    __asm__ volatile("" ::: "memory");
+}
+int main(void)
+{
+    copy(to + (size >> 9), from + (size & 1), size);
+    return to[size];
+}
+"""
 MASKS = """
 #include <dspic30f6014a.h>
 int main(void) { SRbits.IPL = 5; __asm__ volatile("repeat #29\\n nop"); SRbits.IPL = 0; return 0; }
@@ -97,6 +146,38 @@ def test_an_annotated_loop_is_bounded_by_its_note(tmp_path, capsys) -> None:
     assert seen["_main"].cycles <= seven
     assert nine - eight == eight - seven > 0
     assert report(capsys, image, "--let", "n=2")["cycles"] < seen["_main"].cycles  # the note is what counts
+
+
+@pytest.mark.parametrize("level", ["-Os", "-O1", "-O2"])
+def test_the_note_of_a_loop_within_says_nothing_about_the_outer_one(tmp_path, capsys, level: str) -> None:
+    """Although the line of the inner one also leaves both."""
+    row = report(capsys, built(tmp_path, NESTED, level))
+    assert row["cycles"] is None
+    assert [place for place in row["open"] if "program.c:6 " in place or "program.c:8 " in place]
+
+
+def test_one_loop_of_the_source_that_became_two_shares_its_rounds(tmp_path, capsys) -> None:
+    """Ten rounds more cost ten times one, not the square of it; visit alone takes over 100 cycles."""
+    image = built(tmp_path, SPLIT)
+    few, many = (report(capsys, image, "--let", f"n={n}")["cycles"] for n in (10, 20))
+    assert 1_000 < many - few < 2_000
+
+
+def test_a_bounded_argument_bounds_a_copy(tmp_path, capsys) -> None:
+    """memcpy counts down from the argument, in bytes where an address is odd, and asks the sign of what is left."""
+    row = report(capsys, built(tmp_path, COPY), "--function", "copy")
+    assert 20 < row["cycles"] < 80
+
+
+def test_paths_that_call_a_function_can_be_left_out(tmp_path, capsys) -> None:
+    """Without the division, main is cheaper; without main's own callee there is no way through it."""
+    text = '__attribute__((noinline)) int rare(int x) { __asm__ volatile("repeat #99\\n nop"); return x; }\n'
+    text += "volatile int v; int main(void) { int x = v; return x == 7 ? rare(x) : x; }"
+    image = built(tmp_path, text)
+    whole, cheap = report(capsys, image)["cycles"], report(capsys, image, "--without", "rare")["cycles"]
+    assert whole - cheap > 100
+    assert main(["bounds", str(image), "--without", "nothing"]) == 2
+    assert "no function is called nothing" in capsys.readouterr().err
 
 
 def test_a_note_costs_neither_code_nor_memory(tmp_path: Path) -> None:

@@ -14,11 +14,15 @@ HAL_ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
 extern void os_resume_yielded(void), os_thread_start(void);
 COMES_BACK(hal_yield, 0);
 COMES_BACK(hal_block, 0);
-RESUMED_BY(os_resume_yielded, resume_preempted);
+RESUMED_BY(os_resume_yielded, resume_preempted, resume_dsp);
+LOOPS_OF(resume_dsp, 0);
 STACK_AREA(os_memory, HAL_KERNEL_STACK);
 THREADS(sys_function);
 KNOWN_VALUE(CORCON, 0x0024); /* no DO loop is open; each open one adds 10 bytes and 21 Tcy to a SYS_DSP frame */
 INTERRUPT_LEVEL(T2, 1);
+INTERRUPT_LEVEL(C2, 1);
+LINKS_IN_RAM(switch.S);
+OUTSIDE_ONLY(T2, C2); /* the kernel runs at their level */
 static volatile sint16 clock_phase; /* fifths of a cycle by which the clock is late */
 
 HAL_USED void cpu_clock_isr(void)

@@ -2,6 +2,7 @@
 /* Programs the image sensor for the window of camera_sensor.h and arms the capture. */
 #include "camera_sensor.h"
 
+#include "hal_compiler.h"
 #include "i2c_master.h"
 #include "pins.h"
 
@@ -13,6 +14,8 @@ enum {
     TIMER_ON = 0x8002,
     PRIORITY = 6
 };
+INTERRUPT_LEVEL(T4, 6);
+INTERRUPT_LEVEL(T5, 6);
 
 typedef struct {
     uint8_t number, value;
