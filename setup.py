@@ -1,5 +1,5 @@
-"""Puts the kernel's sources into the package: `firmware/` stays one folder beside the Python packages, and a wheel gets
-its text files as `openswarm/firmware`. All else is in pyproject.toml."""
+"""Puts the kernel's sources into sdist and wheel: `firmware/` stays one folder beside the Python packages, and a wheel
+gets its text files as `openswarm/firmware`. All else is in pyproject.toml and MANIFEST.in."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from setuptools import setup
 from setuptools.command.build_py import build_py
+from setuptools.command.sdist import sdist
 
 ROOT = Path(__file__).resolve().parent
 SUFFIXES = {".c", ".cpp", ".h", ".S", ".inc", ".ld", ".mk", ".md", ".json", ".py"}
@@ -32,4 +33,12 @@ class WithFirmware(build_py):
             shutil.copyfile(source, target)
 
 
-setup(cmdclass={"build_py": WithFirmware})
+class WithFirmwareToo(sdist):
+    """The same files for the source distribution."""
+
+    def make_release_tree(self, base_dir: str, files: list[str]) -> None:
+        kernel = [str(source.relative_to(ROOT)) for source in firmware_files()]
+        super().make_release_tree(base_dir, sorted({*files, *kernel}))
+
+
+setup(cmdclass={"build_py": WithFirmware, "sdist": WithFirmwareToo})
