@@ -38,6 +38,8 @@ SCENES: Final = (
 """As the enumeration of firmware/apps/options/options.h."""
 OPTIONS: Final = ("mutex", "join", "cleanup", "quota", "service", "woken_first")
 """Files of firmware/openswarm/option."""
+KERNEL_PARTS: Final = {"_os_call_in_section": "cleanup", "_event_bucket": "quota"}
+"""Functions of the kernel that are linked for an option alone."""
 OBJECTS: Final = {"sys_mutex": "mutex", "sys_cleanup": "cleanup", "sys_quota": "quota", "sys_service": "service"}
 """Type, and the option one of which the application calls `options_` and that name."""
 HEAP: Final = (("a quota", "LIMIT", "options_done"), ("a zombie", "JOIN_ZOMBIE", "options_done"))
@@ -161,9 +163,8 @@ def sizes(image: Image, engine: str = "interp") -> dict[str, int]:
     slots = handles(image)
     for option in OPTIONS:
         file = f"option/{option}.c"
-        found[f"{option}: ROM"] = sum(part.rom for part in parts if part.module.endswith(file)) + sum(
-            size for module, size in slots if module.endswith(file)
-        )
+        code = (part.rom for part in parts if part.module.endswith(file) or KERNEL_PARTS.get(part.name) == option)
+        found[f"{option}: ROM"] = sum(code) + sum(size for module, size in slots if module.endswith(file))
         found[f"{option}: RAM"] = sum(part.ram for part in parts if part.module.endswith(file))
     found |= {f"{kind}: RAM of one": target.size(f"options_{name}") for kind, name in OBJECTS.items()}
     for what, scene, stop in HEAP:

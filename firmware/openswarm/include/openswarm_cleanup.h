@@ -24,7 +24,7 @@ typedef struct sys_cleanup {
  * as in a critical section, on the stack of whoever ends the thread. Its memory is still there, its subscriptions and mutexes
  * are not. SYS_EVENT_TERMINATION follows. */
 bool Sys_Push_Cleanup(sys_cleanup *cleanup, void (*run)(void *arg), void *arg);
-/* T | no | 101, 9 more per newer one of others, 51 and what run takes if it is called | 24 and run's | CONTEXT, PROCESS: there is none.  Takes the caller's newest away, and runs it if asked to. */
+/* T | no | 101, 9 more per newer one of others, 54 and what run takes if it is called | 24 and run's | CONTEXT, PROCESS: there is none.  Takes the caller's newest away, and runs it if asked to. */
 bool Sys_Pop_Cleanup(bool run);
 
 #endif

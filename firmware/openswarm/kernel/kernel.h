@@ -157,6 +157,7 @@ extern sys_pcb **process_scan;
 HAL_OUTLINE sys_error os_enter(void);          /* not from ISRs */
 HAL_OUTLINE sys_error os_enter_blocking(void); /* from threads only; process_block() unlocks as well */
 HAL_OUTLINE bool os_leave(sys_error error);    /* true, or false and the last error */
+void os_call_in_section(void (*run)(void *), void *arg); /* whatever sections it begins or ends */
 
 /* scheduler.c: the ways into the kernel stack; all pick the next thread */
 HAL_USED sys_pcb *os_yield(sys_pcb *running);     /* the running thread stays ready, others come first */

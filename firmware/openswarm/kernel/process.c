@@ -275,6 +275,17 @@ void Sys_End_CriticalSection(void)
     }
 }
 
+void os_call_in_section(void (*run)(void *), void *arg)
+{
+    enum { FAR = 0x4000 };
+    Sys_Start_CriticalSection();
+    uint16 depth = critical_depth;
+    HAL_STORE(critical_depth, (uint16)(depth + FAR));
+    run(arg);
+    HAL_STORE(critical_depth, depth);
+    Sys_End_CriticalSection();
+}
+
 sys_error os_enter(void)
 {
     if (hal_in_isr()) {

@@ -19,18 +19,6 @@ static sys_cleanup **newest_of(uint16 pid)
     return NULL;
 }
 
-/* Whatever sections it begins or ends, the caller's stays. */
-static void call(const sys_cleanup *c)
-{
-    enum { FAR = 0x4000 };
-    Sys_Start_CriticalSection();
-    uint16 depth = critical_depth;
-    HAL_STORE(critical_depth, (uint16)(depth + FAR));
-    c->run(c->arg);
-    HAL_STORE(critical_depth, depth);
-    Sys_End_CriticalSection();
-}
-
 static bool on_burial(sys_pcb *p)
 {
     sys_cleanup **link;
@@ -39,7 +27,7 @@ static bool on_burial(sys_pcb *p)
     while ((link = newest_of(p->pid)) != NULL) {
         const sys_cleanup *c = *link;
         *link = c->next;
-        call(c);
+        os_call_in_section(c->run, c->arg);
     }
     dying = outer;
     return before != NULL && before(p);
@@ -83,7 +71,7 @@ bool Sys_Pop_Cleanup(bool run)
     const sys_cleanup *c = *link;
     *link = c->next;
     if (run) {
-        call(c);
+        os_call_in_section(c->run, c->arg);
     }
     return os_leave(SYS_OK);
 }
