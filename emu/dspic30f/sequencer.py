@@ -201,15 +201,17 @@ class Sequencer:
     def _fetch_error(self) -> None:
         """PC points where no instruction may be fetched: a hard trap at this boundary (isa.md §14.4, causes 4, 5).
 
-        UNVERIFIED: with an equal or higher trap in progress the device resets, as it could not go on.
+        UNVERIFIED: with an equal or higher trap in progress the device resets, as it could not go on. No boundary comes
+        before cycle 0: a fetch that fails there takes it.
         """
         state = self.state
+        state.cycle = max(state.cycle, 1)
         traps = self.exceptions.traps
         if state.ipl >= traps.address.vector.level:
             entered = self.exceptions.latest()
             origin = f", after {entered}" if entered else ""
             raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}{origin}")
-        traps.request(traps.address, max(state.cycle, 1) - 1)
+        traps.request(traps.address, state.cycle - 1)
 
     # Flow
 

@@ -95,11 +95,12 @@ def test_a_stack_pointer_at_the_end_of_ram_cannot_take_an_interrupt_natively(eng
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_reset_puts_the_stack_at_the_start_of_ram_and_fetches_end_with_flash(engine: str) -> None:
-    """isa.md §2.1, and §14.4 cause 5."""
+@pytest.mark.parametrize("begun", [0, 4])
+def test_reset_puts_the_stack_at_the_start_of_ram_and_fetches_end_with_flash(engine: str, begun: int) -> None:
+    """isa.md §2.1, and §14.4 cause 5; in the very first cycle as well, which has no boundary before it."""
     machine = machine_with(engine, "AddressError: bra AddressError")
     assert machine.w[15] == SFR_END
-    machine.run_until(4)
+    machine.run_until(begun)
     machine.pc = FLASH_END
     machine.run_until(machine.cycle + 8)
     assert machine.peek("INTTREG") & 0x3F == 2
