@@ -3,7 +3,7 @@
 Every register of every device is touched: words and bytes, by address and by pointer, read, written and both, plainly,
 under REPEAT, in DO loops (also as their last instruction), in handlers, with the module on or switched off, awake,
 after Idle and Sleep. Timers with short periods let their events fall on every cycle of these accesses. A robot is
-around the chip or not; bytes, edges, levels and light come from outside at odd cycles. All follows from the seed.
+around the chip or not; bytes, edges, levels and light come from outside at odd cycles. All follows from seed and chip.
 """
 
 from __future__ import annotations
@@ -12,20 +12,23 @@ import random
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cpu"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "jit"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "chips"))
 
 import numpy as np
 from cpu_rig import START, assemble
+from made_up import CHIPS
 from twins import QuickCompiler
 
 from emu.boards.epuck.board import Epuck
-from emu.chips.dspic30f6014a import INTERRUPTS, SFRS, VECTORS
+from emu.chips.chip import Chip
+from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.specialised import SpecialisedEngine
 from emu.machine import Machine
@@ -38,10 +41,7 @@ CHUNKS = 14
 """Looks at the machines, some hundred to a few thousand Tcy apart."""
 REGIONS = 40
 """Compiled pieces after which a program is left: it goes through processor modes, each of which has code of its own."""
-STACK, BUFFER = 0x2400, 0x1000
-FIRST = SFRS["INTCON1"].address
-WORDS = [sfr for sfr in SFRS.values() if sfr.size == 2 and sfr.address >= FIRST]
-NAMES = {sfr.address: sfr.name for sfr in WORDS}
+BUFFER = 0x1000
 _CONTROL = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
 """Drawn less often: they stop, reset or switch off everything else."""
 _FAMILIES = ({"TMR", "PR", "T"}, {"PORT", "LAT", "TRIS", "CNEN", "CNPU"}, {"IFS", "IEC", "IPC", "INTCON"},
@@ -54,11 +54,25 @@ _INPUTS = ("RD4", "RF6", "RC3", "RC14", "RA12", "RA13", "RD8", "RD9", "RF2", "RF
            "RG13", "RF7", "RB5", "RB12")  # fmt: skip
 
 
+@cache
+def words_of(chip: str) -> list[Any]:
+    """The registers of all devices of one of CHIPS."""
+    first = CHIPS[chip].sfrs["INTCON1"].address
+    return [sfr for sfr in CHIPS[chip].sfrs.values() if sfr.size == 2 and sfr.address >= first]
+
+
+def stack_of(chip: Chip) -> int:
+    """Where the stack of a program begins: the last eighth of RAM."""
+    ram = chip.data["ram"]
+    return ram.end - (ram.end - ram.start) // 8
+
+
 @dataclass
 class Writer:
     """Writes the statements of one program and counts the ways in which it touches registers."""
 
     draw: random.Random
+    chip: Chip
     pool: list[Any]
     touched: Counter[tuple[str, str]] = field(default_factory=Counter)
     """By register and way."""
@@ -66,8 +80,9 @@ class Writer:
 
     def sfr(self) -> Any:
         """A register, mostly of the devices this program is about."""
-        chosen = self.draw.choice(self.pool if self.draw.random() < 0.85 else WORDS)
-        return self.draw.choice(WORDS) if chosen.name in _CONTROL and self.draw.random() < 0.9 else chosen
+        everything = words_of(self.chip.name)
+        chosen = self.draw.choice(self.pool if self.draw.random() < 0.85 else everything)
+        return self.draw.choice(everything) if chosen.name in _CONTROL and self.draw.random() < 0.9 else chosen
 
     def note(self, sfr: Any, way: str) -> str:
         """Its address as text, noted as touched."""
@@ -167,17 +182,20 @@ class Writer:
             return [draw.choice(("tblwtl w1, [w9++]", "tblwth.b w1, [w9]", "tblrdl [w9++], w2"))]
         if kind < 0.96:
             name = draw.choice(("PMD1", "PMD2"))
-            return [f"mov #{draw.choice((0, 0, draw.randrange(0x10000)))}, w0", f"mov w0, {SFRS[name].address:#x}"]
+            return [f"mov #{draw.choice((0, 0, draw.randrange(0x10000)))}, w0", f"mov w0, {self.at(name)}"]
         if kind < 0.97:
             return self.setting()
         return [f"add {self.data()}, {self.data()}, {self.data()}"]
 
     def nap(self) -> list[str]:
         """Idle until timer 1 matches; rarely Sleep until somebody outside pulls INT0."""
-        at = {name: f"{SFRS[name].address:#x}" for name in ("PR1", "T1CON", "IEC0", "IPC0", "PMD1")}
-        wake = [f"mov #{self.draw.choice((3, 20, 60, 150))}, w0", f"mov w0, {at['PR1']}", f"bclr {at['PMD1']}, #11",
-                "mov #0x8000, w0", f"mov w0, {at['T1CON']}", f"bset {at['IEC0']}, #3", f"bset {at['IEC0']}, #0",
-                "mov #0x4444, w0", f"mov w0, {at['IPC0']}"]  # fmt: skip
+        wake = [f"mov #{self.draw.choice((3, 20, 60, 150))}, w0", f"mov w0, {self.at('PR1')}",
+                f"bclr {self.at('PMD1')}, #11", "mov #0x8000, w0", f"mov w0, {self.at('T1CON')}"]  # fmt: skip
+        sources = {source.name: source for source in self.chip.interrupts.values()}
+        for name in ("T1", "INT0"):
+            word, bit = sources[name].enable
+            levels = self.at(sources[name].priority[0])
+            wake += [f"bset {self.at(word)}, #{bit}", "mov #0x4444, w0", f"mov w0, {levels}"]
         return [*wake, "pwrsav #0" if self.draw.random() < 0.04 else "pwrsav #1"]
 
     def setting(self) -> list[str]:
@@ -185,12 +203,16 @@ class Writer:
         return self.written(SCENES[self.draw.choice(sorted(SCENES))](self.draw))
 
     def written(self, settings: list[tuple[str, int]]) -> list[str]:
-        """Registers and values in order."""
+        """Registers and values in order; those the chip does not have are left out."""
         lines = []
         for name, value in settings:
-            self.note(SFRS[name], "setting")
-            lines += [f"mov #{value:#x}, w0", f"mov w0, {SFRS[name].address:#x}"]
+            if name in self.chip.sfrs:
+                lines += [f"mov #{value:#x}, w0", f"mov w0, {self.note(self.chip.sfrs[name], 'setting')}"]
         return lines
+
+    def at(self, name: str) -> str:
+        """The address of a register as text."""
+        return f"{self.chip.sfrs[name].address:#x}"
 
     def handler(self, number: int) -> list[str]:
         """Touches devices with registers of its own and clears all flags, by word or one byte at a time."""
@@ -204,9 +226,9 @@ class Writer:
                 lines += [line for line in self.pointer("handler", "w12", "w13") if "w4" not in line]
         clear = self.draw.choice(("clr", "clr", "clr.b"))
         for name in ("IFS0", "IFS1", "IFS2"):
-            lines.append(f"{clear} {SFRS[name].address:#x}")
+            lines.append(f"{clear} {self.at(name)}")
             if clear == "clr.b":
-                lines.append(f"clr.b {SFRS[name].address + 1:#x}")
+                lines.append(f"clr.b {self.chip.sfrs[name].address + 1:#x}")
         return [*lines, "retfie"]
 
 
@@ -216,27 +238,27 @@ def family(name: str) -> frozenset[str]:
     return frozenset(next((one for one in _FAMILIES if letters in one), {letters}))
 
 
-def program(seed: int) -> tuple[str, Writer]:
+def program(seed: int, chip: Chip = DSPIC30F6014A) -> tuple[str, Writer]:
     """Assembly text, and who has written it: some devices at work, and their registers accessed again and again."""
     draw = random.Random(seed)
-    writer = Writer(draw, [])
-    lines = [f"mov #{STACK:#x}, w15", "clr 0x42"]
+    writer, words, stack = Writer(draw, chip, []), words_of(chip.name), stack_of(chip)
+    lines = [f"mov #{stack:#x}, w15", "clr 0x42"]
     set_up: set[str] = set()
     for name in draw.sample(sorted(SCENES), draw.choice((1, 2, 2, 3))):
         settings = SCENES[name](draw)
         set_up |= {register for register, _ in settings}
         lines += writer.written(settings)
-    devices = {family(name) for name in set_up} | {family(draw.choice(WORDS).name)}
-    pool = [sfr for sfr in WORDS if family(sfr.name) in devices]
+    devices = {family(name) for name in set_up} | {family(draw.choice(words).name)}
+    pool = [sfr for sfr in words if family(sfr.name) in devices]
     writer.pool[:] = draw.sample(pool, min(HOT, len(pool)))
     for name in ("IEC0", "IEC1", "IEC2"):
-        lines += [f"mov #{draw.choice((0, 0xFFFF, draw.randrange(0x10000)))}, w0", f"mov w0, {SFRS[name].address:#x}"]
+        lines += [f"mov #{draw.choice((0, 0xFFFF, draw.randrange(0x10000)))}, w0", f"mov w0, {writer.at(name)}"]
     for number in range(draw.randrange(4)):
-        lines += [f"mov #{draw.randrange(0x10000)}, w0", f"mov w0, {SFRS[f'IPC{3 * number}'].address:#x}"]
+        lines += [f"mov #{draw.randrange(0x10000)}, w0", f"mov w0, {writer.at(f'IPC{3 * number}')}"]
     values = (0x8000, 0xA000, 0x8030, 0xFFFF, draw.randrange(0x10000), draw.randrange(64))
     lines += [f"mov #{draw.choice(values)}, w{number}" for number in range(8)]
     lines += [f"mov #{BUFFER:#x}, w{number}" for number in (8, 9, 12, 13)]
-    lines += [f"loop: mov #{STACK:#x}, w15", "inc w10, w10"]
+    lines += [f"loop: mov #{stack:#x}, w15", "inc w10, w10"]
     if draw.random() < 0.8:
         lines.append("clr.b 0x42")
     for _ in range(LENGTH):
@@ -244,7 +266,7 @@ def program(seed: int) -> tuple[str, Writer]:
     lines.append("goto loop")
     for number in range(2):
         lines += writer.handler(number)
-    lines += [f"trap: clr {SFRS['INTCON1'].address:#x}", f"mov #{STACK:#x}, w15", "clr 0x42", "clr 0x44", "goto loop"]
+    lines += [f"trap: clr {writer.at('INTCON1')}", f"mov #{stack:#x}, w15", "clr 0x42", "clr 0x44", "goto loop"]
     return "\n".join(lines), writer
 
 
@@ -257,13 +279,13 @@ class Subject:
     rendered: list[tuple[int, int]] = field(default_factory=list)
 
 
-def flash(text: str) -> dict[int, list[int]]:
+def flash(text: str, chip: Chip = DSPIC30F6014A) -> dict[int, list[int]]:
     """Stretches of program words by address, vectors included."""
     words, labels = assemble(text)
     words |= {0: 0x040000 | START, 2: 0}
-    for irq in INTERRUPTS:
-        words[VECTORS[irq + 8].ivt] = words[VECTORS[irq + 8].aivt] = labels[f"handler{irq & 1}"]
-    for vector in VECTORS[:8]:
+    for irq in chip.interrupts:
+        words[chip.vectors[irq + 8].ivt] = words[chip.vectors[irq + 8].aivt] = labels[f"handler{irq >> 1 & 1}"]
+    for vector in chip.vectors[:8]:
         words[vector.ivt] = words[vector.aivt] = labels["trap"]
     stretches: dict[int, list[int]] = {}
     start = -1
@@ -275,13 +297,13 @@ def flash(text: str) -> dict[int, list[int]]:
     return stretches
 
 
-def subject(seed: int, engine: str, stretches: dict[int, list[int]]) -> Subject:
-    """A machine about to run the program: bare, or a robot whose camera notes what it renders."""
+def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip = DSPIC30F6014A) -> Subject:
+    """A machine about to run the program: bare, or a robot whose camera notes what it renders, if its chip fits one."""
     draw = random.Random(seed ^ 0x5EED)
-    robot = draw.random() < 0.6
+    robot = draw.random() < 0.6 and chip is DSPIC30F6014A
     camera = draw.choice(("PO6030K", "PO8030D", "PO3030K", None))
     board = partial(Epuck, camera=camera, selector=draw.randrange(16), seed=seed & 0xFFFF) if robot else None
-    machine = Machine(engine=engine, ipl_slip=int(draw.random() < 0.2), board=board)
+    machine = Machine(chip, engine=engine, ipl_slip=int(draw.random() < 0.2), board=board)
     made = Subject(machine)
     if isinstance(machine.runner, SpecialisedEngine):
         machine.runner.warm = 1  # write functions at once
@@ -294,7 +316,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]]) -> Subject:
     machine.reset("POR")
     for address, words in stretches.items():
         machine.program.put_flash(address, words)
-    for port in (1, 2):
+    for port in machine.uart:
         machine.uart[port].on_byte = lambda byte, cycle, p=port: made.heard.append((p, byte, cycle))
 
     def row(y: int, columns: np.ndarray, cycle: int) -> np.ndarray:
@@ -314,7 +336,8 @@ def disturb(draw: random.Random, machine: Machine) -> None:
         for level in (0, 1, 0):
             machine.pins.set("RF6", level, cycle)
     if kind == 0:
-        machine.uart[draw.choice((1, 2))].feed(bytes(draw.randrange(256) for _ in range(3)), cycle + draw.randrange(99))
+        told = bytes(draw.randrange(256) for _ in range(3))
+        machine.uart[draw.choice(sorted(machine.uart))].feed(told, cycle + draw.randrange(99))
     elif kind == 1:
         for name in draw.sample(_INPUTS, 3):
             machine.pins.set(name, draw.randrange(2), cycle)
@@ -327,12 +350,16 @@ def disturb(draw: random.Random, machine: Machine) -> None:
 
 
 def difference(
-    seed: int, *engines: str, chunks: int = CHUNKS, tally: Counter[tuple[str, str]] | None = None
+    seed: int,
+    *engines: str,
+    chunks: int = CHUNKS,
+    chip: Chip = DSPIC30F6014A,
+    tally: Counter[tuple[str, str]] | None = None,
 ) -> str | None:
     """Run engines side by side with the plain one, with bytes, edges and levels from outside; what differs first."""
-    text, writer = program(seed)
-    stretches = flash(text)
-    subjects = [subject(seed, engine, stretches) for engine in ("plain", *engines)]
+    text, writer = program(seed, chip)
+    stretches = flash(text, chip)
+    subjects = [subject(seed, engine, stretches, chip) for engine in ("plain", *engines)]
     plain = subjects[0].machine
     for chunk in range(chunks):
         draw = random.Random(f"{seed} {chunk}")
@@ -346,7 +373,8 @@ def difference(
             if states[0] != state:
                 field_at = plain.record.field_at
                 places = {field_at(i) for i, (a, b) in enumerate(zip(states[0], state, strict=True)) if a != b}
-                return f"{name} differs in {', '.join(_named(place) for place in sorted(places)[:8])} {where}"
+                named = ", ".join(_named(place, chip) for place in sorted(places)[:8])
+                return f"{name} differs in {named} {where}"
             if subjects[0].heard != one.heard:
                 return f"{name} sends {one.heard[-4:]} instead of {subjects[0].heard[-4:]} {where}"
             if subjects[0].rendered != one.rendered:
@@ -361,8 +389,9 @@ def difference(
     return None
 
 
-def _named(place: str) -> str:
+def _named(place: str, chip: Chip) -> str:
     """A data address with the register that is there."""
     if place.startswith("data "):
-        return f"{place} {NAMES.get(int(place.split()[1], 0) & ~1, '')}".strip()
+        names = {sfr.address: sfr.name for sfr in words_of(chip.name)}
+        return f"{place} {names.get(int(place.split()[1], 0) & ~1, '')}".strip()
     return place
