@@ -66,7 +66,7 @@ class Bus:
         self.on_write: Final[list[WriteHook | None]] = [None] * words
         self.rules: Final[list[Rule | None]] = [None] * words
         """What accesses do in the common case; the hooks answer where a rule does not."""
-        self._integers: Final = Integers(record, events)
+        self.integers: Final = Integers(record, events)
         self.modelled: Final = [False] * words
         """Set for registers a device or the CPU stands behind; others are reported once when touched."""
         self.off: frozenset[int] = frozenset()
@@ -81,7 +81,7 @@ class Bus:
         """The word at even SFR `address` (below `end`) as an instruction reads it, side effects included."""
         word = address >> 1
         rule = self.rules[word]
-        if rule is not None and (shown := self._integers.read(rule)) is not None:
+        if rule is not None and (shown := self.integers.read(rule)) is not None:
             return shown
         hook = self.on_read[word] or self.compute[word]
         if hook is not None:
@@ -94,7 +94,7 @@ class Bus:
         """Store `value` at even SFR `address`; only bits in `lanes` (byte writes) are touched."""
         word = address >> 1
         rule = self.rules[word]
-        if rule is not None and self._integers.write(rule, value, lanes):
+        if rule is not None and self.integers.write(rule, value, lanes):
             return
         u16 = self.record.u16
         old = u16[word]

@@ -12,7 +12,7 @@ from typing import Final
 from emu.bus import Bus, ReadHook, WriteHook
 from emu.events import Events
 from emu.record import Record
-from emu.straight import Place, Rule
+from emu.straight import Line, Place, Rule, place_of
 
 
 class Register:
@@ -82,7 +82,7 @@ def flag_since(record: Record, flag_address: int, flag_bit: int) -> int:
 class Irq:
     """One interrupt request line: setting it sets the IFS bit and makes the engine look."""
 
-    __slots__ = ("_bit", "_events", "_since", "_u16", "_u64", "_word")
+    __slots__ = ("_bit", "_events", "_since", "_u16", "_u64", "_word", "line")
 
     def __init__(self, record: Record, events: Events, flag_address: int, flag_bit: int) -> None:
         self._u16: Final = record.u16
@@ -91,6 +91,10 @@ class Irq:
         self._word: Final = flag_address >> 1
         self._bit: Final = 1 << flag_bit
         self._since: Final = flag_since(record, flag_address, flag_bit)
+        self.line: Final = Line(
+            Place(flag_address, 16), self._bit, Place(8 * self._since, 64), place_of(record, "events.deadline")
+        )
+        """For rules."""
 
     def request(self) -> None:
         """Set the interrupt flag: it first reads 1 in the cycle of the event that calls this.

@@ -7,7 +7,7 @@ wiring, breaks ties. No heap and no serial numbers, so a copy of the record is a
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from emu.record import Record
 
@@ -36,6 +36,8 @@ class Events:
         """What happens has happened before and been told: nobody outside hears of it again."""
         self.names: Final[list[str]] = []
         self._fire: Final[list[Callable[[int], None]]] = []
+        self.rules: Final[dict[int, Any]] = {}
+        """By slot what firing does in the common case, as text for every engine (emu/straight.py)."""
         self._due = record.u64[self._first : self._first + SLOTS]
         for slot in range(SLOTS):
             self._due[slot] = NEVER
@@ -62,6 +64,12 @@ class Events:
         self.names.append(name)
         self._fire.append(fire)
         return len(self.names) - 1
+
+    def ruled(self, slot: int, rule: Any, runs: Callable[[Any], bool]) -> None:
+        """A slot follows `rule` where `runs(rule)` says that it did it all."""
+        fire = self._fire[slot]
+        self.rules[slot] = rule
+        self._fire[slot] = lambda due: None if runs(rule) else fire(due)
 
     def set(self, slot: int, due: int) -> None:
         """Let `slot` fire at cycle `due` (replacing its earlier date)."""

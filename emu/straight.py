@@ -1,9 +1,9 @@
 """Device rules as text that several readers run: integers in every engine, LLVM values in native code.
 
-A `Rule` says what an access to one register does, in a straight line: it gets places of the record, computes, says what
-it needs, then puts places. Nothing is put before the last `need`. Where a need does not hold nothing has been done, and
-the device's own hooks on the bus answer instead, in every engine alike. So engines cannot disagree on a rule, and what
-is rare stays in Python.
+A `Rule` says what an access to one register or an event does, in a straight line: it gets places of the record,
+computes, says what it needs, then puts places. Nothing is put before the last `need`. Where a need does not hold
+nothing has been done, and the device's own hooks answer instead, in every engine alike. So engines cannot disagree on a
+rule, and what is rare stays in Python. Entering an exception is such a text too (dspic30f/exceptions.py).
 """
 
 from __future__ import annotations
@@ -52,12 +52,30 @@ def slot_of(record: Record, number: int) -> Slot:
     return Slot(place_of(record, "events.due", number), place_of(record, "events.deadline"))
 
 
+@dataclass(frozen=True, slots=True)
+class Line:
+    """An interrupt request line: its flag, the cycle in which that was first 1, and the deadline of all slots."""
+
+    flags: Place
+    bit: int
+    since: Place
+    deadline: Place
+
+
+def request(m: Reader, line: Line, cycle: Number) -> None:
+    """The flag is 1 from `cycle` on, if it is not already, and the engine looks."""
+    word = m.get(line.flags)
+    m.put(line.since, m.select((word & line.bit) == 0, cycle, m.get(line.since)))
+    m.put(line.flags, word | line.bit)
+    m.put(line.deadline, 0)
+
+
 class Reader(Protocol):
     """What a rule may do."""
 
     @property
     def now(self) -> Number:
-        """Cycle of the access."""
+        """Cycle of the access or event."""
 
     def get(self, place: Place, index: Number = 0) -> Number:
         """The number at a place, or `index` places behind it."""
@@ -80,13 +98,22 @@ class Reader(Protocol):
     def mod(self, a: Number, b: Number) -> Number:
         """Unsigned remainder; b is not 0."""
 
+    def table(self, values: tuple[int, ...], index: Number) -> Number:
+        """values[index], of a table that never changes."""
+
+    def loop(self, count: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
+        """`count` times, at least once: carried = body(number of the turn, *carried). What is left in the end."""
+
+    def scan(self, bits: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
+        """For every bit set, from bit 0 up: carried = body(number of the bit, *carried). What is left in the end."""
+
     def post(self, slot: Slot, due: Number) -> None:
         """Let an event slot fire at cycle `due`."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """What accesses to one register do; None: that access has no rule."""
+    """What accesses to one register do, or an event slot that falls due; None: that has no rule."""
 
     places: Any
     reads: Callable[[Any, Any], Number] | None = None
@@ -94,9 +121,11 @@ class Rule:
     writes: Callable[[Any, Any, Number, int], bool] | None = None
     """writes(reader, places, value, lanes): the register written; False: no rule for these lanes. `lanes` = 0xFFFF,
     0x00FF or 0xFF00 is known when the rule is read, the value need not be."""
+    fires: Callable[[Any, Any], None] | None = None
+    """fires(reader, places): the slot is idle already; the rule may post it again."""
 
     def __repr__(self) -> str:
-        names = [rule.__qualname__ for rule in (self.reads, self.writes) if rule is not None]
+        names = [rule.__qualname__ for rule in (self.reads, self.writes, self.fires) if rule is not None]
         return f"Rule({self.places!r}, {', '.join(names)})"
 
 
@@ -110,6 +139,7 @@ class Integers:
     def __init__(self, record: Record, events: Events) -> None:
         self._events: Final = events
         self._views: Final = {8: record.u8, 16: record.u16, 32: record.u32, 64: record.u64}
+        self._tops: Final = {bits: (1 << bits) - 1 for bits in self._views}
 
     def read(self, rule: Rule) -> int | None:
         """The word read now, or None where the hooks answer."""
@@ -129,6 +159,16 @@ class Integers:
         except Rare:
             return False
 
+    def fire(self, rule: Rule) -> bool:
+        """Whether the rule did it."""
+        if rule.fires is None:
+            return False
+        try:
+            rule.fires(self, rule.places)
+        except Rare:
+            return False
+        return True
+
     @property
     def now(self) -> int:
         return self._events.now
@@ -137,7 +177,7 @@ class Integers:
         return self._views[place.bits][place.index + index]
 
     def put(self, place: Place, value: int, index: int = 0) -> None:
-        self._views[place.bits][place.index + index] = value & (1 << place.bits) - 1
+        self._views[place.bits][place.index + index] = value & self._tops[place.bits]
 
     def need(self, condition: Number) -> None:
         if not condition:
@@ -154,6 +194,20 @@ class Integers:
 
     def mod(self, a: int, b: int) -> int:
         return a % b
+
+    def table(self, values: tuple[int, ...], index: int) -> int:
+        return values[index]
+
+    def loop(self, count: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
+        for turn in range(count):
+            carried = body(turn, *carried)
+        return carried
+
+    def scan(self, bits: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
+        while bits:
+            carried = body((bits & -bits).bit_length() - 1, *carried)
+            bits &= bits - 1
+        return carried
 
     def post(self, slot: Slot, due: int) -> None:
         self.put(slot.due, due)

@@ -14,7 +14,17 @@ from emu.chips.chip import AdcSite
 from emu.device import Register
 from emu.events import NEVER
 from emu.peripherals.adccourse import FOREVER, Course, Inputs, Published
-from emu.peripherals.adcrules import CONVERTING, OFF, SAMPLING, WAITING, AdcPlaces, Standing, read_standing, write_con1
+from emu.peripherals.adcrules import (
+    CONVERTING,
+    OFF,
+    SAMPLING,
+    WAITING,
+    AdcPlaces,
+    Standing,
+    fire_round,
+    read_standing,
+    write_con1,
+)
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import SLEEP, Kit, Peripheral
 from emu.peripherals.pins import parse_pin
@@ -82,12 +92,15 @@ class Adc(Peripheral):
         self._courses: Final[dict[tuple[int, ...], Course]] = {}
         for register in (*self._buffers, self.con2):
             register.ruled(Rule(Standing(register.place, self._stands.place), read_standing))
-        self.con1.ruled(Rule(self._places(), read_standing, write_con1))
+        places = self._places()
+        self.con1.ruled(Rule(places, read_standing, write_con1))
+        self.ruled(self._step, Rule(places, fires=fire_round))
 
     def _places(self) -> AdcPlaces:
         sfrs, record = self.kit.chip.sfrs, self.record
-        adon, samp = (1 << sfrs["ADCON1"].fields[name][0] for name in ("ADON", "SAMP"))
-        cells = ("native", "frozen", "sampling", "conversion", "results", "state", "mark", "half")
+        adon, samp, done = (1 << sfrs["ADCON1"].fields[name][0] for name in ("ADON", "SAMP", "DONE"))
+        cells = ("native", "frozen", "sampling", "conversion", "results", "length", "state", "mark", "half", "scan",
+                 "use_b", "next", "count", "held", "channels", "level_from")  # fmt: skip
         return AdcPlaces(
             register=self.con1.place,
             until=self._stands.place,
@@ -97,8 +110,11 @@ class Adc(Peripheral):
             adon=adon,
             samp=samp,
             bufs=1 << sfrs["ADCON2"].fields["BUFS"][0],
-            begun=tuple(cell.place for cell in (self._scan, self._use_b, self._next, self._count)),
+            done=done,
+            buffer=self._buffers[0].place,
+            level=place_of(record, "adc.input"),
             step=slot_of(record, self._step),
+            line=self._line.line,
             **{name: place_of(record, f"adc.{name}") for name in cells},
         )
 

@@ -1,13 +1,16 @@
-"""What instructions do to the converter (§13) in the common case: registers that stand, ADON switched."""
+"""The converter (§13) in the common case: registers that stand, ADON switched, whole rounds of conversions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from emu.events import NEVER
 from emu.peripherals.adccourse import FOREVER
-from emu.straight import Number, Place, Reader, Slot
+from emu.straight import Line, Number, Place, Reader, Slot, request
 
+BUFFERS: Final = 16
+"""Results that are kept."""
 OFF, WAITING, SAMPLING, CONVERTING = range(4)
 """States: ADON = 0; nothing connected; SAMP = 1; SAMP = 0 and the converter at work."""
 
@@ -46,9 +49,23 @@ class AdcPlaces:
     state: Place
     mark: Place
     half: Place
-    begun: tuple[Place, ...]
-    """Scan, multiplexer, buffer and count: 0 when sampling begins anew."""
+    scan: Place
+    use_b: Place
+    next: Place
+    count: Place
+    held: Place
+    length: Place
+    channels: Place
+    """The first of the inputs in turn."""
+    level: Place
+    """Of channel 0."""
+    level_from: Place
+    """Of channel 0: first cycle in which `level` is what it shows."""
+    buffer: Place
+    """ADCBUF0."""
+    done: int
     step: Slot
+    line: Line
 
 
 def write_con1(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
@@ -63,7 +80,8 @@ def write_con1(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
     sampling = m.get(p.sampling)
     begun = (m.now + 1) << 1
     end = begun + m.get(p.results) * (sampling + m.get(p.conversion))
-    for place, first in ((p.mark, m.now + 1), (p.half, 0), *((place, 0) for place in p.begun)):
+    anew = ((place, 0) for place in (p.half, p.scan, p.use_b, p.next, p.count))
+    for place, first in ((p.mark, m.now + 1), *anew):
         m.put(place, m.select(starts, first, m.get(place)))
     m.put(p.register, m.select(starts, new | p.samp, new & (0xFFFF & ~p.samp)))
     m.put(p.con2, m.select(starts, con2 & (0xFFFF & ~p.bufs), con2))
@@ -71,3 +89,35 @@ def write_con1(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
     m.put(p.until, m.select(starts, (begun + sampling + 1) >> 1, FOREVER))
     m.post(p.step, m.select(starts, (end + 1) >> 1, NEVER))
     return True
+
+
+def fire_round(m: Reader, p: AdcPlaces) -> None:
+    """All conversions up to the interrupt that is due: automatic, one multiplexer, results from ADCBUF0 on, inputs that
+    hold or were foretold to."""
+    sampling, results, length = m.get(p.sampling), m.get(p.results), m.get(p.length)
+    step, scan, count, following = sampling + m.get(p.conversion), m.get(p.scan), m.get(p.count), m.get(p.next)
+    begun, missing = (m.get(p.mark) << 1) + m.get(p.half), results - count
+    end = begun + missing * step
+    plain = (m.get(p.native) != 0) & (m.get(p.state) == SAMPLING) & (m.get(p.use_b) == 0)
+    m.need(plain & (count < results) & (scan < length) & ((end + 1) >> 1 == m.now))
+
+    def behind(place: Number) -> Number:
+        return m.select(place + 1 < length, place + 1, 0)
+
+    def known(_turn: Number, place: Number, cycle: Number) -> tuple[Number, ...]:
+        m.need(m.get(p.level_from, m.get(p.channels, place)) <= (cycle + sampling + 1) >> 1)
+        return behind(place), cycle + step
+
+    def convert(turn: Number, place: Number, _held: Number) -> tuple[Number, ...]:
+        code = m.get(p.level, m.get(p.channels, place)) >> 4
+        m.put(p.buffer, code, (following + turn) & (BUFFERS - 1))
+        return behind(place), code
+
+    m.loop(missing, known, scan, begun)
+    _place, held = m.loop(missing, convert, scan, 0)
+    for cell, value in ((p.held, held), (p.scan, 0), (p.count, 0), (p.next, 0), (p.mark, end >> 1), (p.half, end & 1)):
+        m.put(cell, value)
+    m.put(p.register, m.get(p.register) | p.samp | p.done)
+    m.put(p.until, (end + sampling + 1) >> 1)
+    m.post(p.step, (end + results * step + 1) >> 1)
+    request(m, p.line, m.now)

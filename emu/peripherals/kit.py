@@ -18,7 +18,7 @@ from emu.events import NEVER
 from emu.peripherals.pins import Pins
 from emu.program import ProgramMemory
 from emu.record import Record
-from emu.straight import place_of
+from emu.straight import Rule, place_of
 
 IDLE: Final = 1
 """Power mode after PWRSAV #1: the CPU stands, peripherals run unless their SIDL bit is set (§17)."""
@@ -131,6 +131,10 @@ class Peripheral(Device):
         slot = self.events.slot(f"{self.name}.{purpose}", fire)
         self._slots.append((slot, self.cell(f"{purpose}.held", "Q", NEVER)))
         return slot
+
+    def ruled(self, slot: int, rule: Rule) -> None:
+        """Events of `slot` follow `rule` where it can say what they do."""
+        self.events.ruled(slot, rule, self.bus.integers.fire)
 
     @property
     def clock(self) -> int:

@@ -1,4 +1,4 @@
-"""What instructions do to a plainly running timer (§7): TMR read and written, PR written.
+"""What instructions do to a plainly running timer (§7): TMR read and written, PR written; and its match.
 
 The stored TMR word is the count at cycle `base`; `tick` Tcy make one count. A match is posted for the cycle in which
 the flag is first 1. Wide, gated and pushed timers, and those that an output compare plans by, are `timers.py`'s.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from emu.events import NEVER
-from emu.straight import Number, Place, Reader, Slot
+from emu.straight import Line, Number, Place, Reader, Slot, request
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,7 @@ class TimerPlaces:
     """How many devices plan by this timer."""
     frozen: Place
     match: Slot
+    line: Line
 
 
 def read_count(m: Reader, t: TimerPlaces) -> Number:
@@ -83,6 +84,14 @@ def write_period(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
     m.put(t.period, m.select(stands, 0, (limit + 1) * tick))
     m.post(t.match, m.select(stands, due, begun + _counts_until(m, start, limit) * tick + 1))
     return True
+
+
+def fire_match(m: Reader, t: TimerPlaces) -> None:
+    """A match of a timer that interrupts periodically (§7 rule 2)."""
+    period = m.get(t.period)
+    m.need(period != 0)
+    request(m, t.line, m.now)
+    m.post(t.match, m.now + period)
 
 
 def _alone(m: Reader, t: TimerPlaces) -> Number:

@@ -16,7 +16,7 @@ from emu.events import NEVER
 from emu.peripherals.counter import PIN, STOPPED, TCY, WAVE, Counter
 from emu.peripherals.counting import PRESCALE, advance
 from emu.peripherals.kit import IDLE, SLEEP, Kit
-from emu.peripherals.timerrules import TimerPlaces, read_count, write_count, write_period
+from emu.peripherals.timerrules import TimerPlaces, fire_match, read_count, write_count, write_period
 from emu.straight import Rule, place_of, slot_of
 
 
@@ -44,6 +44,7 @@ class Timer(Counter):
         places = self._places()
         self.tmr.ruled(Rule(places, read_count, write_count))
         self.pr.ruled(Rule(places, None, write_period))
+        self.ruled(self._match, Rule(places, fires=fire_match))
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
         self.pr.written_by(self._course_written)
@@ -56,7 +57,8 @@ class Timer(Counter):
         cells = ("base", "tick", "period", "before", "phase", "clear_from", "clear_until", "clear_due", "listeners",
                  "frozen")  # fmt: skip
         places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
-        return TimerPlaces(tmr=self.tmr.place, pr=self.pr.place, match=slot_of(self.record, self._match), **places)
+        match, line = slot_of(self.record, self._match), self.line.line
+        return TimerPlaces(tmr=self.tmr.place, pr=self.pr.place, match=match, line=line, **places)
 
     def pair(self, high: Timer) -> None:
         """Join with the type C partner (T2 with T3, T4 with T5)."""
@@ -278,10 +280,6 @@ class Timer(Counter):
 
     def _fire(self, due: int) -> None:
         (self.high or self).line.request() if self.is_wide else self.line.request()
-        period = self.period.value
-        if period:
-            self.events.set(self._match, due + period)
-            return
         for listener in self._on_match:
             listener(due)
         source = self._source.value

@@ -209,11 +209,7 @@ class LlvmBuilder:
     # -- pure -------------------------------------------------------------------------------------------------------
     def select(self, c: Number, a: Number, b: Number) -> Number:
         """`a` if `c` else `b`."""
-        if isinstance(c, int):
-            return a if c else b
-        if isinstance(a, Value) and isinstance(b, Value) and a.bit and b.bit:
-            return self.e.let(f"select i1 {truth(c)}, i1 {a.text}, i1 {b.text}", bit=True)
-        return self.e.let(f"select i1 {truth(c)}, i64 {wide(a)}, i64 {wide(b)}")
+        return self.e.select(c, a, b)
 
     def let(self, v: Number) -> Number:
         """Names are free in SSA."""

@@ -160,8 +160,9 @@ class BoundaryCount:
         """IR behind which the cycles from %cycle to `until` count as Idle; `prefix` makes names unique."""
         return ""
 
-    def entered(self) -> str:
-        """IR behind which those from %cycle to %start count for %handler at level %best, pushed at %sp."""
+    def entered(self, start: str, handler: str, site: str, place: str, level: str, since: str) -> str:
+        """IR behind which those from %cycle to `start` count for `handler` at `level`; `site` was pushed at `place`, the
+        request rose in cycle `since`."""
         return ""
 
     def third_cycle(self) -> str:
@@ -211,29 +212,27 @@ class BoundaryCounting(BoundaryCount):
   %{p}.long = shl i64 %{p}.slept, 32
 {self._note(p, str(SLEPT), (until, f"%{p}.long", "0"))}"""
 
-    def entered(self) -> str:
+    def entered(self, start: str, handler: str, site: str, place: str, level: str, since: str) -> str:
         """Into the handler's cell, and a note."""
         p = "c.in"
         return f"""{self._find(p)}
-  %{p}.level = mul i64 %best, {self._level_bytes}
+  %{p}.level = mul i64 {level}, {self._level_bytes}
   %{p}.cells = getelementptr i8, ptr %{p}.ledger, i64 %{p}.level
-  %{p}.to = zext i32 %handler to i64
-  %{p}.word = lshr i64 %{p}.to, 1
+  %{p}.word = lshr i64 {handler}, 1
   %{p}.cell = getelementptr i64, ptr %{p}.cells, i64 %{p}.word
   %{p}.old = load i64, ptr %{p}.cell
-  %{p}.took = sub i64 %start, %cycle
+  %{p}.took = sub i64 {start}, %cycle
   %{p}.new = add i64 %{p}.old, %{p}.took
   store i64 %{p}.new, ptr %{p}.cell
-  %{p}.pc = zext i32 %pc to i64
-  %{p}.site = shl i64 %{p}.pc, 32
-  %{p}.sp = shl i64 %spx, 16
-  %{p}.lev = shl i64 %best, 8
+  %{p}.site = shl i64 {site}, 32
+  %{p}.sp = shl i64 {place}, 16
+  %{p}.lev = shl i64 {level}, 8
   %{p}.k1 = or i64 %{p}.site, %{p}.sp
   %{p}.k2 = or i64 %{p}.k1, %{p}.lev
   %{p}.k3 = or i64 %{p}.k2, {ENTERED}
   %{p}.long = shl i64 %{p}.took, 32
-  %{p}.where = or i64 %{p}.long, %{p}.to
-{self._note(p, f"%{p}.k3", ("%start", f"%{p}.where", "%c"))}"""
+  %{p}.where = or i64 %{p}.long, {handler}
+{self._note(p, f"%{p}.k3", (start, f"%{p}.where", since))}"""
 
     def third_cycle(self) -> str:
         """Where `Counting.shortened` has said."""

@@ -46,7 +46,6 @@ from emu.dspic30f.jit.runtime import (
     STEPS,
     dispatch_text,
 )
-from emu.dspic30f.jit.service import boundary_of
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.ledger import STRETCH, Ledger
 from emu.dspic30f.modes import REGISTERS, Key, Modes
@@ -348,7 +347,7 @@ class JitEngine:
     def _prepare(self) -> None:
         ledger = self._ledger
         counts = None if ledger is None else BoundaryCounting(ledger.words, ledger.tail, ENTERED)
-        text = dispatch_text(boundary_of(self._core, self._offset), 2 * self._words, counts)
+        text = dispatch_text(self._core, 2 * self._words, counts)
         key = self.compiler.key(BLOCK_LEVEL, text.encode())
         kept = self.compiler.from_disk(key)
         self._dispatch = Call(kept[0] if kept is not None else self.compiler.now(text, BLOCK_LEVEL, key))

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from emu.dspic30f.core import Core
 from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT, RETFIE, SERVICE
 from emu.dspic30f.jit.counting import BoundaryCount
-from emu.dspic30f.jit.service import DONE, Boundary, service_text
+from emu.dspic30f.jit.service import DONE, service_text
 
 LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
@@ -139,12 +140,12 @@ miss:
 """
 
 
-def dispatch_text(boundary: Boundary, flash_end: int, counts: BoundaryCount | None = None) -> str:
+def dispatch_text(core: Core, flash_end: int, counts: BoundaryCount | None = None) -> str:
     """The dispatch loop, with what it does at boundaries; flash ends at `flash_end` (PC units)."""
     counts = counts if counts is not None else BoundaryCount()
-    return service_text(boundary, counts) + DISPATCH.format(
-        third=counts.third_cycle(),
-        pc=boundary.offset["cpu.pc"], repeat=boundary.offset["cpu.repeat"], flash_end=flash_end,
-        cycle=boundary.offset["cpu.cycle"], blocks=BLOCKS, steps=STEPS, entered=ENTERED, begin=BOUNDARY,
+    offset = {name: core.record.fields[f"cpu.{name}"].offset for name in ("pc", "repeat", "cycle")}
+    return service_text(core, counts) + DISPATCH.format(
+        **offset, third=counts.third_cycle(), flash_end=flash_end, blocks=BLOCKS, steps=STEPS, entered=ENTERED,
+        begin=BOUNDARY,
         next=NEXT, retfie=RETFIE, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE,
         period=PERIOD, last=LAST, noted=NOTED, notes=NOTES, rooms=ROOM)

@@ -59,6 +59,14 @@ class Emitter:
         self.block.lines.append(f"{name} = {text}")
         return Value(self, name, bit)
 
+    def select(self, c: Number, a: Number, b: Number) -> Number:
+        """`a` if `c` else `b`."""
+        if isinstance(c, int):
+            return a if c else b
+        if isinstance(a, Value) and isinstance(b, Value) and a.bit and b.bit:
+            return self.let(f"select i1 {truth(c)}, i1 {a.text}, i1 {b.text}", bit=True)
+        return self.let(f"select i1 {truth(c)}, i64 {wide(a)}, i64 {wide(b)}")
+
     def load(self, pointer: str, bits: int) -> Value:
         """Zero-extended load of 8, 16, 32 or 64 bits."""
         if bits == 64:
