@@ -101,6 +101,11 @@ class Reader(Protocol):
     def table(self, values: tuple[int, ...], index: Number) -> Number:
         """values[index], of a table that never changes."""
 
+    def either(
+        self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
+    ) -> tuple[Number, ...]:
+        """costly() if `condition`, else `others`; it is computed only then, and puts and needs nothing."""
+
     def loop(self, count: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
         """`count` times, at least once: carried = body(number of the turn, *carried). What is left in the end."""
 
@@ -133,7 +138,43 @@ class Rare(Exception):
     """A need does not hold."""
 
 
-class Integers:
+class Numbers:
+    """What a reader on ints computes with, no machine behind it."""
+
+    def select(self, condition: Number, a: Number, b: Number) -> Number:
+        return a if condition else b
+
+    def below(self, a: int, b: int) -> bool:
+        return a < b
+
+    def div(self, a: int, b: int) -> int:
+        return a // b
+
+    def mod(self, a: int, b: int) -> int:
+        return a % b
+
+    def table(self, values: tuple[int, ...], index: int) -> int:
+        return values[index]
+
+    def either(self, condition: Number, costly: Callable[[], tuple[int, ...]], *others: int) -> tuple[int, ...]:
+        return costly() if condition else others
+
+    def loop(self, count: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
+        for turn in range(count):
+            carried = body(turn, *carried)
+        return carried
+
+    def scan(self, bits: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
+        while bits:
+            carried = body((bits & -bits).bit_length() - 1, *carried)
+            bits &= bits - 1
+        return carried
+
+
+NUMBERS: Final[Any] = Numbers()
+
+
+class Integers(Numbers):
     """The reader on ints: runs rules on the record itself."""
 
     def __init__(self, record: Record, events: Events) -> None:
@@ -182,32 +223,6 @@ class Integers:
     def need(self, condition: Number) -> None:
         if not condition:
             raise Rare
-
-    def select(self, condition: Number, a: Number, b: Number) -> Number:
-        return a if condition else b
-
-    def below(self, a: int, b: int) -> bool:
-        return a < b
-
-    def div(self, a: int, b: int) -> int:
-        return a // b
-
-    def mod(self, a: int, b: int) -> int:
-        return a % b
-
-    def table(self, values: tuple[int, ...], index: int) -> int:
-        return values[index]
-
-    def loop(self, count: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
-        for turn in range(count):
-            carried = body(turn, *carried)
-        return carried
-
-    def scan(self, bits: int, body: Callable[..., tuple[int, ...]], *carried: int) -> tuple[int, ...]:
-        while bits:
-            carried = body((bits & -bits).bit_length() - 1, *carried)
-            bits &= bits - 1
-        return carried
 
     def post(self, slot: Slot, due: int) -> None:
         self.put(slot.due, due)

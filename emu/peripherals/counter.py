@@ -12,12 +12,7 @@ from emu.events import NEVER
 from emu.peripherals.counting import PRESCALE, advance, counts_until
 from emu.peripherals.kit import Kit, Peripheral
 from emu.peripherals.pins import parse_pin
-
-STOPPED: Final = 0
-TCY: Final = 1
-PIN: Final = 2
-WAVE: Final = 3
-"""Clock sources: none, the instruction clock, edges pushed by a pin, edges of a described waveform."""
+from emu.peripherals.timerrules import PIN, TCY, WAVE
 
 
 class Counter(Peripheral):

@@ -18,10 +18,11 @@ LEDs). Native code may write a latch by itself as long as only lazy pins change;
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 from emu.events import Events
 from emu.record import Record
+from emu.straight import Number, Place
 
 PORTS: Final = "ABCDEFG"
 RING: Final = 256
@@ -50,6 +51,13 @@ class Waveform(Protocol):
         `Pins.disturb`; `cycle` itself if nothing is promised."""
 
 
+class Described(Protocol):
+    """A waveform that also says as text for every engine (emu/straight.py) when it rises."""
+
+    def text_of_rise(self, m: Any, mask: int, after: Number, count: Number) -> Number:
+        """`Waveform.nth_rise`."""
+
+
 def parse_pin(name: str) -> tuple[int, int]:
     """("RC14") -> (port index, bit mask). Raises ValueError for anything that is not a pin name."""
     if len(name) >= 3 and name[0] == "R" and name[1] in PORTS and name[2:].isdecimal() and int(name[2:]) < 16:
@@ -73,6 +81,8 @@ class Pins:
         self.output: Final = words("output")
         self.level: Final = words("level")
         self.pullup: Final = words("pullup")
+        self.described: Final[dict[tuple[int, int], tuple[Described, Place]]] = {}
+        """By port and mask of one pin; see `describe`."""
         for port in range(len(PORTS)):
             self.open[port] = 0xFFFF  # nothing is connected yet
         self.analog: Final = words("analog")
@@ -189,6 +199,12 @@ class Pins:
         if all(entry[1] is not waveform for entry in self._waveforms[port]):
             self._waveforms[port].append((mask, waveform))
             self._wave(port)
+
+    def describe(self, port: int, mask: int, waveform: Described, attached: Place) -> None:
+        """While the number at `attached` is not 0, the waveform on the pins in `mask` is this one."""
+        for bit in range(16):
+            if mask >> bit & 1:
+                self.described[port, 1 << bit] = (waveform, attached)
 
     def detach(self, port: int, waveform: Waveform) -> None:
         """Undo `attach`."""

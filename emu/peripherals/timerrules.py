@@ -6,10 +6,16 @@ the flag is first 1. Wide, gated and pushed timers, and those that an output com
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from emu.events import NEVER
+from emu.peripherals.counting import PRESCALE
+from emu.peripherals.pins import Described
 from emu.straight import Line, Number, Place, Reader, Slot, request
+
+STOPPED, TCY, PIN, WAVE = range(4)
+"""Clock sources: none, the instruction clock, edges pushed by a pin, edges of a described waveform."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +92,56 @@ def write_period(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
     return True
 
 
-def fire_match(m: Reader, t: TimerPlaces) -> None:
-    """A match of a timer that interrupts periodically (§7 rule 2)."""
+@dataclass(frozen=True, slots=True)
+class MatchPlaces:
+    """What a match looks at, too."""
+
+    timer: TimerPlaces
+    con: Place
+    tckps: int
+    """Its lowest bit."""
+    t32: int
+    """Bit of TxCON, 0 for a timer that has none."""
+    source: Place
+    described: Callable[[], tuple[Described, Place] | None]
+    """The waveform on the clock pin that every engine can read, and the place that says whether it is there."""
+    pin: int
+
+
+def fire_match(m: Reader, p: MatchPlaces) -> None:
+    """A match of a timer that interrupts periodically (§7 rule 2), or on a described clock."""
+    t, clock = p.timer, p.described()
     period = m.get(t.period)
-    m.need(period != 0)
+    if clock is None:
+        m.need(period != 0)
+        m.post(t.match, m.now + period)
+    else:
+        wave, attached = clock
+        narrow = (m.get(p.con) & p.t32) == 0
+        counts = (m.get(p.source) == WAVE) & narrow & (m.get(attached) != 0)
+        waves = counts & (m.get(t.pr) != 0) & (m.get(t.listeners) == 0) & (period == 0)
+        m.need((period != 0) | waves)
+        cells = (t.clear_from, t.clear_until, t.clear_due)
+        due, *foretold = m.either(
+            waves, lambda: next_edges(m, p, lambda after, count: wave.text_of_rise(m, p.pin, after, count)),
+            m.now + period, *(m.get(cell) for cell in cells))  # fmt: skip
+        for cell, value in zip(cells, foretold, strict=True):
+            m.put(cell, value)
+        m.post(t.match, due)
     request(m, t.line, m.now)
-    m.post(t.match, m.now + period)
+
+
+def next_edges(m: Reader, p: MatchPlaces, nth_rise: Callable[[Number, Number], Number]) -> tuple[Number, ...]:
+    """After a match on a described clock: when the next one is due, and what clearing TMR leads to, because firmware
+    that counts lines does that now: from when until when, and the match it leads to."""
+    limit = m.get(p.timer.pr)
+    prescale = m.table(PRESCALE, m.get(p.con) >> p.tckps & len(PRESCALE) - 1)
+
+    def due(after: Number, clocks: Number) -> Number:
+        edge = nth_rise(after, clocks)
+        return m.select(edge == NEVER, NEVER, edge + 2)
+
+    return due(m.now - 2, (limit + 1) * prescale), m.now, nth_rise(m.now, 1), due(m.now, limit * prescale)
 
 
 def _alone(m: Reader, t: TimerPlaces) -> Number:

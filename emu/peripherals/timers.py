@@ -13,10 +13,22 @@ from typing import Final
 from emu.chips.chip import TimerSite
 from emu.device import Register
 from emu.events import NEVER
-from emu.peripherals.counter import PIN, STOPPED, TCY, WAVE, Counter
+from emu.peripherals.counter import Counter
 from emu.peripherals.counting import PRESCALE, advance
 from emu.peripherals.kit import IDLE, SLEEP, Kit
-from emu.peripherals.timerrules import TimerPlaces, fire_match, read_count, write_count, write_period
+from emu.peripherals.timerrules import (
+    PIN,
+    STOPPED,
+    TCY,
+    WAVE,
+    MatchPlaces,
+    TimerPlaces,
+    fire_match,
+    next_edges,
+    read_count,
+    write_count,
+    write_period,
+)
 from emu.straight import Rule, place_of, slot_of
 
 
@@ -40,11 +52,15 @@ class Timer(Counter):
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []
         self._listeners: Final = self.cell("listeners", "B")
-        """Those in `_on_change`."""
-        places = self._places()
+        """Those in both."""
+        places = self._registers()
         self.tmr.ruled(Rule(places, read_count, write_count))
         self.pr.ruled(Rule(places, None, write_period))
-        self.ruled(self._match, Rule(places, fires=fire_match))
+        fields, clock = kit.chip.sfrs[self.con.name].fields, (self._port, self._pin)
+        t32 = 1 << fields["T32"][0] if site.kind == "B" else 0
+        self._places: Final = MatchPlaces(places, self.con.place, fields["TCKPS"][0], t32, self._source.place,
+                                          lambda: kit.pins.described.get(clock), self._pin)  # fmt: skip
+        self.ruled(self._match, Rule(self._places, fires=fire_match))
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
         self.pr.written_by(self._course_written)
@@ -53,7 +69,7 @@ class Timer(Counter):
             kit.pins.watch(site.clock_pin, self._edge)
         kit.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
 
-    def _places(self) -> TimerPlaces:
+    def _registers(self) -> TimerPlaces:
         cells = ("base", "tick", "period", "before", "phase", "clear_from", "clear_until", "clear_due", "listeners",
                  "frozen")  # fmt: skip
         places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
@@ -135,21 +151,17 @@ class Timer(Counter):
         self._plan(rewritten=True)
 
     def _post_edges(self, due: int) -> None:
-        """After a match on a described clock: post the next one, and foretell what clearing TMR leads to, because
-        firmware that counts lines does that now."""
+        """After a match on a described clock that not every engine can read."""
         self.clear_until.value = 0
-        waveform, limit = self.kit.pins.waveform(self._port, self._pin), self.limit
-        if waveform is None or self.is_wide or not limit or self._on_change:
+        waveform, pin = self.kit.pins.waveform(self._port, self._pin), self._pin
+        if waveform is None or self.is_wide or not self.limit or self._on_change:
             self._post(due - 1)
             return
-        pin, prescale = self._pin, self._prescale
-        following = waveform.nth_rise(pin, due - 2, (limit + 1) * prescale)
-        self.events.set(self._match, following + 2 if following != NEVER else NEVER)
-        clocks = limit * prescale
-        edge = waveform.nth_rise(pin, due, clocks)
-        self.clear_from.value = due
-        self.clear_until.value = edge if clocks == 1 else waveform.nth_rise(pin, due, 1)
-        self.clear_due.value = NEVER if edge == NEVER else edge + 2
+        following, *foretold = next_edges(
+            self.bus.integers, self._places, lambda after, count: waveform.nth_rise(pin, after, count))  # fmt: skip
+        self.events.set(self._match, following)
+        for cell, value in zip((self.clear_from, self.clear_until, self.clear_due), foretold, strict=True):
+            cell.value = value
 
     def high_written(self, new: int, lanes: int) -> None:
         """A direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
@@ -268,13 +280,14 @@ class Timer(Counter):
         """Call `on_match(due)` at each match from now on, or no longer (ADC trigger, §13)."""
         if wanted != (on_match in self._on_match):
             self._on_match.append(on_match) if wanted else self._on_match.remove(on_match)
+            self._listeners.value = len(self._on_change) + len(self._on_match)
             self._plan()
 
     def tell_changes(self, on_change: Callable[[], None], wanted: bool) -> None:
         """Call `on_change()` whenever the course of the count has changed, or no longer (output compare, §9)."""
         if wanted != (on_change in self._on_change):
             self._on_change.append(on_change) if wanted else self._on_change.remove(on_change)
-            self._listeners.value = len(self._on_change)
+            self._listeners.value = len(self._on_change) + len(self._on_match)
 
     # -- match -------------------------------------------------------------------------------------------------------
 

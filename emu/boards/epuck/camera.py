@@ -55,6 +55,7 @@ class Camera(Part, I2cDevice):
         self._pointer: Final = self.cell("pointer", "B")
         self._pointer_next: Final = self.cell("pointer_next", "B")
         self._plugged: Final = self.cell("plugged", "B")
+        self.pins.describe(SYNC_PORT, HREF | VSYNC | PCLK, self.scan, self._plugged.place)
         self._line: Final = self.array("line", "B", 2 * LINE_PIXELS)
         self._line_from: Final = self.cell("line_from", "Q")
         self._line_to: Final = self.cell("line_to", "Q")

@@ -13,9 +13,12 @@ from emu.boards.epuck.sensors import Timing
 from emu.events import NEVER
 from emu.peripherals.kit import Cell
 from emu.record import Record
+from emu.straight import NUMBERS, Number, Reader
 
 HREF, VSYNC, PCLK = 1 << 3, 1 << 4, 1 << 14
 """RC3, RC4, RC14 (epuck.md §2)."""
+
+_SIGN: Final = 1 << 63
 
 LINE_PIXELS: Final = 1024
 """Longest line: no sensor has more columns, but registers can ask for them."""
@@ -65,8 +68,6 @@ class Scan:
         self._start: Final = Cell(record, "camera.frame_start", "q")
         self._running: Final = Cell(record, "camera.running", "B")
         self.course = Course(*(1 for _ in self._cells))
-        self.edges_per_frame: dict[int, int] = {}
-        """Rising edges of each sync line in a frame."""
         self.start = 0
         self.running = False
 
@@ -80,12 +81,7 @@ class Scan:
 
     def restored(self) -> None:
         """Take over what the record says."""
-        self.course = course = Course(*(cell.value for cell in self._cells.values()))
-        self.edges_per_frame = {
-            HREF: course.lines,
-            PCLK: course.lines * course.line_bytes,
-            VSYNC: int(course.vsync_rise < course.vsync_fall),
-        }
+        self.course = Course(*(cell.value for cell in self._cells.values()))
         self.start = self._start.value
         self.running = bool(self._running.value)
 
@@ -163,28 +159,58 @@ class Scan:
 
     def edges(self, mask: int, cycle: int) -> int:
         """Rising edges of one sync line since the start, up to and with `cycle`."""
-        course = self.course
-        frame, offset = self.place(cycle)
-        if not self.running or frame < 0:
-            return 0
-        earlier = frame * self.edges_per_frame[mask]
-        if mask == VSYNC:
-            return earlier + (course.vsync_rise <= offset and course.vsync_rise < course.vsync_fall)
-        behind = offset - course.first_href
-        lines = min(max(behind // course.line_tcy + 1, 0), course.lines)
-        if mask == HREF or lines == 0:
-            return earlier + lines
-        inside = (behind - (lines - 1) * course.line_tcy) // course.byte_tcy + 1
-        return earlier + (lines - 1) * course.line_bytes + min(inside, course.line_bytes)
+        return int(edges(NUMBERS, mask, self.course, (self.start, self.running), cycle))
 
     def edge_cycle(self, mask: int, number: int) -> int:
         """Cycle of the `number`-th (1 = first) rising edge since the start, or NEVER."""
-        course = self.course
-        per_frame = self.edges_per_frame[mask]
-        if not self.running or not per_frame:
-            return NEVER
-        frame, index = divmod(number - 1, per_frame)
-        if mask == VSYNC:
-            return self.start + frame * course.frame_tcy + course.vsync_rise
-        line, byte = divmod(index, course.line_bytes) if mask == PCLK else (index, 0)
-        return self.href(line, frame) + byte * course.byte_tcy
+        return int(edge_cycle(NUMBERS, mask, self.course, (self.start, self.running), number))
+
+    def text_of_rise(self, m: Reader, mask: int, after: Number, count: Number) -> Number:
+        """`nth_rise` for every engine."""
+        course = Course(*(m.get(cell.place) for cell in self._cells.values()))
+        start = (m.get(self._start.place) ^ _SIGN) - _SIGN
+        begun = (start, m.get(self._running.place))
+        return edge_cycle(m, mask, course, begun, edges(m, mask, course, begun, after) + count)
+
+
+def edges(m: Reader, mask: int, course: Course, begun: tuple[Number, Number], cycle: Number) -> Number:
+    """Text of `Scan.edges`. `begun`: the cycle the first frame began, and whether it did."""
+    start, running = begun
+    counts = (cycle >= start) & (running != 0)
+    passed = m.select(counts, cycle - start, 0)
+    frame, offset = m.div(passed, course.frame_tcy), m.mod(passed, course.frame_tcy)
+    if mask == VSYNC:
+        found: Number = (course.vsync_rise <= offset) & (course.vsync_rise < course.vsync_fall)
+    else:
+        behind = m.select(offset < course.first_href, 0, offset - course.first_href)
+        reached = m.div(behind, course.line_tcy) + 1
+        lines = m.select(reached < course.lines, reached, course.lines)
+        found = lines
+        if mask == PCLK:
+            inside = m.div(behind - m.select(lines == 0, 0, lines - 1) * course.line_tcy, course.byte_tcy) + 1
+            found = (lines - 1) * course.line_bytes + m.select(inside < course.line_bytes, inside, course.line_bytes)
+        found = m.select((offset < course.first_href) | (lines == 0), 0, found)
+    return m.select(counts, frame * per_frame(mask, course) + found, 0)
+
+
+def edge_cycle(m: Reader, mask: int, course: Course, begun: tuple[Number, Number], number: Number) -> Number:
+    """Text of `Scan.edge_cycle`."""
+    start, running = begun
+    rate = per_frame(mask, course)
+    none = (running == 0) | (rate == 0)
+    most = m.select(none, 1, rate)
+    frame, index = m.div(number - 1, most), m.mod(number - 1, most)
+    if mask == VSYNC:
+        offset = course.vsync_rise
+    else:
+        width = m.select(course.line_bytes == 0, 1, course.line_bytes)
+        line, byte = (m.div(index, width), m.mod(index, width)) if mask == PCLK else (index, 0)
+        offset = course.first_href + line * course.line_tcy + byte * course.byte_tcy
+    return m.select(none, NEVER, start + frame * course.frame_tcy + offset)
+
+
+def per_frame(mask: int, course: Course) -> Number:
+    """Rising edges of a sync line in a frame."""
+    if mask == VSYNC:
+        return course.vsync_rise < course.vsync_fall
+    return course.lines * course.line_bytes if mask == PCLK else course.lines

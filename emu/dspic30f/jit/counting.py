@@ -161,8 +161,8 @@ class BoundaryCount:
         return ""
 
     def entered(self, start: str, handler: str, site: str, place: str, level: str, since: str) -> str:
-        """IR behind which those from %cycle to `start` count for `handler` at `level`; `site` was pushed at `place`, the
-        request rose in cycle `since`."""
+        """IR behind which those from %cycle to `start` count for `handler` at `level`; `site` was pushed at `place`,
+        the request rose in cycle `since`."""
         return ""
 
     def third_cycle(self) -> str:

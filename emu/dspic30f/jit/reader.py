@@ -132,6 +132,20 @@ class BoundaryReader(LlvmReader):
             f"{name} = private unnamed_addr constant [{len(values)} x i64] [{', '.join(f'i64 {v}' for v in values)}]"
             for values, name in self._tables.items())  # fmt: skip
 
+    def either(
+        self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
+    ) -> tuple[Number, ...]:
+        """A branch around it."""
+        e, texts = self.e, [wide(value) for value in others]
+        start, yes, done = e.block, e.fresh("yes"), e.fresh("done")
+        e.end(f"br i1 {truth(condition)}, label %{yes}, label %{done}")
+        e.start(yes)
+        found, end = [wide(value) for value in costly()], e.block
+        e.end(f"br label %{done}")
+        e.start(done)
+        return tuple(e.let(f"phi i64 [ {value}, %{end.label} ], [ {other}, %{start.label} ]")
+                     for value, other in zip(found, texts, strict=True))  # fmt: skip
+
     def loop(self, count: Number, body: Callable[..., tuple[Number, ...]], *carried: Number) -> tuple[Number, ...]:
         """The test is behind the body."""
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from emu.boards.epuck.pixels import decode, encode
-from emu.boards.epuck.scan import HREF, PCLK, VSYNC
+from emu.boards.epuck.scan import HREF, PCLK, VSYNC, per_frame
 from emu.boards.epuck.sensors import SENSORS
 
 from .conftest import Robot
@@ -190,7 +190,7 @@ def test_edge_arithmetic_agrees_with_the_levels(sensor, mask):
         assert camera.scan.bits(cycle) & mask
         assert not camera.scan.bits(cycle - 1) & mask
         assert (camera.scan.edges(mask, cycle - 1), camera.scan.edges(mask, cycle)) == (number - 1, number)
-        number += 1 if checked % 3 else max(camera.scan.edges_per_frame[mask] * 3 // 10, 1)
+        number += 1 if checked % 3 else max(per_frame(mask, camera.scan.course) * 3 // 10, 1)
         checked += 1
 
 
