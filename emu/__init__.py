@@ -18,7 +18,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from emu.api import BuildError as BuildError
     from emu.api import Change as Change
+    from emu.api import build as build
     from emu.api import load as load
     from emu.api import watch as watch
     from emu.image import Image as Image
@@ -35,17 +37,32 @@ TCY_SECONDS: Final = 1 / FCY_HZ
 # Names load when they are first used, so that tools which need only the instruction table or the chip's data pay for
 # nothing else.
 _HOME: Final = {
+    "BuildError": "emu.api",
     "Change": "emu.api",
     "Image": "emu.image",
     "LoadError": "emu.image",
     "Machine": "emu.machine",
     "Stop": "emu.machine",
+    "build": "emu.api",
     "load": "emu.api",
     "load_image": "emu.loader",
     "watch": "emu.api",
 }
 
-__all__ = ["FCY_HZ", "TCY_SECONDS", "Change", "Image", "LoadError", "Machine", "Stop", "load", "load_image", "watch"]
+__all__ = [
+    "FCY_HZ",
+    "TCY_SECONDS",
+    "BuildError",
+    "Change",
+    "Image",
+    "LoadError",
+    "Machine",
+    "Stop",
+    "build",
+    "load",
+    "load_image",
+    "watch",
+]
 
 
 def __getattr__(name: str) -> Any:

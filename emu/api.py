@@ -25,8 +25,11 @@ True
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from emu.boards import board_named
@@ -59,6 +62,23 @@ def load(
     machine = Machine(image.chip, engine=engine, ipl_slip=ipl_slip, board=maker, strict=strict)
     machine.load(image)
     return machine
+
+
+def build(
+    *sources: str | os.PathLike[str], flags: Sequence[str] = ("-Os", "-g"), output: str | os.PathLike[str]
+) -> Path:
+    """Compile and link C files to the ELF file `output`, with the project's own compiler, for an e-puck's chip unless
+    `flags` say otherwise. Returns the path. Raises BuildError with what the compiler said."""
+    files = [*(os.fspath(source) for source in sources), "-o", os.fspath(output)]
+    words = [sys.executable, "-m", "toolchain", "cc", *flags, *files]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BuildError(done.stderr.strip() or f"the compiler ended with status {done.returncode}")
+    return Path(output)
+
+
+class BuildError(RuntimeError):
+    """The compiler refused a program; the text is what it said."""
 
 
 @dataclass(frozen=True, slots=True)

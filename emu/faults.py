@@ -184,6 +184,11 @@ def never_started(machine: Machine, stop: Stop, refused: int) -> Stop:
     return replace(stop, reason="fault", fault=_told(machine, Inside(machine), case))
 
 
+def standing(machine: Machine, why: str) -> Fault:
+    """Where a machine stands that has done nothing wrong, told like a fault: thread, call stack, last branches."""
+    return _told(machine, Inside(machine), _Case(why, machine.pc, machine.cycle, None, machine.evidence.began))
+
+
 def _case(machine: Machine, inside: Inside, stop: Stop) -> _Case | None:
     evidence = machine.evidence
     if stop.reason == "fault":

@@ -28,7 +28,8 @@ CPU: Final = ("ipl", "asleep", "thread")
 class Waves:
     """Records `machine` while it is run by `advance`. `watch`: names of CPU, or expressions that name a variable.
 
-    Raises ValueError for what cannot be watched.
+    With `again` it also sees what is run again aside, which nobody else is told. Raises ValueError for what cannot be
+    watched.
     """
 
     def __init__(
@@ -37,6 +38,7 @@ class Waves:
         stream: TextIO,
         watch: Sequence[str] = (),
         advance: Callable[[int], Stop | None] | None = None,
+        again: bool = False,
     ) -> None:
         from vcd import VCDWriter
 
@@ -64,7 +66,7 @@ class Waves:
             data = self._writer.register_var(scope, "tx", "reg", size=8, init=0)
             count = self._writer.register_var(scope, "tx_count", "integer", size=32, init=0)
             self._bytes[number] = [data, count, 0]
-            self._removals.append(uart.listen(partial(self._sent, number)))
+            self._removals.append(uart.listen(partial(self._sent, number), part=again))
         self._watched: Final = [self._watch(name) for name in watch]
         self._seen: Final = [get() for _, get in self._watched]
         for (variable, _), value in zip(self._watched, self._seen, strict=True):

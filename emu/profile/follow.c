@@ -14,7 +14,7 @@ enum { OPEN = 1, CLOSE, SWITCH, SLEEP };
 
 typedef struct { u64 start, stolen; u32 site, entry, place, level, edge; } Frame;
 typedef struct { u64 left; u32 depth; Frame frame[DEPTH]; } Stack;
-typedef struct { u64 key, calls, cycles; } Edge;
+typedef struct { u64 key, calls, cycles, most, least; } Edge;
 typedef struct { u64 cycle, since; u32 what, stack, level, entry, site, length; } Turn;
 typedef struct {
     u64 now;
@@ -79,7 +79,13 @@ static void pop(Tree *t) {
             if (s->frame[i].edge == f->edge) outermost = 0;
             if (s->frame[i].level) break;
         }
-    if (outermost) t->edge[f->edge].cycles += all - f->stolen;
+    if (outermost) {
+        Edge *e = &t->edge[f->edge];
+        u64 own = all - f->stolen;
+        e->cycles += own;
+        if (own > e->most) e->most = own;
+        if (!e->least || own < e->least) e->least = own;
+    }
     if (s->depth) s->frame[s->depth - 1].stolen += f->level ? all : f->stolen;
     tell(t, CLOSE, f, 0, 0);
 }
@@ -144,7 +150,7 @@ void tree_begin(Tree *t, u64 now, u64 entry) {
 
 /* Forget what has been counted; who is where stays. */
 void tree_clear(Tree *t, u64 now) {
-    for (u32 i = 0; i < EDGES; i++) t->edge[i].calls = t->edge[i].cycles = 0;
+    for (u32 i = 0; i < EDGES; i++) t->edge[i].calls = t->edge[i].cycles = t->edge[i].most = t->edge[i].least = 0;
     for (u32 i = 0; i < STACKS; i++) {
         Stack *s = &t->stack[i];
         if (i != t->current) s->left = now;
@@ -192,16 +198,15 @@ u64 tree_follow(Tree *t, const u64 *note, u64 count, Turn *turn) {
     return t->turns;
 }
 
-/* The edges in use: call site or 0xFFFFFF, entry, calls, cycles. */
+/* The edges in use: call site or 0xFFFFFF, entry, calls, cycles, those of the longest and the shortest call. */
 u64 tree_edges(const Tree *t, u64 *out) {
     u64 n = 0;
     for (u32 i = 0; i < EDGES; i++)
         if (t->edge[i].key && (t->edge[i].calls || t->edge[i].cycles)) {
             u64 key = t->edge[i].key - 1;
-            out[4 * n] = key >> 32;
-            out[4 * n + 1] = (u32)key;
-            out[4 * n + 2] = t->edge[i].calls;
-            out[4 * n + 3] = t->edge[i].cycles;
+            const Edge *e = &t->edge[i];
+            u64 row[] = {key >> 32, (u32)key, e->calls, e->cycles, e->most, e->least};
+            for (u32 k = 0; k < 6; k++) out[6 * n + k] = row[k];
             n++;
         }
     return n;

@@ -21,7 +21,7 @@ OPEN, CLOSE, SWITCH, SLEEP = range(1, 5)
 """What a turn tells: a function or handler begins, ends; the program is on another stack; it has slept."""
 NOWHERE: Final = 0xFFFFFF
 """Call site of what nobody called: handlers, and where a stack begins."""
-_EDGE_WORDS, _MOST_EDGES, _STACKS = 4, 1 << 16, 128
+_EDGE_WORDS, _MOST_EDGES, _STACKS = 6, 1 << 16, 128
 _TURN: Final = np.dtype([
     ("cycle", "<u8"), ("since", "<u8"), ("what", "<u4"), ("stack", "<u4"), ("level", "<u4"), ("entry", "<u4"),
     ("site", "<u4"), ("length", "<u4"),
@@ -52,6 +52,9 @@ class Edge:
     calls: int
     cycles: int
     """Tcy from entry to return, with all calls, without interrupts, sleep and other threads."""
+    most: int
+    """Those of the longest call, recursion left out."""
+    least: int
 
 
 @dataclass(frozen=True, slots=True)

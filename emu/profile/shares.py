@@ -7,6 +7,8 @@ exception (the forced NOPs and pushes, isa.md §14.2) counts for the handler tha
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from typing import TYPE_CHECKING, Final
@@ -115,11 +117,7 @@ class Profiler:
     def run(self, until: int, skip: int = 0) -> Profile:
         """Run to cycle `until`, and count from cycle `skip` on; ends earlier with whatever stops the machine."""
         machine, ledger, entry = self._machine, self._ledger, self._machine.pc
-        if self._native is not None:
-            close = self._native.keep(ledger, self._row_of)
-        else:
-            ledger.open()
-            close = ledger.close
+        close = self._open()
         try:
             stop = self._advance(skip) if skip > machine.cycle else None
             ledger.drain()
@@ -129,15 +127,33 @@ class Profiler:
             profile.stop = stop or self._advance(until)
         finally:
             close()
-        profile.end = machine.cycle
         self._read(profile)
         return profile
+
+    @contextmanager
+    def counting(self) -> Iterator[Profile]:
+        """Count what is run inside the block; the profile is filled in at its end."""
+        profile = Profile(self._machine.pc, self._machine.cycle)
+        close = self._open()
+        try:
+            yield profile
+        finally:
+            close()
+            self._read(profile)
+            profile.idle = profile.end - profile.start - profile.busy  # a sleep may be passed over at once, unseen
+
+    def _open(self) -> Callable[[], None]:
+        if self._native is not None:
+            return self._native.keep(self._ledger, self.row_of)
+        self._ledger.open()
+        return self._ledger.close
 
     def _advance(self, until: int) -> Stop | None:
         self._machine.events.kick()  # no cycle passes unseen
         return self._machine.advance(until)
 
     def _read(self, profile: Profile) -> None:
+        profile.end = self._machine.cycle
         cells = self._ledger.cells
         profile.idle = self._ledger.idle
         for level, cycles in enumerate(cells.sum(axis=1).tolist()):
@@ -146,7 +162,7 @@ class Profiler:
         rows: Counter[int] = Counter()
         spent = cells.sum(axis=0)
         for word in np.flatnonzero(spent).tolist():
-            rows[self._row_of(2 * word)] += int(spent[word])
+            rows[self.row_of(2 * word)] += int(spent[word])
         profile.addresses = dict(rows)
         for row, cycles in rows.items():
             profile.places[self.place(row)] += cycles
@@ -154,7 +170,7 @@ class Profiler:
         if self._timed:
             profile.turns = list(self._tree.turns())
 
-    def _row_of(self, pc: int) -> int:
+    def row_of(self, pc: int) -> int:
         """First address of the stretch of code around `pc` that has one function and one line."""
         row = self._rows.get(pc)
         if row is None:

@@ -46,7 +46,7 @@ def test_it_has_its_name_everywhere_and_no_hole(project):
 def test_make_builds_and_its_test_tells_right_from_wrong(project):
     """A mistake in the C source is shown where VS Code's problem matcher finds it."""
     done = called(project, "make", "test")
-    assert (done.returncode, "3 passed" in done.stdout) == (0, True), done.stdout + done.stderr
+    assert (done.returncode, "4 passed" in done.stdout) == (0, True), done.stdout + done.stderr
     source = project / "src" / "main.c"
     right = source.read_text()
     source.write_text(right.replace("Sys_Sleep(1000)", "Sys_Sleep(900)"))

@@ -186,10 +186,13 @@ class JitEngine:
         env[BOUNDARY] = 1
         why = native(record, surroundings)
         limit = max(limit, env[LIMIT]) if env[LAST] else limit
+        interrupted = self._core.sequencer.power.wires.interrupted
         while before != (cycle := u64[now]) < limit:
             before = cycle
             if why == SERVICE:  # most often some device's event is due
                 self._core.events.fire_until(cycle if self._state.mode != RUN else cycle - 1)
+                if interrupted():
+                    break
             elif why == INTERPRET and self._refresh(self._state.pc, cycle):
                 env[BOUNDARY] = 0  # that of this instruction has been done
             else:

@@ -233,6 +233,27 @@ def test_expect_goes_on_behind_the_last_match_and_stops_at_the_byte(build):
         machine.uart[1].expect("never", within=50)
 
 
+SLEEPER = """
+#include <p30F6014A.h>
+volatile unsigned n;
+void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void)
+{ IFS0bits.T1IF = 0; if (++n % 8 == 0) U1TXREG = 'A' + n / 8 % 26; }
+int main(void) { U1BRG = 7; U1MODE = 0x8000; U1STA = 0x400; PR1 = 9999; IEC0bits.T1IE = 1; T1CON = 0x8000;
+    for (;;) __asm__ volatile("pwrsav #1"); }
+"""
+
+
+@pytest.mark.parametrize("engine", ["jit", "interp", "plain"])
+def test_expect_stops_at_the_byte_in_a_firmware_that_sleeps(build, engine):
+    """Native code went on to the end of the time."""
+    machine = emu.load(build("-Os", source=SLEEPER), engine=engine)
+    said = []
+    machine.uart[1].listen(lambda byte, start: said.append(start))
+    for letter in "BCDEFGHIJKLM":
+        machine.uart[1].expect(letter, within=1000)
+        assert machine.cycle - said[-1] == 10 * 16 * 8  # ten bits of 16 (U1BRG + 1) Tcy
+
+
 def test_expect_tells_a_fault(build):
     machine = emu.load(build("-O0", source="int main(void) { *(volatile int *)0x3001 = 1; return 0; }"))
     with pytest.raises(ExpectError, match=r"(?s)writing 2 bytes at 0x3001.*#0 main"):

@@ -1,0 +1,45 @@
+"""What a failed test leaves: a folder that says where the firmware stood and how it came there.
+
+    report.txt     the fault, or where the robot stood: thread, call stack with source lines, last branches
+    waves.vcd      pins and UART bytes of the last stretch, or since the last input, for GTKWave
+    uart1.txt      all that was said, one file for each UART that said anything
+    state.bin      the whole state, for `Machine.restore`
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final, TextIO
+
+from emu.debug.replay import aside
+from emu.faults import standing
+from emu.waves import Waves
+from openswarm.testing.robot import Robot
+
+STRETCH_MS: Final = 50
+"""The waveform's length at most."""
+
+
+def write(robot: Robot, folder: Path) -> str:
+    """Write everything about `robot` into `folder`; returns the text of the report."""
+    folder.mkdir(parents=True, exist_ok=True)
+    report = str(robot.fault) if robot.fault is not None else standing(robot.machine, "the test failed;").report()
+    (folder / "report.txt").write_text(report.replace("firmware fault: the test", "the test") + "\n", encoding="utf-8")
+    for number, line in robot.uarts.items():
+        if line.said:
+            (folder / f"uart{number}.txt").write_bytes(bytes(line.said))
+    (folder / "state.bin").write_bytes(robot.machine.snapshot())
+    with (folder / "waves.vcd").open("w", encoding="utf-8") as stream:
+        _waves(robot, stream)
+    return (folder / "report.txt").read_text(encoding="utf-8").rstrip()
+
+
+def _waves(robot: Robot, stream: TextIO) -> None:
+    """The last stretch, run again aside from the last state that was kept on the way."""
+    machine = robot.machine
+    end, began = machine.cycle, machine.evidence.began
+    with aside(machine, began):
+        machine.run_until(end - machine.cycles_in(STRETCH_MS / 1000))
+        waves = Waves(machine, stream, again=True)
+        waves.advance(end)
+        waves.close()

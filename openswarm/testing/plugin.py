@@ -1,0 +1,140 @@
+"""pytest plugin: builds firmware, puts it on an emulated robot, and keeps what a failure leaves.
+
+    @pytest.mark.firmware("main.c")            # or a folder with a Makefile, or an ELF file; else the ini value
+    @pytest.mark.robot(selector=3)             # what is around the chip; see openswarm.testing.robot.Robot
+    def test_it_answers(robot):
+        robot.uart.expect("ready", within_ms=50)
+
+What leaves a failed test lies in a folder of its own below `--robot-artefacts`, named in the report and in JUnit's
+properties. Everything else is made new for every test, so tests may run in any order and in several processes.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Generator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+if TYPE_CHECKING:
+    from openswarm.testing.robot import Robot
+
+ROBOTS: Final = pytest.StashKey[list[Any]]()
+"""The robots of a test."""
+BUILT: Final = pytest.StashKey[dict[tuple[str, ...], Path]]()
+"""Images of this process by what they were built from."""
+MADE: Final = "build/firmware.elf"
+"""What a project's Makefile makes (`openswarm new`)."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Options and ini values."""
+    group = parser.getgroup("openswarm", "firmware on an emulated robot")
+    group.addoption(
+        "--robot-artefacts", metavar="DIR", default="robot-artefacts",
+        help="where failed tests leave reports and waveforms (default: robot-artefacts)",
+    )  # fmt: skip
+    parser.addini("firmware", "C file, folder with a Makefile, or ELF file that `firmware` is, relative to the rootdir")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The marks."""
+    config.addinivalue_line("markers", "firmware(source, flags=...): what the fixture `firmware` is made from")
+    config.addinivalue_line("markers", "robot(**around): what is around the chip of the fixture `robot`")
+    config.stash[BUILT] = {}
+
+
+@pytest.fixture
+def firmware(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The ELF file of this test: of its mark `firmware`, else of the ini value."""
+    config = request.config
+    mark = request.node.get_closest_marker("firmware")
+    if mark is not None and mark.args:
+        source = (request.path.parent / mark.args[0]).resolve()
+        flags = tuple(mark.kwargs.get("flags", ("-Os", "-g")))
+    elif config.getini("firmware"):
+        source, flags = (config.rootpath / config.getini("firmware")).resolve(), ("-Os", "-g")
+    else:
+        raise pytest.UsageError("no firmware: mark the test @pytest.mark.firmware(...) or set `firmware` in pytest.ini")
+    built = config.stash[BUILT]
+    key = (str(source), *flags)
+    if key not in built:
+        built[key] = _built(source, flags, tmp_path_factory)
+    return built[key]
+
+
+def _built(source: Path, flags: tuple[str, ...], folders: pytest.TempPathFactory) -> Path:
+    import emu
+
+    if source.is_dir():
+        return _made(source)
+    if not source.exists():
+        raise pytest.UsageError(f"{source} does not exist")
+    if source.suffix != ".c":
+        return source
+    return emu.build(source, flags=flags, output=folders.mktemp("firmware") / f"{source.stem}.elf")
+
+
+def _made(folder: Path) -> Path:
+    """The image of a project with a Makefile; several processes make it one after the other."""
+    from emu import BuildError
+
+    with (folder / "Makefile").open(encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        words = ["make", "-s", "-C", str(folder), f"PYTHON={sys.executable}"]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise BuildError(done.stderr.strip() or done.stdout.strip())
+    return folder / MADE
+
+
+@pytest.fixture
+def robot(request: pytest.FixtureRequest, firmware: Path) -> Robot:
+    """A robot with that firmware, just switched on; the mark `robot` says what is around its chip."""
+    from openswarm.testing.robot import Robot
+
+    around: dict[str, Any] = {}
+    for mark in reversed(list(request.node.iter_markers("robot"))):
+        around |= mark.kwargs
+    for name in ("camera", "stimulus"):
+        if isinstance(around.get(name), str):
+            around[name] = request.path.parent / around[name]
+    shutil.rmtree(_artefacts(request.node), ignore_errors=True)
+    made = Robot(firmware, **around)
+    request.node.stash.setdefault(ROBOTS, []).append(made)
+    return made
+
+
+def _artefacts(item: pytest.Item) -> Path:
+    """The folder for what a failure of a test leaves."""
+    root: Path = item.config.rootpath / item.config.getoption("--robot-artefacts")
+    return root / re.sub(r"[^\w.-]+", "_", item.nodeid).strip("_")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Properties for JUnit; what a failure leaves."""
+    report = yield
+    robots = item.stash.get(ROBOTS, [])
+    if report.when != "call" or not robots:
+        return report
+    for number, one in enumerate(robots):
+        item.user_properties.append((f"robot{number or ''}_cycles", one.cycle))
+    if report.failed:
+        from openswarm.testing import artefacts
+
+        for number, one in enumerate(robots):
+            folder = _artefacts(item) / str(number) if number else _artefacts(item)
+            text = artefacts.write(one, folder)
+            report.sections.append(("robot", f"{text}\n\nwaveform: {folder / 'waves.vcd'}\nall of it: {folder}"))
+            item.user_properties.append((f"robot{number or ''}_artefacts", str(folder)))
+    report.user_properties = list(item.user_properties)
+    return report

@@ -1,0 +1,184 @@
+"""A robot in a test: it runs only inside the calls below, in simulated time, so a time-out is the same everywhere.
+
+What enters: an image, what is around the chip. What leaves: what the firmware says and does. A firmware fault fails the
+call in which it happens, with its whole report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import emu
+
+if TYPE_CHECKING:
+    from re import Match
+
+    from emu.debug.threads import Thread
+    from emu.peripherals.expect import Pattern
+    from emu.peripherals.uart import Uart
+    from emu.profile.shares import Profile, Profiler
+
+MILLISECONDS: Final = 1000
+
+
+class FirmwareFault(AssertionError):
+    """The firmware went wrong; the text is the report of `emu run`."""
+
+
+class Line:
+    """A UART of the robot. What was said before and not yet matched can still be expected."""
+
+    def __init__(self, robot: Robot, uart: Uart) -> None:
+        self._robot: Final = robot
+        self._uart: Final = uart
+        self.said: Final = bytearray()
+        """All it has said."""
+        uart.listen(lambda byte, _cycle: self.said.append(byte & 0xFF))
+        uart.expect(b"", within=0)  # hears from now on
+
+    def expect(self, pattern: Pattern, *, within_ms: float) -> Match[bytes]:
+        """Run until `pattern` is said: text and bytes as they are, compiled patterns as regular expressions. Raises
+        ExpectError after `within_ms` of simulated time, FirmwareFault."""
+        found: Match[bytes] = self._robot.watched(partial(self._uart.expect, pattern, within=within_ms))
+        return found
+
+    def feed(self, data: bytes) -> None:
+        """Say something to the robot, from now on at the speed it listens with."""
+        self._uart.feed(data)
+
+
+@dataclass(frozen=True, slots=True)
+class Cycles:
+    """What calls of a function took, with what it calls, without interrupts, sleep and other threads; in Tcy."""
+
+    calls: int
+    total: int
+    most: int
+    least: int
+
+
+class Measured:
+    """What a `Robot.measured` block has run; to be read behind it."""
+
+    def __init__(self, robot: Robot, profiler: Profiler, profile: Profile) -> None:
+        self._robot: Final = robot
+        self._profiler: Final = profiler
+        self.profile: Final = profile
+
+    def cycles(self, function: str) -> Cycles:
+        """Of a function or handler by its name in C. Raises KeyError for an unknown one, ValueError if it did not run
+        to its end."""
+        entry = self._robot.machine.program_address(function)
+        edges = [edge for edge in self.profile.edges if edge.entry == entry and edge.most]
+        if not edges:
+            raise ValueError(f"{function} was not called, or is inlined")
+        return Cycles(
+            sum(edge.calls for edge in edges), sum(edge.cycles for edge in edges),
+            max(edge.most for edge in edges), min(edge.least for edge in edges),
+        )  # fmt: skip
+
+    def coverage(self, file: str) -> float:
+        """Share of the lines with code of a source file, given by the end of its name, that were run. Raises
+        ValueError if no code comes from it."""
+        image, ran, all_lines = self._robot.machine.inside.image, set(), set()
+        for row in image.lines.rows:
+            if row.line and Path(row.file).match(file) and self._robot.machine.inside.is_code(row.start):
+                all_lines.add(row.line)
+                if self.profile.addresses.get(self._profiler.row_of(row.start)):
+                    ran.add(row.line)
+        if not all_lines:
+            raise ValueError(f"no code comes from {file}")
+        return len(ran) / len(all_lines)
+
+
+class Robot:
+    """A robot that has just been switched on. `machine` is all of it (`help(emu.Machine)`)."""
+
+    def __init__(self, image: Path, **around: Any) -> None:
+        """`around` is what `emu.load` takes, and `selector`, `sensor` (a camera type or None), `camera` (a picture
+        file), `stimulus` (a file of events). Raises what `emu.load` does, ValueError for a bad file."""
+        from emu.boards.epuck.board import Epuck
+        from emu.boards.picture import read_picture
+
+        picture, stimulus = around.pop("camera", None), around.pop("stimulus", None)
+        if "board" not in around:
+            fitted: dict[str, Any] = {"selector": around.pop("selector", 0)}
+            if "sensor" in around:
+                fitted["camera"] = around.pop("sensor")
+            around["board"] = partial(Epuck, **fitted)
+        self.image: Final = image
+        self.machine: Final = emu.load(image, **around)
+        self.board: Final[Any] = self.machine.board
+        if picture is not None:
+            self.board.camera.show(read_picture(str(picture)))
+        if stimulus is not None:
+            self.board.stimulus.load(Path(stimulus))
+        self.uarts: Final = {number: Line(self, uart) for number, uart in self.machine.uart.items()}
+        self.uart: Final = self.uarts[1]
+        self.fault: FirmwareFault | None = None
+
+    @property
+    def camera(self) -> Any:
+        """The camera, `None` without one: `show(picture)` of shape (480, 640, 3)."""
+        return self.board.camera
+
+    @property
+    def cycle(self) -> int:
+        """Tcy since power-on."""
+        return self.machine.cycle
+
+    def run(self, *, ms: float) -> emu.Stop:
+        """Run for so many simulated milliseconds. Raises FirmwareFault."""
+        stop: emu.Stop = self.watched(lambda: self.machine.run(seconds=ms / MILLISECONDS))
+        return stop
+
+    def run_to(self, place: str, *, within_ms: float) -> None:
+        """Run to the next arrival at a function or label. Raises FirmwareFault, AssertionError if it is not reached."""
+        cycles = self.machine.cycles_in(within_ms / MILLISECONDS)
+        stop = self.watched(lambda: self.machine.run(cycles, until=place))
+        assert stop.reason == "until", f"{place} was not reached within {within_ms:g} ms: {stop.reason}"
+
+    def watched(self, work: Any) -> Any:
+        """The result of `work`. Raises FirmwareFault if it ends in one."""
+        from emu.peripherals.expect import ExpectError
+
+        try:
+            done = work()
+        except ExpectError as error:
+            if "firmware fault: " in str(error):
+                raise self._failed(str(error)) from None
+            raise
+        if getattr(done, "fault", None) is not None:
+            raise self._failed(done.fault.report())
+        return done
+
+    def _failed(self, report: str) -> FirmwareFault:
+        self.fault = FirmwareFault(report)
+        return self.fault
+
+    def var(self, expression: str) -> Any:
+        """Value of a C expression."""
+        return self.machine.var(expression)
+
+    def stack(self, thread: str) -> Thread:
+        """A thread of OpenSwarm by the name of its function: `.free` are the bytes of its stack never written. Raises
+        KeyError."""
+        for one in self.machine.threads():
+            if one.name == thread:
+                return one
+        raise KeyError(f"no thread runs {thread}, only {', '.join(one.name for one in self.machine.threads())}")
+
+    @contextmanager
+    def measured(self) -> Iterator[Measured]:
+        """Count every cycle inside the block; native code runs at more than half its speed."""
+        from emu.profile.shares import Profiler
+
+        assert self.machine.image is not None
+        profiler = Profiler(self.machine, self.machine.image)
+        with profiler.counting() as profile:
+            yield Measured(self, profiler, profile)

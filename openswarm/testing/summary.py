@@ -1,0 +1,47 @@
+"""A JUnit file as a table in Markdown, for the summary of a job: `python -m openswarm.testing.summary results.xml`.
+
+Failed tests come with what the plugin said of their robot. Exit status 0, 2 for a file that is none.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+CLOCK_HZ = 14_745_600
+"""Tcy per second of an e-puck (dspic30f6014a.md §3)."""
+
+
+def table(root: ElementTree.Element) -> list[str]:
+    """Lines of Markdown."""
+    lines = ["| test | result | simulated |", "|---|---|---|"]
+    told = []
+    for case in root.iter("testcase"):
+        name = f"{case.get('classname')}::{case.get('name')}"
+        failure = case.find("failure") if case.find("failure") is not None else case.find("error")
+        result = "failed" if failure is not None else "skipped" if case.find("skipped") is not None else "passed"
+        properties = {one.get("name"): one.get("value", "") for one in case.iter("property")}
+        cycles = properties.get("robot_cycles")
+        lines.append(f"| {name} | {result} | {f'{int(cycles) / CLOCK_HZ:.3f} s' if cycles else ''} |")
+        if failure is not None:
+            report = Path(properties.get("robot_artefacts", "")) / "report.txt"
+            text = report.read_text(encoding="utf-8").rstrip() if report.is_file() else failure.get("message", "")
+            told += ["", f"**{name}**", "", "```", text, "```"]
+    return lines + told
+
+
+def main(arguments: list[str]) -> int:
+    """Exit status as the module says."""
+    try:
+        (name,) = arguments
+        root = ElementTree.parse(name).getroot()
+    except (ValueError, OSError, ElementTree.ParseError) as error:
+        print(f"summary: expected a JUnit file: {error}", file=sys.stderr)
+        return 2
+    print("\n".join(table(root)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
