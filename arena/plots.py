@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from arena import bodies
-from arena.commands.compare import courses
+from arena.comparison import courses
 from arena.experiments import Curve
 from arena.record import Trial
 from arena.statistics import bootstrap_band

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from arena.commands.compare import compared, courses, mean_load
+from arena.comparison import compared, courses, mean_load
 from arena.record import Trial
 from arena.statistics import pairs_needed
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 LINTER = Path(sys.executable).with_name("lint-imports")
@@ -36,3 +39,21 @@ def test_the_instruction_table_is_a_leaf():
         for line in path.read_text().splitlines():
             if line.lstrip().startswith(("from emu", "import emu", "from ..")):
                 assert "emu.dspic30f.isa" in line, f"{path.name}: {line}"
+
+
+def test_the_pictures_are_what_the_code_says():
+    """docs/architecture.md; drawing them also fails where parts of a package import each other in a circle."""
+    done = subprocess.run(
+        [sys.executable, "docs/architecture.py", "--check"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_circle_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of parts, even where no module imports itself."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    architecture = import_module("architecture")
+    with pytest.raises(ValueError, match="imports go round: a > b > c > a"):
+        architecture.heights({"a": {"b"}, "b": {"c"}, "c": {"a"}})
+    assert architecture.heights({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {"a": 2, "b": 1, "c": 0}
+    assert architecture.reduced({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {"a": {"b"}, "b": {"c"}, "c": set()}

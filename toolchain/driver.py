@@ -154,7 +154,7 @@ def _optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
             break
         from toolchain.runtime_archive import defined_names, library
 
-        absent = invented - {name[1:] for name in defined_names(library(options.jobs))}
+        absent = invented - {name[1:] for name in defined_names(library(object_of, options.jobs))}
         if not absent:
             break
         ir = without_builtins(ir, absent)
@@ -243,7 +243,7 @@ def _compile_program(options: CcOptions, scratch: Path) -> Program:
     from toolchain.runtime_archive import library
 
     modules = _front_end(options, scratch)
-    program = Program(runtime=library(options.jobs) if options.runtime or options.startup else b"")
+    program = Program(runtime=library(object_of, options.jobs) if options.runtime or options.startup else b"")
     for item in options.inputs:
         if item.language == "archive":
             program.archives.append((str(item.path), read_bytes(item.path)))

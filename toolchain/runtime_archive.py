@@ -10,8 +10,9 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -26,7 +27,11 @@ LEVEL = "s"
 LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
 
 
-def library(jobs: int = 0) -> bytes:
+Compile = Callable[[CcOptions, Input, Path], bytes]
+"""Makes an object of one source with a scratch folder: the driver, which itself needs this library."""
+
+
+def library(compile_one: Compile, jobs: int = 0) -> bytes:
     """The archive's bytes. Builds it (seconds, once) when the cache has none for these sources and this compiler."""
     key = fingerprint()
     cached = runtime_libraries() / f"libdspic-{key}.a"
@@ -34,7 +39,7 @@ def library(jobs: int = 0) -> bytes:
         return cached.read_bytes()
     except OSError:
         pass
-    content = build(jobs)
+    content = build(compile_one, jobs)
     if fingerprint() == key:  # nobody edited the compiler meanwhile
         _store(cached, content)
     return content
@@ -57,21 +62,18 @@ def _dependencies(root: Path) -> Iterator[Path]:
                 yield path
 
 
-def build(jobs: int = 0) -> bytes:
+def build(compile_one: Compile, jobs: int = 0) -> bytes:
     """Compile and assemble every file of `runtime/`, one archive member each."""
     from toolchain.link.archive import Member, archive_bytes
 
     sources = sorted(path for path in RUNTIME_DIR.iterdir() if path.suffix in LANGUAGES)
     with ProcessPoolExecutor(max_workers=jobs or os.cpu_count() or 1) as pool:
-        members = [
-            Member(path.stem + ".o", data) for path, data in zip(sources, pool.map(_member, sources), strict=True)
-        ]
+        made = pool.map(partial(_member, compile_one), sources)
+        members = [Member(path.stem + ".o", data) for path, data in zip(sources, made, strict=True)]
     return archive_bytes(members)
 
 
-def _member(source: Path) -> bytes:
-    from toolchain import driver
-
+def _member(compile_one: Compile, source: Path) -> bytes:
     item = Input(source, LANGUAGES[source.suffix])
     options = CcOptions(
         inputs=[item],
@@ -82,7 +84,7 @@ def _member(source: Path) -> bytes:
         clang=["-std=c11" if item.language == "c" else "-std=c++17", "-ffreestanding", "-Wall"],
     )
     with tempfile.TemporaryDirectory(prefix="dspic-rt-") as scratch:
-        return _weakened(driver.object_of(options, item, Path(scratch)), source.name)
+        return _weakened(compile_one(options, item, Path(scratch)), source.name)
 
 
 def _weakened(content: bytes, name: str) -> bytes:

@@ -14,8 +14,8 @@ import numpy as np
 
 from arena.campaign import Plan, claimed, open_folder
 from arena.commands.arguments import count, count_or_none, duration
-from arena.commands.compare import courses
 from arena.commands.run import changed, folder_name, with_progress
+from arena.comparison import courses
 from arena.controllers import CONTROLLERS
 from arena.experiments import experiment_file, experiment_of
 from arena.record import EXPERIMENT, trials_in, write_bytes, write_text

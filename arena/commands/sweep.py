@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from arena.commands import run as single
-from arena.commands.compare import courses
+from arena.comparison import courses
 from arena.record import trials_in
 
 EXAMPLE = "example: arena sweep clustering --brain scripted --vary camera.range_cm=100,150,inf --vary robots.count=3,5"

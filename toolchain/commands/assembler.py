@@ -6,9 +6,10 @@ import argparse
 import sys
 from pathlib import Path
 
+from toolchain.arguments import definition
 from toolchain.asm.assemble import assemble
 from toolchain.asm.state import Options
-from toolchain.commands.parser import definition, parser
+from toolchain.commands.parser import parser
 from toolchain.device import DEFAULT, DEVICES, device
 from toolchain.elf.write import object_bytes
 from toolchain.errors import ToolError

@@ -6,8 +6,6 @@ import argparse
 import sys
 from pathlib import Path
 
-from toolchain.errors import ToolError
-
 
 def parser(
     command: str, description: str, example: str, help_switches: tuple[str, ...] = ("-h", "--help")
@@ -24,20 +22,3 @@ def parser(
     )
     result.add_argument(*help_switches, action="help", help="show this text")
     return result
-
-
-def integer(text: str) -> int:
-    """A number in C notation, for argparse."""
-    try:
-        return int(text, 0)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-
-
-def definition(text: str) -> tuple[str, int]:
-    """NAME=VALUE of --defsym; raises `ToolError`."""
-    name, equals, value = text.partition("=")
-    try:
-        return name, int(value, 0) if equals else 1
-    except ValueError:
-        raise ToolError(f"--defsym {text}: {value!r} is not a number") from None

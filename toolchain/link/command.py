@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from toolchain.commands.parser import definition, integer
+from toolchain.arguments import definition, integer
 from toolchain.device import DEFAULT, DEVICES, device
 from toolchain.elf.read import read_object
 from toolchain.elf.write import executable_bytes
