@@ -6,7 +6,8 @@ GCC := avr-gcc
 GCC_PACKAGES := gcc-avr avr-libc
 GCC_NEEDS := crtatmega328p.o
 GCC_FLAGS := -mmcu=atmega328p -DF_CPU=8000000UL -mcall-prologues -mrelax -flto -mstrict-X \
-    -fno-tree-phiprop -fno-tree-forwprop -fno-partial-inlining -fno-move-loop-invariants
+    -fno-tree-phiprop -fno-tree-forwprop -fno-partial-inlining -fno-move-loop-invariants -flto-partition=none \
+    -fno-tree-sink -fno-gcse -fno-tree-loop-ivcanon -fno-tree-dominator-opts -fno-tree-loop-im -fira-algorithm=priority
 GCC_LINK := $(OS)/port/avr/ram.ld
 else
 PORT := cortex_m

@@ -1,22 +1,32 @@
 """Interrupts at every instruction of every kernel call, on the ports: target/boundaries.
 
-A sample here; `python -m tests.firmware.test_port_boundaries` goes through all boundaries of the Kilobot.
+A sample here; `python -m tests.firmware.test_port_boundaries` goes through all boundaries of the Kilobot, and of the
+e-puck2 with --robot epuck2. In simavr a boundary is an instruction of the round, and the harness sets the interrupt's
+flag. In QEMU it is an instruction's address, the first or a later time it is come to: the CPU stops there at a
+breakpoint, executes one store to the NVIC or the SCB with interrupts held back and the clock standing, and goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
+import subprocess
 import sys
 import tempfile
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from firmware.tools.simulated.epuck2 import Epuck2
 from firmware.tools.simulated.kilobot import Kilobot
-from firmware.tools.simulated.machine import peek
+from firmware.tools.simulated.machine import Machine, NotInstalled, peek
 from tests.firmware.conftest import TARGET_APPS
 from tests.firmware.test_ports import kilobot, make
 
+EXTI0, PENDSV = (0xE000E200, 1 << 6), (0xE000ED04, 1 << 28)
+"""What is stored where to request them: NVIC_ISPR0, SCB_ICSR (ARMv7-M architecture reference manual, B3)."""
+KERNEL_CODE = re.compile(r"/openswarm/(kernel|option|port)/")
 INT0, SLICE = 1, 14
 """Vectors: the device's, T0's compare A."""
 WAYS = ("device", "slice", "nested")
@@ -25,7 +35,7 @@ PRIME = 97
 """Boundaries between two of the sample."""
 
 
-def check(machine: Kilobot, where: str) -> None:
+def check(machine: Machine, where: str) -> None:
     failures = peek(machine, "failures")
     assert failures == 0, f"{where}: {failures} failures, the first in line {peek(machine, 'first_failure')} of main.c"
 
@@ -69,18 +79,74 @@ def test_the_kilobot_is_interrupted_everywhere(way: str, tmp_path: Path) -> None
     assert sweep(machine, way, PRIME) > 50
 
 
+def kernel_instructions(image: Path) -> list[int]:
+    """Addresses of all instructions of kernel, options and port."""
+    symbols = subprocess.run(["arm-none-eabi-nm", "-l", "-S", image], capture_output=True, text=True, check=True).stdout
+    rows = (line.split() for line in symbols.splitlines() if KERNEL_CODE.search(line))
+    spans = [(int(row[0], 16), int(row[1], 16)) for row in rows if len(row) == 5 and row[2] in "tT"]
+    code = subprocess.run(["arm-none-eabi-objdump", "-d", image], capture_output=True, text=True, check=True).stdout
+    places = (int(match[1], 16) for match in re.finditer(r"^ *([0-9a-f]+):\t(?!.*\t\.(?:word|short|byte))", code, re.M))
+    return sorted(at for at in places if any(start <= at < start + size for start, size in spans))
+
+
+def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> int:
+    """One interrupt in each round, at every stride-th instruction of the kernel, the times-th time that the round comes
+    there, if it does; how many were."""
+    places = kernel_instructions(image)[phase::stride]
+    tried = 0
+    with closing(Epuck2(image)) as machine:
+        end, idle = machine.symbols["round_end"], machine.symbols.span("hal_idle")
+        for number, place in enumerate(places):
+            machine.run_to("round_begin")
+            come = 0
+            while come < times and machine.run_to(place, end) == place:
+                come += 1
+            if come < times:
+                continue
+            before = peek(machine, "interrupts")
+            if way != "device":
+                machine.store(*PENDSV)
+            for _ in range(number * 7 % 45 if way == "nested" else 0):
+                if machine.pc not in idle:  # WFI would not end while the clock stands
+                    machine.step()
+            if way != "slice":
+                machine.store(*EXTI0)
+            machine.run_to("round_begin")
+            tried += 1
+            where = f"{way}, {place:#x} the {times}. time"
+            check(machine, where)
+            assert peek(machine, "interrupts") - before == (way != "slice"), f"{where}: the interrupt was lost"
+    return tried
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_the_epuck2_is_interrupted_everywhere(way: str, tmp_path: Path) -> None:
+    """Every 97th instruction of the kernel; interrupts inside IT blocks and under every mask among them."""
+    image = make("epuck2", "boundaries", tmp_path, apps=TARGET_APPS)
+    try:
+        assert sweep_epuck2(image, way, PRIME, 13 * WAYS.index(way), 1) > 10
+    except NotInstalled as missing:
+        pytest.skip(str(missing))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.firmware.test_port_boundaries", description=__doc__)
+    parser.add_argument("--robot", choices=("kilobot", "epuck2"), default="kilobot")
     parser.add_argument("--stride", type=int, default=1, help="boundaries from one to the next (default 1: all)")
+    parser.add_argument("--times", type=int, default=1, help="of the e-puck2: which time an instruction is come to")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         try:
-            image = make("kilobot", "boundaries", Path(folder), apps=TARGET_APPS)
+            image = make(options.robot, "boundaries", Path(folder), apps=TARGET_APPS)
         except pytest.skip.Exception as missing:
             print(missing, file=sys.stderr)
             return 2
         for way in WAYS:
-            print(f"{way}: {sweep(Kilobot(image), way, options.stride):,} boundaries, nothing lost")
+            if options.robot == "kilobot":
+                tried = sweep(Kilobot(image), way, options.stride)
+            else:
+                tried = sweep_epuck2(image, way, options.stride, 0, options.times)
+            print(f"{way}: {tried:,} boundaries, nothing lost", flush=True)
     return 0
 
 

@@ -44,5 +44,6 @@ int main(void)
     Sys_Start_Process(greet);
     Sys_Start_Kernel();
     Sys_Run_SystemThread();
-    return 0;
+    for (;;) {
+    }
 }

@@ -23,6 +23,9 @@
 #ifndef SYS_LOSS_COUNTERS
 #define SYS_LOSS_COUNTERS 4 /* events with a loss counter of their own; losses of further ones are summed under id 0 */
 #endif
+#ifndef SYS_REPORTS
+#define SYS_REPORTS 1 /* 0: a trap or a failed assertion stops the system without words, whose flash is saved */
+#endif
 #ifndef SYS_UARTS
 #define SYS_UARTS 2 /* of the robot */
 #endif

@@ -175,7 +175,7 @@ static HAL_OUTLINE void tell_ready(void)
 static bool on_send(uint16 pid, uint16 event, sys_event_data *data)
 {
     (void)pid;
-    (void)write_message(event == SYS_SEND_UART1 ? SYS_UART1 : SYS_UART2, data->payload, data->size);
+    (void)write_message(SYS_UARTS == 1 || event == SYS_SEND_UART1 ? SYS_UART1 : SYS_UART2, data->payload, data->size);
     return true;
 }
 

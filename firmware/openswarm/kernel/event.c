@@ -285,7 +285,7 @@ typedef uint16 __attribute__((may_alias)) any_word;
 
 static HAL_INLINE void copy(void *to, const void *from, uint16 size)
 {
-    if (size == sizeof(any_word) && ((uintptr_t)from & 1u) == 0) { /* most events */
+    if (HAL_WORD_IS_ONE_ACT && size == sizeof(any_word) && ((uintptr_t)from & 1u) == 0) { /* most events */
         *(any_word *)to = *(const any_word *)from;
     } else if (size != 0) {
         memcpy(to, from, size);

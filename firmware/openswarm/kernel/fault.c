@@ -19,6 +19,9 @@ static HAL_OUTLINE char *put_number(char *end, uint16 number, uint16 radix)
 static HAL_OUTLINE void report_number(const char *before, uint16 number, uint16 radix)
 {
     char text[DIGITS];
+    if (!SYS_REPORTS) {
+        return;
+    }
     text[DIGITS - 1] = '\0';
     board_report(before);
     board_report(put_number(text + DIGITS - 1, number, radix));

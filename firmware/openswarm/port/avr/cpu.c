@@ -26,6 +26,12 @@ HAL_USED void cpu_clock_isr(void)
     } while ((sint16)(TCNT1 - OCR1B) >= 0);
 }
 
+HAL_USED void cpu_overflow(void) /* kernel stack */
+{
+    cli();
+    os_trap(OS_STACK, 0, 0); /* no program counter is to blame */
+}
+
 void hal_init(sys_pcb *process)
 {
     process->limit = &_end;

@@ -17,16 +17,18 @@
 #define HAL_STACK_GROWS_DOWN
 #define HAL_WORD_IS_ONE_ACT 0
 
-typedef uint8_t hal_lock_state; /* I of SREG; CPU_WAS_OPEN: a slice lock that the matching unlock ends */
+/* SREG, and in the high byte "open": a slice lock that the matching unlock ends. The compiler knows that the high byte of
+ * a device lock is 0, and keeps none. */
+typedef uint16_t hal_lock_state;
 typedef uint8_t *hal_limit;     /* lowest byte of the stack */
 
-enum { CPU_WAS_OPEN = 1 << 0, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_OVER = 1 << 3, CPU_FORCED = 1 << 4, CPU_I = 1 << SREG_I }; /* switch.S has the numbers */
+enum { CPU_WAS_OPEN = 1 << 8, CPU_OPEN = 1 << 0, CPU_DUE = 1 << 1, CPU_OVER = 1 << 3, CPU_FORCED = 1 << 4, CPU_I = 1 << SREG_I }; /* switch.S has the numbers */
 
 void cpu_open(void); /* level slice ends: takes a slice end that became due meanwhile */
 
 static inline __attribute__((always_inline)) hal_lock_state hal_lock_slice(void)
 {
-    hal_lock_state before = (hal_lock_state)((SREG & CPU_I) | (GPIOR0 & CPU_OPEN));
+    hal_lock_state before = (hal_lock_state)(SREG | (uint16_t)(GPIOR0 & CPU_OPEN) << 8);
     GPIOR0 &= (uint8_t)~CPU_OPEN;
     hal_barrier();
     return before;
@@ -34,7 +36,7 @@ static inline __attribute__((always_inline)) hal_lock_state hal_lock_slice(void)
 
 static inline __attribute__((always_inline)) hal_lock_state hal_lock_devices(void)
 {
-    hal_lock_state before = SREG & CPU_I;
+    hal_lock_state before = SREG;
     __asm__ volatile("cli" ::: "memory");
     return before;
 }
@@ -45,7 +47,7 @@ static inline __attribute__((always_inline)) void hal_unlock(hal_lock_state befo
     if (before & CPU_WAS_OPEN) { /* never behind hal_lock_devices(): the compiler leaves it out there */
         cpu_open();
     } else {
-        SREG = before;
+        SREG = (uint8_t)before;
     }
 }
 

@@ -2,7 +2,7 @@
 ; Context switch, idle and entry of interrupts to the kernel stack, for avr-gcc's assembler. Interrupts do not nest.
 ;
 ; A thread that does not run has on its stack, from the top: what brought it here, then what leave_thread saved.
-;     preempted  PC, r0, SREG, r1, r18-r27, r30, r31        17 bytes
+;     preempted  PC, r30, r31, SREG, r24, r25, r0, r1, r18-r23, r26, r27   17 bytes
 ;     yielded    PC                                          2 bytes
 ;     both       return into the above, r2-r17, r28, r29    20 bytes; sp points below
 ; The kernel stack is the start of os_memory; it is empty whenever a thread runs. The bit "kernel" says that SP is on it;
@@ -18,7 +18,7 @@
 #define PCB_STATUS 8                    /* offsets in sys_pcb (0: sp, 2: limit) and bits, checked by cpu.c */
 #define STATUS_READY 1
 #define PAINT 0xA5
-#define OS_STACK 4
+#define SAVED 18                        /* bytes leave_thread pushes */
 #define TOP (os_memory + HAL_KERNEL_STACK - 1)
 
         .global TIMER0_COMPA_vect, hal_yield, hal_block, hal_abandon, hal_idle, cpu_open, os_thread_start, os_isr
@@ -31,43 +31,24 @@ TIMER0_COMPA_vect:
         rjmp    later
 preempt:                                ; level thread, I = 0, all registers the thread's
         cbi     GPIOR0, OPEN
-        push    r0
-        in      r0, SREG
-        sei                             ; from here on only slices are excluded
-        push    r0
-        push    r1
-        clr     r1
-        push    r18
-        push    r19
-        push    r20
-        push    r21
-        push    r22
-        push    r23
-        push    r24
-        push    r25
-        push    r26
-        push    r27
         push    r30
         push    r31
+        in      r30, SREG
+        push    r30
+        sei                             ; from here on only slices are excluded
+        push    r24
+        push    r25
+        rcall   push_scratch
         ldi     r30, lo8(gs(os_slice_end))
         ldi     r31, hi8(gs(os_slice_end))
         rcall   leave_thread
-        pop     r31
-        pop     r30
-        pop     r27
-        pop     r26
+        rcall   pop_scratch
         pop     r25
         pop     r24
-        pop     r23
-        pop     r22
-        pop     r21
-        pop     r20
-        pop     r19
-        pop     r18
-        pop     r1
-        pop     r0
-        out     SREG, r0                ; I = 0: level and stack change together
-        pop     r0
+        pop     r30
+        out     SREG, r30               ; I = 0: level and stack change together
+        pop     r31
+        pop     r30
         sbi     GPIOR0, OPEN
         sbic    GPIOR0, DUE             ; an interrupt ended the new slice already
         rjmp    preempt
@@ -104,41 +85,30 @@ cpu_open:
         ret
 
 ; ---- Saves the running thread, runs Z on the kernel stack, resumes the thread it returns; level slice ------------
+; The library's own prologue and epilogue of functions (-mcall-prologues) push and pop r2-r17, r28 and r29: Z = where the first
+; goes on with Y = SP, r30 = bytes the second gives back behind Y.
 leave_thread:
-        push    r2
-        push    r3
-        push    r4
-        push    r5
-        push    r6
-        push    r7
-        push    r8
-        push    r9
-        push    r10
-        push    r11
-        push    r12
-        push    r13
-        push    r14
-        push    r15
-        push    r16
-        push    r17
-        push    r28
-        push    r29
-        lds     r24, os_running
+        movw    r22, r30
+        ldi     r26, 0
+        ldi     r27, 0
+        ldi     r30, lo8(gs(saved))
+        ldi     r31, hi8(gs(saved))
+        jmp     __prologue_saves__
+saved:  lds     r24, os_running
         lds     r25, os_running+1
         movw    r26, r24
-        in      r18, SPL
-        in      r19, SPH
-        st      X+, r18
-        st      X+, r19
+        st      X+, r28
+        st      X+, r29
         ld      r20, X+                 ; limit: below it now, or was something written there before?
         ld      r21, X
-        cp      r18, r20
-        cpc     r19, r21
+        cp      r28, r20
+        cpc     r29, r21
         brlo    overflow
         movw    r26, r20
         ld      r18, X
         cpi     r18, PAINT
         brne    overflow
+        movw    r30, r22
 to_kernel:
         ldi     r18, lo8(TOP)
         ldi     r19, hi8(TOP)
@@ -149,32 +119,15 @@ to_kernel:
         sei
         icall                           ; r25:r24 = the thread that ran
 resume: movw    r30, r24                ; the thread that shall run
-        ld      r18, Z
-        ldd     r19, Z+1
+        ld      r28, Z
+        ldd     r29, Z+1
         cli
         cbi     GPIOR0, KERNEL
-        out     SPH, r19
-        out     SPL, r18
+        out     SPH, r29
+        out     SPL, r28
         sei
-        pop     r29
-        pop     r28
-        pop     r17
-        pop     r16
-        pop     r15
-        pop     r14
-        pop     r13
-        pop     r12
-        pop     r11
-        pop     r10
-        pop     r9
-        pop     r8
-        pop     r7
-        pop     r6
-        pop     r5
-        pop     r4
-        pop     r3
-        pop     r2
-        ret
+        ldi     r30, SAVED
+        jmp     __epilogue_restores__
 
 ; ---- void hal_abandon(hal_pick): any stack, level slice ---------------------------------------------------------
 hal_abandon:
@@ -183,17 +136,9 @@ hal_abandon:
 
 ; The stack reached its last byte: what lies below may be damaged, so this is the end.
 overflow:
-        cli
-        ldi     r18, lo8(TOP)
-        ldi     r19, hi8(TOP)
-        out     SPH, r19
-        out     SPL, r18
-        ldi     r24, OS_STACK
-        ldi     r25, 0
-        ldi     r22, 0                  ; no program counter is to blame
-        ldi     r23, 0
-        movw    r20, r22
-        jmp     os_trap
+        ldi     r30, lo8(gs(cpu_overflow))
+        ldi     r31, hi8(gs(cpu_overflow))
+        rjmp    to_kernel
 
 ; First instructions of every thread; the initial frame puts entry into r17:r16 and its argument into r15:r14.
 os_thread_start:
@@ -223,6 +168,38 @@ hal_idle:
 1:      sei
         ret
 
+; ---- What C may change, r24, r25, r30 and r31 apart: on the stack, and back. Z is the way back of both ----------------
+push_scratch:
+        pop     r31
+        pop     r30
+        push    r0
+        push    r1
+        clr     r1
+        push    r18
+        push    r19
+        push    r20
+        push    r21
+        push    r22
+        push    r23
+        push    r26
+        push    r27
+        ijmp
+
+pop_scratch:
+        pop     r31
+        pop     r30
+        pop     r27
+        pop     r26
+        pop     r23
+        pop     r22
+        pop     r21
+        pop     r20
+        pop     r19
+        pop     r18
+        pop     r1
+        pop     r0
+        ijmp
+
 ; ---- Device interrupts: r30 and r31 are saved, Z = C function (isr.inc) -------------------------------------------
 os_isr: push    r24
         in      r24, SREG
@@ -237,30 +214,13 @@ os_isr: push    r24
         out     SPL, r24
         ldi     r24, hi8(TOP)
         out     SPH, r24
-1:      push    r0
-        push    r1
-        clr     r1
-        push    r18
-        push    r19
-        push    r20
-        push    r21
-        push    r22
-        push    r23
-        push    r25
-        push    r26
-        push    r27
+1:      push    r25
+        movw    r24, r30
+        rcall   push_scratch
+        movw    r30, r24
         icall
-        pop     r27
-        pop     r26
+        rcall   pop_scratch
         pop     r25
-        pop     r23
-        pop     r22
-        pop     r21
-        pop     r20
-        pop     r19
-        pop     r18
-        pop     r1
-        pop     r0
         out     SPH, r29
         out     SPL, r28
         pop     r29

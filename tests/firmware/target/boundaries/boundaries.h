@@ -4,10 +4,8 @@
 
 #include <openswarm.h>
 
-/* Of the CPU (avr/): an interrupt of level device calls boundaries_isr() once per request. */
+/* Of the CPU (avr/, cortex_m/): an interrupt of level device, which the harness requests, calls boundaries_isr(). */
 void inject_init(void);
-void inject_request(void); /* where the CPU can do that by itself: the next boundary, from now on */
-void inject_cancel(void);  /* end of the round */
 void boundaries_isr(void);
 
 void round_begin(void); /* stops of the harness */

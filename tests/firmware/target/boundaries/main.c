@@ -2,7 +2,12 @@
  * outside, every call that an ISR may make and every one that it may not. README.md. */
 #include "boundaries.h"
 
+#include <openswarm_cleanup.h>
 #include <openswarm_io.h>
+#include <openswarm_join.h>
+#include <openswarm_mutex.h>
+#include <openswarm_quota.h>
+#include <openswarm_service.h>
 
 #include <string.h>
 
@@ -55,6 +60,23 @@ static bool other(uint16 pid, uint16 event, sys_event_data *data)
 }
 
 
+static sys_mutex mutex = SYS_MUTEX(2);
+static sys_quota quota, no_quota;
+static sys_cleanup cleanup;
+static sys_service service;
+
+static void options_are_refused(void)
+{
+    static const sys_process_config config;
+    uint16 refused = Sys_Get_Statistics()->refused;
+    MUST(!Sys_Lock_Mutex(&mutex) && !Sys_Unlock_Mutex(&mutex));
+    MUST(Sys_Start_Joinable(&config) == 0 && !Sys_Join(driver_pid));
+    MUST(!Sys_Push_Cleanup(&cleanup, NULL, NULL) && !Sys_Pop_Cleanup(true));
+    MUST(!Sys_Limit_Event(&no_quota, HEARD, 1) && !Sys_Keep_Latest(&no_quota, HEARD));
+    MUST(!Sys_Start_Service(&service) && !Sys_Feed_Watchdog());
+    MUST(refused > UINT16_MAX - 10 || Sys_Get_Statistics()->refused - refused == 10);
+}
+
 __attribute__((used)) void boundaries_isr(void)
 {
     static const sys_process_config config;
@@ -87,6 +109,7 @@ __attribute__((used)) void boundaries_isr(void)
     Sys_Sleep(1);
     Sys_Yield();
     MUST(refused > UINT16_MAX - 11 || Sys_Get_Statistics()->refused - refused == 11); /* it saturates */
+    options_are_refused();
 }
 
 static bool is_one(sys_event_data *data)
@@ -116,6 +139,7 @@ static void lists(void)
 {
     static const uint16 seven = 7;
     MUST(Sys_Register_Event(SHARED) && Sys_IsEventRegistered(SHARED));
+    MUST(Sys_Limit_Event(&quota, SHARED, 1));
     MUST(Sys_Subscribe_to_Event(SHARED, driver_pid, other, NULL));
     MUST(Sys_Subscribe_to_Event(HEARD, driver_pid, other, is_one));
     MUST(Sys_Subscribe_to_Event(SYS_1ms_TIMER, driver_pid, other, is_one));
@@ -152,6 +176,20 @@ static void threads(void)
     Sys_End_CriticalSection();
 }
 
+static void clean(void *unused)
+{
+    (void)unused;
+}
+
+static void options(void)
+{
+    static const sys_process_config config = {short_lived, NULL, 0, 0, 0, 0, 0};
+    MUST(Sys_Lock_Mutex(&mutex) && Sys_Push_Cleanup(&cleanup, clean, NULL));
+    MUST(Sys_Pop_Cleanup(true) && Sys_Unlock_Mutex(&mutex));
+    uint16 pid = Sys_Start_Joinable(&config);
+    MUST(pid != 0 && Sys_Join(pid) && Sys_Get_ProcessState(pid) == SYS_UNKNOWN);
+}
+
 static void driver(void *unused)
 {
     (void)unused;
@@ -161,11 +199,10 @@ static void driver(void *unused)
         uint16 heap = Sys_Get_Statistics()->heap_used;
         sent = isr_sent = heard = 0;
         rounds++;
-        inject_request();
         round_begin();
         lists();
         threads();
-        inject_cancel();
+        options();
         round_end();
         Sys_Sleep(1);
         Sys_Sleep(1);
@@ -180,6 +217,7 @@ int main(void)
     static const sys_process_config waiter_config = {waiter, NULL, 0, 0, 0, 0, 0};
     Sys_Init_Kernel();
     MUST(Sys_Register_Event(HEARD) && Sys_Register_Event(SILENT) && Sys_Register_Event(WAITED));
+    MUST(Sys_Register_Event(SHARED) && Sys_Limit_Event(&quota, SHARED, 1) && Sys_Unregister_Event(SHARED));
     driver_pid = Sys_Start_ProcessWith(&driver_config);
     waiter_pid = Sys_Start_ProcessWith(&waiter_config);
     MUST(driver_pid != 0 && waiter_pid != 0);

@@ -10,11 +10,3 @@ void inject_init(void)
     EICRA = 1 << ISC01; /* falling edge */
     EIMSK = 1 << INT0;
 }
-
-void inject_request(void)
-{
-}
-
-void inject_cancel(void)
-{
-}
