@@ -13,6 +13,7 @@ COMMANDS: Final = {
     "profile": "print the CPU load by function and interrupt level in percent, from exact cycles",
     "cycles": "measure the kernel's operations in exact cycles; check them against a baseline",
     "coverage": "tell which lines, branches and instructions a run executes (lcov, Cobertura)",
+    "inject": "inject faults by a campaign file and tell what becomes of them",
     "debug": "serve an editor that debugs firmware (Debug Adapter Protocol)",
     "completion": "print what makes a shell complete these commands and their options",
 }

@@ -248,6 +248,14 @@ class Uart(Peripheral):
     def _is_listening(self) -> bool:
         return self.is_enabled and (not self.is_frozen or bool(self.mode["WAKE"]))
 
+    def lose(self) -> bool:
+        """The next frame that is on its way to RX never comes; whether there was one."""
+        if self.line.head() is None:
+            return False
+        self.line.drop()
+        self._plan_line()
+        return True
+
     def _line_due(self, due: int) -> None:
         """A start bit falls on the RX pin."""
         frame = self.line.head()

@@ -1,0 +1,175 @@
+"""`emu inject`: faults by a campaign file, and what becomes of them."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import asdict, astuple, fields
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Final, TextIO
+
+from emu.command import CommandError, Parser
+from emu.commands.image_option import add_chip_option, image_of
+from emu.coverage import fingerprint
+from emu.image import Image
+from emu.inject.campaign import Campaign, CampaignError, read
+from emu.inject.report import lines, summary
+from emu.inject.trial import Outcome, Trials
+from emu.outfile import whole_text_file
+from emu.places import use_cache
+from emu.status import DONE
+
+DESCRIPTION: Final = """\
+Run firmware many times with one fault each, chosen at random by the campaign's seed, and tell what becomes of them:
+masked, detected, silent (wrong output that nobody noticed), hang or trap, each with its 95 % Wilson interval.
+
+Faults: bits of RAM, W registers and flash flip; an instruction is skipped; a byte for a UART is lost; a sensor sticks;
+a brown-out. Every trial goes on from a state kept before its fault, and ends as soon as the state is that of the run
+without faults. The same campaign gives the same bytes whatever --jobs; with --state FILE an interrupted one goes on.
+
+A campaign file (TOML):
+
+    seed = 1
+    trials = 400
+    [run]
+    seconds = 1.0               also: start, selector, hang
+    [detect]
+    uart1 = ["assert", "trap"]  what firmware says when it has noticed
+    [input]
+    uart1 = [[0.2, "go\\r"]]
+    [faults]                    shares
+    ram = 4
+    register = 2
+    flash = 1                   also: skip, uart, sensor, brownout
+
+Exit status: 0 done, 2 bad input. Needs the extra `arena` (scipy)."""
+
+
+def parser() -> Parser:
+    made = Parser(
+        "inject", DESCRIPTION, "emu inject firmware.elf --campaign bits.toml --jobs 4 --state bits.state --out bits.csv"
+    )
+    made.add_argument("image", metavar="IMAGE", help="ELF executable")
+    add_chip_option(made)
+    made.add_argument("--campaign", metavar="FILE", required=True, type=Path, help="what to do")
+    made.add_argument("--jobs", metavar="N", type=_jobs, default=1, help="processes (default 1)")
+    made.add_argument("--state", metavar="FILE", type=Path, help="keep what is done, and go on from it")
+    made.add_argument("--out", metavar="FILE", help="write one line for every trial, CSV")
+    made.add_argument("--only", metavar="N", type=int, help="run trial N alone and print it")
+    made.add_argument("--json", action="store_true", help="print one JSON object")
+    made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code there, not in the cache")
+    return made
+
+
+def _jobs(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 1024:
+        raise argparse.ArgumentTypeError(f"expected a number of processes from 1 to 1024, not {text!r}")
+    return int(text)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status as DESCRIPTION says."""
+    image = image_of(options)
+    try:
+        campaign = read(options.campaign)
+    except CampaignError as error:
+        raise CommandError(str(error)) from None
+    try:
+        import scipy.stats  # noqa: F401
+    except ImportError:
+        raise CommandError("intervals need scipy: pip install 'openswarm[arena]'") from None
+    if options.only is not None:
+        if not 0 <= options.only < campaign.trials:
+            raise CommandError(f"--only: the campaign has trials 0 to {campaign.trials - 1}")
+        print(json.dumps(asdict(_trials(image, campaign).run(options.only)), indent=2))
+        return DONE
+    outcomes = _all(image, campaign, options)
+    if options.out:
+        with whole_text_file(options.out) as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow([one.name for one in fields(Outcome)])
+            writer.writerows(astuple(outcome) for outcome in outcomes)
+    found = summary(outcomes)
+    if options.json:
+        print(json.dumps({"image": fingerprint(image), "campaign": campaign.fingerprint, "kinds": found}, indent=2))
+    else:
+        print("\n".join(lines(found)))
+    return DONE
+
+
+def _all(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[Outcome]:
+    """Every outcome in the order of the numbers; those of the state file are not run again."""
+    header = {"image": fingerprint(image), "campaign": campaign.fingerprint}
+    done = _kept(options.state, header) if options.state is not None and options.state.exists() else {}
+    missing = [number for number in range(campaign.trials) if number not in done]
+    with ExitStack() as stack:
+        state: TextIO | None = None
+        if options.state is not None:
+            state = stack.enter_context(options.state.open("a", encoding="utf-8"))
+            if state.tell() == 0:
+                print(json.dumps(header), file=state, flush=True)
+        for outcome in _run(options, campaign, missing):
+            done[outcome.number] = outcome
+            if state is not None:
+                print(json.dumps(asdict(outcome)), file=state, flush=True)
+            if len(done) % 100 == 0 and sys.stderr.isatty():
+                print(f"\r{len(done)} of {campaign.trials}", end="", file=sys.stderr)
+    return [done[number] for number in sorted(done)]
+
+
+def _kept(path: Path, header: dict[str, str]) -> dict[int, Outcome]:
+    """What a state file holds; an unfinished last line is cut off."""
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    found: dict[int, Outcome] = {}
+    for number, line in enumerate(whole.splitlines(), 1):
+        try:
+            facts = json.loads(line)
+            if number == 1:
+                if facts != header:
+                    raise CommandError(f"{path}:1: this is the state of another image or campaign")
+                continue
+            outcome = Outcome(**facts)
+        except (ValueError, TypeError):
+            raise CommandError(f"{path}:{number}: expected a state file of emu inject") from None
+        found[outcome.number] = outcome
+    if whole != text:
+        os.truncate(path, len(whole.encode()))
+    return found
+
+
+_OWN: list[Trials] = []
+"""Of a process."""
+
+
+def _trials(image: Image, campaign: Campaign) -> Trials:
+    try:
+        return Trials(image, campaign)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+
+
+def _begin(options: argparse.Namespace, campaign: Campaign) -> None:
+    _OWN[:] = [_trials(image_of(options), campaign)]
+
+
+def _one(number: int) -> Outcome:
+    return _OWN[0].run(number)
+
+
+def _run(options: argparse.Namespace, campaign: Campaign, numbers: list[int]) -> Iterator[Outcome]:
+    if not numbers:
+        return
+    _begin(options, campaign)  # what is wrong with the run without faults is told here
+    if options.jobs == 1:
+        yield from map(_one, numbers)
+        return
+    around = argparse.Namespace(image=options.image, chip=options.chip)
+    with get_context("spawn").Pool(options.jobs, _begin, (around, campaign)) as pool:
+        yield from pool.imap_unordered(_one, numbers, chunksize=4)

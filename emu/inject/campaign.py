@@ -1,0 +1,169 @@
+"""A campaign file: what to run, what to break, how to judge. TOML; mistakes are told with file and line.
+
+seed = 1                      # whose faults they are
+trials = 400
+[run]
+seconds = 1.0                 # what the output of is compared
+start = 0.1                   # no fault before (default 0)
+selector = 0                  # of the robot (default 0)
+hang = 2.0                    # so many times `seconds` without the output: a hang (default 2)
+[input]                       # bytes for the UARTs (default none), each with its time in s
+uart1 = [[0.2, "go\\r"], [0.5, "stop\\r"]]
+[detect]
+uart1 = ["assert", "trap"]    # regular expressions: the firmware has noticed (default none)
+[faults]                      # shares of the kinds, whole numbers
+ram = 4
+register = 2
+flash = 1
+skip = 2
+uart = 1
+sensor = 1
+brownout = 1
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from emu.inject.faults import KINDS
+
+UARTS: Final = ("uart1", "uart2")
+_KEYS: Final[dict[str, tuple[str, ...]]] = {
+    "": ("seed", "trials", "run", "input", "detect", "faults"),
+    "run": ("seconds", "start", "selector", "hang"),
+    "input": UARTS,
+    "detect": UARTS,
+    "faults": KINDS,
+}
+
+
+class CampaignError(ValueError):
+    """A campaign file is wrong; the text has file, line and what was expected."""
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What a file says. Times in s."""
+
+    seed: int
+    trials: int
+    seconds: float
+    start: float
+    selector: int
+    hang: float
+    input: Mapping[int, tuple[tuple[float, bytes], ...]]
+    detect: Mapping[int, tuple[str, ...]]
+    faults: Mapping[str, int]
+    fingerprint: str
+    """Hash of the file's text."""
+
+
+class _Reader:
+    def __init__(self, name: str, text: str) -> None:
+        self.name, self.text = name, text
+        try:
+            self.data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            line = re.search(r"at line (\d+)", str(error))
+            where = line[1] if line is not None else len(text.splitlines())
+            raise CampaignError(f"{name}:{where}: {error}") from None
+
+    def fail(self, section: str, key: str, expected: str) -> CampaignError:
+        """With the line of a key, or of its section."""
+        here, found = "", 0
+        for number, line in enumerate(self.text.splitlines(), 1):
+            if match := re.match(r"\s*\[([^\]]+)\]", line):
+                here = match[1].strip()
+                found = number if here == (section or key) else found
+            elif here == section and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
+                return CampaignError(f"{self.name}:{number}: {expected}")
+        return CampaignError(f"{self.name}:{found or 1}: {expected}")
+
+    def known(self) -> None:
+        for section, keys in _KEYS.items():
+            table = self.section(section)
+            for key in table:
+                if key not in keys:
+                    raise self.fail(section, key, f"unknown key {key!r}; expected {', '.join(keys)}")
+
+    def section(self, name: str) -> dict[str, Any]:
+        table = self.data.get(name, {}) if name else self.data
+        if not isinstance(table, dict):
+            raise self.fail("", name, f"expected a table [{name}]")
+        return table
+
+    def number(self, section: str, key: str, kind: type, default: Any, least: float, most: float) -> Any:
+        value = self.section(section).get(key, default)
+        fits = isinstance(value, int | float if kind is float else int) and not isinstance(value, bool)
+        if not fits or not least <= value <= most:
+            what = "a number" if kind is float else "a whole number"
+            raise self.fail(section, key, f"{key}: expected {what} from {least:g} to {most:g}, not {value!r}")
+        return kind(value)
+
+
+def read(path: Path) -> Campaign:
+    """The campaign in a file. Raises CampaignError, OSError."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise CampaignError(f"{path}: expected UTF-8: {error}") from None
+    reader = _Reader(str(path), text)
+    reader.known()
+    faults = {kind: reader.number("faults", kind, int, 0, 0, 1_000_000) for kind in KINDS}
+    if not any(faults.values()):
+        raise reader.fail("", "faults", "expected a share above 0 for a kind of fault")
+    seconds = reader.number("run", "seconds", float, None, 0.001, 3600)
+    start = reader.number("run", "start", float, 0.0, 0, 3600)
+    if start >= seconds:
+        raise reader.fail("run", "start", f"start: expected a time before {seconds:g} s, not {start:g}")
+    return Campaign(
+        seed=reader.number("", "seed", int, 1, 0, (1 << 63) - 1),
+        trials=reader.number("", "trials", int, None, 1, 10_000_000),
+        seconds=seconds,
+        start=start,
+        selector=reader.number("run", "selector", int, 0, 0, 15),
+        hang=reader.number("run", "hang", float, 2.0, 1, 100),
+        input={n: _said(reader, f"uart{n}") for n in (1, 2)},
+        detect={n: _patterns(reader, f"uart{n}") for n in (1, 2)},
+        faults=faults,
+        fingerprint=hashlib.sha256(text.encode()).hexdigest(),
+    )
+
+
+def _said(reader: _Reader, key: str) -> tuple[tuple[float, bytes], ...]:
+    expected = f'{key}: expected a list of [seconds, "text"] in the order of time'
+    found: list[tuple[float, bytes]] = []
+    for one in _listed(reader, "input", key):
+        is_pair = isinstance(one, list) and len(one) == 2
+        if not is_pair or not isinstance(one[0], int | float) or not isinstance(one[1], str) or one[0] < 0:
+            raise reader.fail("input", key, expected)
+        if found and one[0] < found[-1][0]:
+            raise reader.fail("input", key, expected)
+        try:
+            found.append((float(one[0]), one[1].encode("latin-1")))
+        except UnicodeEncodeError:
+            raise reader.fail("input", key, f"{key}: expected characters up to \\u00ff") from None
+    return tuple(found)
+
+
+def _patterns(reader: _Reader, key: str) -> tuple[str, ...]:
+    found = _listed(reader, "detect", key)
+    for one in found:
+        try:
+            re.compile(one.encode("latin-1"))
+        except (AttributeError, UnicodeEncodeError, re.error) as error:
+            raise reader.fail("detect", key, f"{key}: expected regular expressions: {error}") from None
+    return tuple(found)
+
+
+def _listed(reader: _Reader, section: str, key: str) -> list[Any]:
+    value = reader.section(section).get(key, [])
+    if not isinstance(value, list):
+        raise reader.fail(section, key, f"{key}: expected a list")
+    return value
