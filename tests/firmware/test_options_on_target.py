@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import random
+
 import emu
 from emu import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
-from tests.firmware.test_on_target import FCY, run_to
+from tests.firmware.test_on_target import FCY, INT1IF, run_to
+from tests.fuzz.seeds import base_seed
 
-MUTEX, NO_MUTEX, LATEST, NO_LATEST, ENDS = range(5)
+MUTEX, NO_MUTEX, LATEST, NO_LATEST, ENDS, INTERRUPTS = range(6)
 """Scenes (target/options/main.c)."""
 
 
@@ -51,3 +54,22 @@ def test_ends_are_seen_waited_for_and_cleaned_up(image: Build) -> None:
     assert machine.peek("joined") == 3
     assert machine.peek("cleaned") == 3
     assert machine.peek("service_starts") == 3
+
+
+def test_an_interrupt_may_call_no_option_and_breaks_none(image: Build) -> None:
+    """Every call of every option is refused, at random instants within locks, joins, burials and limited sends."""
+    machine = emu.load(image("options", TARGET_APPS), engine="jit")
+    run_to(machine, "begin")
+    machine.poke("scene", INTERRUPTS)
+    machine.run(cycles=100_000)
+    machine.write("IEC1", machine.peek("IEC1") | INT1IF)
+    instants = random.Random(base_seed())
+    for _ in range(600):
+        machine.write("IFS1", machine.peek("IFS1") | INT1IF)
+        assert machine.run(cycles=instants.randrange(3_000, 9_000)).reason == "limit"
+    assert machine.peek("wrong") == 0
+    assert machine.peek("interrupts") == 600
+    assert machine.peek("rounds") > 100
+    assert machine.peek("joined") > 10
+    assert machine.peek("cleaned") in (machine.peek("joined"), machine.peek("joined") + 1)
+    assert 0 < machine.peek("ticks") <= 600

@@ -10,7 +10,7 @@ from emu.cli import main
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_on_target import FCY, load, run_to, words
 
-SCHEDULERS = ["round robin", "fixed priority", "earliest deadline"]
+SCHEDULERS = ["round robin", "fixed priority", "earliest deadline", "woken first"]
 MOMENTS = ["never", "before the threads", "before the start", "after the start"]
 
 

@@ -6,7 +6,7 @@
 #include <openswarm_quota.h>
 #include <openswarm_service.h>
 
-enum { MUTEX, NO_MUTEX, LATEST, NO_LATEST, ENDS };
+enum { MUTEX, NO_MUTEX, LATEST, NO_LATEST, ENDS, INTERRUPTS };
 
 volatile uint16 scene __attribute__((used));
 volatile uint16 waited_ms __attribute__((used)), commands __attribute__((used)), ticks __attribute__((used));
@@ -33,7 +33,7 @@ static volatile bool taken;
 
 __attribute__((noinline, used)) void enter(void)
 {
-    if (scene == MUTEX) {
+    if (scene != NO_MUTEX) {
         SYS_ASSERT(Sys_Lock_Mutex(&mutex));
     } else {
         while (taken) {
@@ -45,7 +45,7 @@ __attribute__((noinline, used)) void enter(void)
 
 __attribute__((noinline, used)) void leave(void)
 {
-    if (scene == MUTEX) {
+    if (scene != NO_MUTEX) {
         SYS_ASSERT(Sys_Unlock_Mutex(&mutex));
     } else {
         taken = false;
@@ -153,6 +153,58 @@ static void watch_ends(void *unused)
     done = 1;
 }
 
+/* ---- Every call from an interrupt, while a thread owns a mutex and another waits for it, one joins and one is limited -- */
+
+volatile uint16 interrupts __attribute__((used)), wrong __attribute__((used)), rounds __attribute__((used));
+static uint16 partner;
+static sys_quota two;
+
+__attribute__((used)) void from_interrupt(void)
+{
+    static sys_quota none;
+    static sys_cleanup cleanup;
+    static sys_service service;
+    static const sys_process_config config = {count, NULL, 0, 0, 0, 0, 0};
+    uint16 refused = Sys_Get_Statistics()->refused;
+    wrong += Sys_Lock_Mutex(&mutex) + Sys_Lock_MutexTimeout(&mutex, 1) + Sys_Unlock_Mutex(&mutex);
+    wrong += (Sys_Start_Joinable(&config) != 0) + Sys_Join(partner);
+    wrong += Sys_Push_Cleanup(&cleanup, count, NULL) + Sys_Pop_Cleanup(true);
+    wrong += Sys_Limit_Event(&none, SYS_FIRST_USER_EVENT, 1) + Sys_Keep_Latest(&none, SYS_FIRST_USER_EVENT);
+    wrong += Sys_Start_Service(&service) + Sys_Feed_Watchdog();
+    wrong += Sys_Get_LastError() != SYS_ERROR_CONTEXT || (uint16)(Sys_Get_Statistics()->refused - refused) != 11;
+    wrong += !Sys_Send_IntEvent(SYS_FIRST_USER_EVENT, ++interrupts);
+}
+
+static bool newest(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid, (void)event;
+    wrong += data->value > interrupts;
+    ticks++;
+    return true;
+}
+
+static void lock_and_unlock(void *unused)
+{
+    (void)unused;
+    for (;;) {
+        enter();
+        Sys_Yield();
+        leave();
+        rounds++;
+    }
+}
+
+static void join_for_ever(void *unused)
+{
+    static const sys_process_config config = {brief, NULL, 0, 0, 0, 0, 0};
+    (void)unused;
+    for (;;) {
+        partner = Sys_Start_Joinable(&config);
+        wrong += !Sys_Join(partner);
+        joined++;
+    }
+}
+
 /* A stop for the test: scene is set here. */
 __attribute__((noinline, used)) void begin(void)
 {
@@ -173,6 +225,12 @@ int main(void)
         SYS_ASSERT(scene == NO_LATEST || Sys_Keep_Latest(&quota, SYS_1ms_TIMER));
         SYS_ASSERT(Sys_Subscribe_to_Event(SYS_1ms_TIMER, 0, slow, NULL));
         start(command, 0, 10);
+    } else if (scene == INTERRUPTS) {
+        SYS_ASSERT(Sys_Register_Event(SYS_FIRST_USER_EVENT) && Sys_Keep_Latest(&two, SYS_FIRST_USER_EVENT));
+        SYS_ASSERT(Sys_Subscribe_to_Event(SYS_FIRST_USER_EVENT, 0, newest, NULL));
+        start(lock_and_unlock, 0, 0);
+        start(lock_and_unlock, 0, 0);
+        start(join_for_ever, 0, 0);
     } else {
         start(watch_ends, 0, 0);
     }

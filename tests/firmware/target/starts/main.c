@@ -8,7 +8,7 @@ volatile uint16 rounds[2] __attribute__((used)), periods __attribute__((used)), 
 
 static void set_at(uint16 now)
 {
-    static const sys_scheduler *const all[] = {&sys_round_robin, &sys_fixed_priority, &sys_earliest_deadline};
+    static const sys_scheduler *const all[] = {&sys_round_robin, &sys_fixed_priority, &sys_earliest_deadline, &sys_woken_first};
     if (moment == now) {
         (void)Sys_Set_Scheduler(all[scheduler]);
     }
