@@ -20,6 +20,8 @@ VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.w
 BITCODE_MAGIC = b"BC\xc0\xde"
 DECLARED = re.compile(r"^declare [^@\n]*@([\w$.]+)\(", re.MULTILINE)
 ATTRIBUTES = re.compile(rb"^attributes #\d+ = \{", re.MULTILINE)
+OF_ASSEMBLY = re.compile(r' asm | c"preprologue:| c"save:')
+C_NAME = re.compile(r"\b([A-Za-z_]\w*)")
 ASSEMBLER_NAME = re.compile(r"\b_([A-Za-z_]\w*)")
 
 
@@ -81,12 +83,14 @@ def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
 
 
 def names_in_inline_assembly(text: str) -> set[str]:
-    """C names that inline assembly anywhere in the module's text refers to as `_name`."""
+    """C names that inline assembly anywhere in the module's text, or a `preprologue`, refers to as `_name`, and those that
+    `save` lists."""
     names: set[str] = set()
     for line in text.splitlines():
-        if " asm " in line:
-            quoted = line[line.index(" asm ") :]
-            names.update(ASSEMBLER_NAME.findall(re.sub(r"\\[0-9A-Fa-f]{2}", " ", quoted)))
+        found = OF_ASSEMBLY.search(line)
+        if found:
+            quoted = re.sub(r"\\[0-9A-Fa-f]{2}", " ", line[found.start() :])
+            names.update((C_NAME if found[0].endswith("save:") else ASSEMBLER_NAME).findall(quoted))
     return names
 
 

@@ -295,9 +295,9 @@ def test_scanf_reads_what_c_says(level: str, tmp_path: Path) -> None:
 
 HANDLERS = """
 #include <xc.h>
-int saved = 7;
+int saved = 7, entered, kept = 5;
 volatile int seen, count;
-void __attribute__((interrupt(irq(3), save(saved), preprologue("mov w0,_seen")), no_auto_psv)) tick(void)
+void __attribute__((interrupt(irq(3), save(saved, kept), preprologue("mov w0,_seen; inc _entered")), no_auto_psv)) tick(void)
 {
     saved = 99;
     count++;
@@ -316,14 +316,15 @@ int main(void)
     __asm__ volatile("mov #0x55,w0\\n\\tbset _IFS0,#3\\n\\tnop\\n\\tnop\\n\\tnop\\n\\tnop" ::: "w0", "memory");
     IFS0bits.T2IF = 1;
     Nop(); Nop(); Nop(); Nop();
-    return seen == 0x55 && saved == 7 ? count : 99;
+    return seen == 0x55 && saved == 7 && entered == 1 && kept == 5 ? count : 99;
 }
 """
 
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_arguments_of_the_interrupt_attribute(level: str, tmp_path: Path) -> None:
-    """irq(N) binds a handler of any name, save() keeps variables, preprologue() runs before anything is saved."""
+    """irq(N) binds a handler of any name, save() keeps variables, preprologue() runs before anything is saved;
+    variables that only these name are kept."""
     assert status_of(tmp_path, HANDLERS, level) == 11
 
 
