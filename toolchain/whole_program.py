@@ -83,8 +83,8 @@ def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
 
 
 def names_in_inline_assembly(text: str) -> set[str]:
-    """C names that inline assembly anywhere in the module's text, or a `preprologue`, refers to as `_name`, and those that
-    `save` lists."""
+    """C names that inline assembly anywhere in the module's text, or a `preprologue`, refers to as `_name`, and those
+    that `save` lists."""
     names: set[str] = set()
     for line in text.splitlines():
         found = OF_ASSEMBLY.search(line)

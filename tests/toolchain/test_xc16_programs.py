@@ -297,7 +297,8 @@ HANDLERS = """
 #include <xc.h>
 int saved = 7, entered, kept = 5;
 volatile int seen, count;
-void __attribute__((interrupt(irq(3), save(saved, kept), preprologue("mov w0,_seen; inc _entered")), no_auto_psv)) tick(void)
+#define BEFORE preprologue("mov w0,_seen; inc _entered")
+void __attribute__((interrupt(irq(3), save(saved, kept), BEFORE), no_auto_psv)) tick(void)
 {
     saved = 99;
     count++;

@@ -38,6 +38,7 @@ def device_symbols(chip: Chip) -> tuple[str, ...]:
     guard = ("__HAS_CODEGUARD",) if "FBS" in chip.config else ()
     return (f"__{chip.name.removeprefix('dsPIC')}", *DEVICE_SYMBOLS, *guard)
 
+
 _NUMERIC_LABEL = re.compile(r"(\d+)([fb])$")
 
 

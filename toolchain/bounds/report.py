@@ -126,19 +126,26 @@ class Analyst:
         try:
             outside = kind != "interrupt" or entry in self.program.outside()
             found = self.explore(entry, level, on_other, outside)
+            anywhere = self.explore(entry, level, on_other, False) if kind == "call" and self.private else found
         except TooMuch:
             result.open[self.program.place(entry)] = "too many paths; bound its loops"
             return result
         self._fill(result, found, on_other)
+        self._time(result, found, anywhere)
         return result
+
+    def _time(self, result: Bound, *contexts: Outcome) -> None:
+        """The longest way in any context; PRIVATE_VALUEs are those of threads only outside of sections."""
+        for found in contexts:
+            result.open |= {self.program.place(pc): why for pc, why in found.open.items()}
+        times = [end.time for found in contexts for end in found.ends.values()]
+        times += [found.left for found in contexts if found.left is not None]
+        if times and not result.open:
+            result.cycles = max(times)
 
     def _fill(self, result: Bound, found: Outcome, on_other: bool) -> None:
         place = self.program.place
-        result.open = {place(pc): why for pc, why in found.open.items()}
         result.forever = not found.ends and found.left is None and bool(found.forever)
-        times = [end.time for end in found.ends.values()] + ([] if found.left is None else [found.left])
-        if times and not found.open:
-            result.cycles = max(times)
         start = CALL_BYTES + (self.other[0] if on_other and self.other is not None else self.base)
         deepest = -1
         for (stack, level), (top, chain) in found.peak.items():

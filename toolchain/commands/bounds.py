@@ -101,7 +101,11 @@ def _number(value: int | None) -> str:
 
 
 def _check(report: Report, name: str, limit: int, what: str) -> int:
-    rows = [row for row in (*report.calls, *report.threads, *report.interrupts) if row.name == name.removeprefix("_")]
+    rows = [
+        row
+        for row in (*report.calls, *report.threads, *report.interrupts)
+        if row.name in (name, name.removeprefix("_"))
+    ]
     if not rows:
         raise ToolError(f"no function that was looked at is called {name}")
     value = rows[0].cycles if what == "cycles" else rows[0].bytes if rows[0].stack_is_known else None

@@ -116,7 +116,7 @@ uint16 Sys_Start_ProcessWith(const sys_process_config *config);
 /* MTH | own PID: never returns | ~450 + 25 m + g per subscription of its own | 42 | PROCESS.  Also ends its
  * subscriptions, its wait and its uncleared wait result. */
 bool Sys_Kill_Process(uint16 pid);
-/* T | no | 54 to a yielded thread, 65 to a preempted one | 20 | CONTEXT.  Hands the rest of the slice on. */
+/* T | no | 54 to a yielded thread, 66 to a preempted one | 20 | CONTEXT.  Hands the rest of the slice on. */
 void Sys_Yield(void);
 /* T | yes, ms rounded up to the next 1 ms tick | ~200 + 20 n | 42 | CONTEXT.  0 ms = Sys_Yield. */
 void Sys_Sleep(uint16 ms);
@@ -128,7 +128,7 @@ void Sys_Start_CriticalSection(void);
 void Sys_End_CriticalSection(void);
 /* MTHI | no | 6 | 4 | none.  In a handler: the interrupted thread; use the pid argument of the handler instead. */
 uint16 Sys_Get_ProcessID(void);
-/* MTH | no | ~65 + 18 n | 16 | none.  SYS_UNKNOWN: no such thread. */
+/* MTH | no | ~90 + 25 n | 16 | none.  SYS_UNKNOWN: no such thread. */
 sys_state Sys_Get_ProcessState(uint16 pid);
 /* MTH | no | ~80 + 18 n + 6 per byte | 16 | none.  Stack bytes never used so far; 0 also for an unknown PID and
  * PID 0. */
@@ -152,7 +152,7 @@ uint16 Sys_Get_UnusedKernelStack(void);
  * threads without a period in what those leave. */
 typedef struct sys_scheduler sys_scheduler;
 extern const sys_scheduler sys_round_robin, sys_woken_first, sys_fixed_priority, sys_earliest_deadline;
-/* MTHI | no | 24 | 4 | ARGUMENT.  Takes effect at the next thread switch. NULL is refused. */
+/* MTHI | no | 24, refused 35 | 4 | ARGUMENT.  Takes effect at the next thread switch. NULL is refused. */
 bool Sys_Set_Scheduler(const sys_scheduler *scheduler);
 
 /* ---- Events ------------------------------------------------------------------------------------------------- */
@@ -172,12 +172,12 @@ bool Sys_Subscribe_to_Event(uint16 event, uint16 pid, sys_handler handler, sys_c
 bool Sys_Unsubscribe_from_Event(uint16 event, uint16 pid);
 /* MTH | no | ~120 + 9 b + (15 + g) s | 34 | EVENT.  One handler; false: it was not subscribed. */
 bool Sys_Unsubscribe_Handler(uint16 event, uint16 pid, sys_handler handler);
-/* MTHI | no | 95 + 9 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 if nobody
+/* MTHI | no | 95, or 124 + 10 b; 17 + d/2 more unless d = 2; 8 per waiting thread if there is no handler; 70 if nobody
  * listens; at most 460 more while memory is short | 32 | EVENT, MEMORY, ARGUMENT.  Copies the payload and queues it. True
  * also if nobody listens; then nothing is stored. False: nothing was queued. Payloads above SYS_SMALL_PAYLOAD: not from
  * an ISR. ISRs share the piece of memory that was the largest when something was last given back or started. */
 bool Sys_Send_Event(uint16 event, const void *data, uint16 size);
-/* MTHI | no | 104 + 9 b | 38 | EVENT, MEMORY.  As above. */
+/* MTHI | no | 104, or 133 + 10 b | 38 | EVENT, MEMORY.  As above. */
 bool Sys_Send_IntEvent(uint16 event, uint16 value);
 /* T | yes | ~250 + 9 b + 30 n | 46 | CONTEXT, EVENT.  NULL: refused, or the event was unregistered. A thread owns one
  * result at a time: its next wait, sleep excepted, frees the previous one. */
@@ -206,7 +206,7 @@ typedef struct {
 const sys_statistics *Sys_Get_Statistics(void);
 /* MTHI | no | 12 | 8 | none.  Milliseconds since Sys_Start_Kernel, without drift; wraps after 49.7 days. */
 uint32 Sys_Get_SystemTime(void);
-/* MTHI | no | 14 | 8 | none.  A sys_error of the caller's own: each thread has one, all handlers and conditions have one
+/* MTHI | no | 18 | 8 | none.  A sys_error of the caller's own: each thread has one, all handlers and conditions have one
  * together, and all ISRs. It stays until the next failing call, or in a thread until it blocks, which may set SYS_OK. */
 uint16 Sys_Get_LastError(void);
 /* MTHI | no | 6 | 4 | none.  The speed in force, mm/s, after the post-processor. */

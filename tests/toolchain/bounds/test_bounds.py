@@ -180,6 +180,14 @@ def test_paths_that_call_a_function_can_be_left_out(tmp_path, capsys) -> None:
     assert "no function is called nothing" in capsys.readouterr().err
 
 
+def test_a_call_is_bounded_inside_of_sections_too(tmp_path, capsys) -> None:
+    """Where a PRIVATE_VALUE is not what threads enter with: the way out of a section runs only there."""
+    text = "#include <bounds.h>\nint depth; PRIVATE_VALUE(depth, 0);\n__attribute__((noinline)) void leave(void)\n"
+    text += '{ if (depth) { depth--; __asm__ volatile("repeat #99\\n nop" ::: "memory"); } }\n'
+    text += "int main(void) { depth = 1; leave(); return depth; }"
+    assert report(capsys, built(tmp_path, text), "--function", "leave")["cycles"] > 100
+
+
 def test_a_note_costs_neither_code_nor_memory(tmp_path: Path) -> None:
     """bounds.h promises it."""
     (tmp_path / "a").mkdir()

@@ -1,0 +1,202 @@
+"""Bounds of our kernel's calls beside the worst that runs of its applications take: one table.
+
+`python -m bench.bounds [--seconds S] [--json]`. Each call is bounded in the image it is measured in, with the numbers
+of threads, events and messages that the image can have. Measured is from the first instruction to behind the return,
+as bounds are; a call that was interrupted, or in which threads were switched, is not counted. "Plain" leaves out the
+ways on which memory is short or the call is refused; they count in the other column.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+import emu  # noqa: E402
+from toolchain.bounds.notes import read_notes  # noqa: E402
+from toolchain.bounds.program import Program  # noqa: E402
+from toolchain.bounds.report import Analyst  # noqa: E402
+from toolchain.elf.read import read_executable  # noqa: E402
+from toolchain.stack.annotations import Annotations, add_symbols  # noqa: E402
+
+APART = ("renew_reserve", "refuse_message", "os_fail", "os_refuse", "heap_give")
+"""Functions of the ways that are not plain."""
+SWITCHES = ("hal_yield", "hal_block", "hal_abandon")
+TARGET = "../tests/firmware/target"
+IMAGES = {
+    "stress": ("apps", {"n": 12, "m": 12, "b": 2, "s": 2, "q": 20, "i": 0, "u": 100, "d": 24}),
+    "points": (TARGET, {"n": 3, "m": 12, "b": 2, "s": 2, "q": 4, "i": 0, "u": 100, "d": 24}),
+}
+"""Images, where they are, and the most of everything they have at one time (bounds --help)."""
+CALL_BYTES = 4
+
+
+@dataclass
+class Row:
+    """One call in one image: cycles; None where there is no bound, or it never came undisturbed."""
+
+    image: str
+    call: str
+    seen: int | None = None
+    bound: int | None = None
+    plain_seen: int | None = None
+    plain_bound: int | None = None
+
+
+@dataclass
+class Open:
+    """A call under way: where its stack and clock stood, and whether it still counts, and as plain."""
+
+    name: str
+    top: int
+    start: int
+    counts: bool = True
+    plain: bool = True
+
+
+@dataclass
+class Meter:
+    """Times calls on a running machine."""
+
+    machine: emu.Machine
+    worst: dict[tuple[str, bool], int] = field(default_factory=dict)
+    under_way: list[Open] = field(default_factory=list)
+    watched: set[int] = field(default_factory=set)
+
+    def enter(self, name: str) -> Callable[[], bool]:
+        """What happens at the first instruction of a function."""
+
+        def hook() -> bool:
+            machine = self.machine
+            top = machine.w[15]
+            back = machine.peek(top - 4) | (machine.peek(top - 2) & 0x7F) << 16
+            self.under_way.append(Open(name, top - CALL_BYTES, machine.cycle))
+            if back not in self.watched:
+                self.watched.add(back)
+                machine.hook_pc(back, self.leave)
+            return False
+
+        return hook
+
+    def leave(self) -> bool:
+        """Where some call came from."""
+        top = self.machine.w[15]
+        for one in [one for one in self.under_way if one.top == top]:
+            self.under_way.remove(one)
+            if one.counts:
+                key = one.name, one.plain
+                self.worst[key] = max(self.worst.get(key, 0), self.machine.cycle - one.start)
+        return False
+
+    def disturb(self) -> bool:
+        """An interrupt, or a switch."""
+        for one in self.under_way:
+            one.counts = False
+        return False
+
+    def apart(self) -> bool:
+        """A way that is not plain."""
+        for one in self.under_way:
+            one.plain = False
+        return False
+
+
+def build(app: str, apps: str, out: Path) -> Path:
+    """The image of an application."""
+    words = [f"APP={app}", f"APPS={apps}", f"OUT={out}", f"PYTHON={sys.executable}"]
+    subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), *words], check=True)
+    return out / "firmware.elf"
+
+
+def measure(path: Path, program: Program, names: list[str], seconds: float) -> dict[tuple[str, bool], int]:
+    """The worst of each function, plain and otherwise."""
+    machine = emu.load(path)
+    meter = Meter(machine)
+    for handler in program.interrupts():
+        machine.hook_pc(handler, meter.disturb)
+    for hooked, hook in ((SWITCHES, meter.disturb), (APART, meter.apart)):
+        for name in hooked:
+            address = program.address(name)
+            if address in program.calls.entries:
+                machine.hook_pc(address, hook)
+    for name in names:
+        address = program.address(name)
+        assert address is not None
+        machine.hook_pc(address, meter.enter(name))
+    machine.run(seconds=seconds)
+    return meter.worst
+
+
+def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> list[Row]:
+    """All calls of the kernel in one image."""
+    image = read_executable(path.read_bytes(), str(path))
+    annotations = Annotations()
+    add_symbols(annotations, image.symbols)
+    notes = read_notes(image, values)
+    whole = Program(image, annotations, notes)
+    apart = [name for name in APART if whole.address(name) in whole.calls.entries]
+    plain = Program(image, annotations, notes, apart)
+    names = whole.interesting("_Sys_")
+    seen = measure(path, whole, names, seconds)
+    rows = []
+    for name in names:
+        at = whole.address(name)
+        assert at is not None
+        both = [seen[name, kind] for kind in (True, False) if (name, kind) in seen]
+        if both:
+            bounds = [Analyst(program).bound(name, at, "call").cycles for program in (whole, plain)]
+            rows.append(Row(app, name.lstrip("_"), max(both), bounds[0], seen.get((name, True)), bounds[1]))
+    return rows
+
+
+def table(rows: list[Row]) -> str:
+    """As Markdown."""
+
+    def ratio(bound: int | None, seen: int | None) -> str:
+        return "-" if bound is None or not seen else f"{bound / seen:.2f}"
+
+    def number(value: int | None) -> str:
+        return "-" if value is None else f"{value:,}"
+
+    lines = [
+        "| image | call | plain: bound | seen | ratio | all: bound | seen | ratio |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        cells = [row.image, f"`{row.call}`", number(row.plain_bound), number(row.plain_seen)]
+        cells += [
+            ratio(row.plain_bound, row.plain_seen),
+            number(row.bound),
+            number(row.seen),
+            ratio(row.bound, row.seen),
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Command line; status 1 if anything was seen above its bound."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=2.0, help="simulated time of each image (default 2)")
+    parser.add_argument("--json", action="store_true", help="machine-readable output")
+    options = parser.parse_args()
+    rows: list[Row] = []
+    with tempfile.TemporaryDirectory(prefix="bounds-") as folder:
+        for app, (apps, values) in IMAGES.items():
+            path = build(app, apps, Path(folder) / app)
+            rows += rows_of(app, path, values, options.seconds)
+    print(json.dumps([asdict(row) for row in rows], indent=1) if options.json else table(rows))
+    over = [r for r in rows for b, s in ((r.bound, r.seen), (r.plain_bound, r.plain_seen)) if b and s and s > b]
+    return 1 if over else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
