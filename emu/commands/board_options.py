@@ -40,7 +40,11 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
     board.add_argument(
         "--sensor", choices=SENSORS, default=SENSORS[0], help=f"camera type (default {SENSORS[0]}; none: unplugged)"
     )
-    board.add_argument("--stimulus", metavar="FILE", help="events for the robot, one per line: TIME WHAT ARGUMENTS")
+    board.add_argument(
+        "--stimulus",
+        metavar="FILE",
+        help="events for the robot: a script (lines of TIME WHAT ARGUMENTS), or pins from a .vcd or .csv file",
+    )
 
 
 def add_watch_option(parser: argparse.ArgumentParser) -> None:

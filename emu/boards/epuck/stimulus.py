@@ -17,6 +17,8 @@
     8.0s    i2c       sda 5           SDA is held low for 5 clocks (0: until `free`); or: scl, free
     0       noise     1               sensor noise as the reference says; 0 = none
 
+Waveforms are scripts too: files called *.vcd and *.csv (waveform.py).
+
 Times are in s, ms or us (`1.5s`) or cycles (`22118400`). Lines may be in any order; equal times keep theirs.
 """
 
@@ -32,6 +34,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.remote import KEYS
+from emu.boards.epuck.waveform import WaveformError, read_csv, read_vcd
 from emu.boards.part import Part
 from emu.boards.picture import read_picture
 from emu.peripherals.pins import parse_pin
@@ -69,6 +72,21 @@ def parse(board: Epuck, text: str, name: str = "stimulus") -> list[Step]:
                 steps.append(Step(_time(board, words[0]), number, _action(board, words[1:])))
         except (ValueError, SyntaxError, LookupError) as error:
             raise StimulusError(f"{name}:{number}: {error}") from None
+    return sorted(steps, key=lambda step: step.cycle)
+
+
+def waveform(board: Epuck, path: Path) -> list[Step]:
+    """Steps of a VCD or CSV file in order of time. Raises StimulusError, OSError, UnicodeDecodeError."""
+    steps: list[Step] = []
+    number = 1
+    try:
+        lines = read_vcd(path.read_bytes()) if path.suffix == ".vcd" else read_csv(path.read_text(encoding="utf-8"))
+        for number, time, words in lines:
+            steps.append(Step(round(time * Fraction(board.chip.fcy)), number, _action(board, words)))
+    except WaveformError as error:
+        raise StimulusError(f"{path}:{error.line}: {error}") from None
+    except (ValueError, LookupError) as error:
+        raise StimulusError(f"{path}:{number}: {error}") from None
     return sorted(steps, key=lambda step: step.cycle)
 
 
@@ -251,9 +269,12 @@ class Stimulus(Part):
         self._due: Final = self.slot("next", self._play)
 
     def load(self, path: Path) -> None:
-        """Play the file at `path`. Call it when the machine has its image, whose clock setting turns seconds into
-        cycles. Raises StimulusError, OSError, UnicodeDecodeError."""
-        self.play(parse(self._board, path.read_text(encoding="utf-8"), str(path)))
+        """Play the file at `path`, a script or a waveform. Call it when the machine has its image, whose clock
+        setting turns seconds into cycles. Raises StimulusError, OSError, UnicodeDecodeError."""
+        if path.suffix in (".vcd", ".csv"):
+            self.play(waveform(self._board, path))
+        else:
+            self.play(parse(self._board, path.read_text(encoding="utf-8"), str(path)))
 
     def play(self, steps: list[Step]) -> None:
         """Do `steps`, in order of time, from now on; steps of the past happen at once. Replaces an earlier script."""

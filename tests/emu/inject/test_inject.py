@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -194,6 +195,11 @@ def test_mistakes_are_told_with_their_line(tmp_path, old, new, line, expected):
         read(path)
     assert str(told.value).startswith(f"{path}:{line}: ")
     assert expected in str(told.value)
+
+
+def test_the_campaign_of_the_documents_is_one():
+    campaign = read(Path(__file__).resolve().parents[3] / "docs" / "examples" / "stress-faults.toml")
+    assert (campaign.trials, campaign.seconds) == (400, 3.2)
 
 
 def test_the_state_of_another_campaign_is_refused(firmware, capsys):

@@ -1,0 +1,100 @@
+"""Waveforms as stimulus: what a file says of pins becomes steps of a script.
+
+CSV   a line of names, then one line for every time: `time` in s, then pins and uart1, uart2 (a byte, 0 to 255). An
+      empty cell changes nothing.
+VCD   wires of one bit whose names begin with a pin's (`RB3`, `RC1_front`), in any scope; the rest is passed over,
+      and so are x and z. What `emu run --vcd` writes is such a file.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator
+from fractions import Fraction
+from io import BytesIO, StringIO
+
+from emu.peripherals.pins import parse_pin
+
+UARTS = ("uart1", "uart2")
+Line = tuple[int, Fraction, list[str]]
+"""Line of the file, time in s, and what happens, in the words of a script."""
+
+
+class WaveformError(ValueError):
+    """A file is wrong: `line` of it, and what was expected."""
+
+    def __init__(self, line: int, expected: str) -> None:
+        super().__init__(expected)
+        self.line = line
+
+
+def read_csv(text: str) -> Iterator[Line]:
+    """Raises WaveformError."""
+    rows = csv.reader(StringIO(text), skipinitialspace=True)
+    names = next(rows, [])
+    if not names or names[0] != "time" or len(names) < 2:
+        raise WaveformError(1, "expected names of columns: time, then pins, uart1 or uart2")
+    for name in names[1:]:
+        if name not in UARTS:
+            _pin(name, 1)
+    for row in rows:
+        if not row:
+            continue
+        if len(row) != len(names):
+            raise WaveformError(rows.line_num, f"expected {len(names)} cells, found {len(row)}")
+        try:
+            time = Fraction(row[0])
+        except (ValueError, ZeroDivisionError):
+            time = Fraction(-1)
+        if time < 0:
+            raise WaveformError(rows.line_num, f"expected a time in s, not {row[0]!r}")
+        for name, cell in zip(names[1:], row[1:], strict=True):
+            if cell and name in UARTS:
+                if not cell.isdecimal() or int(cell) > 255:
+                    raise WaveformError(rows.line_num, f"{name}: expected a byte, 0 to 255, not {cell!r}")
+                yield rows.line_num, time, [name, repr(chr(int(cell)))]
+            elif cell:
+                if cell not in ("0", "1"):
+                    raise WaveformError(rows.line_num, f"{name}: a level is 0 or 1, not {cell!r}")
+                yield rows.line_num, time, ["pin", name, cell]
+
+
+def read_vcd(data: bytes) -> Iterator[Line]:
+    """Raises WaveformError."""
+    from vcd.common import Timescale
+    from vcd.reader import TokenKind, VCDParseError, tokenize
+
+    scale, now, pins = Fraction(1, 10**9), 0, {}
+    try:
+        for token in tokenize(BytesIO(data)):
+            line = token.span.start.line
+            if token.kind is TokenKind.TIMESCALE:
+                assert isinstance(token.timescale, Timescale)
+                scale = int(token.timescale.magnitude) * _unit(token.timescale.unit.value)
+            elif token.kind is TokenKind.VAR and token.var.size == 1:
+                name = re.match(r"R[A-G]\d+(?=_|$)", token.var.reference)
+                if name is not None:
+                    pins[token.var.id_code] = _pin(name[0], line)
+            elif token.kind is TokenKind.CHANGE_TIME:
+                now = token.time_change
+            elif token.kind is TokenKind.CHANGE_SCALAR:
+                level = token.scalar_change.value
+                if token.scalar_change.id_code in pins and level in ("0", "1"):
+                    yield line, now * scale, ["pin", pins[token.scalar_change.id_code], level]
+    except VCDParseError as error:
+        raise WaveformError(error.loc.line, f"expected a VCD file: {error}") from None
+    if not pins:
+        raise WaveformError(1, "expected a VCD file with wires of one bit that have names of pins, like RB3")
+
+
+def _unit(name: str) -> Fraction:
+    return Fraction(1, 10 ** (3 * ("s", "ms", "us", "ns", "ps", "fs").index(name)))
+
+
+def _pin(name: str, line: int) -> str:
+    try:
+        parse_pin(name)
+    except (ValueError, LookupError) as error:
+        raise WaveformError(line, str(error)) from None
+    return name
