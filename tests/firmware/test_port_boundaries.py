@@ -20,7 +20,7 @@ import pytest
 
 from firmware.tools.simulated.epuck2 import Epuck2
 from firmware.tools.simulated.kilobot import Kilobot
-from firmware.tools.simulated.machine import Machine, NotInstalled, peek
+from firmware.tools.simulated.machine import Machine, NotInstalled, Stopped, peek
 from tests.firmware.conftest import TARGET_APPS
 from tests.firmware.test_ports import kilobot, make
 
@@ -111,9 +111,12 @@ def sweep_epuck2(image: Path, way: str, stride: int, phase: int, times: int) -> 
                     machine.step()
             if way != "slice":
                 machine.store(*EXTI0)
-            machine.run_to("round_begin")
-            tried += 1
             where = f"{way}, {place:#x} the {times}. time"
+            try:
+                machine.run_to("round_begin")
+            except Stopped as stopped:
+                raise AssertionError(f"{where}: {stopped}") from None
+            tried += 1
             check(machine, where)
             assert peek(machine, "interrupts") - before == (way != "slice"), f"{where}: the interrupt was lost"
     return tried

@@ -26,7 +26,7 @@ SPARSE = 97
 def main() -> int:
     course = Course(parser(__doc__), "rounds", 2 * len(SCENES), "scenes")
     course.parser.add_argument(
-        "--stride", type=int, help=f"every N-th boundary (default 1: hours; {SPARSE} with --seconds)"
+        "--stride", type=int, help=f"every N-th boundary (default 1: an hour; {SPARSE} with --seconds)"
     )
     options = course.parse()
     stride = options.stride or (1 if options.seconds is None else SPARSE)

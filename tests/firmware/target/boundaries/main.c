@@ -190,13 +190,25 @@ static void options(void)
     MUST(pid != 0 && Sys_Join(pid) && Sys_Get_ProcessState(pid) == SYS_UNKNOWN);
 }
 
+/* A tick that just came has its message there until it is delivered. */
+static uint16 heap_at_rest(void)
+{
+    uint16 least = UINT16_MAX;
+    for (uint8 i = 0; i < 3; i++) {
+        Sys_Yield();
+        uint16 used = Sys_Get_Statistics()->heap_used;
+        least = used < least ? used : least;
+    }
+    return least;
+}
+
 static void driver(void *unused)
 {
     (void)unused;
     for (;;) {
         Sys_Sleep(1);
         Sys_Sleep(1); /* what the last round left in the queue is gone */
-        uint16 heap = Sys_Get_Statistics()->heap_used;
+        uint16 heap = heap_at_rest();
         sent = isr_sent = heard = 0;
         rounds++;
         round_begin();
@@ -207,7 +219,7 @@ static void driver(void *unused)
         Sys_Sleep(1);
         Sys_Sleep(1);
         MUST(sent == 2 && heard == sent + isr_sent);
-        MUST(Sys_Get_Statistics()->heap_used == heap);
+        MUST(heap_at_rest() == heap);
     }
 }
 
