@@ -1,0 +1,179 @@
+"""Locals and parameters as a debugger shows them: `python tests/fuzz/fuzz_locals.py [--files N] [--seed N]`.
+
+Random functions, ten to a file, with a model of what every variable holds before every line. At -O0 each variable that
+has been set is right wherever a line begins. At -Os lines move, so a shown value counts as right if the variable has it
+anywhere in the model's run; others are counted, not failed: they are in the optimiser's own debug information, which
+gives a variable the value that is left of it where only some of its bits are used.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+import emu  # noqa: E402
+from emu.debug.locate import Unavailable  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+
+FUNCTIONS = 10
+OPERATORS = ("+", "-", "^", "&", "|", "*")
+State = dict[str, int]
+Run = list[tuple[int, State]]
+"""Lines in the order they are run, each with what the variables hold before."""
+
+
+class Function:
+    """A random function from line `first` on: its text, and a run of the model."""
+
+    def __init__(self, name: str, rng: random.Random, first: int) -> None:
+        self.name, self.rng = name, rng
+        self.parameters = [f"p{n}" for n in range(rng.randrange(1, 5))]
+        self.fixed = self.parameters[: rng.randrange(len(self.parameters) + 1)]
+        self.locals = [f"v{n}" for n in range(rng.randrange(2, 7))]
+        self.arguments = [rng.randrange(1 << 16) for _ in self.parameters]
+        head = ", ".join(f"unsigned {one}" for one in self.parameters)
+        self.lines = [f"unsigned __attribute__((noinline, used)) {name}({head})", "{"]
+        self.first = first
+        self.run: Run = []
+        self._state: State = dict(zip(self.parameters, self.arguments, strict=True))
+        for one in self.locals:
+            self._assign(one, "unsigned ", self._term(), 1)
+        for _ in range(rng.randrange(3, 9)):
+            self._statement()
+        self._line(f"return {' ^ '.join(self.locals)};")
+        self.lines.append("}")
+
+    def _line(self, text: str) -> None:
+        """A line that is run now."""
+        self.run.append((self.first + len(self.lines), dict(self._state)))
+        self.lines.append(f"    {text}")
+
+    def _term(self) -> str:
+        known = sorted(self._state)
+        left, right = self.rng.choice(known), self.rng.choice([*known, str(self.rng.randrange(1, 99)), "volatile_one"])
+        return f"{left} {self.rng.choice(OPERATORS)} {right}"
+
+    def _value(self, term: str) -> int:
+        return int(eval(term, {"volatile_one": 1}, dict(self._state))) & 0xFFFF
+
+    def _assign(self, name: str, kind: str, term: str, times: int) -> None:
+        """`times`: 0 writes the line without running it, more runs it so often behind each other."""
+        text = f"{kind}{name} = {term};"
+        if not times:
+            self.lines.append(f"    {text}")
+            return
+        self._line(text)
+        self._state[name] = self._value(term)
+
+    def _changed(self) -> str:
+        return self.rng.choice([*self.locals, *(one for one in self.parameters if one not in self.fixed)])
+
+    def _statement(self) -> None:
+        kind = self.rng.random()
+        if kind < 0.6:
+            self._assign(self._changed(), "", self._term(), 1)
+            return
+        condition = f"({self._term()}) & {self.rng.choice((1, 2, 4))}"
+        taken = bool(self._value(condition))
+        self._line(f"if ({condition}) {{")
+        for _ in range(self.rng.randrange(1, 3)):
+            self._assign(self._changed(), "", self._term(), int(taken))
+        self.lines.append("    } else {")
+        for _ in range(self.rng.randrange(1, 3)):
+            self._assign(self._changed(), "", self._term(), int(not taken))
+        self.lines.append("    }")
+
+
+def program(seed: int) -> tuple[str, list[Function]]:
+    """A C file and its functions."""
+    rng = random.Random(seed)
+    lines, functions = ["volatile unsigned result, volatile_one = 1;"], []
+    for number in range(FUNCTIONS):
+        functions.append(Function(f"f{number}", rng, len(lines) + 1))
+        lines += functions[-1].lines
+    calls = " ".join(f"result = {one.name}({', '.join(map(str, one.arguments))});" for one in functions)
+    return "\n".join([*lines, f"int main(void) {{ {calls} return 0; }}"]) + "\n", functions
+
+
+def checked(image: Path, functions: list[Function], exact: bool, tally: Counter[str]) -> None:
+    """Step through every function and compare. Raises AssertionError."""
+    machine = emu.load(image, board=None)
+    starts = {row.start: row.line for row in machine.inside.image.lines.rows}
+    for function in functions:
+        assert machine.run(until=function.name).reason == "until"
+        everything: dict[str, set[int]] = {}
+        for _, state in function.run:
+            for name, value in state.items():
+                everything.setdefault(name, set()).add(value)
+        lines, visits, last = {line for line, _ in function.run}, list(function.run), 0
+        entry = machine.w[15]
+        while machine.w[15] >= entry - 4:
+            line = starts.get(machine.pc)
+            if line in lines and line != last and machine.inside.name_of(machine.pc) == function.name:
+                last = line
+                if exact:
+                    expected_line, state = visits.pop(0)
+                    assert line == expected_line, f"{function.name}: line {line} instead of {expected_line}"
+                    compare(machine, {name: {value} for name, value in state.items()}, False, tally)
+                else:
+                    compare(machine, everything, True, tally)
+            machine.step()
+            if machine.w[15] < entry:
+                break
+        assert not (exact and visits), f"{function.name}: lines never reached: {visits[0][0]}"
+        tally["functions"] += 1
+
+
+def compare(machine: emu.Machine, expected: dict[str, set[int]], may_lack: bool, tally: Counter[str]) -> None:
+    """Variables of the innermost frame against the values they may have."""
+    frame = machine.backtrace()[0]
+    for name, values in expected.items():
+        variable = machine.inside.variable(name, frame)
+        assert variable is not None, f"{name} is not known at {machine.inside.where(machine.pc)}"
+        try:
+            value = machine.inside.value(variable, frame).get()
+        except Unavailable as why:
+            if not may_lack:
+                raise AssertionError(f"{name} at {machine.inside.where(machine.pc)}: {why}") from None
+            tally["without value"] += 1
+            continue
+        where = machine.inside.where(machine.pc)
+        assert may_lack or value in values, f"{name} is shown as {value} at {where}, not {sorted(values)}"
+        tally["values" if value in values else "others"] += 1
+
+
+def tried(seed: int, folder: Path, tally: dict[str, Counter[str]]) -> None:
+    """One file at both levels."""
+    text, functions = program(seed)
+    source = folder / "random.c"
+    source.write_text(text)
+    for level in ("-O0", "-Os"):
+        image = emu.build(source, flags=(level, "-g"), output=folder / "random.elf")
+        checked(image, functions, level == "-O0", tally[level])
+
+
+def main() -> int:
+    course = Course(parser(__doc__), "files", 20, "files of ten functions")
+    course.parse()
+    tally: dict[str, Counter[str]] = {"-O0": Counter(), "-Os": Counter()}
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in course:
+            try:
+                tried(seed, Path(folder), tally)
+            except AssertionError as error:
+                return course.failed(error)
+    told = "; ".join(
+        f"{level}: {one['values']:,} values right, {one['others']:,} others, {one['without value']:,} optimised out"
+        for level, one in tally.items()
+    )
+    return course.ended(f"{tally['-O0']['functions']} functions, {told}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
