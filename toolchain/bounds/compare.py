@@ -80,7 +80,9 @@ def tested(steps: list[Step]) -> int | None:
     for index in range(len(steps) - 1, -1, -1):
         row, x = steps[index].insn.row, steps[index].insn.x
         if row.flags:
-            if row.mnemonic not in _RESULTS or "d" not in row.fields or x.B or ("q" in row.fields and x.q):
+            if row.mnemonic not in _RESULTS or "d" not in row.fields:
+                return None
+            if ("B" in row.fields and x.B) or ("q" in row.fields and x.q):
                 return None
             return None if written >> x.d & 1 else index
         written |= steps[index].writes

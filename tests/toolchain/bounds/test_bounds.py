@@ -188,6 +188,13 @@ def test_a_call_is_bounded_inside_of_sections_too(tmp_path, capsys) -> None:
     assert report(capsys, built(tmp_path, text), "--function", "leave")["cycles"] > 100
 
 
+def test_a_branch_on_a_shift_is_followed(tmp_path, capsys) -> None:
+    """Shifts by a number set Z and N and have no byte form."""
+    shift = '__asm__("lsr %1,#3,%0\\n\\tbra z,1f\\n\\tnop\\n1:" : "=r"(r) : "r"(v));'
+    text = "volatile int v; int main(void) { int r; " + shift + " return r; }"
+    assert report(capsys, built(tmp_path, text))["cycles"] > 5
+
+
 def test_a_note_costs_neither_code_nor_memory(tmp_path: Path) -> None:
     """bounds.h promises it."""
     (tmp_path / "a").mkdir()
