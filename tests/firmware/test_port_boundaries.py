@@ -136,6 +136,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.firmware.test_port_boundaries", description=__doc__)
     parser.add_argument("--robot", choices=("kilobot", "epuck2"), default="kilobot")
     parser.add_argument("--stride", type=int, default=1, help="boundaries from one to the next (default 1: all)")
+    parser.add_argument("--phase", type=int, default=0, help="of the e-puck2: the first of them (default 0)")
     parser.add_argument("--times", type=int, default=1, help="of the e-puck2: which time an instruction is come to")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -148,7 +149,7 @@ def main() -> int:
             if options.robot == "kilobot":
                 tried = sweep(Kilobot(image), way, options.stride)
             else:
-                tried = sweep_epuck2(image, way, options.stride, 0, options.times)
+                tried = sweep_epuck2(image, way, options.stride, options.phase, options.times)
             print(f"{way}: {tried:,} boundaries, nothing lost", flush=True)
     return 0
 
