@@ -7,7 +7,6 @@ handler or is silent. Finished trials are kept.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
@@ -19,7 +18,7 @@ from arena.record import FolderInUseError, RecordError
 from arena.scene import SceneError, load_scene, scenes
 from emu.completion import SHELLS, script
 from emu.completion import description as completion_description
-from emu.status import BAD_INPUT, CANNOT_GO_ON, DONE, INTERRUPTED
+from emu.status import BAD_INPUT, CANNOT_GO_ON, DONE, INTERRUPTED, unread_is_done
 
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),
@@ -37,6 +36,7 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
 }
 
 
+@unread_is_done
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the process's exit status."""
     parser = argparse.ArgumentParser(
@@ -63,18 +63,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "scenes":
             for name in scenes():
                 print(f"{name:20} {load_scene(name).description}")
-            status = DONE
-        elif options.command == "completion":
+            return DONE
+        if options.command == "completion":
             print(script("arena", {name: (one, one.description or "") for name, one in commands.choices.items()},
                          options.shell))  # fmt: skip
-            status = DONE
-        else:
-            status = COMMANDS[options.command][1](options)
-        sys.stdout.flush()
-        return status
+            return DONE
+        return COMMANDS[options.command][1](options)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
-        return DONE
+        raise
     except (FolderInUseError, ClusterLostError) as error:
         print(f"arena: {error}; finished trials are kept, the same command goes on", file=sys.stderr)
         return CANNOT_GO_ON

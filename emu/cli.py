@@ -7,7 +7,6 @@ NO_COLOR holds without being asked.
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -16,7 +15,7 @@ from typing import Final
 
 from emu.command import CommandError, Parser
 from emu.commands import COMMANDS
-from emu.status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE
+from emu.status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, unread_is_done
 
 _USAGE: Final = """usage: emu COMMAND [options]
 
@@ -26,16 +25,10 @@ example: emu run firmware.elf --seconds 5
 `emu COMMAND --help` explains a command; `emu --version` tells the version."""
 
 
+@unread_is_done
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        status = _answer(words)
-        sys.stdout.flush()
-        return status
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
-        return DONE
+    return _answer(list(sys.argv[1:] if arguments is None else arguments))
 
 
 def _answer(words: list[str]) -> int:

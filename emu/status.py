@@ -1,9 +1,16 @@
-"""The exit statuses of every command of the project. A leaf: it imports nothing of ours; the table in the documents is
-`table()`. 124 and 130 are what `timeout` of GNU coreutils and shells use for the same."""
+"""The exit statuses of every command of the project, and that a reader who leaves is none of them. A leaf: it imports
+nothing of ours; the table in the documents is `table()`. 124 and 130 are what `timeout` of GNU coreutils and shells use
+for the same."""
 
 from __future__ import annotations
 
-from typing import Final
+import os
+import sys
+from collections.abc import Callable
+from functools import wraps
+from typing import Final, ParamSpec
+
+P = ParamSpec("P")
 
 DONE: Final = 0
 FAULT: Final = 1
@@ -31,3 +38,23 @@ def table() -> str:
     """Every status with its meaning, as a table in Markdown."""
     rows = [f"| {status} | {meaning} |" for status, meaning in MEANING.items()]
     return "\n".join(["| status | meaning |", "|---:|---|", *rows])
+
+
+def unread_is_done(main: Callable[P, int]) -> Callable[P, int]:
+    """Wrap a command line: that nobody reads its output to the end (`| head`) is no failure, and nothing is said of it.
+
+    What is printed may only be refused when it is flushed, which Python does behind `main`, also behind `--help`.
+    """
+
+    @wraps(main)
+    def wrapped(*arguments: P.args, **options: P.kwargs) -> int:
+        try:
+            try:
+                return main(*arguments, **options)
+            finally:
+                sys.stdout.flush()
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return DONE
+
+    return wrapped

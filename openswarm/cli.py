@@ -3,7 +3,6 @@ imported only when it is asked for."""
 
 from __future__ import annotations
 
-import os
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
@@ -11,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import Final, Protocol, cast
 
-from emu.status import BAD_INPUT, DONE, INTERRUPTED
+from emu.status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
 
 COMMANDS: Final = {
     "new": "set up a project: Makefile, CMake, main.c, a test, settings for VS Code",
@@ -47,16 +46,14 @@ def command(name: str) -> Command:
     return cast(Command, import_module(f"openswarm.commands.{name}"))
 
 
+@unread_is_done
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        status = _answer(words)
-        sys.stdout.flush()
-        return status
+        return _answer(words)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more: not our failure
-        return DONE
+        raise
     except (ValueError, OSError) as error:
         print(f"openswarm {words[0]}: {error}", file=sys.stderr)
         return BAD_INPUT

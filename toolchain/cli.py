@@ -5,14 +5,13 @@ A command is a module with `main(arguments) -> exit status`, imported only when 
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from emu.status import BAD_INPUT, DONE, INTERRUPTED
+from emu.status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
 from toolchain.errors import ToolError
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -43,6 +42,7 @@ def _usage() -> str:
     return USAGE.format(commands="\n".join(f"  {name:10} {text}" for name, (_, text) in COMMANDS.items()))
 
 
+@unread_is_done
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0 done, 1 C errors, 2 bad input or usage."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -56,19 +56,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"toolchain: unknown command {words[0]!r}; known: {', '.join(COMMANDS)}", file=sys.stderr)
         return BAD_INPUT
     try:
-        status = import_module(COMMANDS[words[0]][0]).main(words[1:])
-        sys.stdout.flush()
-        return int(status or DONE)
+        return int(import_module(COMMANDS[words[0]][0]).main(words[1:]) or DONE)
     except ToolError as error:
         print(error, file=sys.stderr)
         return BAD_INPUT
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return DONE
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
+@unread_is_done
 def by_name() -> int:
     """Run the command that the program is called after: `dspic-ar rcs x.a y.o`, as build systems want their tools.
 

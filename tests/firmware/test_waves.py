@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -15,10 +14,8 @@ from emu.boards.epuck.board import Epuck
 from emu.cli import main
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_drivers_on_target import START
+from tests.vcd_reader import VCDVCD
 
-pipe = signal.getsignal(signal.SIGPIPE)
-vcdvcd = pytest.importorskip("vcdvcd", reason="the independent reader is not installed (extra: test)")
-signal.signal(signal.SIGPIPE, pipe)  # the reader is a script first: its import lets a broken pipe end the process
 FCY = 14_745_600
 
 
@@ -28,7 +25,7 @@ def picoseconds(cycle: int) -> int:
 
 
 def changes(path: Path) -> dict[str, list[tuple[int, str]]]:
-    read = vcdvcd.VCDVCD(str(path))
+    read = VCDVCD(str(path))
     return {name: read[name].tv for name in read.signals}
 
 

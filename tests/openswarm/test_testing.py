@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
-from vcdvcd import VCDVCD
+
+from tests.vcd_reader import VCDVCD
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from vcdvcd import VCDVCD
 
 from emu.boards.epuck.stimulus import StimulusError, waveform
 from emu.cli import main
+from tests.vcd_reader import VCDVCD
 from toolchain.driver import main as compile_program
 
 PULSES = """

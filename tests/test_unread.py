@@ -1,0 +1,31 @@
+"""Nobody reads what a command prints: `emu --help | head -0`. No traceback, no message, exit status 0."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+WORDS = [
+    "emu --help", "emu --version", "emu run --help", "emu completion bash",
+    "toolchain --help", "toolchain --version", "toolchain cc --help", "toolchain size --help",
+    "arena --help", "arena --version", "arena run --help", "arena scenes", "arena completion bash",
+    "openswarm --help", "openswarm --version", "openswarm new --help", "openswarm doctor",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", WORDS)
+def test_a_reader_that_has_gone_is_no_failure(line: str) -> None:
+    """Standard output is a pipe whose other end is closed already. Output is buffered, as it is for users: with
+    PYTHONUNBUFFERED in the environment, as on many servers, a flush behind `main` has nothing left to fail at."""
+    surroundings = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([sys.executable, "-m", *line.split()], stdout=writer, stderr=subprocess.PIPE, cwd=ROOT,
+                          env=surroundings, timeout=120, check=False)  # fmt: skip
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, b"")
