@@ -20,11 +20,14 @@ LENGTHS = (1, 3, 5, 8)
 PATIENCE = 20_000_000_000
 
 
+PROMISE = re.compile(r"no \| (?:\d+, or )?(\d+) \+.*?at most (\d+) more while memory is short", re.DOTALL)
+"""Of a contract line: what a call takes, `A + ...` or `Z, or A + ...`, and what a full heap may add."""
+
+
 def bound(call: str) -> int:
-    """Tcy the header promises for a call at most, parameters apart: "A + ...; at most B more while memory is short"."""
+    """Tcy the header promises for a call at most, parameters apart."""
     start = HEADER.index(f" {call}(")
-    contract = HEADER[HEADER.rindex("/* MTH", 0, start) : start]
-    base, more = re.search(r"no \| (\d+) \+.*?at most (\d+) more while memory is short", contract, re.DOTALL).groups()
+    base, more = PROMISE.search(HEADER[HEADER.rindex("/* MTH", 0, start) : start]).groups()
     return int(base) + int(more)
 
 
