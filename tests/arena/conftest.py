@@ -69,3 +69,12 @@ _main:  mov     #7, w0
         .pword  0xDB0000                ; no instruction
 3:      bra     3b
 """
+
+
+@pytest.fixture
+def full_disk() -> Path:
+    """A file that answers every write with ENOSPC; elsewhere than on Linux it takes a mount, and that takes root."""
+    device = Path("/dev/full")
+    if not device.exists():
+        pytest.skip("only Linux has /dev/full")
+    return device

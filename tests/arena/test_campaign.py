@@ -129,11 +129,9 @@ def test_a_new_scene_needs_no_code(tmp_path: Path) -> None:
     assert trials_in(tmp_path / "out")[0].about["scene"]["name"] == "small"
 
 
-def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path) -> None:
-    """/dev/full answers every write with ENOSPC, through a link where the part file would be."""
-    if not Path("/dev/full").exists():
-        pytest.skip("only Linux has /dev/full; without it a full disk takes a mount, and that takes root")
-    (tmp_path / "trial-0001.parquet.part").symlink_to("/dev/full")
+def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path, full_disk: Path) -> None:
+    """Every write is answered with ENOSPC, through a link where the part file would be."""
+    (tmp_path / "trial-0001.parquet.part").symlink_to(full_disk)
     rows = Rows()
     rows.add({"t": 0.0, "log": []})
     with pytest.raises(RecordError, match=r"trial-0001\.parquet: cannot be written: .*[Nn]o space"):
@@ -272,13 +270,11 @@ def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, full_disk: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Issue "Must show" 7: the second of three trials cannot be written; with room again the run goes on."""
-    if not Path("/dev/full").exists():
-        pytest.skip("only Linux has /dev/full; without it a full disk takes a mount, and that takes root")
     part = tmp_path / "trial-0002.parquet.part"
-    part.symlink_to("/dev/full")
+    part.symlink_to(full_disk)
     assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 2
     assert "trial-0002.parquet: cannot be written: No space left" in " ".join(capsys.readouterr().err.split())
     assert list(contents(tmp_path)) == ["trial-0001.parquet"]

@@ -28,13 +28,17 @@ int main(void) {
 """
 
 
-@pytest.fixture(scope="module")
-def image(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("profile")
-    source, target = folder / "timer.c", folder / "timer.elf"
-    source.write_text(SOURCE)
+def compiled(folder, text):
+    """The image of a C program."""
+    source, target = folder / "program.c", folder / "program.elf"
+    source.write_text(text)
     assert compile_program(["-Os", "-g", "-fxc16-attributes", str(source), "-o", str(target)]) == 0
     return load_image(target)
+
+
+@pytest.fixture(scope="module")
+def image(tmp_path_factory):
+    return compiled(tmp_path_factory.mktemp("profile"), SOURCE)
 
 
 def profile_of(image, cycles: int, skip: int = 5_000):
@@ -72,7 +76,7 @@ def test_entering_an_interrupt_counts_for_its_handler(image):
 def test_groups_match_functions_and_files(image):
     _, one = profile_of(image, 1_000)
     assert one.group(["_spin"]) == one.functions["_spin"]
-    assert one.group(["*/timer.c"]) == one.busy
+    assert one.group(["*/program.c"]) == one.busy
     assert not one.matched("spin")
 
 
@@ -102,11 +106,7 @@ int main(void) {
 
 @pytest.fixture(scope="module")
 def nested(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("nested")
-    source, target = folder / "nested.c", folder / "nested.elf"
-    source.write_text(NESTED)
-    assert compile_program(["-Os", "-g", "-fxc16-attributes", str(source), "-o", str(target)]) == 0
-    return load_image(target)
+    return compiled(tmp_path_factory.mktemp("nested"), NESTED)
 
 
 def stepped(image, until: int):
