@@ -62,6 +62,8 @@ class History:
         self._kept: list[Kept] = []
         self._cycles: list[int] = []
         self._ended = b""
+        self._behind: tuple[int, list[int]] = (-1, [])
+        """A cycle, and the cycles of the steps before it, oldest first: found by the last step back."""
         self.end = machine.cycle
         """The present: the latest cycle that was run to."""
         self._keep(machine.snapshot(), is_input=True)
@@ -138,6 +140,7 @@ class History:
         if state == self._ended:
             return
         cycle = self.machine.cycle
+        self._behind = (-1, [])
         place = bisect_right(self._cycles, cycle)
         if self._ended or cycle != self.start:
             del self._kept[place:], self._cycles[place:]
@@ -188,16 +191,16 @@ class History:
         now = self.machine.cycle
         if now <= self.start:
             return False
+        behind = self._behind[1] if self._behind[0] == now else []
         window = FIRST_WINDOW
-        before: int | None = None
-        while before is None and window <= WIDEST:
+        while not behind and window <= WIDEST:
             begin = max(self.start, now - window)
-            steps = list(self._steps(begin, now))
-            before = steps[-1][0] if steps else None
+            behind = [cycle for cycle, _ in self._steps(begin, now)]
             if begin == self.start:
                 break
             window *= WIDER
-        self._go(self.start if before is None else before)
+        self._go(behind.pop() if behind else self.start)
+        self._behind = (self.machine.cycle, behind)
         return True
 
     def _steps(self, begin: int, now: int) -> Iterator[tuple[int, int]]:

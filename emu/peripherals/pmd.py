@@ -41,11 +41,14 @@ class ModuleDisable(Peripheral):
         self._modules: Final = modules
         self._off: Final[dict[int, _Access]] = {}
         self._bits: Final[list[tuple[Callable[[], int], str]]] = []
+        self._words: Final[dict[str, list[int]]] = {}
+        """Word indices of each module's registers."""
         for name in ("PMD1", "PMD2"):
             register = self.register(name)
             register.written_by(lambda _old, _new, _lanes: self._written())
             for field in register_fields(kit, name):
                 self._bits.append((lambda register=register, field=field: register[field], field[:-2]))  # type: ignore[misc]
+                self._words[field[:-2]] = self._words_of(field[:-2])
         if "PMD3" in kit.chip.sfrs:
             self.register("PMD3")
 
@@ -53,8 +56,7 @@ class ModuleDisable(Peripheral):
         """Never: these are switches."""
         return False
 
-    def _words(self, module: str) -> list[int]:
-        """Word indices of a module's registers."""
+    def _words_of(self, module: str) -> list[int]:
         timer = module[1:] if module[0] == "T" else None
         prefixes = _PREFIXES.get(module, (module,))
         return sorted(
@@ -67,14 +69,14 @@ class ModuleDisable(Peripheral):
 
     def _written(self) -> None:
         for is_off, module in self._bits:
-            first = self._words(module)[0]
+            first = self._words[module][0]
             if is_off() and first not in self._off:
                 self._clear(module)
         self.restored()
 
     def _clear(self, module: str) -> None:
         """The module loses its state, as by a reset of its own."""
-        for word in self._words(module):
+        for word in self._words[module]:
             self.record.u16[word] = self.bus.reset_value[word]
         if module in self._modules:
             self._modules[module].restart()
@@ -82,10 +84,11 @@ class ModuleDisable(Peripheral):
     def restored(self) -> None:
         """Wire the registers of each module as its bit says."""
         for is_off, module in self._bits:
-            for word in self._words(module):
-                if is_off() and word not in self._off:
+            off = bool(is_off())
+            for word in self._words[module]:
+                if off and word not in self._off:
                     self._cut(word)
-                elif not is_off() and word in self._off:
+                elif not off and word in self._off:
                     self._mend(word)
 
     def reset(self, power_on: bool) -> None:

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,8 @@ sys.path.insert(0, str(ROOT))
 import emu  # noqa: E402
 from emu.boards.epuck.board import Epuck  # noqa: E402
 from emu.debug.history import History  # noqa: E402
+from emu.image import Image  # noqa: E402
+from emu.loader import load_image  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 APPS = {"clustering": 8, "listing1": 0}
@@ -61,10 +63,19 @@ def i2c(machine: emu.Machine) -> bytes:
     return machine.peek_bytes(machine.chip.sfrs["I2CRCV"].address, 12)
 
 
+@cache
+def image_at(path: Path) -> Image:
+    """Read once, its debug information too."""
+    return load_image(path)
+
+
 def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
     """One walk. Raises AssertionError."""
     rng = random.Random(seed)
-    machine = emu.load(image, engine=rng.choice(["jit", "jit", "interp"]), board=partial(Epuck, selector=selector))
+    program = image_at(image)
+    engine = rng.choice(["jit", "jit", "interp"])
+    machine = emu.Machine(program.chip, engine=engine, board=partial(Epuck, selector=selector))
+    machine.load(program)
     picture = np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
     machine.board.camera.show(picture)
     machine.run_until(rng.randrange(rng.choice([120_000, 12_000_000])))  # the camera is set up by I2C in the beginning
@@ -85,7 +96,7 @@ def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
         elif machine.is_asleep:
             history.step()  # the middle of a sleep is no place a step leads to
         start = len(states)
-        for number in range(rng.randrange(20, 150)):
+        for number in range(rng.randrange(20, 400)):
             states.append((machine.cycle, hashed(machine)))
             before = machine.pc, machine.w[15], i2c(machine)
             assert history.step() is None
