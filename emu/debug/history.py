@@ -198,6 +198,7 @@ class History:
             behind = [cycle for cycle, _ in self._steps(begin, now)]
             if begin == self.start:
                 break
+            del behind[:1]  # `begin` may be between an interrupt's entry and its first instruction: inside of a step
             window *= WIDER
         self._go(behind.pop() if behind else self.start)
         self._behind = (self.machine.cycle, behind)
