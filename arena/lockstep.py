@@ -1,21 +1,20 @@
 """Demand lock-step: robots run ahead until they look at something, the world follows the slowest of them.
 
 A robot whose firmware reads a line of its camera needs poses of that quantum; the world can only tell them when all
-robots have lived until then. So the others are run first, which may look at something themselves, but only earlier.
-Nothing that is recorded can tell this from quantum after quantum: a robot sees the same poses either way.
+robots have lived until then. So each robot is a greenlet: one that looks is left where it stands, in the middle of its
+run, until the others have come as far. Nothing that is recorded can tell this from quantum after quantum: a robot sees
+the same poses either way.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol, runtime_checkable
 
+from greenlet import getcurrent, greenlet
+
 from arena.ether import Ether
 from arena.world import Poses, World
-
-FRAMES: Final = 40
-"""Most calls of Python inside each other between a robot that looks and the next one that is run for it."""
 
 
 @runtime_checkable
@@ -32,7 +31,8 @@ class Runner(Protocol):
         """Wheel speeds in cm/s during a quantum that is over; asked for once, quantum after quantum."""
 
     def join(self, look_at: Callable[[int], tuple[Poses, Poses]]) -> None:
-        """Get poses from `look_at` from now on: those at the beginning of a quantum, and a quantum before."""
+        """Get poses from `look_at` from now on: those at the beginning of a quantum, and a quantum before. All quanta
+        before it must be over for the robot when it asks."""
 
 
 class LockStep:
@@ -44,20 +44,36 @@ class LockStep:
         self._ether: Final = ether or Ether(len(robots), world.scene.clock.quantum_tcy)
         self._ether.slowest = 0
         self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
-        sys.setrecursionlimit(max(sys.getrecursionlimit(), 1000 + FRAMES * len(robots)))
+        self._hub: greenlet = getcurrent()
         for robot in robots:
             robot.join(self.look_at)
 
     def advance(self, ticks: int) -> list[tuple[float, float]]:
         """Let so many quanta be over for everybody; wheel speeds of the last of them."""
-        wheels = self._follow(ticks)
+        self._hub = getcurrent()
+        waiting = {greenlet(robot.live): self._world.ticks for robot in self._robots if robot.lived < ticks}
+        asked: tuple[int, ...] = (ticks,)  # the first time a greenlet is switched to it gets the argument of `live`
+        wheels: list[tuple[float, float]] = []
+        ready = list(waiting)
+        while ready:
+            for life in ready:
+                looks_at = life.switch(*asked)
+                if life.dead:
+                    del waiting[life]
+                else:
+                    waiting[life] = looks_at
+            asked = ()
+            until = min(waiting.values(), default=ticks)
+            wheels = self._step_to(until) or wheels
+            ready = [life for life, tick in waiting.items() if tick == until]
         for tick in [tick for tick in self._past if tick < ticks - 1]:
             del self._past[tick]
         return wheels
 
     def look_at(self, tick: int) -> tuple[Poses, Poses]:
         """Poses at the beginning of a quantum, and a quantum before."""
-        self._follow(tick)
+        if tick > self._world.ticks:
+            self._hub.switch(tick)
         poses = self._past[tick]
         return poses, self._past.get(tick - 1, poses)
 
@@ -65,12 +81,9 @@ class LockStep:
         """Something was put somewhere else between two quanta."""
         self._past[self._world.ticks] = self._world.poses
 
-    def _follow(self, ticks: int) -> list[tuple[float, float]]:
+    def _step_to(self, ticks: int) -> list[tuple[float, float]]:
+        """Let the world make the quanta that all robots have lived; wheel speeds of the last."""
         world, wheels = self._world, []
-        if world.ticks < ticks:
-            for robot in self._robots:
-                if robot.lived < ticks:
-                    robot.live(ticks)
         while world.ticks < ticks:
             wheels = [robot.speed(world.ticks) for robot in self._robots]
             world.step(wheels)
