@@ -74,6 +74,7 @@ class EmulatedBrain:
         self._rng = generator(seed, STREAM_SENSORS, robot)
         self._sight = Sight(scene, robot, traits_of(scene, seed, robot))
         self._colours = colours_of(scene).astype(np.int16)
+        self._colours_at: Final = self._colours.ctypes.data
         noise = self._rng.normal(0.0, scene.camera.pixel_noise, _NOISE + 3 * 640)
         self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
         self._noise_at: Final = self._noise.ctypes.data
@@ -260,8 +261,7 @@ class EmulatedBrain:
         first = int(self._rng.integers(_NOISE))
         dark = self._scene.camera.vignetting
         bright = self._sight.lens.vignetting(y, columns, dark) if dark else None
-        colours, noise = self._colours.ctypes.data, self._noise_at + self._noise.itemsize * first
-        pixels = self._sight.pixels(y, columns, colours, noise, bright)
+        pixels = self._sight.pixels(y, columns, self._colours_at, self._noise_at + self._noise.itemsize * first, bright)
         if y in _STRIP_ROWS:
             self._strip = columns, pixels
         return pixels

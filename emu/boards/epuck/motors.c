@@ -82,16 +82,23 @@ void decode(const struct motor *m, const uint64_t *changes, i64 count, i64 port)
 }
 
 // Steps made by each of some cycles, which rise and are not behind the present; what is older is forgotten.
-void steps_by(const struct motor *m, const i64 *cycles, i64 count, i64 *steps)
+static void steps_by(const struct motor *m, const i64 *cycles, i64 count, i64 *steps)
 {
     struct history *h = m->history;
     i64 place = 0;
     for (i64 i = 0; i < count; i++) {
         while (place < h->count && h->cycle[place] <= cycles[i])
             h->before = h->steps[place++];
-        steps[i] = h->before;
+        steps[2 * i] = h->before;
     }
     h->count -= place;
     for (i64 i = 0; i < h->count; i++)
         h->cycle[i] = h->cycle[place + i], h->steps[i] = h->steps[place + i];
+}
+
+// Both motors' steps, left, right, left and so on.
+void both_by(const struct motor *left, const struct motor *right, const i64 *cycles, i64 count, i64 *steps)
+{
+    steps_by(left, cycles, count, steps);
+    steps_by(right, cycles, count, steps + 1);
 }

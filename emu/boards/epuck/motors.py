@@ -6,6 +6,7 @@ counts once it has stood for `SETTLE` Tcy. Nothing is posted for that; what is d
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
 from ctypes import POINTER, Structure, addressof, c_int64, c_void_p, pointer
 from functools import cache
@@ -43,7 +44,7 @@ def _code() -> dict[str, Callable[..., None]]:
         "settle_by": (None, (ADDRESS, INT)),
         "change": (None, (ADDRESS, INT, INT)),
         "decode": (None, (ADDRESS, ADDRESS, INT, INT)),
-        "steps_by": (None, (ADDRESS, ADDRESS, INT, ADDRESS)),
+        "both_by": (None, (ADDRESS, ADDRESS, ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 
 
@@ -64,10 +65,11 @@ class Stepper(Part):
         self._on_step: Callable[[int, int], None] | None = None
         code = _code()
         self._settle_by, self._change = code["settle_by"], code["change"]
-        self._decode, self._steps_by = code["decode"], code["steps_by"]
+        self._decode = code["decode"]
         self._motor: Final = _Motor(self.record.address + field.offset, shift, forward)
         self._history: _History | None = None
-        self._at: Final = addressof(self._motor)
+        self.at: Final = addressof(self._motor)
+        """Where `struct motor` of motors.c is."""
         self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True, reader=self._read)
 
     @property
@@ -109,18 +111,10 @@ class Stepper(Part):
         self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)  # so that edges come by as they happen
 
     def remember(self) -> None:
-        """Keep from now on when steps were made, for `steps_by`."""
+        """Keep from now on when steps were made, for `Motors.steps_by`."""
         self._catch_up()
         self._history = _History(self._state[_STEPS], 0)
         self._motor.history = pointer(self._history)
-
-    def steps_by(self, cycles: Sequence[int]) -> list[int]:
-        """`steps` as they were in some cycles, which rise from call to call; see `remember`."""
-        self._catch_up()
-        count = len(cycles)
-        asked, steps = (c_int64 * count)(*cycles), (c_int64 * count)()
-        self._steps_by(self._at, asked, count, steps)
-        return list(steps)
 
     def _catch_up(self) -> None:
         self.pins.flush()
@@ -141,13 +135,13 @@ class Stepper(Part):
         """Do what may find that a step was made, and tell."""
         state = self._state
         before, since = state[_STEPS], state[_SINCE]
-        work(self._at, *arguments)
+        work(self.at, *arguments)
         if state[_STEPS] != before and self._on_step is not None and not self.events.quiet:
             self._on_step(since, state[_STEPS] - before)
 
     def _read(self, changes: int, count: int) -> None:
         """What native code has done; nobody listens for steps then."""
-        self._decode(self._at, changes, count, PORT)
+        self._decode(self.at, changes, count, PORT)
 
 
 class Motors:
@@ -156,6 +150,7 @@ class Motors:
     def __init__(self, chip: Peripherals) -> None:
         self.left: Final = Stepper("motor.left", chip, 0, -1)
         self.right: Final = Stepper("motor.right", chip, 4, 1)
+        self._both_by: Final = _code()["both_by"]
 
     def steps(self) -> tuple[int, int]:
         """Steps of both made so far (left, right): what `Stepper.steps` of each says, in one look."""
@@ -170,5 +165,9 @@ class Motors:
         self.right.remember()
 
     def steps_by(self, cycles: Sequence[int]) -> list[tuple[int, int]]:
-        """As `Stepper.steps_by`, of both."""
-        return list(zip(self.left.steps_by(cycles), self.right.steps_by(cycles), strict=True))
+        """Steps of both (left, right) as they were in some cycles, which rise from call to call; see `remember`."""
+        self.steps()
+        count = len(cycles)
+        asked, made = array("q", cycles), array("q", bytes(16 * count))
+        self._both_by(self.left.at, self.right.at, asked.buffer_info()[0], count, made.buffer_info()[0])
+        return list(zip(made[::2], made[1::2], strict=True))
