@@ -191,8 +191,9 @@ def claimed(folder: Path) -> Iterator[None]:
         raise RecordError(f"{folder}: is not a folder") from None
 
 
-def open_folder(plan: Plan, folder: Path, command: list[str]) -> list[int]:
-    """Begin or continue the run in a folder that is `claimed`; numbers of the trials still to do.
+def open_folder(plan: Plan, folder: Path, arguments: list[str]) -> list[int]:
+    """Begin or continue the run in a folder that is `claimed`; numbers of the trials still to do. The manifest
+    keeps the command's `arguments`.
 
     Raises RecordError if it holds another run.
     """
@@ -205,7 +206,7 @@ def open_folder(plan: Plan, folder: Path, command: list[str]) -> list[int]:
     if before is not None and before.get("key") != key:
         raise RecordError(f"{folder}: holds another run (different {', '.join(_changed(before.get('key'), key))}); "
                           "choose another --out")  # fmt: skip
-    write_json(manifest, (before or {"host": []}) | {"key": key, "made_on": host(), "command": command})
+    write_json(manifest, (before or {"host": []}) | {"key": key, "made_on": host(), "command": ["arena", *arguments]})
     return [number for number in range(1, plan.trials + 1) if not trial_path(folder, number).exists()]
 
 

@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
         plan = replace(plan, scene=scripted(scene))
     folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"
     with claimed(folder):
-        missing = open_folder(plan, folder, sys.argv)
+        missing = open_folder(plan, folder, sys.argv[1:])
         if own is not None:
             write_bytes(folder / EXPERIMENT, own.read_bytes())
             plan = replace(plan, experiment=folder / EXPERIMENT)

@@ -92,7 +92,7 @@ def _ends(options: argparse.Namespace, name: str, controller: str) -> list[float
     with claimed(folder):
         if own is not None:
             write_bytes(folder / EXPERIMENT, own.read_bytes())
-        with_progress(plan, folder, open_folder(plan, folder, sys.argv), options.jobs)
+        with_progress(plan, folder, open_folder(plan, folder, sys.argv[1:]), options.jobs)
     trials = [trial for trial in trials_in(folder) if trial.about["seed"] < options.seed + options.trials]
     metric = trials[0].experiment.curves[0].name
     return [one.last(metric) for _, one in courses(trials).values()]
