@@ -1,8 +1,8 @@
 """Source lines of program addresses, from DWARF (abi-elf.md §6.7).
 
-What enters: the raw octets of debug sections. What leaves: file and line per address. Microchip's tools and ours store
-every DWARF byte twice as wide (octet, phantom 0); plain DWARF is understood too. Debug information that cannot be read
-is worth a note, never a failed run.
+What enters: the raw octets of debug sections. What leaves: file and line per address. Microchip's tools store every
+DWARF byte twice as wide (octet, phantom 0), and ours in objects and where asked to; plain DWARF is understood too.
+Debug information that cannot be read is worth a note, never a failed run.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from elftools.dwarf.dwarfinfo import DWARFInfo
 
 _NEEDED: Final = (".debug_info", ".debug_abbrev", ".debug_line")
+_TELLING: Final = (".debug_info", ".debug_abbrev")
 DW_OP_ADDR: Final = 0x03
 """DWARF 2 §7.7.1: a fixed address, 4 bytes here."""
 _DOUBLED_SHARE: Final = 0.9
@@ -38,12 +39,15 @@ class Line:
         return f"{self.file}:{self.line}"
 
 
-def undoubled(octets: bytes) -> bytes:
-    """DWARF bytes of a section stored with phantoms; the octets themselves if it is not."""
-    phantoms = octets[1::2]
+def undoubled(sections: Mapping[str, bytes]) -> dict[str, bytes]:
+    """DWARF bytes of debug sections stored with phantoms, by name; the octets themselves if they are not.
+
+    Names and strings of the entries decide for all: a plain list of small addresses has zeros at the same places.
+    """
+    phantoms = b"".join(sections.get(name, b"")[1::2] for name in _TELLING)
     if phantoms and phantoms.count(0) >= _DOUBLED_SHARE * len(phantoms):
-        return octets[::2]
-    return octets
+        return {name: octets[::2] for name, octets in sections.items()}
+    return dict(sections)
 
 
 class Lines:
@@ -93,13 +97,15 @@ class Lines:
 
 
 def dwarf_of(sections: Mapping[str, bytes]) -> DWARFInfo:
-    """A pyelftools view of the un-doubled sections."""
+    """A pyelftools view of debug sections, doubled or plain."""
     from elftools.dwarf.dwarfinfo import DebugSectionDescriptor, DwarfConfig, DWARFInfo
 
+    plain = undoubled({name: octets for name, octets in sections.items() if name.startswith(".debug_")})
+
     def descriptor(name: str) -> DebugSectionDescriptor | None:
-        if name not in sections:
+        if name not in plain:
             return None
-        octets = undoubled(sections[name])
+        octets = plain[name]
         return DebugSectionDescriptor(io.BytesIO(octets), name, 0, len(octets), 0)
 
     config = DwarfConfig(little_endian=True, machine_arch="dsPIC30F", default_address_size=4)

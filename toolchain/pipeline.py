@@ -16,6 +16,7 @@ from .lower import (
     bindings,
     branches,
     by_value,
+    call_frames,
     cfg,
     combine,
     constants,
@@ -315,13 +316,16 @@ class ModuleCompiler:
         rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None
         ranges = Ranges(str(self.serial))
         emitter = emit.Emitter(c.m, str(self.serial), self.options.large_code, self.dwarf.info.position)
-        self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges)
+        frames = call_frames.follow(c.m, str(self.serial)) if self.options.debug else None
+        self.lines += emitter.text(rows.mark if rows is not None else no_rows, ranges, frames)
         gone = c.taken - {b.name for b in c.m.blocks}  # nothing jumps there, but their addresses are still values
         self.lines += [f"{block_label(f.name, block)}:" for block in sorted(gone)]
         self.lines.append(f"\t.size {name},.-{name}")
-        if rows is not None and f.dbg is not None:
-            end = f".Lend{self.serial}"
+        end = f".Lend{self.serial}"
+        if frames is not None:
             self.lines.append(f"{end}:")
+            self.dwarf.add_frames(name, end, frames)
+        if rows is not None and f.dbg is not None:
             ranges.close(end)
             frame_vars = frame_variables(f, c.m)
             known = [record.variable for record in f.dbg_records]

@@ -112,7 +112,7 @@ class DebugInfo:
         """Structs, unions, enums and typedefs by name, the complete ones."""
         self.constants: Final[dict[str, int]] = {}
         """Enumerators by name."""
-        sections = {section.name: section.octets for section in image.sections if section.kind == "info"}
+        sections = undoubled({s.name: s.octets for s in image.sections if s.name.startswith(".debug_")})
         if sections.get(".debug_info") and sections.get(".debug_abbrev"):
             _Reader(self, sections).read()
         self.functions.sort(key=lambda one: one.ranges[0])
@@ -143,8 +143,8 @@ class _Reader:
     def __init__(self, info: DebugInfo, sections: dict[str, bytes]) -> None:
         self.info: Final = info
         self.dwarf: Final = dwarf_of(sections)
-        self.loc: Final = undoubled(sections.get(".debug_loc", b""))
-        self.range: Final = undoubled(sections.get(".debug_ranges", b""))
+        self.loc: Final = sections.get(".debug_loc", b"")
+        self.range: Final = sections.get(".debug_ranges", b"")
         self.types: Final[dict[int, Type]] = {}
         self.files: list[str] = []
         self.unit_base = 0

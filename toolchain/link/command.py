@@ -51,6 +51,8 @@ def add_options(p: argparse.ArgumentParser) -> None:
     p.add_argument("--no-isr", dest="isr", action="store_false", help="leave vectors without handler empty")
     p.add_argument("--isr", dest="isr", action="store_true", help=argparse.SUPPRESS)
     p.add_argument("--fill-upper", type=integer, default=0, metavar="BYTE", help="upper byte of data words in flash")
+    p.add_argument("--debug-phantoms", action="store_true",
+                   help="store debug information as XC16 does, every byte followed by a phantom octet")  # fmt: skip
     p.add_argument("--report-mem", action="store_true", help="print memory use")
     p.add_argument("--memorysummary", metavar="FILE", help="write memory use as the XML that MPLAB X shows")
     p.add_argument("-T", "--script", action="append", default=[], metavar="FILE",
@@ -85,6 +87,7 @@ def link_options(options: argparse.Namespace) -> LinkOptions:
         handles=options.handles,
         isr=options.isr,
         fill_upper=options.fill_upper,
+        debug_phantoms=options.debug_phantoms,
         undefined=options.undefined,
         define=dict(map(definition, options.defsym)),
         chip=chip,

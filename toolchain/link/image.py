@@ -72,8 +72,14 @@ def _content(section: Section, octets: bytearray, size: int, fill_upper: int) ->
     return result
 
 
-def build_outputs(layout: Layout, contents: dict[Section, bytearray], fill_upper: int) -> list[Output]:
-    """Join neighbouring input sections of one kind; order: program, constants, data, debug."""
+def build_outputs(
+    layout: Layout, contents: dict[Section, bytearray], fill_upper: int, debug_phantoms: bool
+) -> list[Output]:
+    """Join neighbouring input sections of one kind; order: program, constants, data, debug.
+
+    Debug sections leave their phantoms behind, so that any DWARF reader understands the image; `debug_phantoms` keeps
+    them, as XC16's images do.
+    """
     rank = {"program": 0, "config": 1, "eeprom": 2, "data": 3, "info": 4}
 
     def order(section: Section) -> tuple[int, str, int]:
@@ -99,6 +105,9 @@ def build_outputs(layout: Layout, contents: dict[Section, bytearray], fill_upper
             last.nobits_units += placed.size
         else:
             last.data += content
+    if not debug_phantoms:
+        for section in (output.section for output in outputs if output.section.name.startswith(".debug_")):
+            section.type, section.data = c.SHT_PROGBITS, section.data[::2]
     return outputs
 
 

@@ -111,7 +111,7 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
     if options.data_init:
         dinit.fill(table, records, contents, options.fill_upper)
         contents[table] = table.data
-    outputs = build_outputs(layout, contents, options.fill_upper)
+    outputs = build_outputs(layout, contents, options.fill_upper, options.debug_phantoms)
     entry = relocator.target(synthesize.wanted(options.entry)).address
     image = build_executable(resolution, outputs, relocator, entry, options.chip.processors[0])
     return Linked(image, resolution, layout, outputs, records, live, stack, messages)

@@ -25,6 +25,7 @@ class LinkOptions:
     handles: bool = True
     isr: bool = True
     fill_upper: int = 0
+    debug_phantoms: bool = False  # DWARF bytes doubled, as XC16 stores them (abi-elf.md §6.2)
     undefined: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
     chip: Chip = field(default_factory=chip_named)

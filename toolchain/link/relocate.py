@@ -17,6 +17,8 @@ _NEAR_FORMS = frozenset((4, 5))  # FILE_REG_BYTE, FILE_REG
 _LSB, _MSB = 32, 33
 _DATA_WORD = frozenset((2, 8))  # `.word` and MOV #lit16: a code address does not fit there (§4.2)
 
+_LISTS = frozenset((".debug_loc", ".debug_ranges"))
+
 
 @dataclass(frozen=True, slots=True)
 class Target:
@@ -89,6 +91,8 @@ class Relocator:
         """Return the raw field content for one relocation."""
         target = self.target(reloc.symbol)
         formula = kind.formula
+        if section.name in _LISTS and self._is_discarded(reloc.symbol):
+            return 1  # a pair of zeros would end the list
         if formula is Formula.ADDRESS:
             if (
                 target.space == "program"
@@ -122,6 +126,10 @@ class Relocator:
     def _is_code(self, symbol: Symbol) -> bool:
         home = self.resolution.lookup(symbol).section
         return home is not None and home.is_code
+
+    def _is_discarded(self, symbol: Symbol) -> bool:
+        home = self.resolution.lookup(symbol).section
+        return home is not None and home not in self.layout.placed
 
     def _address(self, kind: RelocationType, target: Target, field: int) -> int:
         """S+A; the addend is read as signed first, then as unsigned, as GNU's bit-field check does."""

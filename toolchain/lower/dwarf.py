@@ -1,4 +1,4 @@
-"""DWARF 2 as assembler data directives (abi-elf.md §6.7): units, functions, variables, types and the line table.
+"""DWARF 2 as assembler data directives (abi-elf.md §6.7): units, functions, variables, types, lines and call frames.
 
 Code addresses are PC units, variables data addresses, both 4 bytes. Frame variables are relative to W15 at entry, which
 the frame base expresses through W15 or W14. Variables in registers have location lists; where neither applies,
@@ -10,7 +10,9 @@ from __future__ import annotations
 import re
 
 from ..ir.model import Module
+from .call_frames import CallFrames, FrameSection
 from .debuginfo import DebugInfo
+from .leb import sleb, uleb
 from .names import symbol
 from .scopes import Die, FunctionInfo, Scope, Scopes, split_name
 
@@ -44,25 +46,6 @@ COMPOSITES = {"DW_TAG_structure_type": "structure_type", "DW_TAG_union_type": "u
               "DW_TAG_enumeration_type": "enumeration_type", "DW_TAG_array_type": "array_type"}  # fmt: skip
 
 
-def _uleb(value: int) -> list[str]:
-    out = []
-    while True:
-        byte, value = value & 0x7F, value >> 7
-        out.append(str(byte | (0x80 if value else 0)))
-        if not value:
-            return out
-
-
-def _sleb(value: int) -> list[str]:
-    out = []
-    while True:
-        byte, value = value & 0x7F, value >> 7
-        done = (value == 0 and not byte & 0x40) or (value == -1 and byte & 0x40)
-        out.append(str(byte | (0 if done else 0x80)))
-        if done:
-            return out
-
-
 def _string(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'\t.asciz "{escaped}"'
@@ -71,7 +54,7 @@ def _string(text: str) -> str:
 def _expression(f: FunctionInfo, where: tuple[int, ...]) -> list[str]:
     """Location of a variable in registers, or in the frame (a negative number, `mir.Located`)."""
     if where[0] < 0:
-        return [str(OP_FBREG), *_sleb(f.objects[-1 - where[0]])]
+        return [str(OP_FBREG), *sleb(f.objects[-1 - where[0]])]
     data: list[str] = []
     for r in where:
         data.append(str(OP_REG0 + r))
@@ -155,7 +138,7 @@ class Unit:
             ("prototyped", "flag", 1),
             ("low_pc", "addr", f.name),
             ("high_pc", "addr", f.end_label),
-            ("frame_base", "block1", [str(OP_BREG0 + register), *_sleb(offset)]),
+            ("frame_base", "block1", [str(OP_BREG0 + register), *sleb(offset)]),
         ]
         die = Die("subprogram", attributes)
         scopes = Scopes(self.info, f)
@@ -200,7 +183,7 @@ class Unit:
     ) -> Die:
         attributes = self._declared(ref) + self._type_attribute(self.info.node(ref).get("type"))
         if offset is not None:
-            attributes.append(("location", "block1", [str(OP_FBREG), *_sleb(offset)]))
+            attributes.append(("location", "block1", [str(OP_FBREG), *sleb(offset)]))
         elif ranges:
             attributes.append(("location", "data4", f".Ldbg_loc{self.number}_{len(self.lists)}"))
             self.lists.append([(start, end, _expression(f, where)) for start, end, where in ranges])
@@ -285,7 +268,7 @@ class Unit:
             attributes += [("byte_size", "data2", storage), ("bit_size", "data1", size),
                            ("bit_offset", "data1", max(0, 8 * storage - size - (bit - 8 * at)))]  # fmt: skip
         if parent == "structure_type":
-            attributes.append(("data_member_location", "block1", [str(OP_PLUS_UCONST), *_uleb(at)]))
+            attributes.append(("data_member_location", "block1", [str(OP_PLUS_UCONST), *uleb(at)]))
         return Die("member", attributes)
 
     def _storage(self, ref: str | None) -> int:
@@ -319,6 +302,7 @@ class DwarfWriter:
         self.info = DebugInfo(module)
         self.units: dict[str, Unit] = {}
         self.abbreviations: dict[tuple[object, ...], int] = {}
+        self.frames = FrameSection()
         self.out: list[str] = []
 
     def unit(self, ref: str) -> Unit:
@@ -332,6 +316,10 @@ class DwarfWriter:
         unit = self.info.node(f.subprogram).get("unit", "")
         if unit.startswith("!"):
             self.unit(unit).functions.append(f)
+
+    def add_frames(self, name: str, end: str, frames: CallFrames) -> None:
+        """Record the call frames of one compiled function, which need not be one of the source."""
+        self.frames.add(name, end, frames)
 
     def _collect_globals(self) -> None:
         owners = self._owners()
@@ -351,7 +339,7 @@ class DwarfWriter:
         return out
 
     def text(self) -> list[str]:
-        """All lines of .debug_info, .debug_abbrev and .debug_line."""
+        """All lines of all debug sections."""
         self._collect_globals()
         self.out.append("\t.section .debug_info,info")
         trees = [(u, u.tree()) for u in self.units.values()]
@@ -370,7 +358,7 @@ class DwarfWriter:
         self.out.append("\t.section .debug_line,info")
         for unit, _ in trees:
             self._lines(unit)
-        return self.out
+        return self.out + self.frames.text()
 
     # -- .debug_info --------------------------------------------------------------------------------------------------
 
@@ -386,7 +374,7 @@ class DwarfWriter:
         code = self.abbreviations.setdefault(key, len(self.abbreviations) + 1)
         if die.label:
             self.out.append(f"{die.label}:")
-        self.out.append(f"\t.byte {','.join(_uleb(code))}")
+        self.out.append(f"\t.byte {','.join(uleb(code))}")
         for _, form, value in die.attributes:
             self._value(form, value, base)
         if die.children:
@@ -408,7 +396,7 @@ class DwarfWriter:
                 self.out.append(f"\t.4byte {value}-{base}")
             case "sdata":
                 assert isinstance(value, int)
-                self.out.append(f"\t.byte {','.join(_sleb(value))}")
+                self.out.append(f"\t.byte {','.join(sleb(value))}")
             case "block1":
                 assert isinstance(value, list)
                 if value[0] == "addr":
@@ -418,10 +406,10 @@ class DwarfWriter:
 
     def _abbreviations(self) -> None:
         for (tag, children, attributes), code in self.abbreviations.items():
-            data = [*_uleb(code), *_uleb(TAGS[str(tag)]), str(int(bool(children)))]
+            data = [*uleb(code), *uleb(TAGS[str(tag)]), str(int(bool(children)))]
             assert isinstance(attributes, tuple)
             for name, form in attributes:
-                data += [*_uleb(ATTRIBUTES[name]), *_uleb(FORMS[form])]
+                data += [*uleb(ATTRIBUTES[name]), *uleb(FORMS[form])]
             self.out.append(f"\t.byte {','.join([*data, '0', '0'])}")
         self.out.append("\t.byte 0")
 
@@ -450,7 +438,7 @@ class DwarfWriter:
         self.out += [_string(d) for d in directories] + ["\t.byte 0"]
         for directory, name in unit.files:
             index = directories.index(directory) + 1 if directory else 0
-            self.out += [_string(name), f"\t.byte {','.join(_uleb(index))},0,0"]
+            self.out += [_string(name), f"\t.byte {','.join(uleb(index))},0,0"]
         self.out += ["\t.byte 0", f".Ldbg_program{n}:"]
         for f in unit.functions:
             self._sequence(unit, f)
@@ -464,10 +452,10 @@ class DwarfWriter:
             number = unit.file_number(node)
             data = []
             if number != file:
-                data += ["4", *_uleb(number)]
+                data += ["4", *uleb(number)]
                 file = number
             if row_line != line:
-                data += ["3", *_sleb(row_line - line)]
+                data += ["3", *sleb(row_line - line)]
                 line = row_line
             self.out.append(f"\t.byte {','.join([*data, '1'])}")
         self.out += [f"\t.byte 0,{1 + ADDRESS_BYTES},2", f"\t.4byte {f.end_label}", "\t.byte 0,1,1"]

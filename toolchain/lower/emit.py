@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from ..target import SP
+from .call_frames import CallFrames
 from .mir import MI, File, Imm, MBlock, Mem, MFunction, Operand
 from .names import block_label
 from .variables import Ranges, proved
@@ -76,8 +78,9 @@ class Emitter:
         self.serial += 1
         return f".L{self.prefix}_i{self.serial}"
 
-    def text(self, location: Callable[[str | None], str], ranges: Ranges) -> list[str]:
+    def text(self, location: Callable[[str | None], str], ranges: Ranges, frames: CallFrames | None) -> list[str]:
         """All lines. `location` gives the line-table label text for a !dbg reference, or ""."""
+        self.frames = frames
         self.variables = proved(self.m) if self.m.bindings else {}
         for block in self.m.blocks:
             self._block(block, location, ranges)
@@ -90,7 +93,9 @@ class Emitter:
             self.lines.append(f"{block_label(self.m.name, block.name)}:")
         label = ""  # behind what a skip covers
         for mi in block.insts:
-            self.lines += [mark for mark in (ranges.at(self.variables.get(id(mi), ())), location(mi.line)) if mark]
+            frame = self.frames.at(mi) if self.frames is not None else ""
+            marks = (ranges.at(self.variables.get(id(mi), ())), location(mi.line), frame)
+            self.lines += [mark for mark in marks if mark]
             if label and not mi.pred:
                 self.lines.append(f"{label}:")
                 label = ""
@@ -171,6 +176,9 @@ class Emitter:
         suffix = ".b" if mi.byte else ""
         self._out(f"repeat {operand_text(mi.args[0])}")
         if mi.op == "repmov":
+            count = mi.args[0]
+            if self.frames is not None and mi.args[2] == SP and isinstance(count, Imm) and count.value:
+                self.lines.append(self.frames.repeated(int(count.value)))
             self._out(f"mov{suffix} [w{mi.args[1]}++],[w{mi.args[2]}++]")
         elif mi.op == "repclr":
             self._out(f"clr{suffix} [w{mi.args[1]}++]")
@@ -212,6 +220,8 @@ class Emitter:
         for line in ASM_OPERAND.sub(replace, mi.text).split("\n"):
             if line.strip():
                 self._out(line.strip())
+                if self.frames is not None and (mark := self.frames.inside(line)):
+                    self.lines.append(mark)
 
     def _hold(self, mi: MI) -> None:
         """DISI for the sequence behind it, unless a longer one is under way (`holds`)."""

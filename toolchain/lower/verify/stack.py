@@ -42,11 +42,11 @@ def _through(b: MBlock, at: int, m: MFunction) -> int:
             at += LINK
             continue
         if at < LINK:
-            at += _change(mi)
+            at += stack_change(mi)
     return at
 
 
-def _change(mi: MI) -> int:
+def stack_change(mi: MI) -> int:
     """Bytes an instruction adds."""
     if mi.op == "spadd" or (mi.op in ("addl", "subl") and mi.args[1] == SP):
         k = _number(mi.args[0])
