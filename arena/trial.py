@@ -42,6 +42,83 @@ class Result:
     faults: list[tuple[int, float, str]]
 
 
+class Running:
+    """A trial that goes on when it is told to: a world, its brains, and what of it is recorded.
+
+    Some of the brains may live in other processes, `crews`; `ether` is that of the brains of this one. A robot whose
+    firmware stops stands still; the others go on. `experiment` may have a supervisor (stage.py), who can end the trial.
+    `on_row(row)` is called for every sample. Raises SceneError if there is no room or the supervisor fails.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        seed: int,
+        brains: Sequence[Brain],
+        seconds: float,
+        world: World | None = None,
+        on_row: Callable[[dict[str, Any]], None] | None = None,
+        crews: Sequence[Crew] = (),
+        ether: Ether | None = None,
+        experiment: Experiment | None = None,
+    ) -> None:
+        self.world: Final = world or World(scene, seed)
+        self.brains: Final = brains
+        self.quanta: Final = math.ceil(seconds / self.world.dt - 0.5)
+        """After which the trial is over."""
+        self.per_second: Final = max(round(1 / self.world.dt), 1)
+        self._crews: Final = crews
+        self._ether: Final = ether
+        self._supervised: Final = Supervised(experiment, Stage(self.world, brains, seed))
+        self.stage: Final = self._supervised.stage
+        self._recorder: Final = _Recorder(self.world, brains, on_row, self.stage.noted)
+        self._sample_s: Final = scene.clock.sample_s
+        self._recorder.sample([STOPPED] * len(brains))
+        self._samples = 1
+        self._ahead: Final = None if crews else _together(self.world, brains, ether)
+        self._is_over = False
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its time is up or its supervisor has ended it."""
+        return self._is_over or self.world.ticks >= self.quanta
+
+    @property
+    def result(self) -> Result:
+        """What it has left so far."""
+        return Result(self._recorder.rows, self._recorder.faults)
+
+    def go_on(self, limit: int | None = None) -> None:
+        """To the next moment at which something is due from outside (a sample, the supervisor, a whole second), at most
+        until `limit` quanta are over."""
+        world = self.world
+        if self._ahead is not None:
+            until = world.ticks + 1
+            last = self.quanta if limit is None else min(self.quanta, limit)
+            while until < last and not self._is_due(until):
+                until += 1
+            wheels = self._ahead.advance(until)
+        else:
+            wheels = _quantum(world, self.brains, self._crews, self._ether)
+        self._is_over = self._supervised.is_over()
+        self.touched()
+        if self._is_over or self._is_sample(world.ticks):
+            self._recorder.sample(wheels)
+            self._samples += 1
+
+    def touched(self) -> None:
+        """Somebody may have moved something since the last quantum."""
+        if self._ahead is not None:
+            self._ahead.moved()
+
+    def _is_due(self, tick: int) -> bool:
+        return tick % self.per_second == 0 or self._is_sample(tick) or self._supervised.is_due(tick)
+
+    def _is_sample(self, tick: int) -> bool:
+        """A sample is the end of the quantum nearest to the time asked."""
+        return self.world.seconds_at(tick) >= self._samples * self._sample_s - self.world.dt / 2
+
+
 def run_trial(
     scene: Scene,
     seed: int,
@@ -54,48 +131,14 @@ def run_trial(
     ether: Ether | None = None,
     experiment: Experiment | None = None,
 ) -> Result:
-    """Let `brains` live in a new world for `seconds`. `progress(seconds)` is called once per simulated second,
-    `on_row(row)` for every sample.
-
-    Some of the brains may live in other processes, `crews`; `ether` is that of the brains of this one.
-
-    A robot whose firmware stops stands still; the others go on. `experiment` may have a supervisor (stage.py), who can
-    end the trial early. Raises SceneError if there is no room or the supervisor fails.
-    """
-    world = world or World(scene, seed)
-    quanta = math.ceil(seconds / world.dt - 0.5)
-    per_second = max(round(1 / world.dt), 1)
-    supervised = Supervised(experiment, Stage(world, brains, seed))
-    recorder = _Recorder(world, brains, on_row, supervised.stage.noted)
-    wheels: list[tuple[float, float]] = [STOPPED] * len(brains)
-    recorder.sample(wheels)
-    samples = 1
-
-    def is_sample(tick: int) -> bool:
-        """A sample is the end of the quantum nearest to the time asked."""
-        return world.seconds_at(tick) >= samples * scene.clock.sample_s - world.dt / 2
-
-    ahead = None if crews else _together(world, brains, ether)
-    while world.ticks < quanta:
-        tick = world.ticks
-        if ahead is not None:
-            until = tick + 1
-            while until < quanta and not (until % per_second == 0 or is_sample(until) or supervised.is_due(until)):
-                until += 1
-            wheels = ahead.advance(until)
-        else:
-            wheels = _quantum(world, brains, crews, ether)
-        is_over = supervised.is_over()
-        if ahead is not None:
-            ahead.moved()
-        if is_over or is_sample(world.ticks):
-            recorder.sample(wheels)
-            samples += 1
-        if progress is not None and world.ticks % per_second == 0:
-            progress(world.seconds)
-        if is_over:
-            break
-    return Result(recorder.rows, recorder.faults)
+    """Let `brains` live in a new world for `seconds`; `progress(seconds)` is called once per simulated second. The rest
+    is that of `Running`, which says what it raises."""
+    running = Running(scene, seed, brains, seconds, world, on_row, crews, ether, experiment)
+    while not running.is_over:
+        running.go_on()
+        if progress is not None and running.world.ticks % running.per_second == 0:
+            progress(running.world.seconds)
+    return running.result
 
 
 def _together(world: World, brains: Sequence[Brain], ether: Ether | None) -> LockStep | None:
