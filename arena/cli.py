@@ -13,7 +13,20 @@ from importlib.metadata import version
 
 import emu
 from arena.cluster import ClusterLostError
-from arena.commands import bundle, compare, experiment, figures, plot, reaction, replay, report, run, sensitivity, sweep
+from arena.commands import (
+    bundle,
+    compare,
+    experiment,
+    figures,
+    plot,
+    reaction,
+    replay,
+    report,
+    run,
+    sensitivity,
+    studio,
+    sweep,
+)
 from arena.record import FolderInUseError, RecordError
 from arena.scene import SceneError, load_scene, scenes
 from emu.completion import SHELLS, script
@@ -33,6 +46,7 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
     "verify": (bundle.verify_parser, bundle.verify),
     "reaction": (reaction.parser, reaction.run),
     "replay": (replay.parser, replay.run),
+    "studio": (studio.parser, studio.run),
 }
 
 

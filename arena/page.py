@@ -28,9 +28,10 @@ _MIDDLE_ROW: Final = 240
 _STRIP: Final = np.arange(STRIP_PIXELS) * len(STRIP_COLUMNS) // STRIP_PIXELS + STRIP_COLUMNS.start
 
 
-def page(trial: Trial, live: bool = False) -> str:
-    """The page's text; `live`: it asks where it came from for more."""
-    data = head_of(trial) | samples_of(trial) | {"live": live}
+def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None) -> str:
+    """The page's text; `live`: it asks where it came from for more; `studio`: what it needs to take the trial in hand
+    there (commands/studio.py)."""
+    data = head_of(trial) | samples_of(trial) | {"live": live, "studio": studio}
     text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, text)
 

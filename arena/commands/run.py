@@ -27,23 +27,28 @@ EXAMPLE = "example: arena run clustering --brain openswarm --controller A --tria
 def parser() -> argparse.ArgumentParser:
     """Options of the command."""
     made = argparse.ArgumentParser(description="run trials; finished ones are kept and skipped", epilog=EXAMPLE)
-    made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
-    made.add_argument("--brain", default="openswarm", help="openswarm (default), bare, scripted, or an ELF or HEX file")
-    made.add_argument("--controller", default="A", choices=sorted(CONTROLLERS), help="table of speeds (default A)")
     made.add_argument("--trials", type=count, default=10, metavar="N")
-    made.add_argument("--minutes", type=duration, default=15.0, metavar="M", help="simulated, per trial (default 15)")
-    made.add_argument("--robots", type=count_or_none, metavar="N", help="instead of the scene's number")
-    made.add_argument("--objects", type=count_or_none, metavar="N", help="instead of the scene's number")
-    made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
-    made.add_argument("--seed", type=count_or_none, default=1, help="of the first trial, then counted on (default 1)")
+    add_plan(made)
     made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes")
     made.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
     )
     made.add_argument("--out", type=Path, metavar="FOLDER", help="default results/SCENE-BRAIN-CONTROLLER")
-    made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep images and native code there")
     made.add_argument("--json", action="store_true", help="results as JSON on standard output")
     return made
+
+
+def add_plan(made: argparse.ArgumentParser) -> None:
+    """Options that say what a trial is."""
+    made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
+    made.add_argument("--brain", default="openswarm", help="openswarm (default), bare, scripted, or an ELF or HEX file")
+    made.add_argument("--controller", default="A", choices=sorted(CONTROLLERS), help="table of speeds (default A)")
+    made.add_argument("--minutes", type=duration, default=15.0, metavar="M", help="simulated, per trial (default 15)")
+    made.add_argument("--robots", type=count_or_none, metavar="N", help="instead of the scene's number")
+    made.add_argument("--objects", type=count_or_none, metavar="N", help="instead of the scene's number")
+    made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
+    made.add_argument("--seed", type=count_or_none, default=1, help="of the first trial, then counted on (default 1)")
+    made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep images and native code there")
 
 
 def changed(scene: Scene, settings: list[str], robots: int | None = None, objects: int | None = None) -> Scene:
@@ -78,17 +83,22 @@ def folder_name(text: str) -> str:
     return re.sub("[^A-Za-z0-9.,=+_-]+", "-", text.lower()).strip("-.")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Exit status 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
+def planned(options: argparse.Namespace, trials: int) -> Plan:
+    """What the options of `add_plan` ask for. Raises SceneError, LoadError, ValueError."""
     scene = changed(load_scene(options.scene), options.set, options.robots, options.objects)
     home = Path(options.scene).parent
     image = image_for(options.brain) if not scene.groups or any(not one.image for one in scene.groups) else None
     images = tuple((one, image_for(one, home)) for one in dict.fromkeys(group.image for group in scene.groups) if one)
     name = Path(options.brain).stem
     own = experiment_file(scene.experiment, home)
-    plan = Plan(scene, name, options.controller, image, options.trials, 60 * options.minutes, options.seed, own, images)
-    if not plan.has_firmware:
-        plan = replace(plan, scene=scripted(scene))
+    plan = Plan(scene, name, options.controller, image, trials, 60 * options.minutes, options.seed, own, images)
+    return plan if plan.has_firmware else replace(plan, scene=scripted(scene))
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
+    plan = planned(options, options.trials)
+    own, image, images, scene, name = plan.experiment, plan.image, plan.images, plan.scene, plan.brain
     folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"
     with claimed(folder):
         missing = open_folder(plan, folder, sys.argv[1:])

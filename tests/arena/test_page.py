@@ -137,7 +137,7 @@ const c = canvas.getBoundingClientRect();
 canvas.dispatchEvent(new MouseEvent("click", {clientX: c.left + X(r0.x[4]) + 2, clientY: c.top + Y(r0.y[4])}));
 found.clicked = chosen;
 const half = clock = (d.t[4] + d.t[5]) / 2;
-found.between = [share(), pose(r0, share())[0], (r0.x[4] + r0.x[5]) / 2];
+found.between = [share(), pose(0, share())[0], (r0.x[4] + r0.x[5]) / 2];
 press(" "); found.playing = playing; press(" ");
 const p = document.getElementById("plot").getBoundingClientRect();
 const middle = {clientX: p.left + p.width / 2, clientY: p.top + 20};

@@ -1,0 +1,315 @@
+"""A trial in somebody's hands: it runs, stands, goes on by single quanta and back, while robots and things are moved.
+
+In: a plan, a seed, and what is asked for (`ask` from any thread). Out: rows as they come, the present moment, and what
+one robot is doing inside. Everything that is done to the world is kept with its quantum, so a trial that is made again
+from its seed comes to the same state, to the byte: that is how it goes back.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import queue
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Thread
+from typing import Any, Final, TypeVar
+
+from arena.campaign import Plan, brains_of
+from arena.emulated import EmulatedBrain
+from arena.page import samples_of
+from arena.record import Trial
+from arena.scene import SceneError
+from arena.trial import Running
+
+T = TypeVar("T")
+IDLE_S: Final = 0.05
+"""For which a trial that stands waits before it looks whether it is to end."""
+FRAMES: Final = 12
+"""Frames of a call stack that are told."""
+
+
+class RefusedError(ValueError):
+    """What was asked for cannot be done now, or not at all."""
+
+
+@dataclass(frozen=True)
+class Deed:
+    """What somebody did between two quanta, so that it can be done again."""
+
+    tick: int
+    do: Callable[[Running], None]
+
+
+class Studio:
+    """`plan`'s trial number `seed`, standing at its beginning. `close` ends it.
+
+    Raises what making the trial raises: SceneError, emu.LoadError.
+    """
+
+    def __init__(self, plan: Plan, seed: int) -> None:
+        self._plan: Final = plan
+        self._seed: Final = seed
+        self._jobs: Final[queue.Queue[tuple[Callable[[], Any], Future[Any]]]] = queue.Queue()
+        self._deeds: list[Deed] = []
+        self._again: deque[Deed] = deque()
+        self._goal: int | None = None
+        self._pace = 1.0
+        self._breaks: dict[tuple[int, str], Callable[[], None]] = {}
+        self._held = ""
+        self._hold = False
+        self._ended = False
+        self.epoch = 0
+        """How often the trial was begun anew: samples of another one are not those of this."""
+        begun: Future[None] = Future()
+        self._thread: Final = Thread(target=self._live, args=(begun,), daemon=True)
+        self._thread.start()
+        begun.result()
+
+    # -- for any thread ----------------------------------------------------------------------------------------------
+
+    def ask(self, what: Callable[[], T]) -> T:
+        """The result of one of the methods below, at the next moment at which the world stands between two quanta, or
+        one of its robots at a breakpoint. Raises what it raises, RefusedError if the studio is closed."""
+        answer: Future[Any] = Future()
+        self._jobs.put((what, answer))
+        while True:
+            with suppress(TimeoutError):
+                result: T = answer.result(timeout=1.0)
+                return result
+            if not self._thread.is_alive():
+                raise RefusedError("the studio is closed")
+
+    def close(self) -> None:
+        """End the trial."""
+        with suppress(RefusedError):
+            self.ask(self._end)
+        self._thread.join()
+
+    # -- what can be asked for ---------------------------------------------------------------------------------------
+
+    def go(self, pace: float = 1.0) -> None:
+        """Run until told otherwise, at most `pace` times as fast as real time. Leaves a breakpoint."""
+        if not pace > 0:
+            raise RefusedError(f"{pace} times as fast as real time: expected a positive number")
+        self._pace, self._hold = pace, False
+        self._goal = self._running.quanta
+
+    def stand(self) -> None:
+        """Stand still at the end of this quantum."""
+        self._goal = None
+
+    def step(self, quanta: int = 1) -> None:
+        """Let some quanta be over."""
+        self._free()
+        if quanta < 1:
+            raise RefusedError(f"{quanta} quanta: expected 1 or more")
+        self._pace, self._goal = 0.0, min(self._running.world.ticks + quanta, self._running.quanta)
+
+    def back(self, tick: int) -> None:
+        """Back, or forth, to the moment at which `tick` quanta were over: by beginning anew with the same seed, doing
+        again what was done until then. What was done later is forgotten."""
+        self._free()
+        if not 0 <= tick <= self._running.quanta:
+            raise RefusedError(f"quantum {tick}: the trial has those from 0 to {self._running.quanta}")
+        self._deeds = [deed for deed in self._deeds if deed.tick <= tick]
+        if tick < self._running.world.ticks:
+            self._begin()
+            self._again = deque(self._deeds)
+            self._do_again()
+        self._pace, self._goal = 0.0, tick
+
+    def move(self, kind: str, number: int, x: float, y: float) -> None:
+        """Put a robot or an object somewhere else; cm."""
+        self._free()
+        if kind not in ("robot", "object"):
+            raise RefusedError(f"{kind!r} cannot be moved; expected robot or object")
+        if not 0 <= number < len(getattr(self._running.world, f"{kind}s")):
+            raise RefusedError(f"there is no {kind} {number}")
+
+        def put(running: Running) -> None:
+            (running.stage.move_robot if kind == "robot" else running.stage.move_object)(number, x, y)
+            running.touched()
+
+        self._do(put)
+
+    def tell(self, robot: int, text: str) -> None:
+        """Send a robot something by Bluetooth."""
+        self._free()
+        self._brain(robot)
+        try:
+            text.encode("latin-1")
+        except UnicodeEncodeError:
+            raise RefusedError("Bluetooth carries bytes: letters of Latin-1 only") from None
+        self._do(lambda running: running.stage.tell(robot, text))
+
+    def stop_at(self, robot: int, place: str) -> None:
+        """Let the whole world stand still when a robot comes to a function, until `go`; again = no more."""
+        machine = self._emulated(robot).machine
+        key = robot, place
+        if key in self._breaks:
+            self._breaks.pop(key)()
+            return
+        try:
+            self._breaks[key] = machine.hook_pc(place, lambda *_: self._stands_at(robot, place))
+        except (KeyError, ValueError) as error:
+            raise RefusedError(f"robot {robot}: {error.args[0]}") from None
+
+    def now(self) -> dict[str, Any]:
+        """The present moment: cm, rad, s."""
+        world = self._running.world
+        return {
+            "tick": world.ticks, "t": world.seconds, "epoch": self.epoch, "quanta": self._running.quanta,
+            "robots": world.poses.robots, "objects": world.poses.objects, "held": self._held,
+            "breaks": [f"{robot} {place}" for robot, place in self._breaks],
+            "state": "at a breakpoint" if self._held else "over" if self._running.is_over
+                     else "standing" if self._goal is None else "going back" if self._again else "running",
+        }  # fmt: skip
+
+    def more(self, first: int, epoch: int) -> dict[str, Any]:
+        """Samples from `first` on, or all if those are of another epoch, and `now`."""
+        columns = self._running.result.rows.columns
+        begin = first if epoch == self.epoch else 0
+        about = self._about | {"faults": [list(fault) for fault in self._running.result.faults]}
+        found: dict[str, Any] = {}
+        if begin < len(columns["t"]):
+            rows = {name: values[begin:] for name, values in columns.items()}
+            found = samples_of(Trial(Path("studio"), rows, about))
+        return found | {"from": begin, "now": self.now()}
+
+    def trial(self) -> Trial:
+        """What is recorded so far."""
+        faults = [list(fault) for fault in self._running.result.faults]
+        columns = {name: list(values) for name, values in self._running.result.rows.columns.items()}
+        return Trial(Path("studio"), columns, self._about | {"faults": faults})
+
+    def inside(self, robot: int) -> dict[str, Any]:
+        """What one robot is doing: registers, call stack, threads. A script has nothing inside."""
+        brain = self._brain(robot)
+        if not isinstance(brain, EmulatedBrain):
+            return {"robot": robot, "script": True}
+        machine = brain.machine
+        place = machine.image.symbols.text(machine.pc) if machine.image else ""
+        return {
+            "robot": robot, "pc": machine.pc, "place": place, "cycle": machine.cycle, "sr": machine.peek("SR"),
+            "asleep": machine.is_asleep, "w": [machine.peek(f"W{n}") for n in range(16)],
+            "frames": [str(frame) for frame in machine.backtrace()[:FRAMES]],
+            "threads": [{"name": one.name, "pid": one.pid, "state": one.state, "used": one.used,
+                         "size": one.stack and one.stack[1] - one.stack[0]} for one in machine.threads()],
+        }  # fmt: skip
+
+    def digest(self) -> str:
+        """SHA-256 of everything that lives: bodies with their speeds, and every machine's whole state."""
+        world = self._running.world
+        digest = hashlib.sha256(world.poses.values.tobytes())
+        for body in (*world.robots, *world.objects):
+            moves = tuple(body.position), body.angle, tuple(body.velocity), body.angular_velocity
+            digest.update(repr(moves).encode())
+        for brain in self._running.brains:
+            if isinstance(brain, EmulatedBrain):
+                digest.update(brain.machine.snapshot())
+        return digest.hexdigest()
+
+    # -- the trial's own thread --------------------------------------------------------------------------------------
+
+    def _live(self, begun: Future[None]) -> None:
+        self._made: AbstractContextManager[Any] | None = None
+        try:
+            self._begin()
+            begun.set_result(None)
+        except Exception as error:
+            begun.set_exception(error)
+            return
+        while not self._ended:
+            if self._goal is None or self._running.is_over or self._running.world.ticks >= self._goal:
+                self._goal = None
+                self._answer(IDLE_S)
+            else:
+                self._go_on()
+        self._close()
+
+    def _go_on(self) -> None:
+        """To the next sample, or where something is to be done, no faster than wanted."""
+        assert self._goal is not None
+        running, start, before = self._running, time.monotonic(), self._running.world.seconds
+        running.go_on(min(self._goal, self._again[0].tick) if self._again else self._goal)
+        self._do_again()
+        self._answer(0)
+        while self._pace and not self._ended and self._goal is not None:
+            left = (running.world.seconds - before) / self._pace - (time.monotonic() - start)
+            if left <= 0:
+                break
+            self._answer(min(left, IDLE_S))
+
+    def _answer(self, wait: float) -> None:
+        """Do what is asked for; wait for it so many seconds at most."""
+        try:
+            what, answer = self._jobs.get(timeout=wait) if wait else self._jobs.get_nowait()
+        except queue.Empty:
+            return
+        try:
+            answer.set_result(what())
+        except Exception as error:
+            answer.set_exception(error)
+
+    def _begin(self) -> None:
+        self._close()
+        made = brains_of(self._plan, self._seed, 1)
+        brains, _, ether = made.__enter__()
+        self._made = made
+        plan = self._plan
+        self._running = Running(plan.scene, self._seed, brains, plan.seconds, ether=ether, experiment=plan.to_do)
+        self._about: dict[str, Any] = plan.key() | {"seed": self._seed}
+        self.epoch += 1
+        again, self._breaks = list(self._breaks), {}
+        for robot, place in again:
+            self.stop_at(robot, place)
+
+    def _close(self) -> None:
+        if self._made is not None:
+            self._made.__exit__(None, None, None)
+            self._made = None
+
+    def _end(self) -> None:
+        self._ended, self._hold = True, False
+
+    def _do(self, what: Callable[[Running], None]) -> None:
+        """Do something to the world, and keep it. Raises RefusedError where the scene has no room for it."""
+        try:
+            what(self._running)
+        except SceneError as error:
+            raise RefusedError(str(error)) from None
+        self._deeds.append(Deed(self._running.world.ticks, what))
+
+    def _do_again(self) -> None:
+        while self._again and self._again[0].tick <= self._running.world.ticks:
+            self._again.popleft().do(self._running)
+
+    def _stands_at(self, robot: int, place: str) -> bool:
+        """A robot has come to a breakpoint, in the middle of a quantum: whatever is asked for now is answered here."""
+        if self._again or self._ended:
+            return False
+        self._held, self._hold = f"robot {robot} is at {place}", True
+        while self._hold:
+            self._answer(IDLE_S)
+        self._held = ""
+        return False
+
+    def _free(self) -> None:
+        if self._held:
+            raise RefusedError(f"{self._held}; let it go on first")
+
+    def _brain(self, robot: int) -> Any:
+        if not 0 <= robot < len(self._running.brains):
+            raise RefusedError(f"there is no robot {robot}")
+        return self._running.brains[robot]
+
+    def _emulated(self, robot: int) -> EmulatedBrain:
+        brain = self._brain(robot)
+        if not isinstance(brain, EmulatedBrain):
+            raise RefusedError(f"robot {robot} is a script: it has no firmware to stop in")
+        return brain

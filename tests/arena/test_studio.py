@@ -1,0 +1,285 @@
+"""The studio: a trial that stands, steps and goes back to the byte; a server for its own page alone; the page."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arena.brain import ScriptedBrain
+from arena.campaign import Plan, brains_of
+from arena.commands import studio as command
+from arena.commands.studio import HEADER, Serving, server
+from arena.scene import Scene, load_scene, scripted
+from arena.studio import RefusedError, Studio
+from arena.trial import run_trial
+
+ROOT = Path(__file__).resolve().parents[2]
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
+SECONDS = 6.0
+
+
+def scene_of(robots: int, objects: int) -> Scene:
+    return load_scene("clustering").with_values(robots__count=robots, objects__count=objects)
+
+
+def scripted_plan() -> Plan:
+    return Plan(scripted(scene_of(2, 4)), "scripted", "A", None, 1, SECONDS, 3)
+
+
+@contextmanager
+def studio_of(plan: Plan) -> Iterator[Studio]:
+    made = Studio(plan, plan.seed)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def settled(studio: Studio, state: str = "standing") -> dict[str, Any]:
+    """`now`, once the trial is in a state."""
+    for _ in range(1200):
+        now = studio.ask(studio.now)
+        if now["state"] in (state, "over"):
+            return now
+        time.sleep(0.05)
+    raise AssertionError(f"still {now['state']}, not {state}")
+
+
+def do(studio: Studio, what: Callable[[], Any]) -> dict[str, Any]:
+    studio.ask(what)
+    return settled(studio)
+
+
+def test_a_trial_that_was_stopped_and_stepped_is_recorded_as_any_other() -> None:
+    """However it is cut, the rows are those of `run_trial`."""
+    plan = scripted_plan()
+    whole = run_trial(plan.scene, 3, [ScriptedBrain(plan.scene, 3, robot, "A") for robot in range(2)], SECONDS,
+                      experiment=plan.to_do)  # fmt: skip
+    with studio_of(plan) as studio:
+        for quanta in (1, 7, 100, 33):
+            do(studio, lambda quanta=quanta: studio.step(quanta))
+        studio.ask(lambda: studio.go(1000.0))
+        assert settled(studio, "over")["state"] == "over"
+        assert studio.ask(studio.trial).columns == whole.rows.columns
+
+
+def test_going_back_leads_to_the_first_pass_to_the_byte(clustering_image: Path) -> None:
+    """Two robots with firmware, an object moved on the way: bodies, speeds and whole machines by hash."""
+    plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
+    with studio_of(plan) as studio:
+        do(studio, lambda: studio.step(1300))
+        studio.ask(lambda: studio.move("object", 1, 100.0, 120.0))
+        here = do(studio, lambda: studio.step(301))
+        first, rows = studio.ask(studio.digest), studio.ask(studio.trial).columns
+        for _ in range(3):
+            do(studio, lambda: studio.step(1))
+        studio.ask(lambda: studio.move("robot", 0, 50.0, 50.0))
+        assert do(studio, lambda: studio.step(1))["tick"] == here["tick"] + 4
+        assert studio.ask(studio.digest) != first
+        again = do(studio, lambda: studio.back(here["tick"]))
+        assert (again["tick"], again["epoch"]) == (here["tick"], here["epoch"] + 1)
+        assert studio.ask(studio.digest) == first
+        assert studio.ask(studio.trial).columns == rows
+        assert studio.ask(lambda: studio.more(2, here["epoch"]))["from"] == 0, "samples of another epoch"
+
+
+def test_a_breakpoint_holds_the_whole_world(clustering_image: Path) -> None:
+    """Nobody moves while a robot stands; what is inside it can be read; afterwards all is as without it."""
+    plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
+    with brains_of(plan, 3, 1) as (brains, _, ether):
+        whole = run_trial(plan.scene, 3, brains, SECONDS, ether=ether, experiment=plan.to_do)
+    with studio_of(plan) as studio:
+        do(studio, lambda: studio.step(1100))
+        studio.ask(lambda: studio.stop_at(1, "Sys_Send_Event"))
+        with pytest.raises(RefusedError, match="robot 0"):
+            studio.ask(lambda: studio.stop_at(0, "no_such_function"))
+        studio.ask(lambda: studio.go(1000.0))
+        now = settled(studio, "at a breakpoint")
+        assert now["held"] == "robot 1 is at Sys_Send_Event"
+        inside = studio.ask(lambda: studio.inside(1))
+        assert inside["place"] == "_Sys_Send_Event"
+        assert any("Sys_Send_Event" in frame for frame in inside["frames"])
+        assert len(inside["w"]) == 16
+        with pytest.raises(RefusedError, match="let it go on first"):
+            studio.ask(lambda: studio.move("object", 0, 50.0, 50.0))
+        time.sleep(0.2)
+        assert studio.ask(studio.now)["tick"] == now["tick"]
+        studio.ask(lambda: studio.stop_at(1, "Sys_Send_Event"))
+        studio.ask(lambda: studio.go(1000.0))
+        settled(studio, "over")
+        assert studio.ask(studio.trial).columns == whole.rows.columns
+
+
+def test_what_is_told_arrives(assembled: Callable[[str], Path]) -> None:
+    """A robot that echoes what it hears by Bluetooth."""
+    plan = Plan(scene_of(1, 0), "echo", "A", assembled(ECHO), 1, SECONDS, 1)
+    with studio_of(plan) as studio:
+        do(studio, lambda: studio.step(100))
+        studio.ask(lambda: studio.tell(0, "hello\r"))
+        with pytest.raises(RefusedError, match="Latin-1"):
+            studio.ask(lambda: studio.tell(0, "\u20ac"))
+        do(studio, lambda: studio.step(500))
+        assert [line["text"] for row in studio.ask(studio.trial).columns["log"] for line in row] == ["hello"]
+
+
+ECHO = """
+        .include "p30F6014A.inc"
+        .text
+        .global _main
+_main:  mov     #7, w0
+        mov     w0, U1BRG
+        mov     #0x8000, w0
+        mov     w0, U1MODE
+        bset    U1STA, #10
+wait:   btss    U1STA, #0
+        bra     wait
+        mov     U1RXREG, w1
+        mov     w1, U1TXREG
+        bra     wait
+"""
+
+
+# -- the server ------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def serving() -> Iterator[Serving]:
+    with studio_of(scripted_plan()) as studio, server(studio, 0) as one:
+        threading.Thread(target=one.serve_forever, daemon=True).start()
+        yield one
+        one.shutdown()
+
+
+def asked(one: Serving, path: str, body: bytes | None = None, **headers: str) -> tuple[int, str]:
+    given = {HEADER: one.token} | {name.replace("_", "-"): value for name, value in headers.items()}
+    request = urllib.request.Request(f"http://{one.hosts[0]}{path}", body, given)
+    try:
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.status, answer.read().decode()
+    except urllib.error.HTTPError as error:
+        return error.code, error.read().decode()
+
+
+def test_strangers_are_refused() -> None:
+    """Another page's origin, a name that leads here, a missing or wrong token: 403, and nothing is done."""
+    step = json.dumps({"do": "step", "quanta": 5}).encode()
+    with serving() as one:
+        assert asked(one, "/", **{HEADER: ""})[0] == 403
+        assert asked(one, f"/?token={one.token}", **{HEADER: ""})[0] == 200
+        assert asked(one, f"/more?from=0&epoch=1&token={one.token}", **{HEADER: ""})[0] == 403
+        for strange in ({HEADER: ""}, {HEADER: one.token[:-1]}, {"Origin": "http://example.org"}, {"Origin": "null"},
+                        {"Host": f"example.org:{one.server_port}"}):  # fmt: skip
+            status, text = asked(one, "/do", step, **strange)
+            assert status == 403, strange
+            assert text.endswith("use the one that `arena studio` printed")
+        assert json.loads(asked(one, "/more?from=0&epoch=1")[1])["now"]["tick"] == 0
+        status, text = asked(one, "/do", step, Origin=f"http://{one.hosts[1]}")
+        assert (status, json.loads(text)["state"]) == (200, "running")
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (b"{", "no JSON"),
+        (b"[" * 5000, "no JSON"),
+        (b"[]", "expected an object"),
+        (b'{"do": "__init__"}', "expected an object"),
+        (b'{"do": "go"}', "go: expected pace"),
+        (b'{"do": "go", "pace": 0}', "expected a positive number"),
+        (b'{"do": "go", "pace": NaN}', "pace is nan"),
+        (b'{"do": "step", "quanta": true}', "quanta is True"),
+        (b'{"do": "step", "quanta": 1.5}', "quanta is 1.5"),
+        (b'{"do": "back", "tick": -1}', "quantum -1"),
+        (b'{"do": "back", "tick": 1e400}', "tick is inf"),
+        (b'{"do": "move", "kind": "wall", "number": 0, "x": 1, "y": 1}', "cannot be moved"),
+        (b'{"do": "move", "kind": "robot", "number": 9, "x": 1, "y": 1}', "there is no robot 9"),
+        (b'{"do": "move", "kind": "robot", "number": 0, "x": 1e9, "y": 1}', "outside the walls"),
+        (b'{"do": "tell", "robot": -1, "text": ""}', "there is no robot -1"),
+        (b'{"do": "stop_at", "robot": 0, "place": "main"}', "robot 0 is a script"),
+        (b'{"do": "stand", "more": 1}', "expected nothing more"),
+    ],
+)
+def test_bad_requests_are_told_in_one_line(body: bytes, said: str) -> None:
+    """409, and the studio goes on."""
+    with serving() as one:
+        status, text = asked(one, "/do", body)
+        assert (status, text.count("\n")) == (409, 0)
+        assert said in text
+        assert asked(one, "/inside?robot=7")[0] == asked(one, "/more?from=-1&epoch=1")[0] == 409
+        assert asked(one, "/elsewhere")[0] == 404
+        assert json.loads(asked(one, "/inside?robot=1")[1]) == {"robot": 1, "script": True}
+
+
+def test_the_command_ends_with_ctrl_c() -> None:
+    """It names its address; a bad scene is one line and status 2."""
+    words = [sys.executable, "-m", "arena", "studio", "clustering", "--brain", "scripted", "--port", "0"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        with urllib.request.urlopen(process.stdout.readline().split()[0], timeout=60) as answer:
+            assert 'id="studio"' in answer.read().decode()
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.read() == ""
+    assert process.returncode == 0
+    bad = [sys.executable, "-m", "arena", "studio", "nowhere"]
+    done = subprocess.run(bad, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+
+
+# -- the page --------------------------------------------------------------------------------------------------------
+
+PROBE = """<pre id="result"></pre><script>
+const found = {}, rest = ms => new Promise(done => setTimeout(done, ms));
+const still = async () => { do await rest(100); while (d.studio.now.state !== "standing"); };
+(async () => {
+  found.first = d.studio.now.tick;
+  el("quantum").click(); await still(); found.stepped = d.studio.now.tick;
+  el("speed").value = "64"; el("go").click(); await rest(700); el("go").click(); await still();
+  found.ran = d.studio.now.tick; found.before = (await ask("digest")).digest;
+  const [x, y] = d.studio.now.objects[0], at = (x, y) => ({offsetX: X(x), offsetY: Y(y)});
+  canvas.onpointerdown(at(x, y)); canvas.onpointermove(at(200, 150));
+  canvas.onpointerup(); canvas.onclick(at(200, 150));
+  await rest(300); found.dragged = d.studio.now.objects[0]; found.moved = (await ask("digest")).digest;
+  await act({do: "step", quanta: 20}); await still();
+  await act({do: "back", tick: found.ran}); await still();
+  found.backTick = d.studio.now.tick; found.back = (await ask("digest")).digest;
+  choose(1); await rest(700); found.inside = el("inside").textContent;
+  el("stopat").value = "main"; el("stopat").dispatchEvent(new Event("change")); await rest(300);
+  found.refused = el("refused").textContent; found.samples = d.t.length;
+  document.getElementById("result").textContent = JSON.stringify(found);
+})().catch(error => { document.getElementById("result").textContent = JSON.stringify({error: error.stack}); });
+</script></html>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+def test_the_page_takes_the_trial_in_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Step, run, stand, drag, back to the moment of the drag, look inside, and what is refused is told."""
+    assert BROWSER is not None
+    plain = command.page
+    monkeypatch.setattr(command, "page", lambda *one, **more: plain(*one, **more).replace("</html>", PROBE))
+    with serving() as one:
+        words = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
+                 f"--user-data-dir={tmp_path}", "--virtual-time-budget=60000", "--dump-dom", one.address]  # fmt: skip
+        done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    found = json.loads(done.stdout.split('<pre id="result">')[1].split("</pre>")[0])
+    assert "error" not in found, found
+    assert (found["first"], found["stepped"]) == (0, 1)
+    assert found["ran"] > 10
+    assert found["backTick"] == found["ran"]
+    assert found["dragged"] == pytest.approx([200, 150], abs=1.5)
+    assert found["before"] != found["moved"] == found["back"]
+    assert found["inside"] == "a script: nothing is inside"
+    assert "robot 1 is a script" in found["refused"]
