@@ -247,7 +247,7 @@ def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
     out = []
     for record in f.dbg_records:
         slot = m.slot_of.get(id(record.value))
-        if record.kind == "dbg_declare" and slot is not None:
+        if record.kind in ("dbg_declare", "parameter") and slot is not None:
             out.append((record.variable, offset_of(m, slot)))
     return out
 
@@ -330,7 +330,10 @@ class ModuleCompiler:
             frame_vars = frame_variables(f, c.m)
             known = [record.variable for record in f.dbg_records]
             objects = {k: offset_of(c.m, k) for k in range(len(c.m.frame))}
-            info = FunctionInfo(name, f.dbg, end, c.m.frame_base, rows.rows, frame_vars, ranges.found, known, objects)
+            info = FunctionInfo(
+                name, f.dbg, end, c.m.frame_base, rows.rows, frame_vars, ranges.found, known, bindings.constants(f),
+                objects,
+            )  # fmt: skip
             self.dwarf.add_function(info)
 
     def header(self, f: Function, interrupt: str) -> None:

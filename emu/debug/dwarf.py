@@ -177,7 +177,7 @@ class _Reader:
     def _entry(self, die: Any) -> None:
         if die.tag == "DW_TAG_variable":
             one = self._variable(die)
-            if one is not None and one.location is not None:
+            if one is not None and (one.location is not None or one.constant is not None):
                 self.info.globals.setdefault(one.name, []).append(one)
                 self.info.statics.setdefault(self.unit, {})[one.name] = one
         elif die.tag == "DW_TAG_subprogram":

@@ -356,13 +356,11 @@ class Value:
             if first < last:
                 skip = first - begin
                 if piece.kind == "register":
-                    if skip % 2:
-                        raise locate.Unavailable("an odd byte of registers")
-                    found.append(locate.Piece("register", piece.at + skip // 2, last - first))
+                    found.append(locate.Piece("register", piece.at + skip // 2, last - first, skip=skip % 2))
                 elif piece.kind == "memory":
                     found.append(locate.Piece("memory", piece.at + skip, last - first))
                 else:
-                    found.append(locate.Piece("value", 0, last - first, piece.data[skip:]))
+                    found.append(locate.Piece(piece.kind, 0, last - first, piece.data[skip:]))
             begin += length
         if len(found) == 1 and found[0].kind == "memory":
             return (locate.Piece("memory", found[0].at),)

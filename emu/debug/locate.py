@@ -62,10 +62,12 @@ class Piece:
     """Part of a variable: in memory, in a register, or known by value. `size` 0: all that is left."""
 
     kind: str
-    """"memory", "register" or "value"."""
+    """"memory", "register", "value", or "gone" for a part that was optimised out."""
     at: int
     size: int = 0
     data: bytes = b""
+    skip: int = 0
+    """1: it begins with the upper byte of its register."""
 
 
 def pieces_of(code: bytes, view: View, frame_base: Callable[[], int]) -> tuple[Piece, ...]:
@@ -83,6 +85,8 @@ def read(pieces: tuple[Piece, ...], size: int, view: View) -> bytes:
     data = b""
     for piece in pieces:
         wanted = piece.size or size - len(data)
+        if piece.kind == "gone":
+            raise Unavailable("partly optimised out" if len(pieces) > 1 else "optimised out")
         if piece.kind == "value":
             data += piece.data[:wanted].ljust(wanted, b"\0")
         elif piece.kind == "memory":
@@ -91,7 +95,7 @@ def read(pieces: tuple[Piece, ...], size: int, view: View) -> bytes:
             except ValueError as error:
                 raise Unavailable(str(error)) from None
         else:
-            data += _registers(piece.at, wanted, view)
+            data += _registers(piece.at, piece.skip + wanted, view)[piece.skip :]
     return data[:size]
 
 
@@ -114,6 +118,8 @@ def write(pieces: tuple[Piece, ...], data: bytes, view: View) -> None:
         if piece.kind == "memory":
             view.set_memory(piece.at, part)
         elif piece.kind == "register":
+            if piece.skip:  # the byte below stays
+                part = _registers(piece.at, 1, view) + part
             for index in range(0, len(part), 2):
                 number = piece.at + index // 2
                 old = view.register(number)
@@ -154,7 +160,7 @@ class _Evaluation:
             part, self.simple = self.simple, None
             return Piece(part.kind, part.at, size, part.data)
         if not self.stack:
-            raise Unavailable("partly optimised out")
+            return Piece("gone", 0, size)
         return Piece("memory", self.stack.pop() & 0xFFFF, size)
 
     def _do(self, operation: int) -> None:

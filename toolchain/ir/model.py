@@ -348,6 +348,8 @@ class DbgRecord:
     location: str = ""
     address: Value | None = None
     link: str = ""
+    words: tuple[Value | None, ...] = ()
+    """Of a struct that arrived in registers: where its words are, None for those nobody reads."""
 
 
 @dataclass(slots=True)

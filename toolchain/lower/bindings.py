@@ -6,7 +6,7 @@ hand on lines. Where two ways into a block disagree, nothing is known of the var
 
 from __future__ import annotations
 
-from ..ir.model import Block, DbgRecord, Function, Instr, Type, size_of
+from ..ir.model import Arg, Block, ConstInt, DbgRecord, Function, Instr, Type, size_of
 from .cfg import predecessors
 from .debuginfo import DebugInfo
 
@@ -27,6 +27,8 @@ def bind(f: Function, info: DebugInfo) -> None:
     for k, home in in_memory(f, info).items():
         f.dbg_records[k].kind, f.dbg_records[k].value = "memory", home
     for record in f.dbg_records:
+        if record.kind == "dbg_declare" and isinstance(record.value, Arg):  # a struct, perhaps in registers
+            record.kind = "parameter"
         if record.kind == "dbg_assign":
             record.kind = "dbg_value"
             if isinstance(record.address, Instr):  # on its way to memory, which others may change from then on
@@ -154,6 +156,21 @@ def _holds(home: Instr, record: DbgRecord, info: DebugInfo) -> bool:
     """Whether the object is as large as the variable: a part of one that was taken apart is not."""
     t = home.extra.get("type")
     return isinstance(t, Type) and 8 * size_of(t) == info.bits(info.node(record.variable).get("type", ""))
+
+
+def constants(f: Function) -> dict[str, bytes]:
+    """Variables (`name_of`) that are one number wherever they are anything."""
+    found: dict[str, set[bytes | None]] = {}
+    for record in f.dbg_records:
+        v = record.value
+        known = record.kind == "dbg_value" and isinstance(v, ConstInt) and not record.expression
+        found.setdefault(record.variable, set()).add(bytes_of(v) if known and isinstance(v, ConstInt) else None)
+    return {name: value for name, values in found.items() if len(values) == 1 and (value := next(iter(values)))}
+
+
+def bytes_of(v: ConstInt) -> bytes:
+    """The number as memory holds it."""
+    return v.value.to_bytes((v.type.bits + 7) // 8, "little")
 
 
 def root(address: Instr) -> Instr:

@@ -74,6 +74,8 @@ def _read_words(f: Function, a: Arg, loads: list[tuple[Instr, int]]) -> None:
     for record in f.dbg_records:
         if record.kind == "dbg_value" and id(record.value) in values:
             record.value = values[id(record.value)]
+        elif record.kind == "parameter" and record.value is a:
+            record.words = tuple(words.get(k) for k in range(max(words) + 1))
     f.blocks[0].instrs[:0] = words.values()
 
 

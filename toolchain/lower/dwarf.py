@@ -8,17 +8,20 @@ debuggers report them as optimised out.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from ..ir.model import Module
 from .call_frames import CallFrames, FrameSection
 from .debuginfo import DebugInfo
 from .leb import sleb, uleb
+from .mir import CONSTANT, GONE
 from .names import symbol
 from .scopes import Die, FunctionInfo, Scope, Scopes, split_name
 
 PRODUCER = "toolchain for dsPIC30F, clang front end"
 ADDRESS_BYTES = 4
 REFERENCE = re.compile(r"!\d+")
+VALUE = re.compile(r"DW_OP_const([us]), (-?\d+), DW_OP_stack_value")
 # DWARF 2 §7.5.4
 TAGS = {"array_type": 0x01, "enumeration_type": 0x04, "formal_parameter": 0x05, "lexical_block": 0x0B, "member": 0x0D,
         "pointer_type": 0x0F, "compile_unit": 0x11, "structure_type": 0x13, "subroutine_type": 0x15, "typedef": 0x16,
@@ -38,6 +41,7 @@ ENCODINGS = {"address": 1, "boolean": 2, "float": 4, "signed": 5, "signed_char":
 LANGUAGE_C89 = 1
 INLINED = 1  # DW_INL_inlined
 OP_ADDR, OP_PLUS_UCONST, OP_REG0, OP_BREG0, OP_FBREG, OP_PIECE = 0x03, 0x23, 0x50, 0x70, 0x91, 0x93  # DWARF 2 §7.7.1
+OP_IMPLICIT_VALUE = 0x9E  # DWARF 4
 LINE_BASE, LINE_RANGE, OPCODE_BASE = -10, 245, 10  # abi-elf.md §6.7, C units
 STANDARD_LENGTHS = (0, 1, 1, 1, 1, 0, 0, 0, 1)
 SPECIFIERS = {"DW_TAG_const_type": "const_type", "DW_TAG_volatile_type": "volatile_type",
@@ -52,15 +56,29 @@ def _string(text: str) -> str:
 
 
 def _expression(f: FunctionInfo, where: tuple[int, ...]) -> list[str]:
-    """Location of a variable in registers, or in the frame (a negative number, `mir.Located`)."""
+    """Location of a variable: in the frame, in registers, or a value without a place (`mir.Located`)."""
     if where[0] < 0:
         return [str(OP_FBREG), *sleb(f.objects[-1 - where[0]])]
+    if all(w >= CONSTANT for w in where):
+        return [str(OP_IMPLICIT_VALUE), str(2 * len(where)), *(str(b) for w in where for b in _octets(w - CONSTANT))]
     data: list[str] = []
-    for r in where:
-        data.append(str(OP_REG0 + r))
+    for w in where:
+        if w != GONE:
+            data.append(str(OP_REG0 + w))
         if len(where) > 1:
             data += [str(OP_PIECE), "2"]
     return data
+
+
+def _octets(word: int) -> bytes:
+    return word.to_bytes(2, "little")
+
+
+def _constant(value: bytes) -> tuple[str, str, str | int | list[str]]:
+    """DW_AT_const_value."""
+    if len(value) in (1, 2, 4):
+        return ("const_value", f"data{len(value)}", int.from_bytes(value, "little"))
+    return ("const_value", "block1", [str(b) for b in value])
 
 
 class Unit:
@@ -74,7 +92,7 @@ class Unit:
         self.types: dict[str, Die] = {}
         self.files: list[tuple[str, str]] = []
         self.functions: list[FunctionInfo] = []
-        self.globals: list[tuple[str, str]] = []  # DIGlobalVariable, assembler symbol
+        self.globals: list[tuple[str, str | bytes]] = []  # DIGlobalVariable, assembler symbol or value
         self.lists: list[list[tuple[str, str, list[str]]]] = []  # location lists, for .debug_loc
         self.ranges: list[list[tuple[str, str]]] = []  # addresses of units and scopes, for .debug_ranges
         self.abstract: dict[str, Die] = {}  # functions that were inlined somewhere
@@ -96,7 +114,7 @@ class Unit:
         ])  # fmt: skip
         if self.functions:
             top.attributes.append(self._addresses([(f.name, f.end_label) for f in self.functions]))
-        body = [self._variable(ref, s) for ref, s in self.globals] + [self._function(f) for f in self.functions]
+        body = [self._variable(ref, place) for ref, place in self.globals] + [self._function(f) for f in self.functions]
         top.children = [*self.types.values(), *self.abstract.values(), *body]
         return top
 
@@ -119,11 +137,11 @@ class Unit:
         die = self.type(ref)
         return [("type", "ref4", die.label)] if die is not None else []
 
-    def _variable(self, ref: str, name: str) -> Die:
+    def _variable(self, ref: str, place: str | bytes) -> Die:
         node = self.info.node(ref)
         attributes = self._declared(ref) + self._type_attribute(node.get("type"))
         attributes.append(("external", "flag", int(node.get("isLocal") != "true")))
-        attributes.append(("location", "block1", ["addr", name]))
+        attributes.append(_constant(place) if isinstance(place, bytes) else ("location", "block1", ["addr", place]))
         return Die("variable", attributes)
 
     def _function(self, f: FunctionInfo) -> Die:
@@ -145,7 +163,7 @@ class Unit:
         located = dict(f.variables)
         for name in dict.fromkeys([*self._parameters(node), *f.known]):
             ref, call = split_name(name)
-            scopes.place(ref, call, self._local(f, ref, located.get(name), f.ranges.get(name)))
+            scopes.place(ref, call, self._local(f, name, located.get(name)))
         self._fill(die, scopes.top)
         return die
 
@@ -178,12 +196,13 @@ class Unit:
         retained = self.info.items(subprogram.get("retainedNodes", ""))
         return [r for r in retained if self.info.number(r, "arg")]
 
-    def _local(
-        self, f: FunctionInfo, ref: str, offset: int | None, ranges: list[tuple[str, str, tuple[int, ...]]] | None
-    ) -> Die:
+    def _local(self, f: FunctionInfo, name: str, offset: int | None) -> Die:
+        ref, ranges = split_name(name)[0], f.ranges.get(name)
         attributes = self._declared(ref) + self._type_attribute(self.info.node(ref).get("type"))
         if offset is not None:
             attributes.append(("location", "block1", [str(OP_FBREG), *sleb(offset)]))
+        elif name in f.constants:
+            attributes.append(_constant(f.constants[name]))
         elif ranges:
             attributes.append(("location", "data4", f".Ldbg_loc{self.number}_{len(self.lists)}"))
             self.lists.append([(start, end, _expression(f, where)) for start, end, where in ranges])
@@ -329,14 +348,23 @@ class DwarfWriter:
             ref = self.info.node(var.dbg).get("var", "")
             if ref in owners and self.info.node(ref).get("name"):
                 self.unit(owners[ref]).globals.append((ref, symbol(self.module, var.name)))
+        for cu, expression in self._expressions():
+            value = VALUE.search(self.info.node(expression).get("expr", ""))
+            ref = self.info.node(expression).get("var", "")
+            if value is not None and ref not in {known for known, _ in self.unit(cu).globals}:
+                size = max(1, self.info.bits(self.info.node(ref).get("type", "")) // 8)
+                number = int(value[2]) & (1 << 8 * size) - 1
+                self.unit(cu).globals.append((ref, number.to_bytes(size, "little")))
 
     def _owners(self) -> dict[str, str]:
         """DIGlobalVariable -> its compile unit."""
-        out = {}
+        return {self.info.node(expression).get("var", ""): cu for cu, expression in self._expressions()}
+
+    def _expressions(self) -> Iterator[tuple[str, str]]:
+        """Compile units with their DIGlobalVariableExpressions."""
         for cu in REFERENCE.findall(self.module.named_metadata.get("llvm.dbg.cu", "")):
             for expression in self.info.items(self.info.node(cu).get("globals", "")):
-                out[self.info.node(expression).get("var", "")] = cu
-        return out
+                yield cu, expression
 
     def text(self) -> list[str]:
         """All lines of all debug sections."""

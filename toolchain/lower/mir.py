@@ -352,7 +352,9 @@ def _show(a: Operand) -> str:
 
 
 Claim = tuple[str, tuple[int, ...], tuple[int, ...]]  # DILocalVariable, registers, what they hold if it is true
-Located = tuple[str, tuple[int, ...]]  # DILocalVariable, registers of its words; -1 - k is frame object k
+Located = tuple[str, tuple[int, ...]]
+"""DILocalVariable and its words: in registers, GONE, or CONSTANT + the word; -1 - k: all of it in frame object k."""
+GONE, CONSTANT = 1 << 20, 1 << 21
 
 
 @dataclass(slots=True)

@@ -26,6 +26,7 @@ class FunctionInfo:
     variables: list[tuple[str, int]] = field(default_factory=list)  # DILocalVariable, offset from W15 at entry
     ranges: dict[str, list[tuple[str, str, tuple[int, ...]]]] = field(default_factory=dict)  # start, end, registers
     known: list[str] = field(default_factory=list)  # every variable there is, also those of inlined functions
+    constants: dict[str, bytes] = field(default_factory=dict)  # variables that are one number everywhere
     objects: dict[int, int] = field(default_factory=dict)  # frame object -> offset from W15 at entry
 
 

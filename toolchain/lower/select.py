@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..ir.model import (
+    ConstInt,
+    DbgRecord,
     Instr,
     Undef,
     UnsupportedError,
@@ -19,7 +21,7 @@ from ..ir.model import (
 from . import arith, calls, choose, compare, memory, multiply, shifts
 from .address import AddressSelector
 from .cfg import loop_depths, predecessors
-from .mir import MI, MBlock, MFunction
+from .mir import CONSTANT, GONE, MI, MBlock, MFunction
 
 
 class Selector(AddressSelector):
@@ -72,12 +74,21 @@ class Selector(AddressSelector):
         self.m.slot_of = dict(self.slots)
         for k, record in enumerate(self.f.dbg_records):
             slot = self.slots.get(id(record.value)) if record.kind == "memory" else None
-            found = self.registers.get(id(record.value)) if record.kind == "dbg_value" else None
-            if slot is not None:
-                self.m.bindings[k] = (record.variable, (-1 - slot,))
-            elif found is not None and not record.expression:
+            found = (-1 - slot,) if slot is not None else self._words_of(record)
+            if found:
                 self.m.bindings[k] = (record.variable, found)
         return self.m
+
+    def _words_of(self, record: DbgRecord) -> tuple[int, ...]:
+        """Where a variable's words are (`mir.Located`); none where that is not known."""
+        if record.kind == "parameter":
+            return tuple(self.registers.get(id(word), (GONE,))[0] for word in record.words)
+        if record.kind != "dbg_value" or record.expression:
+            return ()
+        if isinstance(record.value, ConstInt):
+            words = max(1, record.value.type.bits // 16)
+            return tuple(CONSTANT + (record.value.value >> 16 * k & 0xFFFF) for k in range(words))
+        return tuple(self.registers.get(id(record.value), ()))
 
     def phi_input(self, phi: Instr) -> tuple[int, ...]:
         """Registers predecessors write for a phi: its own, or separate ones below an indirectbr."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from .bindings import Position
 from .liveness import bits, live_out
-from .mir import MI, Located, MFunction
+from .mir import GONE, MI, Located, MFunction
 
 Values = dict[int, int]
 """Register -> number of the value it holds."""
@@ -23,13 +23,10 @@ def claim(m: MFunction, rename: Mapping[int, int], group: Mapping[int, int]) -> 
 
     `rename` gives their real ones, `group` one number to registers that are the same value under two names.
     """
-    known: dict[int, tuple[str, int, tuple[int, ...], tuple[int, ...]]] = {}
-    for k, (variable, registers) in m.bindings.items():
-        if registers[0] < 0:
-            known[k] = (variable, 0, registers, ())
-        elif all(r in rename and r not in m.pairs for r in registers):
-            real = tuple(rename[r] for r in registers)
-            known[k] = (variable, bits(list(registers)), real, tuple(group[r] for r in registers))
+    known: dict[int, tuple[str, tuple[int, ...], tuple[int, ...], tuple[int, ...]]] = {}
+    for k, (variable, words) in m.bindings.items():
+        virtual = tuple(w if w >= GONE or w < 0 or (w in rename and w not in m.pairs) else GONE for w in words)
+        known[k] = variable, virtual, tuple(rename.get(w, w) for w in virtual), tuple(group.get(w, 0) for w in virtual)
     out = live_out(m)
     for b in m.blocks:
         live = out[b.name]
@@ -38,7 +35,10 @@ def claim(m: MFunction, rename: Mapping[int, int], group: Mapping[int, int]) -> 
             live = live & ~bits(mi.defs()) | bits(mi.uses())
             if isinstance(mi.line, Position):
                 here = [known[k] for k in mi.line.records if k in known]
-                mi.variables = tuple((v, real, values) for v, mask, real, values in here if live & mask == mask)
+                claims = [(v, tuple(r if w < 0 or w >= GONE or live >> w & 1 else GONE
+                                    for w, r in zip(virtual, real, strict=True)), values)
+                          for v, virtual, real, values in here]  # fmt: skip
+                mi.variables = tuple(claim for claim in claims if _anywhere(claim[1]))
 
 
 def proved(m: MFunction) -> dict[int, tuple[Located, ...]]:
@@ -49,14 +49,21 @@ def proved(m: MFunction) -> dict[int, tuple[Located, ...]]:
         values = dict(at_start[b.name])
         for mi in b.insts:
             values.update(mi.holds_before)
-            true = [(v, real) for v, real, wanted in mi.variables if _true(values, real, wanted)]
-            found[id(mi)] = tuple(sorted(true))
+            true = [(v, _true(values, real, wanted)) for v, real, wanted in mi.variables]
+            found[id(mi)] = tuple(sorted((v, words) for v, words in true if _anywhere(words)))
             _step(values, mi)
     return found
 
 
-def _true(values: Values, registers: tuple[int, ...], wanted: tuple[int, ...]) -> bool:
-    return not wanted or all(values.get(r) == value for r, value in zip(registers, wanted, strict=True))
+def _true(values: Values, words: tuple[int, ...], wanted: tuple[int, ...]) -> tuple[int, ...]:
+    """The words, those in registers as far as these hold what they should."""
+    return tuple(
+        w if w < 0 or w >= GONE or values.get(w) == value else GONE for w, value in zip(words, wanted, strict=True)
+    )
+
+
+def _anywhere(words: tuple[int, ...]) -> bool:
+    return any(w != GONE for w in words)
 
 
 def _step(values: Values, mi: MI) -> None:

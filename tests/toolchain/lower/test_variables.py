@@ -147,7 +147,11 @@ class Reader:
         if die.tag == "DW_TAG_inlined_subroutine":
             return None
         size, signed = TYPES[self._type(die)]
-        location = die.attributes.get("DW_AT_location")
+        location, constant = (die.attributes.get(f"DW_AT_{what}") for what in ("location", "const_value"))
+        if constant is not None:
+            assert location is None
+            data = constant.value.to_bytes(size, "little") if isinstance(constant.value, int) else bytes(constant.value)
+            return int.from_bytes(data[:size], "little", signed=signed)
         if location is None:
             return None
         if location.form == "DW_FORM_block1":
@@ -161,12 +165,16 @@ class Reader:
         base = die.get_DIE_from_attribute("DW_AT_type")
         return str(base.attributes["DW_AT_name"].value.decode())
 
-    def _evaluate(self, code: list[int], function: DIE, size: int, signed: bool) -> int:
+    def _evaluate(self, code: list[int], function: DIE, size: int, signed: bool) -> int | None:
         w = self.machine.w
         if code[0] == 0x91:  # DW_OP_fbreg
             base = list(function.attributes["DW_AT_frame_base"].value)
             at = self.stack(base[0] - 0x70) + _sleb(base[1:]) + _sleb(code[1:])
             data = bytes(self.machine.peek(at + k, 1) for k in range(size))
+        elif code[0] == 0x9E:  # DW_OP_implicit_value
+            data = bytes(code[2:])[:size]
+        elif 0x93 in (code[0], code[3] if len(code) > 3 else 0):  # DW_OP_piece of what is nowhere
+            return None
         else:
             words = [code[k] - 0x50 for k in range(0, len(code), 3)]
             data = b"".join(w[r].to_bytes(2, "little") for r in words)[:size]
@@ -224,3 +232,44 @@ def test_locations_of_variables_are_true(options: tuple[str, ...], tmp_path: Pat
         assert told == seen
     else:
         assert told > seen / 5  # constants have no location in DWARF 2
+
+
+WORDS = """
+struct three { int a; char b, c; long d; };
+struct pair { int lo, hi; };
+volatile int sink = 3;
+static const long big = 123456;
+__attribute__((noinline)) long sum(struct three t, struct pair p)
+{
+    int first = t.a + p.lo;
+    sink = first;
+    return first + t.c + p.hi + t.d;
+}
+int main(void)
+{
+    int five = 5;
+    long long wide = 0x123456789ALL;
+    sink = five + (int)wide + (int)big;
+    for (int i = 0; i < 3; i++)
+        sink += i;
+    return sum((struct three){sink, 2, 3, sink * 4L}, (struct pair){7, sink});
+}
+"""
+
+
+@pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
+def test_structs_in_registers_and_constants_are_shown(level: str, tmp_path: Path) -> None:
+    """Members word by word, those that are gone as such; variables that the optimiser has replaced by their value."""
+    (tmp_path / "words.c").write_text(WORDS)
+    built = build([tmp_path / "words.c"], tmp_path / "words.elf", "-g", level, "-fno-lto")
+    assert built.status == 0, built.messages
+    machine = emu.load(tmp_path / "words.elf", engine="interp")
+    machine.run(until="main", cycles=1_000_000)
+    machine.step()
+    assert [machine.value(name).get() for name in ("five", "wide", "big")] == [5, 0x123456789A, 123456]
+    machine.run(until="sum", cycles=1_000_000)
+    shown = [machine.value(name).get() for name in ("t.a", "t.c", "t.d", "p.lo", "p.hi")]
+    total = shown[0]
+    assert shown == [total, 3, 4 * total, 7, total]
+    machine.set_var("t.c", 99)
+    assert (machine.var("t.c"), machine.w[1] & 0xFF) == (99, 2)
