@@ -1,7 +1,8 @@
 """A study as one file: records, images, experiments, manifests and the hash of each, in a zip archive.
 
 What enters: folders of runs; what leaves: an archive whose bytes depend on these files alone, and `verify`, which
-computes chosen trials again and compares.
+computes chosen trials again and compares. A light bundle has the hashes of the records instead of the records: a few
+hundred kB that say as much about what a trial must be.
 """
 
 from __future__ import annotations
@@ -12,17 +13,19 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
+import numpy as np
+
 from arena.campaign import Plan, run_one, trial_path
-from arena.record import EXPERIMENT, MANIFEST, RecordError, Trial, read_trial, write_bytes
+from arena.record import EXPERIMENT, MANIFEST, RecordError, read_trial, write_bytes
 from arena.scene import scene_of
-from arena.versions import versions
 
 CONTENTS: Final = "bundle.json"
-KEPT: Final = (MANIFEST, EXPERIMENT, "trial-*.parquet", "firmware*")
+RECORD, DIGEST = "trial-*.parquet", "trial-*.json"
+KEPT: Final = (MANIFEST, EXPERIMENT, RECORD, DIGEST, "firmware*")
 LIMIT: Final = 1 << 32
 """Bytes of everything unpacked: more is no study of ours."""
 DAMAGE: Final = (OSError, zipfile.BadZipFile, zlib.error, LookupError, TypeError, ValueError, AttributeError,
@@ -31,7 +34,7 @@ DAMAGE: Final = (OSError, zipfile.BadZipFile, zlib.error, LookupError, TypeError
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 
 
-def pack(folders: list[Path], target: Path) -> str:
+def pack(folders: list[Path], target: Path, light: bool = False) -> str:
     """Write the runs in `folders` into one archive; its SHA-256. Raises RecordError for a folder without a finished
     trial, two folders of one name, or an archive that cannot be written."""
     names = [folder.resolve().name for folder in folders]
@@ -42,7 +45,11 @@ def pack(folders: list[Path], target: Path) -> str:
         if not any(folder.glob("trial-*.parquet")) or not (folder / MANIFEST).exists():
             raise RecordError(f"{folder}: no finished run (manifest.json and trial-*.parquet) here")
         for path in sorted(path for pattern in KEPT for path in folder.glob(pattern)):
-            files[f"{name}/{path.name}"] = path.read_bytes()
+            if light and path.match(RECORD):
+                digest = json.dumps(asdict(digest_of(path)), indent=0, sort_keys=True)
+                files[f"{name}/{path.with_suffix('.json').name}"] = digest.encode()
+            else:
+                files[f"{name}/{path.name}"] = path.read_bytes()
     hashes = {name: hashlib.sha256(data).hexdigest() for name, data in sorted(files.items())}
     contents = json.dumps({"format": 1, "files": hashes}, indent=1).encode()
     with tempfile.TemporaryFile() as scratch:
@@ -56,6 +63,48 @@ def pack(folders: list[Path], target: Path) -> str:
         whole = scratch.read()
     write_bytes(target, whole)
     return hashlib.sha256(whole).hexdigest()
+
+
+@dataclass(frozen=True)
+class Digest:
+    """What a record is, without its numbers: SHA-256 of the file and of each column, and the versions named in it."""
+
+    sha256: str
+    columns: dict[str, str]
+    versions: dict[str, str]
+
+
+def digest_of(record: Path) -> Digest:
+    """The digest of a trial's file. Raises RecordError."""
+    trial = read_trial(record)
+    columns = {name: hashlib.sha256(_plain(values)).hexdigest() for name, values in trial.columns.items()}
+    return Digest(hashlib.sha256(record.read_bytes()).hexdigest(), columns, trial.about.get("versions", {}))
+
+
+def _plain(values: Any) -> bytes:
+    """The values of a column as bytes, equal for equal values."""
+    if isinstance(values, np.ndarray):
+        return f"{values.dtype.str} ".encode() + bytes(values.data)
+    return json.dumps(values, default=bytes.hex).encode()
+
+
+def _kept(folder: Path, number: int) -> Digest:
+    """The digest of a trial of an unpacked run. Raises RecordError."""
+    record = trial_path(folder, number)
+    if record.exists():
+        return digest_of(record)
+    path = record.with_suffix(".json")
+    try:
+        found = json.loads(path.read_text())
+        return Digest(found["sha256"], dict(found["columns"]), dict(found["versions"]))
+    except DAMAGE as error:
+        raise RecordError(f"{path}: is no digest of a trial: {type(error).__name__}: {error}") from None
+
+
+def _numbers(folder: Path) -> list[int]:
+    """Numbers of the trials an unpacked run has."""
+    paths = {path.stem for pattern in (RECORD, DIGEST) for path in folder.glob(pattern)}
+    return sorted(int(stem.partition("-")[2]) for stem in paths if stem.partition("-")[2].isdecimal())
 
 
 @dataclass(frozen=True)
@@ -106,7 +155,7 @@ def plan_of(folder: Path) -> Plan:
                        for place, name in enumerate(own, start=1))  # fmt: skip
         image = firmware["firmware"] if key["image_sha256"] else None
         experiment = folder / EXPERIMENT if key.get("experiment_sha256") else None
-        return Plan(scene, key["brain"], key["controller"], image, len(list(folder.glob("trial-*.parquet"))),
+        return Plan(scene, key["brain"], key["controller"], image, len(_numbers(folder)),
                     key["seconds"], key["seed"], experiment, images)  # fmt: skip
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RecordError(f"{folder / MANIFEST}: {type(error).__name__}: {error}") from None
@@ -119,25 +168,18 @@ def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], jobs: int) ->
             plan = plan_of(folder)
             again = folder / "again"
             again.mkdir()
-            numbers = sorted(int(path.stem.partition("-")[2]) for path in folder.glob("trial-*.parquet"))
-            for number in chosen(numbers):
+            for number in chosen(_numbers(folder)):
                 run_one(plan, number, again, None, jobs if plan.has_firmware else 1)
-                yield _compared(folder.name, number, trial_path(folder, number), trial_path(again, number))
+                yield _compared(folder.name, number, _kept(folder, number), digest_of(trial_path(again, number)))
 
 
-def _compared(run: str, number: int, kept: Path, made: Path) -> Check:
-    if kept.read_bytes() == made.read_bytes():
+def _compared(run: str, number: int, kept: Digest, made: Digest) -> Check:
+    if kept.sha256 == made.sha256:
         return Check(run, number, True, (), ())
-    one, other = read_trial(kept), read_trial(made)
-    now, then = versions(), one.about.get("versions", {})
+    now, then = made.versions, kept.versions
     changed = tuple(
         f"{name} {then.get(name, '?')} then, {now[name]} now" for name in now if then.get(name) != now[name]
     )
-    differs = tuple(name for name in sorted({*one.columns, *other.columns}) if not _same(one, other, name))
+    names = sorted({*kept.columns, *made.columns})
+    differs = tuple(name for name in names if kept.columns.get(name) != made.columns.get(name))
     return Check(run, number, not differs and bool(changed), differs, changed)
-
-
-def _same(one: Trial, other: Trial, name: str) -> bool:
-    if name not in one.columns or name not in other.columns:
-        return False
-    return list(one.columns[name]) == list(other.columns[name])

@@ -21,13 +21,14 @@ def parser() -> argparse.ArgumentParser:
         epilog="example: arena bundle study.zip results/openswarm-A results/bare-A",
     )
     made.add_argument("bundle", type=Path, metavar="FILE")
+    made.add_argument("--light", action="store_true", help="hashes instead of records: verify works, replay does not")
     made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the file. Raises RecordError."""
-    digest = bundle.pack(options.runs, options.bundle)
+    digest = bundle.pack(options.runs, options.bundle, options.light)
     size = options.bundle.stat().st_size / 1e6
     print(f"{options.bundle}: {size:.2f} MB, SHA-256 {digest}")
     return 0

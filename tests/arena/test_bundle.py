@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import zipfile
 from pathlib import Path
@@ -70,10 +71,39 @@ def test_another_version_is_told_and_values_are_compared(
     """The file names its versions, so its bytes cannot be the same; what happened can."""
     changed = versions.versions() | {"pymunk": "99"}
     monkeypatch.setattr(campaign, "versions", lambda: changed)
-    monkeypatch.setattr(bundle, "versions", lambda: changed)
     assert main(["verify", str(packed)]) == 0
     assert "all values equal, other versions (pymunk" in capsys.readouterr().out
     assert main(["verify", str(packed), "--strict"]) == 1
+
+
+def test_a_light_bundle_says_as_much(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Hashes instead of records: equal to the byte, equal in all values, and different in which columns."""
+    light, whole = tmp_path / "light.zip", tmp_path / "whole.zip"
+    runs = [str(study / "script"), str(study / "talk")]
+    assert main(["bundle", "--light", str(light), *runs]) == main(["bundle", str(whole), *runs]) == 0
+    with zipfile.ZipFile(light) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".parquet")]
+        digest = json.loads(archive.read("script/trial-0001.json"))
+        contents = json.loads(archive.read("bundle.json"))
+    assert light.stat().st_size < whole.stat().st_size
+    assert main(["verify", str(light), "--trials", "9", "--strict"]) == 0
+    digest |= {"sha256": "0" * 64, "columns": digest["columns"] | {"r1_x": "0" * 64}}
+    changed = json.dumps(digest).encode()
+    contents["files"]["script/trial-0001.json"] = hashlib.sha256(changed).hexdigest()
+    change = {"script/trial-0001.json": changed, "bundle.json": json.dumps(contents).encode()}
+    capsys.readouterr()
+    assert main(["verify", str(rewritten(light, tmp_path / "changed.zip", change))]) == 1
+    assert "script, trial 1: different in r1_x\n" in capsys.readouterr().out
+    monkeypatch.setattr(campaign, "versions", lambda: versions.versions() | {"pymunk": "99"})
+    assert main(["verify", str(light)]) == 0
+    assert "all values equal, other versions (pymunk" in capsys.readouterr().out
+    change["script/trial-0001.json"] = b"[]"
+    contents["files"]["script/trial-0001.json"] = hashlib.sha256(b"[]").hexdigest()
+    change["bundle.json"] = json.dumps(contents).encode()
+    assert main(["verify", str(rewritten(light, tmp_path / "changed.zip", change))]) == 2
+    assert "is no digest of a trial" in capsys.readouterr().err
 
 
 def test_a_record_that_is_not_what_the_plan_gives_is_found(
