@@ -61,6 +61,7 @@ class Studio:
         self._pace = 1.0
         self._breaks: dict[tuple[int, str], Callable[[], None]] = {}
         self._held = ""
+        self._broken = ""
         self._hold = False
         self._ended = False
         self.epoch = 0
@@ -96,6 +97,7 @@ class Studio:
         """Run until told otherwise, at most `pace` times as fast as real time. Leaves a breakpoint."""
         if not pace > 0:
             raise RefusedError(f"{pace} times as fast as real time: expected a positive number")
+        self._able()
         self._pace, self._hold = pace, False
         self._goal = self._running.quanta
 
@@ -106,6 +108,7 @@ class Studio:
     def step(self, quanta: int = 1) -> None:
         """Let some quanta be over."""
         self._free()
+        self._able()
         if quanta < 1:
             raise RefusedError(f"{quanta} quanta: expected 1 or more")
         self._pace, self._goal = 0.0, min(self._running.world.ticks + quanta, self._running.quanta)
@@ -166,7 +169,8 @@ class Studio:
             "tick": world.ticks, "t": world.seconds, "epoch": self.epoch, "quanta": self._running.quanta,
             "robots": world.poses.robots, "objects": world.poses.objects, "held": self._held,
             "breaks": [f"{robot} {place}" for robot, place in self._breaks],
-            "state": "at a breakpoint" if self._held else "over" if self._running.is_over
+            "state": f"cannot go on: {self._broken}" if self._broken
+                     else "at a breakpoint" if self._held else "over" if self._running.is_over
                      else "standing" if self._goal is None else "going back" if self._again else "running",
         }  # fmt: skip
 
@@ -229,7 +233,10 @@ class Studio:
                 self._goal = None
                 self._answer(IDLE_S)
             else:
-                self._go_on()
+                try:
+                    self._go_on()
+                except Exception as error:  # a supervisor's, most often: the moment before can still be looked at
+                    self._goal, self._broken = None, f"{error}"
         self._close()
 
     def _go_on(self) -> None:
@@ -258,6 +265,7 @@ class Studio:
 
     def _begin(self) -> None:
         self._close()
+        self._broken = ""
         made = brains_of(self._plan, self._seed, 1)
         brains, _, ether = made.__enter__()
         self._made = made
@@ -302,6 +310,10 @@ class Studio:
     def _free(self) -> None:
         if self._held:
             raise RefusedError(f"{self._held}; let it go on first")
+
+    def _able(self) -> None:
+        if self._broken:
+            raise RefusedError(f"the trial cannot go on ({self._broken}); go back first")
 
     def _brain(self, robot: int) -> Any:
         if not 0 <= robot < len(self._running.brains):

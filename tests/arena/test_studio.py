@@ -135,6 +135,37 @@ def test_what_is_told_arrives(assembled: Callable[[str], Path]) -> None:
         assert [line["text"] for row in studio.ask(studio.trial).columns["log"] for line in row] == ["hello"]
 
 
+def test_a_supervisor_that_fails_leaves_the_moment_before(tmp_path: Path) -> None:
+    """It is told; looking and going back are still possible, going on is not."""
+    own = tmp_path / "own.py"
+    own.write_text(FAILING)
+    plan = Plan(scripted(scene_of(2, 4)), "scripted", "A", None, 1, SECONDS, 3, own)
+    with studio_of(plan) as studio:
+        studio.ask(lambda: studio.go(1000.0))
+        while (now := studio.ask(studio.now))["state"] == "running":
+            time.sleep(0.05)
+        assert now["state"].startswith("cannot go on: ")
+        assert "ouch" in now["state"]
+        assert now["t"] == pytest.approx(1.1, abs=0.02)
+        with pytest.raises(RefusedError, match="go back first"):
+            studio.ask(lambda: studio.step(1))
+        assert do(studio, lambda: studio.back(50))["tick"] == 50
+
+
+FAILING = """
+from arena.experiments import Curve
+
+CURVES = [Curve("t", "time")]
+
+
+def metrics(sample):
+    return {"t": 1.0}
+
+
+def step(world):
+    if world.seconds > 1:
+        raise ValueError("ouch")
+"""
 ECHO = """
         .include "p30F6014A.inc"
         .text
