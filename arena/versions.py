@@ -18,7 +18,8 @@ ROOT: Final = Path(__file__).resolve().parent.parent
 LIBRARIES: Final = ("pymunk", "numpy", "pyarrow", "llvmlite")
 """Physics, noise, the file's bytes, native code."""
 SHOWING: Final = ("commands/", "cli.py", "plots.py", "film.py", "movie.py", "page.py", "report.py", "live.py",
-                  "statistics.py", "bundle.py", "env.py", "studio.py", "README.md", "scenes/")  # fmt: skip
+                  "studio.py", "statistics.py", "bundle.py", "env.py", "answering.py", "README.md",
+                  "scenes/")  # fmt: skip
 """Of the arena: what only looks at records. A scene is in the key by its values."""
 _KINDS: Final = {".py", ".c", ".csv", ".toml"}
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 from contextlib import suppress
 from functools import partial
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
+from arena.answering import HERE, Answer
 from arena.commands.arguments import count, duration, port
 from arena.live import Follower
 from arena.movie import write_movie
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     """Write the page or film and name it. Raises RecordError, ValueError, OSError."""
     if options.live:
         with server(Follower(options.trial, options.number), options.port) as serving:
-            print(f"http://127.0.0.1:{serving.server_port}/ (Ctrl-C ends)", flush=True)
+            print(f"http://{HERE}:{serving.server_port}/ (Ctrl-C ends)", flush=True)
             with suppress(KeyboardInterrupt):
                 serving.serve_forever()
         return 0
@@ -59,10 +59,10 @@ def run(options: argparse.Namespace) -> int:
 
 def server(follower: Follower, port: int) -> ThreadingHTTPServer:
     """A server for this machine alone: `/` is the page, `/more?from=N` the samples from N on."""
-    return ThreadingHTTPServer(("127.0.0.1", port), partial(_Answer, follower))
+    return ThreadingHTTPServer((HERE, port), partial(_Answer, follower))
 
 
-class _Answer(BaseHTTPRequestHandler):
+class _Answer(Answer):
     def __init__(self, follower: Follower, *arguments: object) -> None:
         self._follower = follower
         super().__init__(*arguments)  # type: ignore[arg-type]
@@ -73,21 +73,10 @@ class _Answer(BaseHTTPRequestHandler):
         first = parse_qs(place.query).get("from", ["0"])[0]
         try:
             if place.path == "/":
-                self._send(200, "text/html; charset=utf-8", self._follower.page())
+                self.send_page(self._follower.page())
             elif place.path == "/more" and first.isdecimal():
-                self._send(200, "application/json", json.dumps(self._follower.more(int(first))))
+                self.send_json(self._follower.more(int(first)))
             else:
-                self._send(404, "text/plain", "there are / and /more?from=N")
+                self.send_words(404, "there are / and /more?from=N")
         except RecordError as error:
-            self._send(503, "text/plain", str(error))
-
-    def _send(self, status: int, kind: str, text: str) -> None:
-        body = text.encode()
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, form: str, *arguments: object) -> None:
-        """Quiet."""
+            self.send_words(503, str(error))

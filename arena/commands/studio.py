@@ -13,11 +13,11 @@ import math
 import secrets
 import webbrowser
 from contextlib import suppress
-from functools import partial
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import ThreadingHTTPServer
 from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
+from arena.answering import HERE, Answer
 from arena.commands.arguments import port
 from arena.commands.run import add_plan, planned
 from arena.page import page
@@ -72,8 +72,8 @@ class Serving(ThreadingHTTPServer):
     def __init__(self, studio: Studio, port: int) -> None:
         self.studio: Final = studio
         self.token: Final = secrets.token_urlsafe(16)
-        super().__init__(("127.0.0.1", port), partial(_Answer))
-        self.hosts: Final = (f"127.0.0.1:{self.server_port}", f"localhost:{self.server_port}")
+        super().__init__((HERE, port), _Answer)
+        self.hosts: Final = (f"{HERE}:{self.server_port}", f"localhost:{self.server_port}")
         self.address: Final = f"http://{self.hosts[0]}/?token={self.token}"
 
 
@@ -82,7 +82,7 @@ def server(studio: Studio, port: int) -> Serving:
     return Serving(studio, port)
 
 
-class _Answer(BaseHTTPRequestHandler):
+class _Answer(Answer):
     server: Serving
 
     def do_GET(self) -> None:
@@ -97,19 +97,19 @@ class _Answer(BaseHTTPRequestHandler):
                 head = studio.ask(lambda: (studio.trial(), studio.now()))
                 quantum = head[0].scene.clock.quantum_tcy / FCY
                 control = {"token": self.server.token, "header": HEADER, "now": head[1], "quantum": quantum}
-                self._send(200, "text/html; charset=utf-8", page(head[0], studio=control))
+                self.send_page(page(head[0], studio=control))
             elif place.path == "/more":
                 first, epoch = _whole(query.get("from")), _whole(query.get("epoch"))
-                self._json(studio.ask(lambda: studio.more(first, epoch)))
+                self.send_json(studio.ask(lambda: studio.more(first, epoch)))
             elif place.path == "/inside":
                 robot = _whole(query.get("robot"))
-                self._json(studio.ask(lambda: studio.inside(robot)))
+                self.send_json(studio.ask(lambda: studio.inside(robot)))
             elif place.path == "/digest":
-                self._json(studio.ask(lambda: {"digest": studio.digest(), "tick": studio.now()["tick"]}))
+                self.send_json(studio.ask(lambda: {"digest": studio.digest(), "tick": studio.now()["tick"]}))
             else:
-                self._send(404, "text/plain", "there are /, /more?from=N&epoch=E, /inside?robot=N, /digest and /do")
+                self.send_words(404, "there are /, /more?from=N&epoch=E, /inside?robot=N, /digest and /do")
         except RefusedError as error:
-            self._send(409, "text/plain", str(error))
+            self.send_words(409, str(error))
 
     def do_POST(self) -> None:
         """Something is to be done."""
@@ -120,9 +120,9 @@ class _Answer(BaseHTTPRequestHandler):
             if urlsplit(self.path).path != "/do":
                 raise RefusedError("what is to be done goes to /do")
             name, arguments = _deed(self._body())
-            self._json(studio.ask(lambda: (getattr(studio, name)(**arguments), studio.now())[1]))
+            self.send_json(studio.ask(lambda: (getattr(studio, name)(**arguments), studio.now())[1]))
         except RefusedError as error:
-            self._send(409, "text/plain", str(error))
+            self.send_words(409, str(error))
 
     def _may_ask(self, token: str) -> bool:
         """Whether the request is the page's own; if not it has been answered."""
@@ -132,7 +132,7 @@ class _Answer(BaseHTTPRequestHandler):
         )
         if strange or not hmac.compare_digest(token.encode(), self.server.token.encode()):
             why = "this page is for its own address only" if strange else "the address lacks its token"
-            self._send(403, "text/plain", f"{why}; use the one that `arena studio` printed")
+            self.send_words(403, f"{why}; use the one that `arena studio` printed")
             return False
         return True
 
@@ -144,22 +144,6 @@ class _Answer(BaseHTTPRequestHandler):
             return json.loads(self.rfile.read(length))
         except (ValueError, RecursionError):
             raise RefusedError("the request is no JSON") from None
-
-    def _json(self, value: Any) -> None:
-        self._send(200, "application/json", json.dumps(value))
-
-    def _send(self, status: int, kind: str, text: str) -> None:
-        body = text.encode()
-        with suppress(ConnectionError):  # the browser has gone to another page
-            self.send_response(status)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-            self.send_header("Cache-Control", "no-store")
-            self.end_headers()
-            self.wfile.write(body)
-
-    def log_message(self, form: str, *arguments: object) -> None:
-        """Quiet."""
 
 
 def _whole(text: str | None) -> int:
