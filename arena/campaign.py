@@ -154,8 +154,11 @@ def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brai
             crew.close()
 
 
-def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None, processes: int = 1) -> Done:
-    """Run trial `number` (from 1), its robots in `processes`, and write its file.
+def run_one(
+    plan: Plan, number: int, folder: Path, report: Report | None = None, processes: int = 1,
+    meet: Callable[[Sequence[Brain]], None] | None = None,
+) -> Done:  # fmt: skip
+    """Run trial `number` (from 1), its robots in `processes`, and write its file. `meet` is shown the robots first.
 
     Raises SceneError, RecordError, emu.LoadError."""
     start = time.perf_counter()
@@ -166,6 +169,8 @@ def run_one(plan: Plan, number: int, folder: Path, report: Report | None = None,
         progress = None if report is None else (lambda seconds: report(number, seconds))
         on_row = live.write if live is not None else None
         with brains_of(plan, seed, processes) as (brains, crews, ether):
+            if meet is not None:
+                meet(brains)
             result = run_trial(plan.scene, seed, brains, plan.seconds, progress, None, on_row, crews, ether,
                                plan.to_do)  # fmt: skip
         about["faults"] = [list(fault) for fault in result.faults]

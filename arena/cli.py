@@ -16,6 +16,7 @@ from arena.cluster import ClusterLostError
 from arena.commands import (
     bundle,
     compare,
+    debug,
     experiment,
     figures,
     plot,
@@ -35,6 +36,7 @@ from emu.status import BAD_INPUT, CANNOT_GO_ON, DONE, INTERRUPTED, unread_is_don
 
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),
+    "debug": (debug.parser, debug.run),
     "experiment": (experiment.parser, experiment.run),
     "sweep": (sweep.parser, sweep.run),
     "sensitivity": (sensitivity.parser, sensitivity.run),
@@ -62,7 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, (make, _) in COMMANDS.items():
         one = make()
-        commands.add_parser(name, parents=[one], help=one.description, description=one.description, epilog=one.epilog,
+        about = str(one.description).partition("\n")[0]
+        commands.add_parser(name, parents=[one], help=about, description=one.description, epilog=one.epilog,
                             formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False)  # fmt: skip
     commands.add_parser("scenes", help="list the scenes that come along")
     shells = commands.add_parser("completion", help="print what makes a shell complete these commands",

@@ -277,7 +277,9 @@ class EmulatedBrain:
             self._text.append(byte)
 
     def _lit(self, led: int, cycle: int, changed: int, levels: int) -> None:
-        """Changes in one cycle are one."""
+        """Changes in one cycle are one. What is run again has been noted."""
+        if self.machine.events.quiet:
+            return
         self._leds = self._leds | led if levels & changed else self._leds & ~led
         if self._lights and self._lights[-1].cycle == self._on_at + cycle:
             self._lights.pop()

@@ -73,7 +73,8 @@ class Ring:
         return list(self._board.ir.reflection) if self.is_read else None
 
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
-        self._ether.switch(self._robot, self._on_at + cycle, line, bool(levels & changed))
+        if not self._board.ir.events.quiet:  # others have seen what is run again
+            self._ether.switch(self._robot, self._on_at + cycle, line, bool(levels & changed))
 
     def _level(self, sensor: int, source: Callable[[int], int], cycle: int) -> int:
         if self._is_stale:

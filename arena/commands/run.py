@@ -95,27 +95,27 @@ def planned(options: argparse.Namespace, trials: int) -> Plan:
     return plan if plan.has_firmware else replace(plan, scene=scripted(scene))
 
 
+def kept(plan: Plan, folder: Path) -> Plan:
+    """The plan with everything it needs in the folder: what it came from may be built anew meanwhile."""
+    if plan.experiment is not None:
+        write_bytes(folder / EXPERIMENT, plan.experiment.read_bytes())
+        plan = replace(plan, experiment=folder / EXPERIMENT)
+    images = []
+    for place, (group, path) in enumerate((("", plan.image), *plan.images)):
+        copy = folder / f"firmware{f'-{place}' if place else ''}{path.suffix}" if path is not None else None
+        if copy is not None and path is not None:
+            write_bytes(copy, path.read_bytes())
+        images.append((group, copy))
+    return replace(plan, image=images[0][1], images=tuple(images[1:]))
+
+
 def run(options: argparse.Namespace) -> int:
     """Exit status 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
     plan = planned(options, options.trials)
-    own, image, images, scene, name = plan.experiment, plan.image, plan.images, plan.scene, plan.brain
-    folder = options.out or Path("results") / f"{scene.name}-{name}-{options.controller}"
+    folder = options.out or Path("results") / f"{plan.scene.name}-{plan.brain}-{options.controller}"
     with claimed(folder):
         missing = open_folder(plan, folder, sys.argv[1:])
-        if own is not None:
-            write_bytes(folder / EXPERIMENT, own.read_bytes())
-            plan = replace(plan, experiment=folder / EXPERIMENT)
-        if image is not None:  # kept beside the results; the one it came from may be built anew meanwhile
-            kept = folder / f"firmware{image.suffix}"
-            write_bytes(kept, image.read_bytes())
-            plan = replace(plan, image=kept)
-        kept_images = []
-        for place, (group, path) in enumerate(images, start=1):
-            kept = folder / f"firmware-{place}{path.suffix}" if path is not None else None
-            if kept is not None and path is not None:
-                write_bytes(kept, path.read_bytes())
-            kept_images.append((group, kept))
-        plan = replace(plan, images=tuple(kept_images))
+        plan = kept(plan, folder)
         faults = with_progress(plan, folder, missing, options.jobs, options.scheduler)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
     results = [trial for trial in trials_in(folder) if trial.path.name in wanted]

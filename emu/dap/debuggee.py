@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.dap.breakpoints import Breakpoint
-from emu.debug.history import History, Write
+from emu.debug.history import History
 from emu.debug.inside import Frame, Inside
 from emu.debug.threads import Thread, Threads
 from emu.dspic30f.facts import facts_of
@@ -42,10 +42,12 @@ class Halt:
 class Debuggee:
     """Drives `machine`. `wanted()` tells whether somebody wants it to stand; `say(text)` gets log messages."""
 
-    def __init__(self, machine: Machine, wanted: Callable[[], bool], say: Callable[[str], None]) -> None:
+    def __init__(
+        self, machine: Machine, wanted: Callable[[], bool], say: Callable[[str], None], history: History
+    ) -> None:
         self.machine: Final = machine
         self.inside: Final[Inside] = machine.inside
-        self.history: Final = History(machine)
+        self.history: Final = history
         self.breakpoints: Final[dict[str, list[Breakpoint]]] = {}
         """By kind and, for those in sources, file."""
         self.stops_at_faults = True
@@ -129,7 +131,7 @@ class Debuggee:
             return Halt("breakpoint", stop.detail or "breakpoint in the program", stop=stop)
         if stop.reason == "halt":
             return Halt("pause", "the firmware sleeps and nothing will wake it", stop=stop)
-        return Halt("pause", stop.reason, stop=stop)
+        return Halt("pause", stop.detail or stop.reason, stop=stop)
 
     def _stepped(self) -> Halt | None:
         """One instruction, breakpoints not asked."""
@@ -284,14 +286,16 @@ class Debuggee:
         self.history.seek(cycle)
         return halt
 
-    def last_write(self, address: int, size: int) -> Write | None:
-        """Back to the last instruction that changed a place."""
-        return self.history.last_write(address, size)
-
     def restart(self) -> Halt:
         """Back to where the recording began."""
         self.history.seek(self.history.start)
         return Halt("entry")
+
+    def leave(self) -> None:
+        """Give the machine back as it would be without a debugger: in the present, with no breakpoint."""
+        self.breakpoints.clear()
+        self._rehook()
+        self.history.seek(self.history.end)
 
     # What there is to see
 

@@ -13,12 +13,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.dap.breakpoints import Breakpoint, bad_hit_condition
+from emu.dap.console import command
 from emu.dap.debuggee import Debuggee, Halt
+from emu.dap.sfrs import groups
 from emu.dap.sights import Row, Sights, Sources, disassembled
 from emu.dap.wire import Message, Wire
 from emu.debug.expression import ExpressionError, evaluate
+from emu.debug.history import History
 from emu.debug.inside import Value
-from emu.debug.locate import Unavailable, address_of
+from emu.debug.locate import Unavailable
 
 if TYPE_CHECKING:
     from emu.machine import Machine
@@ -39,15 +42,6 @@ CAPABILITIES: Final = {
 GOING: Final = ("continue", "next", "stepIn", "stepOut", "stepBack", "reverseContinue", "restart")
 WHILE_RUNNING: Final = ("pause", "disconnect", "terminate", "cancel", "threads")
 """Requests that are answered while the machine runs; the others wait, except those that change breakpoints."""
-HELP: Final = """\
-an expression of C; NAME = VALUE; or
-/time              cycle, seconds, how far in the past
-/goto CYCLE        go to a cycle of the recording
-/lastwrite PLACE   go back to the instruction that changed a place last
-/threads           OpenSwarm's threads with stack use
-"""
-
-
 MOST_ROWS: Final = 1 << 16
 """Instructions, or bytes of memory, that one request may ask for: as many as there are of either on a chip."""
 
@@ -64,11 +58,17 @@ MISTAKES: Final = (
 
 
 class Server:
-    """Serves one client to the end. `make(arguments)` gives a machine; it raises ValueError or OSError for bad ones."""
+    """Serves one client to the end. `make(arguments)` gives a machine; it raises ValueError or OSError for bad ones.
+    `record` makes the recording by which it goes back."""
 
-    def __init__(self, wire: Wire, make: Callable[[Row], Machine]) -> None:
+    def __init__(
+        self, wire: Wire, make: Callable[[Row], Machine], record: Callable[[Machine], History] = History
+    ) -> None:
         self._wire: Final = wire
         self._make: Final = make
+        self._record: Final = record
+        self.ends_all = False
+        """The client wants what is debugged to end, not only to be left alone."""
         self._target: Debuggee | None = None
         self._views: tuple[Sights, Sources] | None = None
         self._launch: Row = {}
@@ -85,9 +85,11 @@ class Server:
         while not self._over:
             message = self._waiting.pop(0) if self._waiting else self._wire.inbox.get()
             if message is None:
-                return
+                break
             if message.get("type") == "request":
                 self._answer(message)
+        if self._target is not None:
+            self._target.leave()
 
     def _answer(self, message: Message) -> None:
         """Respond to one request. Whatever is wrong with it, the session goes on."""
@@ -150,7 +152,7 @@ class Server:
         self._launch = arguments
         program = Path(machine.image.path).resolve()
         roots = [Path(root) for root in arguments.get("sourceRoots", [])] + [Path.cwd(), *program.parents]
-        self._target = Debuggee(machine, self._wanted, self._say)
+        self._target = Debuggee(machine, self._wanted, self._say, self._record(machine))
         sources = Sources(machine.inside, roots)
         self._views = Sights(machine.inside, sources), sources
         for number in machine.uart:
@@ -179,13 +181,15 @@ class Server:
             return {}, lambda: self._stopped(Halt("entry"))
         return {}, lambda: self._go(target.go_on)
 
-    def _do_disconnect(self, _arguments: Row) -> Any:
+    def _do_disconnect(self, arguments: Row) -> Any:
+        self.ends_all = self.ends_all or bool(arguments.get("terminateDebuggee"))
         return {}, self._leave
 
     def _leave(self) -> None:
         self._over = True
 
     def _do_terminate(self, _arguments: Row) -> Any:
+        self.ends_all = True
         return {}, lambda: self._event("terminated")
 
     def _do_cancel(self, _arguments: Row) -> Row:
@@ -276,7 +280,8 @@ class Server:
             self._next_id, kind, places, str(wanted.get("condition") or ""), hit,
             str(wanted.get("logMessage") or ""), more.pop("size", 0), more.pop("access", "write"),
         )  # fmt: skip
-        problem = bad_hit_condition(hit) or ("" if places else more.pop("problem", "there is no code"))
+        missing = more.pop("problem", "there is no code")
+        problem = bad_hit_condition(hit) or ("" if places else missing)
         if problem:
             made.places = ()
         made.facts = {"id": made.id, "verified": not problem} | ({"message": problem} if problem else {}) | more
@@ -390,7 +395,10 @@ class Server:
     def _do_evaluate(self, arguments: Row) -> Any:
         text = str(arguments["expression"]).strip()
         if arguments.get("context") == "repl" and text.startswith("/"):
-            return self._command(text[1:])
+            said = command(self._debuggee, text[1:])
+            if isinstance(said, str):
+                return {"result": said, "variablesReference": 0}
+            return {"result": "", "variablesReference": 0}, lambda: self._go(said)
         name, equals, value = text.partition("=")
         if arguments.get("context") == "repl" and equals and not value.startswith("=") and name[-1:] not in "!<>=":
             return self._assigned(name.strip(), value.strip(), arguments)
@@ -414,8 +422,14 @@ class Server:
         return self._result(name, arguments)
 
     def _write(self, place: Value, text: str, arguments: Row) -> None:
+        self._may_change()
         value = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
         place.set(value.get() if isinstance(value, Value) else value)
+
+    def _may_change(self) -> None:
+        frozen = self._debuggee.history.frozen
+        if frozen:
+            raise Refused(frozen)
 
     def _do_setVariable(self, arguments: Row) -> Row:
         place = self._sights.find(int(arguments["variablesReference"]), str(arguments["name"]))
@@ -455,47 +469,15 @@ class Server:
         return row | ({"data": base64.b64encode(data).decode()} if data else {})
 
     def _do_writeMemory(self, arguments: Row) -> Row:
+        self._may_change()
         address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
         data = base64.b64decode(arguments["data"])
         self._debuggee.machine.poke(address, int.from_bytes(data, "little"), len(data))
         return {"bytesWritten": len(data)}
 
-    # Commands of the console
-
-    def _command(self, text: str) -> Any:
-        word, _, rest = text.partition(" ")
-        target = self._debuggee
-        machine, history = target.machine, target.history
-        if word == "time":
-            past = f", {history.end - machine.cycle:,} before the present" if history.is_past else ""
-            return {"result": f"cycle {machine.cycle:,}, {machine.seconds:.9f} s{past}", "variablesReference": 0}
-        if word == "threads":
-            lines = [f"{one}: {one.state}, stack {one.used} of {one.stack and one.stack[1] - one.stack[0]} bytes used"
-                     for one in target.threads()]  # fmt: skip
-            return {"result": "\n".join(lines) or "there are no threads", "variablesReference": 0}
-        if word == "goto":
-            cycle = int(rest.replace(",", ""), 0)
-            return {"result": "", "variablesReference": 0}, lambda: self._go(lambda: self._sought(cycle))
-        if word == "lastwrite":
-            place = evaluate(target.inside, rest, self._sights.frame(None))
-            at = address_of(place.pieces) if isinstance(place, Value) else None
-            if at is None or not isinstance(place, Value):
-                raise Refused(f"{rest} is not in memory")
-            size = place.type.bytes
-            return {"result": "", "variablesReference": 0}, lambda: self._go(lambda: self._last_write(at, size))
-        return {"result": HELP, "variablesReference": 0}
-
-    def _sought(self, cycle: int) -> Halt:
-        history = self._debuggee.history
-        history.seek(min(max(cycle, history.start), history.end))
-        return Halt("goto")
-
-    def _last_write(self, address: int, size: int) -> Halt:
-        found = self._debuggee.last_write(address, size)
-        if found is None:
-            return Halt("goto", "nothing has changed it since the recording began")
-        where = self._debuggee.inside.where(found.pc)
-        return Halt("goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {where}")
+    def _do_sfrs(self, _arguments: Row) -> Row:
+        """Of our own: what the editor's view of registers shows."""
+        return {"groups": groups(self._debuggee.machine)}
 
 
 def _size(arguments: Row, name: str) -> int:

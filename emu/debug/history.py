@@ -79,6 +79,11 @@ class History:
         return self.machine.cycle < self.end
 
     @property
+    def frozen(self) -> str:
+        """Why the machine may not be changed now; empty if it may."""
+        return ""
+
+    @property
     def size(self) -> int:
         """Bytes kept."""
         flash = {id(one.flash): len(one.flash) for one in self._kept}
@@ -101,7 +106,7 @@ class History:
                     stop = machine.run_until(min(target, self.end))
                 self._take_input()
             else:
-                stop = machine.advance(target)
+                stop = self._run_on(target)
                 self._reached(following)
         self._ended = machine.snapshot()
         return stop
@@ -115,10 +120,18 @@ class History:
                 stop = self.machine.step()
             self._take_input()
         else:
-            stop = self.machine.step()
+            stop = self._step_on()
             self._reached(following)
         self._ended = self.machine.snapshot()
         return stop
+
+    def _run_on(self, cycle: int) -> Stop | None:
+        """Run beyond the present."""
+        return self.machine.advance(cycle)
+
+    def _step_on(self) -> Stop | None:
+        """Step beyond the present."""
+        return self.machine.step()
 
     def _take_input(self) -> None:
         """What came from outside at this cycle comes again."""
@@ -335,11 +348,13 @@ class History:
 
     @contextmanager
     def _silence(self) -> Iterator[None]:
-        """Nobody hears what has been told already."""
+        """Nobody hears what has been told already, nor are edges of pins that wait to be told taken for later ones."""
+        self.machine.pins.flush()
         events, held = self.machine.events, self.machine.hold()
         quiet, events.quiet = events.quiet, True
         try:
             yield
         finally:
+            self.machine.pins.flush()
             events.quiet = quiet
             held()

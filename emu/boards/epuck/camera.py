@@ -100,6 +100,11 @@ class Camera(Part, I2cDevice):
         self._line_to.value = 0
 
     @property
+    def sampled(self) -> PixelSource | None:
+        """What `sample` was given last."""
+        return self._pixels
+
+    @property
     def lamp(self) -> float:
         """Brightness of the scene's light, 1 = as the picture says; automatic exposure follows a change."""
         return self._exposure.lamp

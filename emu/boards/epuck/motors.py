@@ -7,7 +7,8 @@ counts once it has stood for `SETTLE` Tcy. Nothing is posted for that; what is d
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from ctypes import POINTER, Structure, addressof, c_int64, c_void_p, pointer
 from functools import cache
 from pathlib import Path
@@ -116,6 +117,15 @@ class Stepper(Part):
         self._history = _History(self._state[_STEPS], 0)
         self._motor.history = pointer(self._history)
 
+    @contextmanager
+    def unremembered(self) -> Iterator[None]:
+        """As `Motors.unremembered`."""
+        kept, self._motor.history = self._history, None
+        try:
+            yield
+        finally:
+            self._motor.history = pointer(kept) if kept is not None else None
+
     def _catch_up(self) -> None:
         self.pins.flush()
         self.settled_steps(self.now)
@@ -163,6 +173,12 @@ class Motors:
         """As `Stepper.remember`."""
         self.left.remember()
         self.right.remember()
+
+    @contextmanager
+    def unremembered(self) -> Iterator[None]:
+        """Steps made inside the block are not kept for `steps_by`: they have been made before, and are made again."""
+        with self.left.unremembered(), self.right.unremembered():
+            yield
 
     def steps_by(self, cycles: Sequence[int]) -> list[tuple[int, int]]:
         """Steps of both (left, right) as they were in some cycles, which rise from call to call; see `remember`."""

@@ -1,4 +1,4 @@
-"""A small client of the Debug Adapter Protocol over the standard streams of `emu debug`."""
+"""A small client of the Debug Adapter Protocol over the standard streams of `emu debug` or another command."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from queue import Empty, Queue
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[3]
-PATIENCE = 60
+PATIENCE = 200
 
 
 class Client:
     """Sends requests, waits for responses, keeps events."""
 
-    def __init__(self) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "emu", "debug"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=ROOT
-        )
+    def __init__(self, *words: str) -> None:
+        command = [sys.executable, "-m", *(words or ("emu", "debug"))]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=ROOT)
         self.inbox: Queue[dict[str, Any]] = Queue()
         self.events: list[dict[str, Any]] = []
         self.seq = 0

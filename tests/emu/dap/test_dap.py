@@ -250,3 +250,26 @@ def test_a_bad_launch_is_refused_in_words(client: Client, arguments: dict[str, s
     assert not reply["success"]
     assert words in reply["message"]
     assert not client.asked("continue", threadId=1)["success"]
+
+
+def test_registers_are_told_by_peripheral_and_bit_field(stopped: Callable[..., Client]) -> None:
+    """The request `sfrs` of our own; every path is an expression, and looking changes nothing."""
+    client = stopped("total = sum;")
+    groups = {one["name"]: one["parts"] for one in client.ask("sfrs")["groups"]}
+    assert {"CPU core", "UART 1", "Timer 1", "I/O ports", "CAN 2"} <= set(groups)
+    uart = {one["name"]: one for one in groups["UART 1"]}
+    assert uart["U1MODE"]["address"] == "0x020c"
+    assert [one["name"] for one in groups["Timer 1"]] == ["TMR1", "PR1", "T1CON"]
+    client.evaluate("T1CON.TCKPS = 2", context="repl")
+    groups = {one["name"]: one["parts"] for one in client.ask("sfrs")["groups"]}
+    control = groups["Timer 1"][2]
+    assert control["value"] == "0x0020"
+    prescaler = next(one for one in control["parts"] if one["name"] == "TCKPS")
+    assert (prescaler["value"], client.evaluate(prescaler["path"])) == ("2", "2")
+
+
+def test_a_breakpoint_that_is_there_has_no_problem(client: Client, program: str) -> None:
+    client.start(program)
+    made = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "twice"}, {"name": "thrice"}])["breakpoints"]
+    assert made[0] == {"id": 1, "verified": True}
+    assert "thrice" in made[1]["message"]

@@ -1,0 +1,101 @@
+"""`arena debug SCENE --robot N`: a debugger on one robot of a trial, for editors; the whole world stands with it."""
+
+from __future__ import annotations
+
+import argparse
+import socket
+import sys
+import tempfile
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from arena.brain import Brain
+from arena.campaign import Plan, claimed, note_host_time, open_folder, run_one, trial_path
+from arena.commands.arguments import count_or_none, port
+from arena.commands.run import add_plan, kept, planned
+from arena.debugged import Debugged, GivenUpError
+from arena.emulated import EmulatedBrain
+from arena.record import RecordError
+from emu.dap.server import Server
+from emu.dap.wire import Wire
+from emu.status import DONE
+
+DESCRIPTION: Final = """\
+debug one robot of a trial from an editor, the whole world stands with it
+
+A server of the Debug Adapter Protocol on standard input and output, or on a TCP port of this machine (see `emu debug
+--help`). Where the robot stops all stand; it steps, goes back, and on by itself as far as its past goes, and beyond
+that with all others. Launch arguments: stopOnEntry, sourceRoots.
+
+With --out the trial is recorded, to the byte as `arena run --trials 1` does it, and cannot be changed by the debugger;
+a client that disconnects lets it go on to its end, one that terminates ends it without a record."""
+EXAMPLE: Final = "example: arena debug clustering --robot 2 --port 4711"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Options of the command."""
+    made = argparse.ArgumentParser(description=DESCRIPTION, epilog=EXAMPLE)
+    add_plan(made)
+    made.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="which one, from 0")
+    made.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: a free one)")
+    made.add_argument("--out", type=Path, metavar="FOLDER", help="record the trial there")
+    return made
+
+
+def run(options: argparse.Namespace) -> int:
+    """Exit status 0, 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
+    plan = planned(options, 1)
+    if not 0 <= options.robot < plan.scene.robots.count:
+        raise ValueError(f"--robot {options.robot}: the scene has robots 0 to {plan.scene.robots.count - 1}")
+    if options.out is None:
+        with tempfile.TemporaryDirectory() as folder:
+            return debugged(plan, Path(folder), options)
+    with claimed(options.out):
+        if not open_folder(plan, options.out, sys.argv[1:]):
+            raise RecordError(f"{options.out}: the trial is there already; choose another --out")
+        return debugged(kept(plan, options.out), options.out, options)
+
+
+def debugged(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
+    """Run the trial with a debugger on its robot."""
+    met: list[Debugged] = []
+
+    def meet(brains: Sequence[Brain]) -> None:
+        brain = brains[options.robot]
+        if not isinstance(brain, EmulatedBrain):
+            raise ValueError(f"--robot {options.robot}: it has no firmware, its brain is scripted")
+        met.append(Debugged(brain, partial(served, port=options.port), keeps=options.out is not None))
+
+    try:
+        done = run_one(plan, 1, folder, meet=meet)
+    except GivenUpError:
+        print("arena debug: the trial was ended, nothing is recorded", file=sys.stderr)
+        return DONE
+    if options.out is not None:
+        note_host_time(folder, done)
+        print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
+    met[0].over()
+    return 1 if done.faults else DONE
+
+
+def served(debugged: Debugged, port: int | None) -> bool:
+    """Serve one client; true if the trial is to go on without it."""
+    if port is None:
+        out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
+        return _served(debugged, Wire(sys.stdin.fileno(), out))
+    with socket.create_server(("127.0.0.1", port)) as listening:
+        print(f"arena debug: listening on 127.0.0.1:{listening.getsockname()[1]}", file=sys.stderr, flush=True)
+        connection, _ = listening.accept()
+    with connection, connection.makefile("wb") as writer:
+        return _served(debugged, Wire(connection.fileno(), writer))
+
+
+def _served(debugged: Debugged, wire: Wire) -> bool:
+    server = Server(wire, lambda _arguments: debugged.machine, debugged.record)
+    try:
+        server.serve()
+    finally:
+        wire.close()
+    return debugged.keeps and not server.ends_all

@@ -1,0 +1,57 @@
+"""Commands of a debug console that begin with a slash: time, threads, going somewhere else in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.dap.debuggee import Debuggee, Halt
+from emu.debug.expression import evaluate
+from emu.debug.inside import Value
+from emu.debug.locate import address_of
+
+HELP: Final = """\
+an expression of C; NAME = VALUE; or
+/time              cycle, seconds, how far in the past
+/goto CYCLE        go to a cycle of the recording
+/lastwrite PLACE   go back to the instruction that changed a place last
+/threads           OpenSwarm's threads with stack use
+"""
+
+
+def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
+    """What a command says, or how the machine is to move. Raises ValueError, ExpressionError."""
+    word, _, rest = text.partition(" ")
+    machine, history = target.machine, target.history
+    if word == "time":
+        past = f", {history.end - machine.cycle:,} before the present" if history.is_past else ""
+        return f"cycle {machine.cycle:,}, {machine.seconds:.9f} s{past}"
+    if word == "threads":
+        lines = [f"{one}: {one.state}, stack {one.used} of {one.stack and one.stack[1] - one.stack[0]} bytes used"
+                 for one in target.threads()]  # fmt: skip
+        return "\n".join(lines) or "there are no threads"
+    if word == "goto":
+        cycle = int(rest.replace(",", ""), 0)
+        return lambda: _sought(target, cycle)
+    if word == "lastwrite":
+        frames = target.frames()
+        place = evaluate(target.inside, rest, frames[0] if frames else None)
+        at = address_of(place.pieces) if isinstance(place, Value) else None
+        if at is None or not isinstance(place, Value):
+            raise ValueError(f"{rest} is not in memory")
+        size = place.type.bytes
+        return lambda: _last_write(target, at, size)
+    return HELP
+
+
+def _sought(target: Debuggee, cycle: int) -> Halt:
+    history = target.history
+    history.seek(min(max(cycle, history.start), history.end))
+    return Halt("goto")
+
+
+def _last_write(target: Debuggee, address: int, size: int) -> Halt:
+    found = target.history.last_write(address, size)
+    if found is None:
+        return Halt("goto", "nothing has changed it since the recording began")
+    return Halt("goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {target.inside.where(found.pc)}")

@@ -1,0 +1,76 @@
+"""A debugger on one robot of a trial: it goes on, back and on again, and nothing of it can be seen in the record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from arena.cli import main
+from tests.emu.dap.client import Client
+
+SEED = ("--seed", "3")
+
+
+def moved(client: Client, request: str, **arguments: object) -> str:
+    """Let it go somewhere; the time it stands at."""
+    client.send(request, threadId=1, **arguments)
+    client.event("stopped")
+    return str(client.ask("evaluate", expression="/time", context="repl")["result"])
+
+
+@pytest.mark.parametrize(
+    ("scene", "brain", "robot", "place"),
+    [("clustering", "", 2, "react"), ("avoidance", "avoidance", 1, "steer")],
+    ids=["camera", "infrared"],
+)
+def test_a_record_is_the_same_with_a_debugger_on_a_robot(
+    tmp_path: Path, clustering_image: Path, scene: str, brain: str, robot: int, place: str
+) -> None:
+    """Byte for byte, after steps, steps back, breakpoints both ways and a look at the end."""
+    trial = [scene, "--minutes", "0.02", "--brain", brain or str(clustering_image), *SEED]
+    trial += ["--set", "start.selector=8"] if scene == "clustering" else []  # it does not wait for the remote control
+    client = Client("arena", "debug", *trial, "--robot", str(robot), "--out", str(tmp_path / "debugged"))
+    client.ask("initialize", adapterID="openswarm")
+    client.ask("launch", stopOnEntry=True)
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": place}])
+    client.ask("configurationDone")
+    assert client.event("stopped")["reason"] == "entry"
+    first = moved(client, "continue")
+    there = [moved(client, "next") for _ in range(3)]
+    assert moved(client, "stepBack", granularity="instruction") != there[-1]
+    assert moved(client, "reverseContinue").startswith(first)
+    refused = client.asked("evaluate", expression="W0 = 3", context="repl")
+    assert "the trial is being recorded" in refused["message"]
+    assert moved(client, "continue") != first
+    client.ask("setFunctionBreakpoints", breakpoints=[])
+    end = moved(client, "continue")
+    assert moved(client, "stepBack", granularity="instruction") != end
+    client.close()
+    assert main(["run", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
+    records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
+    assert records[0] == records[1]
+
+
+def test_the_present_may_be_changed_the_past_not_and_who_leaves_ends_it(tmp_path: Path, clustering_image: Path) -> None:
+    client = Client("arena", "debug", "clustering", "--minutes", "9", "--brain", str(clustering_image), "--robot", "0")
+    client.ask("initialize", adapterID="openswarm")
+    client.ask("launch", stopOnEntry=True)
+    client.ask("configurationDone")
+    assert client.event("stopped")["reason"] == "entry"
+    moved(client, "stepIn", granularity="instruction")
+    moved(client, "stepIn", granularity="instruction")
+    moved(client, "stepBack", granularity="instruction")
+    refused = client.asked("evaluate", expression="T1CON.TCKPS = 2", context="repl")
+    assert "the other robots have seen what came of it" in refused["message"]
+    moved(client, "stepIn", granularity="instruction")
+    assert client.ask("evaluate", expression="T1CON.TCKPS = 2", context="repl")["result"] == "2"
+    client.ask("terminate")
+    client.close()
+
+
+def test_a_robot_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["debug", "clustering", "--brain", "scripted", "--robot", "7"]) == 2
+    assert "robots 0 to 4" in capsys.readouterr().err
+    assert main(["debug", "clustering", "--brain", "scripted", "--robot", "1", "--minutes", "0.01"]) == 2
+    assert "no firmware" in capsys.readouterr().err
