@@ -1,0 +1,158 @@
+// Starts the debugger of the Python package and shows what the protocol has no view for: registers by peripheral and bit
+// field, and the time. Everything comes from requests of the Debug Adapter Protocol; nothing is installed or fetched.
+const vscode = require('vscode');
+
+const TYPE = 'openswarm';
+const NO_VALUE = '';
+
+/** The command line of the adapter for a launch configuration: words after the interpreter. */
+function wordsOf(configuration) {
+    if (!configuration.scene) {
+        return ['-m', 'emu', 'debug'];
+    }
+    const brain = configuration.program || configuration.brain;
+    const words = ['-m', 'arena', 'debug', configuration.scene, '--robot', String(configuration.robot || 0)];
+    return [...words, ...(brain ? ['--brain', brain] : []), ...(configuration.arenaOptions || [])];
+}
+
+class Adapters {
+    createDebugAdapterDescriptor(session) {
+        const configuration = session.configuration;
+        if (configuration.request === 'attach') {
+            return new vscode.DebugAdapterServer(configuration.port, configuration.host || '127.0.0.1');
+        }
+        const folder = session.workspaceFolder;
+        const settings = vscode.workspace.getConfiguration('openswarm', folder);
+        const cwd = configuration.cwd || (folder && folder.uri.fsPath);
+        const python = configuration.python || settings.get('python');
+        return new vscode.DebugAdapterExecutable(python, wordsOf(configuration), cwd ? { cwd } : undefined);
+    }
+}
+
+class Configurations {
+    /** What a configuration lacks; F5 without any looks for the firmware where the template's Makefile puts it. */
+    resolveDebugConfiguration(_folder, configuration) {
+        if (!configuration.type && !configuration.request) {
+            Object.assign(configuration, { type: TYPE, request: 'launch', name: 'Debug the robot' });
+        }
+        if (configuration.request === 'launch' && !configuration.program && !configuration.scene) {
+            configuration.program = '${workspaceFolder}/build/firmware.elf';
+        }
+        return configuration;
+    }
+}
+
+/** Peripheral, register, bit field: what the request `sfrs` tells, asked for when it is looked at. */
+class Registers {
+    constructor() {
+        this.changed = new vscode.EventEmitter();
+        this.onDidChangeTreeData = this.changed.event;
+        this.session = undefined;
+        this.before = new Map();
+        this.now = new Map();
+    }
+
+    /** The robot stands, goes on, or there is none any more. */
+    show(session) {
+        this.session = session;
+        this.before = this.now;
+        this.now = new Map();
+        this.changed.fire();
+    }
+
+    async getChildren(item) {
+        if (item) {
+            return item.parts || [];
+        }
+        if (!this.session) {
+            return [];
+        }
+        try {
+            return (await this.session.customRequest('sfrs')).groups;
+        } catch {
+            return []; // it runs
+        }
+    }
+
+    getTreeItem(item) {
+        const state = item.parts ? vscode.TreeItemCollapsibleState.Collapsed : vscode.TreeItemCollapsibleState.None;
+        const shown = new vscode.TreeItem(item.name, state);
+        shown.id = item.path;
+        if (item.value !== undefined) {
+            this.now.set(item.path, item.value);
+            const before = this.before.get(item.path);
+            shown.description = before !== undefined && before !== item.value ? `${item.value}  (was ${before})` : item.value;
+            shown.tooltip = item.address ? `${item.path} at ${item.address}` : item.path;
+            shown.contextValue = 'value';
+        }
+        return shown;
+    }
+}
+
+function activate(context) {
+    const registers = new Registers();
+    const clock = vscode.window.createStatusBarItem(vscode.StatusBarAlignment.Left);
+    clock.tooltip = 'Simulated time of the robot';
+    clock.command = 'openswarm.goToCycle';
+
+    const said = async (session, text) => (await session.customRequest('evaluate', { expression: text, context: 'repl' })).result;
+    const stands = async (session) => {
+        registers.show(session);
+        clock.text = `$(watch) ${await said(session, '/time')}`;
+        clock.show();
+    };
+    const gone = () => {
+        registers.show(undefined);
+        clock.hide();
+    };
+    const asked = async (prompt, value) => {
+        const session = vscode.debug.activeDebugSession;
+        const text = session && session.type === TYPE ? await vscode.window.showInputBox({ prompt, value }) : undefined;
+        return text === undefined || text === NO_VALUE ? [] : [session, text];
+    };
+    const told = (work) => async (...words) => {
+        try {
+            await work(...words);
+        } catch (error) {
+            vscode.window.showErrorMessage(error.message);
+        }
+    };
+
+    context.subscriptions.push(
+        clock,
+        vscode.debug.registerDebugAdapterDescriptorFactory(TYPE, new Adapters()),
+        vscode.debug.registerDebugConfigurationProvider(TYPE, new Configurations()),
+        vscode.window.registerTreeDataProvider('openswarm.sfrs', registers),
+        vscode.debug.registerDebugAdapterTrackerFactory(TYPE, {
+            createDebugAdapterTracker: (session) => ({
+                onDidSendMessage: (message) => {
+                    if (message.type === 'event' && message.event === 'stopped') {
+                        stands(session).catch(gone);
+                    }
+                },
+                onWillStopSession: gone,
+            }),
+        }),
+        vscode.commands.registerCommand('openswarm.setSfr', told(async (item) => {
+            const [session, value] = await asked(`New value of ${item.path}, an expression of C`, item.value);
+            if (session) {
+                await session.customRequest('evaluate', { expression: `${item.path} = ${value}`, context: 'repl' });
+                await stands(session);
+            }
+        })),
+        vscode.commands.registerCommand('openswarm.goToCycle', told(async () => {
+            const [session, cycle] = await asked('Go to cycle', '');
+            if (session) {
+                await said(session, `/goto ${cycle}`);
+            }
+        })),
+        vscode.commands.registerCommand('openswarm.lastWrite', told(async () => {
+            const [session, place] = await asked('Go back to the instruction that changed this last (a variable or register)', '');
+            if (session) {
+                await said(session, `/lastwrite ${place}`);
+            }
+        })),
+    );
+}
+
+module.exports = { activate, wordsOf };

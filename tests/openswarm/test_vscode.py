@@ -1,0 +1,117 @@
+"""The extension for Visual Studio Code: what it declares fits the debugger, new projects and the packaging tool."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import jsonschema
+import pytest
+
+from arena.commands import debug as arena_debug
+from openswarm.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "editors" / "vscode"
+EXTENSION: dict[str, Any] = json.loads((FOLDER / "package.json").read_text(encoding="utf-8"))
+DEBUGGER: dict[str, Any] = EXTENSION["contributes"]["debuggers"][0]
+EVERYWHERE = ("type", "request", "name", "preLaunchTask", "presentation")
+"""What VS Code knows of every configuration."""
+VSCE = "@vscode/vsce@3"
+
+
+def matched(configuration: dict[str, Any]) -> None:
+    """Raises jsonschema.ValidationError unless the extension's own schema takes a launch configuration."""
+    assert configuration["type"] == DEBUGGER["type"]
+    schema = DEBUGGER["configurationAttributes"][configuration["request"]]
+    own = {name: value for name, value in configuration.items() if name not in EVERYWHERE}
+    jsonschema.validate(own, {"type": "object", "additionalProperties": False, **schema})
+
+
+def plain(body: Any) -> Any:
+    """A snippet's body as it stands once it is inserted."""
+    text = re.sub(r"\$\{\d:([^}]*)\}", r"\1", json.dumps(body))
+    return json.loads(re.sub(r'"\^\\"(.*?)\\""', r'"\1"', text).replace("\\\\$", "$"))
+
+
+def test_snippets_and_first_configurations_fit_the_schema() -> None:
+    for configuration in DEBUGGER["initialConfigurations"]:
+        matched(configuration)
+    for snippet in DEBUGGER["configurationSnippets"]:
+        matched(plain(snippet["body"]))
+    with pytest.raises(jsonschema.ValidationError, match="selektor"):
+        matched({"type": "openswarm", "request": "launch", "selektor": 3})
+
+
+def test_a_new_project_fits_the_extension(tmp_path: Path) -> None:
+    """Its launch configurations and the problem matchers in its tasks, which work without the extension too."""
+    assert main(["new", str(tmp_path / "robot")]) == 0
+    launch = json.loads((tmp_path / "robot" / ".vscode" / "launch.json").read_text())
+    for configuration in launch["configurations"]:
+        matched(configuration)
+    tasks = json.loads((tmp_path / "robot" / ".vscode" / "tasks.json").read_text())["tasks"]
+    patterns = {one["name"]: one for one in EXTENSION["contributes"]["problemPatterns"]}
+    for task in tasks[:2]:
+        matcher = task["problemMatcher"]
+        assert patterns[matcher["owner"]]["regexp"] == matcher["pattern"]["regexp"]
+    assert {one["pattern"] for one in EXTENSION["contributes"]["problemMatchers"]} == {f"${name}" for name in patterns}
+    assert launch["configurations"][0]["preLaunchTask"] in {task["label"] for task in tasks}
+
+
+def test_it_is_of_this_version_and_licence() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert (EXTENSION["version"], EXTENSION["license"]) == (project["version"], project["license"])
+    assert (FOLDER / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
+    assert f"openswarm-{EXTENSION['version']}.vsix" in (FOLDER / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
+def test_the_command_lines_it_starts_are_understood() -> None:
+    """extension.js is run with a stand-in for the editor's interface."""
+    script = """
+        require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? {} : load(name, ...rest))
+            (require('module')._load);
+        const { wordsOf } = require('./extension.js');
+        console.log(JSON.stringify([wordsOf({ program: 'a.elf' }),
+            wordsOf({ scene: 'clustering', robot: 2, program: 'a.elf', arenaOptions: ['--seed', '3'] })]));
+    """
+    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=60, check=True)
+    alone, swarm = json.loads(done.stdout)
+    assert alone == ["-m", "emu", "debug"]
+    assert swarm[:3] == ["-m", "arena", "debug"]
+    options = arena_debug.parser().parse_args(swarm[3:])
+    assert (options.scene, options.robot, options.brain, options.seed) == ("clustering", 2, "a.elf", 3)
+
+
+def test_it_is_packaged(tmp_path: Path) -> None:
+    """By VS Code's own tool; the package has the extension, its licence and nothing else."""
+    npx = shutil.which("npx")
+    if npx is None:
+        pytest.skip("there is no npm (Debian packages nodejs, npm)")
+    given = os.environ.get("VSCE_NODE_MODULES")
+    tool = [str(Path(given) / ".bin" / "vsce")] if given else [npx, "--yes", VSCE]
+    copy = shutil.copytree(FOLDER, tmp_path / "vscode", ignore=shutil.ignore_patterns("*.vsix"))
+    out = tmp_path / "openswarm.vsix"
+    words = [*tool, "package", "--allow-missing-repository", "--out", str(out)]
+    done = subprocess.run(words, cwd=copy, capture_output=True, text=True, timeout=400, check=False)
+    if done.returncode and "npm error" in done.stderr:
+        pytest.skip(f"npm cannot get {VSCE}: {done.stderr.strip().splitlines()[-1]}")
+    assert done.returncode == 0, done.stdout + done.stderr
+    with zipfile.ZipFile(out) as package:
+        names = set(package.namelist())
+        manifest = ElementTree.fromstring(package.read("extension.vsixmanifest"))
+        inner = json.loads(package.read("extension/package.json"))
+    wanted = {"package.json", "extension.js", "readme.md", "LICENSE.txt"}
+    assert names == {"extension.vsixmanifest", "[Content_Types].xml", *(f"extension/{name}" for name in wanted)}
+    identity = manifest.find(".//{*}Identity")
+    assert identity is not None
+    assert (identity.get("Id"), identity.get("Version")) == ("openswarm", EXTENSION["version"])
+    assert inner["contributes"] == EXTENSION["contributes"]
