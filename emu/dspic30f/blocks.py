@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from types import CodeType
 from typing import Any, Final
 
+from emu.dspic30f import flowrules
+from emu.dspic30f.expressions import Expr
 from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Repeat, Return, Skip
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.pysource import CHANGED, DONE, Source, Unsupported
-from emu.dspic30f.state import FIRST, LAST, MIDDLE, NOT_REPEATING, PC_MASK, RA
+from emu.dspic30f.state import PC_MASK
+from emu.dspic30f.ways import PythonWays, compiled
 
 LENGTH: Final = 48
 """Longest block in instructions: compiling costs about 0.1 ms each."""
@@ -37,12 +38,6 @@ class Block:
     run: Callable[[int], int]
     reach: int
     last_start: int
-
-
-@lru_cache(maxsize=4096)
-def compiled(text: str) -> CodeType:
-    """The code of one function's text, shared by all machines of the process."""
-    return compile(text, "<specialised>", "exec")
 
 
 NATIVE: Final = (None, Branch, Call, Goto, Repeat, Return, Skip)
@@ -117,9 +112,8 @@ class BlockWriter:
             raise _Ends
         if self._loop is not None and pc == self._loop[1] and facts.flow is not None:
             raise _Ends
-        stalled = bool(self._visited) and bool(source.stall & facts.source_pointers)
-        start = self._cycle + stalled
-        source.begin(pc, self._cycle, start + insn.row.cycles - 1)
+        start = self._cycle + flowrules.stall(source.stall if self._visited else 0, facts.source_pointers)
+        source.begin(pc, self._cycle, start + facts.access)
         flow: Flow = insn.row.does(source, insn.x)
         source.commit()
         source.at_entry = False
@@ -142,12 +136,11 @@ class BlockWriter:
         cycle, stall = self._cycle, source.stall
         match flow:
             case Branch(cond, target):
-                source.leave(target, cycle + 1, stall, DONE, under=str(cond))
-                self._longest = max(self._longest, cycle + 1)
+                source.leave(target, cycle + flowrules.TAKEN, stall, DONE, under=str(cond))
+                self._longest = max(self._longest, cycle + flowrules.TAKEN)
                 return after
             case Skip(cond):
-                skipped = self._fetch(after)
-                words = 1 if skipped is None else skipped.words
+                words = flowrules.words_skipped(self._fetch(after))
                 source.leave(after + 2 * words & PC_MASK, cycle + words, stall, DONE, under=str(cond))
                 self._longest = max(self._longest, cycle + words)
                 if source.ends_here:
@@ -169,71 +162,63 @@ class BlockWriter:
                 source.emit(f"return {CHANGED}")
             case Repeat(count):
                 source.settle()
-                source.emit(f"u16[{at['RCOUNT']}] = {count}")
-                if not isinstance(count, int) or count:
-                    if not isinstance(count, int):
-                        source.emit(f"if {count}:")
-                        source.nested(1)
-                    source.emit(f"u16[{at['SR']}] |= {RA}")
-                    source.emit(f"u16[{at['cpu.repeat']}] = {FIRST}")
-                    source.nested(0)
+                PythonWays(source.emit, {}).all(lambda m: flowrules.repeat(m, source.places.flow, count))
                 source.leave(after, cycle, stall, DONE)
         return None
 
     def _end_loop(self, after: int) -> None:
-        """Behind the instruction at DOEND (isa.md §7.6)."""
-        source, at = self._source, self._source.places.at
-        assert self._loop is not None
+        """Behind the instruction at DOEND. EDT is the sequencer's."""
+        source, loop = self._source, self._loop
+        assert loop is not None
         source.settle()
-        source.emit(f"if u16[{at['DCOUNT']}]:")
-        source.nested(1)
-        source.emit(f"u16[{at['DCOUNT']}] -= 1")
-        source.leave(self._loop[0], self._cycle, source.stall, DONE)
-        source.nested(0)
-        source.emit("end_loop()")
-        source.leave(after, self._cycle, source.stall, CHANGED)
+        flow = source.places.flow
+        ways = PythonWays(source.emit, {flow.edt: 0})
+
+        def leave(again: bool) -> None:
+            source.leave(loop[0] if again else after, self._cycle, source.stall, DONE if again else CHANGED,
+                         write=ways.line)
+
+        ways.each(lambda m: flowrules.loop_again(m, flow), leave)
 
 
 def write_repeat(source: Source, insn: Insn, pc: int) -> int:
-    """Write the loop of a REPEAT target: as many iterations as end by `bound`. Returns the cycles of one.
+    """Write the loop of a REPEAT target: as many iterations as end by `bound`. Returns the cycles of one. RA is set
+    except in the last iteration, when RCOUNT is 0.
 
     Raises Unsupported for targets the sequencer must run.
     """
-    facts, at = facts_of(insn), source.places.at
+    facts, at, flow = facts_of(insn), source.places.at, source.places.flow
     if facts.flow is not None or insn.words != 1:
         raise Unsupported("a flow change under REPEAT")
     cycles = insn.row.cycles
     source.emit(f"c = u64[{at['cpu.cycle']}]")
     source.emit(f"n = u16[{at['RCOUNT']}]")
-    source.emit(f"if u16[{at['cpu.stall']}] & {facts.source_pointers}:")
-    source.emit("    c += 1")
+    if facts.source_pointers:
+        source.emit(f"if u16[{at['cpu.stall']}] & {facts.source_pointers}:")
+        source.emit("    c += 1")
     source.emit("while True:")
     source.nested(1)
     source.emit(f"if c + {cycles} > bound:")
     source.emit(f"    return {DONE}")
-    source.begin(pc, 0, cycles - 1)
-    flow: Flow = insn.row.does(source, insn.x)
-    assert flow is None
+    source.begin(pc, 0, facts.access)
+    insn.row.does(source, insn.x)
     source.commit()
     if source.ends_here or source.modes_changed:
         raise Unsupported("a device access under REPEAT")
     source.settle()
-    stalled = int(bool(source.stall & facts.source_pointers))
     source.emit(f"c += {cycles}")
     source.emit(f"u64[{at['cpu.cycle']}] = c")
     source.emit(f"u16[{at['cpu.stall']}] = {source.stall}")
-    source.emit("if not n:")
-    source.emit(f"    u16[{at['cpu.repeat']}] = {NOT_REPEATING}")
-    source.emit(f"    u32[{at['cpu.pc']}] = {pc + 2 & PC_MASK}")
-    source.emit(f"    return {DONE}")
-    source.emit("n -= 1")
-    source.emit(f"u16[{at['RCOUNT']}] = n")
-    source.emit("if n:")
-    source.emit(f"    u16[{at['cpu.repeat']}] = {MIDDLE}")
-    source.emit("else:")
-    source.emit(f"    u16[{at['SR']}] &= {~RA & 0xFFFF}")
-    source.emit(f"    u16[{at['cpu.repeat']}] = {LAST}")
-    if stalled:
+    counted = Expr("n", 1, 0xFFFF, atom=True)  # where it is counted down it is not 0
+    ways = PythonWays(source.emit, {}, (flow.rcount, counted))
+
+    def end(again: bool) -> None:
+        if not again:
+            ways.line(f"u32[{at['cpu.pc']}] = {pc + 2 & PC_MASK}")
+            ways.line(f"return {DONE}")
+
+    ways.each(lambda m: flowrules.repeated(m, flow, 1), end)
+    if flowrules.stall(source.stall, facts.source_pointers):
         source.emit("c += 1")
     return cycles + 1
 

@@ -54,7 +54,7 @@ class Core:
         self.traps: Final = Traps(self.state, events, chip)
         self.exceptions: Final = Exceptions(self.state, events, bus, self.data, program, self.traps, chip)
         self.builder: Final = Interpreter(self.state, events, self.data, program, self.exceptions)
-        self.sequencer: Final = Sequencer(self.state, events, program, self.registers, self.exceptions, self.builder)
+        self.sequencer: Final = Sequencer(self.state, events, program, self.exceptions, self.builder)
 
     def reset(self) -> None:
         """Core state after any reset; SFRs have their reset values already."""

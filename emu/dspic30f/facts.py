@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any
 
 from emu.dspic30f.isa.builder import Context, Side, Size
-from emu.dspic30f.isa.flow import Flow, Value
+from emu.dspic30f.isa.flow import Flow, Return, Value
 from emu.dspic30f.isa.row import Insn
 
 
@@ -28,6 +28,10 @@ class Facts:
     reads: tuple[int, ...]
     """Data addresses read that are written in the instruction itself."""
     stores: int
+    access: int
+    """Cycle of the only or last data access, counted from the instruction's first one (design §4.2)."""
+    window_cycles: int
+    """What a read of the PSV window adds outside of REPEAT (isa.md §13.3)."""
     flow: type | None
     """Class of the Flow returned, None for "next"."""
 
@@ -108,7 +112,11 @@ def facts_of(insn: Insn) -> Facts:
     notes: Any = _Notes(0)
     flow: Flow = insn.row.does(notes, insn.x)
     kind = None if flow is None else type(flow)
-    return Facts(notes.source_pointers, notes.writes, notes.loads, tuple(notes.reads), notes.stores, kind)
+    access = 1 if kind is Return else insn.row.cycles - 1
+    window = 1 if insn.row.psv_class == "mov" else 2
+    return Facts(
+        notes.source_pointers, notes.writes, notes.loads, tuple(notes.reads), notes.stores, access, window, kind
+    )
 
 
 def flow_of(insn: Insn, pc: int) -> Flow:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from emu.dspic30f import flowrules
 from emu.dspic30f.core import Core
 from emu.dspic30f.modes import REGISTERS
 
@@ -22,6 +23,7 @@ class Places:
     """Word indices of SFRs whose read depends on what only the sequencer keeps current."""
     modes: frozenset[int]
     """Word indices of SFRs that change how instructions are translated."""
+    flow: flowrules.FlowPlaces
 
 
 def places_of(core: Core) -> Places:
@@ -37,4 +39,5 @@ def places_of(core: Core) -> Places:
         effects,
         frozenset((at["PCL"], at["PCH"])),
         frozenset(at[name] for name in REGISTERS),
+        flowrules.places_of(core.state),
     )

@@ -117,11 +117,15 @@ class Source:
         self._flags.clear()
         self._sr = ""
 
-    def leave(self, pc: Number, cycle: int, stall: int, status: int, under: str = "") -> None:
+    def leave(
+        self, pc: Number, cycle: int, stall: int, status: int, under: str = "",
+        write: Callable[[str], None] | None = None,
+    ) -> None:
         """Return from the function with the next instruction at `pc`, starting `cycle` behind `c`.
 
-        `under`: only if this condition holds.
+        `under`: only if this condition holds; `write`: takes the lines instead of `emit`.
         """
+        write = write or self.emit
         lines = self.settle_flags()
         at = self.places.at
         lines.append(f"u32[{at['cpu.pc']}] = {pc}")
@@ -129,9 +133,9 @@ class Source:
         lines.append(f"u16[{at['cpu.stall']}] = {stall}")
         lines.append(f"return {CHANGED if status == DONE and self.modes_changed else status}")
         if under:
-            self.emit(f"if {under}:")
+            write(f"if {under}:")
         for line in lines:
-            self.emit("    " + line if under else line)
+            write("    " + line if under else line)
 
     def bail(self, condition: str) -> None:
         """Leave before the present instruction if `condition`. At the entry nothing has been changed yet."""

@@ -45,12 +45,6 @@ class CoreRegisters:
         """Cycles for which DISI still blocks, as read in the current cycle (isa.md §12)."""
         return max(0, self._state.disi_end - self._events.now)
 
-    def disi(self, count: int, cycle: int) -> None:
-        """DISI #count executed in `cycle`: that cycle and the next `count` are blocked (isa.md §12)."""
-        self._state.disi_end = cycle + 1 + count
-        self._u16[self._state.at["DISICNT"]] = count
-        self._events.kick()
-
     def _disicnt_written(self, _old: int, new: int, lanes: int) -> None:
         """A written 0 ends the block at once: the next boundary accepts (isa.md §12)."""
         state = self._state

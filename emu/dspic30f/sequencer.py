@@ -12,7 +12,8 @@ RETURN, RETLW and RETFIE look one cycle early: they take 2 cycles instead of 3 i
 
 Within REPEAT the target stays at PC; every iteration is followed by a boundary. RA is 0 during the last iteration
 (isa.md §7.5, UNVERIFIED). At the end of the instruction at DOEND, if it falls through, the loop goes on or ends (§7.6).
-A flow change out of a REPEAT target or out of the last instruction of a DO loop simply happens (undefined on silicon).
+What REPEAT, DO, RETFIE and DISI do to registers, and what skips and stalls cost, is the text of flowrules.py. A flow
+change out of a REPEAT target or out of the last instruction of a DO loop simply happens (undefined on silicon).
 
 Faults. An address error inhibits the stores of its instruction, which otherwise completes; stack and math errors are
 visible from e + 1, hard traps from e. An illegal opcode, an uninitialised pointer and a trap conflict reset the device.
@@ -23,6 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from emu.dspic30f import flowrules
 from emu.dspic30f.facts import Facts, facts_of
 from emu.dspic30f.faults import Breakpoint, DeviceReset, IllegalOpcode, TrapConflict
 from emu.dspic30f.interp import Interpreter
@@ -45,27 +47,10 @@ from emu.dspic30f.isa.flow import (
 )
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.power import PowerSaving, Sleeping
-from emu.dspic30f.registers import CoreRegisters
-from emu.dspic30f.state import (
-    DA,
-    FIRST,
-    IDLE,
-    IPL3,
-    LAST,
-    MIDDLE,
-    NOT_REPEATING,
-    PC_MASK,
-    RA,
-    RUN,
-    SLEEP,
-    State,
-)
+from emu.dspic30f.state import DA, IDLE, MIDDLE, NOT_REPEATING, PC_MASK, RA, RUN, SLEEP, State
+from emu.dspic30f.ways import function_of
 from emu.events import Events
 from emu.program import ProgramMemory
-
-EDT_MATURE: Final = 3
-"""`State.edt` from which the end test of a DO loop obeys: two instructions have completed since the one that wrote EDT,
-so it was latched before the penultimate instruction (isa.md §7.6)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +60,6 @@ class Step:
     insn: Insn
     facts: Facts
     next_pc: int
-    cycles: int
-    window_extra: int
-    """PSV cycles outside REPEAT (isa.md §13.3)."""
 
 
 class Sequencer:
@@ -88,20 +70,25 @@ class Sequencer:
         state: State,
         events: Events,
         program: ProgramMemory,
-        registers: CoreRegisters,
         exceptions: Exceptions,
         builder: Interpreter,
     ) -> None:
         self.state: Final = state
         self.events: Final = events
         self.program: Final = program
-        self.registers: Final = registers
         self.exceptions: Final = exceptions
         self.builder: Final = builder
         self.power: Final = PowerSaving(state, events, exceptions)
         self._hold: Final = state.record.reserve("cpu.hold", "Q").index
         self._steps: Final[dict[int, Step]] = {}
         program.changed.append(self._forget)
+        places, record = flowrules.places_of(state), state.record
+        self._repeat: Final = function_of(record, flowrules.repeat, places, "count")
+        self._repeated: Final = function_of(record, flowrules.repeated, places, "counting")
+        self._do: Final = function_of(record, flowrules.do, places, "count", "start", "end")
+        self._loop_again: Final = function_of(record, flowrules.loop_again, places)
+        self._resume: Final = function_of(record, flowrules.resume, places, "srl", "ipl3")
+        self._disi: Final = function_of(record, flowrules.disi, places, "count", "after")
 
     def _forget(self, start: int, end: int) -> None:
         """Flash words in [start, end) changed."""
@@ -152,9 +139,7 @@ class Sequencer:
                 if is_debug_word(word1):
                     raise Breakpoint(f"debugger word {word1:06X}")
                 raise IllegalOpcode(word1)
-            extra = 1 if insn.row.psv_class == "mov" else 2
-            after = pc + 2 * insn.words & PC_MASK
-            step = self._steps[pc] = Step(insn, facts_of(insn), after, insn.row.cycles, extra)
+            step = self._steps[pc] = Step(insn, facts_of(insn), pc + 2 * insn.words & PC_MASK)
         return step
 
     def execute(self) -> None:
@@ -175,11 +160,10 @@ class Sequencer:
             state.stall = 0
             raise
         facts, builder = step.facts, self.builder
-        start = state.cycle + (state.stall & facts.source_pointers != 0)
+        start = state.cycle + flowrules.stall(state.stall, facts.source_pointers)
         repeat = state.repeat
-        extra = step.window_extra if repeat == NOT_REPEATING else 0 if repeat == MIDDLE else 2
-        access = start + (1 if facts.flow is Return else step.cycles - 1)
-        builder.begin(pc, access, facts.loads, extra)
+        extra = facts.window_cycles if repeat == NOT_REPEATING else 0 if repeat == MIDDLE else 2
+        builder.begin(pc, start + facts.access, facts.loads, extra)
         try:
             state.pc = step.next_pc
             flow = step.insn.row.does(builder, step.insn.x)
@@ -192,9 +176,9 @@ class Sequencer:
             builder.request_soft_traps(last)
         if state.sr & RA or repeat != NOT_REPEATING:
             last = self._after_target(step, flow, pc, last)
-        if state.sr & DA and pc == state.pair("DOENDL") and state.pc == step.next_pc:
-            self._after_loop_end()
-        if state.edt and state.edt < EDT_MATURE:
+        if state.sr & DA and pc == state.pair("DOENDL") and state.pc == step.next_pc and self._loop_again():
+            state.pc = state.pair("DOSTARTL")
+        if state.edt and state.edt < flowrules.EDT_MATURE:
             state.edt += 1
         state.cycle = last + 1
 
@@ -222,7 +206,7 @@ class Sequencer:
             case Branch(cond, target):
                 if cond:
                     state.pc = target
-                    last += 1
+                    last += flowrules.TAKEN
             case Skip(cond):
                 if cond:
                     last += self._skip()
@@ -231,20 +215,12 @@ class Sequencer:
             case Return():
                 return self._return(flow, last)
             case Repeat(count):
-                if count:
-                    state.rcount = count
-                    state.sr |= RA
-                    state.repeat = FIRST
-                else:
-                    state.rcount = 0
+                self._repeat(count)
             case Do(count, end):
-                state.push_do()
-                state.dcount = count
-                state.set_pair("DOSTARTL", pc + 4)
-                state.set_pair("DOENDL", end)
-                state.do_level = min(state.do_level + 1, 7)
+                self._do(count, state.pc, end)
             case Disi(count):
-                self.registers.disi(count, last)
+                self._disi(count, last + 1)
+                self.events.kick()
             case ClearWatchdog():
                 self.events.arrive(last)
                 self.power.wires.clear_watchdog()
@@ -257,10 +233,10 @@ class Sequencer:
         return last
 
     def _skip(self) -> int:
-        """Step over the next instruction; a word that is none counts as one word."""
+        """Step over the next instruction."""
         pc = self.state.pc
         insn = decode_for_execution(self.program.word(pc), self.program.word(pc + 2 & PC_MASK))
-        words = 1 if insn is None else insn.words
+        words = flowrules.words_skipped(insn)
         self.state.pc = pc + 2 * words & PC_MASK
         return words
 
@@ -273,12 +249,8 @@ class Sequencer:
 
     def finish_retfie(self, target: int, srl: int, ipl3: int, second: int) -> int:
         """Continue at `target` with the popped SR<7:0> and IPL3; returns the last cycle."""
-        state = self.state
-        state.pc = target
-        state.sr = state.sr & 0xFF00 | srl
-        state.corcon = state.corcon & ~IPL3 | (IPL3 if ipl3 else 0)
-        if state.sr & RA:
-            state.repeat = FIRST
+        self.state.pc = target
+        self._resume(srl, ipl3)
         self.events.kick()
         return second if self._exception_at(second) else second + 1
 
@@ -298,43 +270,13 @@ class Sequencer:
         return True
 
     def _after_target(self, step: Step, flow: Flow, pc: int, last: int) -> int:
-        """Count an iteration of a REPEAT target (isa.md §7.5); returns its last cycle, which PSV may move (§13.3)."""
+        """Count an iteration of a REPEAT target; returns its last cycle, which PSV may move (isa.md §13.3)."""
         state = self.state
         if isinstance(flow, Repeat | Return) or state.pc != step.next_pc:
             return last
-        if not state.sr & RA:
-            state.repeat = NOT_REPEATING
-            return last
-        middle = state.repeat == MIDDLE
-        if state.rcount:
-            state.rcount -= 1
+        middle, counting = state.repeat == MIDDLE, state.sr & RA
+        if self._repeated(counting):
             state.pc = pc
-            if state.rcount:
-                state.repeat = MIDDLE
-            else:
-                state.sr &= ~RA
-                state.repeat = LAST
-        else:
-            state.sr &= ~RA
-            state.repeat = NOT_REPEATING
-        if self.builder.window and middle and self._exception_at(last):
+        if counting and self.builder.window and middle and self._exception_at(last):
             last += 2
         return last
-
-    def _after_loop_end(self) -> None:
-        """The instruction at DOEND has completed: next iteration, or out of the loop (isa.md §7.6)."""
-        state = self.state
-        if state.dcount and state.edt < EDT_MATURE:
-            state.dcount -= 1
-            state.pc = state.pair("DOSTARTL")
-        else:
-            self.end_loop()
-
-    def end_loop(self) -> None:
-        """Leave the innermost DO loop."""
-        state = self.state
-        state.edt = 0
-        level = state.do_level
-        if level == 2:
-            state.pop_do()
-        state.do_level = level - 1

@@ -61,7 +61,6 @@ class SpecialisedEngine:
             "u64": record.u64,
             "read": core.bus.read,
             "write": core.bus.write,
-            "end_loop": core.sequencer.end_loop,
             "finish": core.sequencer.finish_retfie,
             "div_trunc": div_trunc,
             "rem_trunc": rem_trunc,

@@ -115,7 +115,6 @@ class State:
         self._reset_stack: Final = chip.data["ram"].start
         self.check_pointers = True
         """Whether a reset leaves W0..W14 uninitialised, so that using one as a pointer resets again (isa.md §2.2)."""
-        self._do_registers: Final = [self.at[name] for name in ("DCOUNT", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")]
 
     @property
     def ipl(self) -> int:
@@ -127,38 +126,10 @@ class State:
         self.corcon = self.corcon & ~IPL3 | level & IPL3
         self.sr = self.sr & ~IPL_MASK | (level & 7) << 5
 
-    @property
-    def do_level(self) -> int:
-        """CORCON.DL, 0..7."""
-        return (self.corcon & DL_MASK) >> DL_SHIFT
-
-    @do_level.setter
-    def do_level(self, level: int) -> None:
-        self.corcon = self.corcon & ~DL_MASK | (level & 7) << DL_SHIFT
-        self.sr = self.sr | DA if level & 7 else self.sr & ~DA
-
     def pair(self, low: str) -> int:
         """A program address kept in two registers, `low` and the word behind it (DOSTART, DOEND)."""
         index = self.at[low]
         return self.u16[index] | self.u16[index + 1] << 16
-
-    def set_pair(self, low: str, address: int) -> None:
-        """Set such a pair; bit 0 stays 0 and the high half has 7 bits (isa.md §2.1)."""
-        index = self.at[low]
-        self.u16[index] = address & 0xFFFE
-        self.u16[index + 1] = address >> 16 & 0x7F
-
-    def push_do(self) -> None:
-        """Copy DCOUNT, DOSTART, DOEND to their shadows (isa.md §2.6)."""
-        shadow = self.at["cpu.do_shadow"]
-        for number, index in enumerate(self._do_registers):
-            self.u16[shadow + number] = self.u16[index]
-
-    def pop_do(self) -> None:
-        """Copy the shadows back."""
-        shadow = self.at["cpu.do_shadow"]
-        for number, index in enumerate(self._do_registers):
-            self.u16[index] = self.u16[shadow + number]
 
     def set_w(self, number: int, value: int) -> None:
         """Word write of a W register by an instruction: bit 0 of W15 stays 0, the register counts as initialised."""

@@ -11,21 +11,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
+from emu.dspic30f import flowrules
 from emu.dspic30f.isa.builder import Context, Side, Size
-from emu.dspic30f.jit.reader import NativeReader
+from emu.dspic30f.jit.reader import LlvmWays, NativeReader
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import Variables, pointer
 from emu.dspic30f.registers import NSTDIS
-from emu.dspic30f.state import FIRST, FLAGS, LAST, MIDDLE, RA, SA, SAB, SB
+from emu.dspic30f.state import FLAGS, SA, SAB, SB
 from emu.straight import Rule
 
 W_END: Final = 0x20  # W0..W15 are data addresses 0x00..0x1F, isa.md §2.2
 STACK_POINTER: Final = 15
 
-NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK = range(7)
+NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK, MODES = range(8)
 """Why native code came back: go on at PC; interpret the instruction at PC; the block at PC reaches the deadline;
 look at events and interrupts before PC; no native code at PC; a RETFIE has run for two cycles;
-PC is hooked."""
+PC is hooked; the processor modes are others at PC."""
 
 Access = Literal["plain", "slow", "irq", "flags", "sr"]
 """How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;
@@ -76,6 +77,7 @@ class Surroundings:
     rcon_idle: int
     rcon_wdto: int
     latches: Latches
+    flow: flowrules.FlowPlaces
     rules: Mapping[int, Rule] = field(default_factory=dict)
     """Of device registers, by even address."""
     hooks: frozenset[int] = frozenset()
@@ -182,19 +184,11 @@ class LlvmBuilder:
             self.e.start(self._slow)
             self.before_slow()
             if self.repeating is not None and self.left_count is not None:
-                self._leave_repeat(self.left_count, self.repeating)
+                count, left = self.left_count, self.repeating
+                LlvmWays(self.e).all(lambda m: flowrules.repeating(m, self.around.flow, count, left))
             self.v.leave(self.pc, INTERPRET)
             self.e.block = current
         return self._slow
-
-    def _leave_repeat(self, count: Number, left: Number) -> None:
-        """REPEAT state in the record, as the sequencer keeps it before an iteration with RCOUNT = `left`."""
-        e, offset = self.e, self.around.offset
-        phase = self.select(left == 0, LAST, self.select(left == count, FIRST, MIDDLE))
-        e.store(pointer(e, offset["RCOUNT"]), left, 16)
-        e.store(pointer(e, offset["cpu.repeat"]), phase, 16)
-        place = pointer(e, offset["SR"])
-        e.store(place, (e.load(place, 16) & (0xFFFF & ~RA)) | self.select(left == 0, 0, RA), 16)
 
     def guard(self, ok: Number) -> None:
         """Leave through the slow exit unless `ok`."""
@@ -323,7 +317,7 @@ class LlvmBuilder:
             word = self.w(word_address >> 1)
             return word if size == 2 else (word >> 8 if ea & 1 else word & 0xFF)
         if word_address == self.around.offset["SR"]:
-            value = self._sr_word()
+            value = self.sr_word()
             return value if size == 2 else (value >> 8 if ea & 1 else value & 0xFF)
         self.pending.touches_sfr |= self.around.offset["SR"] < word_address < self.around.ram[0]
         rule = self.around.rules.get(word_address)
@@ -382,7 +376,7 @@ class LlvmBuilder:
             self._store_accumulator(*place, placed, mask & lanes)
             return
         if how == "sr":
-            old = self._sr_word()
+            old = self.sr_word()
             nstdis = self.e.load(pointer(self.e, self.around.offset["INTCON1"]), 16) & NSTDIS
             self.guard(((old & (SA | SB | SAB)) | nstdis) == 0)
             free = mask & lanes
@@ -472,7 +466,7 @@ class LlvmBuilder:
         """Change SR bits."""
         self.pending.flags.update(flags)
 
-    def _sr_word(self) -> Value:
+    def sr_word(self) -> Value:
         """SR as an instruction reads it: flags from the variables, the rest from the record."""
         if self.dsp_region or self.repeating is not None:
             raise NeedsInterpreter

@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
 from emu.dspic30f.facts import facts_of
+from emu.dspic30f.flowrules import places_of
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
@@ -431,8 +432,8 @@ def surroundings_of(core: Core, key: Key, hooks: frozenset[int], offset: Mapping
     return Surroundings(
         offset, reads, writes, key.initialised, bool(key.limit_armed), (ram.start, ram.end), chip.data["yram"].start,
         chip.program["flash"].end // 2, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
-        latches_of(core), {2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None}, hooks,
-        start, end)  # fmt: skip
+        latches_of(core), places_of(core.state),
+        {2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None}, hooks, start, end)  # fmt: skip
 
 
 def latches_of(core: Core) -> Latches:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
+from emu.dspic30f import flowrules
 from emu.dspic30f.isa.builder import Context, Size
 from emu.dspic30f.isa.flow import Branch, Goto, Skip
 from emu.dspic30f.jit.builder import LlvmBuilder, NeedsInterpreter, Surroundings
@@ -86,8 +87,8 @@ def _costs(path: list[Step], around: Surroundings, context: Context) -> tuple[tu
         allowed = (Branch, Goto) if last else (type(None), Branch, Skip)
         if not isinstance(flow, allowed) or (flow is not None and not last and step.target is None):
             raise NeedsInterpreter
-        stall = written & step.facts.source_pointers != 0
-        costs.append((step.pc, step.insn.row.cycles + stall + (last and isinstance(flow, Branch))))
+        stall = flowrules.stall(written, step.facts.source_pointers)
+        costs.append((step.pc, step.insn.row.cycles + stall + flowrules.TAKEN * (last and isinstance(flow, Branch))))
         written = step.facts.writes
     if probe.notes.carried & probe.notes.changed:
         raise NeedsInterpreter

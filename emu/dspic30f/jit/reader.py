@@ -6,12 +6,14 @@ it; what happens at a boundary to Python.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import pointer
 from emu.dspic30f.state import STACK_POINTER
+from emu.dspic30f.ways import Ways
 from emu.straight import Place, Slot, place_of
 
 if TYPE_CHECKING:
@@ -58,8 +60,15 @@ class NativeReader(LlvmReader):
         self._b: Final = b
         self.now: Final = b.now
 
+    def get(self, place: Place, index: Number = 0) -> Value:
+        """Load; flags of SR may be in variables."""
+        return self._b.sr_word() if place == self._b.around.flow.sr else super().get(place, index)
+
     def put(self, place: Place, value: Number, index: Number = 0) -> None:
         """Store, with the instruction's other effects."""
+        if place == self._b.around.flow.sr:
+            self._b.pending.sr = value
+            return
         e, offset = self.e, index * (place.bits // 8) + place.offset
         self._b.pending.stores.append(lambda: e.store(pointer(e, offset), value, place.bits))
 
@@ -73,6 +82,39 @@ class NativeReader(LlvmReader):
         self.put(slot.due, due)
         self.put(slot.deadline, self.least(deadline, due))
         self._b.pending.replanned = True
+
+
+class LlvmWays(Ways):
+    """Rules of flow behind an instruction, done as they are read; RA and DA of SR are in the record. `known` as for
+    `Ways`; begun() is called where a way begins."""
+
+    def __init__(
+        self, e: Emitter, known: Mapping[Place, int] = MappingProxyType({}), begun: Callable[[], None] = lambda: None
+    ) -> None:
+        super().__init__(known)
+        self.e: Final = e
+        self._begun: Final = begun
+
+    def load(self, place: Place) -> Value:
+        """From the record."""
+        return self.e.load(pointer(self.e, place.offset), place.bits)
+
+    def store(self, place: Place, value: Number) -> None:
+        """To the record."""
+        self.e.store(pointer(self.e, place.offset), value, place.bits)
+
+    def select(self, condition: Number, a: Number, b: Number) -> Number:
+        """Choice."""
+        return self.e.select(condition, a, b)
+
+    def branches(self, condition: Number) -> Iterator[bool]:
+        """Two blocks."""
+        yes, no = self.e.fresh("yes"), self.e.fresh("no")
+        self.e.end(f"br i1 {truth(condition)}, label %{yes}, label %{no}")
+        for label, turn in ((yes, True), (no, False)):
+            self.e.start(label)
+            self._begun()
+            yield turn
 
 
 class BoundaryReader(LlvmReader):

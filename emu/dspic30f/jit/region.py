@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from emu.dspic30f.facts import Facts, facts_of, flow_of
+from emu.dspic30f.flowrules import words_skipped
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Do, Goto, Repeat, Reset, Return, Skip, Sleep
 from emu.dspic30f.isa.row import Insn
 
@@ -53,7 +54,7 @@ def static_target(pc: int, insn: Insn, fetch: Fetch) -> int | None:
     flow = flow_of(insn, pc)
     if isinstance(flow, Skip):
         skipped = fetch((pc + 2) & PC_WRAP)
-        return None if skipped is None else (pc + 2 + 2 * skipped.words) & PC_WRAP
+        return None if skipped is None else (pc + 2 + 2 * words_skipped(skipped)) & PC_WRAP
     if isinstance(flow, (Branch, Goto)) and isinstance(flow.target, int):
         return flow.target & PC_WRAP
     return None

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from emu.dspic30f import flowrules
 from emu.dspic30f.isa.flow import Repeat
 from emu.dspic30f.jit.builder import DEADLINE, SERVICE, LlvmBuilder, NeedsInterpreter, Pending
+from emu.dspic30f.jit.reader import LlvmWays
 from emu.dspic30f.jit.region import Step
-from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
-from emu.dspic30f.jit.variables import MemoryVariables, pointer
-from emu.dspic30f.state import FIRST, LAST, MIDDLE, NOT_REPEATING, RA
+from emu.dspic30f.jit.values import Emitter, Number, Value, wide
+from emu.dspic30f.jit.variables import MemoryVariables
+from emu.dspic30f.state import RA
 
 if TYPE_CHECKING:
     from emu.dspic30f.jit.translate import Translator
@@ -37,22 +39,19 @@ class Repeats:
         target = t.region.steps.get(step.next_pc)
         if target is None or not self._is_native(target):
             raise NeedsInterpreter
-        count = flow.count
-        if isinstance(count, Value):
-            t.count.settle()
-            some, none = e.fresh("some"), e.fresh("none")
-            e.end(f"br i1 {truth(count)}, label %{some}, label %{none}")
-            e.start(none)
-            self._nothing(step, stall)
-            e.start(some)
-            t.v.new_block()
-        elif count == 0:
-            self._nothing(step, stall)
-            return
+        count, ways = flow.count, LlvmWays(e, begun=t.v.new_block)
+        t.count.settle()
         if t.exact:
-            self._begin_exact(step, target, count, stall)
-        else:
-            self._whole(step, target, count, stall)
+            ways.each(lambda m: flowrules.repeat(m, t.around.flow, count),
+                      lambda again: self._begin(step, target, stall, again))  # fmt: skip
+            return
+        for some in ways.branches(count) if isinstance(count, Value) else [count != 0]:
+            if some:
+                self._whole(step, target, count, stall)
+            else:
+                ways.all(lambda m: flowrules.repeat(m, t.around.flow, 0))
+                t.advance(stall + 1, step.facts.writes)
+                t.jump(step.next_pc)
 
     def _is_native(self, target: Step) -> bool:
         """Whether an instruction can be repeated natively, found by translating it for nothing."""
@@ -74,18 +73,11 @@ class Repeats:
             return False
         return not trial.pending.stop
 
-    def _nothing(self, step: Step, stall: Number) -> None:
-        """REPEAT #0 is a NOP that clears RCOUNT."""
-        t = self._t
-        t.e.store(pointer(t.e, t.around.offset["RCOUNT"]), 0, 16)
-        t.advance(stall + 1, step.facts.writes)
-        t.jump(step.next_pc)
-
     # -- block code ---------------------------------------------------------------------------------------------------
     def _whole(self, step: Step, target: Step, count: Number, stall: Number) -> None:
         """All iterations at once, if they fit before the deadline."""
         t, e = self._t, self._t.e
-        again = int(target.facts.writes & target.facts.source_pointers != 0)
+        again = int(flowrules.stall(target.facts.writes, target.facts.source_pointers))
         cycles = target.insn.row.cycles
         total = stall + 1 + cycles * (count + 1) + again * count
         go = e.fresh("go")
@@ -97,7 +89,7 @@ class Repeats:
             self._divide(target)
         else:
             self._loop(target, count, cycles, again)
-        e.store(pointer(e, t.around.offset["RCOUNT"]), 0, 16)
+        LlvmWays(e).store(t.around.flow.rcount, 0)
         t.jump(target.next_pc)
 
     def _divide(self, target: Step) -> None:
@@ -142,16 +134,14 @@ class Repeats:
         t.v.new_block()
 
     # -- exact code ---------------------------------------------------------------------------------------------------
-    def _begin_exact(self, step: Step, target: Step, count: Number, stall: Number) -> None:
-        """The REPEAT instruction alone: state to the record, then the loop of its target."""
+    def _begin(self, step: Step, target: Step, stall: Number, again: bool) -> None:
+        """The REPEAT instruction alone has run; then comes the loop of its target."""
         t, e = self._t, self._t.e
-        offset = t.around.offset
-        e.store(pointer(e, offset["RCOUNT"]), count, 16)
-        e.store(pointer(e, offset["cpu.repeat"]), FIRST, 16)
-        status = pointer(e, offset["SR"])
-        e.store(status, e.load(status, 16) | RA, 16)
         t.advance(stall + 1, step.facts.writes)
         t.count.settle()
+        if not again:
+            t.jump(step.next_pc)
+            return
         known = target.pc in self.resumes
         label = self.resumes.setdefault(target.pc, f"r{target.pc:x}")
         e.end(f"br label %{label}")
@@ -160,38 +150,29 @@ class Repeats:
 
     def _iterations(self, target: Step, label: str) -> None:
         """One iteration after another, each a boundary; entered from REPEAT or from outside."""
-        t, e, b = self._t, self._t.e, self._t.b
-        offset = t.around.offset
+        t, e, b, flow = self._t, self._t.e, self._t.b, self._t.around.flow
         e.start(label)
         t.v.new_block()
         early = e.let(f"icmp ult i64 {wide(t.v.get('cycle'))}, %stop", bit=True)
-        go, on, done = e.fresh("go"), e.fresh("on"), e.fresh("done")
+        go = e.fresh("go")
         e.end(f"br i1 {early.text}, label %{go}, label %{t.exit(target.pc, SERVICE)}")
         e.start(go)
         t.at = target.pc
-        stall: Number = 0
-        if target.facts.source_pointers:
-            stall = (t.v.get("stall") & target.facts.source_pointers) != 0
-        count_place, status = pointer(e, offset["RCOUNT"]), pointer(e, offset["SR"])
-        phase = pointer(e, offset["cpu.repeat"])
-        left = e.load(count_place, 16)
+        stall = flowrules.stall(t.v.get("stall"), target.facts.source_pointers)
+        ways = LlvmWays(e, begun=t.v.new_block)
         b.begin(target.pc, None)
-        b.repeating = left
+        b.repeating = ways.get(flow.rcount)  # the target leaves it alone: it is not native else
         target.insn.row.does(b, target.insn.x)  # type: ignore[arg-type]
         b.commit()
         b.repeating = None
         t.advance(target.insn.row.cycles + stall, target.facts.writes | b.pending.mapped)
         t.count.settle()
-        word = e.load(status, 16)
-        more = ((word & RA) != 0) & (left != 0)
-        e.end(f"br i1 {truth(more)}, label %{on}, label %{done}")
-        e.start(on)
-        fewer = left - 1
-        e.store(count_place, fewer, 16)
-        e.store(phase, b.select(fewer == 0, LAST, MIDDLE), 16)
-        e.store(status, b.select(fewer == 0, word & (0xFFFF & ~RA), word), 16)
-        e.end(f"br label %{label}")
-        e.start(done)
-        e.store(status, word & (0xFFFF & ~RA), 16)
-        e.store(phase, NOT_REPEATING, 16)
-        t.jump(target.next_pc)
+        counting = ways.get(flow.sr) & RA
+
+        def end(again: bool) -> None:
+            if again:
+                e.end(f"br label %{label}")
+            else:
+                t.jump(target.next_pc)
+
+        ways.each(lambda m: flowrules.repeated(m, flow, counting), end)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from emu.dspic30f import flowrules
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
 from emu.dspic30f.jit.builder import (
@@ -16,6 +17,7 @@ from emu.dspic30f.jit.builder import (
     HOOK,
     INTERPRET,
     MISS,
+    MODES,
     NEXT,
     RETFIE,
     SERVICE,
@@ -25,11 +27,12 @@ from emu.dspic30f.jit.builder import (
 )
 from emu.dspic30f.jit.counting import Count
 from emu.dspic30f.jit.polling import empty_loops
+from emu.dspic30f.jit.reader import LlvmWays, NativeReader
 from emu.dspic30f.jit.region import Region, Step
 from emu.dspic30f.jit.repeat import Repeats
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import MemoryVariables, Variables, pointer
-from emu.dspic30f.state import FIRST, IDLE, IPL3, NOT_REPEATING, PC_MASK, RA
+from emu.dspic30f.state import IDLE, IPL3, NOT_REPEATING, PC_MASK
 from emu.events import NEVER
 
 RESUME: Final = 5
@@ -80,7 +83,7 @@ class Translator:
         e = self.e
         self.v.touch("pc", "stall", "cycle")
         steps = set(self.region.steps)
-        for pc in sorted(steps if self.exact else self.region.leaders | ({self.around.do_end} & steps)):
+        for pc in sorted(steps if self.exact else self.region.leaders):
             self._label(pc)
         while self._todo:
             self._block(self._todo.pop(0))
@@ -177,9 +180,11 @@ class Translator:
             first = False
             total += step.insn.row.cycles + (step.facts.source_pointers != 0)
             if self._psv and step.facts.loads:
-                total += 2
+                total += step.facts.window_cycles
             if step.facts.flow is not None:
                 return total + 2
+            if pc == self.around.do_end:
+                break
             pc = step.next_pc
         return total
 
@@ -199,11 +204,6 @@ class Translator:
             self._stop_for_hook(start)
         if start in self._heads:
             e.line(f"store i1 true, ptr %passed.{start:x}")
-        if start == self.around.do_end:
-            again = e.fresh("again")
-            left = e.load(pointer(e, self.around.offset["DCOUNT"]), 16)
-            e.end(f"br i1 {truth(left)}, label %{again}, label %{self.exit(start, INTERPRET)}")
-            e.start(again)
         written: Number = v.get("stall")
         pc = start
         while True:
@@ -239,14 +239,10 @@ class Translator:
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
         """One instruction; returns whether the block ends and the W registers written on the destination side."""
         b, row = self.b, step.insn.row
-        stall: Number = 0
-        if step.facts.source_pointers:
-            hit = written & step.facts.source_pointers
-            stall = (1 if hit else 0) if isinstance(hit, int) else hit != 0
-        psv_cycles = 1 if row.psv_class == "mov" else 2
-        b.begin(step.pc, psv_cycles)
+        stall = flowrules.stall(written, step.facts.source_pointers)
+        b.begin(step.pc, step.facts.window_cycles)
         self.at = step.pc
-        b.now = self.v.get("cycle") + stall + (1 if step.facts.flow is Return else row.cycles - 1)
+        b.now = self.v.get("cycle") + stall + step.facts.access
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
         if flow is not None and step.pc == self.around.do_end:
             raise NeedsInterpreter  # undefined on silicon; the sequencer says what happens here
@@ -274,32 +270,46 @@ class Translator:
             any_window = b.pending.psv[0]
             for other in b.pending.psv[1:]:
                 any_window = any_window | other
-            cycles = cycles + b.select(any_window, psv_cycles, 0)
+            cycles = cycles + b.select(any_window, step.facts.window_cycles, 0)
         mask = step.facts.writes | b.pending.mapped
         if flow is None:
             self.advance(cycles, mask)
             if b.pending.sr is not None:
                 self.count.level_changed()
             if step.pc == self.around.do_end:
-                self._loop_again()
-                return True, mask
-            if b.pending.replanned:
-                self.count.settle()
-                self.e.end(f"br label %{self.exit(step.next_pc, NEXT)}")
-                return True, mask
-            if b.pending.stop:
-                self._look(step.next_pc)
-                return True, mask
-            return False, mask
+                self._end_of_loop(step)
+            elif b.pending.replanned or b.pending.stop:
+                self._behind(step.next_pc)
+            else:
+                return False, mask
+            return True, mask
         self._flow(step, flow, cycles, mask)
         return True, mask
 
-    def _loop_again(self) -> None:
-        """The last instruction of a DO loop whose count is not used up (isa.md §7.6)."""
-        e = self.e
-        place = pointer(e, self.around.offset["DCOUNT"])
-        e.store(place, e.load(place, 16) - 1, 16)
-        self.jump(self.around.do_start)
+    def _behind(self, pc: int) -> None:
+        """Go on at `pc` behind an instruction without flow, which may have asked for attention."""
+        if self.b.pending.replanned:
+            self.count.settle()
+            self.e.end(f"br label %{self.exit(pc, NEXT)}")
+        elif self.b.pending.stop:
+            self._look(pc)
+        else:
+            self.jump(pc)
+
+    def _end_of_loop(self, step: Step) -> None:
+        """The instruction at DOEND. EDT is the sequencer's; who leaves the loop leaves its translation."""
+        flow = self.around.flow
+        self.count.settle()
+
+        def end(again: bool) -> None:
+            if again:
+                self._behind(self.around.do_start)
+                return
+            if self.b.pending.stop:
+                self.e.store(pointer(self.e, self.around.offset["events.deadline"]), 0, 64)
+            self.v.leave(step.next_pc, MODES)
+
+        LlvmWays(self.e, {flow.edt: 0}, self.v.new_block).each(lambda m: flowrules.loop_again(m, flow), end)
 
     def advance(self, cycles: Number, mask: int) -> None:
         self.v.set("cycle", self.v.get("cycle") + cycles)
@@ -316,7 +326,7 @@ class Translator:
             assert step.target is not None
             e.start(taken)
             self.v.new_block()
-            extra = 1 if isinstance(flow, Branch) else (step.target - step.next_pc) // 2
+            extra = flowrules.TAKEN if isinstance(flow, Branch) else (step.target - step.next_pc) // 2
             self.v.set("cycle", self.v.get("cycle") + extra)
             self.count.spend(step.pc, extra)
             self._jump_back(step.pc, step.target)
@@ -330,8 +340,8 @@ class Translator:
             self.jump(step.next_pc)
             return
         if isinstance(flow, Disi):
-            e.store(pointer(e, self.around.offset["DISICNT"]), flow.count, 16)
-            e.store(pointer(e, self.around.offset["cpu.disi_end"]), self.v.get("cycle") + flow.count, 64)
+            count, after = flow.count, self.v.get("cycle")
+            LlvmWays(e).all(lambda m: flowrules.disi(m, self.around.flow, count, after))
             self._look(step.next_pc)
             return
         assert isinstance(flow, (Goto, Call, Return, Sleep))
@@ -344,8 +354,6 @@ class Translator:
             self._jump_back(step.pc, flow.target)
             return
         if isinstance(flow, Return) and flow.kind == "retfie":
-            repeats = (flow.srl & RA) != 0
-            self.e.store(pointer(e, self.around.offset["cpu.repeat"]), self.b.select(repeats, FIRST, NOT_REPEATING), 16)
             self._leave_if_requested(step, flow)
         if isinstance(flow, Return):
             self.count.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), self.v.get("cycle"))
@@ -432,5 +440,4 @@ class Translator:
         plain = (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
         b.guard(plain)
         self._requested = self._requests()
-        sr = b._sr_word()
-        b.pending.sr = (sr & 0xFF00) | (flow.srl & 0xFF)
+        flowrules.resume(NativeReader(b), self.around.flow, flow.srl & 0xFF, 0)
