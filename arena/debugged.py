@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from arena.emulated import EmulatedBrain
 from emu.debug.history import History
-from emu.machine import Machine, Stop
+from emu.machine import Machine
+from emu.stops import Stop
 
 SENSORS: Final = range(8, 16)
 """Channels of the infrared sensors."""

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from emu.image import LoadError as LoadError
     from emu.loader import load_image as load_image
     from emu.machine import Machine as Machine
-    from emu.machine import Stop as Stop
+    from emu.stops import Stop as Stop
 
 FCY_HZ: Final = 14_745_600
 """Instruction cycles per second of an e-puck with the vendor's clock setting, XT_PLL8 (dspic30f6014a.md §3)."""

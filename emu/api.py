@@ -35,8 +35,9 @@ from typing import Any
 from emu.boards import board_named
 from emu.chips import chip_named
 from emu.loader import load_image
-from emu.machine import Machine, Stop
+from emu.machine import Machine
 from emu.peripherals import Peripherals
+from emu.stops import Stop
 
 
 def load(

@@ -28,7 +28,8 @@ from emu.dspic30f.state import IPL3, STACK_POINTER
 from emu.image import ERASED
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 TRAPS: Final = {
     "OscillatorFail": ("OSCFAIL", "oscillator failure trap"),

@@ -7,9 +7,8 @@ What enters: an image, pin levels, bytes. What leaves: `Stop`s, registers and me
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 from emu.bus import Bus
 from emu.chips.chip import Chip, Vector
@@ -25,59 +24,9 @@ from emu.image import Image
 from emu.peripherals import Peripherals, Wires, build
 from emu.program import ProgramMemory
 from emu.record import Record
-
-if TYPE_CHECKING:
-    from emu.faults import Fault
-
-REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted")
-
-RESETS_KEPT: Final = 16
-"""Length of `Machine.resets`."""
-RESET_LOOP: Final = 8
-"""Equal resets in a row, each within RESET_LOOP_CYCLES of the last, that count as a fault."""
-RESET_LOOP_CYCLES: Final = 1_000_000
-
-CHECKPOINT_CYCLES: Final = 1 << 23
-"""A run remembers where it was at least this often, to be able to go back when something goes wrong (half a second)."""
+from emu.stops import CHECKPOINT_CYCLES, RESET_LOOP, RESETS_KEPT, Evidence, LastReset, Stop, following
 
 PcHook = Callable[[], bool | None]
-
-
-@dataclass(slots=True)
-class Evidence:
-    """What a fault is explained with: states of the record, kept as the run goes on."""
-
-    began: bytes | None = None
-    """A while ago; nothing has come from outside since."""
-    middle: tuple[int, bytes] | None = None
-    """Less long ago: cycle and state. It becomes `began` when that has grown old."""
-    ended: bytes | None = None
-    """Where `advance` ended; a machine that begins elsewhere has been changed from outside."""
-    trap: tuple[Vector, bytes, bytes | None] | None = None
-    """The trap entered last: its vector, the state just before, and what `began` was then."""
-    reset: bytes | None = None
-    """Just before the reset for a fault that ended the run."""
-
-    def look(self, cycle: int, state: bytes) -> None:
-        """A run is about to go on from `state`, that of `cycle`."""
-        if state != self.ended:
-            self.began, self.middle = state, (cycle, state)
-        elif self.middle is None or cycle - self.middle[0] >= CHECKPOINT_CYCLES:
-            self.began, self.middle = self.middle[1] if self.middle else state, (cycle, state)
-
-
-@dataclass(frozen=True, slots=True)
-class Stop:
-    """Why and where a run ended. `pc` is the next instruction, of a debugger word that word."""
-
-    reason: str
-    """One of REASONS: "limit" (of cycles or time), "breakpoint" (a hook said stop, or a debugger word), "halt" (asleep,
-    and nothing will ever wake it), "fault" (the firmware went wrong), "until", "interrupted"."""
-    pc: int
-    cycle: int
-    detail: str = ""
-    fault: Fault | None = None
-    """With reason "fault" and an image loaded: what went wrong, where, in which thread, and how it came to that."""
 
 
 class _WRegisters(Protocol):
@@ -125,7 +74,7 @@ class Machine(Contents, BySource):
         """(cycle, cause) of the last resets."""
         self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
         self._stopped_at: tuple[int, int] | None = None
-        self._last_reset = ("", 0, 0, 0)
+        self._last_reset = LastReset()
         self._interrupt = False
         self._last = 0
         self._cuts: list[int] = []
@@ -457,18 +406,12 @@ class Machine(Contents, BySource):
         if reset.fault:
             self.state.cycle += 1
         self.reset(reset.cause)
-        loop = self._loops(reset.cause, culprit)
+        self._last_reset = last = following(self._last_reset, reset.cause, culprit, self.cycle)
+        loop = not last.repeats
         if not self.stop_on_fault or not (reset.fault or loop):
             return None
         detail = reset.detail if reset.fault else f"reset loop: {reset.detail}, {RESET_LOOP} times in a row"
         return self._explained(Stop("fault", culprit, self.cycle, detail))
-
-    def _loops(self, cause: str, culprit: int) -> bool:
-        """Whether the device was reset RESET_LOOP times for the same reason, each soon after the one before."""
-        soon = self._last_reset[:2] == (cause, culprit) and self.cycle - self._last_reset[2] < RESET_LOOP_CYCLES
-        count = self._last_reset[3] + 1 if soon else 1
-        self._last_reset = (cause, culprit, self.cycle, count % RESET_LOOP)
-        return count == RESET_LOOP
 
     # Memory
 

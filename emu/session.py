@@ -17,7 +17,8 @@ from emu.console import Port, wait_for_input
 from emu.stamps import Stamp
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 SLICE_SECONDS: Final = 0.02
 """Host time a slice should take: output and Ctrl-C wait no longer than this."""

@@ -11,7 +11,8 @@ from emu.disassembly import Item, instruction
 from emu.image import Image
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 CORE_END: Final = 0x0054
 """First data address behind the core's registers (isa.md §2.1)."""

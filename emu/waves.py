@@ -16,7 +16,8 @@ from emu.debug.threads import RUNNING
 from emu.peripherals.pins import PORTS, parse_pin
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 PICOSECONDS: Final = 10**12
 LOOK_CYCLES: Final = 1_000_000

@@ -24,7 +24,8 @@ from emu.status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATU
 
 if TYPE_CHECKING:
     from emu.dspic30f.isa.row import Insn
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
     from emu.waves import Waves
 
 EXIT_SYMBOL: Final = "__exit_status"

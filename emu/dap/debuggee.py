@@ -20,7 +20,8 @@ from emu.dspic30f.isa.flow import Call
 from emu.lines import Line
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 SLICE: Final = 400_000
 """Cycles between looks at what the client wants."""

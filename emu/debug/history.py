@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 PERIOD: Final = 1 << 20
 """Cycles between kept states: 71 ms of an e-puck, so a step back takes what running that long takes."""

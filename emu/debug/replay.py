@@ -16,7 +16,8 @@ from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.state import STACK_POINTER
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 BRANCHES: Final = 20
 """Branches that are told."""

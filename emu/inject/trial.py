@@ -21,7 +21,7 @@ from emu.machine import Machine
 
 if TYPE_CHECKING:
     from emu.image import Image
-    from emu.machine import Stop
+    from emu.stops import Stop
 
 OUTCOMES: Final = ("masked", "detected", "silent", "hang", "trap")
 STATES: Final = 64

@@ -20,7 +20,8 @@ from emu.image import Image
 from emu.profile.follow import Edge, Tree, Turn
 
 if TYPE_CHECKING:
-    from emu.machine import Machine, Stop
+    from emu.machine import Machine
+    from emu.stops import Stop
 
 Place = tuple[str, str, int]
 """Function, source file and line; "" and 0 for code without lines."""

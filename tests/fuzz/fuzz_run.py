@@ -21,7 +21,8 @@ from elf_samples import ElfSample, Part, words  # noqa: E402
 from programs import ECHO, HELLO, SPIN, assembled  # noqa: E402
 
 from emu.loader import parse_image  # noqa: E402
-from emu.machine import REASONS, Machine  # noqa: E402
+from emu.machine import Machine  # noqa: E402
+from emu.stops import REASONS  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 CYCLES = 3_000

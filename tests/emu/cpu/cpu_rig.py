@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from emu.device import Irq
 from emu.dspic30f.isa.text import parse
 from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine, Stop
+from emu.machine import Machine
+from emu.stops import Stop
 
 START = 0x200
 RAM = 0x1000

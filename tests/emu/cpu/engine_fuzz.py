@@ -18,7 +18,8 @@ from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Repeat, Reset, Return,
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
 from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine, Stop
+from emu.machine import Machine
+from emu.stops import Stop
 
 PC = 0x4000
 INTERESTING = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFE, 0xFFFF)
