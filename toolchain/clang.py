@@ -20,7 +20,7 @@ from pathlib import Path
 
 from emu.chips import chip_named
 from emu.chips.chip import Chip
-from toolchain import accumulators, config_pragma, name_case
+from toolchain import accumulators, asm_constraints, config_pragma, name_case
 from toolchain.asm_registers import REFUSED, respell
 from toolchain.cc_options import CcOptions, Input
 from toolchain.errors import ToolError
@@ -210,6 +210,8 @@ def _run_job(program: list[str], arguments: list[str], chip: Chip) -> subprocess
         changes.append(lambda text: config_pragma.applied(text, chip))
     if result.returncode and REFUSED.search(result.stderr):
         changes.append(respell)
+    if result.returncode and asm_constraints.REFUSED.search(result.stderr):
+        changes += [respell, asm_constraints.respell]
     if result.returncode and accumulators.REFUSED.search(result.stderr):
         changes += [respell, accumulators.applied]
     if changes:

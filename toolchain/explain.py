@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from toolchain.errors import ToolError
 
 _UNDEFINED = re.compile(r"error: undefined symbol (\S+), referenced at ")
+_REFUSED = re.compile(r"not supported: (?:LLVM IR line|in function|function) ")
 _FUNCTION = re.compile(r'^define .*?@("[^"]+"|[\w$.]+)\(')
 _NAME = re.compile(r'@("[^"]+"|[\w$.]+)')
 _LOCATION = re.compile(r"!dbg (!\d+)")
@@ -19,8 +20,12 @@ MOST_PLACES = 3  # shown of one symbol
 
 
 def concerns_generated_code(error: ToolError) -> bool:
-    """Whether debug information could tell more: an assembler's message, or a symbol that nobody defines."""
-    return any(re.match(r"[^:\n]+:\d+: error: ", line) or _UNDEFINED.search(line) for line in error.findings)
+    """Whether debug information could tell more: an assembler's message, a symbol that nobody defines, or what the back
+    end does not do."""
+    return any(
+        re.match(r"[^:\n]+:\d+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line)
+        for line in error.findings
+    )
 
 
 def with_places(error: ToolError, modules: Callable[[], Iterable[str]]) -> ToolError:

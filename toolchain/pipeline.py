@@ -6,6 +6,7 @@ verifies the constraints at import, so a pass cannot be moved to where its needs
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -42,6 +43,8 @@ from .lower.names import block_label, symbol
 from .lower.scopes import FunctionInfo
 from .lower.variables import Ranges
 from .lower.verify import Verifier
+
+METADATA = re.compile(r"^!(\d+) = (.*)$", re.MULTILINE)
 
 
 class CompileOptions(Protocol):
@@ -367,4 +370,10 @@ class ModuleCompiler:
 
 def compile_module(ll_text: str, options: CompileOptions) -> str:
     """Translate one module. Raises UnsupportedError naming the construct and its source line."""
-    return ModuleCompiler(read_module(ll_text), options).run()
+    try:
+        module = read_module(ll_text)
+    except UnsupportedError as e:
+        metadata = Module(metadata=dict(METADATA.findall(ll_text)))
+        found = DebugInfo(metadata).position(e.line)
+        raise UnsupportedError(e.what, f"{found[0]}:{found[1]}" if found is not None else e.where) from None
+    return ModuleCompiler(module, options).run()

@@ -236,6 +236,11 @@ class Reader(InstrReader):
             while "]" not in text:
                 text += " " + self.lines[self.at]
                 self.at += 1
+        if "callbr" in text.split("@", 1)[0].split():
+            refused = UnsupportedError("asm goto: let the statement set a variable and test that", f"LLVM IR line {n}")
+            place = re.search(r"!dbg (!\d+)", text + self.lines[self.at])
+            refused.line = place[1] if place is not None else None
+            raise refused
         c = Cursor(strip_comment(text) if ";" in text else text, n)
         name = ""
         if c.tokens[0][0] == "%" and len(c.tokens) > 1 and c.tokens[1] == "=":

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..asm_constraints import CLASSES, MARK
 from ..ir.model import ConstInt, GlobalRef, InlineAsm, Instr, Type, UnsupportedError, Value, size_of
 from .mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, opaque
 
@@ -62,6 +63,28 @@ def _parse(text: str) -> tuple[list[Constraint], list[int]]:
     return operands, clobbers
 
 
+def _place(constraints: list[Constraint], clobbers: list[int], text: str) -> None:
+    """Give operands that asked for a class of registers one of it. An input may share an output's register unless that
+    is written early. Raises UnsupportedError when a class has too few."""
+    mark = MARK.match(text)
+    if mark is None:
+        return
+    taken = {True: set(clobbers), False: set(clobbers)}
+    for c in constraints:
+        if c.fixed is not None:
+            taken[c.output].add(c.fixed)
+    for number, letter in re.findall(r"(\d+)([a-z])", mark[1]):
+        c = constraints[int(number)]
+        tied = any(other.tied == int(number) for other in constraints)
+        sides = (True, False) if tied or c.early else (c.output,)
+        free = [r for r in CLASSES[letter] if not any(r in taken[side] for side in sides)]
+        if not free:
+            raise UnsupportedError(f"inline assembly: no register is left for constraint '{letter}'")
+        c.fixed = free[0]
+        for side in sides:
+            taken[side].add(free[0])
+
+
 def _split(text: str) -> list[str]:
     return re.findall(r"[^,{]*\{[^}]*\}[^,]*|[^,]+", text)
 
@@ -87,6 +110,7 @@ class AsmBuilder:
 
     def run(self) -> None:
         constraints, clobbers = _parse(self.asm.constraints)
+        _place(constraints, clobbers, self.asm.text)
         results = self.i.extra["results"]
         assert isinstance(results, list)
         inputs = list(self.i.args)
@@ -232,7 +256,7 @@ class AsmBuilder:
             at = self.reference[int(number)]
             return f"\x00{at}:{m[3] or ''}\x00"
 
-        return REFERENCE.sub(replace, self.asm.text)
+        return REFERENCE.sub(replace, MARK.sub("", self.asm.text))
 
 
 def element(asm: Instr, k: int) -> Type:
