@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from emu.cli import main
+from emu.loader import load_image
 
 HERE = Path(__file__).parent
 BASELINES = HERE.parents[1] / "firmware" / "baseline"
@@ -66,3 +67,11 @@ def test_a_number_that_grew_fails_the_check_and_names_the_lines(image, tmp_path,
 def test_another_application_is_refused(image, capsys, command):
     assert main([command, str(image("hello"))]) == 2
     assert "is not the application `latency`" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("level", ["-O1", "-O2"])
+def test_what_cycles_are_counted_from_stands_at_higher_levels_too(image, level):
+    """The optimiser used to dissolve Sys_Yield in its callers, and `emu cycles` ended with "no symbol"."""
+    symbols = load_image(str(image("latency", None, f"OPTIMISE={level}"))).symbols
+    stops = ("Sys_Yield", "Sys_Send_Event", "hal_idle", "_T1Interrupt", "_T2Interrupt", "latency_handler")
+    assert [name for name in stops if symbols.find(name) is None] == []

@@ -98,7 +98,7 @@ void os_preempt(void)
     }
 }
 
-void Sys_Yield(void)
+HAL_OUTLINE void Sys_Yield(void) /* `emu cycles` counts from its entry, at -O2 too */
 {
     if (HAL_LIKELY(hal_in_thread())) {
         hal_yield();
