@@ -152,6 +152,7 @@ class Machine(Contents, BySource):
         wires.end_run = self.interrupt
         power.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
         power.wires.power = self._power
+        power.wires.idling, power.wires.clearing = self.peripherals.watchdog.idling, self.peripherals.watchdog.clearing
         power.wires.restart = self.peripherals.oscillator.wake_tcy
         power.wires.can_wake = lambda: self.peripherals.watchdog.is_enabled
         power.wires.interrupted = lambda: self._interrupt

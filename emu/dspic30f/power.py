@@ -10,7 +10,9 @@ from typing import Final
 from emu.dspic30f.interrupts import Exceptions
 from emu.dspic30f.state import RUN, SLEEP, State
 from emu.events import NEVER, Events
+from emu.straight import Rule
 
+NOTHING: Final = Rule(None)
 STIR: Final = 1_000_000
 """Tcy for which devices still run when the CPU sleeps with nothing enabled that could wake it: transmitters drain."""
 
@@ -30,6 +32,9 @@ class Wires:
     clear_watchdog: Callable[[], None] = lambda: None
     power: Callable[[int, int], None] = lambda mode, cycle: None
     """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
+    idling: Rule = NOTHING
+    clearing: Rule = NOTHING
+    """What PWRSAV #1 and CLRWDT do in the common case, as text for every engine."""
     can_wake: Callable[[], bool] = lambda: False
     """Whether something other than an interrupt or trap can wake a sleeping CPU (the watchdog)."""
     restart: Callable[[], int] = lambda: 0

@@ -93,12 +93,6 @@ class Peripherals:
             self.pmd,
         )
         self.all: Final[tuple[Peripheral, ...]] = tuple(part for part in parts if part is not None)
-
-        self._idle_bits: Final = [
-            (register.address >> 1, 1 << chip.sfrs[register.name].fields[bit][0])
-            for register, bit in (device.idle_bit for device in self.all if device.idle_bit is not None)
-        ]
-        """Word and mask of every SIDL bit: Idle is entered thousands of times a second, mostly with none set."""
         self._stopped: Final = Cell(kit.bus.record, "power.stopped", "B")
         self.config: Mapping[int, int] = {}
         """Configuration words that the chip keeps when an image brings none, by program address."""
@@ -147,10 +141,11 @@ class Peripherals:
 
     def sleep(self, mode: int, cycle: int) -> None:
         """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""
+        if mode == IDLE and self.kit.bus.integers.fire(self.watchdog.idling):
+            return
         self.watchdog.clear(cycle)
         self.watchdog.power_mode(mode)
-        u16 = self.kit.bus.record.u16
-        if mode == IDLE and not any(u16[word] & bit for word, bit in self._idle_bits):
+        if mode == IDLE and not self.watchdog.stops_devices:
             return
         self._stopped.value = 1
         for device in self.all:

@@ -6,6 +6,8 @@ from typing import Final
 
 from emu.events import NEVER
 from emu.peripherals.kit import IDLE, SLEEP, Kit, Peripheral
+from emu.peripherals.powerrules import any_bit, clear_watchdog, idle, places_of
+from emu.straight import Rule
 
 WDT_HZ: Final = 128_000
 """The LPRC divided by 4 clocks the watchdog's 8-bit counter (§4)."""
@@ -49,10 +51,10 @@ class Watchdog(Peripheral):
         resets.rcon.written_by(self._rcon_written)
         kit.power_mode = lambda: self._mode.value
         fields = kit.chip.sfrs["RCON"].fields
-        self._wdto, self._swdten, self._sleep, self._idle = (
-            1 << fields[name][0] for name in ("WDTO", "SWDTEN", "SLEEP", "IDLE")
-        )
-        self._fwdten: Final = 1 << kit.chip.config["FWDT"].fields["FWDTEN"][0]
+        self._swdten, self._sleep = (1 << fields[name][0] for name in ("SWDTEN", "SLEEP"))
+        self._places: Final = places_of(self.bus.record, kit.chip, self._timeout, self._mode.place)
+        self.clearing: Final = Rule(self._places, fires=clear_watchdog)
+        self.idling: Final = Rule(self._places, fires=idle)
 
     def stops_in(self, mode: int) -> bool:
         """Never: the LPRC runs in every power mode."""
@@ -61,7 +63,12 @@ class Watchdog(Peripheral):
     @property
     def is_enabled(self) -> bool:
         """FWDTEN in the configuration word, or SWDTEN."""
-        return bool(self.kit.program.setting("FWDT") & self._fwdten or self._resets.rcon.value & self._swdten)
+        return bool(any_bit(self.bus.integers, self._places.enables))
+
+    @property
+    def stops_devices(self) -> bool:
+        """Whether some device would stop in Idle."""
+        return bool(any_bit(self.bus.integers, self._places.stops))
 
     @property
     def period(self) -> int:
@@ -73,9 +80,9 @@ class Watchdog(Peripheral):
 
     def clear(self, cycle: int) -> None:
         """CLRWDT or PWRSAV in `cycle`: counter and prescalers restart, WDTO falls (§4)."""
-        rcon = self._resets.rcon
-        rcon.value &= ~self._wdto  # UNVERIFIED: the family manual says so (§4)
-        self._arm(cycle)
+        if not self.bus.integers.fire(self.clearing):
+            self._resets.rcon.value &= ~self._places.wdto
+            self._arm(cycle)
 
     def _arm(self, cycle: int) -> None:
         if self.is_enabled:
@@ -91,7 +98,7 @@ class Watchdog(Peripheral):
         """The CPU goes to sleep (IDLE or SLEEP) or runs again (0)."""
         self._mode.value = mode
         if mode:
-            self._resets.rcon.value |= self._sleep if mode == SLEEP else self._idle
+            self._resets.rcon.value |= self._sleep if mode == SLEEP else self._places.idle
 
     def _expired(self, due: int) -> None:
         if self._mode.value in (IDLE, SLEEP):

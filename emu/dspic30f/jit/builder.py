@@ -68,14 +68,9 @@ class Surroundings:
     """Addresses of interrupt flag registers, each with that of its enables."""
     trap_flags: int
     """Bits of INTCON1 that request a trap."""
-    idle_stops: tuple[tuple[int, int], ...]
-    """Control registers and their bits that stop a device in Idle."""
-    watchdog: int
-    """Byte offset of the due cycle of the watchdog's time-out."""
-    watchdog_enables: tuple[tuple[int, int], ...]
-    """Byte offsets of words and their bits: the watchdog runs while one of them is set."""
-    rcon_idle: int
-    rcon_wdto: int
+    idling: Rule
+    clearing: Rule
+    """What PWRSAV #1 and CLRWDT do."""
     latches: Latches
     flow: flowrules.FlowPlaces
     rules: Mapping[int, Rule] = field(default_factory=dict)

@@ -431,8 +431,8 @@ def surroundings_of(core: Core, key: Key, hooks: frozenset[int], offset: Mapping
     start, end = key.loop if key.loop is not None else (-1, -1)
     return Surroundings(
         offset, reads, writes, key.initialised, bool(key.limit_armed), (ram.start, ram.end), chip.data["yram"].start,
-        chip.program["flash"].end // 2, tuple(sorted(words.items())), core.traps.flags, *idle_facts(core),
-        latches_of(core), places_of(core.state),
+        chip.program["flash"].end // 2, tuple(sorted(words.items())), core.traps.flags,
+        core.sequencer.power.wires.idling, core.sequencer.power.wires.clearing, latches_of(core), places_of(core.state),
         {2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None}, hooks, start, end)  # fmt: skip
 
 
@@ -441,21 +441,6 @@ def latches_of(core: Core) -> Latches:
     flash, eeprom = (core.record.fields[f"program.{kind}_latch"] for kind in ("flash", "eeprom"))
     program = core.program
     return Latches(flash.offset, flash.count, eeprom.offset, eeprom.count, program.eeprom_range, program.captured_in)
-
-
-def idle_facts(core: Core) -> tuple[tuple[tuple[int, int], ...], int, tuple[tuple[int, int], ...], int, int]:
-    """What decides whether Idle and CLRWDT are simple: stop-in-Idle bits, the watchdog's event slot, what enables it,
-    and the RCON bits."""
-    stops = []
-    for sfr in core.chip.sfrs.values():
-        bits = sum(1 << lsb for name, (lsb, _width) in sfr.fields.items() if name.endswith("SIDL"))
-        if bits:
-            stops.append((sfr.address, bits))
-    watchdog = core.record.fields["events.due"].offset + 8 * core.events.names.index("wdt.timeout")
-    word, rcon = core.chip.config["FWDT"], core.chip.sfrs["RCON"]
-    config = core.record.fields["program.config"].offset + word.address - core.chip.program["config"].start
-    enables = ((config, 1 << word.fields["FWDTEN"][0]), (rcon.address, 1 << rcon.fields["SWDTEN"][0]))
-    return tuple(sorted(stops)), watchdog, enables, 1 << rcon.fields["IDLE"][0], 1 << rcon.fields["WDTO"][0]
 
 
 def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access, int]]]:

@@ -34,6 +34,7 @@ from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import MemoryVariables, Variables, pointer
 from emu.dspic30f.state import IDLE, IPL3, NOT_REPEATING, PC_MASK
 from emu.events import NEVER
+from emu.straight import Rule
 
 RESUME: Final = 5
 """Word of the environment: the hooked address Python has just seen, or"""
@@ -250,9 +251,11 @@ class Translator:
             self._repeats.translate(step, flow, stall)
             return True, 0
         if isinstance(flow, Sleep) and flow.mode == "idle":
-            self._check_idle()
+            self._read(self.around.idling)
+            if self.exact:
+                b.guard(self.fits(2))
         elif isinstance(flow, ClearWatchdog):
-            self._check_watchdog()
+            self._read(self.around.clearing)
             b.pending.touches_sfr = True
         elif not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip, Disi)):
             raise NeedsInterpreter
@@ -336,7 +339,6 @@ class Translator:
         self.advance(cycles, mask)
         self.count.settle()
         if isinstance(flow, ClearWatchdog):
-            self._clear_watchdog()
             self.jump(step.next_pc)
             return
         if isinstance(flow, Disi):
@@ -375,40 +377,17 @@ class Translator:
         self.v.new_block()
 
     # -- watchdog and Idle ------------------------------------------------------------------------------------------
-    def _any_bit(self, words: tuple[tuple[int, int], ...]) -> Number:
-        """Bits set of those named, as one word that is not 0."""
-        found: Number = 0
-        for address, bits in words:
-            found = found | (self.e.load(pointer(self.e, address), 16) & bits)
-        return found
-
-    def _check_watchdog(self) -> None:
-        """Clearing the watchdog is native while none runs (dspic30f6014a.md §4)."""
-        self.b.guard(self._any_bit(self.around.watchdog_enables) == 0)
-
-    def _clear_watchdog(self) -> None:
-        """WDTO falls, and nothing will expire."""
-        e = self.e
-        place = pointer(e, self.around.offset["RCON"])
-        e.store(place, e.load(place, 16) & (0xFFFF & ~self.around.rcon_wdto), 16)
-        e.store(pointer(e, self.around.watchdog), -1, 64)
-
-    def _check_idle(self) -> None:
-        """Native Idle: no device stops in it, and no watchdog runs (dspic30f6014a.md §4, §17)."""
-        self.b.guard(self._any_bit(self.around.idle_stops) == 0)
-        self._check_watchdog()
-        if self.exact:
-            self.b.guard(self.fits(2))
+    def _read(self, rule: Rule) -> None:
+        """What the devices do with the instruction."""
+        if rule.fires is None:
+            raise NeedsInterpreter
+        rule.fires(NativeReader(self.b), rule.places)
 
     def _idle(self, next_pc: int) -> None:
         """The CPU stops; the boundary behind lets time pass."""
         e, offset = self.e, self.around.offset
-        self._clear_watchdog()
-        place = pointer(e, offset["RCON"])
-        e.store(place, e.load(place, 16) | self.around.rcon_idle, 16)
         e.store(pointer(e, offset["cpu.mode"]), IDLE, 16)
         e.store(pointer(e, offset["cpu.slept"]), self.v.get("cycle") - 1, 64)
-        e.store(pointer(e, offset["wdt.mode"]), IDLE, 8)
         e.store(pointer(e, offset["events.deadline"]), 0, 64)
         e.end(f"br label %{self.exit(next_pc, SERVICE)}")
 
