@@ -321,7 +321,7 @@ MUCH_RAM = "char big[9000]; int main(void) { big[3] = 1; return *(volatile char 
 MUCH_CONST = "const unsigned char t[40000] = {1}; int main(void) { volatile int i = 3; return t[i]; }\n"
 PLAIN_HANDLER = "int n; void _T1Interrupt(void) { n++; } int main(void) { return n; }\n"
 MISSPELT_HANDLER = "#include <xc.h>\nint n; OS_ISR(_T1Interupt) { n++; } int main(void) { return n; }\n"
-STRANGE_OPERAND = 'int main(void)\n{\n    int x;\n    __asm__("nop" : "=a"(x));\n    return x;\n}\n'
+STRANGE_OPERAND = 'int main(void)\n{\n    int x;\n    __asm__("nop" : "=q"(x));\n    return x;\n}\n'
 
 BAD_PROGRAMS = {
     "C error": ({"a.c": "int main(void) { return x; }\n"}, 1, "a.c:1:25: error: use of undeclared identifier 'x'"),
