@@ -89,7 +89,7 @@ REFUSED = {
         "static __attribute__((noinline)) void deeper(void) { edges++; Sys_Yield(); }\n"
         "static void on_edge(void) { deeper(); edges++; }\nSYS_INTERRUPT(INT1, 5, on_edge)\n",
         "",
-        "INT1 -> deeper: level 5",
+        "INT1 -> deeper -> Sys_Yield: level 5",
     ),
     "a pointer from level 5": (
         "void (*volatile wherever)(void) = on_button;\nstatic void jump(void) { wherever(); edges++; }\n"
