@@ -6,6 +6,7 @@ rule is read anew up to the next such condition. What a rule puts is written at 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from types import CodeType
@@ -26,7 +27,7 @@ class _Parts(Exception):
         self.condition: Final = condition
 
 
-class Ways:
+class Ways(ABC):
     """Reads rules way by way; subclasses write the code. `known`: what stands at places already."""
 
     def __init__(self, known: Mapping[Place, Any]) -> None:
@@ -72,17 +73,17 @@ class Ways:
             return turn
         raise _Parts(condition)
 
+    @abstractmethod
     def load(self, place: Place) -> Any:
         """The number at a place."""
-        raise NotImplementedError
 
+    @abstractmethod
     def store(self, place: Place, value: Any) -> None:
         """Write it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def branches(self, condition: Any) -> Iterator[bool]:
         """Open the branch for True, then that for False."""
-        raise NotImplementedError
 
 
 class PythonWays(Ways):
