@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.arena.images import BEGIN
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -43,15 +45,7 @@ def _assembled(folder: Path, text: str) -> Path:
     return image
 
 
-TALKING = """
-        .include "p30F6014A.inc"
-        .text
-        .global _main
-_main:  mov     #7, w0
-        mov     w0, U1BRG               ; 115,200 baud (epuck.md)
-        mov     #0x8000, w0
-        mov     w0, U1MODE
-        bset    U1STA, #10              ; UTXEN
+TALKING = f"""{BEGIN}
         mov     #'h', w0
         mov     w0, U1TXREG
         mov     #'i', w0

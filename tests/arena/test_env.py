@@ -20,6 +20,7 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 from arena.env import SENSED, SIZE, ArenaEnv, serial_command
 from arena.look import OBJECT, ROBOT
 from arena.scene import load_scene
+from tests.arena.images import ECHO
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -88,23 +89,6 @@ def test_food_brought_home_is_a_reward() -> None:
     mine = ArenaEnv("foraging", seconds=1.0, reward=lambda stage: stage.seconds)
     mine.reset(seed=1)
     assert mine.step({})[1]["robot_0"] == pytest.approx(0.1, abs=0.01)
-
-
-ECHO = """
-        .include "p30F6014A.inc"
-        .text
-        .global _main
-_main:  mov     #7, w0
-        mov     w0, U1BRG
-        mov     #0x8000, w0
-        mov     w0, U1MODE
-        bset    U1STA, #10
-1:      btss    U1STA, #0
-        bra     1b
-        mov     U1RXREG, w0
-        mov     w0, U1TXREG
-        bra     1b
-"""
 
 
 def test_robots_with_firmware_are_told_by_bluetooth(assembled: Callable[[str], Path]) -> None:

@@ -22,6 +22,7 @@ from arena.scenery import NAMED
 from arena.sight import Sight
 from arena.vision import Eye, sensor_of
 from arena.world import Poses, World, traits_of
+from tests.arena.images import BEGIN, REPEATING
 
 FULL = """name = "yard"
 description = "everything a scene can have"
@@ -362,16 +363,8 @@ image = "scripted"
     assert "different images_sha256" in capsys.readouterr().err
 
 
-SPEAKER = """
-        .include "p30F6014A.inc"
-        .text
-        .global _main
-_main:  mov     #7, w0
-        mov     w0, U1BRG
-        mov     #0x8000, w0
-        mov     w0, U1MODE
-        bset    U1STA, #10
-        mov     #'{letter}', w0
+SPEAKER = f"""{BEGIN}
+        mov     #'{{letter}}', w0
         mov     w0, U1TXREG
         mov     PORTG, w0
         lsr     w0, #6, w0
@@ -381,12 +374,7 @@ _main:  mov     #7, w0
         mov     w0, U1TXREG
         mov     #10, w0
         mov     w0, U1TXREG
-1:      btss    U1STA, #0
-        bra     1b
-        mov     U1RXREG, w0
-        mov     w0, U1TXREG
-        bra     1b
-"""
+{REPEATING}"""
 
 
 # -- robots that differ -----------------------------------------------------------------------------------------------

@@ -15,20 +15,10 @@ from arena.emulated import EmulatedBrain
 from arena.record import Trial, read_trial
 from arena.scene import FCY, load_scene
 from arena.world import World
+from tests.arena.images import BEGIN, ECHO
 
 ROOT = Path(__file__).resolve().parents[2]
 Assembled = Callable[[str], Path]
-
-BEGIN = """
-        .include "p30F6014A.inc"
-        .text
-        .global _main
-_main:  mov     #7, w0
-        mov     w0, U1BRG               ; 115,200 baud (epuck.md)
-        mov     #0x8000, w0
-        mov     w0, U1MODE
-        bset    U1STA, #10              ; UTXEN
-"""
 
 
 def run(image: Path, out: Path, *words: object, seconds: float = 1.5) -> tuple[int, Trial]:
@@ -168,15 +158,6 @@ def test_the_switch_has_sixteen_positions(assembled: Assembled, position: int, t
     _, trial = run(image, tmp_path, "--set", f"start.selector={position}", seconds=0.5)
     said = [line["text"] for row in trial.columns["log"] for line in row]
     assert said == [chr(ord("A") + position)] * 2
-
-
-ECHO = f"""{BEGIN}
-1:      btss    U1STA, #0               ; URXDA
-        bra     1b
-        mov     U1RXREG, w0
-        mov     w0, U1TXREG
-        bra     1b
-"""
 
 
 def test_robots_are_told_things_by_uart_at_times_of_the_trial(assembled: Assembled, tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from arena.commands.studio import HEADER, Serving, server
 from arena.scene import Scene, load_scene, scripted
 from arena.studio import RefusedError, Studio
 from arena.trial import run_trial
+from tests.arena.images import ECHO
 
 ROOT = Path(__file__).resolve().parents[2]
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -165,21 +166,6 @@ def metrics(sample):
 def step(world):
     if world.seconds > 1:
         raise ValueError("ouch")
-"""
-ECHO = """
-        .include "p30F6014A.inc"
-        .text
-        .global _main
-_main:  mov     #7, w0
-        mov     w0, U1BRG
-        mov     #0x8000, w0
-        mov     w0, U1MODE
-        bset    U1STA, #10
-wait:   btss    U1STA, #0
-        bra     wait
-        mov     U1RXREG, w1
-        mov     w1, U1TXREG
-        bra     wait
 """
 
 
