@@ -35,6 +35,7 @@ from .lower import (
     select,
     switch,
     tails,
+    used,
 )
 from .lower.debuginfo import DebugInfo
 from .lower.dwarf import DwarfWriter
@@ -268,6 +269,7 @@ class ModuleCompiler:
         self.module = module
         self.options = options
         self.notes = isr.annotations_of(module)
+        self.used = used.kept(module)
         module.large_data = options.large_data
         module.far = data.beyond_near(self.notes)
         self.lines: list[str] = []
@@ -285,7 +287,7 @@ class ModuleCompiler:
             elif f.linkage == "extern_weak":
                 self.lines.append(f"\t.weak {symbol(self.module, f.name)}")
         self.lines += constructors.emit_constructors(self.module, self.options.large_code)
-        self.lines += data.emit_data(self.module, self.notes)
+        self.lines += data.emit_data(self.module, self.notes, self.used)
         self.aliases()
         if self.options.debug:
             self.lines += self.dwarf.text()
@@ -345,7 +347,8 @@ class ModuleCompiler:
         own = "" if f.section in data.PLACES else f.section  # near and far say how to call, which -mlarge-code decides
         section = own or (".isr.text." if interrupt else ".text.") + name
         modifiers = isr.section_modifiers(f.name, self.notes.get(f.name, set()))
-        self.lines.append(f"\t.section {section},code{modifiers}")
+        keep = used.KEEP if f.name in self.used else ""
+        self.lines.append(f"\t.section {section},code{modifiers}{keep}")
         self.lines.append("\t.align 2")
         if f.linkage in data.WEAK:
             self.lines.append(f"\t.weak {name}")

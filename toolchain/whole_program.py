@@ -21,6 +21,8 @@ BITCODE_MAGIC = b"BC\xc0\xde"
 DECLARED = re.compile(r"^declare [^@\n]*@([\w$.]+)\(", re.MULTILINE)
 ATTRIBUTES = re.compile(rb"^attributes #\d+ = \{", re.MULTILINE)
 OF_ASSEMBLY = re.compile(r' asm | c"preprologue:| c"save:')
+USED_TABLES = ("llvm.used", "llvm.compiler.used")
+GLOBAL_NAME = re.compile(r"ptr @([\w$.]+)")
 C_NAME = re.compile(r"\b([A-Za-z_]\w*)")
 ASSEMBLER_NAME = re.compile(r"\b_([A-Za-z_]\w*)")
 
@@ -95,13 +97,14 @@ def names_in_inline_assembly(text: str) -> set[str]:
 
 
 def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
-    """Give `internal` linkage to every definition except `main`, vectors and the names given.
+    """Give `internal` linkage to every definition except `main`, vectors, `used` ones and the names given.
 
     `assembler_names` are object-file names, with the leading underscore of C names (abi-elf.md §2.6). They include what
     the run-time library defines: generated code may call its functions without any call in the IR.
     """
     keep = {name[1:] for name in assembler_names if name.startswith("_")} | {"main"}
     keep |= names_in_inline_assembly(str(module))
+    keep |= {name for v in module.global_variables if v.name in USED_TABLES for name in GLOBAL_NAME.findall(str(v))}
     for value in [*module.functions, *module.global_variables]:
         if value.is_declaration or value.linkage not in VISIBLE_LINKAGES:
             continue

@@ -54,6 +54,7 @@ def _section(asm: Assembler, text: str) -> None:
         same = (wanted.flags, wanted.type) == (existing.flags, existing.type)
         if not same or wanted.address not in (None, existing.load):
             raise ExprError(f"section {name} already exists with other attributes (first used at {existing.place})")
+        existing.keep |= wanted.keep
     _enter(asm, existing)
 
 

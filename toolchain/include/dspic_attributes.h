@@ -50,6 +50,7 @@
 #define __dspic_a_persistent ~, (__section__(".pbss"))
 #define __dspic_a_noload ~, (__annotate__("noload"))
 #define __dspic_a_address(number) ~, (__used__, __annotate__("address(" __dspic_text(number) ")"))
+#define __dspic_a_keep ~, (__used__, __retain__)
 #define __dspic_a_reverse(number) ~, (__annotate__("reverse(" __dspic_text(number) ")"))
 #define __dspic_a_user_init ~, (__constructor__)
 #define __dspic_a_space(kind) ~, (__dspic_space_##kind)
@@ -71,6 +72,7 @@
 #define __dspic_a___persistent__ __dspic_a_persistent
 #define __dspic_a___noload__ __dspic_a_noload
 #define __dspic_a___address__ __dspic_a_address
+#define __dspic_a___keep__ __dspic_a_keep
 #define __dspic_a___reverse__ __dspic_a_reverse
 #define __dspic_a___user_init__ __dspic_a_user_init
 #define __dspic_a___space__ __dspic_a_space

@@ -24,6 +24,7 @@ from ..ir.model import (
 from ..target import NEAR_BYTES, NEAR_END
 from .isr import numbers, section_modifiers
 from .names import block_label, symbol
+from .used import KEEP
 
 WORDS_PER_LINE = 8
 SKIPPED_SECTIONS = ("llvm.metadata",)
@@ -65,9 +66,10 @@ def beyond_near(notes: dict[str, set[str]]) -> frozenset[str]:
 class DataEmitter:
     """Text of all variables of a module."""
 
-    def __init__(self, module: Module, notes: dict[str, set[str]]) -> None:
+    def __init__(self, module: Module, notes: dict[str, set[str]], used: frozenset[str]) -> None:
         self.module = module
         self.notes = notes
+        self.used = used
         self.lines: list[str] = []
 
     def run(self) -> list[str]:
@@ -87,7 +89,8 @@ class DataEmitter:
         name, size = symbol(self.module, var.name), size_of(var.type)
         zero = isinstance(var.init, ConstZero | Undef) or (isinstance(var.init, ConstInt) and var.init.value == 0)
         modifiers = section_modifiers(var.name, self.notes.get(var.name, set()))
-        self.lines.append(f"\t.section {self._section(var, name, zero, modifiers)}{modifiers}")
+        keep = KEEP if var.name in self.used else ""
+        self.lines.append(f"\t.section {self._section(var, name, zero, modifiers)}{modifiers}{keep}")
         align = max(var.align, 2 if size > 1 else 1)
         if align > 1:
             self.lines.append(f"\t.align {align}")
@@ -238,6 +241,6 @@ class Image:
         return n & ~1
 
 
-def emit_data(module: Module, notes: dict[str, set[str]]) -> list[str]:
-    """Assembly lines of all variables; `notes` are their annotations."""
-    return DataEmitter(module, notes).run()
+def emit_data(module: Module, notes: dict[str, set[str]], used: frozenset[str]) -> list[str]:
+    """Assembly lines of all variables; `notes` are their annotations, `used` those that collection must keep."""
+    return DataEmitter(module, notes, used).run()
