@@ -1,7 +1,8 @@
 """Which seeds a campaign tries: new ones with every commit, as many as fit into its time, and how to see one again.
 
 Every campaign takes `--seed N` (the first seed; default: from the hash of the commit that is checked out) and
-`--seconds S` (as long as that, instead of its own number of tries). What a seed does depends on nothing but the seed.
+`--seconds S` (as long as that, instead of its own number of tries). What a seed does depends on nothing but the seed, so
+a campaign that was interrupted goes on with `--seed` of the last line it told.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SKIPPED = 77
 """Exit status of a campaign that cannot run here, because a program it needs is not installed."""
+TOLD_EVERY = 30.0
+"""Seconds between two lines on standard error that say how far a campaign is."""
 WITHOUT_COMMIT = 1
 """Where a source tree without its history begins."""
 
@@ -77,8 +80,13 @@ class Course:
         return late or (self._count is not None and self.done >= self._count)
 
     def __iter__(self) -> Iterator[int]:
+        told = self.spent
         while not self.done or not self.over:
             self.seed = self.first + self.done
+            if self.spent >= told + TOLD_EVERY:
+                told = self.spent
+                of = "" if self._count is None else f" of {self._count}"
+                print(f"{self.done}{of} {self.option}, {told:.0f} s, at seed {self.seed}", file=sys.stderr, flush=True)
             yield self.seed
             self.done += 1
 

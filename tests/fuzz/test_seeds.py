@@ -33,6 +33,16 @@ def test_a_course_has_as_many_seeds_as_asked_for_or_as_fit_into_its_time() -> No
     assert [next(endless) for _ in range(9)] == list(range(7, 16))
 
 
+def test_a_long_campaign_tells_where_it_is(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The next seed among it, with which it is gone on with; results alone are on standard output."""
+    monkeypatch.setattr("tests.fuzz.seeds.TOLD_EVERY", 0.0)
+    assert list(course("--seed", "7", "--tries", "2")) == [7, 8]
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.splitlines()[-1].startswith("1 of 2 tries, ")
+    assert said.err.splitlines()[-1].endswith("at seed 8")
+
+
 def test_a_failure_names_its_seed_and_how_to_see_it_again(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
