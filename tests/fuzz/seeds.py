@@ -1,8 +1,8 @@
 """Which seeds a campaign tries: new ones with every commit, as many as fit into its time, and how to see one again.
 
 Every campaign takes `--seed N` (the first seed; default: from the hash of the commit that is checked out) and
-`--seconds S` (as long as that, instead of its own number of tries). What a seed does depends on nothing but the seed, so
-a campaign that was interrupted goes on with `--seed` of the last line it told.
+`--seconds S` (as long as that, instead of its own number of tries). What a seed does depends on nothing but the seed,
+so a campaign that was interrupted goes on with `--seed` of the last line it told.
 """
 
 from __future__ import annotations
