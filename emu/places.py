@@ -45,6 +45,13 @@ def images() -> Path:
     return cache() / "firmware"
 
 
+def history() -> Path:
+    """What was typed at the debugger's prompt, in the user's folder for such things (`$XDG_STATE_HOME`)."""
+    from platformdirs import user_state_path
+
+    return user_state_path("openswarm", appauthor=False) / "debug-history"
+
+
 def in_checkout() -> bool:
     """Whether this code runs in the project's own folder and not from an installed package."""
     return (_ROOT / "firmware" / "Makefile").is_file()

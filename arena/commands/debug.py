@@ -1,4 +1,4 @@
-"""`arena debug SCENE --robot N`: a debugger on one robot of a trial, for editors; the whole world stands with it."""
+"""`arena debug SCENE --robot N`: a debugger on one robot of a trial; the whole world stands with it."""
 
 from __future__ import annotations
 
@@ -20,18 +20,19 @@ from arena.emulated import EmulatedBrain
 from arena.record import RecordError
 from emu.dap.server import Server
 from emu.dap.wire import Wire
+from emu.prompt.reader import Prompt
 from emu.status import DONE
 
 DESCRIPTION: Final = """\
-debug one robot of a trial from an editor, the whole world stands with it
+debug one robot of a trial, the whole world stands with it
 
 A server of the Debug Adapter Protocol on standard input and output, or on a TCP port of this machine (see `emu debug
 --help`). Where the robot stops all stand; it steps, goes back, and on by itself as far as its past goes, and beyond
-that with all others. Launch arguments: stopOnEntry, sourceRoots.
+that with all others. Launch arguments: stopOnEntry, sourceRoots. With --tui, a prompt here instead (see the same).
 
 With --out the trial is recorded, to the byte as `arena run --trials 1` does it, and cannot be changed by the debugger;
 a client that disconnects lets it go on to its end, one that terminates ends it without a record."""
-EXAMPLE: Final = "example: arena debug clustering --robot 2 --port 4711"
+EXAMPLE: Final = "example: arena debug clustering --robot 2 --port 4711    or    arena debug clustering --robot 2 --tui"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,12 +41,15 @@ def parser() -> argparse.ArgumentParser:
     add_plan(made)
     made.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="which one, from 0")
     made.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: a free one)")
+    made.add_argument("--tui", action="store_true", help="debug in the terminal, or by a script on standard input")
     made.add_argument("--out", type=Path, metavar="FOLDER", help="record the trial there")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
     """Exit status 0, 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
+    if options.tui and options.port is not None:
+        raise ValueError("--port is for editors, --tui is not")
     plan = planned(options, 1)
     if not 0 <= options.robot < plan.scene.robots.count:
         raise ValueError(f"--robot {options.robot}: the scene has robots 0 to {plan.scene.robots.count - 1}")
@@ -61,23 +65,32 @@ def run(options: argparse.Namespace) -> int:
 def debugged(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Run the trial with a debugger on its robot."""
     met: list[Debugged] = []
+    ended: list[int] = []
 
     def meet(brains: Sequence[Brain]) -> None:
         brain = brains[options.robot]
         if not isinstance(brain, EmulatedBrain):
             raise ValueError(f"--robot {options.robot}: it has no firmware, its brain is scripted")
-        met.append(Debugged(brain, partial(served, port=options.port), keeps=options.out is not None))
+        debugger = partial(prompted, ended=ended) if options.tui else partial(served, port=options.port)
+        met.append(Debugged(brain, debugger, keeps=options.out is not None))
 
     try:
         done = run_one(plan, 1, folder, meet=meet)
     except GivenUpError:
         print("arena debug: the trial was ended, nothing is recorded", file=sys.stderr)
-        return DONE
+        return max(ended, default=DONE)
     if options.out is not None:
         note_host_time(folder, done)
         print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
     met[0].over()
-    return 1 if done.faults else DONE
+    return max([1 if done.faults else DONE, *ended])
+
+
+def prompted(debugged: Debugged, ended: list[int]) -> bool:
+    """Debug at a prompt, or by a script; true if the trial is to go on without it. Its exit status goes to `ended`."""
+    prompt = Prompt("arena debug", lambda _launch: debugged.machine, debugged.record)
+    ended.append(prompt.serve({}, sys.stdin))
+    return debugged.keeps and not prompt.ends_all
 
 
 def served(debugged: Debugged, port: int | None) -> bool:

@@ -14,7 +14,7 @@ COMMANDS: Final = {
     "cycles": "measure the kernel's operations in exact cycles; check them against a baseline",
     "coverage": "tell which lines, branches and instructions a run executes (lcov, Cobertura)",
     "inject": "inject faults by a campaign file and tell what becomes of them",
-    "debug": "serve an editor that debugs firmware (Debug Adapter Protocol)",
+    "debug": "debug at a prompt, or serve an editor (Debug Adapter Protocol)",
     "completion": "print what makes a shell complete these commands and their options",
 }
 """Name and description of every command; the module of that name has `parser()` and `run()`."""

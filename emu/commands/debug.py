@@ -1,4 +1,4 @@
-"""`emu debug`: a Debug Adapter Protocol server, for editors."""
+"""`emu debug`: a Debug Adapter Protocol server for editors, or a prompt in the terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.boards import BOARDS
-from emu.command import Parser
+from emu.command import CommandError, Parser
+from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.status import DONE
 
 if TYPE_CHECKING:
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
 
 DESCRIPTION: Final = """\
 Debug firmware from an editor: a server of the Debug Adapter Protocol on standard input and output, or on a TCP port
-of this machine.
+of this machine. With --tui, debug it here: a prompt with completion and history; `help` there lists its commands.
+Without a terminal, standard input is a script of such commands, one a line; the first that fails ends it:
+
+    printf 'break add if a == 3\\nrun\\nbacktrace\\n' | emu debug --tui firmware.elf
 
 Launch arguments: program (the ELF file; required), board, selector, camera (a picture), engine, strict, stopOnEntry,
 sourceRoots (folders that file names of the program are relative to).
@@ -27,20 +31,28 @@ Breakpoints in sources, functions, instructions and data, with conditions, hit c
 line and instruction, forward and back; OpenSwarm's threads; locals, statics, registers, SFRs by bit field; memory;
 disassembly. In the console: expressions of C, assignments, and /help.
 
-Exit status: 0 the client has left, 2 bad input."""
+Exit status: 0 the client has left, the user has, or the script is at its end; 1 it ended at a firmware fault, 2 bad
+input."""
 
 
 def parser() -> Parser:
-    made = Parser("debug", DESCRIPTION, "emu debug --port 4711")
+    made = Parser("debug", DESCRIPTION, "emu debug --port 4711    or    emu debug --tui firmware.elf --selector 3")
     made.add_argument("--port", metavar="N", type=int, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
     made.add_argument("--once", action="store_true", help="with --port: end after the first client")
+    made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file here; what follows is for that")
+    made.add_argument("--engine", default="auto", help="auto, jit, interp or plain (default auto)")
+    made.add_argument("--strict", action="store_true", help="faults of what the hardware lets pass, as for `emu run`")
+    add_board_options(made)
     return made
 
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
+    if options.tui is not None:
+        return _prompted(options)
     from emu.dap.wire import Wire
 
+    _refuse_options_of_the_prompt(options)
     if options.port is None:
         out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
         _serve(Wire(sys.stdin.fileno(), out))
@@ -53,6 +65,25 @@ def run(options: argparse.Namespace) -> int:
                 _serve(Wire(connection.fileno(), writer))
             if options.once:
                 return DONE
+
+
+def _prompted(options: argparse.Namespace) -> int:
+    import emu
+    from emu.prompt.reader import Prompt
+
+    if options.port is not None or options.once:
+        raise CommandError("--port and --once are for editors, --tui is not")
+    machine = emu.load(options.tui, board=board_of(options), engine=options.engine, strict=options.strict)
+    set_up(machine, options)
+    return Prompt("emu debug", lambda _launch: machine).serve({}, sys.stdin)
+
+
+def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
+    """An editor's launch configuration says them. Raises CommandError."""
+    made = parser()
+    for name in ("engine", "strict", "board", "crystal", "selector", "camera", "sensor", "stimulus"):
+        if getattr(options, name) != made.get_default(name):
+            raise CommandError(f"--{name} is for --tui; an editor's launch configuration has `{name}`")
 
 
 def _serve(wire: Wire) -> None:

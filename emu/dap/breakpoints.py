@@ -23,6 +23,8 @@ COMPARE: Final[dict[str, Callable[[int, int], bool]]] = {
 }
 IN_MESSAGE: Final = re.compile(r"\{([^{}]*)\}")
 
+SAME: Final = ("kind", "places", "condition", "hit_condition", "message", "size", "access")
+
 
 @dataclass(eq=False, slots=True)
 class Breakpoint:
@@ -41,6 +43,10 @@ class Breakpoint:
     hits: int = 0
     facts: dict[str, Any] = field(default_factory=dict)
     """What the client was told about it."""
+
+    def is_as(self, other: Breakpoint) -> bool:
+        """Whether it is the same one, told again."""
+        return all(getattr(self, name) == getattr(other, name) for name in SAME)
 
     def stops(self, inside: Inside, say: Callable[[str], None]) -> bool:
         """Whether a run ends here, now that it has come by. A condition that means nothing ends it, and says why."""

@@ -10,13 +10,15 @@ from emu.debug.expression import evaluate
 from emu.debug.inside import Value
 from emu.debug.locate import address_of
 
-HELP: Final = """\
-an expression of C; NAME = VALUE; or
-/time              cycle, seconds, how far in the past
-/goto CYCLE        go to a cycle of the recording
-/lastwrite PLACE   go back to the instruction that changed a place last
-/threads           OpenSwarm's threads with stack use
-"""
+WORDS: Final = {
+    "time": "              cycle, seconds, how far in the past",
+    "goto": " CYCLE        go to a cycle of the recording, or run on to one behind it",
+    "cycle": " [N]         run for N cycles, one if N is left out; an instruction is not divided",
+    "lastwrite": " PLACE   go back to the instruction that changed a place last",
+    "reverse-finish": "    go back to the call of this function, or to before the interrupt",
+    "threads": "           OpenSwarm's threads with stack use",
+}
+HELP: Final = "an expression of C; NAME = VALUE; or\n" + "".join(f"/{word}{text}\n" for word, text in WORDS.items())
 
 
 def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
@@ -31,8 +33,13 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
                  for one in target.threads()]  # fmt: skip
         return "\n".join(lines) or "there are no threads"
     if word == "goto":
-        cycle = int(rest.replace(",", ""), 0)
-        return lambda: _sought(target, cycle)
+        cycle = _count(rest)
+        return lambda: target.go_to(cycle)
+    if word == "cycle":
+        count = _count(rest or "1")
+        return lambda: target.go_to(machine.cycle + count)
+    if word == "reverse-finish":
+        return target.back_out
     if word == "lastwrite":
         frames = target.frames()
         place = evaluate(target.inside, rest, frames[0] if frames else None)
@@ -44,10 +51,11 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
     return HELP
 
 
-def _sought(target: Debuggee, cycle: int) -> Halt:
-    history = target.history
-    history.seek(min(max(cycle, history.start), history.end))
-    return Halt("goto")
+def _count(text: str) -> int:
+    try:
+        return int(text.replace(",", ""), 0)
+    except ValueError:
+        raise ValueError(f"expected a number of cycles, not {text!r}") from None
 
 
 def _last_write(target: Debuggee, address: int, size: int) -> Halt:

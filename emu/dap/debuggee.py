@@ -6,6 +6,7 @@ each way forward has one back.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -57,12 +58,15 @@ class Debuggee:
         self._hooks: list[Callable[[], None]] = []
         self._hit: list[int] = []
         self._extra: tuple[Collection[int], Callable[[], bool]] | None = None
-        self._touched = ""
+        self._limit: int | None = None
+        """The cycle a run ends at."""
 
     # Breakpoints
 
     def set_breakpoints(self, key: str, wanted: list[Breakpoint]) -> None:
-        """Replace one list."""
+        """Replace one list. A breakpoint that was in it goes on counting its hits."""
+        for one in wanted:
+            one.hits = next((old.hits for old in self.breakpoints.get(key, []) if old.is_as(one)), 0)
         self.breakpoints[key] = wanted
         self._rehook()
 
@@ -70,10 +74,14 @@ class Debuggee:
         """Every breakpoint."""
         return [one for some in self.breakpoints.values() for one in some]
 
+    def _places(self) -> set[int]:
+        """Instructions that have a breakpoint."""
+        return {place for one in self.all() if one.kind != "data" for place in one.places}
+
     def _rehook(self) -> None:
         for remove in self._hooks:
             remove()
-        places = {place for one in self.all() if one.kind != "data" for place in one.places}
+        places = self._places()
         if self._extra is not None:
             places |= set(self._extra[0])
         self._hooks = [self.machine.hook_pc(place, self._arrived) for place in sorted(places)]
@@ -101,7 +109,7 @@ class Debuggee:
     def _run(self) -> Halt | None:
         """Run; None if somebody wants it to stand, or it has arrived where `_extra` says."""
         data = [one for one in self.all() if one.kind == "data"]
-        while not self._wanted():
+        while not self._wanted() and not self._is_there():
             self._hit = []
             if data:
                 halt = self._watched(data)
@@ -110,7 +118,7 @@ class Debuggee:
                 continue
             self.machine.scout = self._arrived
             try:
-                stop = self.history.advance(self.machine.cycle + SLICE)
+                stop = self.history.advance(min(self.machine.cycle + SLICE, self._limit or sys.maxsize))
             finally:
                 self.machine.scout = None
             if stop is None:
@@ -121,6 +129,9 @@ class Debuggee:
             if halt is not None:
                 return halt
         return None
+
+    def _is_there(self) -> bool:
+        return self._limit is not None and self.machine.cycle >= self._limit
 
     def _arrived_extra(self) -> bool:
         return self._extra is not None and self.machine.pc in self._extra[0] and self._extra[1]()
@@ -153,6 +164,7 @@ class Debuggee:
             touched.append(("write", ea, size))
             write(ea, value, size)
 
+        places = self._places()
         vars(space)["read"], vars(space)["write"] = reads, writes
         try:
             for _ in range(LOOK_STEPS):
@@ -166,10 +178,9 @@ class Debuggee:
                 if ids:
                     verb = "/".join(sorted({touch[0] for touch in touched if any(_meets(one, touch) for one in hit)}))
                     return Halt("data breakpoint", f"{verb} at {self.inside.where(pc)}", tuple(ids))
-                places = {place for one in self.all() if one.kind != "data" for place in one.places}
                 if machine.pc in places and self._arrived() and self._hit:
                     return Halt("breakpoint", breakpoints=tuple(self._hit))
-                if self._arrived_extra():
+                if self._arrived_extra() or self._is_there():
                     return None
         finally:
             del vars(space)["read"], vars(space)["write"]
@@ -189,6 +200,10 @@ class Debuggee:
     def step_instruction(self) -> Halt:
         """One instruction."""
         return self._stepped() or Halt("step")
+
+    def step_over(self) -> Halt:
+        """One instruction; a call, and an interrupt, as a whole."""
+        return self._one(into=False) or Halt("step")
 
     def step_line(self, into: bool) -> Halt:
         """To the next line; into functions that have lines, or over them. Interrupts are run through."""
@@ -238,6 +253,20 @@ class Debuggee:
         top = frames[0].raw.entry - 4
         return self.run_to([frames[1].pc], lambda: self.machine.w[STACK_POINTER] == top) or Halt("step")
 
+    def go_to(self, cycle: int) -> Halt:
+        """To a cycle of the recording, or on to one behind it, unless something stops it before."""
+        history = self.history
+        if cycle <= history.end:
+            history.seek(max(cycle, history.start))
+            return Halt("goto")
+        self._limit = cycle
+        try:
+            hooked = not self.machine.is_asleep and self.machine.pc in self._places()
+            halt = (self._stepped() if hooked else None) or self._run()
+        finally:
+            self._limit = None
+        return halt or Halt("goto" if self.machine.cycle >= cycle else "pause")
+
     def _line(self) -> Line | None:
         return self.inside.image.lines.find(self.machine.pc)
 
@@ -266,9 +295,20 @@ class Debuggee:
         self.history.seek(self.history.start)
         return START
 
+    def back_out(self) -> Halt:
+        """To the call of this function, or to before the interrupt."""
+        frame = next((one for one in self.inside.frames() if one.kind != "inlined"), None)
+        start = self.inside.start_of(self.machine.pc)
+        if frame is None or frame.raw.entry is None or start is None:
+            return Halt("step", "there is no caller")
+        machine, entry = self.machine, frame.raw.entry
+        if machine.pc != start or machine.w[STACK_POINTER] != entry:
+            self.history.run_back([start], lambda: machine.w[STACK_POINTER] == entry)
+        return self.back_instruction()
+
     def back(self) -> Halt:
         """Back to the last breakpoint; data breakpoints to the last write."""
-        places = {place for one in self.all() if one.kind != "data" for place in one.places}
+        places = self._places()
         now = self.machine.cycle
         found: list[tuple[int, Halt]] = []
         if self.history.run_back(places, self._arrived) is not None:

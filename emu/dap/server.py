@@ -1,23 +1,22 @@
 """One debugging session: requests of a client become acts of the debuggee, its halts become events.
 
-What enters: a `Wire`, what makes a machine from launch arguments. What leaves: nothing but messages. Between two slices
-of a run the inbox is looked at, so everything but what needs a standing machine is answered while it runs.
+What enters: a channel to the client, what makes a machine from launch arguments. What leaves: nothing but messages.
+Between two slices of a run the inbox is looked at, so everything but what needs a standing machine is answered while it
+runs.
 """
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.dap.breakpoints import Breakpoint, bad_hit_condition
-from emu.dap.console import command
 from emu.dap.debuggee import Debuggee, Halt
-from emu.dap.sfrs import groups
-from emu.dap.sights import Row, Sights, Sources, disassembled
-from emu.dap.wire import Message, Wire
+from emu.dap.looking import Looking, Refused
+from emu.dap.sights import Row, Sights, Sources
+from emu.dap.wire import Channel, Message
 from emu.debug.expression import ExpressionError, evaluate
 from emu.debug.history import History
 from emu.debug.inside import Value
@@ -33,23 +32,15 @@ CAPABILITIES: Final = {
         "FunctionBreakpoints", "InstructionBreakpoints", "DisassembleRequest", "SteppingGranularity", "DataBreakpoints",
         "DataBreakpointBytes", "StepBack", "ReadMemoryRequest", "WriteMemoryRequest", "SetVariable", "SetExpression",
         "EvaluateForHovers", "ExceptionInfoRequest", "RestartRequest", "TerminateRequest",
-        "DelayedStackTraceLoading", "BreakpointLocationsRequest", "CancelRequest",
+        "DelayedStackTraceLoading", "BreakpointLocationsRequest", "CancelRequest", "CompletionsRequest",
+        "LoadedSourcesRequest",
     )
 } | {
     "supportTerminateDebuggee": True,
     "exceptionBreakpointFilters": [{"filter": "fault", "label": "Firmware faults", "default": True}],
 }  # fmt: skip
-GOING: Final = ("continue", "next", "stepIn", "stepOut", "stepBack", "reverseContinue", "restart")
 WHILE_RUNNING: Final = ("pause", "disconnect", "terminate", "cancel", "threads")
 """Requests that are answered while the machine runs; the others wait, except those that change breakpoints."""
-MOST_ROWS: Final = 1 << 16
-"""Instructions, or bytes of memory, that one request may ask for: as many as there are of either on a chip."""
-
-
-class Refused(Exception):
-    """A request that cannot be done; the text is for the user."""
-
-
 MISTAKES: Final = (
     Refused, ExpressionError, Unavailable, ValueError, LookupError, ArithmeticError, TypeError, AttributeError,
     RecursionError, OSError,
@@ -57,12 +48,12 @@ MISTAKES: Final = (
 """What a request with arguments of the wrong kind, size or meaning can end in."""
 
 
-class Server:
+class Server(Looking):
     """Serves one client to the end. `make(arguments)` gives a machine; it raises ValueError or OSError for bad ones.
     `record` makes the recording by which it goes back."""
 
     def __init__(
-        self, wire: Wire, make: Callable[[Row], Machine], record: Callable[[Machine], History] = History
+        self, wire: Channel, make: Callable[[Row], Machine], record: Callable[[Machine], History] = History
     ) -> None:
         self._wire: Final = wire
         self._make: Final = make
@@ -87,11 +78,20 @@ class Server:
             if message is None:
                 break
             if message.get("type") == "request":
-                self._answer(message)
+                self.answer(message)
+        self.leave()
+
+    @property
+    def is_over(self) -> bool:
+        """The client has left."""
+        return self._over
+
+    def leave(self) -> None:
+        """Give back what was debugged."""
         if self._target is not None:
             self._target.leave()
 
-    def _answer(self, message: Message) -> None:
+    def answer(self, message: Message) -> None:
         """Respond to one request. Whatever is wrong with it, the session goes on."""
         command = str(message.get("command"))
         arguments = message.get("arguments") or {}
@@ -121,24 +121,6 @@ class Server:
 
     def _say(self, text: str, category: str = "console") -> None:
         self._event("output", {"category": category, "output": text})
-
-    @property
-    def _debuggee(self) -> Debuggee:
-        if self._target is None:
-            raise Refused("nothing is being debugged")
-        return self._target
-
-    @property
-    def _sights(self) -> Sights:
-        if self._views is None:
-            raise Refused("nothing is being debugged")
-        return self._views[0]
-
-    @property
-    def _sources(self) -> Sources:
-        if self._views is None:
-            raise Refused("nothing is being debugged")
-        return self._views[1]
 
     # Life
 
@@ -183,9 +165,9 @@ class Server:
 
     def _do_disconnect(self, arguments: Row) -> Any:
         self.ends_all = self.ends_all or bool(arguments.get("terminateDebuggee"))
-        return {}, self._leave
+        return {}, self._end
 
-    def _leave(self) -> None:
+    def _end(self) -> None:
         self._over = True
 
     def _do_terminate(self, _arguments: Row) -> Any:
@@ -210,7 +192,7 @@ class Server:
                 self._over = self._pause = True
             elif message.get("type") == "request" and message.get("command") in WHILE_RUNNING:
                 self._pause = self._pause or message["command"] != "threads"
-                self._answer(message)
+                self.answer(message)
             else:
                 self._waiting.append(message)
                 self._pause = self._pause or str(message.get("command", "")).startswith("set")
@@ -226,7 +208,7 @@ class Server:
         halt = act()
         while halt.reason == "pause" and any(str(m.get("command", "")).startswith("set") for m in self._waiting):
             while self._waiting:  # breakpoints were changed: answer and run on
-                self._answer(self._waiting.pop(0))
+                self.answer(self._waiting.pop(0))
             self._pause = False
             halt = self._debuggee.go_on()
         if not self._over:
@@ -253,10 +235,12 @@ class Server:
         return self._doer(self._debuggee.go_on)
 
     def _do_next(self, arguments: Row) -> Any:
-        return self._doer(self._step(arguments, lambda: self._debuggee.step_line(into=False)))
+        fine = arguments.get("granularity") == "instruction"
+        return self._doer(self._debuggee.step_over if fine else lambda: self._debuggee.step_line(into=False))
 
     def _do_stepIn(self, arguments: Row) -> Any:
-        return self._doer(self._step(arguments, lambda: self._debuggee.step_line(into=True)))
+        fine = arguments.get("granularity") == "instruction"
+        return self._doer(self._debuggee.step_instruction if fine else lambda: self._debuggee.step_line(into=True))
 
     def _do_stepOut(self, _arguments: Row) -> Any:
         return self._doer(self._debuggee.step_out)
@@ -267,9 +251,6 @@ class Server:
 
     def _do_reverseContinue(self, _arguments: Row) -> Any:
         return self._doer(self._debuggee.back)
-
-    def _step(self, arguments: Row, by_line: Callable[[], Halt]) -> Callable[[], Halt]:
-        return self._debuggee.step_instruction if arguments.get("granularity") == "instruction" else by_line
 
     # Breakpoints
 
@@ -364,7 +345,7 @@ class Server:
         lines = sorted({row.line for row in rows if first <= row.line <= last})
         return {"breakpoints": [{"line": line} for line in lines]}
 
-    # Looking
+    # What it stands at
 
     def _do_threads(self, _arguments: Row) -> Row:
         threads = self._debuggee.threads() if self._configured else []
@@ -384,105 +365,9 @@ class Server:
         levels = int(arguments.get("levels") or 0) or len(frames)
         return {"stackFrames": self._sights.stack(frames[first : first + levels]), "totalFrames": len(frames)}
 
-    def _do_scopes(self, arguments: Row) -> Row:
-        frame = self._sights.frame(int(arguments["frameId"]))
-        return {"scopes": self._sights.scopes(frame) if frame is not None else []}
-
-    def _do_variables(self, arguments: Row) -> Row:
-        start, count = int(arguments.get("start") or 0), int(arguments.get("count") or 0)
-        return {"variables": self._sights.variables(int(arguments["variablesReference"]), start, count)}
-
-    def _do_evaluate(self, arguments: Row) -> Any:
-        text = str(arguments["expression"]).strip()
-        if arguments.get("context") == "repl" and text.startswith("/"):
-            said = command(self._debuggee, text[1:])
-            if isinstance(said, str):
-                return {"result": said, "variablesReference": 0}
-            return {"result": "", "variablesReference": 0}, lambda: self._go(said)
-        name, equals, value = text.partition("=")
-        if arguments.get("context") == "repl" and equals and not value.startswith("=") and name[-1:] not in "!<>=":
-            return self._assigned(name.strip(), value.strip(), arguments)
-        return self._result(text, arguments)
-
-    def _result(self, text: str, arguments: Row) -> Row:
-        found = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
-        if not isinstance(found, Value):
-            return {"result": str(found), "variablesReference": 0}
-        row = self._sights.shown(found, text)
-        if row["value"].startswith("<"):
-            raise Refused(row["value"][1:-1])
-        return {"result": row.pop("value"), **row}
-
-    def _assigned(self, name: str, text: str, arguments: Row) -> Row:
-        inside, frame = self._debuggee.inside, self._sights.frame(arguments.get("frameId"))
-        place = evaluate(inside, name, frame)
-        if not isinstance(place, Value):
-            raise Refused(f"{name} is no place")
-        self._write(place, text, arguments)
-        return self._result(name, arguments)
-
-    def _write(self, place: Value, text: str, arguments: Row) -> None:
-        self._may_change()
-        value = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
-        place.set(value.get() if isinstance(value, Value) else value)
-
-    def _may_change(self) -> None:
-        frozen = self._debuggee.history.frozen
-        if frozen:
-            raise Refused(frozen)
-
-    def _do_setVariable(self, arguments: Row) -> Row:
-        place = self._sights.find(int(arguments["variablesReference"]), str(arguments["name"]))
-        if place is None:
-            raise Refused(f"{arguments['name']} cannot be set")
-        self._write(place, str(arguments["value"]), arguments)
-        return self._sights.shown(place, str(arguments["name"]))
-
-    def _do_setExpression(self, arguments: Row) -> Row:
-        row = self._assigned(str(arguments["expression"]), str(arguments["value"]), arguments)
-        return {"value": row.pop("result"), **row}
-
     def _do_exceptionInfo(self, _arguments: Row) -> Row:
         stop = self._halt.stop
         if stop is None or stop.fault is None:
             raise Refused("it did not stop at a fault")
         details = {"message": stop.fault.cause, "stackTrace": stop.fault.report()}
         return {"exceptionId": "fault", "description": stop.fault.report(), "breakMode": "always", "details": details}
-
-    def _do_disassemble(self, arguments: Row) -> Row:
-        address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
-        address += 2 * int(arguments.get("instructionOffset") or 0)
-        symbols = bool(arguments.get("resolveSymbols"))
-        count = _size(arguments, "instructionCount")
-        return {"instructions": disassembled(self._debuggee.inside, self._sources, address & ~1, count, symbols)}
-
-    def _do_readMemory(self, arguments: Row) -> Row:
-        address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
-        count = _size(arguments, "count")
-        data = b""
-        for at in range(address, address + count):
-            try:
-                data += self._debuggee.machine.peek_bytes(at, 1)
-            except ValueError:
-                break
-        row: Row = {"address": f"{address:#06x}", "unreadableBytes": count - len(data)}
-        return row | ({"data": base64.b64encode(data).decode()} if data else {})
-
-    def _do_writeMemory(self, arguments: Row) -> Row:
-        self._may_change()
-        address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
-        data = base64.b64decode(arguments["data"])
-        self._debuggee.machine.poke(address, int.from_bytes(data, "little"), len(data))
-        return {"bytesWritten": len(data)}
-
-    def _do_sfrs(self, _arguments: Row) -> Row:
-        """Of our own: what the editor's view of registers shows."""
-        return {"groups": groups(self._debuggee.machine)}
-
-
-def _size(arguments: Row, name: str) -> int:
-    """A number of rows or bytes. Raises Refused, KeyError, ValueError."""
-    count = int(arguments[name])
-    if not 0 <= count <= MOST_ROWS:
-        raise Refused(f"{name} {count} is not within 0 to {MOST_ROWS}")
-    return count

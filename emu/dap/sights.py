@@ -190,6 +190,10 @@ class Sources:
         """A source of the protocol."""
         return {"name": Path(file).name, "path": str(self.path(file))}
 
+    def all(self) -> list[Row]:
+        """Every file that code comes from."""
+        return [self.row(file) for file in sorted({row.file for row in self._inside.image.lines.rows})]
+
     def lines(self, path: str) -> list[Line]:
         """Rows of the line table that come from the file a client calls `path`."""
         wanted = Path(path.split("//", 1)[1].split("/", 1)[1] if "//" in path else path)

@@ -8,7 +8,7 @@ import re
 import select
 import threading
 from queue import SimpleQueue
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO, Final, Protocol
 
 HEADER: Final = re.compile(rb"content-length:[ \t]*(\d{1,9})", re.IGNORECASE)
 READ_SIZE: Final = 1 << 16
@@ -18,6 +18,17 @@ LONGEST: Final = 1 << 24
 """Bytes of a message; a longer one is not one."""
 
 Message = dict[str, Any]
+
+
+class Channel(Protocol):
+    """What a server talks over: messages that came, None at the end, and a way to send some."""
+
+    @property
+    def inbox(self) -> SimpleQueue[Message | None]:
+        """What the client has sent."""
+
+    def send(self, message: Message) -> None:
+        """To the client."""
 
 
 class Wire:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,28 @@ def test_the_present_may_be_changed_the_past_not_and_who_leaves_ends_it(tmp_path
     assert client.ask("evaluate", expression="T1CON.TCKPS = 2", context="repl")["result"] == "2"
     client.ask("terminate")
     client.close()
+
+
+def test_at_a_prompt_by_a_script(
+    tmp_path: Path, clustering_image: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The trial goes on without it when it is detached, ends when it is not; a command that fails is the status."""
+    trial = ["--minutes", "0.01", "--brain", str(clustering_image), *SEED, "--set", "start.selector=8"]
+    command = ["debug", "clustering", *trial, "--robot", "2", "--tui"]
+
+    def played(*lines: str, more: tuple[str, ...] = ()) -> int:
+        monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(lines)))
+        return main([*command, *more])
+
+    out = ("--out", str(tmp_path / "debugged"))
+    assert played("break react", "continue", "next 2", "reverse-stepi", "info locals", "detach", more=out) == 0
+    assert "react at " in capsys.readouterr().out
+    assert main(["run", "clustering", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
+    records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
+    assert records[0] == records[1]
+    assert played("stepi", "frob") == 2
+    assert "line 2, frob: there is no command frob" in capsys.readouterr().err
+    assert played(more=("--port", "0")) == 2
 
 
 def test_a_robot_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,130 @@
+"""What the server answers, as text for a terminal."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any, Final
+
+from emu.prompt.client import RefusedError, Row
+
+PER_ROW: Final = 8
+"""Registers or units of memory in one line."""
+ROW_BYTES: Final = 16
+INTEGER: Final = re.compile(r"0x[0-9a-fA-F]+|-?\d+")
+FORMATS: Final = "xdutca"
+
+
+def frame(row: Row) -> str:
+    """`add at program.c:12`."""
+    if row.get("source"):
+        return f"{row['name']} at {row['source']['name']}:{row['line']}"
+    return f"{row['name']} at {row['instructionPointerReference']}"
+
+
+def backtrace(frames: Sequence[Row], at: int) -> str:
+    """One line per frame, the selected one marked."""
+    return "\n".join(f"{'*' if n == at else ' '} #{n} {frame(row)}" for n, row in enumerate(frames)) or "no frames"
+
+
+def source(path: str, first: int, last: int, here: int = 0) -> str:
+    """Lines of a file with their numbers; `here` is marked. Raises RefusedError if there are none."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise RefusedError(f"{path}: {error.strerror}") from None
+    first = max(first, 1)
+    if first > len(lines):
+        raise RefusedError(f"{Path(path).name} has {len(lines)} lines")
+    shown = enumerate(lines[first - 1 : last], first)
+    return "\n".join(f"{'>' if n == here else ' '}{n:5} {text}".rstrip() for n, text in shown)
+
+
+def number(text: str, form: str) -> str:
+    """The number at the beginning of a value, hexadecimal (x), signed (d) or not (u) decimal, binary (t), as a
+    character (c) or an address (a). Raises RefusedError."""
+    match = INTEGER.match(text)
+    if match is None:
+        raise RefusedError(f"{text} is no whole number")
+    value = int(match[0], 0)
+    bits = next(bits for bits in (16, 32, 64, 4096) if -(1 << bits - 1) <= value < 1 << bits)
+    plain = value & (1 << bits) - 1
+    match form:
+        case "x" | "a":
+            return f"{plain:#x}"
+        case "t":
+            return f"{plain:#b}"
+        case "c":
+            return repr(chr(plain & 0xFF))
+        case "u":
+            return str(plain)
+    return str(value)
+
+
+def registers(rows: Sequence[Row]) -> str:
+    """Working registers in lines of eight, then the others."""
+    texts = [(one["name"], f"{int(one['value']):#06x}" if one["value"].isdecimal() else one["value"]) for one in rows]
+    working = [f"{name}={value}" for name, value in texts if name.startswith("W")]
+    lines = ["  ".join(f"{one:<11}" for one in working[at : at + PER_ROW]) for at in range(0, len(working), PER_ROW)]
+    return "\n".join([*(line.rstrip() for line in lines),
+                      *(f"{name} {value}" for name, value in texts if not name.startswith("W"))])  # fmt: skip
+
+
+def sfrs(groups: Sequence[Row], wanted: str) -> str:
+    """Registers whose name, or the name of whose peripheral, fits the pattern, with their fields; the peripherals
+    without one. Raises RefusedError if none fits."""
+    if not wanted:
+        return "\n".join(f"{group['name']}: {' '.join(one['name'] for one in group['parts'])}" for group in groups)
+    pattern = wanted.upper()
+    found = [
+        f"{one['name']:<9} {one['address']}  {one['value']}  "
+        + " ".join(f"{part['name']}={part['value']}" for part in one.get("parts", []))
+        for group in groups
+        for one in group["parts"]
+        if fnmatchcase(one["name"].upper(), pattern) or fnmatchcase(group["name"].upper(), pattern)
+    ]
+    if not found:
+        raise RefusedError(f"no register and no peripheral is called {wanted}")
+    return "\n".join(line.rstrip() for line in found)
+
+
+def memory(row: Row, size: int, form: str) -> str:
+    """Units of `size` bytes in lines of 16 bytes; a string with form "s"."""
+    data = base64.b64decode(row.get("data", ""))
+    address = int(row["address"], 16)
+    if form == "s":
+        return f"{address:#06x}: {data.partition(bytes(1))[0].decode('latin-1')!r}"
+
+    def units(at: int) -> Iterator[str]:
+        for place in range(at, min(at + ROW_BYTES, len(data) - size + 1), size):
+            value = int.from_bytes(data[place : place + size], "little", signed=form == "d")
+            yield f"{value:#0{2 * size + 2}x}" if form in "xa" else number(str(value), form)
+
+    lines = [f"{address + at:#06x}: {' '.join(units(at))}" for at in range(0, len(data), ROW_BYTES)]
+    if row["unreadableBytes"]:
+        lines.append(f"{address + len(data):#06x}: no memory")
+    return "\n".join(lines)
+
+
+def disassembly(rows: Sequence[Row], here: int) -> str:
+    """One instruction a line, source lines and functions where they begin."""
+    lines = []
+    for row in rows:
+        if row.get("presentationHint") == "invalid":
+            continue
+        if row.get("symbol"):
+            lines.append(f"{row['symbol']}:")
+        if row.get("location"):
+            lines.append(f"    {row['location']['name']}:{row['line']}")
+        address = int(row["address"], 16)
+        lines.append(f"{'>' if address == here else ' '} {row['address']}  {row['instructionBytes']}  "
+                     f"{row['instruction']}".rstrip())  # fmt: skip
+    return "\n".join(lines)
+
+
+def variables(rows: Sequence[dict[str, Any]]) -> str:
+    """One variable a line."""
+    return "\n".join(f"{one['name']} = {one['value']}" for one in rows)

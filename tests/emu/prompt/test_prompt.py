@@ -1,0 +1,285 @@
+"""The debugger in a terminal: by a script, by a person at a pseudo terminal, and what it shares with the server."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+import termios
+import time
+from pathlib import Path
+
+import pytest
+
+import emu
+from emu.debug.history import History
+from emu.prompt.looking import TOPICS
+from emu.prompt.reader import Prompt, candidates, carry_out
+from emu.prompt.table import TABLE
+from tests.emu.dap.test_dap import SOURCE, line_of
+from toolchain import driver
+
+ROOT = Path(__file__).resolve().parents[3]
+PATIENCE = 60
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> str:
+    image = tmp_path_factory.mktemp("prompt") / "program.elf"
+    assert driver.main(["-g", "-O0", str(SOURCE), "-o", str(image)]) == 0
+    return str(image)
+
+
+@pytest.fixture
+def play(program: str, capsys: pytest.CaptureFixture[str]) -> type:
+    """Plays scripts in this process: `play(script)` has the output by command, the errors and the exit status."""
+
+    class Played:
+        def __init__(self, *lines: str) -> None:
+            machine = emu.load(program)
+            prompt = Prompt("emu debug", lambda _launch: machine)
+            self.status = prompt.serve({}, io.StringIO("\n".join(lines)))
+            self.out, self.err = capsys.readouterr()
+
+    return Played
+
+
+def test_a_script_stops_looks_and_goes_back(play: type) -> None:
+    total = line_of("total = sum;")
+    played = play(
+        "# as gdb has it", "", f"break program.c:{total} if a == 3 && b == 3", "run", "bt", "p sum", "up", "p/x once",
+        "info locals", f"tb {line_of('for (i = 0; i < 500')}", "info breakpoints", "delete 1", "c", "lastwrite total",
+        "time", "reverse-finish", "info b",
+    )  # fmt: skip
+    assert played.status == 0, played.err
+    out = played.out
+    assert "breakpoint 1\nadd at program.c:13, cycle " in out
+    assert f">{total:5} " in out
+    assert "* #0 add at program.c:13\n  #1 twice at program.c:20\n  #2 main at program.c:27\n" in out
+    assert "sum = 6\n" in out
+    assert "once = 0x3\n" in out
+    assert "n = 3\nonce = 3\n" in out
+    assert "1: program.c:13, if a == 3 && b == 3\n2: 30, once\n" in out
+    assert "last write: 0400 -> 0800 at " in out
+    assert re.search(r"before the present\ntwice at program.c:20, cycle [\d,]+", out)
+    assert out.endswith("no breakpoints\n")
+
+
+def test_a_script_ends_with_the_first_command_that_fails(play: type) -> None:
+    played = play("break main", "run", "print nonsense", "print total")
+    assert played.status == 2
+    assert played.err == "emu debug: line 3, print nonsense: there is nothing called 'nonsense' here\n"
+    assert "total" not in played.out
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("frobnicate", "there is no command frobnicate: try help"),
+        ("re", "re is ambiguous: "),
+        ("break nowhere", "there is no function nowhere"),
+        ("break other.c:3", "no code of this program comes from other.c"),
+        ("break", "expected FUNCTION, LINE, FILE:LINE or *ADDRESS"),
+        ("break 3", "there is no source here: say FILE:LINE"),
+        ("delete 7", "there is no breakpoint 7"),
+        ("watch 3 + 4", "it is not in memory"),
+        ("step many", "expected how many times, not 'many'"),
+        ("print/q total", "the formats are /x /d /u /t /c /a, not /q"),
+        ("x/8zz total", "/zz is no format"),
+        ("frame 99", "the frames are 0 to 0, not 99"),
+        ("thread 9", "there is no thread 9: main"),
+        ("goto tomorrow", "expected a number of cycles, not 'tomorrow'"),
+        ("info", "info breakpoints: all of them, by number; frame: "),
+        ("info sfr NOSUCH", "no register and no peripheral is called NOSUCH"),
+        ("set total", "expected PLACE = EXPRESSION"),
+        ("list 9", "there is no source here"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_one_line(play: type, line: str, told: str) -> None:
+    played = play(line)
+    assert played.status == 2
+    assert told in played.err
+    assert played.err.count("\n") == 1
+
+
+def test_a_script_that_ends_at_a_fault_has_its_status(play: type) -> None:
+    played = play("run")
+    assert played.status == 1
+    assert "reading 2 bytes at 0x3009, an odd address" in played.out
+    assert "#0 main at" in played.out
+    assert play("run", "reverse-stepi").status == 0
+
+
+def test_stops_are_kept_by_number(play: type) -> None:
+    """A breakpoint goes on counting when another one is set; conditions, hit counts and switches can be changed."""
+    total = line_of("total = sum;")
+    played = play(
+        f"b program.c:{total}", "hits 1 4", "log program.c:12 a is {a}", "disable 2", "run", "p a + b", "hits 1",
+        "cond 1 a == 4 && b == 4", "c", "p sum", "disable", "enable 2", "watch pairs[1].second", "c", "info b",
+    )  # fmt: skip
+    assert played.status == 0, played.err
+    assert "a + b = 2\n" in played.out
+    assert "sum = 8\n" in played.out
+    assert "a is 0" not in played.out
+    assert "data breakpoint 3: write at" in played.out
+    assert "1: program.c:13, if a == 4 && b == 4, off\n2: program.c:12, log a is {a}\n3: pairs[1].sec" in played.out
+    more = f"b {line_of('return sum;')}"
+    counted = play(f"b program.c:{total}", "hits 1 ==6", "run", more, "delete 2", "restart", "c")
+    assert counted.out.count("breakpoint 1\nadd") == 1  # six hits are behind it
+
+
+def test_memory_registers_instructions_sources(play: type) -> None:
+    played = play(
+        "b add", "run", "x/8xb pairs", "x/2dh pairs", "x/s pairs", "x/2i PC", "dis add 3", "info registers",
+        "info sfr U1STA", "info sfr timer 1", "list main", "list", "set pairs[0].second = -5",
+        "p pairs[0]", "set U1BRG = 7", "p U1BRG", "nexti", "stepi 2", "cycle 3", "time", "delete", "goto 400",
+        "time", "finish",
+    )  # fmt: skip
+    assert played.status == 0, played.err
+    out = played.out
+    assert ": 0x01 0x00 0x0a 0x00 0x00 0x00 0x02 0x00\n" in out
+    assert ": 1 10\n" in out
+    assert ": '\\x01'\n" in out
+    assert re.search(r"> 0x0001\w\w  \w{6}  add.w w15, #0x6, w15", out)
+    assert "W14=0x27f0" in out.replace(" ", "")
+    assert "U1STA     0x020e  0x0110  UTXISEL=0" in out
+    assert "T1CON" in out
+    assert f" {line_of('int main'):5} int main(void)" in out
+    assert "pairs[0] = {first = 1, second = -5}\n" in out
+    assert "U1BRG = 7\n" in out
+    assert "cycle 400, " in out
+    assert out.rstrip().splitlines()[-1].startswith(">")
+
+
+def test_reverse_finish_goes_to_the_call(program: str) -> None:
+    machine = emu.load(program)
+    history = History(machine)
+    said: list[str] = []
+    prompt = Prompt("test", lambda _launch: machine, lambda _machine: history)
+    prompt.session.write = said.append  # type: ignore[misc]
+    prompt.session.start({})
+    for line in ("break add if b == 2", "run", "next", "next", "reverse-finish"):
+        carry_out(prompt.session, line)
+    calls = machine.pc
+    assert prompt.session.frames[0]["name"] == "twice"
+    carry_out(prompt.session, "stepi")
+    assert machine.pc == machine.program_address("add") != calls
+
+
+def test_names_are_completed(program: str) -> None:
+    prompt = Prompt("test", lambda _launch: emu.load(program))
+    prompt.session.write = lambda _text: None  # type: ignore[misc]
+    prompt.session.start({})
+
+    def names(text: str) -> set[str]:
+        return {text[: len(text) - replaced] + name for name, replaced, _ in candidates(prompt.session, text)}
+
+    assert {"tbreak", "threads", "thread", "time"} <= names("t")
+    assert names("break tw") == {"break twice"}
+    assert names("list prog") == {"list program.c:"}
+    assert {"print total", "print twice"} <= names("print t")
+    assert names("print pairs[1].s") == {"print pairs[1].second"}
+    assert names("p U1STA.TR") == {"p U1STA.TRMT"}
+    assert names("p U1ST") == {"p U1STA", "p U1STAbits"}
+    assert names("info l") == {"info locals"}
+    assert names("help rev") == {f"help reverse-{how}" for how in ("continue", "finish", "next", "stepi")}
+    assert names("print nothing.x") == set()
+
+
+def test_help_names_every_command_and_the_guide_every_kind(play: type) -> None:
+    out = play("help", "help break").out
+    for one in TABLE:
+        assert one.usage in out
+    guide = (ROOT / "docs" / "debugging.md").read_text(encoding="utf-8")
+    for one in TABLE:
+        assert f"`{one.name}`" in guide, one.name
+    assert all(topic in guide for topic in TOPICS)
+
+
+class Terminal:
+    """A program on a pseudo terminal."""
+
+    def __init__(self, folder: Path, *words: str) -> None:
+        main, side = pty.openpty()
+        termios.tcsetwinsize(side, (40, 120))
+        environment = os.environ | {"TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1", "XDG_STATE_HOME": str(folder)}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", *words], stdin=side, stdout=side, stderr=side, cwd=ROOT, env=environment,
+            start_new_session=True, preexec_fn=lambda: os.close(os.open(os.ttyname(0), os.O_RDWR)),
+        )  # fmt: skip
+        os.close(side)
+        self._main = main
+        self._seen = ""
+
+    def expect(self, text: str) -> str:
+        """What was shown up to and with `text`, without the terminal's control sequences."""
+        end = time.monotonic() + PATIENCE
+        while text not in self._seen:
+            assert time.monotonic() < end, self._seen
+            if select.select([self._main], [], [], 1)[0]:
+                try:
+                    data = os.read(self._main, 4096)
+                except OSError:
+                    data = b""
+                assert data, self._seen
+                self._seen += re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", data.decode()).replace("\r", "")
+        shown, self._seen = self._seen.split(text, 1)
+        return shown + text
+
+    def type(self, text: str) -> None:
+        os.write(self._main, text.encode())
+
+    def close(self) -> int:
+        status = self.process.wait(timeout=PATIENCE)
+        os.close(self._main)
+        return status
+
+
+def test_at_a_terminal(program: str, tmp_path: Path) -> None:
+    """Completion, repetition, a mistake, an interrupt of what runs, and the history of the session before."""
+    terminal = Terminal(tmp_path, "emu", "debug", "--tui", program)
+    terminal.expect("(emu)")
+    terminal.type("break twi\t")
+    terminal.expect("break twice")
+    terminal.type("\r")
+    terminal.expect("breakpoint 1: twice\n")
+    terminal.type("run\r")
+    terminal.expect("twice at program.c:18")
+    terminal.type("print nonsense\r")
+    terminal.expect("there is nothing called 'nonsense' here")
+    terminal.type("stepi\r")
+    terminal.expect("cycle 283")
+    terminal.type("\r")
+    terminal.expect("cycle 284")
+    terminal.type("delete\r")
+    terminal.type("set total = 0\r")
+    terminal.expect("total = 0")
+    terminal.type("log program.c:31 round\r")
+    terminal.expect("breakpoint 2: program.c:31")
+    terminal.type("goto 100000000000\r")
+    terminal.expect("total 8")
+    terminal.expect("odd address")
+    terminal.type("q\r")
+    assert terminal.close() == 0
+    assert "break twice" in (tmp_path / "openswarm" / "debug-history").read_text()
+
+
+def test_an_interrupt_makes_a_machine_stand(tmp_path: Path) -> None:
+    source = tmp_path / "loop.c"
+    source.write_text("volatile unsigned n;\nint main(void)\n{\n    for (;;)\n        n++;\n}\n")
+    image = tmp_path / "loop.elf"
+    assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
+    terminal = Terminal(tmp_path, "emu", "debug", "--tui", str(image))
+    terminal.expect("(emu)")
+    terminal.type("run\r")
+    terminal.expect("run")
+    time.sleep(1)
+    terminal.type("\x03")
+    assert "main at loop.c:" in terminal.expect("cycle ")
+    terminal.expect("(emu)")
+    terminal.type("\x04")
+    assert terminal.close() == 0
