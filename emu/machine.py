@@ -18,7 +18,7 @@ from emu.debug.bysource import BySource
 from emu.dspic30f.core import Core
 from emu.dspic30f.engines import make_engine
 from emu.dspic30f.faults import RESTART, Breakpoint, DeviceReset, Violation
-from emu.dspic30f.state import RUN, W15_INITIALISED
+from emu.dspic30f.state import PC_MASK, RUN, W15_INITIALISED
 from emu.events import NEVER, Events
 from emu.image import Image
 from emu.peripherals import Peripherals, Wires, build
@@ -137,7 +137,7 @@ class Machine(Contents, BySource):
 
     @pc.setter
     def pc(self, address: int) -> None:
-        self.state.pc = address & 0x7FFFFE
+        self.state.pc = address & PC_MASK
         self.state.stall = 0
 
     def _connect(self, wires: Wires) -> None:

@@ -15,6 +15,7 @@ from emu.device import Register
 from emu.events import NEVER
 from emu.peripherals.adccourse import FOREVER, Course, Inputs, Published
 from emu.peripherals.adcrules import (
+    CHANNELS,
     CONVERTING,
     OFF,
     SAMPLING,
@@ -24,6 +25,7 @@ from emu.peripherals.adcrules import (
     fire_round,
     read_standing,
     write_con1,
+    write_scan,
 )
 from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import SLEEP, Kit, Peripheral
@@ -33,8 +35,6 @@ from emu.straight import Rule, place_of, slot_of
 
 FULL_SCALE: Final = 0x10000
 """AVDD in units of analog level."""
-CHANNELS: Final = 16
-"""Positions of the multiplexer; those without a pin read 0. UNVERIFIED."""
 _COURSES: Final = 64
 """Register settings remembered; firmware has a handful."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
@@ -94,6 +94,7 @@ class Adc(Peripheral):
             register.ruled(Rule(Standing(register.place, self._stands.place), read_standing))
         places = self._places()
         self.con1.ruled(Rule(places, read_standing, write_con1))
+        self.cssl.ruled(Rule(places, None, write_scan))
         self.ruled(self._step, Rule(places, fires=fire_round))
 
     def _places(self) -> AdcPlaces:
@@ -110,6 +111,9 @@ class Adc(Peripheral):
             adon=adon,
             samp=samp,
             bufs=1 << sfrs["ADCON2"].fields["BUFS"][0],
+            cssl=self.cssl.place,
+            scannable=sfrs["ADCSSL"].writable,
+            cscna=1 << sfrs["ADCON2"].fields["CSCNA"][0],
             done=done,
             buffer=self._buffers[0].place,
             level=place_of(record, "adc.input"),

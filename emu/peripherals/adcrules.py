@@ -11,6 +11,8 @@ from emu.straight import Line, Number, Place, Reader, Slot, request
 
 BUFFERS: Final = 16
 """Results that are kept."""
+CHANNELS: Final = 16
+"""Positions of the multiplexer; those without a pin read 0. UNVERIFIED."""
 OFF, WAITING, SAMPLING, CONVERTING = range(4)
 """States: ADON = 0; nothing connected; SAMP = 1; SAMP = 0 and the converter at work."""
 
@@ -41,6 +43,10 @@ class AdcPlaces:
     adon: int
     samp: int
     bufs: int
+    cssl: Place
+    scannable: int
+    """Bits of ADCSSL."""
+    cscna: int
     native: Place
     frozen: Place
     sampling: Place
@@ -69,13 +75,14 @@ class AdcPlaces:
 
 
 def write_con1(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
-    """ADON alone changes. On: sampling begins with the next cycle, from the first channel on. Off: the conversion under
-    way is lost."""
+    """ADON changes and no setting does. On: sampling begins with the next cycle, from the first channel on. Off: the
+    conversion under way is lost. SAMP is the converter's in both cases."""
     old = m.get(p.register)
     free, kept = p.writable & lanes, p.clear_only & lanes
     new = (old & (0xFFFF & ~(free | kept))) | (value & free) | (old & value & kept)
     plain = (m.get(p.native) != 0) & (m.get(p.frozen) == NEVER)
-    m.need(((old ^ new) == p.adon) & plain & (m.now < m.get(p.until)))
+    settings = 0xFFFF & ~(p.samp | p.done)
+    m.need((((old ^ new) & settings) == p.adon) & plain & (m.now < m.get(p.until)))
     starts, con2 = (new & p.adon) != 0, m.get(p.con2)
     sampling = m.get(p.sampling)
     begun = (m.now + 1) << 1
@@ -88,6 +95,22 @@ def write_con1(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
     m.put(p.state, m.select(starts, SAMPLING, OFF))
     m.put(p.until, m.select(starts, (begun + sampling + 1) >> 1, FOREVER))
     m.post(p.step, m.select(starts, (end + 1) >> 1, NEVER))
+    return True
+
+
+def write_scan(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
+    """ADCSSL written while the converter is off: the channels in turn from now on."""
+    if lanes != 0xFFFF:
+        return False
+    chosen = value & p.scannable
+    m.need((m.get(p.native) != 0) & (m.get(p.state) == OFF) & ((m.get(p.con2) & p.cscna) != 0) & (chosen != 0))
+    length: Number = 0
+    for channel in range(CHANNELS):
+        is_chosen = (chosen >> channel) & 1
+        m.put(p.channels, m.select(is_chosen, channel, m.get(p.channels, length)), length)
+        length = length + is_chosen
+    m.put(p.length, length)
+    m.put(p.cssl, chosen)
     return True
 
 

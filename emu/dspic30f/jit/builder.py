@@ -7,109 +7,20 @@ that only Python can make (a register with side effects, a trap, a cold memory),
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Final, Literal
+from collections.abc import Callable
+from typing import Final
 
 from emu.dspic30f import flowrules
+from emu.dspic30f.data import W_END
 from emu.dspic30f.isa.builder import Context, Side, Size
+from emu.dspic30f.jit.pending import Pending, Store
+from emu.dspic30f.jit.pointed import CONVENTION, POINTED
 from emu.dspic30f.jit.reader import LlvmWays, NativeReader
+from emu.dspic30f.jit.surroundings import INTERPRET, Surroundings
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import Variables, pointer
 from emu.dspic30f.registers import NSTDIS
-from emu.dspic30f.state import FLAGS, SA, SAB, SB
-from emu.straight import Rule
-
-W_END: Final = 0x20  # W0..W15 are data addresses 0x00..0x1F, isa.md §2.2
-STACK_POINTER: Final = 15
-
-NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK, MODES = range(8)
-"""Why native code came back: go on at PC; interpret the instruction at PC; the block at PC reaches the deadline;
-look at events and interrupts before PC; no native code at PC; a RETFIE has run for two cycles;
-PC is hooked; the processor modes are others at PC."""
-
-Access = Literal["plain", "slow", "irq", "flags", "sr"]
-"""How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;
-interrupt flags, which native code only clears; SR."""
-
-
-@dataclass(frozen=True)
-class Latches:
-    """Where table writes go: byte offsets in the record, and the addresses of EEPROM (`ProgramMemory.table_write`)."""
-
-    flash: int
-    flash_count: int
-    eeprom: int
-    eeprom_count: int
-    eeprom_range: tuple[int, int]
-    captured_in: tuple[int, int] | None
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What the translator knows of the machine around an instruction."""
-
-    offset: Mapping[str, int]
-    """Byte offsets in the record of registers and hidden state by name."""
-    reads: Mapping[int, Access]
-    """By even SFR address; absent: slow."""
-    writes: Mapping[int, tuple[Access, int]]
-    """By even SFR address: how, and the bits a write can change; absent: slow."""
-    initialised: int
-    """W registers known to have been written since reset: they need no check as pointers (isa.md §2.2)."""
-    limit_armed: bool
-    """SPLIM has been written since reset (isa.md §10.2)."""
-    ram: tuple[int, int]
-    """First data address behind the SFRs, first one behind RAM."""
-    y_ram: int
-    """First data address of Y RAM, which is the upper part of RAM."""
-    flash_words: int
-    flag_words: tuple[tuple[int, int], ...]
-    """Addresses of interrupt flag registers, each with that of its enables."""
-    trap_flags: int
-    """Bits of INTCON1 that request a trap."""
-    idling: Rule
-    clearing: Rule
-    """What PWRSAV #1 and CLRWDT do."""
-    latches: Latches
-    flow: flowrules.FlowPlaces
-    rules: Mapping[int, Rule] = field(default_factory=dict)
-    """Of device registers, by even address."""
-    hooks: frozenset[int] = frozenset()
-    """Program addresses that Python wants to see."""
-    do_start: int = -1
-    do_end: int = -1
-    """The DO loop that is active: its first and last instruction; -1: none."""
-
-    def accumulator_at(self, address: int) -> tuple[int, int] | None:
-        """Accumulator of which the word at `address` is a part, and from which bit on; None elsewhere."""
-        for i, low in enumerate((self.offset["ACCAL"], self.offset["ACCBL"])):
-            if low <= address < low + 6:
-                return i, 8 * (address - low)
-        return None
-
-
-@dataclass
-class Pending:
-    """What the instruction being translated will commit."""
-
-    w: dict[int, Number] = field(default_factory=dict)
-    flags: dict[str, Number] = field(default_factory=dict)
-    acc: dict[int, Number] = field(default_factory=dict)
-    registers: dict[str, Number] = field(default_factory=dict)
-    stores: list[Callable[[], None]] = field(default_factory=list)
-    initialises: int = 0
-    psv: list[Value] = field(default_factory=list)
-    """Truth values: the instruction read the PSV window."""
-    stop: bool = False
-    """The next boundary must look at interrupts."""
-    replanned: bool = False
-    """The deadline may have come nearer: the function must be left."""
-    touches_sfr: bool = False
-    """An SFR that events may change, or that devices hear of, is accessed."""
-    sr: Number | None = None
-    mapped: int = 0
-    """W registers written through their data addresses: stall sources like any written register."""
+from emu.dspic30f.state import FLAGS, SA, SAB, SB, STACK_POINTER
 
 
 class NeedsInterpreter(Exception):
@@ -137,6 +48,11 @@ class LlvmBuilder:
         """Some instruction of the function writes accumulator flags, so SR in the record may lack them."""
         self.before_slow: Callable[[], None] = lambda: None
         """Writes what goes into a slow exit first."""
+        self.reach: Callable[[], Number] | None = None
+        """Truth of "no event is due up to the access", for pointers that turn out to lead to a register. None: such an
+        access is the interpreter's."""
+        self.several_stores = False
+        """Of one instruction: a register's is then the interpreter's, who alone can do all or none."""
         self._slow: str | None = None
 
     # -- instruction frame ------------------------------------------------------------------------------------------
@@ -148,11 +64,14 @@ class LlvmBuilder:
         self.pc = pc
         self.psv_cycles = psv_cycles
         self.pending = Pending()
+        self.reach = None
         self._slow = None
 
     def commit(self) -> None:
         """All probes have been made: write registers, flags and memory."""
         p = self.pending
+        if p.pointed is not None:
+            self._store_pointed(p.pointed)
         for store in p.stores:
             store()
         for n, value in p.w.items():
@@ -262,10 +181,11 @@ class LlvmBuilder:
         if isinstance(ea, int):
             return self._load_static(ea, size)
         in_ram = self._in_ram(ea, size, ptr)
-        if not self.context.psv or ptr == STACK_POINTER or self.psv_cycles is None:
+        window = bool(self.context.psv) and self.psv_cycles is not None
+        if ptr == STACK_POINTER or not (window or self.reach):
             self.guard(in_ram)
             return self.e.load(pointer(self.e, ea), 8 * size)
-        return self._load_ram_or_psv(ea, size, in_ram)
+        return self._load_pointed(ea, size, in_ram, window)
 
     def _in_ram(self, ea: Value, size: int, ptr: int | None) -> Value:
         """Aligned, in RAM and, for the stack pointer, not above SPLIM: one comparison plus one (design §4.3)."""
@@ -280,29 +200,57 @@ class LlvmBuilder:
             return ok & (ea <= limit)
         return ok
 
-    def _load_ram_or_psv(self, ea: Value, size: int, in_ram: Value) -> Value:
+    def _load_pointed(self, ea: Value, size: Size, in_ram: Value, window: bool) -> Value:
+        """From RAM, from the PSV window if it is open, or from a register."""
         e = self.e
-        ram, other, window, done = (e.fresh(s) for s in ("ram", "other", "psv", "done"))
+        ram, other, done = (e.fresh(s) for s in ("ram", "other", "done"))
         e.end(f"br i1 {truth(in_ram)}, label %{ram}, label %{other}, !prof !0")
+        e.start(ram)
+        found = [(wide(e.load(pointer(e, ea), 8 * size)), ram)]
+        e.end(f"br label %{done}")
         e.start(other)
+        if window:
+            value, label, elsewhere = self._load_window(ea, size)
+            found.append((value, label))
+            e.end(f"br label %{done}")
+            e.start(elsewhere)
+        if self.reach is None:
+            e.end(f"br label %{self.slow_label}")
+        else:
+            self.guard(self.reach() & ((ea & (size - 1)) == 0))
+            word = self._pointed(ea & 0xFFFE, 0, 0, "memory(read)")
+            self.guard(word >= 0)
+            found.append((wide(word if size == 2 else (word >> ((ea & 1) << 3)) & 0xFF), e.block.label))
+            e.end(f"br label %{done}")
+        e.start(done)
+        if window:
+            ways = ", ".join(f"[ {str(i == 1).lower()}, %{label} ]" for i, (_, label) in enumerate(found))
+            self.pending.psv.append(e.let(f"phi i1 {ways}", bit=True))
+        return e.let(f"phi i64 {', '.join(f'[ {value}, %{label} ]' for value, label in found)}")
+
+    def _load_window(self, ea: Value, size: Size) -> tuple[str, str, str]:
+        """What the PSV window shows at an address, the block that has read it, and that of addresses not in it."""
+        e = self.e
+        window, elsewhere = e.fresh("psv"), e.fresh("elsewhere")
         fits = (ea & 0x8000) != 0
         if size == 2:
             fits = fits & ((ea & 1) == 0)
         page = e.load(pointer(e, self.around.offset["PSVPAG"]), 16)
         word = ((page << 15) | (ea & 0x7FFE)) >> 1
         fits = fits & (word < self.around.flash_words)
-        e.end(f"br i1 {truth(fits)}, label %{window}, label %{self.slow_label}")
+        e.end(f"br i1 {truth(fits)}, label %{window}, label %{elsewhere}")
         e.start(window)
         code = e.load(pointer(e, (word << 2) + self.around.offset["flash"]), 32)
         shifted = code >> ((ea & 1) << 3) if size == 1 else code
-        from_flash = wide(shifted & (0xFF if size == 1 else 0xFFFF))
-        e.end(f"br label %{done}")
-        e.start(ram)
-        from_ram = wide(e.load(pointer(e, ea), 8 * size))
-        e.end(f"br label %{done}")
-        e.start(done)
-        self.pending.psv.append(e.let(f"phi i1 [ true, %{window} ], [ false, %{ram} ]", bit=True))
-        return e.let(f"phi i64 [ {from_flash}, %{window} ], [ {from_ram}, %{ram} ]")
+        return wide(shifted & (0xFF if size == 1 else 0xFFFF)), window, elsewhere
+
+    def _pointed(self, word: Number, lanes: Number, value: Number, effect: str = "") -> Value:
+        """Call what `pointed.py` makes."""
+        e, place, function = self.e, self.e.name(), self.e.name()
+        e.line(f"{place} = getelementptr i64, ptr %env, i64 {POINTED}")
+        e.line(f"{function} = load ptr, ptr {place}")
+        numbers = ", ".join(f"i64 {wide(one)}" for one in (self.now, word, lanes, value))
+        return e.let(f"call {CONVENTION} i64 {function}(ptr %rec, {numbers}) cold nounwind {effect}")
 
     def _load_static(self, ea: int, size: Size) -> Number:
         if size == 2 and ea & 1:
@@ -337,13 +285,31 @@ class LlvmBuilder:
         if isinstance(ea, int):
             self._store_static(ea, v, size)
             return
-        self.guard(self._in_ram(ea, size, ptr))
-        target = ea
+        in_ram, target = self._in_ram(ea, size, ptr), ea
+        if self.reach is not None and ptr != STACK_POINTER and not self.several_stores:
+            self.pending.pointed = Store(ea, v, size, in_ram)
+            return
+        self.guard(in_ram)
+        self.pending.stores.append(lambda: self.e.store(pointer(self.e, target), v, 8 * size))
 
-        def now() -> None:
-            self.e.store(pointer(self.e, target), v, 8 * size)
-
-        self.pending.stores.append(now)
+    def _store_pointed(self, s: Store) -> None:
+        """To RAM or to a register, which is the last that can refuse."""
+        assert self.reach is not None
+        e = self.e
+        ram, device, done = (e.fresh(name) for name in ("ram", "device", "done"))
+        e.end(f"br i1 {truth(s.in_ram)}, label %{ram}, label %{device}, !prof !0")
+        e.start(device)
+        self.guard(self.reach() & ((s.address & (s.size - 1)) == 0))
+        odd = s.address & 1
+        lanes, placed = (0xFFFF, s.value) if s.size == 2 else (0xFF << (odd << 3), s.value << (odd << 3))
+        self.guard(self._pointed(s.address & 0xFFFE, lanes, placed) != 0)
+        written = e.block.label
+        e.end(f"br label %{done}")
+        e.start(ram)
+        e.store(pointer(e, s.address), s.value, 8 * s.size)
+        e.end(f"br label %{done}")
+        e.start(done)
+        self.pending.left = e.let(f"phi i1 [ true, %{written} ], [ false, %{ram} ]", bit=True)
 
     def _store_static(self, ea: int, v: Number, size: Size) -> None:
         if (size == 2 and ea & 1) or ea >= self.around.ram[1]:

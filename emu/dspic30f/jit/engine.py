@@ -7,7 +7,6 @@ yet. Code arrives from the disk cache at once or from the compile process later;
 from __future__ import annotations
 
 import ctypes
-import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -15,24 +14,12 @@ from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
 from emu.dspic30f.facts import facts_of
-from emu.dspic30f.flowrules import places_of
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.builder import (
-    DEADLINE,
-    HOOK,
-    INTERPRET,
-    MISS,
-    RETFIE,
-    SERVICE,
-    W_END,
-    Access,
-    Latches,
-    Surroundings,
-)
 from emu.dspic30f.jit.compiler import shared_compiler
 from emu.dspic30f.jit.counting import LEDGER, BoundaryCounting, Counting, RowOf
+from emu.dspic30f.jit.pointed import POINTED, pointed_text
 from emu.dspic30f.jit.region import Region, discover
 from emu.dspic30f.jit.runtime import (
     BLOCKS,
@@ -47,9 +34,21 @@ from emu.dspic30f.jit.runtime import (
     STEPS,
     dispatch_text,
 )
+from emu.dspic30f.jit.surroundings import (
+    DEADLINE,
+    HOOK,
+    INTERPRET,
+    MISS,
+    RETFIE,
+    SERVICE,
+    Surroundings,
+    identity_of,
+    offsets,
+    surroundings_of,
+)
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.ledger import STRETCH, Ledger
-from emu.dspic30f.modes import REGISTERS, Key, Modes
+from emu.dspic30f.modes import Key, Modes
 from emu.dspic30f.state import NOT_REPEATING, RUN
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
@@ -82,6 +81,8 @@ class Code:
     around: Surroundings
     identity: bytes
     """Hash of all that code depends on apart from program words."""
+    pointed: int
+    """Address of the function for registers that are reached by pointer."""
     blocks: Any
     steps: Any
     regions: dict[int, Region] = field(default_factory=dict)
@@ -126,6 +127,7 @@ class JitEngine:
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
         self._env_address: Final = ctypes.addressof(self._env)
         self._codes: Final[dict[object, Code]] = {}
+        self._pointers: Final[dict[object, int]] = {}
         self._code: Code | None = None
         self._key: object = None
         self._dispatch: Any = None
@@ -341,11 +343,23 @@ class JitEngine:
         self._code = code
         self._env[BLOCKS] = ctypes.addressof(code.blocks)
         self._env[STEPS] = ctypes.addressof(code.steps)
+        self._env[POINTED] = code.pointed
 
     def _new_code(self, key: Key) -> Code:
         around = surroundings_of(self._core, key, frozenset(self._hooks), self._offset)
         table = ctypes.c_uint64 * self._words
-        return Code(key.context, around, identity_of(key.context, around), table(), table())
+        return Code(key.context, around, identity_of(key.context, around), self._pointed(around), table(), table())
+
+    def _pointed(self, around: Surroundings) -> int:
+        """Native accesses to registers that are reached by pointer."""
+        bus = self._core.bus
+        key = bus.off, frozenset(bus.watched), around.limit_armed
+        if key not in self._pointers:
+            text = pointed_text(self._core, around)
+            name = self.compiler.key(STEP_LEVEL, text.encode())
+            kept = self.compiler.from_disk(name)
+            self._pointers[key] = kept[0] if kept is not None else self.compiler.now(text, STEP_LEVEL, name)
+        return self._pointers[key]
 
     # -- translation ------------------------------------------------------------------------------------------------
     def _prepare(self) -> None:
@@ -405,66 +419,3 @@ class JitEngine:
         self._codes.clear()
         self._computed.clear()
         self._key = None
-
-def identity_of(context: Context, around: Surroundings) -> bytes:
-    """Hash of processor modes and surroundings, without the hooks: those in a region belong to the region."""
-    facts = vars(around) | {"hooks": None}
-    parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in facts.values()]
-    return hashlib.sha256(repr((context, parts)).encode()).digest()
-
-
-def offsets(core: Core) -> dict[str, int]:
-    """Byte offsets in the record of every register and reserved field, by name."""
-    offset = {name: sfr.address for name, sfr in core.chip.sfrs.items()}
-    offset |= {name: reserved.offset for name, reserved in core.record.fields.items()}
-    offset |= {name: 2 * core.state.at[name] for name in ("W0S", "W1S", "W2S", "W3S", "SRS")}
-    offset["flash"] = core.program.flash_offset
-    return offset
-
-
-def surroundings_of(core: Core, key: Key, hooks: frozenset[int], offset: Mapping[str, int]) -> Surroundings:
-    """What translations in the modes `key` may rely on, apart from the program."""
-    chip, bus = core.chip, core.bus
-    words = {chip.sfrs[s.flag[0]].address: chip.sfrs[s.enable[0]].address for s in chip.interrupts.values()}
-    reads, writes = access_kinds(core)
-    ram = chip.data["ram"]
-    start, end = key.loop if key.loop is not None else (-1, -1)
-    return Surroundings(
-        offset, reads, writes, key.initialised, bool(key.limit_armed), (ram.start, ram.end), chip.data["yram"].start,
-        chip.program["flash"].end // 2, tuple(sorted(words.items())), core.traps.flags,
-        core.sequencer.power.wires.idling, core.sequencer.power.wires.clearing, latches_of(core), places_of(core.state),
-        {2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None}, hooks, start, end)  # fmt: skip
-
-
-def latches_of(core: Core) -> Latches:
-    """Where table writes go."""
-    flash, eeprom = (core.record.fields[f"program.{kind}_latch"] for kind in ("flash", "eeprom"))
-    program = core.program
-    return Latches(flash.offset, flash.count, eeprom.offset, eeprom.count, program.eeprom_range, program.captured_in)
-
-
-def access_kinds(core: Core) -> tuple[dict[int, Access], dict[int, tuple[Access, int]]]:
-    """How native code may touch each SFR, from what stands behind it on the bus."""
-    bus, sfrs = core.bus, core.chip.sfrs
-    sources = core.chip.interrupts.values()
-    special: dict[int, Access] = {}
-    if not core.exceptions.ipl_slip:
-        special |= {sfrs[name].address: "irq" for s in sources for name in (s.enable[0], s.priority[0])}
-        special |= {sfrs[source.flag[0]].address: "flags" for source in sources}
-        special[sfrs["SR"].address] = "sr"
-    if core.state.limit_armed:
-        special[sfrs["SPLIM"].address] = "plain"
-    modes = {sfrs[name].address for name in REGISTERS} - special.keys()
-    reads: dict[int, Access] = {}
-    writes: dict[int, tuple[Access, int]] = {}
-    for address in range(W_END, bus.end, 2):
-        word = address >> 1
-        if bus.modelled[word] and bus.on_read[word] is None and bus.compute[word] is None:
-            reads[address] = "plain"
-        if word in bus.watched or address in modes:
-            continue
-        if address in special:
-            writes[address] = (special[address], bus.writable[word])
-        elif bus.modelled[word] and bus.on_write[word] is None and not bus.clear_only[word]:
-            writes[address] = ("plain", bus.writable[word])
-    return reads, writes

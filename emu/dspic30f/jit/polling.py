@@ -13,8 +13,9 @@ from typing import Final
 from emu.dspic30f import flowrules
 from emu.dspic30f.isa.builder import Context, Size
 from emu.dspic30f.isa.flow import Branch, Goto, Skip
-from emu.dspic30f.jit.builder import LlvmBuilder, NeedsInterpreter, Surroundings
+from emu.dspic30f.jit.builder import LlvmBuilder, NeedsInterpreter
 from emu.dspic30f.jit.region import Region, Step
+from emu.dspic30f.jit.surroundings import Surroundings
 from emu.dspic30f.jit.values import Emitter, Number, Value
 from emu.dspic30f.jit.variables import Variables
 

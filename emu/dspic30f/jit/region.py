@@ -14,11 +14,10 @@ from emu.dspic30f.facts import Facts, facts_of, flow_of
 from emu.dspic30f.flowrules import words_skipped
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Do, Goto, Repeat, Reset, Return, Skip, Sleep
 from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.state import PC_MASK
 
 LIMIT: Final = 150
 """Instructions in a region: compile time per instruction grows behind that (design §4.3, measured)."""
-
-PC_WRAP: Final = 0x7FFFFE
 
 Fetch = Callable[[int], Insn | None]
 """Decoded instruction at a program address; None where nothing legal stands."""
@@ -53,10 +52,10 @@ def static_target(pc: int, insn: Insn, fetch: Fetch) -> int | None:
     """Target of a branch or jump that the instruction itself names, or where a skip leads; None if computed."""
     flow = flow_of(insn, pc)
     if isinstance(flow, Skip):
-        skipped = fetch((pc + 2) & PC_WRAP)
-        return None if skipped is None else (pc + 2 + 2 * words_skipped(skipped)) & PC_WRAP
+        skipped = fetch((pc + 2) & PC_MASK)
+        return None if skipped is None else (pc + 2 + 2 * words_skipped(skipped)) & PC_MASK
     if isinstance(flow, (Branch, Goto)) and isinstance(flow.target, int):
-        return flow.target & PC_WRAP
+        return flow.target & PC_MASK
     return None
 
 
@@ -76,7 +75,7 @@ def discover(start: int, fetch: Fetch, known: Container[int] = (), hooks: Contai
             if insn is None:
                 break
             facts = facts_of(insn)
-            next_pc = (pc + 2 * insn.words) & PC_WRAP
+            next_pc = (pc + 2 * insn.words) & PC_MASK
             target = static_target(pc, insn, fetch)
             region.steps[pc] = Step(pc, insn, facts, next_pc, target)
             if pc in hooks:

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 from emu.dspic30f import flowrules
 from emu.dspic30f.isa.flow import Repeat
-from emu.dspic30f.jit.builder import DEADLINE, SERVICE, LlvmBuilder, NeedsInterpreter, Pending
+from emu.dspic30f.jit.builder import LlvmBuilder, NeedsInterpreter
+from emu.dspic30f.jit.pending import Pending
 from emu.dspic30f.jit.reader import LlvmWays
 from emu.dspic30f.jit.region import Step
+from emu.dspic30f.jit.surroundings import DEADLINE, SERVICE
 from emu.dspic30f.jit.values import Emitter, Number, Value, wide
 from emu.dspic30f.jit.variables import MemoryVariables
 from emu.dspic30f.state import RA

@@ -8,15 +8,17 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.jit.builder import DEADLINE, MISS, NEXT, RETFIE, SERVICE
 from emu.dspic30f.jit.counting import BoundaryCount
+from emu.dspic30f.jit.pointed import POINTED
 from emu.dspic30f.jit.service import DONE, service_text
+from emu.dspic30f.jit.surroundings import DEADLINE, MISS, NEXT, RETFIE, SERVICE
 
 LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
 steps; interrupts entered so far; whether to begin with the boundary before PC."""
-PERIOD, LAST, NOTED, NOTES = range(7, 11)
-"""A limit before the last one is noted instead: the next is a period later. How many are noted, and the cycles."""
+PERIOD, LAST, NOTED = range(7, 10)
+"""A limit before the last one is noted instead: the next is a period later. How many are noted; `NOTES`: the cycles."""
+NOTES: Final = POINTED + 1
 ROOM: Final = 1024
 """Notes that are kept until Python takes them."""
 ENV_WORDS: Final = NOTES + ROOM

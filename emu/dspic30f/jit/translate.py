@@ -12,24 +12,14 @@ from typing import Final
 from emu.dspic30f import flowrules
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
-from emu.dspic30f.jit.builder import (
-    DEADLINE,
-    HOOK,
-    INTERPRET,
-    MISS,
-    MODES,
-    NEXT,
-    RETFIE,
-    SERVICE,
-    LlvmBuilder,
-    NeedsInterpreter,
-    Surroundings,
-)
+from emu.dspic30f.jit.builder import LlvmBuilder, NeedsInterpreter
 from emu.dspic30f.jit.counting import Count
+from emu.dspic30f.jit.pointed import requested
 from emu.dspic30f.jit.polling import empty_loops
 from emu.dspic30f.jit.reader import LlvmWays, NativeReader
 from emu.dspic30f.jit.region import Region, Step
 from emu.dspic30f.jit.repeat import Repeats
+from emu.dspic30f.jit.surroundings import DEADLINE, HOOK, INTERPRET, MISS, MODES, NEXT, RETFIE, SERVICE, Surroundings
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import MemoryVariables, Variables, pointer
 from emu.dspic30f.state import IDLE, IPL3, NOT_REPEATING, PC_MASK
@@ -78,6 +68,7 @@ class Translator:
         self._requested: Value
         self._polling: Final = {} if exact else empty_loops(region, around, context)
         self._heads: Final = {loop.head for loop in self._polling.values()}
+        self._polled: Final = {pc for loop in self._polling.values() for pc, _ in loop.costs}
 
     def text(self) -> str:
         """The module."""
@@ -233,9 +224,10 @@ class Translator:
         e.start(seen)
         e.line(f"store i64 {NOWHERE}, ptr {place}, align 1")
 
-    def fits(self, cost: Number) -> Value:
-        """Whether `cost` cycles from now on end before the cycle of the deadline."""
-        return self.e.let(f"icmp ult i64 {wide(self.v.get('cycle') + cost)}, %stop", bit=True)
+    def fits(self, cost: Number, start: Number | None = None) -> Value:
+        """Whether `cost` cycles from `start` (now) on end before the cycle of the deadline."""
+        begun = self.v.get("cycle") if start is None else start
+        return self.e.let(f"icmp ult i64 {wide(begun + cost)}, %stop", bit=True)
 
     def _instruction(self, step: Step, written: Number) -> tuple[bool, Number]:
         """One instruction; returns whether the block ends and the W registers written on the destination side."""
@@ -243,7 +235,11 @@ class Translator:
         stall = flowrules.stall(written, step.facts.source_pointers)
         b.begin(step.pc, step.facts.window_cycles)
         self.at = step.pc
-        b.now = self.v.get("cycle") + stall + step.facts.access
+        start = self.v.get("cycle")
+        b.now = start + stall + step.facts.access
+        b.several_stores = step.facts.stores > 1
+        if step.pc not in self._polled:  # iterations that are skipped may not read what time changes
+            b.reach = lambda: self.fits(row.cycles + stall, start) if self.exact else 1
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
         if flow is not None and step.pc == self.around.do_end:
             raise NeedsInterpreter  # undefined on silicon; the sequencer says what happens here
@@ -284,6 +280,7 @@ class Translator:
             elif b.pending.replanned or b.pending.stop:
                 self._behind(step.next_pc)
             else:
+                self._leave_behind_register(step.next_pc)
                 return False, mask
             return True, mask
         self._flow(step, flow, cycles, mask)
@@ -297,7 +294,15 @@ class Translator:
         elif self.b.pending.stop:
             self._look(pc)
         else:
+            self._leave_behind_register(pc)
             self.jump(pc)
+
+    def _leave_behind_register(self, pc: int) -> None:
+        """If an instruction without flow has written a register by pointer."""
+        if self.b.pending.left is not None:
+            on = self.e.fresh("on")
+            self.e.end(f"br i1 {self.b.pending.left.text}, label %{self.exit(pc, NEXT)}, label %{on}")
+            self.e.start(on)
 
     def _end_of_loop(self, step: Step) -> None:
         """The instruction at DOEND. EDT is the sequencer's; who leaves the loop leaves its translation."""
@@ -392,21 +397,12 @@ class Translator:
         e.end(f"br label %{self.exit(next_pc, SERVICE)}")
 
     # -- interrupts -------------------------------------------------------------------------------------------------
-    def _requests(self) -> Value:
-        """Truth of "some enabled interrupt is requested"."""
-        e = self.e
-        total: Number = 0
-        for flags, enables in self.around.flag_words:
-            total = total | (e.load(pointer(e, flags), 16) & e.load(pointer(e, enables), 16))
-        assert isinstance(total, Value)
-        return total != 0
-
     def _look(self, next_pc: int) -> None:
         """The instruction before may have made an interrupt acceptable: look if any is requested at all."""
         e = self.e
         self.count.settle()
         some = e.fresh("some")
-        e.end(f"br i1 {self._requests().text}, label %{some}, label %{self._label(next_pc)}")
+        e.end(f"br i1 {requested(e, self.around).text}, label %{some}, label %{self._label(next_pc)}")
         e.start(some)
         e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
         e.end(f"br label %{self.exit(next_pc, SERVICE)}")
@@ -418,5 +414,5 @@ class Translator:
         traps = e.load(pointer(e, self.around.offset["INTCON1"]), 16) & self.around.trap_flags
         plain = (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
         b.guard(plain)
-        self._requested = self._requests()
+        self._requested = requested(self.e, self.around)
         flowrules.resume(NativeReader(b), self.around.flow, flow.srl & 0xFF, 0)
