@@ -48,6 +48,9 @@ class Ring:
         self._on_at = on_at
         self._poses = Poses([], [])
         self._is_stale = True
+        self._near: Nearby | None = None
+        self._unfelt = 0
+        """Bit n: nobody has asked for sensor n since what is near was found out."""
         self.is_read = False
         """Whether the firmware has ever converted one of the sensors."""
         self.look: Callable[[], Poses] | None = None
@@ -70,7 +73,11 @@ class Ring:
     @property
     def readings(self) -> list[int] | None:
         """Counts by which the own emitters lower the sensors when lit; None if none was ever converted."""
-        return list(self._board.ir.reflection) if self.is_read else None
+        if not self.is_read:
+            return None
+        for sensor in range(SENSORS):
+            self._feel(sensor)
+        return list(self._board.ir.reflection)
 
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
         if not self._board.ir.events.quiet:  # others have seen what is run again
@@ -79,7 +86,11 @@ class Ring:
     def _level(self, sensor: int, source: Callable[[int], int], cycle: int) -> int:
         if self._is_stale:
             self._sense()
+        if self._unfelt >> sensor & 1:
+            self._feel(sensor)
         level = source(cycle)
+        if not self._heard[sensor]:
+            return level
         light = 0.0
         for other, line, counts in self._heard[sensor]:
             if self._ether.seen(other, self._on_at + cycle) >> line & 1:
@@ -90,49 +101,79 @@ class Ring:
         if self.look is not None and not self.is_read:
             self._poses = self.look()
         self._is_stale, self.is_read = False, True
+        self._near, self._unfelt = nearby(self._scene, self._poses, self._robot), (1 << SENSORS) - 1
         ir = self._board.ir
-        for sensor, (distance, share) in enumerate(surfaces(self._scene, self._poses, self._robot)):
-            ir.reflection[sensor] = round(reflection_at(distance) * share)
         for sensor, counts in enumerate(ambient(self._scene, self._poses.robots[self._robot])):
             ir.ambient[sensor] = counts
         self._heard = signals(self._scene, self._poses, self._robot)
 
+    def _feel(self, sensor: int) -> None:
+        """What a sensor sees of its own light, when it is first asked for."""
+        if self._near is not None and self._unfelt >> sensor & 1:
+            self._unfelt &= ~(1 << sensor)
+            distance, share = surface(self._scene, self._near, sensor)
+            self._board.ir.reflection[sensor] = round(reflection_at(distance) * share)
+
+
+_BEARINGS: Final = tuple(math.radians(bearing) for bearing in bodies.IR_BEARINGS_DEG)
+
+
+def _axis(pose: tuple[float, float, float], sensor: int) -> tuple[float, float]:
+    """Unit vector of a sensor of a robot, which is also its emitter's."""
+    angle = pose[2] - _BEARINGS[sensor]
+    return math.cos(angle), math.sin(angle)
+
 
 def _axes(pose: tuple[float, float, float]) -> list[tuple[float, float]]:
-    """Unit vectors of the sensors of a robot, which are also its emitters'."""
-    angles = [pose[2] - math.radians(bearing) for bearing in bodies.IR_BEARINGS_DEG]
-    return [(math.cos(angle), math.sin(angle)) for angle in angles]
+    """Of all of them."""
+    return [_axis(pose, sensor) for sensor in range(SENSORS)]
 
 
 def surfaces(scene: Scene, poses: Poses, robot: int) -> list[Surface]:
-    """What each sensor's axis meets from the body's edge: wall, object or robot, beyond IR_RANGE nothing (inf mm). A
-    surface that stands askew reflects by the cosine (Lambert, UNVERIFIED)."""
-    x, y, _ = poses.robots[robot]
+    """What each sensor's axis meets from the body's edge: wall, object or robot, beyond IR_RANGE nothing (inf mm)."""
+    near = nearby(scene, poses, robot)
+    return [surface(scene, near, sensor) for sensor in range(SENSORS)]
+
+
+class Nearby(NamedTuple):
+    """What sensors of a robot can reach: discs as (x, y, radius, share) from its middle, sides with their shares."""
+
+    pose: tuple[float, float, float]
+    discs: list[tuple[float, float, float, float]]
+    outlines: list[tuple[geometry.Side, float]]
+
+
+def nearby(scene: Scene, poses: Poses, robot: int) -> Nearby:
+    """What is near a robot."""
+    x, y, _ = pose = poses.robots[robot]
     ring = scene.infrared
     discs = [(ox - x, oy - y, radius, share) for ox, oy, radius, share in _objects(scene, poses)]
     discs += [(one.x_cm - x, one.y_cm - y, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
     discs += [(one[0] - x, one[1] - y, bodies.ROBOT_RADIUS, ring.robot_share)
               for i, one in enumerate(poses.robots) if i != robot]  # fmt: skip
     reach = bodies.ROBOT_RADIUS + bodies.IR_RANGE
-    near = [(dx, dy, r, share) for dx, dy, r, share in discs if dx * dx + dy * dy < (reach + r) ** 2]
-    outlines = [(side, white) for side, white in _outlines(scene) if geometry.distance_to(x, y, side) < reach]
-    found = []
-    for east, north in _axes(poses.robots[robot]):
-        to_x, to_y = _to_wall(x, east, scene.arena.width_cm), _to_wall(y, north, scene.arena.height_cm)
-        distance, share = (to_x, abs(east)) if to_x < to_y else (to_y, abs(north))
-        share *= ring.wall_share
-        for side, white in outlines:
-            along = geometry.meeting(x, y, east, north, side)
-            if along < distance:
-                distance, share = along, white * abs(_facing(side, east, north))
-        for dx, dy, r, white in near:
-            along = dx * east + dy * north
-            root = r * r - (dx * dx + dy * dy - along * along)
-            if root > 0 and along > 0 and along - math.sqrt(root) < distance:
-                distance, share = along - math.sqrt(root), white * math.sqrt(root) / r
-        gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
-        found.append(Surface(10 * gap, share) if gap <= bodies.IR_RANGE else Surface(math.inf, 0.0))
-    return found
+    near = [disc for disc in discs if disc[0] * disc[0] + disc[1] * disc[1] < (reach + disc[2]) ** 2]
+    return Nearby(pose, near, [one for one in _outlines(scene) if geometry.distance_to(x, y, one[0]) < reach])
+
+
+def surface(scene: Scene, near: Nearby, sensor: int) -> Surface:
+    """What one sensor's axis meets. A surface that stands askew reflects by the cosine (Lambert, UNVERIFIED)."""
+    x, y, _ = near.pose
+    east, north = _axis(near.pose, sensor)
+    to_x, to_y = _to_wall(x, east, scene.arena.width_cm), _to_wall(y, north, scene.arena.height_cm)
+    distance, share = (to_x, abs(east)) if to_x < to_y else (to_y, abs(north))
+    share *= scene.infrared.wall_share
+    for side, white in near.outlines:
+        along = geometry.meeting(x, y, east, north, side)
+        if along < distance:
+            distance, share = along, white * abs(_facing(side, east, north))
+    for dx, dy, r, white in near.discs:
+        along = dx * east + dy * north
+        root = r * r - (dx * dx + dy * dy - along * along)
+        if root > 0 and along > 0 and along - math.sqrt(root) < distance:
+            distance, share = along - math.sqrt(root), white * math.sqrt(root) / r
+    gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
+    return Surface(10 * gap, share) if gap <= bodies.IR_RANGE else Surface(math.inf, 0.0)
 
 
 def _outlines(scene: Scene) -> list[tuple[geometry.Side, float]]:
@@ -196,13 +237,16 @@ def signals(scene: Scene, poses: Poses, robot: int) -> list[list[tuple[int, int,
     robots hide them from each other."""
     x, y, _ = poses.robots[robot]
     heard: list[list[tuple[int, int, float]]] = [[] for _ in range(SENSORS)]
-    axes = _axes(poses.robots[robot])
+    axes: list[tuple[float, float]] = []
     for other, pose in enumerate(poses.robots):
         dx, dy = pose[0] - x, pose[1] - y
+        if other == robot or max(abs(dx), abs(dy)) > SIGNAL_RANGE + 2 * bodies.ROBOT_RADIUS:
+            continue
         apart = math.hypot(dx, dy)
         gap = max(apart - 2 * bodies.ROBOT_RADIUS, 1.0)
-        if other == robot or gap > SIGNAL_RANGE or _is_hidden(scene, poses, robot, other):
+        if gap > SIGNAL_RANGE or _is_hidden(scene, poses, robot, other):
             continue
+        axes = axes or _axes(poses.robots[robot])
         strength = SIGNAL_COUNTS * (SIGNAL_RANGE / gap) ** 2
         sent = [max(-(dx * east + dy * north) / apart, 0.0) for east, north in _axes(pose)]
         for sensor, (east, north) in enumerate(axes):

@@ -167,20 +167,11 @@ class Adc(Peripheral):
             return 0, FULL_SCALE
         return self._vref_low.value if vcfg & 2 else 0, self._vref_high.value if vcfg & 1 else FULL_SCALE
 
-    def _sample(self, course: Course, cycle: int) -> int:
-        """Code of the input selected for this sample, 0..4095; the selection moves on."""
-        use_b = bool(self._use_b.value)
+    def _sampled(self, course: Course, channel: int, negative: int, cycle: int) -> int:
+        """Code of an input, 0..4095."""
         low, high = self._references(course.references)
-        channel, negative = course.inputs[use_b]
-        if course.scanned and not use_b:
-            place = self._scan.value % len(course.scanned)
-            channel = course.scanned[place]
-            self._scan.value = (place + 1) % len(course.scanned)
-        if course.alternates or use_b:
-            self._use_b.value = course.alternates and not use_b
         zero = self.source.at(1, cycle) if negative else low
-        span = max(high - low, 1)
-        return min(max((self.source.at(channel, cycle) - zero) * 4096 // span, 0), 4095)
+        return min(max((self.source.at(channel, cycle) - zero) * 4096 // max(high - low, 1), 0), 4095)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
@@ -197,7 +188,9 @@ class Adc(Peripheral):
         self.con1["SAMP"] = state == SAMPLING
         if state == CONVERTING:
             self.con1["DONE"] = 0
-            self._held.value = self._sample(self._course(), halves + 1 >> 1)
+            course = self._course()
+            channel, negative, self._scan.value, self._use_b.value = course.turn(self._scan.value, self._use_b.value)
+            self._held.value = self._sampled(course, channel, negative, halves + 1 >> 1)
 
     def catch_up(self, cycle: int) -> bool:
         """Carry out every conversion that ends at or before `cycle`. True if one of them raised the interrupt."""
@@ -208,6 +201,7 @@ class Adc(Peripheral):
         begun = 2 * self._mark.value + self._half.value
         interrupted, moved = False, False
         held, done = self._held.value, 0
+        scan, use_b = self._scan.value, self._use_b.value
         while True:
             duration = self._duration(course, state)
             if duration == NEVER or begun + duration + 1 >> 1 > cycle:
@@ -216,12 +210,15 @@ class Adc(Peripheral):
             moved = True
             if state == SAMPLING:
                 state, done = CONVERTING, 0
-                held = self._sample(course, begun + 1 >> 1)
+                channel, negative, scan, use_b = course.turn(scan, use_b)
+                held = self._sampled(course, channel, negative, begun + 1 >> 1)
             else:
-                interrupted |= self._store(course, held)
+                if self._store(course, held):
+                    interrupted, scan = True, 0  # the scan starts again behind every interrupt (§13)
                 state, done = (SAMPLING if course.again else WAITING), 1
         if moved:
             self._state.value, self._held.value = state, held
+            self._scan.value, self._use_b.value = scan, use_b
             self._mark.value, self._half.value = begun >> 1, begun & 1
             self.con1["SAMP"] = state == SAMPLING
             self.con1["DONE"] = done
@@ -238,7 +235,7 @@ class Adc(Peripheral):
             self._count.value = count
             self._next.value = (place + 1) % 16
             return False
-        self._count.value = self._scan.value = 0  # the scan starts again behind every interrupt (§13)
+        self._count.value = 0
         if course.in_halves:
             self.con2["BUFS"] = 1 - self.con2["BUFS"]
             self._next.value = 8 * self.con2["BUFS"]

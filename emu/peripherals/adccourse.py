@@ -54,6 +54,14 @@ class Course:
         """Inputs in turn, multiplexer A."""
         return self.scanned or (self.inputs[0][0],)
 
+    def turn(self, scan: int, use_b: int) -> tuple[int, int, int, int]:
+        """What is sampled now, (channel, CH0N), and what comes next: place in the scan, whether multiplexer B is."""
+        channel, negative = self.inputs[use_b]
+        if self.scanned and not use_b:
+            place = scan % len(self.scanned)
+            channel, scan = self.scanned[place], (place + 1) % len(self.scanned)
+        return channel, negative, scan, int(self.alternates and not use_b)
+
     @property
     def is_plain(self) -> bool:
         """Whether native code can follow it."""
@@ -92,7 +100,8 @@ class Inputs:
     def at(self, channel: int, cycle: int) -> int:
         """Level of a channel in a cycle."""
         source = self._source[channel]
-        return source(cycle) if source is not None else self.level[channel]
+        known = source is None or self._holds_from[channel] <= cycle
+        return self.level[channel] if known else source(cycle)  # type: ignore[misc]
 
 
 class Published:
