@@ -18,7 +18,7 @@ from greenlet import getcurrent, greenlet
 from numpy.typing import NDArray
 
 from arena.emulated import EmulatedBrain
-from emu.debug.history import History
+from emu.debug.history import History, place
 from emu.machine import Machine
 from emu.stops import Stop
 
@@ -101,15 +101,17 @@ class Recording(History):
 
     def _step_on(self) -> Stop | None:
         """A sleep is slept from cut to cut."""
-        stepped = False
+        machine, stepped = self.machine, False
+        before = place(machine)
 
         def one(limit: int) -> Stop | None:
             nonlocal stepped
-            stop = self.machine.approach(limit)
-            if stop is not None or self.machine.cycle >= limit:
-                return stop or self.machine.run_until(limit)
+            stop = machine.approach(limit)
+            entered = stepped = place(machine) != before
+            if entered or stop is not None or machine.cycle >= limit:
+                return stop or machine.run_until(machine.cycle if entered else limit)
             stepped = True
-            return self.machine.step()
+            return machine.step()
 
         stop = None
         while stop is None and not stepped:

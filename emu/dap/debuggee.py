@@ -29,6 +29,8 @@ SLICE: Final = 400_000
 LOOK_STEPS: Final = 2_000
 """The same in single steps."""
 STACK_POINTER: Final = 15
+PUSHED: Final = 4
+"""Bytes that entering an interrupt puts on the stack."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,8 +239,7 @@ class Debuggee:
         halt = self._stepped()
         if halt is not None:
             return halt
-        start = self.inside.start_of(machine.pc)
-        if self.inside.is_handler(start) and not self.inside.is_handler(self.inside.start_of(pc)):
+        if self.inside.is_handler(machine.pc) and machine.w[STACK_POINTER] == top + PUSHED and not calls:
             return self.run_to([pc], lambda: machine.w[STACK_POINTER] == top)
         if calls and insn is not None and not (into and self._line() is not None):
             back = pc + 2 * insn.words

@@ -5,7 +5,8 @@ States are kept at intervals; any other is had by running again from the one bef
 what comes from outside between two runs must be kept: it shows as a difference to where the last run ended, and the
 state with it is kept for good. What a listener does to the machine in the middle of a run is not known here.
 
-Time is the cycle: between two steps of `Machine.step` no two states have the same.
+Time is the cycle: no two states between two steps have the same. A step is an instruction, or the entry of an
+interrupt: whoever stands on the first instruction of a handler stands between two steps.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from emu.events import NEVER
+
 if TYPE_CHECKING:
     from emu.machine import Machine
     from emu.stops import Stop
@@ -27,6 +30,7 @@ MOST: Final = 4096
 """Kept states; beyond, of the older half every other one goes."""
 FIRST_WINDOW, WIDER, WIDEST = 64, 16, 1 << 26
 """Cycles that are stepped to find the step before, and how they grow while the CPU sleeps."""
+STACK_POINTER: Final = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,11 @@ class Write:
     pc: int
     old: bytes
     new: bytes
+
+
+def place(machine: Machine) -> tuple[int, int]:
+    """PC and stack pointer: what changes when an interrupt is entered."""
+    return machine.pc, machine.w[STACK_POINTER]
 
 
 class History:
@@ -113,12 +122,12 @@ class History:
         return stop
 
     def step(self) -> Stop | None:
-        """As `Machine.step`."""
+        """As `Machine.step`, but that an interrupt is entered is a step of its own."""
         self._notice()
         following = self._cycles[-1] + self.period
         if self.is_past:
             with self._silence():
-                stop = self.machine.step()
+                stop = self._single()
             self._take_input()
         else:
             stop = self._step_on()
@@ -132,7 +141,16 @@ class History:
 
     def _step_on(self) -> Stop | None:
         """Step beyond the present."""
-        return self.machine.step()
+        return self._single()
+
+    def _single(self) -> Stop | None:
+        """One step. A sleeping CPU sleeps until something wakes it."""
+        machine = self.machine
+        before = place(machine)
+        stop = machine.approach(NEVER)
+        if stop is not None:
+            return stop
+        return machine.run_until(machine.cycle) if place(machine) != before else machine.step()
 
     def _take_input(self) -> None:
         """What came from outside at this cycle comes again."""
@@ -212,7 +230,6 @@ class History:
             behind = [cycle for cycle, _ in self._steps(begin, now)]
             if begin == self.start:
                 break
-            del behind[:1]  # `begin` may be between an interrupt's entry and its first instruction: inside of a step
             window *= WIDER
         self._go(behind.pop() if behind else self.start)
         self._behind = (self.machine.cycle, behind)
@@ -232,7 +249,7 @@ class History:
                 if not began_asleep:
                     yield machine.cycle, machine.pc
                 began_asleep = False
-                machine.step()
+                self._single()
                 if inputs and inputs[0].cycle <= machine.cycle:  # between two steps, or while the CPU sleeps
                     machine.put_back(self._state(inputs.pop(0)))
 

@@ -114,6 +114,30 @@ def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:
     remove_calls()
 
 
+def test_the_first_instruction_of_a_handler_is_a_place_to_stand(image: Build) -> None:
+    """Entering an interrupt is a step of its own: forward from the instruction before, and back from the one behind."""
+    machine = emu.load(image("culprit", TARGET_APPS))
+    machine.run(until="main")
+    history = History(machine)
+    vectors = machine.chip.vectors
+    handlers = {machine.image.word(vector.ivt) for vector in vectors} if machine.image is not None else set()
+    removals = [machine.hook_pc(handler, lambda: True) for handler in handlers if handler]
+    assert history.advance(1_000_000) is not None
+    for remove in removals:
+        remove()
+    entered = machine.cycle, machine.snapshot()
+    assert machine.pc in handlers
+    handler = machine.pc
+    assert history.step() is None
+    assert machine.pc == handler + 2
+    assert history.step_back()
+    assert (machine.cycle, machine.snapshot()) == entered
+    assert history.step_back()
+    assert machine.inside.start_of(machine.pc) != handler
+    assert history.step() is None
+    assert (machine.cycle, machine.snapshot()) == entered
+
+
 def test_a_change_in_the_past_is_a_new_present(image: Build) -> None:
     machine = emu.load(image("culprit", TARGET_APPS))
     history = History(machine)

@@ -89,7 +89,6 @@ def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
             remove = machine.hook_pc(PIXELS, lambda: True)
             history.advance(machine.cycle + FRAME)
             remove()
-            history.step()  # the handler was entered, and a step is that and its first instruction
         fed = rng.random() < 0.7
         if fed:
             machine.uart[1].feed(rng.randbytes(rng.randrange(1, 6)))
