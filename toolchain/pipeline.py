@@ -30,6 +30,7 @@ from .lower import (
     legalize,
     peephole,
     regalloc,
+    repeats,
     returns,
     schedule,
     select,
@@ -125,6 +126,11 @@ def _constants(c: Context) -> None:
         constants.run(c.m)
 
 
+def _repeats(c: Context) -> None:
+    if c.options.level != "0":
+        repeats.run(c.m)
+
+
 def _schedule(c: Context) -> None:
     if c.options.level != "0":
         schedule.run(c.m)
@@ -167,6 +173,7 @@ FUNCTION_PASSES = [
     Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ("legal",), ("no-switch",)),
     Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ("no-switch",), ("no-critical-edges",)),
     Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
+    Pass("repeats", _repeats, ("machine",)),
     Pass("constants", _constants, ("machine",)),
     Pass("allocate", _allocate, ("machine",), ("real-registers",)),
     Pass("frame", lambda c: frame.build_frame(c.m, c.probe), ("real-registers",), ("framed",)),

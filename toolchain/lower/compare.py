@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..ir.model import I1, ConstInt, Instr, Undef, Value
+from ..target import LIT10_BYTE_MAX, LIT10_MAX
 from .build import SWAPPED
 from .mir import CC_INVERSE, MI, Imm
 from .rules import CONDITION
@@ -97,18 +98,30 @@ def _compare_constant(s: Selector, a: Value, b: ConstInt, pred: str, byte: bool,
         return _compare_zero(s, a, pred, byte, fold)
     if k <= 31:
         s.emit("cp", s.reg(a), Imm(k), byte=byte)
-    elif pred in ("eq", "ne") and -k & ones <= 31:
+    elif -k & ones <= 31:  # a + (-k) leaves the flags of a - k, but for 0 and the least number
         s.emit("add", s.reg(a), Imm(-k & ones), s.temp(), byte=byte)
     else:
         t = s.temp()
-        s.load_imm(k, t)
         right = s.source(a, fold) if fold is not None else s.reg(a)
-        if isinstance(right, int):
-            s.emit("cp", right, t, byte=byte)
-        else:
+        if not isinstance(right, int):
+            s.load_imm(k, t)
             s.emit("cp", t, right, byte=byte)
             pred = SWAPPED[pred]
+        elif fold is None or fold.op != "br" or not s.single_use(a) or not _subtract(s, right, k, bits, t):
+            s.load_imm(k, t)
+            s.emit("cp", right, t, byte=byte)
     return CONDITION[pred]
+
+
+def _subtract(s: Selector, a: int, k: int, bits: int, t: int) -> bool:
+    """The flags of a - k by a two-address instruction, which spoils t, a copy of a, and needs no register for k."""
+    negative = -k & ((1 << bits) - 1)
+    most = LIT10_BYTE_MAX if bits == 8 else LIT10_MAX
+    if min(k, negative) > most:
+        return False
+    s.copy(a, t)
+    s.emit("subl" if k <= most else "addl", Imm(k if k <= most else negative), t, byte=bits == 8)
+    return True
 
 
 def _compare_zero(s: Selector, a: Value, pred: str, byte: bool, fold: Instr | None) -> str:

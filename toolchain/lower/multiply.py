@@ -33,7 +33,36 @@ def select_mul(s: Selector, i: Instr) -> None:
     if ka is not None and i.type.bits == 32 and (kb is not None or _fits(b, ka[0])):
         _mul_extended(s, i, ka, kb)
         return
+    if i.type.bits == 32 and (signed := _signed_word(s, i)) is not None:
+        _mul_signed(s, i, *signed)
+        return
     _mul_wide(s, i, ka, kb)
+
+
+def _signed_word(s: Selector, i: Instr) -> tuple[Value, int] | None:
+    """(factor of two words, register of the other) of a product with a signed word or a small negative constant."""
+    for a, b in (i.args, i.args[::-1]):
+        kind = _extension_kind(b)
+        if kind is not None and kind[0] == "s":
+            return a, _narrow_reg(s, *kind)
+        if isinstance(b, ConstInt) and -0x8000 <= b.signed < 0:
+            t = s.temp()
+            s.load_imm(b.value & 0xFFFF, t)
+            return a, t
+    return None
+
+
+def _mul_signed(s: Selector, i: Instr, a: Value, b: int) -> None:
+    """(h * 2^16 + l) * b is l * b in full, unsigned by signed, with the low word of h * b added to its upper word."""
+    d = s.value_regs(i)
+    words = s.regs(a)
+    upper = s.m.new_pair()
+    crossed = s.temp()
+    s.emit("mul.ss", words[1], b, upper)
+    s.emit("splitlo", crossed, upper)
+    low, high = _pair(s, "us", words[0], b)
+    s.copy(low, d[0])
+    s.emit("add", high, crossed, d[1])
 
 
 def _fits(b: Value, kind: str) -> bool:

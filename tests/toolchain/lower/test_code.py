@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from bench.codegen import GOAL_TOTAL, XC16_OS_WORDS, sizes
 from tests.toolchain.lower.compiled import assembly, body, words
 
 SAMPLES = """
@@ -44,6 +47,14 @@ def test_primitive_functions_are_no_larger_than_xc16s() -> None:
     assert {n: w for n, w in ours.items() if w > XC16_PRIMITIVES[n]} == {}
 
 
+def test_the_public_set_is_small_at_os(tmp_path: Path) -> None:
+    """bench.codegen's functions: 0.85 of XC16's words in all, none above XC16's, none larger than at -O1."""
+    small, fast = sizes("-Os", tmp_path), sizes("-O1", tmp_path)
+    assert sum(small[n] for n in XC16_OS_WORDS) <= GOAL_TOTAL * sum(XC16_OS_WORDS.values())
+    assert [n for n, most in XC16_OS_WORDS.items() if small[n] > most] == []
+    assert [n for n in small if small[n] > fast[n]] == []
+
+
 IDIOMS = [
     ("one SFR bit is set atomically", "void f(void){ P |= 4; }", ["bset _P,#2", "return"]),
     ("one SFR bit is cleared atomically", "void f(void){ P &= ~0x8000; }", ["bclr _P,#15", "return"]),
@@ -51,6 +62,12 @@ IDIOMS = [
     ("a wide near counter carries through memory", "void f(void){ T++; }", ["inc _T", "clr w0", "addc _T+2", "return"]),
     ("a widening product is one MUL", "long f(int a,int b){ return (long)a*b; }", ["mul.ss w1,w0,w0", "return"]),
     ("a tail call is a branch", "int g(int); int f(int a){ return g(a+1); }", ["inc w0,w0", "bra _g"]),
+    ("a long times a signed word is two MUL", "long f(long a,int b){ return a*b; }",
+     ["mul.ss w1,w2,w6", "mul.us w0,w2,w0", "add w1,w6,w1", "return"]),
+    ("the last look at a value may spoil it", "void f(int a){ if (a > 300) P = 1; }",
+     ["sub #300,w0", "bra le,.L1_2", "mov #1,w7", "mov w7,_P", "return"]),
+    ("an index of two arrays is scaled once", "int g(int,int); int f(int *a,int *b,int i){ return g(a[i], b[i]); }",
+     ["sl w2,w7", "mov [w0+w7],w0", "mov [w1+w7],w1", "bra _g"]),
     ("a zero store is CLR", "void f(int *p){ *p = 0; }", ["clr [w0]", "return"]),
 ]
 
