@@ -78,7 +78,10 @@ class Brain(Protocol):
         """Changes of the LEDs since the last call."""
 
     def tell(self, data: bytes) -> None:
-        """What a host sends it by Bluetooth."""
+        """What a host or another robot sends it by Bluetooth."""
+
+    def spoken(self) -> bytes:
+        """What it wrote to UART1 since the last call; kept from the first call on."""
 
     def close(self) -> None:
         """Give back processes and memory."""
@@ -160,6 +163,10 @@ class ScriptedBrain:
 
     def tell(self, data: bytes) -> None:
         """A script does not listen."""
+
+    def spoken(self) -> bytes:
+        """A script says nothing."""
+        return b""
 
     def close(self) -> None:
         """Nothing to give back."""

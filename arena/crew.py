@@ -23,9 +23,9 @@ from arena.brain import Brain, Lights, Line, Reading
 from arena.ether import Ether, Switch
 from arena.world import Poses
 
-THINK, SAMPLE, TELL, ANSWER, FAILED = b"t", b"s", b"m", b"a", b"f"
+THINK, SAMPLE, TELL, SPOKEN, ANSWER, FAILED = b"t", b"s", b"m", b"w", b"a", b"f"
 """First byte of a message: a quantum begins; what is to be recorded is asked for; something for a robot, which is not
-answered; what a crew answers."""
+answered; what a robot has spoken is asked for; what a crew answers."""
 _HEAD: Final = struct.Struct("<qqqq")
 """Tick, number of robots, of the numbers that say where everything is, and of switches."""
 _SWITCH: Final = struct.Struct("<qqqq")
@@ -146,6 +146,11 @@ class Crew:
         """Something for a robot, before its next quantum."""
         self._wire.send(TELL + struct.pack("<q", place) + data)
 
+    def spoken(self, place: int) -> bytes:
+        """What a robot of the crew wrote to UART1."""
+        self._wire.send(SPOKEN + struct.pack("<q", place))
+        return self._answer()[1:]
+
     def _answer(self) -> bytes:
         try:
             message = self._wire.receive()
@@ -192,6 +197,10 @@ class RemoteBrain:
         """As `Brain.tell`."""
         self._crew.tell(self._place, data)
 
+    def spoken(self) -> bytes:
+        """As `Brain.spoken`."""
+        return self._crew.spoken(self._place)
+
     def close(self) -> None:
         """The crew is closed as a whole."""
 
@@ -215,6 +224,9 @@ def _serve(wire: Wire, make: Make, robots: Sequence[int], ether: Ether | None) -
             elif message[:1] == TELL:
                 (place,) = struct.unpack_from("<q", message, 1)
                 brains[place].tell(message[9:])
+            elif message[:1] == SPOKEN:
+                (place,) = struct.unpack_from("<q", message, 1)
+                wire.send(ANSWER + brains[place].spoken())
             else:
                 parts = [(brain.reading(), brain.lines(), brain.lights()) for brain in brains]
                 wire.send(ANSWER + pickle.dumps(parts))

@@ -108,6 +108,7 @@ class EmulatedBrain:
         self._strip: tuple[NDArray[np.intp], NDArray[np.uint8]] | None = None
         self._said: list[Line] = []
         self._text = bytearray()
+        self._spoken: bytearray | None = None
         self._text_at = 0
         self._busy = self._probes = 0
         self._probe_at = 1
@@ -267,6 +268,8 @@ class EmulatedBrain:
         return pixels
 
     def _byte(self, byte: int, cycle: int) -> None:
+        if self._spoken is not None:
+            self._spoken.append(byte)
         if byte in b"\r\n" or len(self._text) >= LINE_LIMIT:
             if self._text:
                 self._said.append(Line(self._text_at, self._text.decode("ascii", "backslashreplace")))
@@ -311,6 +314,12 @@ class EmulatedBrain:
     def tell(self, data: bytes) -> None:
         """As `Brain.tell`: into UART1, byte after byte at its rate."""
         self.machine.uart[1].feed(data)
+
+    def spoken(self) -> bytes:
+        """As `Brain.spoken`."""
+        said = bytes(self._spoken or b"")
+        self._spoken = bytearray()
+        return said
 
     def close(self) -> None:
         """Memory goes with the object."""

@@ -53,6 +53,7 @@ def head_of(trial: Trial) -> dict[str, Any]:
         "obstacles": [_shape(one) for one in trial.scene.obstacles],
         "patches": [_shape(one) for one in trial.scene.patches],
         "lamps": _lamps(trial.scene),
+        "links": trial.scene.bluetooth.links,
         "names": [
             f" ({one.name} {trial.scene.id_of(robot)})" if one.name else ""
             for robot, one in enumerate(map(trial.scene.group_of, range(trial.scene.robots.count)))
@@ -100,6 +101,7 @@ def samples_of(trial: Trial) -> dict[str, Any]:
         "curves": {name: values.tolist() for name, values in done.curves.items()},
         "log": columns["log"],
         "lights": columns["lights"],
+        "messages": columns["messages"] if trial.scene.bluetooth.links else [[] for _ in trial.times],
         "faults": trial.about["faults"],
     }
 

@@ -25,6 +25,7 @@ from arena.scenery import (
     TABLES,
     Arena,
     BatterySetting,
+    Bluetooth,
     CameraSetting,
     Clock,
     InfraredSetting,
@@ -69,6 +70,7 @@ class Scene:
     light: Light = field(default_factory=Light)
     battery: BatterySetting = field(default_factory=BatterySetting)
     start: Start = field(default_factory=Start)
+    bluetooth: Bluetooth = field(default_factory=Bluetooth)
     clock: Clock = field(default_factory=Clock)
     groups: tuple[RobotGroup, ...] = ()
     """Empty: `robots.count` robots of one kind on marks."""
@@ -306,11 +308,26 @@ def _checked(scene: Scene, errors: _Errors) -> Scene:
     if not 0 <= scene.robots.count <= 1000 or not 0 <= scene.objects.count <= 10_000:
         words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 1000 and 10000"
         raise errors.at("robots", "count", words)
+    _check_links(errors, scene)
     if scene.arena.polygon:
         _check_polygon(errors, "arena", scene.arena.polygon, None)
         if min(value for point in scene.arena.polygon for value in point) < 0:
             raise errors.at("arena", "polygon", "arena.polygon: corners are 0 or more cm from the lower left")
     return scene
+
+
+def _check_links(errors: _Errors, scene: Scene) -> None:
+    taken: set[frozenset[float]] = set()
+    for link in scene.bluetooth.links:
+        ends = frozenset(link)
+        words = ""
+        if len(link) != 2 or len(ends) != 2 or not all(end in range(scene.robots.count) for end in ends):
+            words = f"expected two different robots of 0 to {scene.robots.count - 1}"
+        elif ends in taken:
+            words = "is there twice"
+        if words:
+            raise errors.at("bluetooth", "links", f"bluetooth.links: {[f'{end:g}' for end in link]}: {words}")
+        taken.add(ends)
 
 
 def _check_limits(errors: _Errors, name: str, table: Any, number: int | None = None) -> None:

@@ -126,6 +126,15 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
+class Bluetooth:
+    """`links`: pairs of robots, numbered from 0, joined by a serial port connection: what one writes to UART1 the other
+    reads there. What is said within a period arrives at its end (UNVERIFIED: radios of the time took 10 to 50 ms)."""
+
+    links: Points = ()
+    period_ms: float = 20.0
+
+
+@dataclass(frozen=True, slots=True)
 class Clock:
     """Lock-step of world and brains, another one when all brains are scripted, and how often rows are written."""
 
@@ -237,6 +246,7 @@ TABLES: Final[Mapping[str, type[Any]]] = {
     "light": Light,
     "battery": BatterySetting,
     "start": Start,
+    "bluetooth": Bluetooth,
     "clock": Clock,
 }
 LISTS: Final[Mapping[str, type[Any]]] = {
@@ -293,6 +303,7 @@ LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
         "remote_held_s": (0, 7),
         "silent_s": (0.1, math.inf),
     },
+    Bluetooth: {"period_ms": (0.1, 10_000)},
     Clock: {"quantum_ms": (0.1, 20), "scripted_quantum_ms": (0.1, 20), "sample_s": (0.02, 60)},
     RobotGroup: {**_PLACED, "count": (0, 1000), "id_first": (0, 65_535), "selector": (-1, 15)},
     ObjectKind: {

@@ -14,6 +14,7 @@ from arena.brain import Brain
 from arena.crew import Crew
 from arena.ether import Ether
 from arena.experiments import Experiment
+from arena.links import Links
 from arena.lockstep import LockStep, Runner
 from arena.scene import Scene
 from arena.stage import Stage, Supervised
@@ -71,7 +72,8 @@ class Running:
         self._ether: Final = ether
         self._supervised: Final = Supervised(experiment, Stage(self.world, brains, seed))
         self.stage: Final = self._supervised.stage
-        self._recorder: Final = _Recorder(self.world, brains, on_row, self.stage.noted)
+        self._links: Final = Links(scene, brains)
+        self._recorder: Final = _Recorder(self.world, brains, on_row, self.stage.noted, self._links)
         self._sample_s: Final = scene.clock.sample_s
         self._recorder.sample([STOPPED] * len(brains))
         self._samples = 1
@@ -100,6 +102,8 @@ class Running:
             wheels = self._ahead.advance(until)
         else:
             wheels = _quantum(world, self.brains, self._crews, self._ether)
+        if self._links.is_due(world.ticks):
+            self._links.carry(world.ticks)
         self._is_over = self._supervised.is_over()
         self.touched()
         if self._is_over or self._is_sample(world.ticks):
@@ -112,7 +116,8 @@ class Running:
             self._ahead.moved()
 
     def _is_due(self, tick: int) -> bool:
-        return tick % self.per_second == 0 or self._is_sample(tick) or self._supervised.is_due(tick)
+        mine = tick % self.per_second == 0 or self._is_sample(tick)
+        return mine or self._supervised.is_due(tick) or self._links.is_due(tick)
 
     def _is_sample(self, tick: int) -> bool:
         """A sample is the end of the quantum nearest to the time asked."""
@@ -170,9 +175,11 @@ class _Recorder:
         brains: Sequence[Brain],
         on_row: Callable[[dict[str, Any]], None] | None,
         noted: Mapping[str, float],
+        links: Links,
     ) -> None:
         self._on_row = on_row
         self._noted = noted
+        self._links = links
         self._world = world
         self._brains = brains
         self.rows = Rows()
@@ -202,6 +209,7 @@ class _Recorder:
             said += [{"robot": index, "cycle": line.cycle, "text": line.text} for line in brain.lines()]
             lit += [{"robot": index, "cycle": change.cycle, "leds": change.leds} for change in brain.lights()]
         row["log"], row["lights"] = said, lit
+        row |= self._links.messages()
         row |= {f"n_{name}": value for name, value in self._noted.items()}
         self.rows.add(row)
         if self._on_row is not None:

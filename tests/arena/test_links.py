@@ -1,0 +1,91 @@
+"""Bluetooth between robots: what one writes another reads, at times that depend on nothing but the trial."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from arena.cli import main
+from arena.page import head_of, samples_of
+from arena.record import Trial, kind_of, read_trial
+from arena.scene import FCY, SceneError, load_scene
+from tests.arena.images import ECHO
+
+SCENE = """name = "pair"
+[arena]
+width_cm = 100.0
+height_cm = 100.0
+[[robots]]
+count = 2
+[[robots]]
+name = "told"
+stimulus = '0.2s uart1 "go"'
+[start]
+remote = ""
+[bluetooth]
+links = [[2, 0], [0, 1]]
+period_ms = 50
+"""
+
+
+def played(folder: Path, image: Path, *words: str, text: str = SCENE) -> Trial:
+    """The record of half a second in which three robots repeat what they are told."""
+    scene = folder / "pair.toml"
+    scene.write_text(text)
+    command = ["run", str(scene), "--brain", str(image), "--trials", "1", "--minutes", "0.0084", "--out"]
+    assert main([*command, str(folder / "out"), "--jobs", "1", *words]) == 0
+    return read_trial(folder / "out" / "trial-0001.parquet")
+
+
+def test_words_pass_from_robot_to_robot(assembled: Callable[[str], Path], tmp_path: Path) -> None:
+    """Robot 2 repeats what it is told at 0.2 s; its partner hears it a period later, and so on along the links."""
+    trial = played(tmp_path, assembled(ECHO))
+    messages = [one for row in trial.columns["messages"] for one in row]
+    said = [(one["robot"], one["to"], round(1000 * one["cycle"] / FCY), one["text"]) for one in messages]
+    assert said[:3] == [(2, 0, 250, "go"), (0, 1, 300, "go"), (0, 2, 300, "go")]
+    assert (1, 0, 350, "go") in said
+    assert {(one, other) for one, other, _, _ in said} == {(2, 0), (0, 2), (0, 1), (1, 0)}
+    assert all(time % 50 == 0 for *_, time, _ in said)
+    assert head_of(trial)["links"] == ((2.0, 0.0), (0.0, 1.0))
+    assert samples_of(trial)["messages"] == trial.columns["messages"]
+
+
+def test_the_number_of_processes_does_not_show(assembled: Callable[[str], Path], tmp_path: Path) -> None:
+    """Robots in two processes, the same bytes."""
+    image = assembled(ECHO)
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+    one, two = played(tmp_path / "one", image), played(tmp_path / "two", image, "--jobs", "2")
+    assert one.path.read_bytes() == two.path.read_bytes()
+
+
+def test_without_links_there_is_no_column_of_messages(assembled: Callable[[str], Path], tmp_path: Path) -> None:
+    """Records of other scenes are what they were."""
+    trial = played(tmp_path, assembled(ECHO), text=SCENE[: SCENE.index("[bluetooth]")])
+    assert "messages" not in trial.columns
+    assert samples_of(trial)["messages"] == [[] for _ in trial.times]
+
+
+@pytest.mark.parametrize(
+    ("links", "words"),
+    [
+        ([[0, 0]], "two different robots of 0 to 4"),
+        ([[0, 5]], "two different robots of 0 to 4"),
+        ([[0, 0.5]], "two different robots of 0 to 4"),
+        ([[0, 1, 2]], "two different robots of 0 to 4"),
+        ([[0, 1], [1, 0]], "is there twice"),
+        ([0, 1], "expected a list of points"),
+    ],
+)
+def test_links_that_cannot_be_are_refused(links: list[object], words: str) -> None:
+    """With the numbers there are."""
+    with pytest.raises(SceneError, match=words):
+        load_scene("clustering").with_values(bluetooth__links=links)
+
+
+def test_a_supervisor_may_call_its_numbers_what_it_likes() -> None:
+    """Names of other columns too: its numbers stay numbers."""
+    for name in ("log", "messages", "lights", "seen", "strip"):
+        assert kind_of(f"n_{name}") == kind_of("t")
