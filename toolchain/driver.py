@@ -173,7 +173,7 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
         raise ToolError(f"not supported: {error}") from error
 
 
-def _assemble(options: CcOptions, text: str, name: str, relax: bool) -> bytes:
+def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes:
     """Object bytes. Branch shortening only for compiled code, as XC16's driver does (abi-elf.md §5 Relaxation)."""
     from toolchain.asm.assemble import assemble
     from toolchain.asm.state import Options
@@ -181,7 +181,8 @@ def _assemble(options: CcOptions, text: str, name: str, relax: bool) -> bytes:
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
     folders += [b for a, b in zip(options.clang, options.clang[1:], strict=False) if a == "-I"]
-    chosen = Options(folders, relax=relax, debug=options.debug, chip=options.chip, prefix_map=options.prefix_map)
+    chosen = Options(folders, relax=compiled, compiled=compiled, debug=options.debug, chip=options.chip,
+                     prefix_map=options.prefix_map)  # fmt: skip
     obj, messages = assemble(text, name, chosen)
     for message in messages:
         print(message, file=sys.stderr)
@@ -208,10 +209,10 @@ def object_of(options: CcOptions, item: Input, scratch: Path) -> bytes:
 def _object(options: CcOptions, item: Input, modules: dict[Input, bytes], scratch: Path) -> bytes:
     if item in modules:
         text = _to_assembly(options, _optimise(options, modules[item], scratch))
-        return _assemble(options, text, item.path.name, relax=True)
+        return _assemble(options, text, item.path.name, compiled=True)
     if item.language == "object":
         return read_bytes(item.path)
-    return _assemble(options, _assembly_text(options, item, scratch), str(item.path), relax=False)
+    return _assemble(options, _assembly_text(options, item, scratch), str(item.path), compiled=False)
 
 
 def _translate(options: CcOptions, item: Input, modules: dict[Input, bytes], scratch: Path) -> tuple[Path, bytes]:
@@ -261,7 +262,7 @@ def _compile_program(options: CcOptions, scratch: Path) -> Program:
             base = output_path(options)
             write_outputs([(base.with_suffix(".ll"), ir_text.encode()), (base.with_suffix(".s"), assembly.encode())])
         name = next(iter(modules)).path.name if len(modules) == 1 else "program.c"
-        program.objects.append((name, _assemble(options, assembly, name, relax=True)))
+        program.objects.append((name, _assemble(options, assembly, name, compiled=True)))
     return program
 
 

@@ -23,7 +23,7 @@ def concerns_generated_code(error: ToolError) -> bool:
     """Whether debug information could tell more: an assembler's message, a symbol that nobody defines, or what the back
     end does not do."""
     return any(
-        re.match(r"[^:\n]+:\d+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line)
+        re.match(r"[^:\n]+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line)
         for line in error.findings
     )
 

@@ -294,7 +294,7 @@ class ModuleCompiler:
             elif f.linkage == "extern_weak":
                 self.lines.append(f"\t.weak {symbol(self.module, f.name)}")
         self.lines += constructors.emit_constructors(self.module, self.options.large_code)
-        self.lines += data.emit_data(self.module, self.notes, self.used)
+        self.lines += data.emit_data(self.module, self.notes, self.used, self.dwarf.info)
         self.aliases()
         if self.options.debug:
             self.lines += self.dwarf.text()
@@ -323,6 +323,7 @@ class ModuleCompiler:
                     verifier.check(p.name, c.m)
         except UnsupportedError as e:
             raise UnsupportedError(e.what, e.where or where(self.dwarf.info, f, e.line)) from e
+        self.lines += self.dwarf.info.marker(f.dbg)
         self.header(f, interrupt)
         name = symbol(self.module, f.name)
         rows = LineRows(self.dwarf.info, f, name) if self.options.debug and f.dbg is not None else None

@@ -171,6 +171,25 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     assert f"{unknown}:2:20: warning: unknown attribute 'bogus' ignored" in said
 
 
+@pytest.mark.parametrize(("line", "attribute"), [
+    ("volatile int n __attribute__((sfr(0x2D2)));", "sfr"),
+    ("extern volatile int n __attribute__((__sfr__));", "sfr"),
+    ("void __attribute__((boot)) n(void) {}", "boot"),
+    ("void __attribute__((noinline, secure(1))) n(void) {}", "secure"),
+    ("int n __attribute__((space(dma)));", "space(dma)"),
+    ("int n __attribute__((aligned(4), __space__(extern_memory)));", "space(extern_memory)"),
+])  # fmt: skip
+def test_an_attribute_that_would_move_something_is_not_ignored(
+    line: str, attribute: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A variable at an address of its own or in memory that is not there is no variable anywhere."""
+    source = write(tmp_path, "a.c", f"\n{line}\n")
+    code, said = cc(capsys, "-c", source, "-o", tmp_path / "a.o")
+    assert code == 1
+    assert f"{source}:2:" in said
+    assert f"error: static assertion failed: attribute {attribute} is not supported" in said
+
+
 def test_xc16_register_names_in_inline_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Clobbers and register variables named w0-w15; other strings of that spelling stay, and so do diagnostics."""
     source = write(

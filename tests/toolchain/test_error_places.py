@@ -51,3 +51,33 @@ def test_a_source_beside_the_present_folder_is_named_in_full(
     source.write_text("int main(void) { extern int missing(void); return missing(); }\n")
     assert driver.main([str(source), "-o", "x.elf"]) == 2
     assert capsys.readouterr().err.startswith(f"{source}:1: error: undefined symbol _missing")
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=" ".join)
+@pytest.mark.parametrize(("line", "said"), [
+    ("int kept __attribute__((persistent, used)) = 4;",
+     "section .pbss has no content: only zero may be stored into it at _kept"),
+    ("int t[16] __attribute__((reverse(48), used));",
+     "section .nbss._t: reverse(48) is not a power of two up to 32768"),
+    ("void __attribute__((interrupt(irq(3)), no_auto_psv)) _T1Interrupt(void) {}",
+     "symbol __T1Interrupt is already defined"),
+    ('__attribute__((used)) int f(int a) { __asm__("nop\\n nop\\n frob"); return a; }', "unknown instruction 'frob'"),
+], ids=["variable", "section", "function", "third line of a text"])  # fmt: skip
+def test_what_the_assembler_refuses_of_a_declaration_names_its_line(
+    line: str, said: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Not the line of assembly that nobody has seen."""
+    source = tmp_path / "main.c"
+    source.write_text(f'void first(void) {{ __asm__("nop"); }}\n\n\n{line}\nint main(void) {{ return 0; }}\n')
+    assert driver.main([*options, str(source), "-o", str(tmp_path / "x")]) == 2
+    assert capsys.readouterr().err.splitlines() == [f"{source}:4: error: {said}"]
+
+
+def test_a_global_variable_in_a_register_is_refused_in_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "main.c"
+    source.write_text('register int r5 __asm__("w5");\nint main(void) {\n  return r5;\n}\n')
+    assert driver.main([str(source), "-o", str(tmp_path / "x")]) == 2
+    said = "a global variable in a register: only A and B, the accumulators, can be one"
+    assert capsys.readouterr().err == f"error: not supported: {source}:3: {said}\n"

@@ -52,10 +52,16 @@ def string_argument(text: str, directive: str) -> str:
     return unescape(match[1]).decode("utf-8", "replace")
 
 
+def _no_content(asm: Assembler) -> ExprError:
+    """Something other than zero is to be stored into a section of kind bss."""
+    label = f" at {asm.label}" if asm.label else ""
+    return ExprError(f"section {asm.section.name} has no content: only zero may be stored into it{label}")
+
+
 def _put(asm: Assembler, data: bytes, packed: bool) -> int:
     asm.after_repeat = ""
     if asm.section.type == c.SHT_NOBITS and any(data):
-        raise ExprError(f"section {asm.section.name} has no content: only zero may be stored into it")
+        raise _no_content(asm)
     return asm.section.put_packed(data) if packed else asm.section.put_bytes(data)
 
 
@@ -166,7 +172,7 @@ def _space(packed: bool) -> Handler:
             _put(asm, bytes((fill & 0xFF,)) * numbers[0], packed=True)
         else:
             if asm.section.type == c.SHT_NOBITS and fill:
-                raise ExprError(f"section {asm.section.name} has no content: only zero may be stored into it")
+                raise _no_content(asm)
             asm.section.skip(numbers[0], fill)
         asm.after_repeat = ""
 

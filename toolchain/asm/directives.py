@@ -59,7 +59,10 @@ def _section(asm: Assembler, text: str) -> None:
 
 
 def _configure(section: AsmSection, text: str) -> None:
-    wanted = attributes.parse(text, section.name)
+    try:
+        wanted = attributes.parse(text, section.name)
+    except ExprError as error:
+        raise ExprError(f"section {section.name}: {error}") from error
     section.configure(wanted.flags, wanted.type)
     section.extended, section.load, section.keep = wanted.extended, wanted.address, wanted.keep
     if wanted.align is not None:

@@ -47,6 +47,7 @@ class Frame:
     line: int  # number of the line before the next one
     macro: str = ""  # name of the macro this is an expansion of
     fixed: bool = False  # expansions report the line that caused them
+    counted: bool = True  # lines have numbers of their own; in a compiler's output only markers say where one is from
     index: int = 0
     conditionals: int = 0  # open conditionals when the frame began
     labels: dict[str, str] = field(default_factory=dict)
@@ -55,8 +56,8 @@ class Frame:
 class Source:
     """The stack of frames; `next()` gives line after line."""
 
-    def __init__(self, text: str, file: str) -> None:
-        self.frames = [Frame(strip_comments(text), file, 0)]
+    def __init__(self, text: str, file: str, counted: bool = True) -> None:
+        self.frames = [Frame(strip_comments(text), file, 0, counted=counted)]
         self.expanded = 0
         self.place = Place(file, 0)
         self.on_end: Callable[[Frame], None] = lambda frame: None
@@ -73,9 +74,9 @@ class Source:
             text = frame.lines[frame.index]
             frame.index += 1
             if not frame.fixed:
-                frame.line += 1
+                frame.line += frame.counted
                 if "#" in text and (marker := _LINE_MARKER.match(text)):
-                    frame.line, frame.file = int(marker[1]) - 1, marker[2]
+                    frame.line, frame.file = int(marker[1]) - frame.counted, marker[2]
                     continue
                 self.place = Place(frame.file, frame.line)
             else:

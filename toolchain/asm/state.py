@@ -49,6 +49,7 @@ class Options:
     include: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
     relax: bool = False
+    compiled: bool = False  # `file` is what the text was compiled from: its lines are those of markers alone
     debug: bool = False
     chip: Chip = field(default_factory=chip_named)
     prefix_map: list[tuple[str, str]] = field(default_factory=list)
@@ -66,7 +67,7 @@ class Assembler:
 
     def __init__(self, text: str, file: str, options: Options) -> None:
         self.options = options
-        self.source = Source(text, file)
+        self.source = Source(text, file, counted=not options.compiled)
         self.conditionals = Conditionals()
         self.source.on_end = self._frame_ended
         self.symbols: dict[str, AsmSymbol] = {}
@@ -82,6 +83,7 @@ class Assembler:
         self.fill_value = 0
         self.packed_fill_value = 0
         self.file_name = ""
+        self.label = ""  # the last one defined, for messages
         self.line_rows: list[tuple[Label, Place]] = []
         self.ended = False
         place = Place(file, 0)
@@ -166,6 +168,7 @@ class Assembler:
         if symbol.place is not None or symbol.common is not None:
             raise ExprError(f"symbol {name} is already defined")
         symbol.place = self.section.label()
+        self.label = name
 
     def assign(self, name: str, text: str, once: bool = False) -> None:
         """Set `name` to the value of `text` (.set, .equ, =; `once` for .equiv)."""

@@ -53,15 +53,25 @@
 #define __dspic_a_keep ~, (__used__, __retain__)
 #define __dspic_a_reverse(number) ~, (__annotate__("reverse(" __dspic_text(number) ")"))
 #define __dspic_a_user_init ~, (__constructor__)
-#define __dspic_a_space(kind) ~, (__dspic_space_##kind)
+/* What XC16 has for other parts, or does not do here, would change where things are: an error, not a warning. */
+#define __dspic_refused(text) __aligned__(sizeof(struct { int i; _Static_assert(0, text " is not supported"); }))
+#define __unused__(...) __unused__ /* takes what follows in parentheses, as `__used__` does above */
+#define __dspic_a_sfr ~, (__dspic_refused("attribute sfr"), __unused__)
+#define __dspic_a_boot ~, (__dspic_refused("attribute boot"), __unused__)
+#define __dspic_a_secure ~, (__dspic_refused("attribute secure"), __unused__)
+#define __dspic_a_eds ~, (__dspic_refused("attribute eds"), __unused__)
+#define __dspic_a_space(kind) ~, (__dspic_space(__dspic_s_##kind, (__dspic_refused("attribute space(" #kind ")"))))
+#define __dspic_space(...) __dspic_space_second(__VA_ARGS__, )
+#define __dspic_space_second(first, second, ...) __dspic_space_open second
+#define __dspic_space_open(...) __VA_ARGS__
 
-#define __dspic_space_data
-#define __dspic_space_auto_psv
-#define __dspic_space_prog __section__(".prog." __dspic_number(__COUNTER__))
-#define __dspic_space_psv __section__(".psv." __dspic_number(__COUNTER__))
-#define __dspic_space_eedata __used__, __section__(".eedata." __dspic_number(__COUNTER__))
-#define __dspic_space_xmemory __section__(".xmemory")
-#define __dspic_space_ymemory __section__(".ymemory")
+#define __dspic_s_data ~, ()
+#define __dspic_s_auto_psv ~, ()
+#define __dspic_s_prog ~, (__section__(".prog." __dspic_number(__COUNTER__)))
+#define __dspic_s_psv ~, (__section__(".psv." __dspic_number(__COUNTER__)))
+#define __dspic_s_eedata ~, (__used__, __section__(".eedata." __dspic_number(__COUNTER__)))
+#define __dspic_s_xmemory ~, (__section__(".xmemory"))
+#define __dspic_s_ymemory ~, (__section__(".ymemory"))
 
 #define __dspic_a___interrupt__ __dspic_a_interrupt
 #define __dspic_a___auto_psv__ __dspic_a_auto_psv
@@ -76,5 +86,9 @@
 #define __dspic_a___reverse__ __dspic_a_reverse
 #define __dspic_a___user_init__ __dspic_a_user_init
 #define __dspic_a___space__ __dspic_a_space
+#define __dspic_a___sfr__ __dspic_a_sfr
+#define __dspic_a___boot__ __dspic_a_boot
+#define __dspic_a___secure__ __dspic_a_secure
+#define __dspic_a___eds__ __dspic_a_eds
 
 #endif

@@ -22,6 +22,7 @@ from ..ir.model import (
     struct_offsets,
 )
 from ..target import NEAR_BYTES, NEAR_END
+from .debuginfo import DebugInfo
 from .isr import numbers, section_modifiers
 from .names import block_label, symbol
 from .used import KEEP
@@ -66,8 +67,9 @@ def beyond_near(notes: dict[str, set[str]]) -> frozenset[str]:
 class DataEmitter:
     """Text of all variables of a module."""
 
-    def __init__(self, module: Module, notes: dict[str, set[str]], used: frozenset[str]) -> None:
+    def __init__(self, module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugInfo) -> None:
         self.module = module
+        self.info = info
         self.notes = notes
         self.used = used
         self.lines: list[str] = []
@@ -90,6 +92,7 @@ class DataEmitter:
         zero = isinstance(var.init, ConstZero | Undef) or (isinstance(var.init, ConstInt) and var.init.value == 0)
         modifiers = section_modifiers(var.name, self.notes.get(var.name, set()))
         keep = KEEP if var.name in self.used else ""
+        self.lines += self.info.marker(var.dbg)
         self.lines.append(f"\t.section {self._section(var, name, zero, modifiers)}{modifiers}{keep}")
         align = max(var.align, 2 if size > 1 else 1)
         if align > 1:
@@ -241,6 +244,6 @@ class Image:
         return n & ~1
 
 
-def emit_data(module: Module, notes: dict[str, set[str]], used: frozenset[str]) -> list[str]:
+def emit_data(module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugInfo) -> list[str]:
     """Assembly lines of all variables; `notes` are their annotations, `used` those that collection must keep."""
-    return DataEmitter(module, notes, used).run()
+    return DataEmitter(module, notes, used, info).run()

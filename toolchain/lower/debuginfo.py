@@ -74,6 +74,12 @@ class DebugInfo:
         elsewhere = os.path.isabs(directory) and directory != os.getcwd()
         return (os.path.join(directory, name) if elsewhere else name), line
 
+    def marker(self, ref: str | None) -> list[str]:
+        """Assembly that says of what follows where in the source it is from: of a DISubprogram or of a variable."""
+        node = self.node(ref) if ref is not None else {}
+        place = self.position(node.get("var", ref))
+        return [f'# {place[1]} "{place[0]}"'] if place is not None else []
+
     def subprogram(self, ref: str) -> str:
         """The DISubprogram a scope lies in."""
         for _ in range(MAX_DEPTH):

@@ -222,6 +222,8 @@ class Emitter:
                 self._out(line.strip())
                 if self.frames is not None and (mark := self.frames.inside(line)):
                     self.lines.append(mark)
+        if place is not None:  # no more
+            self.lines.append(f'# 0 "{place[0]}"')
 
     def _hold(self, mi: MI) -> None:
         """DISI for the sequence behind it, unless a longer one is under way (`holds`)."""

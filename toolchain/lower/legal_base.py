@@ -17,6 +17,7 @@ from ..ir.model import (
     GlobalRef,
     InlineAsm,
     Instr,
+    MetaRef,
     Module,
     Type,
     Undef,
@@ -74,6 +75,8 @@ class LegalizerBase:
             return v
         if isinstance(v, ConstExpr):
             return self.const_expr(v)
+        if isinstance(v, MetaRef):  # what clang calls llvm.read_register with
+            raise UnsupportedError("a global variable in a register: only A and B, the accumulators, can be one")
         raise UnsupportedError(f"operand {v!r} of type {v.type}")
 
     def const_expr(self, v: ConstExpr) -> Value:
