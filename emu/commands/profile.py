@@ -97,10 +97,10 @@ def _write(profile: Profile, profiler: Profiler, image: Image, options: argparse
     name = Path(image.path).name
     if options.speedscope:
         with whole_text_file(options.speedscope) as stream:
-            json.dump(speedscope(tracks, profiler.place, name, profile.start, profile.end), stream)
+            stream.writelines(speedscope(tracks, profiler.place, name, profile.start, profile.end))
     if options.perfetto:
         with whole_text_file(options.perfetto) as stream:
-            json.dump(perfetto(tracks, profiler.place, name, float(profiler.hz), profiler.inside), stream)
+            stream.writelines(perfetto(tracks, profiler.place, name, float(profiler.hz), profiler.inside))
 
 
 def _check_groups(profile: Profile, groups: list[tuple[str, list[str]]]) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ NOWHERE: Final = 0xFFFFFF
 """Call site of what nobody called: handlers, and where a stack begins."""
 _EDGE_WORDS, _MOST_EDGES, _STACKS = 6, 1 << 16, 128
 _TURN: Final = np.dtype([
-    ("cycle", "<u8"), ("since", "<u8"), ("what", "<u4"), ("stack", "<u4"), ("level", "<u4"), ("entry", "<u4"),
+    ("cycle", "<u8"), ("since", "<u8"), ("what", "<u4"), ("stack", "<u4"), ("raised", "<u4"), ("entry", "<u4"),
     ("site", "<u4"), ("length", "<u4"),
 ])  # fmt: skip
 
@@ -57,22 +57,21 @@ class Edge:
     least: int
 
 
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """Something that happened in `cycle`."""
+class Turn(NamedTuple):
+    """Something that happened in `cycle`. There are many: tuples are made at half the cost."""
 
     cycle: int
+    since: int
+    """Cycle in which the interrupt of a handler was requested."""
     what: int
     """OPEN, CLOSE, SWITCH or SLEEP."""
     stack: int
     """Number of the stack the program is on."""
-    level: int | None
-    """CPU priority of a handler; None for a called function."""
+    raised: int
+    """1 + CPU priority of a handler; 0 for a called function."""
     entry: int
     site: int
     """Program address of a call, or of what an interrupt interrupted."""
-    since: int
-    """Cycle in which the interrupt of a handler was requested."""
     length: int
     """Tcy of a sleep that ends now."""
 
@@ -114,5 +113,4 @@ class Tree:
     def turns(self) -> Iterator[Turn]:
         """What happened, in order."""
         for part in self._parts:
-            for cycle, since, what, stack, level, entry, site, length in part.tolist():
-                yield Turn(cycle, what, stack, level - 1 if level else None, entry, site, since, length)
+            yield from map(Turn._make, part.tolist())

@@ -7,7 +7,7 @@ exception (the forced NOPs and pushes, isa.md §14.2) counts for the handler tha
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -46,8 +46,8 @@ class Profile:
     """By CPU priority: 0 to 7, traps 8 and above."""
     edges: list[Edge] = field(default_factory=list)
     """Who called whom, how often, for how long."""
-    turns: list[Turn] = field(default_factory=list)
-    """What happened in order, if it was asked for."""
+    turns: Iterable[Turn] = ()
+    """What happened in order, if it was asked for: to be gone through once."""
     stop: Stop | None = None
     """What ended the run before its time."""
 
@@ -169,7 +169,7 @@ class Profiler:
             profile.places[self.place(row)] += cycles
         profile.edges = self._tree.end(profile.end)
         if self._timed:
-            profile.turns = list(self._tree.turns())
+            profile.turns = self._tree.turns()
 
     def row_of(self, pc: int) -> int:
         """First address of the stretch of code around `pc` that has one function and one line."""

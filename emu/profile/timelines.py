@@ -1,4 +1,4 @@
-"""Timelines of a profile for speedscope and for Perfetto, as plain data to be written as JSON.
+"""Timelines of a profile for speedscope and for Perfetto, as the text of their files.
 
 speedscope: its file-format-schema, evented profiles in Tcy, one for every thread and interrupt level. Perfetto: the
 "Trace Event Format" of Chrome: slices on a track per thread and level, requests of interrupts as flows to their
@@ -8,7 +8,8 @@ Its times are in µs with fractions; the exact cycle is in `args`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from json import dumps
 from typing import Any, Final
 
 from emu.profile.shares import Place
@@ -23,11 +24,13 @@ LEVEL_TRACKS: Final = 10
 """Thread number of level 0; the threads' come behind the levels'."""
 
 
-def speedscope(tracks: Tracks, place_of: Callable[[int], Place], name: str, start: int, end: int) -> dict[str, Any]:
-    """A speedscope file."""
+def speedscope(
+    tracks: Tracks, place_of: Callable[[int], Place], name: str, start: int, end: int
+) -> Iterator[str]:
+    """A speedscope file, in pieces."""
     frames: list[dict[str, Any]] = []
     known: dict[int, int] = {}
-    profiles: dict[Track, list[dict[str, Any]]] = {}
+    profiles: dict[Track, list[str]] = {}
     for mark in tracks.marks:
         number = known.get(mark.entry)
         if number is None:
@@ -35,26 +38,21 @@ def speedscope(tracks: Tracks, place_of: Callable[[int], Place], name: str, star
             number = known[mark.entry] = len(frames)
             frames.append({"name": function.removeprefix("_")} | ({"file": file, "line": line} if file else {}))
         profiles.setdefault(mark.track, []).append(
-            {"type": "O" if mark.begins else "C", "frame": number, "at": mark.cycle}
+            f'{{"type": "{"O" if mark.begins else "C"}", "frame": {number}, "at": {mark.cycle}}}'
         )
-    return {
+    about = {
         "$schema": "https://www.speedscope.app/file-format-schema.json",
         "exporter": "emu profile",
         "name": name,
         "activeProfileIndex": 0,
         "shared": {"frames": frames},
-        "profiles": [
-            {
-                "type": "evented",
-                "name": tracks.title(track),
-                "unit": "none",
-                "startValue": start,
-                "endValue": end,
-                "events": events,
-            }
-            for track, events in sorted(profiles.items(), key=lambda one: _thread_number(one[0]))
-        ],
     }
+    yield dumps(about)[:-1] + ', "profiles": ['
+    for place, (track, events) in enumerate(sorted(profiles.items(), key=lambda one: _thread_number(one[0]))):
+        about = {"type": "evented", "name": tracks.title(track), "unit": "none", "startValue": start, "endValue": end}
+        yield (", " if place else "") + dumps(about)[:-1] + ', "events": ['
+        yield ", ".join(events) + "]}"
+    yield "]}"
 
 
 def _thread_number(track: Track) -> int:
@@ -71,47 +69,68 @@ def perfetto(
     name: str,
     hz: float,
     inside: Callable[[int], frozenset[str]],
-) -> dict[str, Any]:
-    """A file in the Trace Event Format. `hz` is the number of cycles in a second; `inside` gives the functions around
-    an address, inlined ones too."""
-    events: list[dict[str, Any]] = [
-        {"ph": "M", "pid": ROBOT, "tid": 0, "name": "process_name", "args": {"name": name}},
-    ]
+) -> Iterator[str]:
+    """A file in the Trace Event Format, in pieces. `hz` is the number of cycles in a second; `inside` gives the
+    functions around an address, inlined ones too."""
+    whole = dumps({"traceEvents": [], "displayTimeUnit": "ns", "otherData": {"cycles_per_second": hz}})
+    first, last = whole.split("]", 1)
+    process = {"ph": "M", "pid": ROBOT, "tid": 0, "name": "process_name", "args": {"name": name}}
+    yield first + dumps(process)
     seen: set[Track] = set()
-    sent: list[dict[str, Any]] = []
+    for piece in _events(tracks, place_of, hz, inside, seen):
+        yield ", " + piece
+    titles = {_thread_number(track): tracks.title(track) for track in seen} | {LEVEL_TRACKS - 1: "requests"}
+    for number, title in sorted(titles.items()):
+        about = {"ph": "M", "pid": ROBOT, "tid": number}
+        yield ", " + dumps(about | {"name": "thread_name", "args": {"name": title}})
+        yield ", " + dumps(about | {"name": "thread_sort_index", "args": {"sort_index": number}})
+    yield "]" + last
+
+
+def _events(
+    tracks: Tracks, place_of: Callable[[int], Place], hz: float, inside: Callable[[int], frozenset[str]],
+    seen: set[Track],
+) -> Iterator[str]:  # fmt: skip
+    """Events as text: there are tens of thousands in a second. `seen` gets their tracks."""
+    sent: list[str] = []
     flows = 0
+    texts: dict[int, tuple[str, str, str]] = {}
+    numbers: dict[Track, int] = {}
 
     def at(cycle: int) -> float:
         return round(cycle * 1e6 / hz, 3)
 
     for mark in tracks.marks:
-        function, file, line = place_of(mark.entry)
-        function, track = function.removeprefix("_"), _thread_number(mark.track)
-        base = {"pid": ROBOT, "tid": track, "ts": at(mark.cycle)}
-        seen.add(mark.track)
-        source = {"source": f"{file}:{line}"} if mark.begins and file else {}
-        events.append({"ph": "B" if mark.begins else "E", "name": function, "args": {"cycle": mark.cycle} | source})
-        events[-1] |= base
+        known = texts.get(mark.entry)
+        if known is None:
+            function, file, line = place_of(mark.entry)
+            function = function.removeprefix("_")
+            source = f', "source": {dumps(f"{file}:{line}")}' if file else ""
+            known = texts[mark.entry] = function, dumps(function), source
+        function, quoted, source = known
+        track = numbers.get(mark.track)
+        if track is None:
+            track = numbers[mark.track] = _thread_number(mark.track)
+            seen.add(mark.track)
+        base = f'"pid": {ROBOT}, "tid": {track}, "ts": {at(mark.cycle)!r}'
+        if mark.begins:
+            yield f'{{"ph": "B", "name": {quoted}, "args": {{"cycle": {mark.cycle}{source}}}, {base}}}'
+        else:
+            yield f'{{"ph": "E", "name": {quoted}, "args": {{"cycle": {mark.cycle}}}, {base}}}'
         if not (mark.begins and mark.is_new):
             continue
         if mark.track[0] < 0 and mark.since:
             flows += 1
-            request = {"pid": ROBOT, "tid": LEVEL_TRACKS - 1, "cat": "interrupt", "name": function}
-            events.append(request | {
-                "ph": "X", "ts": at(mark.since), "dur": at(mark.cycle - mark.since), "args": {"cycle": mark.since},
-            })  # fmt: skip
-            events.append(request | {"ph": "s", "id": flows, "ts": at(mark.since)})
-            events.append(base | {"ph": "f", "bp": "e", "id": flows, "cat": "interrupt", "name": function})
+            request = f'"pid": {ROBOT}, "tid": {LEVEL_TRACKS - 1}, "cat": "interrupt", "name": {quoted}'
+            since = at(mark.since)
+            yield (f'{{{request}, "ph": "X", "ts": {since!r}, "dur": {at(mark.cycle - mark.since)!r}, '
+                   f'"args": {{"cycle": {mark.since}}}}}')  # fmt: skip
+            yield f'{{{request}, "ph": "s", "id": {flows}, "ts": {since!r}}}'
+            yield f'{{{base}, "ph": "f", "bp": "e", "id": {flows}, "cat": "interrupt", "name": {quoted}}}'
         elif function in SENDS:
             flows += 1
-            sent.append({"id": flows, "cat": "event", "name": "event"})
-            events.append(base | {"ph": "s"} | sent[-1])
+            sent.append(f'"id": {flows}, "cat": "event", "name": "event"')
+            yield f'{{{base}, "ph": "s", {sent[-1]}}}'
         elif sent and DELIVERIES & inside(mark.site):
-            events += [base | {"ph": "f", "bp": "e"} | one for one in sent]
+            yield from (f'{{{base}, "ph": "f", "bp": "e", {one}}}' for one in sent)
             sent.clear()
-    titles = {_thread_number(track): tracks.title(track) for track in seen} | {LEVEL_TRACKS - 1: "requests"}
-    for number, title in sorted(titles.items()):
-        about = {"ph": "M", "pid": ROBOT, "tid": number}
-        events.append(about | {"name": "thread_name", "args": {"name": title}})
-        events.append(about | {"name": "thread_sort_index", "args": {"sort_index": number}})
-    return {"traceEvents": events, "displayTimeUnit": "ns", "otherData": {"cycles_per_second": hz}}

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from emu.profile.follow import CLOSE, OPEN, SLEEP, SWITCH, Turn
 
@@ -22,8 +21,7 @@ Track = tuple[int, int]
 """Stack and how many there were on it before; of a handler -1 and the CPU priority."""
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+class Mark(NamedTuple):
     """Something begins or ends."""
 
     cycle: int
@@ -83,9 +81,10 @@ class Tracks:
             yield from self._wait(turn.cycle - turn.length)
             yield from self._go_on(turn.cycle)
         elif turn.what == OPEN:
-            if turn.level is not None:
+            level = turn.raised - 1 if turn.raised else None
+            if level is not None:
                 yield from self._wait(turn.cycle)
-            stack.append((turn.entry, turn.level))
+            stack.append((turn.entry, level))
             yield Mark(turn.cycle, self._track(), True, turn.entry, True, turn.since, turn.site)
         elif turn.what == CLOSE and stack:
             track = self._track()
