@@ -102,8 +102,9 @@ class Studio:
         self._goal = self._running.quanta
 
     def stand(self) -> None:
-        """Stand still at the end of this quantum."""
+        """Stand still at the end of this quantum. On the way back, what was done later is forgotten."""
         self._goal = None
+        self._forget(self._running.world.ticks)
 
     def step(self, quanta: int = 1) -> None:
         """Let some quanta be over."""
@@ -111,6 +112,7 @@ class Studio:
         self._able()
         if quanta < 1:
             raise RefusedError(f"{quanta} quanta: expected 1 or more")
+        self._forget(self._running.world.ticks)
         self._pace, self._goal = 0.0, min(self._running.world.ticks + quanta, self._running.quanta)
 
     def back(self, tick: int) -> None:
@@ -119,7 +121,7 @@ class Studio:
         self._free()
         if not 0 <= tick <= self._running.quanta:
             raise RefusedError(f"quantum {tick}: the trial has those from 0 to {self._running.quanta}")
-        self._deeds = [deed for deed in self._deeds if deed.tick <= tick]
+        self._forget(tick)
         if tick < self._running.world.ticks:
             self._begin()
             self._again = deque(self._deeds)
@@ -287,11 +289,18 @@ class Studio:
 
     def _do(self, what: Callable[[Running], None]) -> None:
         """Do something to the world, and keep it. Raises RefusedError where the scene has no room for it."""
+        if self._again:
+            raise RefusedError("the trial is on its way back; let it stand first")
         try:
             what(self._running)
         except SceneError as error:
             raise RefusedError(str(error)) from None
         self._deeds.append(Deed(self._running.world.ticks, what))
+
+    def _forget(self, tick: int) -> None:
+        """What was done after `tick` quanta was never done."""
+        self._deeds = [deed for deed in self._deeds if deed.tick <= tick]
+        self._again = deque(deed for deed in self._again if deed.tick <= tick)
 
     def _do_again(self) -> None:
         while self._again and self._again[0].tick <= self._running.world.ticks:

@@ -97,6 +97,50 @@ def test_going_back_leads_to_the_first_pass_to_the_byte(clustering_image: Path) 
         assert studio.ask(lambda: studio.more(2, here["epoch"]))["from"] == 0, "samples of another epoch"
 
 
+def on_the_way_back(studio: Studio, goal: int, what: Callable[[], Any]) -> None:
+    """Begin to go back to `goal`, and do something before anything of that has been done again."""
+    studio.ask(lambda: (studio.back(goal), what()))
+
+
+def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
+    """Moved at 20 and 300; going back to 400, somebody stops at 0: neither move has happened, nor will it."""
+    plan = scripted_plan()
+    with studio_of(plan) as untouched:
+        do(untouched, lambda: untouched.step(1))
+        first = untouched.ask(untouched.digest)
+        do(untouched, lambda: untouched.step(399))
+        last = untouched.ask(untouched.digest)
+
+    def moved(studio: Studio) -> None:
+        do(studio, lambda: studio.step(20))
+        studio.ask(lambda: studio.move("object", 1, 100.0, 120.0))
+        do(studio, lambda: studio.step(280))
+        studio.ask(lambda: studio.move("object", 2, 200.0, 120.0))
+        do(studio, lambda: studio.step(110))
+
+    with studio_of(plan) as studio:
+        moved(studio)
+        with pytest.raises(RefusedError, match="on its way back; let it stand first"):
+            on_the_way_back(studio, 400, lambda: studio.move("object", 0, 50.0, 50.0))
+        settled(studio)
+        on_the_way_back(studio, 390, studio.stand)
+        do(studio, lambda: studio.step(400))
+        assert studio.ask(studio.digest) == last
+    with studio_of(plan) as studio:
+        moved(studio)
+        on_the_way_back(studio, 400, lambda: studio.step(1))
+        assert settled(studio)["tick"] == 1
+        assert studio.ask(studio.digest) == first
+        do(studio, lambda: studio.step(399))
+        assert studio.ask(studio.digest) == last
+    with studio_of(plan) as studio:
+        moved(studio)
+        on_the_way_back(studio, 400, lambda: studio.back(10))
+        assert settled(studio)["tick"] == 10
+        do(studio, lambda: studio.step(390))
+        assert studio.ask(studio.digest) == last, "what was done later is forgotten"
+
+
 def test_a_breakpoint_holds_the_whole_world(clustering_image: Path) -> None:
     """Nobody moves while a robot stands; what is inside it can be read; afterwards all is as without it."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
