@@ -1,0 +1,47 @@
+"""A whole session by a second client that others wrote: dap-mode of Emacs, by its own commands."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.emu.dap.test_dap import SOURCE, line_of
+from toolchain import driver
+
+ROOT = Path(__file__).resolve().parents[3]
+SITE = Path("/usr/share/emacs/site-lisp/elpa-src")
+"""Where Debian puts Emacs's packages."""
+
+
+def test_a_session_in_emacs(tmp_path: Path) -> None:
+    """Breakpoint, locals, a step, a step back, on, out, back to the breakpoint, and the end."""
+    emacs = shutil.which("emacs")
+    if emacs is None or not list(SITE.glob("dap-mode-*")):
+        pytest.skip("Emacs with dap-mode is not there (Debian packages emacs-nox, elpa-dap-mode)")
+    image = tmp_path / "program.elf"
+    assert driver.main(["-g", "-O0", str(SOURCE), "-o", str(image)]) == 0
+    environment = os.environ | {
+        "HOME": str(tmp_path), "PYTHONPATH": str(ROOT), "EMU_PYTHON": sys.executable, "EMU_PROGRAM": str(image),
+        "EMU_SOURCE": str(SOURCE), "EMU_LINE": str(line_of("total = sum;")),
+    }  # fmt: skip
+    done = subprocess.run(
+        [emacs, "--batch", "-l", str(Path(__file__).with_name("conversation.el"))],
+        capture_output=True, text=True, env=environment, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-9:] == [
+        "add at program.c:13: total = sum;",
+        "Locals: a=0 b=0 sum=0",
+        "add at program.c:14: return sum;",
+        "add at program.c:13: total = sum;",
+        "add at program.c:13: total = sum;",
+        "Locals: a=0 b=0 sum=0",
+        "twice at program.c:20: return add(once, n);",
+        "add at program.c:13: total = sum;",
+        "the adapter has ended: 0",
+    ]
