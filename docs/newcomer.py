@@ -49,8 +49,9 @@ def installed(wheel: Path, folder: Path) -> dict[str, str]:
     """The surroundings of a shell in which the wheel is installed and nothing else of this project."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
     python = folder / "bin" / "python"
+    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}  # it may have this package
     subprocess.run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index",
-                    "--no-compile", "--disable-pip-version-check", wheel], check=True)  # fmt: skip
+                    "--no-compile", "--disable-pip-version-check", wheel], check=True, env=alone)  # fmt: skip
     packages = next((folder / "lib").glob("python*")) / "site-packages"
     (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
     home = folder.parent / "home"
