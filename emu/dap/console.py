@@ -9,6 +9,7 @@ from emu.dap.debuggee import Debuggee, Halt
 from emu.debug.expression import evaluate
 from emu.debug.inside import Value
 from emu.debug.locate import address_of
+from emu.debug.threads import Thread
 
 WORDS: Final = {
     "time": "              cycle, seconds, how far in the past",
@@ -29,9 +30,7 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
         past = f", {history.end - machine.cycle:,} before the present" if history.is_past else ""
         return f"cycle {machine.cycle:,}, {machine.seconds:.9f} s{past}"
     if word == "threads":
-        lines = [f"{one}: {one.state}, stack {one.used} of {one.stack and one.stack[1] - one.stack[0]} bytes used"
-                 for one in target.threads()]  # fmt: skip
-        return "\n".join(lines) or "there are no threads"
+        return "\n".join(f"{one}: {one.state}{_stack(one)}" for one in target.threads()) or "there are no threads"
     if word == "goto":
         cycle = _count(rest)
         return lambda: target.go_to(cycle)
@@ -49,6 +48,13 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
         size = place.type.bytes
         return lambda: _last_write(target, at, size)
     return HELP
+
+
+def _stack(thread: Thread) -> str:
+    """Its use, if it has a stack of its own."""
+    if thread.stack is None or thread.used is None:
+        return ""
+    return f", stack {thread.used} of {thread.stack[1] - thread.stack[0]} bytes used"
 
 
 def _count(text: str) -> int:

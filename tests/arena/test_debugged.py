@@ -82,8 +82,12 @@ def test_at_a_prompt_by_a_script(
         return main([*command, *more])
 
     out = ("--out", str(tmp_path / "debugged"))
-    assert played("break react", "continue", "next 2", "reverse-stepi", "info locals", "detach", more=out) == 0
-    assert "react at " in capsys.readouterr().out
+    session = ("break react", "continue", "next 2", "reverse-stepi", "info locals", "threads", "detach")
+    assert played(*session, more=out) == 0
+    told = capsys.readouterr().out
+    assert "react at " in told
+    assert "thread 0 (main): " in told
+    assert "None" not in told
     assert main(["run", "clustering", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
     records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
     assert records[0] == records[1]
