@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import lzma
+import math
 import tempfile
 import zipfile
 import zlib
@@ -20,6 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from arena.campaign import Plan, run_one, trial_path
+from arena.controllers import CONTROLLERS
 from arena.record import EXPERIMENT, MANIFEST, RecordError, read_trial, write_bytes
 from arena.scene import scene_of
 
@@ -29,7 +32,7 @@ KEPT: Final = (MANIFEST, EXPERIMENT, RECORD, DIGEST, "firmware*")
 LIMIT: Final = 1 << 32
 """Bytes of everything unpacked: more is no study of ours."""
 DAMAGE: Final = (OSError, zipfile.BadZipFile, zlib.error, LookupError, TypeError, ValueError, AttributeError,
-                 NotImplementedError, EOFError)  # fmt: skip
+                 EOFError, RuntimeError, lzma.LZMAError)  # fmt: skip
 """What reading an archive that is none, or another one, can end in."""
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 
@@ -154,11 +157,25 @@ def plan_of(folder: Path) -> Plan:
         images = tuple((name, firmware[f"firmware-{place}"] if hashes.get(name) else None)
                        for place, name in enumerate(own, start=1))  # fmt: skip
         image = firmware["firmware"] if key["image_sha256"] else None
+        _plausible(key)
         experiment = folder / EXPERIMENT if key.get("experiment_sha256") else None
         return Plan(scene, key["brain"], key["controller"], image, len(_numbers(folder)),
                     key["seconds"], key["seed"], experiment, images)  # fmt: skip
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except DAMAGE as error:
         raise RecordError(f"{folder / MANIFEST}: {type(error).__name__}: {error}") from None
+
+
+def _plausible(key: dict[str, Any]) -> None:
+    """Raises ValueError for what no plan has."""
+    seconds, seed = key["seconds"], key["seed"]
+    for name, value, good in (
+        ("brain", key["brain"], isinstance(key["brain"], str)),
+        ("controller", key["controller"], key["controller"] in CONTROLLERS),
+        ("seconds", seconds, isinstance(seconds, int | float) and 0 < seconds < math.inf),
+        ("seed", seed, isinstance(seed, int) and seed >= 0),
+    ):
+        if not good:
+            raise ValueError(f"{name}: {value!r:.40} is none")
 
 
 def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], jobs: int) -> Iterator[Check]:
@@ -168,7 +185,10 @@ def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], jobs: int) ->
             plan = plan_of(folder)
             again = folder / "again"
             again.mkdir()
-            for number in chosen(_numbers(folder)):
+            numbers = _numbers(folder)
+            if not numbers:
+                raise RecordError(f"{bundle}: run {folder.name} has no trial")
+            for number in chosen(numbers):
                 run_one(plan, number, again, None, jobs if plan.has_firmware else 1)
                 yield _compared(folder.name, number, _kept(folder, number), digest_of(trial_path(again, number)))
 

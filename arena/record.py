@@ -20,6 +20,7 @@ from arena.experiments import Experiment, Moments, experiment_of
 from arena.metrics import Course
 from arena.scene import Scene, scene_of
 from arena.trial import Rows
+from emu.outfile import is_opened
 
 if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
     import pyarrow as pa
@@ -192,9 +193,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all. Raises RecordError."""
+    """Write a file whole or not at all; a device or pipe as it is. Raises RecordError."""
     part = path.with_name(path.name + ".part")
     try:
+        if is_opened(path):
+            path.write_bytes(data)
+            return
         part.write_bytes(data)
         os.replace(part, path)
     except OSError as error:

@@ -11,6 +11,14 @@ from pathlib import Path
 from typing import TextIO
 
 
+def is_opened(path: str | os.PathLike[str]) -> bool:
+    """Whether a path is a device, a pipe, or a name that the system gives to an open file (/dev/stdout): to be opened
+    and written, never to be replaced by a file."""
+    target = Path(path)
+    of_system = os.path.abspath(target).startswith(("/dev/", "/proc/"))
+    return target.exists() and (not target.is_file() or (of_system and target.is_symlink()))
+
+
 @contextmanager
 def whole_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     """A text file written beside `path` and renamed to it when the block ends without an exception.
@@ -22,7 +30,7 @@ def whole_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
         sys.stdout.flush()
         return
     target = Path(path)
-    if target.exists() and not target.is_file():
+    if is_opened(target):
         with target.open("w", encoding="utf-8") as stream:
             yield stream
         return

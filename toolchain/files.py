@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+from emu.outfile import is_opened
 from toolchain.errors import ToolError
 
 
@@ -28,14 +29,20 @@ def read_text(path: str | Path) -> str:
 
 
 def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
-    """Write all files or none: each goes to a temporary beside its target, then all are renamed.
+    """Write all files or none: each goes to a temporary beside its target, then all are renamed. Devices and pipes are
+    written last, as they are.
 
     Raises `ToolError` when a target cannot be written; temporaries are removed in every case.
     """
     pending: list[tuple[str, Path]] = []
+    opened: list[tuple[Path, bytes]] = []
+    target = Path("output")
     try:
         for path, data in outputs:
             target = Path(path)
+            if is_opened(target):
+                opened.append((target, data))
+                continue
             handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
             pending.append((temporary, target))
             with os.fdopen(handle, "wb") as stream:
@@ -43,9 +50,10 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
             os.chmod(temporary, 0o666 & ~_umask())
         for temporary, target in pending:
             os.replace(temporary, target)
+        for target, data in opened:
+            target.write_bytes(data)
     except OSError as error:
-        name = pending[-1][1] if pending else "output"
-        raise ToolError(f"cannot write {name}: {error.strerror or error}") from None
+        raise ToolError(f"cannot write {target}: {error.strerror or error}") from None
     finally:
         for temporary, _ in pending:
             if os.path.exists(temporary):

@@ -131,6 +131,14 @@ def rewritten(packed: Path, target: Path, change: dict[str, bytes]) -> Path:
     return target
 
 
+def listed(packed: Path, change: dict[str, bytes]) -> dict[str, bytes]:
+    """`change`, with the hashes in the bundle's list that it needs."""
+    with zipfile.ZipFile(packed) as archive:
+        contents = json.loads(archive.read("bundle.json"))
+    contents["files"] |= {name: hashlib.sha256(data).hexdigest() for name, data in change.items()}
+    return change | {"bundle.json": json.dumps(contents).encode()}
+
+
 def test_changed_files_and_archives_that_are_none_are_refused(packed: Path, tmp_path: Path) -> None:
     """One line each; nothing is written outside the folder."""
     with zipfile.ZipFile(packed) as archive:
@@ -161,3 +169,64 @@ def test_only_runs_can_be_packed(study: Path, tmp_path: Path, capsys: pytest.Cap
     assert main(["bundle", str(tmp_path / "x.zip"), str(study / "talk"), str(study / "talk")]) == 2
     assert "the same name" in capsys.readouterr().err
     assert main(["verify", str(tmp_path / "none.zip")]) == 2
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"seconds": "6"}, "seconds: '6' is none"), ({"seconds": -1.0}, "seconds: -1.0 is none"),
+    ({"seed": "x"}, "seed: 'x' is none"), ({"controller": "Z"}, "controller: 'Z' is none"),
+    ({"controller": ["A"]}, "manifest.json: "), ({"brain": None}, "brain: None is none"),
+])  # fmt: skip
+def test_a_manifest_that_is_no_plan_is_refused(
+    change: dict[str, object], said: str, packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line, status 2, although all hashes fit."""
+    with zipfile.ZipFile(packed) as archive:
+        manifest = json.loads(archive.read("script/manifest.json"))
+    manifest["key"] |= change
+    changed = listed(packed, {"script/manifest.json": json.dumps(manifest).encode()})
+    path = rewritten(packed, tmp_path / "x.zip", changed)
+    assert main(["verify", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+
+
+DEEP = b"[" * 100_000 + b"]" * 100_000
+
+
+def test_nesting_encryption_and_other_compressions_are_refused(
+    packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What the readers of zip and JSON raise beside ValueError."""
+    rewritten(packed, tmp_path / "list.zip", {"bundle.json": DEEP})
+    rewritten(packed, tmp_path / "manifest.zip", listed(packed, {"script/manifest.json": DEEP}))
+    flagged = bytearray(packed.read_bytes())
+    at = -1
+    while (at := flagged.find(b"PK\x01\x02", at + 1)) >= 0:
+        flagged[at + 8] |= 1
+    (tmp_path / "secret.zip").write_bytes(flagged)
+    with zipfile.ZipFile(tmp_path / "lzma.zip", "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("bundle.json", DEEP)
+    damaged = bytearray((tmp_path / "lzma.zip").read_bytes())
+    damaged[60] ^= 0xFF
+    (tmp_path / "lzma.zip").write_bytes(damaged)
+    for name in ("list", "manifest", "secret", "lzma"):
+        assert main(["verify", str(tmp_path / f"{name}.zip")]) == 2, name
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_run_without_trials_proves_nothing(
+    packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Status 2, not "0 trials computed again"."""
+    with zipfile.ZipFile(packed) as archive:
+        names = [name for name in archive.namelist() if name.startswith("script/trial-")]
+    path = tmp_path / "x.zip"
+    with zipfile.ZipFile(packed) as old, zipfile.ZipFile(path, "w") as new:
+        contents = json.loads(old.read("bundle.json"))
+        contents["files"] = {name: digest for name, digest in contents["files"].items() if name not in names}
+        new.writestr("bundle.json", json.dumps(contents))
+        for name in contents["files"]:
+            new.writestr(name, old.read(name))
+    assert main(["verify", str(path)]) == 2
+    assert "run script has no trial" in capsys.readouterr().err
