@@ -73,6 +73,8 @@ class Outcome:
     """It stores where the address says nothing."""
     visited: set[int] = field(default_factory=set)
     """Functions run."""
+    shared: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """Loops whose rounds its times leave out (`Explorer.sharing`): head -> the longest round, and how many in all."""
 
     def take(self, other: Outcome, start: int, since: list[int | None], caller: tuple[int, ...]) -> None:
         """Add what a call, made at time `start`, found."""
@@ -91,6 +93,8 @@ class Outcome:
         self.forever |= other.forever
         self.visited |= other.visited
         self.wild |= other.wild
+        for head, (cycles, total) in other.shared.items():
+            self.longer(self.shared, head, cycles, total)
         if other.left is not None:
             self.left = max(self.left or 0, start + other.left)
 
@@ -112,6 +116,8 @@ class Rules:
 
     loop: Callable[[Code, Loop], int | None] = lambda _code, _loop: None
     """Most rounds of a loop beyond its first, per entry."""
+    total: Callable[[Code, Loop], int | None] = lambda _code, _loop: None
+    """The same of all its entries together."""
     same: Callable[[Code], set[int]] = lambda _code: set()
     """Heads of loops that are one with the loop around them."""
     calls: Callable[[int, State], list[int] | None] = lambda _pc, _state: None
@@ -129,8 +135,9 @@ class Rules:
 class Explorer:
     """Runs functions of one image; results of equal calls are kept."""
 
-    def __init__(self, world: World, graph: Builder, rules: Rules) -> None:
-        self.world, self.graph, self.rules = world, graph, rules
+    def __init__(self, world: World, graph: Builder, rules: Rules, sharing: bool = False) -> None:
+        """`sharing`: rounds that a loop has a number of in all cost nothing in place; `Outcome.shared` has them."""
+        self.world, self.graph, self.rules, self.sharing = world, graph, rules, sharing
         self.abstract: Final = Abstract(world)
         self.codes: Final[dict[int, Code]] = {}
         self.known: Final[dict[object, Outcome]] = {}
@@ -247,7 +254,9 @@ class _Run:
         explorer, pending = self.explorer, self.pending
         if loop.members.isdisjoint(pending):
             return
-        bound = explorer.rules.loop(self.code, loop)
+        bound, total = explorer.rules.loop(self.code, loop), explorer.rules.total(self.code, loop)
+        bound = min((most for most in (bound, total) if most is not None), default=None)
+        shared = total is not None and explorer.sharing and len(loop.heads) == 1
         limit = HOPELESS_TURNS if loop.head in explorer.hopeless else MAX_TURNS
         before: dict[int, State] = {}
         turns = 0
@@ -259,6 +268,10 @@ class _Run:
                 if turns > limit:
                     explorer.hopeless.add(loop.head)
                     self._widen(before, now)
+                if shared and total is not None:
+                    cycles = now[loop.head].time - before[loop.head].time
+                    Outcome.longer(self.outcome.shared, loop.head, cycles, total)
+                    now[loop.head].shift(-cycles)
                 if {h: s.key() for h, s in now.items()} == {h: s.key() for h, s in before.items()}:
                     if bound is None:
                         explorer.hopeless.add(loop.head)

@@ -64,7 +64,13 @@ class Notes:
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
                 a, b = self._value(left, where), self._value(right, where)
                 return None if a is None or b is None else _OPERATORS[type(op)](a, b)
-        raise ToolError(f"{where.file}:{where.line}: expected integers, names, + - * /, got {ast.unparse(tree)!r}")
+            case ast.Call(func=ast.Name(id="min"), args=[_, *_] as parts, keywords=[]):
+                missing = set(self.missing)
+                known = [number for part in parts if (number := self._value(part, where)) is not None]
+                if known:
+                    self.missing = missing
+                return min(known, default=None)
+        raise ToolError(f"{where.file}:{where.line}: expected integers, names, + - * / min, got {ast.unparse(tree)!r}")
 
 
 def read_notes(image: Executable, values: Mapping[str, int]) -> Notes:

@@ -112,14 +112,20 @@ class Program:
 
     def rounds(self, code: Code, loop: Loop) -> int | None:
         """Rounds of a loop by its LOOP_BOUND, the line in front of its condition."""
-        numbers = [
-            self.notes.number(note.text, note) for head in loop.heads for note in self._bound(code, "loop", head)
-        ]
+        numbers = self._numbers(code, loop, "loop")
         for note in self.notes.of("loops"):
             name, _, text = note.text.partition(" ")
             if self.address(name) == code.entry:
                 numbers.append(self.notes.number(text, note))
         return None if None in numbers else max((n for n in numbers if n is not None), default=None)
+
+    def total(self, code: Code, loop: Loop) -> int | None:
+        """Rounds of a loop in all, by its LOOP_TOTAL."""
+        numbers = self._numbers(code, loop, "total")
+        return None if None in numbers else max((n for n in numbers if n is not None), default=None)
+
+    def _numbers(self, code: Code, loop: Loop, kind: str) -> list[int | None]:
+        return [self.notes.number(note.text, note) for head in loop.heads for note in self._bound(code, kind, head)]
 
     def same(self, code: Code) -> set[int]:
         """Heads of loops that are one with the loop around them, by SAME_LOOP."""

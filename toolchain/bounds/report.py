@@ -72,6 +72,7 @@ class Analyst:
         self.world = World(Area(areas), program.words, program.window, kept, program.links_in_ram)
         self.rules = Rules(
             loop=program.rounds,
+            total=program.total,
             same=program.same,
             without=program.without(),
             calls=program.targets,
@@ -104,7 +105,7 @@ class Analyst:
                 found.append((address & ~1, value))
         return found
 
-    def explore(self, entry: int, level: int, on_other: bool, thread: bool) -> Outcome:
+    def explore(self, entry: int, level: int, on_other: bool, thread: bool, sharing: bool = False) -> Outcome:
         """Run a function from one state of entry; raises `TooMuch`."""
         state = State()
         state.ipl = level, level
@@ -118,30 +119,36 @@ class Analyst:
             most = self.program.notes.number(text, note)
             if self.program.address(name) == entry and most is not None:
                 state.w[int(number)] = span(0, most)
-        return Explorer(self.world, self.program.graph, self.rules).run(entry, state)
+        return Explorer(self.world, self.program.graph, self.rules, sharing).run(entry, state)
 
     def bound(self, name: str, entry: int, kind: str, level: int = 0, on_other: bool = False) -> Bound:
         """The bound of one function."""
         result = Bound(name.removeprefix("_"), kind, level)
         try:
             outside = kind != "interrupt" or entry in self.program.outside()
-            found = self.explore(entry, level, on_other, outside)
-            anywhere = self.explore(entry, level, on_other, False) if kind == "call" and self.private else found
+            contexts = [outside, False] if kind == "call" and self.private else [outside]
+            found, *others = (self.explore(entry, level, on_other, thread) for thread in contexts)
+            shared = []
+            if self.program.notes.of("total"):
+                shared = [self.explore(entry, level, on_other, thread, sharing=True) for thread in contexts]
         except TooMuch:
             result.open[self.program.place(entry)] = "too many paths; bound its loops"
             return result
         self._fill(result, found, on_other)
-        self._time(result, found, anywhere)
+        self._time(result, [found, *others], shared)
         return result
 
-    def _time(self, result: Bound, *contexts: Outcome) -> None:
-        """The longest way in any context; PRIVATE_VALUEs are those of threads only outside of sections."""
+    def _time(self, result: Bound, contexts: list[Outcome], shared: list[Outcome]) -> None:
+        """The longest way in any context; PRIVATE_VALUEs are those of threads only outside of sections.
+
+        Rounds that loops share are counted where they are as often as one entry may have them, or once for all, with
+        the longest of them; the smaller sum is the bound.
+        """
         for found in contexts:
             result.open |= {self.program.place(pc): why for pc, why in found.open.items()}
-        times = [end.time for found in contexts for end in found.ends.values()]
-        times += [found.left for found in contexts if found.left is not None]
-        if times and not result.open:
-            result.cycles = max(times)
+        sums = [max(times) for group in (contexts, shared) if (times := _times(group))]
+        if sums and not result.open:
+            result.cycles = min(sums)
 
     def _fill(self, result: Bound, found: Outcome, on_other: bool) -> None:
         place = self.program.place
@@ -166,6 +173,16 @@ class Analyst:
                     cycles = end.time - max(since, 0)
                     if cycles > result.masked.get(level, (-1, ""))[0]:
                         result.masked[level] = cycles, "its end"
+
+
+def _times(contexts: list[Outcome]) -> list[int]:
+    """Cycles of every way through."""
+    found = []
+    for one in contexts:
+        rounds = sum(cycles * total for cycles, total in one.shared.values())
+        found += [end.time + rounds for end in one.ends.values()]
+        found += [one.left + rounds] if one.left is not None else []
+    return found
 
 
 @dataclass(slots=True)

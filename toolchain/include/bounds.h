@@ -2,7 +2,8 @@
 /* What `python -m toolchain bounds` cannot find out by itself, told beside the code.  Each is a declaration: no instruction
  * and no byte of memory comes of it; in the image it is a line of the section .note.bounds.
  *
- * Numbers are expressions of integers and names; a name gets its value on the command line (--let n=4).
+ * Numbers are expressions of integers, names, + - * / and min(...); a name gets its value on the command line (--let n=4).
+ * In min(...) what has no value does not count.
  */
 #ifndef _BOUNDS_H_
 #define _BOUNDS_H_
@@ -12,6 +13,9 @@
  * other, SAME_LOOP in front of a line of the inner one says so: they share their rounds. */
 #define LOOP_BOUND(rounds) _BOUNDS_NOTE("loop", rounds)
 #define SAME_LOOP() _BOUNDS_NOTE("same", .)
+/* On the line of a LOOP_BOUND, or alone: in one call of whatever is looked at, all rounds of the loop together, however often
+ * it is entered, are at most `rounds`. Of the two ways to count, the one that gives less is taken. */
+#define LOOP_TOTAL(rounds) _BOUNDS_NOTE("total", rounds)
 /* Anywhere: the loops of this function, which may be assembly, go round at most `rounds` times. */
 #define LOOPS_OF(function, rounds) _BOUNDS_NOTE("loops", function rounds)
 /* In front of a call through a pointer: its targets are the functions named, of a type named all whose address is taken,

@@ -12,11 +12,12 @@
 
 /* What bounds of time and stack take from the source (toolchain/include/bounds.h); nothing to other compilers. n threads,
  * m events, b newer events in the same bucket, s subscriptions of one event, q queued messages, i times idle, u bytes of a
- * stack never used. */
+ * stack never used; where they are told, t subscriptions of all events together, h holes on a path of the heap's tree. */
 #if defined(__clang__) && defined(__dsPIC30F__)
 #include <bounds.h>
 #else
 #define LOOP_BOUND(rounds)
+#define LOOP_TOTAL(rounds)
 #define SAME_LOOP()
 #define LOOPS_OF(function, rounds) struct no_note
 #define CALL_TARGETS(...)

@@ -133,7 +133,7 @@ static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
 
 static HAL_OUTLINE void disown_messages(message *m, const event *e)
 {
-    LOOP_BOUND(q);
+    LOOP_BOUND(q); LOOP_TOTAL(q);
     for (; m != NULL; m = HAL_LOAD(m->queued.next)) {
         if (m->queued.event == e) {
             m->queued.event = NULL;
@@ -218,7 +218,7 @@ static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
 {
     bool found = false;
     subscription **link = &e->subscribers;
-    LOOP_BOUND(s);
+    LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s));
     while (*link != NULL) {
         if ((*link)->pid == pid && (handler == NULL || (*link)->handler == handler)) {
             unlink_subscription(link);
@@ -249,7 +249,7 @@ bool Sys_Unsubscribe_from_Event(uint16 id, uint16 pid)
 void event_drop_subscriptions(uint16 pid)
 {
     for (event **bucket = events; bucket != events + BUCKETS; bucket++) {
-        LOOP_BOUND(m);
+        LOOP_BOUND(m); LOOP_TOTAL(m);
         for (event *e = *bucket; e != NULL; e = e->next) {
             (void)unsubscribe(e, pid, NULL);
         }

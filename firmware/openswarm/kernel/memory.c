@@ -79,7 +79,7 @@ static HAL_OUTLINE hole **find_hole(uintptr_t at)
 {
     hole **link = &holes;
     uint16 offset = (uint16)(at - (uintptr_t)os_memory.bytes);
-    LOOP_BOUND(10); /* a path has at most 10 nodes (README.md) */
+    LOOP_BOUND(min(10, h)); /* a path has at most 10 nodes (README.md) */
     for (uint16 bit = TOP_BIT; *link != &no_hole && (uintptr_t)*link != at; bit >>= 1) {
         link = offset & bit ? &(*link)->side[1] : &(*link)->side[0];
     }
@@ -104,7 +104,7 @@ static HAL_OUTLINE void put_hole(void *at, uint16 size)
         }
         link = offset_of(h) & bit ? &stays->side[1] : &stays->side[0];
         bit >>= 1;
-        LOOP_BOUND(9);
+        LOOP_BOUND(min(9, h));
     } while (h != &no_hole);
 }
 
@@ -112,7 +112,7 @@ static HAL_OUTLINE void put_hole(void *at, uint16 size)
 static HAL_OUTLINE hole *pull_hole(hole **link)
 {
     hole *gone = *link, *left = gone->side[0], *right = gone->side[1];
-    LOOP_BOUND(9);
+    LOOP_BOUND(min(9, h));
     while (left != right) { /* not both nothing */
         hole *next;
         if (left->size >= right->size) {
@@ -223,7 +223,7 @@ void *heap_take(uint16 size)
 void *heap_keep(uint16 size)
 {
     hole **link = NULL, **next = &holes;
-    LOOP_BOUND(10);
+    LOOP_BOUND(min(10, h));
     while ((*next)->size >= size + sizeof(hole)) {
         link = next;
         next = &(*link)->side[0];

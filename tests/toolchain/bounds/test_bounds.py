@@ -48,6 +48,21 @@ __attribute__((noinline)) int pairs(struct item *q, int key)
 }
 int main(void) { return pairs(head, 3); }
 """
+TABLE = """
+#include <bounds.h>
+struct item { struct item *next; int key; } items[8], *table[8];
+volatile int found;
+__attribute__((noinline)) void visit(struct item *p) { __asm__ volatile("repeat #99\\n nop" :: "r"(p)); }
+int main(void)
+{
+    for (int i = 0; i < 8; i++) { items[i].next = table[i & 3]; table[i & 3] = &items[i]; }
+    for (int i = 0; i < 8; i++) {
+        LOOP_BOUND(b); LOOP_TOTAL(min(t, 8 * b));
+        for (struct item *p = table[i]; p; p = p->next) visit(p);
+    }
+    return 0;
+}
+"""
 SPLIT = """
 #include <bounds.h>
 struct item { struct item *next; int key; } items[8], *head, **volatile place;
@@ -161,6 +176,20 @@ def test_one_loop_of_the_source_that_became_two_shares_its_rounds(tmp_path, caps
     image = built(tmp_path, SPLIT)
     few, many = (report(capsys, image, "--let", f"n={n}")["cycles"] for n in (10, 20))
     assert 1_000 < many - few < 2_000
+
+
+def test_rounds_of_all_entries_together_are_counted_once(tmp_path, capsys) -> None:
+    """Eight lists of up to eight, eight items in all: not 64 visits of over 100 cycles."""
+    image = built(tmp_path, TABLE)
+    seen = measure(image)
+    assert isinstance(seen, dict)
+    apart, together, more = (
+        report(capsys, image, "--let", "b=8", *words)["cycles"] for words in ((), ("--let", "t=8"), ("--let", "t=9"))
+    )
+    assert seen["_main"].cycles <= together <= 1.2 * seen["_main"].cycles
+    assert apart > 64 * 100 > 3 * together
+    assert 100 < more - together < 150
+    assert report(capsys, image, "--let", "b=1", "--let", "t=80")["cycles"] <= together  # the smaller way to count
 
 
 def test_a_bounded_argument_bounds_a_copy(tmp_path, capsys) -> None:
