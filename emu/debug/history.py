@@ -230,6 +230,7 @@ class History:
             behind = [cycle for cycle, _ in self._steps(begin, now)]
             if begin == self.start:
                 break
+            del behind[:1]  # `begin` may be where the CPU wakes to enter an interrupt: inside of a step
             window *= WIDER
         self._go(behind.pop() if behind else self.start)
         self._behind = (self.machine.cycle, behind)
