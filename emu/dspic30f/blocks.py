@@ -110,11 +110,14 @@ class BlockWriter:
         facts = facts_of(insn)
         if facts.flow not in NATIVE:
             raise _Ends
-        if self._loop is not None and pc == self._loop[1] and facts.flow is not None:
+        last_of_loop = self._loop is not None and pc == self._loop[1]
+        if last_of_loop and facts.flow is not None:
             raise _Ends
         start = self._cycle + flowrules.stall(source.stall if self._visited else 0, facts.source_pointers)
         source.begin(pc, self._cycle, start + facts.access)
         flow: Flow = insn.row.does(source, insn.x)
+        if last_of_loop and source.writes_modes:
+            raise _Ends  # where the loop goes on is in the registers, not in this translation
         source.commit()
         source.at_entry = False
         self._visited.add(pc)
@@ -123,7 +126,7 @@ class BlockWriter:
         self._cycle = start + insn.row.cycles
         if flow is not None:
             return self._follow(flow, after)
-        if self._loop is not None and pc == self._loop[1]:
+        if last_of_loop:
             self._end_loop(after)
             return None
         if source.ends_here:

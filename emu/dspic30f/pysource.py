@@ -176,6 +176,11 @@ class Source:
         self.stall = pending.stall
 
     @property
+    def writes_modes(self) -> bool:
+        """Whether the instruction being written stores to a register that decides what instructions mean."""
+        return self._pending.mode_write
+
+    @property
     def ends_here(self) -> bool:
         """A device may have posted an event or asked for attention: the function must end behind this instruction."""
         return self._pending.bus_write or self._pending.side_effect

@@ -178,3 +178,18 @@ def test_repeat_inside_do(engine: str) -> None:
     rig = Rig("do #2, last\nrepeat #3\ninc w0, w0\nlast: inc w1, w1\nend: nop", engine, w0=0, w1=0)
     assert rig.cycles_to() == 2 + 3 * 6
     assert (rig.machine.w[0], rig.machine.w[1]) == (12, 3)
+
+
+def test_the_last_instruction_may_move_the_loops_own_start(engine: str) -> None:
+    """isa.md §7.6: the loop goes on where DOSTARTL points then. 2 + 3, then four times the part from `from` on."""
+    start = "mov #from, w2\ndo #4, last\ninc w0, w0\nfrom: inc w1, w1\nlast: mov w2, 0x3A\nend: nop"
+    rig = Rig(start, engine, w0=0, w1=0)
+    assert rig.cycles_to() == 1 + 2 + 3 + 4 * 2
+    assert (rig.machine.w[0], rig.machine.w[1]) == (1, 5)
+
+
+def test_the_last_instruction_may_change_the_count(engine: str) -> None:
+    """isa.md §7.6: DCOUNT is looked at behind it."""
+    rig = Rig("do #5, last\ninc w0, w0\nlast: lsr 0x38\nend: nop", engine, w0=0)
+    rig.cycles_to()
+    assert rig.machine.w[0] == 2  # 5 becomes 2, counted down to 1, that becomes 0
