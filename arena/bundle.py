@@ -178,7 +178,7 @@ def _plausible(key: dict[str, Any]) -> None:
             raise ValueError(f"{name}: {value!r:.40} is none")
 
 
-def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], jobs: int) -> Iterator[Check]:
+def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], processes: int) -> Iterator[Check]:
     """Compute `chosen` of each run's trial numbers again. Raises RecordError, SceneError, emu.LoadError."""
     with tempfile.TemporaryDirectory(prefix="arena-") as name:
         for folder in unpack(bundle, Path(name)):
@@ -189,7 +189,7 @@ def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], jobs: int) ->
             if not numbers:
                 raise RecordError(f"{bundle}: run {folder.name} has no trial")
             for number in chosen(numbers):
-                run_one(plan, number, again, None, jobs if plan.has_firmware else 1)
+                run_one(plan, number, again, None, processes if plan.has_firmware else 1)
                 yield _compared(folder.name, number, _kept(folder, number), digest_of(trial_path(again, number)))
 
 

@@ -225,13 +225,15 @@ def _changed(before: Any, now: dict[str, Any]) -> list[str]:
 
 
 def run_all(
-    plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None]
-) -> None:
-    """Run trials `numbers` on `jobs` workers; 1 = in this process. A single trial with emulated brains is spread over
-    them. Raises what a trial raises, after the others of its moment; files of finished trials stay."""
-    if jobs <= 1 or len(numbers) <= 1:
+    plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None],
+    processes: int = 1,
+) -> None:  # fmt: skip
+    """Run trials `numbers` on `jobs` workers; 1 = in this process. With several `processes` trials are run one after
+    the other, their emulated robots spread over them. Raises what a trial raises, after the others of its moment;
+    files of finished trials stay."""
+    if jobs <= 1 or len(numbers) <= 1 or processes > 1:
         for number in numbers:
-            done(run_one(plan, number, folder, report, jobs if plan.has_firmware else 1))
+            done(run_one(plan, number, folder, report, processes if plan.has_firmware else 1))
         return
     context = multiprocessing.get_context("spawn")
     queue: Any = context.Queue()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -46,7 +45,7 @@ def verify_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--number", type=count, action="append", metavar="N", help="this trial of each run that has it")
     made.add_argument("--strict", action="store_true", help="versions must be the same too: equal to the byte")
-    made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="processes for a trial")
+    made.add_argument("--processes", type=count, default=1, metavar="N", help="as for `arena run` (default 1)")
     made.add_argument("--json", action="store_true")
     return made
 
@@ -58,7 +57,7 @@ def verify(options: argparse.Namespace) -> int:
         return [one for one in numbers if one in options.number] if options.number else numbers[: options.trials]
 
     status, checks = 0, []
-    for one in bundle.verify(options.bundle, chosen, options.jobs):
+    for one in bundle.verify(options.bundle, chosen, options.processes):
         good = one.equal and not (options.strict and one.versions)
         status = status if good else DIFFERENT
         checks.append(asdict(one))

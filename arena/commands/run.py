@@ -30,6 +30,8 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--trials", type=count, default=10, metavar="N")
     add_plan(made)
     made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes")
+    made.add_argument("--processes", type=count, default=1, metavar="N",
+                      help="run one trial after the other, its robots in N processes (default 1): see arena/README.md")
     made.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
     )
@@ -116,7 +118,7 @@ def run(options: argparse.Namespace) -> int:
     with claimed(folder):
         missing = open_folder(plan, folder, sys.argv[1:])
         plan = kept(plan, folder)
-        faults = with_progress(plan, folder, missing, options.jobs, options.scheduler)
+        faults = with_progress(plan, folder, missing, options.jobs, options.scheduler, options.processes)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
     results = [trial for trial in trials_in(folder) if trial.path.name in wanted]
     if options.json:
@@ -143,7 +145,9 @@ def told(trial: Trial) -> str:
     return f"{trial.path.stem}: seed {trial.about['seed']}, after {trial.times[-1]:g} s: {values}"
 
 
-def with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None) -> bool:
+def with_progress(
+    plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None, processes: int = 1
+) -> bool:
     """Run what is missing, on workers here or on those of a Dask scheduler; true if something happened to a robot."""
     stopped = False
     with Told(len(missing), plan.seconds) as telling:
@@ -161,5 +165,5 @@ def with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, sched
 
             run_on(scheduler, plan, folder, missing, telling.reached, done)
         else:
-            run_all(plan, folder, missing, jobs, telling.reached, done)
+            run_all(plan, folder, missing, jobs, telling.reached, done, processes)
     return stopped

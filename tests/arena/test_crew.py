@@ -110,6 +110,6 @@ def test_a_trial_is_the_same_in_one_two_and_three_processes(
     files = []
     for jobs in ("1", "2", "3"):
         main(["run", "clustering", "--brain", str(request.getfixturevalue(image)), "--robots", "3", "--trials", "1",
-              "--minutes", str(seconds / 60), "--jobs", jobs, "--out", str(tmp_path / jobs)])  # fmt: skip
+              "--minutes", str(seconds / 60), "--processes", jobs, "--out", str(tmp_path / jobs)])  # fmt: skip
         files.append((tmp_path / jobs / "trial-0001.parquet").read_bytes())
     assert files[0] == files[1] == files[2]

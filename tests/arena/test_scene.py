@@ -347,9 +347,9 @@ selector = 9
 [[robots]]
 image = "scripted"
 """)
-    for jobs in (1, 2):
-        assert main(["run", str(path), "--trials", "1", "--minutes", "0.01", "--jobs", str(jobs), "--out",
-                     str(tmp_path / str(jobs))]) == 0  # fmt: skip
+    for processes in (1, 2):
+        assert main(["run", str(path), "--trials", "1", "--minutes", "0.01", "--processes", str(processes), "--out",
+                     str(tmp_path / str(processes))]) == 0  # fmt: skip
     trial = read_trial(tmp_path / "1" / "trial-0001.parquet")
     said = sorted((line["robot"], line["text"]) for row in trial.columns["log"] for line in row)
     assert said == [(0, "41"), (0, "PD"), (1, "42"), (1, "PD"), (2, "QJ")]

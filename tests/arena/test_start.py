@@ -25,8 +25,6 @@ def run(image: Path, out: Path, *words: object, seconds: float = 1.5) -> tuple[i
     """Exit status and record of one trial of two robots."""
     command = ["run", "clustering", "--brain", str(image), "--robots", "2", "--objects", "0", "--trials", "1",
                "--minutes", str(seconds / 60), "--out", str(out), *map(str, words)]  # fmt: skip
-    if "--jobs" not in command:
-        command += ["--jobs", "1"]
     status = main(command)
     return status, read_trial(out / "trial-0001.parquet")
 
@@ -165,8 +163,8 @@ def test_robots_are_told_things_by_uart_at_times_of_the_trial(assembled: Assembl
     script = '0.5s uart1 "go 7\\n"'
     image = assembled(ECHO)
     records = []
-    for jobs in (1, 2):
-        _, trial = run(image, tmp_path / str(jobs), "--set", f"start.stimulus={script}", "--jobs", jobs)
+    for processes in (1, 2):
+        _, trial = run(image, tmp_path / str(processes), "--set", f"start.stimulus={script}", "--processes", processes)
         records.append(trial.path.read_bytes())
         lines = [line for row in trial.columns["log"] for line in row]
         assert sorted((line["robot"], line["text"]) for line in lines) == [(0, "go 7"), (1, "go 7")]
