@@ -63,6 +63,7 @@ def made(folder: Path, *options: str) -> Path:
     return image
 
 
+@pytest.mark.skipif(shutil.which("readelf") is None, reason="readelf is not installed (Debian package binutils)")
 @pytest.mark.parametrize(
     "options", [("-O0",), ("-Os",), ("-O2", "-fno-lto"), ("-O1", "-fno-lto", "-Wl,--gc-sections")], ids=" ".join
 )
