@@ -181,7 +181,7 @@ def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
     folders += [b for a, b in zip(options.clang, options.clang[1:], strict=False) if a == "-I"]
-    chosen = Options(folders, relax=compiled, compiled=compiled, debug=options.debug, chip=options.chip,
+    chosen = Options(include=folders, relax=compiled, compiled=compiled, debug=options.debug, chip=options.chip,
                      prefix_map=options.prefix_map)  # fmt: skip
     obj, messages = assemble(text, name, chosen)
     for message in messages:

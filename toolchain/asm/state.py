@@ -42,7 +42,7 @@ def device_symbols(chip: Chip) -> tuple[str, ...]:
 _NUMERIC_LABEL = re.compile(r"(\d+)([fb])$")
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class Options:
     """What the command line can choose."""
 

@@ -45,8 +45,8 @@ def main(arguments: list[str]) -> int:
     output = options.output or ("a.out" if options.source == "-" else str(Path(name).with_suffix(".o").name))
     if Path(output) == Path(name):
         raise ToolError(f"the output {output} would overwrite the source")
-    asm_options = Options(options.include, dict(map(definition, options.defsym)), options.relax, options.debug,
-                          chip=chip, prefix_map=options.debug_prefix_map)  # fmt: skip
+    asm_options = Options(include=options.include, define=dict(map(definition, options.defsym)), relax=options.relax,
+                          debug=options.debug, chip=chip, prefix_map=options.debug_prefix_map)  # fmt: skip
     obj, messages = assemble(text, name, asm_options)
     for message in messages:
         print(message, file=sys.stderr)
