@@ -12,6 +12,7 @@ import random
 import sys
 import tempfile
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -141,7 +142,7 @@ def called_of(image: Path, functions: list[Function]) -> set[str]:
     called: set[str] = set()
     for one in functions:
         if machine.inside.image.symbols.find(one.name) is not None:
-            machine.hook_pc(one.name, lambda _, name=one.name: called.add(name))
+            machine.hook_pc(one.name, partial(called.add, one.name))
     machine.run()
     return called
 
