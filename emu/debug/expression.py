@@ -21,6 +21,27 @@ TOKEN: Final = re.compile(
     r"\s*(?:(0[xX][0-9a-fA-F]+|0[bB][01]+|\d+\.\d+|\d+)[uUlL]*|'(\\?.)'|(\$?[A-Za-z_]\w*)"
     r"|(->|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^~!<>()\[\].?:]))"
 )
+WIDEST: Final = 64
+"""Bits of the longest type: a shift by as many means nothing in C, and one by 10^10 would fill the memory."""
+DEEPEST: Final = 50
+"""Brackets and signs inside one another."""
+
+
+def _within(bits: int) -> int:
+    """A count of a shift. Raises ValueError."""
+    if not 0 <= bits < WIDEST:
+        raise ValueError(f"a shift by {bits} bits; expected 0 to {WIDEST - 1}")
+    return bits
+
+
+def _quotient(a: Any, b: Any) -> int:
+    """Towards zero, as C divides; exact for whole numbers of any size."""
+    if isinstance(a, float) or isinstance(b, float):
+        return int(a / b)
+    size: int = abs(a) // abs(b)
+    return size if (a < 0) == (b < 0) else -size
+
+
 BINARY: Final[dict[str, tuple[int, Callable[[Any, Any], Any]]]] = {
     "||": (1, lambda a, b: int(bool(a) or bool(b))),
     "&&": (2, lambda a, b: int(bool(a) and bool(b))),
@@ -33,13 +54,13 @@ BINARY: Final[dict[str, tuple[int, Callable[[Any, Any], Any]]]] = {
     ">": (7, lambda a, b: int(a > b)),
     "<=": (7, lambda a, b: int(a <= b)),
     ">=": (7, lambda a, b: int(a >= b)),
-    "<<": (8, operator.lshift),
-    ">>": (8, operator.rshift),
+    "<<": (8, lambda a, b: operator.lshift(a, _within(b))),
+    ">>": (8, lambda a, b: operator.rshift(a, _within(b))),
     "+": (9, operator.add),
     "-": (9, operator.sub),
     "*": (10, operator.mul),
-    "/": (10, lambda a, b: a / b if isinstance(a, float) or isinstance(b, float) else int(a / b)),
-    "%": (10, lambda a, b: a - b * int(a / b)),
+    "/": (10, lambda a, b: a / b if isinstance(a, float) or isinstance(b, float) else _quotient(a, b)),
+    "%": (10, lambda a, b: a - b * _quotient(a, b)),
 }
 ESCAPES: Final = {"n": 10, "r": 13, "t": 9, "0": 0, "\\": 92, "'": 39}
 
@@ -86,7 +107,7 @@ class _Parser:
         self.text: Final = text
         self.frame: Final = frame
         self.tokens: Final = tokens(text)
-        self.at = 0
+        self.at = self.depth = 0
 
     def _peek(self) -> str:
         return self.tokens[self.at][1] if self.at < len(self.tokens) and self.tokens[self.at][0] == "sign" else ""
@@ -123,7 +144,7 @@ class _Parser:
                 return _constant(left.type, compute(self._number(left), count * step) & 0xFFFF, self.inside)
         try:
             return compute(self._number(left), self._number(right))
-        except (ZeroDivisionError, TypeError, ValueError) as error:
+        except (ArithmeticError, TypeError, ValueError) as error:
             raise ExpressionError(f"{self.text!r}: {error}") from None
 
     def _number(self, value: Any) -> Any:
@@ -136,6 +157,15 @@ class _Parser:
         return value
 
     def unary(self) -> Any:
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise ExpressionError(f"more than {DEEPEST} brackets or signs inside one another")
+        try:
+            return self._signed()
+        finally:
+            self.depth -= 1
+
+    def _signed(self) -> Any:
         if self._take("-"):
             return -self._number(self.unary())
         if self._take("+"):

@@ -80,6 +80,16 @@ def test_a_breakpoint_shows_stack_scopes_and_values(stopped: Callable[..., Clien
     fields = client.ask("variables", variablesReference=sr["variablesReference"])["variables"]
     assert {"UARTEN", "PDSEL"} <= {one["name"] for one in fields}
     assert client.evaluate("pairs[2].second + sum") == "36"
+    assert client.evaluate("4611686018427387905 / 1") == "4611686018427387905", "no float between"
+    towards_zero = {"-7 / 2": "-3", "-7 % 2": "-1", "7 / -2": "-3", "7 % -2": "1"}
+    assert {text: client.evaluate(text) for text in towards_zero} == towards_zero
+    for text, said in (
+        ("1 << 99999999999", "a shift by 99999999999 bits; expected 0 to 63"), ("sum >> -1", "a shift by -1 bits"),
+        ("(" * 5000, "more than 50 brackets"), ("-" * 5000 + "1", "more than 50 brackets"), ("7 % 0", "zero"),
+    ):  # fmt: skip
+        bad = client.asked("evaluate", expression=text, context="watch", frameId=frame)
+        assert not bad["success"]
+        assert said in bad["message"]
     refused = client.asked("evaluate", expression="nonsense", context="watch", frameId=frame)
     assert not refused["success"]
     assert "nothing called 'nonsense'" in refused["message"]
