@@ -63,7 +63,7 @@ def _call(name: str, rest: list[str]) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:
-        print(f"emu {name}: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        print(f"emu {name}: {f'{error.filename}: ' if error.filename else ''}{error.strerror}", file=sys.stderr)
         return bad_input
     except KeyboardInterrupt:
         return DONE

@@ -4,6 +4,7 @@ for the same."""
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
@@ -40,8 +41,14 @@ def table() -> str:
     return "\n".join(["| status | meaning |", "|---:|---|", *rows])
 
 
+def _drop_output() -> None:
+    """What Python still holds for standard output goes nowhere when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def unread_is_done(main: Callable[P, int]) -> Callable[P, int]:
-    """Wrap a command line: that nobody reads its output to the end (`| head`) is no failure, and nothing is said of it.
+    """Wrap a command line: that nobody reads its output to the end (`| head`) is no failure, and nothing is said of it;
+    a full disk under it is one line.
 
     What is printed may only be refused when it is flushed, which Python does behind `main`, also behind `--help`.
     """
@@ -54,7 +61,13 @@ def unread_is_done(main: Callable[P, int]) -> Callable[P, int]:
             finally:
                 sys.stdout.flush()
         except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _drop_output()
             return DONE
+        except OSError as error:
+            if error.errno != errno.ENOSPC:
+                raise
+            _drop_output()
+            print(f"cannot write: {error.strerror}", file=sys.stderr)
+            return BAD_INPUT
 
     return wrapped

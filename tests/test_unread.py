@@ -29,3 +29,17 @@ def test_a_reader_that_has_gone_is_no_failure(line: str) -> None:
                           env=surroundings, timeout=120, check=False)  # fmt: skip
     os.close(writer)
     assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has /dev/full")
+@pytest.mark.parametrize(
+    "line", ["emu --help", "emu --version", "toolchain --version", "arena scenes", "openswarm --version"]
+)
+def test_a_full_disk_under_the_output_is_one_line(line: str) -> None:
+    """Neither a traceback nor silence."""
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run([sys.executable, "-m", *line.split()], stdout=full, stderr=subprocess.PIPE, cwd=ROOT,
+                              text=True, timeout=120, check=False)  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "No space left on device" in done.stderr
