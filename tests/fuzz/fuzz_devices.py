@@ -44,8 +44,9 @@ def main() -> int:
     for (_name, way), count in touched.items():
         ways[way] += count
     print(", ".join(f"{count} {way}" for way, count in sorted(ways.items())))
-    names = {name for name, _ in touched}
-    return course.ended(f"{len(names)} of {len(words_of(options.chip or real))} registers touched, no difference")
+    words = {sfr.name for sfr in words_of(options.chip or real)}
+    names = {name for name, _ in touched} & words
+    return course.ended(f"{len(names)} of {len(words)} registers touched, no difference")
 
 
 if __name__ == "__main__":

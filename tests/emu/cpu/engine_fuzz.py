@@ -191,6 +191,10 @@ CONDITIONS = tuple(row for row in ROWS if row.syntax.startswith("BRA ") and "," 
 SKIPS = tuple(row for row in ROWS if row.mnemonic in ("BTSS", "BTSC", "CPSEQ", "CPSNE", "CPSGT", "CPSLT"))
 
 
+CORE = ("DCOUNT", "DCOUNT", "RCOUNT", "SR", "CORCON", "DOSTARTL", "DOENDL", "DOENDH", "PSVPAG", "TBLPAG")
+"""Registers of the CPU that say how a program goes on."""
+
+
 class Program:
     """Random code of roughly `length` instructions that ends in a loop back to its start."""
 
@@ -208,9 +212,10 @@ class Program:
                     self._call,
                     self._disi,
                     self._status,
+                    self._core,
                     self._idle,
                 ),
-                (60, 8, 8, 8, 4, 4, 2, 2, 1),
+                (60, 8, 8, 8, 4, 4, 2, 2, 2, 1),
             )[0]()
         self._add("BRA Expr", n=-len(self.words) - 1)
 
@@ -248,13 +253,36 @@ class Program:
 
     def _repeat(self) -> None:
         self._add("REPEAT #lit14", k=self._rng.choice((0, 1, 2, 7, 17)))
-        self._one(tuple(row for row in PLAIN_ROWS if row.repeat_ok))
+        if self._rng.random() < 0.25:
+            self._core()
+        else:
+            self._one(tuple(row for row in PLAIN_ROWS if row.repeat_ok))
+
+    def _core(self) -> None:
+        """One instruction with a register that says how the program goes on. Counts mostly fall, so that it does."""
+        rng = self._rng
+        f, byte = DSPIC30F6014A.sfrs[rng.choice(CORE)].address, int(rng.random() < 0.3)
+        way = rng.random()
+        if way < 0.3:
+            self._add(rng.choice(("MOV{.W} Wns, f", "MOV{.W} f, Wnd")), f=f, s=rng.randrange(8), d=rng.randrange(8))
+        elif way < 0.6:
+            self._add("BTG{.B} f, #bit4", f=f + rng.randrange(2), b=rng.randrange(8), B=1)
+        else:
+            self._add(rng.choice(("CLR{.B} f", "LSR{.B} f")), f=f, B=byte)
 
     def _do(self) -> None:
         inner = self._nested(6)
         while len(inner) < 3:
             inner += encode(BY_TEXT["NOP"], {})
-        inner += encode(BY_TEXT["NOP"], {}) * 2
+        inner += encode(BY_TEXT["NOP"], {})
+        kept, self.words = self.words, []
+        if self._rng.random() < 0.5:
+            self._core()
+        else:
+            while not self.words or len(self.words) > 1:
+                self.words = []
+                self._one()
+        inner, self.words = inner + self.words, kept
         self._add("DO #lit14, Expr", k=self._rng.randrange(4), n=len(inner) - 1)
         self.words += inner
 

@@ -134,6 +134,20 @@ def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int
     return literal(value, 7) + words_of("MOV{.W} Wns, f", s=7, f=chip.sfrs[name].address)
 
 
+def core_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
+    """A register that says how the program goes on, at the end of a DO loop, under REPEAT or anywhere."""
+    name = generator.choice(("DCOUNT", "DCOUNT", "RCOUNT", "SR", "CORCON", "DOSTARTL", "DOENDL"))
+    address = chip.sfrs[name].address
+    one = generator.choice((
+        words_of("MOV{.W} Wns, f", s=generator.randrange(8), f=address), words_of("LSR{.B} f", B=0, f=address),
+        words_of("MOV{.W} f, Wnd", d=generator.randrange(8), f=address), words_of("CLR{.B} f", B=1, f=address),
+        words_of("BTG{.B} f, #bit4", f=address + generator.randrange(2), b=generator.randrange(8), B=1)))  # fmt: skip
+    way = generator.random()
+    if way < 0.4:
+        return [*words_of("DO #lit14, Expr", k=generator.randrange(6), n=2), 0, 0, *one]
+    return words_of("REPEAT #lit14", k=generator.randrange(6)) + one if way < 0.6 else one
+
+
 def _enabled(chip: Chip, generator: random.Random) -> list[tuple[str, int]]:
     """Registers and values that let timers 1 to 3 interrupt, at any priorities."""
     sources = [chip.interrupts[timer.irq] for timer in chip.timers[:3]]
@@ -184,7 +198,7 @@ def random_firmware(seed: int, chip: Chip = DSPIC30F6014A) -> Firmware:
         row = generator.choice(ROWS)
         words = random_words(row, generator, at, end, ram)
         if generator.random() < 0.2:
-            words = generator.choice((interrupt_words, device_words, mode_words))(generator, chip)
+            words = generator.choice((interrupt_words, device_words, mode_words, core_words))(generator, chip)
         if words is not None:
             at = firmware.put(at, words)
     firmware.put(at, words_of("GOTO Expr", n=CODE - 0x40 if generator.random() < 0.8 else CODE - 2))

@@ -50,6 +50,9 @@ _FAMILIES = ({"TMR", "PR", "T"}, {"PORT", "LAT", "TRIS", "CNEN", "CNPU"}, {"IFS"
 """Registers of one device whose names begin differently; those of others share the letters in front of the number."""
 HOT = 14
 """Registers a program is about."""
+CORE = ("DCOUNT", "DCOUNT", "DCOUNT", "RCOUNT", "RCOUNT", "SR", "SR", "CORCON", "DOSTARTL", "DOENDL", "DOENDH",
+        "PSVPAG", "TBLPAG")  # fmt: skip
+"""Registers of the CPU that say how a program goes on; the more often the more there is to say about them."""
 _INPUTS = ("RD4", "RF6", "RC3", "RC14", "RA12", "RA13", "RD8", "RD9", "RF2", "RF3", "RG2", "RG3", "RC1", "RC2", "RF0",
            "RG13", "RF7", "RB5", "RB12")  # fmt: skip
 
@@ -136,9 +139,24 @@ class Writer:
         target = BUFFER + 2 * draw.randrange(64)
         return [f"mov #{sfr.address + start:#x}, {p}", f"mov #{target:#x}, {q}", draw.choice(forms)]
 
+    def core(self, place: str) -> str:
+        """One one-word instruction with a register of the CPU. Counts mostly fall: a program is to go on."""
+        draw, name, w = self.draw, self.draw.choice(CORE), self.data()
+        word = self.note(self.chip.sfrs[name], f"{place} core")
+        forms = [f"mov {w}, {word}", f"mov {word}, {w}", f"clr {word}", f"lsr {word}", f"clr.b {word}",
+                 f"lsr.b {word}", f"btg {word}, #{draw.randrange(16)}", f"push {word}", f"pop {word}",
+                 f"mov.b {word}, WREG"]  # fmt: skip
+        if name == "CORCON":
+            forms += [f"btg {word}, #2", f"bclr {word}, #3", f"btg {word}, #11"]  # PSV, IPL3, EDT
+        if name == "SR":
+            forms += [f"bset.b {word}, #{draw.randrange(5, 8)}", f"inc {word}"]
+        return draw.choice(forms)
+
     def repeated(self, place: str) -> list[str]:
         """REPEAT and an access, by address or walking along registers."""
         draw, sfr, count = self.draw, self.sfr(), self.draw.choice((0, 1, 2, 3, 7, 15))
+        if draw.random() < 0.15:
+            return [f"repeat #{count}", self.core(f"{place} REPEAT")]
         self.note(sfr, f"{place} REPEAT")
         word = f"{sfr.address:#x}"
         head = f"repeat #{count}"
@@ -150,12 +168,16 @@ class Writer:
         return [f"mov #{sfr.address:#x}, w8", f"mov #{BUFFER + 0x100:#x}, w9", head, form]
 
     def loop(self) -> list[str]:
-        """A DO loop; its last instruction is an access too."""
+        """A DO loop; its last instruction is an access too, by address, by pointer or of the loop's own registers."""
         self.loops += 1
         label = f"end{self.loops}"
         body = [line for _ in range(self.draw.randrange(1, 4)) for line in self.statement("DO", plain=True)]
-        last = self.direct("DO end")
-        return [f"do #{self.draw.choice((0, 1, 2, 5))}, {label}", *body, "nop", f"{label}: {last}"]
+        kind = self.draw.random()
+        access = self.core if kind < 0.6 else self.direct
+        *before, last = self.pointer("DO end") if kind < 0.25 else [access("DO end")]
+        if last.startswith("btss"):
+            last = "nop"
+        return [f"do #{self.draw.choice((0, 1, 2, 5))}, {label}", *body, *before, "nop", f"{label}: {last}"]
 
     def statement(self, place: str = "", plain: bool = False) -> list[str]:
         """One of the things a program does."""
@@ -168,9 +190,11 @@ class Writer:
             return self.repeated(place)
         if kind < 0.80:
             return [f"btss {self.note(self.sfr(), 'skip')}, #{draw.randrange(8)}", self.direct(place)]
+        if kind < 0.83:
+            return [self.core(place)]
         if plain:
             return ["nop"] * draw.randrange(3)
-        if kind < 0.86:
+        if kind < 0.88:
             return self.loop()
         if kind < 0.90:
             return [f"repeat #{draw.randrange(40)}", "nop"]
@@ -219,7 +243,7 @@ class Writer:
         lines = [f"handler{number}: inc w11, w11"]
         for _ in range(self.draw.randrange(4)):
             way = self.draw.random()
-            direct = self.direct("handler")
+            direct = self.direct("handler") if way > 0.15 else self.core("handler")
             if way < 0.5 and "WREG" not in direct and not direct.startswith(("push", "pop")):
                 lines.append(direct)
             else:
