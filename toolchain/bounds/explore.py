@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Call, Disi, Do, Flow, Goto, Repeat, Reset, Return, Skip, Sleep
 from toolchain.bounds.builder import Abstract, World, exact
 from toolchain.bounds.compare import Result, refined, tested
 from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step, joined
+from toolchain.bounds.outcome import Outcome
 from toolchain.bounds.state import INHERITED, LEVELS, NOWHERE, State, widened
 from toolchain.bounds.values import WORD, Value, ends, span
 
@@ -49,65 +50,6 @@ LOOP: Final = "no bound of this loop is known"
 
 class TooMuch(Exception):
     """The budget of steps is used up."""
-
-
-@dataclass(slots=True)
-class Outcome:
-    """What a run of one function found.  Addresses are program addresses, times cycles."""
-
-    ends: dict[int | None, State] = field(default_factory=dict)
-    """At its return, by the number in W0 where it is small and known; without any it never returns."""
-    peak: dict[tuple[int, int], tuple[int, tuple[int, ...]]] = field(default_factory=dict)
-    """By stack and CPU priority: the highest address used, and the functions on the way there."""
-    masked: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """By level: longest time it was held back, and where it ended; complete stretches only."""
-    prefix: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """The same for stretches that began before the call, from the call on."""
-    open: dict[int, str] = field(default_factory=dict)
-    """What has no bound: address -> why."""
-    forever: set[int] = field(default_factory=set)
-    """Heads of loops without a way out."""
-    left: int | None = None
-    """Longest time to a change to another stack, from which it does not return by itself."""
-    wild: bool = False
-    """It stores where the address says nothing."""
-    visited: set[int] = field(default_factory=set)
-    """Functions run."""
-    shared: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """Loops whose rounds its times leave out (`Explorer.sharing`): head -> the longest round, and how many in all."""
-
-    def take(self, other: Outcome, start: int, since: list[int | None], caller: tuple[int, ...]) -> None:
-        """Add what a call, made at time `start`, found."""
-        for stack, (top, chain) in other.peak.items():
-            if top > self.peak.get(stack, (-1,))[0]:
-                self.peak[stack] = top, caller + chain
-        for level, (cycles, where) in other.masked.items():
-            self.longer(self.masked, level, cycles, where)
-        for level, (cycles, where) in other.prefix.items():
-            began = since[level]
-            if began == INHERITED:
-                self.longer(self.prefix, level, start + cycles, where)
-            elif began is not None:
-                self.longer(self.masked, level, start + cycles - began, where)
-        self.open.update(other.open)
-        self.forever |= other.forever
-        self.visited |= other.visited
-        self.wild |= other.wild
-        for head, (cycles, total) in other.shared.items():
-            self.longer(self.shared, head, cycles, total)
-        if other.left is not None:
-            self.left = max(self.left or 0, start + other.left)
-
-    def moved(self, stack: int, distance: int) -> Outcome:
-        """The same, entered that many bytes further up a stack."""
-        peak = {k: (top + distance if k[0] == stack else top, chain) for k, (top, chain) in self.peak.items()}
-        return replace(self, peak=peak)
-
-    @staticmethod
-    def longer(table: dict[int, tuple[int, int]], level: int, cycles: int, where: int) -> None:
-        """Keep the longest."""
-        if cycles > table.get(level, (-1, 0))[0]:
-            table[level] = cycles, where
 
 
 @dataclass(slots=True)
