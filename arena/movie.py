@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import importlib
 import math
-import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ from arena.brain import STRIP_PIXELS
 from arena.look import COLOURS
 from arena.page import samples_of
 from arena.record import RecordError, Trial, reason_of
+from emu.outfile import whole_file
 
 SCALE: Final = 1.6
 """Pixels per cm."""
@@ -47,18 +47,14 @@ def write_movie(trial: Trial, path: Path, speed: float, seconds: float | None = 
     if count > LIMIT:
         raise ValueError(f"--speed {speed:g} makes {count} frames of {end:g} s; the limit is {LIMIT}")
     pictures = frames(trial, [frame / FRAMES_PER_S * speed for frame in range(count)])
-    part = path.with_name(f"{path.stem}.part{kind}")
     try:
-        if kind == ".gif":
-            _gif(pictures, part)
-        else:
-            _mp4(pictures, part)
-        os.replace(part, path)
+        with whole_file(path) as part:
+            if kind == ".gif":
+                _gif(pictures, part)
+            else:
+                _mp4(pictures, part)
     except OSError as error:
         raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None
-    finally:
-        with suppress(OSError):
-            part.unlink()
 
 
 def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
@@ -128,14 +124,15 @@ def _gif(pictures: Iterator[Image.Image], part: Path) -> None:
     palette = Image.new("P", (1, 1))
     palette.putpalette([value for colour in _palette() for value in colour])
     coloured = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
-    next(coloured).save(part, save_all=True, append_images=coloured, duration=round(1000 / FRAMES_PER_S), loop=0)
+    first = next(coloured)
+    first.save(part, "GIF", save_all=True, append_images=coloured, duration=round(1000 / FRAMES_PER_S), loop=0)
 
 
 def _mp4(pictures: Iterator[Image.Image], part: Path) -> None:
     first = next(pictures)
     size = f"{first.width}x{first.height}"
     command = [_ffmpeg(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r",
-               str(FRAMES_PER_S), "-i", "-", "-pix_fmt", "yuv420p", str(part)]  # fmt: skip
+               str(FRAMES_PER_S), "-i", "-", "-pix_fmt", "yuv420p", "-f", "mp4", str(part)]  # fmt: skip
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
         assert encoder.stderr is not None

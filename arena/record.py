@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +19,7 @@ from arena.experiments import Experiment, Moments, experiment_of
 from arena.metrics import Course
 from arena.scene import Scene, scene_of
 from arena.trial import Rows
-from emu.outfile import is_opened
+from emu.outfile import whole_file
 
 if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
     import pyarrow as pa
@@ -119,13 +118,10 @@ def write_trial(path: Path, rows: Rows, about: dict[str, Any]) -> None:
     for name, values in rows.columns.items():
         arrays[name] = pa.array(values, kind_of(name))
     table = pa.table(arrays).replace_schema_metadata({"arena": json.dumps(about, sort_keys=True)})
-    part = path.with_name(path.name + ".part")
     try:
-        pq.write_table(table, part, compression="zstd")
-        os.replace(part, path)
+        with whole_file(path) as part:
+            pq.write_table(table, part, compression="zstd")
     except OSError as error:
-        with suppress(OSError):
-            part.unlink()
         raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None
 
 
@@ -194,14 +190,8 @@ def write_text(path: Path, text: str) -> None:
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file whole or not at all; a device or pipe as it is. Raises RecordError."""
-    part = path.with_name(path.name + ".part")
     try:
-        if is_opened(path):
-            path.write_bytes(data)
-            return
-        part.write_bytes(data)
-        os.replace(part, path)
+        with whole_file(path) as part:
+            part.write_bytes(data)
     except OSError as error:
-        with suppress(OSError):
-            part.unlink()
         raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None

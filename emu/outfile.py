@@ -29,19 +29,33 @@ def whole_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
         yield sys.stdout
         sys.stdout.flush()
         return
-    target = Path(path)
-    if is_opened(target):
-        with target.open("w", encoding="utf-8") as stream:
+    if is_opened(path):
+        with open(path, "w", encoding="utf-8") as stream:
             yield stream
         return
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name + ".", suffix=".part", text=True)
+    with whole_file(path) as part, part.open("w", encoding="utf-8") as stream:
+        yield stream
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A new, empty file beside `path`, to be written by name. It becomes `path` when the block ends without an
+    exception; for a pipe or device what it holds is copied. Raises OSError as `open` does.
+    """
+    target = Path(path)
+    opened = is_opened(target)
+    folder = None if opened else target.parent
+    handle, name = tempfile.mkstemp(dir=folder, prefix=f".{target.name}.", suffix=".part")
+    os.close(handle)
+    part = Path(name)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            yield stream
+        yield part
+        if opened:
+            target.write_bytes(part.read_bytes())
+            return
         mask = os.umask(0)
         os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, target)
-    except BaseException:
-        os.unlink(name)
-        raise
+        part.chmod(0o666 & ~mask)
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)

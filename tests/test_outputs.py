@@ -7,10 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 
+import numpy as np
 import pytest
 
 from arena.record import write_bytes
-from emu.outfile import is_opened, whole_text_file
+from emu.boards.picture import write_picture
+from emu.outfile import is_opened, whole_file, whole_text_file
 from toolchain.files import write_outputs
 
 
@@ -19,10 +21,17 @@ def text(path: Path) -> None:
         stream.write("text")
 
 
+def part_of(path: Path) -> None:
+    with whole_file(path) as part:
+        part.write_bytes(b"part")
+
+
 WRITERS: dict[str, tuple[Callable[[Path], None], bytes]] = {
     "toolchain": (lambda path: write_outputs([(path, b"object")]), b"object"),
     "record": (lambda path: write_bytes(path, b"record"), b"record"),
     "text": (text, b"text"),
+    "picture": (lambda path: write_picture(path, np.zeros((2, 2, 3), np.uint8)), b"\x89PNG"),
+    "file": (part_of, b"part"),
 }
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from emu.outfile import whole_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,11 +39,6 @@ def write_picture(path: str | os.PathLike[str], pixels: NDArray[np.uint8], enlar
     import numpy as np
     from PIL import Image
 
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
     large = np.repeat(np.repeat(pixels, enlarge, axis=0), enlarge, axis=1)
-    try:
+    with whole_file(path) as part:
         Image.fromarray(np.ascontiguousarray(large)).save(part, format="PNG")
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)

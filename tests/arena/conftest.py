@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -72,3 +73,20 @@ def full_disk() -> Path:
     if not device.exists():
         pytest.skip("only Linux has /dev/full")
     return device
+
+
+@pytest.fixture
+def unwritable(full_disk: Path, monkeypatch: pytest.MonkeyPatch) -> set[str]:
+    """Names of files: while a name is in it, every write of such a file is answered with ENOSPC."""
+    names: set[str] = set()
+    make = tempfile.mkstemp
+
+    def make_full(*, dir: str | Path | None, prefix: str, suffix: str) -> tuple[int, str]:
+        handle, name = make(dir=dir, prefix=prefix, suffix=suffix)
+        if prefix.strip(".") in names:
+            Path(name).unlink()
+            Path(name).symlink_to(full_disk)
+        return handle, name
+
+    monkeypatch.setattr("emu.outfile.tempfile.mkstemp", make_full)
+    return names

@@ -43,7 +43,7 @@ def test_finished_trials_are_kept_and_an_unfinished_one_starts_from_its_seed(tmp
     kept = tmp_path / "a" / "trial-0001.parquet"
     stamp = kept.stat().st_mtime_ns
     (tmp_path / "a" / "trial-0002.parquet").unlink()
-    (tmp_path / "a" / "trial-0002.parquet.part").write_bytes(b"half")
+    (tmp_path / "a" / ".trial-0002.parquet.x.part").write_bytes(b"half")
     assert run("--trials", 3, "--jobs", 1, "--out", tmp_path / "a") == 0
     assert contents(tmp_path / "a") == before
     assert kept.stat().st_mtime_ns == stamp
@@ -129,9 +129,9 @@ def test_a_new_scene_needs_no_code(tmp_path: Path) -> None:
     assert trials_in(tmp_path / "out")[0].about["scene"]["name"] == "small"
 
 
-def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path, full_disk: Path) -> None:
-    """Every write is answered with ENOSPC, through a link where the part file would be."""
-    (tmp_path / "trial-0001.parquet.part").symlink_to(full_disk)
+def test_a_full_disk_is_reported_and_leaves_no_file(tmp_path: Path, unwritable: set[str]) -> None:
+    """Every write is answered with ENOSPC, through a link where the unfinished file would be."""
+    unwritable.add("trial-0001.parquet")
     rows = Rows()
     rows.add({"t": 0.0, "log": []})
     with pytest.raises(RecordError, match=r"trial-0001\.parquet: cannot be written: .*[Nn]o space"):
@@ -270,15 +270,14 @@ def test_sensitivity_prints_and_saves_a_table(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_a_disk_that_fills_up_during_a_run_ends_it_and_keeps_what_is_finished(
-    tmp_path: Path, full_disk: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, unwritable: set[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Issue "Must show" 7: the second of three trials cannot be written; with room again the run goes on."""
-    part = tmp_path / "trial-0002.parquet.part"
-    part.symlink_to(full_disk)
+    unwritable.add("trial-0002.parquet")
     assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 2
     assert "trial-0002.parquet: cannot be written: No space left" in " ".join(capsys.readouterr().err.split())
     assert list(contents(tmp_path)) == ["trial-0001.parquet"]
-    assert not part.is_symlink()
+    unwritable.clear()
     assert run("--trials", 3, "--jobs", 1, "--out", tmp_path) == 0
     assert len(contents(tmp_path)) == 3
 
