@@ -32,6 +32,7 @@ from arena.record import MANIFEST, FolderInUseError, RecordError, write_json, wr
 from arena.scene import Scene
 from arena.trial import run_trial
 from arena.versions import host, versions
+from arena.world import World
 
 Report = Callable[[int, float], None]
 """report(trial, seconds simulated)."""
@@ -156,9 +157,10 @@ def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brai
 
 def run_one(
     plan: Plan, number: int, folder: Path, report: Report | None = None, processes: int = 1,
-    meet: Callable[[Sequence[Brain]], None] | None = None,
+    meet: Callable[[World, Sequence[Brain]], None] | None = None,
 ) -> Done:  # fmt: skip
-    """Run trial `number` (from 1), its robots in `processes`, and write its file. `meet` is shown the robots first.
+    """Run trial `number` (from 1), its robots in `processes`, and write its file. `meet` is shown world and
+    robots first.
 
     Raises SceneError, RecordError, emu.LoadError."""
     start = time.perf_counter()
@@ -169,9 +171,10 @@ def run_one(
         progress = None if report is None else (lambda seconds: report(number, seconds))
         on_row = live.write if live is not None else None
         with brains_of(plan, seed, processes) as (brains, crews, ether):
+            world = World(plan.scene, seed)
             if meet is not None:
-                meet(brains)
-            result = run_trial(plan.scene, seed, brains, plan.seconds, progress, None, on_row, crews, ether,
+                meet(world, brains)
+            result = run_trial(plan.scene, seed, brains, plan.seconds, progress, world, on_row, crews, ether,
                                plan.to_do)  # fmt: skip
         about["faults"] = [list(fault) for fault in result.faults]
         write_trial(trial_path(folder, number), result.rows, about)

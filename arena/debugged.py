@@ -3,12 +3,14 @@
 Two greenlets: the trial's, in which the robot lives, and the debugger's. The robot's machine runs forward only in the
 trial's, from cut to cut, so what it looks at comes from the world as always; in between the debugger decides how far.
 What the robot has been shown is kept (`Shown`), so that its past is run again in the debugger's greenlet without the
-world, which stays where it is.
+world, which stays where it is until somebody looks at it, or changes what has been: then the trial leaves by an
+exception, is run again from its seed up to the cycle in which the robot stands, and the debugger goes on with the new
+robots, which are the old ones to the bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, Final
@@ -17,7 +19,10 @@ import numpy as np
 from greenlet import getcurrent, greenlet
 from numpy.typing import NDArray
 
+from arena.brain import Brain
 from arena.emulated import EmulatedBrain
+from arena.standing import seen
+from arena.world import World
 from emu.debug.history import History, place
 from emu.machine import Machine
 from emu.stops import Stop
@@ -25,11 +30,14 @@ from emu.stops import Stop
 SENSORS: Final = range(8, 16)
 """Channels of the infrared sensors."""
 OVER: Final = "the trial is over"
-PAST: Final = "this is the past, and the other robots have seen what came of it: go back to the present to change it"
 
 
 class GivenUpError(Exception):
     """Whoever debugs wants the trial to end."""
+
+
+class AnewError(Exception):
+    """Whoever debugs wants the trial to be run again."""
 
 
 class Shown:
@@ -82,7 +90,7 @@ class Recording(History):
 
     @property
     def frozen(self) -> str:
-        return self._debugged.frozen or (PAST if self.is_past else "")
+        return self._debugged.frozen
 
     def parted(self) -> None:
         """The robot is left alone until `met`."""
@@ -126,47 +134,74 @@ class Recording(History):
 
 
 class Debugged:
-    """`brain`'s machine, run as `debugger` says: called in a greenlet of its own when the robot gets power, it makes
-    a recording by `record`, and whether it comes back true the trial goes on without it. With `keeps` the trial is
-    recorded, and must not be changed.
+    """Robot number `robot` of a trial, run as `debugger` says: called in a greenlet of its own when the robot gets
+    power, it makes a recording by `record`, and whether it comes back true the trial goes on without it. With `keeps`
+    the trial is recorded, and must not be changed.
+
+    Whoever runs the trial lets it `meet` world and robots first, and begins it again when that ends in AnewError.
     """
 
-    def __init__(self, brain: EmulatedBrain, debugger: Callable[[Debugged], bool], keeps: bool) -> None:
-        self.machine: Final = brain.machine
+    def __init__(self, robot: int, debugger: Callable[[Debugged], bool], keeps: bool) -> None:
         self.keeps: Final = keeps
         self.frozen: Final = "the trial is being recorded: leave out --out to change it" if keeps else ""
-        self._shown: Final = Shown(self.machine)
+        self._number: Final = robot
         self._debugger: Final = greenlet(lambda _begins: debugger(self))
-        self._robot: greenlet | None = None
+
+    def meet(self, world: World, brains: Sequence[Brain]) -> None:
+        """A trial begins, for the first time or again. Raises ValueError if the robot has no firmware."""
+        brain = brains[self._number]
+        if not isinstance(brain, EmulatedBrain):
+            raise ValueError(f"--robot {self._number}: it has no firmware, its brain is scripted")
+        self._world, self._brains = world, brains
+        self.machine = brain.machine
+        self._shown = Shown(self.machine)
+        self._trial: greenlet | None = None
+        """Where the trial goes on; none before the robot gets power."""
+        self._is_over = False
         self._recording: Recording | None = None
-        self._last = 0
-        self._limit = 0
+        self._last = self._limit = 0
         self._cuts: list[int] = []
         self._ended: Stop | None = None
-        self._plain: Final = self.machine.run_past
+        self._plain = self.machine.run_past
         machine = vars(self.machine)
         machine["run_past"], machine["end_at_cut"] = self._run_past, self._end_at_cut
         machine["cuts_so_far"] = lambda: self._cuts
 
+    # In the debugger's greenlet
+
     def record(self, machine: Machine) -> Recording:
         """The recording of what the debugger does."""
         self._recording = Recording(self, machine)
+        self._recording.around = self
         return self._recording
 
     def live(self, act: Callable[[int], Stop | None]) -> Stop | None:
-        """In the debugger's greenlet: let the robot do `act(limit)` in its own, and the world follow."""
-        robot = self._robot
-        if robot is None:
+        """Let the robot do `act(limit)` in its own greenlet, and the world follow."""
+        if self._is_over or self._trial is None:
             return Stop("limit", self.machine.pc, self.machine.cycle, OVER)
-        stop: Stop | None = robot.switch(act)
+        stop: Stop | None = self._trial.switch(act)
         return stop
 
+    def anew(self) -> Machine:
+        """The trial begins again; the robot as it gets power."""
+        assert self._trial is not None
+        self._trial.switch(_begin_again)
+        return self.machine
+
+    def seen(self) -> list[tuple[str, str]]:
+        """Where everything is, and what the robots are at."""
+        return seen(self._world, self._brains, self._number)
+
+    # In the trial's greenlets
+
     def over(self) -> None:
-        """The trial is over: what is left is to look at the robot, and back."""
-        self._robot = None
+        """The trial is over: what is left is to look at the robot, and back. Raises AnewError."""
+        self._is_over = True
         if self._debugger and not self._debugger.dead:
-            self._debugger.parent = getcurrent()
+            self._trial = self._debugger.parent = getcurrent()
             self._debugger.switch(Stop("limit", self.machine.pc, self.machine.cycle, OVER))
+            if not self._debugger.dead:
+                raise AnewError
 
     def _end_at_cut(self) -> None:
         self._last = min(self._last, self._limit)
@@ -174,8 +209,8 @@ class Debugged:
     def _run_past(self, first: int, period: int, last: int, cuts: list[int]) -> Stop | None:
         """As `Machine.run_past`, in steps of the debugger's."""
         machine, began = self.machine, len(cuts)
-        self._robot, self._cuts, self._last = getcurrent(), cuts, last
-        self._debugger.parent = self._robot
+        self._trial, self._cuts, self._last = getcurrent(), cuts, last
+        self._debugger.parent = self._trial
         if self._recording is not None:
             self._recording.met()
         stop = None
@@ -191,6 +226,8 @@ class Debugged:
             if self._debugger.dead:
                 self._release(act)
                 return stop if ended else self._plain(self._limit, period, self._last, cuts)
+            if act is _begin_again:
+                raise AnewError
             if ended:
                 self._ended = stop
                 break
@@ -207,3 +244,8 @@ class Debugged:
         self._recording, self._shown.keeps = None, False
         if not goes_on:
             raise GivenUpError
+
+
+def _begin_again(_limit: int) -> Stop | None:
+    """What the debugger's greenlet says instead of what the robot is to do."""
+    raise AnewError

@@ -7,7 +7,6 @@ from its seed comes to the same state, to the byte: that is how it goes back.
 
 from __future__ import annotations
 
-import hashlib
 import queue
 import time
 from collections import deque
@@ -24,6 +23,7 @@ from arena.emulated import EmulatedBrain
 from arena.page import samples_of
 from arena.record import Trial
 from arena.scene import SceneError
+from arena.standing import digest, place_of
 from arena.trial import Running
 
 T = TypeVar("T")
@@ -199,9 +199,9 @@ class Studio:
         if not isinstance(brain, EmulatedBrain):
             return {"robot": robot, "script": True}
         machine = brain.machine
-        place = machine.image.symbols.text(machine.pc) if machine.image else ""
         return {
-            "robot": robot, "pc": machine.pc, "place": place, "cycle": machine.cycle, "sr": machine.peek("SR"),
+            "robot": robot, "pc": machine.pc, "place": place_of(machine), "cycle": machine.cycle,
+            "sr": machine.peek("SR"),
             "asleep": machine.is_asleep, "w": [machine.peek(f"W{n}") for n in range(16)],
             "frames": [str(frame) for frame in machine.backtrace()[:FRAMES]],
             "threads": [{"name": one.name, "pid": one.pid, "state": one.state, "used": one.used,
@@ -210,15 +210,7 @@ class Studio:
 
     def digest(self) -> str:
         """SHA-256 of everything that lives: bodies with their speeds, and every machine's whole state."""
-        world = self._running.world
-        digest = hashlib.sha256(world.poses.values.tobytes())
-        for body in (*world.robots, *world.objects):
-            moves = tuple(body.position), body.angle, tuple(body.velocity), body.angular_velocity
-            digest.update(repr(moves).encode())
-        for brain in self._running.brains:
-            if isinstance(brain, EmulatedBrain):
-                digest.update(brain.machine.snapshot())
-        return digest.hexdigest()
+        return digest(self._running.world, self._running.brains)
 
     # -- the trial's own thread --------------------------------------------------------------------------------------
 

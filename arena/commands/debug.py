@@ -6,17 +6,14 @@ import argparse
 import socket
 import sys
 import tempfile
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-from arena.brain import Brain
 from arena.campaign import Plan, claimed, note_host_time, open_folder, run_one, trial_path
 from arena.commands.arguments import count_or_none, port
 from arena.commands.run import add_plan, kept, planned
-from arena.debugged import Debugged, GivenUpError
-from arena.emulated import EmulatedBrain
+from arena.debugged import AnewError, Debugged, GivenUpError
 from arena.record import RecordError
 from emu.dap.server import Server
 from emu.dap.wire import Wire
@@ -27,8 +24,9 @@ DESCRIPTION: Final = """\
 debug one robot of a trial, the whole world stands with it
 
 A server of the Debug Adapter Protocol on standard input and output, or on a TCP port of this machine (see `emu debug
---help`). Where the robot stops all stand; it steps, goes back, and on by itself as far as its past goes, and beyond
-that with all others. Launch arguments: stopOnEntry, sourceRoots. With --tui, a prompt here instead (see the same).
+--help`). Where the robot stops all stand; it steps and goes on with all others, and back by itself: the others follow
+when they are looked at (/world) or something is changed, by running the trial again up to there. Launch arguments:
+stopOnEntry, sourceRoots. With --tui, a prompt here instead (see the same).
 
 With --out the trial is recorded, to the byte as `arena run --trials 1` does it, and cannot be changed by the debugger;
 a client that disconnects lets it go on to its end, one that terminates ends it without a record."""
@@ -64,26 +62,25 @@ def run(options: argparse.Namespace) -> int:
 
 def debugged(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Run the trial with a debugger on its robot."""
-    met: list[Debugged] = []
     ended: list[int] = []
-
-    def meet(brains: Sequence[Brain]) -> None:
-        brain = brains[options.robot]
-        if not isinstance(brain, EmulatedBrain):
-            raise ValueError(f"--robot {options.robot}: it has no firmware, its brain is scripted")
-        debugger = partial(prompted, ended=ended) if options.tui else partial(served, port=options.port)
-        met.append(Debugged(brain, debugger, keeps=options.out is not None))
-
-    try:
-        done = run_one(plan, 1, folder, meet=meet)
-    except GivenUpError:
-        print("arena debug: the trial was ended, nothing is recorded", file=sys.stderr)
-        return max(ended, default=DONE)
-    if options.out is not None:
-        note_host_time(folder, done)
-        print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
-    met[0].over()
-    return max([1 if done.faults else DONE, *ended])
+    debugger = partial(prompted, ended=ended) if options.tui else partial(served, port=options.port)
+    robot = Debugged(options.robot, debugger, keeps=options.out is not None)
+    is_recorded = False
+    while True:
+        try:
+            done = run_one(plan, 1, folder, meet=robot.meet)
+            if options.out is not None and not is_recorded:
+                note_host_time(folder, done)
+                print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
+                is_recorded = True
+            robot.over()
+        except AnewError:
+            continue
+        except GivenUpError:
+            told = "it was recorded before it went back" if is_recorded else "nothing is recorded"
+            print(f"arena debug: the trial was ended, {told}", file=sys.stderr)
+            return max(ended, default=DONE)
+        return max([1 if done.faults else DONE, *ended])
 
 
 def prompted(debugged: Debugged, ended: list[int]) -> bool:

@@ -18,6 +18,7 @@ WORDS: Final = {
     "lastwrite": " PLACE   go back to the instruction that changed a place last",
     "reverse-finish": "    go back to the call of this function, or to before the interrupt",
     "threads": "           OpenSwarm's threads with stack use",
+    "world": "             what is around the machine: the other robots of a trial, at this very time",
 }
 HELP: Final = "an expression of C; NAME = VALUE; or\n" + "".join(f"/{word}{text}\n" for word, text in WORDS.items())
 

@@ -110,9 +110,9 @@ class Debuggee:
 
     def _run(self) -> Halt | None:
         """Run; None if somebody wants it to stand, or it has arrived where `_extra` says."""
-        data = [one for one in self.all() if one.kind == "data"]
         while not self._wanted() and not self._is_there():
             self._hit = []
+            data = [one for one in self.all() if one.kind == "data"]
             if data:
                 halt = self._watched(data)
                 if halt is not None or self._arrived_extra():
@@ -268,6 +268,14 @@ class Debuggee:
             self._limit = None
         return halt or Halt("goto" if self.machine.cycle >= cycle else "pause")
 
+    def arrive(self, cycle: int) -> bool:
+        """Run on to a cycle, whatever is on the way, unless somebody wants it to stand; whether it is there."""
+        machine, before = self.machine, -1
+        while machine.cycle < cycle and machine.cycle > before and not self._wanted():
+            before = machine.cycle
+            self.history.advance(min(before + SLICE, cycle))
+        return machine.cycle >= cycle
+
     def _line(self) -> Line | None:
         return self.inside.image.lines.find(self.machine.pc)
 
@@ -332,6 +340,13 @@ class Debuggee:
         """Back to where the recording began."""
         self.history.seek(self.history.start)
         return Halt("entry")
+
+    def follow(self, other: Debuggee) -> None:
+        """Take over what stops `other`, hits counted."""
+        self.breakpoints.update(other.breakpoints)
+        self.stops_at_faults = other.stops_at_faults
+        other.breakpoints.clear()
+        self._rehook()
 
     def leave(self) -> None:
         """Give the machine back as it would be without a debugger: in the present, with no breakpoint."""

@@ -13,7 +13,7 @@ from emu.dap.names import completions
 from emu.dap.sfrs import groups
 from emu.dap.sights import Row, Sights, Sources, disassembled
 from emu.debug.expression import evaluate
-from emu.debug.inside import Value
+from emu.debug.inside import Inside, Value
 
 MOST_ROWS: Final = 1 << 16
 """Instructions, or bytes of memory, that one request may ask for: as many as there are of either on a chip."""
@@ -32,6 +32,22 @@ class Looking(ABC):
     @abstractmethod
     def _go(self, act: Callable[[], Halt]) -> None:
         """Let the machine go, and tell where it halts."""
+
+    @abstractmethod
+    def _bring(self) -> None:
+        """Bring what is around the machine to the time at which it stands. Raises Refused if it was interrupted."""
+
+    @abstractmethod
+    def _change(self, act: Callable[[Inside], None]) -> None:
+        """Change the machine that stands here, and again whenever it is brought here anew. Raises Refused."""
+
+    def _world(self) -> list[tuple[str, str]]:
+        """What is around the machine, at the time at which it stands. Raises Refused."""
+        around = self._debuggee.history.around
+        if around is None:
+            raise Refused("there is nothing around this machine")
+        self._bring()
+        return around.seen()
 
     @property
     def _debuggee(self) -> Debuggee:
@@ -62,6 +78,8 @@ class Looking(ABC):
     def _do_evaluate(self, arguments: Row) -> Any:
         text = str(arguments["expression"]).strip()
         if arguments.get("context") == "repl" and text.startswith("/"):
+            if text == "/world":
+                return {"result": "\n".join(": ".join(one) for one in self._world()), "variablesReference": 0}
             said = command(self._debuggee, text[1:])
             if isinstance(said, str):
                 return {"result": said, "variablesReference": 0}
@@ -89,21 +107,16 @@ class Looking(ABC):
         return self._result(name, arguments)
 
     def _write(self, place: Value, text: str, arguments: Row) -> None:
-        self._may_change()
         value = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
-        place.set(value.get() if isinstance(value, Value) else value)
-
-    def _may_change(self) -> None:
-        frozen = self._debuggee.history.frozen
-        if frozen:
-            raise Refused(frozen)
+        number = value.get() if isinstance(value, Value) else value
+        self._change(lambda inside: place.within(inside).set(number))
 
     def _do_setVariable(self, arguments: Row) -> Row:
         place = self._sights.find(int(arguments["variablesReference"]), str(arguments["name"]))
         if place is None:
             raise Refused(f"{arguments['name']} cannot be set")
         self._write(place, str(arguments["value"]), arguments)
-        return self._sights.shown(place, str(arguments["name"]))
+        return self._sights.shown(place.within(self._debuggee.inside), str(arguments["name"]))
 
     def _do_setExpression(self, arguments: Row) -> Row:
         row = self._assigned(str(arguments["expression"]), str(arguments["value"]), arguments)
@@ -129,10 +142,9 @@ class Looking(ABC):
         return row | ({"data": base64.b64encode(data).decode()} if data else {})
 
     def _do_writeMemory(self, arguments: Row) -> Row:
-        self._may_change()
         address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
         data = base64.b64decode(arguments["data"])
-        self._debuggee.machine.poke(address, int.from_bytes(data, "little"), len(data))
+        self._change(lambda inside: inside.machine.poke(address, int.from_bytes(data, "little"), len(data)))
         return {"bytesWritten": len(data)}
 
     def _do_completions(self, arguments: Row) -> Row:

@@ -19,7 +19,7 @@ from emu.dap.sights import Row, Sights, Sources
 from emu.dap.wire import Channel, Message
 from emu.debug.expression import ExpressionError, evaluate
 from emu.debug.history import History
-from emu.debug.inside import Value
+from emu.debug.inside import Inside, Value
 from emu.debug.locate import Unavailable
 
 if TYPE_CHECKING:
@@ -39,8 +39,13 @@ CAPABILITIES: Final = {
     "supportTerminateDebuggee": True,
     "exceptionBreakpointFilters": [{"filter": "fault", "label": "Firmware faults", "default": True}],
 }  # fmt: skip
-WHILE_RUNNING: Final = ("pause", "disconnect", "terminate", "cancel", "threads")
-"""Requests that are answered while the machine runs; the others wait, except those that change breakpoints."""
+ENDING: Final = ("pause", "disconnect", "terminate", "cancel")
+"""Requests that make a running machine stand."""
+WHILE_RUNNING: Final = (
+    "threads", "setBreakpoints", "setFunctionBreakpoints", "setInstructionBreakpoints", "setDataBreakpoints",
+    "setExceptionBreakpoints",
+)  # fmt: skip
+"""Those that are answered while it runs; the others wait until it stands."""
 MISTAKES: Final = (
     Refused, ExpressionError, Unavailable, ValueError, LookupError, ArithmeticError, TypeError, AttributeError,
     RecursionError, OSError,
@@ -67,6 +72,8 @@ class Server(Looking):
         self._halt = Halt("entry")
         self._pause = False
         self._waiting: list[Message] = []
+        self._changes: list[tuple[int, Callable[[Inside], None]]] = []
+        """What was changed, and in which cycle."""
         self._said: dict[int, bytearray] = {}
         self._next_id = 0
         self._thread = 1
@@ -136,12 +143,16 @@ class Server(Looking):
         roots = [Path(root) for root in arguments.get("sourceRoots", [])] + [Path.cwd(), *program.parents]
         self._target = Debuggee(machine, self._wanted, self._say, self._record(machine))
         sources = Sources(machine.inside, roots)
-        self._views = Sights(machine.inside, sources), sources
-        for number in machine.uart:
-            machine.uart[number].listen(partial(self._heard, number))
+        world = self._world if self._target.history.around is not None else None
+        self._views = Sights(machine.inside, sources, world), sources
+        self._listen(machine)
         return {}, lambda: self._event("initialized")
 
     _do_attach = _do_launch
+
+    def _listen(self, machine: Machine) -> None:
+        for number in machine.uart:
+            machine.uart[number].listen(partial(self._heard, number))
 
     def _heard(self, number: int, byte: int, _cycle: int) -> None:
         text = self._said.setdefault(number, bytearray())
@@ -190,12 +201,11 @@ class Server(Looking):
             message = self._wire.inbox.get()
             if message is None:
                 self._over = self._pause = True
-            elif message.get("type") == "request" and message.get("command") in WHILE_RUNNING:
-                self._pause = self._pause or message["command"] != "threads"
+            elif message.get("type") == "request" and message.get("command") in (*ENDING, *WHILE_RUNNING):
+                self._pause = self._pause or message["command"] in ENDING
                 self.answer(message)
             else:
                 self._waiting.append(message)
-                self._pause = self._pause or str(message.get("command", "")).startswith("set")
         return self._pause
 
     def _do_pause(self, _arguments: Row) -> Row:
@@ -206,13 +216,39 @@ class Server(Looking):
         self._sights.forget()
         self._pause = False
         halt = act()
-        while halt.reason == "pause" and any(str(m.get("command", "")).startswith("set") for m in self._waiting):
-            while self._waiting:  # breakpoints were changed: answer and run on
-                self.answer(self._waiting.pop(0))
-            self._pause = False
-            halt = self._debuggee.go_on()
         if not self._over:
             self._stopped(halt)
+
+    def _bring(self) -> None:
+        target, history = self._debuggee, self._debuggee.history
+        if history.around is None or not history.is_past:
+            return
+        cycle = target.machine.cycle
+        self._changes = [one for one in self._changes if one[0] <= cycle]
+        self._say(f"the trial is run again up to cycle {cycle:,}\n")
+        self._pause = False
+        machine = history.around.anew()
+        fresh = Debuggee(machine, self._wanted, self._say, self._record(machine))
+        for at, act in self._changes:
+            if fresh.arrive(at):
+                act(machine.inside)
+        is_there = fresh.arrive(cycle)
+        fresh.follow(target)
+        self._target, self._sights.inside = fresh, machine.inside
+        self._listen(machine)
+        if not is_there:
+            self._changes = [one for one in self._changes if one[0] <= machine.cycle]
+            self._go(lambda: Halt("pause", "on the way back"))
+            raise Refused(f"interrupted on the way back, at cycle {machine.cycle:,}")
+
+    def _change(self, act: Callable[[Inside], None]) -> None:
+        frozen = self._debuggee.history.frozen
+        if frozen:
+            raise Refused(frozen)
+        self._bring()
+        act(self._debuggee.inside)
+        if self._debuggee.history.around is not None:
+            self._changes.append((self._debuggee.machine.cycle, act))
 
     def _stopped(self, halt: Halt) -> None:
         self._flush()

@@ -21,11 +21,15 @@ Row = dict[str, Any]
 
 
 class Sights:
-    """References handed out since the machine stopped last."""
+    """References handed out since the machine stopped last. `world` tells what is around the machine, if anything."""
 
-    def __init__(self, inside: Inside, sources: Sources) -> None:
-        self._inside: Final = inside
+    def __init__(
+        self, inside: Inside, sources: Sources, world: Callable[[], list[tuple[str, str]]] | None = None
+    ) -> None:
+        self.inside = inside
+        """Of the machine that is looked into; references hold as well for another that stands where it did."""
         self._sources: Final = sources
+        self._world: Final = world
         self._next = 0
         self._frames: dict[int, Frame] = {}
         self._lists: dict[int, Callable[[], Iterator[tuple[str, Value | None, str]]]] = {}
@@ -39,7 +43,7 @@ class Sights:
         """The frame of a reference; without one, the innermost."""
         if number is not None and number in self._frames:
             return self._frames[number]
-        frames = self._inside.frames()
+        frames = self.inside.frames()
         return frames[0] if frames else None
 
     def stack(self, frames: list[Frame]) -> list[Row]:
@@ -60,55 +64,60 @@ class Sights:
         return rows
 
     def scopes(self, frame: Frame) -> list[Row]:
-        """Locals, statics and globals of the file, registers, SFRs."""
-        inside = self._inside
+        """Locals, statics and globals of the file, registers, SFRs, the world around the machine."""
         unit = frame.scopes[0].unit if frame.scopes else -1
 
         def of_variables(names: list[Any]) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
             def rows() -> Iterator[tuple[str, Value | None, str]]:
                 for one in names:
                     try:
-                        yield one.name, inside.value(one, frame), one.name
+                        yield one.name, self.inside.value(one, frame), one.name
                     except Unavailable as why:
                         yield one.name, None, f"<{why}>"
 
             return rows
 
-        mine = of_variables(inside.variables(frame))
-        statics = of_variables(list(inside.debug.statics.get(unit, {}).values()))
+        mine = of_variables(self.inside.variables(frame))
+        statics = of_variables(list(self.inside.debug.statics.get(unit, {}).values()))
         everything = [("Locals", mine, "locals", False), ("Statics", statics, "", False),
                       ("Registers", lambda: self._registers(frame), "registers", False),
                       ("SFRs", self._sfrs, "registers", True)]  # fmt: skip
+        if self._world is not None:
+            everything.append(("World", self._around, "", True))
         return [
             {"name": name, "variablesReference": self._keep(rows), "expensive": slow}
             | ({"presentationHint": hint} if hint else {})
             for name, rows, hint, slow in everything
         ]
 
+    def _around(self) -> Iterator[tuple[str, Value | None, str]]:
+        for name, text in self._world() if self._world is not None else ():
+            yield name, None, text
+
     def _registers(self, frame: Frame) -> Iterator[tuple[str, Value | None, str]]:
-        view = self._inside.view(frame)
+        view = self.inside.view(frame)
         for number in range(REGISTERS):
             known = view.register(number) is not None
             value = Value(UNSIGNED[2], (Piece("register", number),), view, f"W{number}")
             yield f"W{number}", value if known else None, f"W{number}" if known else "<not known in this frame>"
         yield "PC", None, f"{frame.pc:#08x}"
         yield "SR", self._sfr("SR"), "SR"
-        yield "cycle", None, f"{self._inside.machine.cycle:,}"
+        yield "cycle", None, f"{self.inside.machine.cycle:,}"
 
     def _sfr(self, name: str) -> Value:
-        sfr = self._inside.image.chip.sfrs[name]
-        return Value(UNSIGNED[sfr.size], (Piece("memory", sfr.address),), self._inside.view(), name)
+        sfr = self.inside.image.chip.sfrs[name]
+        return Value(UNSIGNED[sfr.size], (Piece("memory", sfr.address),), self.inside.view(), name)
 
     def _sfrs(self) -> Iterator[tuple[str, Value | None, str]]:
-        for name in sorted(self._inside.image.chip.sfrs):
+        for name in sorted(self.inside.image.chip.sfrs):
             yield name, self._sfr(name), name
 
     def _fields(self, value: Value) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
-        fields = self._inside.image.chip.sfrs[value.name].fields
+        fields = self.inside.image.chip.sfrs[value.name].fields
 
         def rows() -> Iterator[tuple[str, Value | None, str]]:
             for name, (lsb, width) in fields.items():
-                part = Value(value.type, value.pieces, self._inside.view(), name, (width, lsb))
+                part = Value(value.type, value.pieces, self.inside.view(), name, (width, lsb))
                 yield name, part, f"{value.name}.{name}"
 
         return rows
@@ -141,7 +150,7 @@ class Sights:
         row: Row = {"value": value.text(), "type": str(value.type), "variablesReference": 0, "evaluateName": path}
         if value.address is not None:
             row["memoryReference"] = f"{value.address:#06x}"
-        sfr = self._inside.image.chip.sfrs.get(value.name)
+        sfr = self.inside.image.chip.sfrs.get(value.name)
         if sfr is not None and sfr.fields and value.bits is None and value.address == sfr.address:
             row["value"] = f"{value.get():#06x}"
             row["variablesReference"] = self._keep(self._fields(value))

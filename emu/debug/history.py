@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Final
 from emu.events import NEVER
 
 if TYPE_CHECKING:
+    from emu.debug.around import Around
     from emu.machine import Machine
     from emu.stops import Stop
 
@@ -64,6 +65,8 @@ class History:
 
     def __init__(self, machine: Machine, *, period: int = PERIOD, most: int = MOST) -> None:
         self.machine: Final = machine
+        self.around: Around | None = None
+        """What lives around the machine. It stands in the present while the machine alone goes back."""
         self.period: Final = period
         self.most: Final = most
         self._flash: Final = slice(

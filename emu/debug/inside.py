@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from emu.machine import Machine
 
 REGISTERS: Final = 16
+STACK_POINTER: Final = 15
 ABSENT: Final = bytes(locate.ADDR_0)
 """Where the linker puts what it leaves out."""
 
@@ -228,23 +229,25 @@ class FrameView:
 
     def __init__(self, inside: Inside, frame: Frame | None) -> None:
         self._machine: Final = inside.machine
-        self._frame: Final = frame
+        self.frame: Final = frame
         self._is_innermost: Final = frame is None or (
-            frame.raw.pc == self._machine.pc and frame.raw.registers == inside.registers()
+            frame.raw.pc == self._machine.pc and frame.raw.registers[STACK_POINTER] == self._machine.w[STACK_POINTER]
         )
 
     @property
     def pc(self) -> int:
         """Where variables are looked up: inside the call of a frame that waits for one."""
-        if self._frame is None:
+        if self.frame is None:
             return self._machine.pc
-        return self._frame.pc if self._is_innermost else self._frame.pc - 2
+        return self.frame.pc if self._is_innermost else self.frame.pc - 2
 
     def register(self, number: int) -> int | None:
         """Wn, None if it is not known in this frame."""
         if number >= REGISTERS:
             return None
-        return self._machine.w[number] if self._frame is None else self._frame.raw.registers[number]
+        if self.frame is None or self._is_innermost:
+            return self._machine.w[number]
+        return self.frame.raw.registers[number]
 
     def set_register(self, number: int, value: int) -> None:
         """Change Wn of the innermost frame. Raises ValueError for another."""
@@ -310,6 +313,11 @@ class Value:
             locate.write(self.pieces, word.to_bytes(self.type.bytes, "little"), self._view)
             return
         locate.write(self.pieces, encode(self.type, value), self._view)
+
+    def within(self, inside: Inside) -> Value:
+        """The same place in another machine that stands where this one does."""
+        frame = self._view.frame if isinstance(self._view, FrameView) else None
+        return Value(self.type, self.pieces, inside.view(frame), self.name, self.bits)
 
     def text(self) -> str:
         """For people, in one line; the reason if there is no value."""

@@ -162,6 +162,11 @@ def time_(session: Session, _text: str) -> None:
     session.write(session.time())
 
 
+@command("world", "what is around the machine: the other robots of a trial, at this very time")
+def world_(session: Session, _text: str) -> None:
+    session.console("/world")
+
+
 @command("help [COMMAND]", "this", "h", "?")
 def help_(session: Session, text: str) -> None:
     wanted = [called(text)] if text else sorted(TABLE, key=lambda one: one.name)

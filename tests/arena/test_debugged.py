@@ -20,6 +20,13 @@ def moved(client: Client, request: str, **arguments: object) -> str:
     return str(client.ask("evaluate", expression="/time", context="repl")["result"])
 
 
+def world(client: Client) -> str:
+    """What there is to see of all robots at this time, with a hash of everything that lives."""
+    told = str(client.ask("evaluate", expression="/world", context="repl")["result"])
+    assert told.splitlines()[-1].startswith("state: ")
+    return told
+
+
 @pytest.mark.parametrize(
     ("scene", "brain", "robot", "place"),
     [("clustering", "", 2, "react"), ("avoidance", "avoidance", 1, "steer")],
@@ -28,7 +35,8 @@ def moved(client: Client, request: str, **arguments: object) -> str:
 def test_a_record_is_the_same_with_a_debugger_on_a_robot(
     tmp_path: Path, clustering_image: Path, scene: str, brain: str, robot: int, place: str
 ) -> None:
-    """Byte for byte, after steps, steps back, breakpoints both ways and a look at the end."""
+    """Byte for byte, after steps, steps back, breakpoints both ways and a look at the end. Wherever it goes back to,
+    the world and the other robots are as they were then."""
     trial = [scene, "--minutes", "0.02", "--brain", brain or str(clustering_image), *SEED]
     trial += ["--set", "start.selector=8"] if scene == "clustering" else []  # it does not wait for the remote control
     client = Client("arena", "debug", *trial, "--robot", str(robot), "--out", str(tmp_path / "debugged"))
@@ -38,34 +46,56 @@ def test_a_record_is_the_same_with_a_debugger_on_a_robot(
     client.ask("configurationDone")
     assert client.event("stopped")["reason"] == "entry"
     first = moved(client, "continue")
+    world_there = world(client)
     there = [moved(client, "next") for _ in range(3)]
+    world_later = world(client)
+    assert world_later != world_there
     assert moved(client, "stepBack", granularity="instruction") != there[-1]
     assert moved(client, "reverseContinue").startswith(first)
+    assert world(client) == world_there
+    assert "before the present" not in client.ask("evaluate", expression="/time", context="repl")["result"]
+    assert [moved(client, "next") for _ in range(3)] == there
+    assert world(client) == world_later
     refused = client.asked("evaluate", expression="W0 = 3", context="repl")
     assert "the trial is being recorded" in refused["message"]
     assert moved(client, "continue") != first
     client.ask("setFunctionBreakpoints", breakpoints=[])
     end = moved(client, "continue")
+    world_end = world(client)
     assert moved(client, "stepBack", granularity="instruction") != end
+    assert world(client) != world_end
+    assert moved(client, "continue") == end
+    assert world(client) == world_end
     client.close()
     assert main(["run", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
     records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
     assert records[0] == records[1]
 
 
-def test_the_present_may_be_changed_the_past_not_and_who_leaves_ends_it(tmp_path: Path, clustering_image: Path) -> None:
+def test_who_changes_the_past_takes_the_world_back_and_who_leaves_ends_it(clustering_image: Path) -> None:
+    """What was changed before is changed again on the way."""
     client = Client("arena", "debug", "clustering", "--minutes", "9", "--brain", str(clustering_image), "--robot", "0")
     client.ask("initialize", adapterID="openswarm")
     client.ask("launch", stopOnEntry=True)
     client.ask("configurationDone")
     assert client.event("stopped")["reason"] == "entry"
-    moved(client, "stepIn", granularity="instruction")
+    for _ in range(3):
+        moved(client, "stepIn", granularity="instruction")
+    assert client.ask("evaluate", expression="T1CON.TCKPS = 2", context="repl")["result"] == "2"
+    for _ in range(2):
+        moved(client, "stepIn", granularity="instruction")
+    as_changed = world(client)
     moved(client, "stepIn", granularity="instruction")
     moved(client, "stepBack", granularity="instruction")
-    refused = client.asked("evaluate", expression="T1CON.TCKPS = 2", context="repl")
-    assert "the other robots have seen what came of it" in refused["message"]
-    moved(client, "stepIn", granularity="instruction")
-    assert client.ask("evaluate", expression="T1CON.TCKPS = 2", context="repl")["result"] == "2"
+    scopes = client.ask("scopes", frameId=client.top()["id"])["scopes"]
+    lists = {one["name"]: one["variablesReference"] for one in scopes}
+    assert world(client) == as_changed
+    shown = client.ask("variables", variablesReference=lists["World"])["variables"]
+    assert "\n".join(f"{one['name']}: {one['value']}" for one in shown) == as_changed
+    w0 = client.ask("setVariable", variablesReference=lists["Registers"], name="W0", value="7")
+    assert w0["value"] == client.evaluate("W0") == "7"
+    assert client.evaluate("T1CON.TCKPS") == "2"
+    assert world(client) != as_changed
     client.ask("terminate")
     client.close()
 

@@ -184,6 +184,10 @@ def test_memory_registers_and_variables_are_set(stopped: Callable[..., Client]) 
     assert client.ask("setVariable", variablesReference=local, name="a", value="b + 9")["value"] == "9"
     refused = client.asked("setVariable", variablesReference=local, name="a", value="70000")
     assert "does not fit" in refused["message"]
+    registers = next(scope["variablesReference"] for scope in scopes if scope["name"] == "Registers")
+    for number in ("3", "4"):
+        assert client.ask("setVariable", variablesReference=registers, name="W9", value=number)["value"] == number
+        assert client.ask("evaluate", expression="W9", context="watch", frameId=frame)["result"] == number
     place = client.ask("evaluate", expression="pairs", context="watch", frameId=frame)["memoryReference"]
     data = client.ask("readMemory", memoryReference=place, offset=0, count=6)
     assert base64.b64decode(data["data"]) == b"\xfb\xff\x0a\0\0\0"
