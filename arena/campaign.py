@@ -136,7 +136,7 @@ def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brai
     """All brains of a trial, spread over some processes, closed at the end. This one has the fewest robots, because it
     has the world."""
     count = plan.scene.robots.count
-    ether = Ether(count, plan.scene.clock.quantum_tcy) if plan.has_firmware else None
+    ether = Ether.of(plan.scene) if plan.has_firmware else None
     bounds = [count * part // processes for part in range(processes + 1)]
     parts = [range(one, other) for one, other in pairwise(bounds) if other > one]
     brains: list[Brain] = []

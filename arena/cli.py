@@ -15,6 +15,7 @@ import emu
 from arena.cluster import ClusterLostError
 from arena.commands import (
     bundle,
+    channel,
     compare,
     debug,
     experiment,
@@ -46,6 +47,7 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
     "report": (report.parser, report.run),
     "bundle": (bundle.parser, bundle.run),
     "verify": (bundle.verify_parser, bundle.verify),
+    "channel": (channel.parser, channel.run),
     "reaction": (reaction.parser, reaction.run),
     "replay": (replay.parser, replay.run),
     "studio": (studio.parser, studio.run),

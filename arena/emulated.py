@@ -86,8 +86,7 @@ class EmulatedBrain:
         self._board.camera.sample(self._pixels)
         self._begin(scene)
         self.machine.uart[1].on_byte = self._byte
-        ether = ether or Ether(scene.robots.count, self._quantum)
-        self._ring = Ring(scene, self._board, ether, robot, self._on_at)
+        self._ring = Ring(scene, seed, self._board, ether or Ether.of(scene), robot, self._on_at)
         self._poses = self._before = Poses([], [])
         self._start = 0
         self._looked = -1

@@ -1,15 +1,26 @@
-"""What all robots' infrared emitters do, as far as other robots may know it."""
+"""What all robots' infrared emitters do, as far as other robots may know it, and how far receivers have followed."""
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from arena.scene import FCY, Scene
+from emu.boards.epuck.analog import PULSE_PINS, TAU_SECONDS
+
+LINES: Final = len(PULSE_PINS)
+SETTLED: Final = 16.0
+"""Time constants after which what an emitter did before is forgotten: e^-16 of full light is 4e-4 counts."""
 _KEPT: Final = 256
 _OVERRUN: Final = 64
 """Tcy by which a robot may be ahead of the end of a quantum: it ends with a whole instruction."""
+_STEADY: Final = tuple(tuple(float(lit >> line & 1) for line in range(LINES)) for lit in range(1 << LINES))
+
+Shares = tuple[float, ...]
+"""Of each pulse line: how far receivers have settled to its full light, 0 to 1."""
 
 
 class Switch(NamedTuple):
@@ -29,14 +40,27 @@ class Ether:
     quantum: int
     slowest: int = 1 << 62
     """Cycle of the trial before which nobody asks any more than four quanta, where robots run ahead of each other."""
+    tau: float = TAU_SECONDS * FCY
+    """Time constant of the receivers in Tcy."""
     _cycles: list[list[int]] = field(init=False)
     _lines: list[list[int]] = field(init=False)
     _news: list[Switch] = field(init=False)
+    _at_switch: list[tuple[int, Shares]] = field(init=False)
+    """Per robot the last answer about a switch: its cycle, and the shares in it."""
+    _settled: int = field(init=False)
+    """Tcy after which a switch is forgotten."""
 
     def __post_init__(self) -> None:
         self._cycles = [[] for _ in range(self.robots)]
         self._lines = [[0] for _ in range(self.robots)]
         self._news = []
+        self._at_switch = [(-1, _STEADY[0])] * self.robots
+        self._settled = round(SETTLED * self.tau)
+
+    @classmethod
+    def of(cls, scene: Scene) -> Ether:
+        """That of a trial in a scene."""
+        return cls(scene.robots.count, scene.clock.quantum_tcy, tau=scene.infrared.tau_us * 1e-6 * FCY)
 
     def switch(self, robot: int, cycle: int, line: int, lit: bool) -> None:
         """A pulse line of a robot is switched."""
@@ -46,15 +70,52 @@ class Ether:
         robot, cycle, line, lit = switch
         cycles, lines = self._cycles[robot], self._lines[robot]
         state = lines[-1] | 1 << line if lit else lines[-1] & ~(1 << line)
-        if len(cycles) > _KEPT and cycles[_KEPT // 2] < min(cycle, self.slowest) - 4 * self.quantum:
+        if len(cycles) > _KEPT and cycles[_KEPT // 2] < self._looked_back(min(cycle, self.slowest)):
             del cycles[: _KEPT // 2], lines[: _KEPT // 2]
         cycles.append(cycle)
         lines.append(state)
         self._news.append(switch)
 
-    def seen(self, robot: int, cycle: int) -> int:
-        """Bit n: others see pulse line n of a robot lit in a cycle of the trial. That is how it was a quantum ago."""
-        return self._lines[robot][bisect_right(self._cycles[robot], cycle - self.quantum - _OVERRUN)]
+    def _looked_back(self, cycle: int) -> int:
+        """Cycle before which nothing matters any more to who asks about `cycle`."""
+        return cycle - 4 * self.quantum - 2 * self._settled
+
+    def shares(self, robot: int, cycle: int) -> Shares:
+        """What others see of the light of a robot's pulse lines in a cycle of the trial: how it was a quantum ago,
+        behind receivers of first order. The same for everybody, whenever it is asked."""
+        cycles, since = self._cycles[robot], cycle - self.quantum - _OVERRUN
+        index = bisect_right(cycles, since)
+        lit = self._lines[robot][index]
+        age = since - cycles[index - 1] if index else self._settled
+        if age >= self._settled:
+            return _STEADY[lit]
+        return self._followed(self._shares_at(robot, index - 1), lit, age)
+
+    def is_dark(self, robot: int, first: int, last: int) -> bool:
+        """Whether others see no light of a robot from one cycle to another: its emitters are off and forgotten."""
+        cycles, lines = self._cycles[robot], self._lines[robot]
+        forgotten = first - self.quantum - _OVERRUN - self._settled
+        if not lines[-1] and (not cycles or cycles[-1] <= forgotten):
+            return True  # at once, as it is most often
+        index = bisect_right(cycles, last - self.quantum - _OVERRUN)
+        return not lines[index] and (not index or cycles[index - 1] <= forgotten)
+
+    def _shares_at(self, robot: int, index: int) -> Shares:
+        """In the cycle of a switch, from what was switched shortly before."""
+        cycles, lines = self._cycles[robot], self._lines[robot]
+        at, shares = self._at_switch[robot]
+        if at != cycles[index]:
+            first = bisect_right(cycles, cycles[index] - self._settled)
+            shares = _STEADY[lines[first]]
+            for place in range(first, index):
+                shares = self._followed(shares, lines[place + 1], cycles[place + 1] - cycles[place])
+            self._at_switch[robot] = cycles[index], shares
+        return shares
+
+    def _followed(self, shares: Shares, lit: int, age: int) -> Shares:
+        """`shares` after the lines have been lit as in `lit` for so long."""
+        left = math.exp(-age / self.tau)
+        return tuple([end + (share - end) * left for share, end in zip(shares, _STEADY[lit], strict=True)])
 
     def take(self) -> list[Switch]:
         """What was added since the last call: what other processes have to hear."""

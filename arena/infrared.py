@@ -13,21 +13,17 @@ from typing import Final, NamedTuple
 
 from arena import bodies, geometry
 from arena.ether import Ether
-from arena.scene import Scene
-from arena.world import Poses
+from arena.optics import Optics, Signal
+from arena.scene import FCY, Scene
+from arena.world import STREAM_INFRARED, Poses, generator
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS, reflection_at
 from emu.boards.epuck.board import Epuck
+from emu.boards.noise import gaussian
 
-FIRST_CHANNEL: Final = 8
-"""AN8..AN15 (epuck.md §2)."""
-SIGNAL_RANGE: Final = 25.0
-"""cm at which another robot's emitter is still heard (epuck.md §5, UNVERIFIED)."""
-SIGNAL_COUNTS: Final = 53.0
-"""Counts there, both facing each other, growing as 1 / d^2: the weakest reflection of the response table. UNVERIFIED"""
-SATURATION: Final = 3788.0
-"""Counts no light exceeds: the table's first entry (epuck.md §5)."""
 LAMP_CM: Final = 100.0
 """Distance at which `light.lamp_counts` holds."""
+_RIPPLE: Final = math.tau * 100 / FCY
+"""Of lamps on the mains, rad per Tcy."""
 
 
 class Surface(NamedTuple):
@@ -40,7 +36,7 @@ class Surface(NamedTuple):
 class Ring:
     """The eight sensors of one robot, put between its board and the world. Cycles of the board are `on_at` behind."""
 
-    def __init__(self, scene: Scene, board: Epuck, ether: Ether, robot: int, on_at: int) -> None:
+    def __init__(self, scene: Scene, seed: int, board: Epuck, ether: Ether, robot: int, on_at: int) -> None:
         self._scene = scene
         self._board = board
         self._ether = ether
@@ -55,13 +51,15 @@ class Ring:
         """Whether the firmware has ever converted one of the sensors."""
         self.look: Callable[[], Poses] | None = None
         """Where poses come from before that; later `move` tells them."""
-        self._heard: list[list[tuple[int, int, float]]] = [[] for _ in range(SENSORS)]
+        self._optics: Optics | None = None
+        self._heard: list[Signal] = []
+        rng = generator(seed, STREAM_INFRARED, robot)
+        self._seed = int(rng.integers(1 << 62))
+        self._offsets = rng.normal(0.0, scene.light.ambient_sd_counts, SENSORS).tolist()
+        board.ir.tau_seconds = scene.infrared.tau_us * 1e-6
+        board.ir.shine(self._light)
         for line, pin in enumerate(PULSE_PINS):
             board.chip.pins.watch(pin, partial(self._switched, line))
-        for sensor in range(SENSORS):
-            source = board.chip.adc.source[FIRST_CHANNEL + sensor]
-            assert source is not None
-            board.chip.adc.source[FIRST_CHANNEL + sensor] = partial(self._level, sensor, source)
 
     def move(self, poses: Poses) -> None:
         """A quantum begins. What was sampled before it is made final first."""
@@ -83,29 +81,38 @@ class Ring:
         if not self._board.ir.events.quiet:  # others have seen what is run again
             self._ether.switch(self._robot, self._on_at + cycle, line, bool(levels & changed))
 
-    def _level(self, sensor: int, source: Callable[[int], int], cycle: int) -> int:
+    def _light(self, sensor: int, cycle: int) -> float:
+        """Counts taken off by other robots' light, noise and lamps on the mains; the rest is brought up to date."""
         if self._is_stale:
-            self._sense()
+            self._sense(cycle)
         if self._unfelt >> sensor & 1:
             self._feel(sensor)
-        level = source(cycle)
-        if not self._heard[sensor]:
-            return level
-        light = 0.0
-        for other, line, counts in self._heard[sensor]:
-            if self._ether.seen(other, self._on_at + cycle) >> line & 1:
-                light += counts
-        return max(level - (round(min(light, SATURATION)) << 4), 0)
+        setting, now, light = self._scene.infrared, self._on_at + cycle, 0.0
+        for other, counts, shares in self._heard:
+            if shares[sensor]:
+                lit = self._ether.shares(other, now)
+                light += shares[sensor] * sum([one * share for one, share in zip(counts, lit, strict=True)])
+        if setting.ripple_counts:
+            light += setting.ripple_counts * math.sin(_RIPPLE * now)
+        if setting.noise_counts:
+            light += setting.noise_counts * gaussian(self._seed, sensor, now)
+        return light
 
-    def _sense(self) -> None:
+    def _sense(self, cycle: int) -> None:
         if self.look is not None and not self.is_read:
             self._poses = self.look()
         self._is_stale, self.is_read = False, True
         self._near, self._unfelt = nearby(self._scene, self._poses, self._robot), (1 << SENSORS) - 1
         ir = self._board.ir
-        for sensor, counts in enumerate(ambient(self._scene, self._poses.robots[self._robot])):
-            ir.ambient[sensor] = counts
-        self._heard = signals(self._scene, self._poses, self._robot)
+        counts = ambient(self._scene, self._poses.robots[self._robot])
+        for sensor, (one, offset) in enumerate(zip(counts, self._offsets, strict=True)):
+            ir.ambient[sensor] = min(max(round(one + offset), 0), 4095)
+        now, others = self._on_at + cycle, range(len(self._poses.robots))
+        lit = [other for other in others if other != self._robot
+               and not self._ether.is_dark(other, now, now + self._ether.quantum)]  # fmt: skip
+        if lit and self._optics is None:
+            self._optics = Optics(self._scene)
+        self._heard = self._optics.signals(self._poses, self._robot, lit) if self._optics is not None else []
 
     def _feel(self, sensor: int) -> None:
         """What a sensor sees of its own light, when it is first asked for."""
@@ -230,49 +237,3 @@ def ambient(scene: Scene, pose: tuple[float, float, float]) -> list[int]:
         for sensor, (east, north) in enumerate(_axes(pose)):
             taken[sensor] += full * max((dx * east + dy * north) / distance, 0.0)
     return [round(max(light.ambient_counts - one, 0.0)) for one in taken]
-
-
-def signals(scene: Scene, poses: Poses, robot: int) -> list[list[tuple[int, int, float]]]:
-    """For each sensor the emitters of other robots it sees: (robot, pulse line, counts when lit). Bodies between two
-    robots hide them from each other."""
-    x, y, _ = poses.robots[robot]
-    heard: list[list[tuple[int, int, float]]] = [[] for _ in range(SENSORS)]
-    axes: list[tuple[float, float]] = []
-    for other, pose in enumerate(poses.robots):
-        dx, dy = pose[0] - x, pose[1] - y
-        if other == robot or max(abs(dx), abs(dy)) > SIGNAL_RANGE + 2 * bodies.ROBOT_RADIUS:
-            continue
-        apart = math.hypot(dx, dy)
-        gap = max(apart - 2 * bodies.ROBOT_RADIUS, 1.0)
-        if gap > SIGNAL_RANGE or _is_hidden(scene, poses, robot, other):
-            continue
-        axes = axes or _axes(poses.robots[robot])
-        strength = SIGNAL_COUNTS * (SIGNAL_RANGE / gap) ** 2
-        sent = [max(-(dx * east + dy * north) / apart, 0.0) for east, north in _axes(pose)]
-        for sensor, (east, north) in enumerate(axes):
-            caught = max((dx * east + dy * north) / apart, 0.0)
-            for emitter, share in enumerate(sent):
-                counts = min(strength * caught * share, SATURATION)
-                if counts >= 1:
-                    heard[sensor].append((other, emitter % len(PULSE_PINS), counts))
-    return heard
-
-
-def _is_hidden(scene: Scene, poses: Poses, one: int, other: int) -> bool:
-    """Whether an object or a third robot stands on the line between two robots' centres."""
-    (x, y, _), (to_x, to_y, _) = poses.robots[one], poses.robots[other]
-    dx, dy = to_x - x, to_y - y
-    apart2 = dx * dx + dy * dy
-    discs = [(ox, oy, radius) for ox, oy, radius, _ in _objects(scene, poses)]
-    discs += [(fixed.x_cm, fixed.y_cm, fixed.radius_cm) for fixed in scene.obstacles if fixed.radius_cm]
-    for shape in (fixed.polygon for fixed in scene.obstacles if fixed.polygon):
-        if any(geometry.meeting(x, y, dx, dy, side) < 1 for side in geometry.sides(shape)):
-            return True
-    discs += [
-        (third[0], third[1], bodies.ROBOT_RADIUS) for i, third in enumerate(poses.robots) if i not in (one, other)
-    ]
-    for ox, oy, radius in discs:
-        along = ((ox - x) * dx + (oy - y) * dy) / apart2
-        if 0 < along < 1 and math.hypot(x + along * dx - ox, y + along * dy - oy) < radius:
-            return True
-    return False

@@ -41,7 +41,7 @@ class LockStep:
     def __init__(self, world: World, robots: Sequence[Runner], ether: Ether | None = None) -> None:
         self._world: Final = world
         self._robots: Final = robots
-        self._ether: Final = ether or Ether(len(robots), world.scene.clock.quantum_tcy)
+        self._ether: Final = ether or Ether.of(world.scene)
         self._ether.slowest = 0
         self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
         self._hub: greenlet = getcurrent()

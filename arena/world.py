@@ -28,7 +28,7 @@ ITERATIONS: Final = 20
 """Of the constraint solver (epuck.md §4)."""
 WALL_THICKNESS: Final = 20.0
 """Half thickness of the walls' segments in cm: nothing tunnels through."""
-STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT = range(6)
+STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT, STREAM_INFRARED = range(7)
 """Independent generators of a trial: `generator(seed, stream, robot)`."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Final
 
@@ -10,6 +11,20 @@ from emu.record import Record
 
 _ONES: Final = (1 << 64) - 1
 _SCALE_ONE: Final = 1 << 16
+
+
+def _mixed(seed: int, channel: int, cycle: int) -> int:
+    """64 bits (SplitMix64)."""
+    x = (seed + (cycle << 8 | channel) * 0x9E37_79B9_7F4A_7C15) & _ONES
+    x = (x ^ x >> 30) * 0xBF58_476D_1CE4_E5B9 & _ONES
+    x = (x ^ x >> 27) * 0x94D0_49BB_1331_11EB & _ONES
+    return x ^ x >> 31
+
+
+def gaussian(seed: int, channel: int, cycle: int) -> float:
+    """Standard normal with its tails, to 6.6 deviations (Box and Muller): where rare errors are counted."""
+    x = _mixed(seed, channel, cycle)
+    return math.sqrt(-2 * math.log(((x >> 32) + 1) / 2**32)) * math.cos(math.tau / 2**32 * (x & 0xFFFF_FFFF))
 
 
 class Noise:
@@ -39,9 +54,6 @@ class Noise:
         """Noise of standard deviation `deviation` on a channel in a cycle."""
         if not self._strength.value:
             return 0.0
-        x = (self._seed.value + (cycle << 8 | channel) * 0x9E37_79B9_7F4A_7C15) & _ONES  # SplitMix64
-        x = (x ^ x >> 30) * 0xBF58_476D_1CE4_E5B9 & _ONES
-        x = (x ^ x >> 27) * 0x94D0_49BB_1331_11EB & _ONES
-        x ^= x >> 31
+        x = _mixed(self._seed.value, channel, cycle)
         uniform = sum(x >> shift & 0xFFFF for shift in (0, 16, 32, 48)) / 0x10000 - 2  # four of variance 1/12
         return uniform * 3**0.5 * deviation * self.strength

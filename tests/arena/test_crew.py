@@ -33,9 +33,9 @@ class Echo:
         if tick == 3:
             raise ValueError(f"robot {self._robot} has had enough")
         assert self._ether is not None
-        seen = self._ether.seen(0, 1000 * tick + 1000)
+        seen = self._ether.shares(0, 1000 * tick + 1000)[3]
         self._ether.switch(self._robot, 1000 * tick, self._robot, lit=True)
-        return poses.robots[self._robot][0], float(seen)
+        return poses.robots[self._robot][0], seen
 
     def reading(self) -> Reading:
         """Its number as load."""
@@ -76,17 +76,17 @@ def test_a_quantum_survives_its_message(
 
 def test_a_crew_answers_records_and_hears() -> None:
     """Speeds in order, what is recorded, and switches in both directions."""
-    ether = Ether(3, 1000)
+    ether = Ether(3, 1000, tau=1.0)
     crew = Crew(echoes, (1, 2), ether)
     poses = Poses([(1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (3.0, 0.0, 0.0)], [])
     try:
         first, second = crew.brains
-        ether.switch(0, -50, 5, lit=True)
+        ether.switch(0, -50, 3, lit=True)
         crew.begin(0, poses, ether.take())
         assert [first.think(0, poses), second.think(0, poses)] == [(2.0, 0.0), (3.0, 0.0)]
         assert ether.take() == [Switch(1, 0, 1, 1), Switch(2, 0, 2, 1)]
         crew.begin(1, poses, [])
-        assert first.think(1, poses) == (2.0, 32.0)
+        assert first.think(1, poses) == (2.0, 1.0)
         assert [(one.reading().load, one.lines()) for one in (first, second)] == [
             (1.0, [Line(1, "hello")]), (2.0, [Line(2, "hello")])]  # fmt: skip
         crew.begin(3, poses, [])

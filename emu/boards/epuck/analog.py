@@ -19,8 +19,10 @@ PULSE_PINS: Final = ("RF7", "RF8", "RG0", "RG1")
 """Line n lights the emitters of sensors n and n + 4 (epuck.md §2)."""
 TAU_SECONDS: Final = 60e-6
 """Time constant of the receiver behind its emitter (epuck.md §10)."""
-SETTLED_TCY: Final = round(9.2 * TAU_SECONDS * 30e6)
-"""Time after which less than half a count is missing of the largest reflection, at the fastest clock (chip §3)."""
+_SETTLED: Final = 9.2
+"""Time constants after which less than half a count is missing of the largest reflection."""
+_FASTEST_HZ: Final = 30e6
+"""The fastest clock (chip §3)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
 
 NOISE_COUNTS, NOISE_SHARE = 5.0, 0.03
@@ -48,11 +50,14 @@ def reflection_at(distance_mm: float) -> float:
 
 
 class Infrared(Part):
-    """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled."""
+    """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled - `shine`'s."""
 
     def __init__(self, chip: Peripherals, noise: Noise) -> None:
         super().__init__("ir", chip)
         self._noise: Final = noise
+        self.tau_seconds = TAU_SECONDS
+        """Time constant of all receivers; set it before the robot runs."""
+        self._outside: Callable[[int, int], float] | None = None
         self.ambient: Final = self.array("ambient", "H", SENSORS)
         """Raw counts with the emitter off, per sensor. Falls with light."""
         self.reflection: Final = self.array("reflection", "H", SENSORS)
@@ -69,6 +74,12 @@ class Infrared(Part):
             self.pins.watch(pin, partial(self._switched, line))
             self._foretell(line)
         noise.on_change.append(self._foretell_all)
+
+    def shine(self, outside: Callable[[int, int], float]) -> None:
+        """From now on each conversion asks `outside(sensor, cycle)` for the counts taken off by whatever else shines on
+        the sensor; it may set `ambient` and `reflection`, which are looked at afterwards."""
+        self._outside = outside
+        self._foretell_all()
 
     def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
         """Put a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
@@ -97,7 +108,7 @@ class Infrared(Part):
 
     def _share(self, line: int, cycle: int) -> float:
         """How far the receivers of a line have settled to full light, 0..1."""
-        tau = TAU_SECONDS * self.chip.fcy
+        tau = self.tau_seconds * self.chip.fcy
         target = 1.0 if self._lit[line] else 0.0
         start = self._from[line] / 0xFFFF
         return target + (start - target) * math.exp(-max(cycle - self._since[line], 0) / tau)
@@ -119,15 +130,15 @@ class Infrared(Part):
         """Tell the converter what the receivers of a line will show once they have settled: without noise a number."""
         for sensor in (line, line + len(PULSE_PINS)):
             raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
-            level = None if self._noise.strength else min(max(raw, 0), 4095) << 4
-            self.chip.adc.source.foretell(
-                _FIRST_CHANNEL + sensor, self._sources[sensor], level, self._since[line] + SETTLED_TCY
-            )
+            level = None if self._noise.strength or self._outside else min(max(raw, 0), 4095) << 4
+            settled = self._since[line] + round(_SETTLED * self.tau_seconds * _FASTEST_HZ)
+            self.chip.adc.source.foretell(_FIRST_CHANNEL + sensor, self._sources[sensor], level, settled)
 
     def _level(self, sensor: int, cycle: int) -> int:
+        light = self._outside(sensor, cycle) if self._outside is not None else 0.0
         lowered = self.reflection[sensor] * self._share(sensor % len(PULSE_PINS), cycle)
         deviation = max(NOISE_COUNTS, NOISE_SHARE * lowered)
-        raw = self.ambient[sensor] - lowered + self._noise.at(_FIRST_CHANNEL + sensor, cycle, deviation)
+        raw = self.ambient[sensor] - lowered - light + self._noise.at(_FIRST_CHANNEL + sensor, cycle, deviation)
         return min(max(round(raw), 0), 4095) << 4
 
 
