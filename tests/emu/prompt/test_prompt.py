@@ -245,7 +245,7 @@ def test_names_are_completed(program: str) -> None:
     assert names("p U1STA.TR") == {"p U1STA.TRMT"}
     assert names("p U1ST") == {"p U1STA", "p U1STAbits"}
     assert names("info l") == {"info locals"}
-    assert names("help rev") == {f"help reverse-{how}" for how in ("continue", "finish", "next", "stepi")}
+    assert names("help rev") == {f"help reverse-{how}" for how in ("continue", "finish", "next", "step", "stepi")}
     assert names("print nothing.x") == set()
 
 
