@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: MIT */
+/* Messages in and out: events, processors, the own number. */
+#include "infrared_parts.h"
+#include "kernel.h"
+
+#include <string.h>
+
+enum { HOUSEKEEPINGS = 64 /* a second */, DRAWN_AFTER = 16 };
+
+uint16 infrared_number;
+void (*infrared_event_sink)(const frame *f);
+
+static bool number_is_kept;
+static uint8 housekeepings;
+static uint16 sent_before; /* frames sent when the beacon was last put off */
+static uint16 beacon_at;   /* low word of the system time */
+static sys_message_processor message_processor;
+static sys_sending_processor sending_processor;
+
+static void draw_number(void)
+{
+    if (!number_is_kept) {
+        do {
+            infrared_number = link_random() & NUMBER_MASK;
+        } while (infrared_number == 0);
+    }
+}
+
+static void pass_on(const frame *f, uint8 repairs, uint8 sensor, uint16 strength)
+{
+    sys_neighbour_message m = {f->number, strength, sensor, repairs, f->size, {0}};
+    memcpy(m.payload, f->payload, f->size);
+    if (message_processor == NULL || message_processor(&m)) {
+        (void)Sys_Send_Event(SYS_NEIGHBOUR_MESSAGE, &m, sizeof m);
+    }
+}
+
+void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength)
+{
+    frame f;
+    frame_unpack(b, &f);
+    if (f.number == infrared_number) {
+        os_count(&infrared_statistics.conflicts);
+        draw_number();
+    }
+    if (f.number != 0) {
+        neighbours_heard(f.number, sensor, strength);
+    }
+    if (f.kind == FRAME_EVENT && infrared_event_sink != NULL) {
+        infrared_event_sink(&f);
+    } else if (f.kind == FRAME_MESSAGE && f.size != 0 && f.size <= SYS_MESSAGE_BYTES) {
+        pass_on(&f, b->repairs, sensor, strength);
+    }
+}
+
+static void keep_alive(void)
+{
+    uint16 now = clock_now();
+    if (infrared_statistics.sent != sent_before) {
+        sent_before = infrared_statistics.sent;
+        beacon_at = (uint16)(now + SYS_BEACON_PERIOD + (link_random() & (SYS_BEACON_PERIOD / 4 - 1)));
+    } else if ((sint16)(now - beacon_at) >= 0) {
+        beacon_at = (uint16)(now + SYS_BEACON_PERIOD);
+        (void)link_queue(FRAME_MESSAGE, &housekeepings, 0);
+    }
+}
+
+void infrared_housekeeping(void)
+{
+    if (housekeepings < DRAWN_AFTER && ++housekeepings == DRAWN_AFTER && infrared_number == 0) {
+        draw_number();
+    }
+    neighbours_age();
+    keep_alive();
+}
+
+bool Sys_Send_Neighbours(const void *payload, uint16 size)
+{
+    uint8 changed[SYS_MESSAGE_BYTES];
+    uint8 bytes = (uint8)size;
+    if (size == 0 || size > SYS_MESSAGE_BYTES) {
+        return os_fail(SYS_ERROR_ARGUMENT);
+    }
+    memcpy(changed, payload, size);
+    sys_sending_processor processor = HAL_LOAD(sending_processor);
+    if (processor != NULL && (!processor(changed, &bytes) || bytes == 0 || bytes > SYS_MESSAGE_BYTES)) {
+        return os_fail(SYS_ERROR_ARGUMENT);
+    }
+    return link_queue(FRAME_MESSAGE, changed, bytes) || os_fail(SYS_ERROR_BUSY);
+}
+
+static bool on_request(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid;
+    (void)event;
+    (void)Sys_Send_Neighbours(data->payload, data->size);
+    return true;
+}
+
+sys_message_processor Sys_Set_MessageProcessor(sys_message_processor processor)
+{
+    sys_message_processor before = message_processor;
+    HAL_STORE(message_processor, processor);
+    return before;
+}
+
+sys_sending_processor Sys_Set_SendingProcessor(sys_sending_processor processor)
+{
+    sys_sending_processor before = sending_processor;
+    HAL_STORE(sending_processor, processor);
+    return before;
+}
+
+uint16 Sys_Get_RobotNumber(void)
+{
+    return HAL_LOAD(infrared_number);
+}
+
+static bool keep_number(uint16 number)
+{
+    if (number == 0 || number > NUMBER_MASK) {
+        return false;
+    }
+    HAL_STORE(infrared_number, number);
+    number_is_kept = true;
+    return true;
+}
+
+bool Sys_Set_RobotNumber(uint16 number)
+{
+    return keep_number(number) || os_fail(SYS_ERROR_ARGUMENT);
+}
+
+bool Sys_Set_InfraredThreshold(uint8 counts)
+{
+    return detector_set_threshold(counts) || os_fail(SYS_ERROR_ARGUMENT);
+}
+
+const sys_infrared_statistics *Sys_Get_InfraredStatistics(void)
+{
+    return &infrared_statistics;
+}
+
+bool Sys_Start_Infrared(void)
+{
+    detector_init();
+    reflections_init();
+    link_init();
+    (void)keep_number(hal_infrared_number());
+    hal_infrared_start();
+    return Sys_Register_Event(SYS_IO_PROXIMITY) && Sys_Register_Event(SYS_NEIGHBOUR_MESSAGE) &&
+           Sys_Register_Event(SYS_NEIGHBOUR_SEEN) && Sys_Register_Event(SYS_NEIGHBOUR_LOST) &&
+           Sys_Register_Event(SYS_SEND_NEIGHBOURS) && Sys_Subscribe_to_Event(SYS_SEND_NEIGHBOURS, 0, on_request, NULL);
+}

@@ -1,0 +1,347 @@
+/* SPDX-License-Identifier: MIT */
+/* Who may light up when, and what light means. A frame on the air, three scans a bit: six ones, a zero, its words, a
+ * zero.
+ *
+ * Receiver: light for two scans picks the strongest sensor; where the ones end, the bits begin, at half of what they
+ * took from that sensor. So neither a late start nor a robot's own proximity costs more than a few of the ones. Shorter
+ * light, as others' proximity makes it, begins nothing; light that stays is the room's from now on. */
+#include "infrared_parts.h"
+#include "hal_cpu.h"
+
+#include <string.h>
+
+enum {
+    SCANS_PER_BIT = 3,
+    PREAMBLE = 0x3F,
+    PREAMBLE_BITS = 7, /* as long as an own flash, faint light's way through the filter and LEAST_ONES */
+    PICK_AFTER = 2,    /* scans of light */
+    LEAST_ONES = 5,    /* scans of light that begin a frame: proximity lights for 3 or 4 */
+    MOST_ONES = 36,    /* then it is not a frame */
+    CLEAR = 12,        /* dark scans: more than any usual word has in a row */
+    SLOT = 3,          /* scans of back-off: a frame that begins is seen in the next */
+    FIRST_SLOTS = 8,
+    SLOTS_PER_NEIGHBOUR = 4,
+    FLASH = 3,              /* scans of the own light: 0.5 ms settle the receivers, then they are read */
+    AFTERGLOW = 2,          /* scans until the receivers have settled again */
+    PROXIMITY_PERIOD = 205, /* scans: 50 ms */
+    FOLLOW_EVERY = 4,       /* scans */
+    HOUSEKEEPING = 64,
+    MULTIPLIER = 25173,
+    INCREMENT = 13849 /* of a full period of 2^16 */
+};
+
+typedef struct {
+    bool is_filled; /* its sender may have been interrupted */
+    uint8 kind, size;
+    uint8 payload[FRAME_PAYLOAD];
+} waiting_frame;
+
+static waiting_frame queue[SYS_INFRARED_QUEUE];
+static volatile uint8 queue_first, queue_length;
+
+static enum { LISTEN, ONES, BITS, SEND, FLASHING, SETTLING, RESTING } state;
+static uint8 phase;      /* scans until something is due, or of a bit */
+static uint8 lit, quiet; /* scans with light, without; in LISTEN */
+static uint8 rest;       /* scans of silence on top before an own flash */
+static uint16 backoff;   /* scans of silence on top before an own frame */
+static uint8 sensor;     /* that hears the frame best */
+static uint8 ones;
+static bool falling;                /* the last scan was dark: the ones are over if the next is as well */
+static uint16 dark, bright, slicer; /* of that sensor, sixteenths of a count */
+static uint16 sum;                  /* of a bit's scans, the middle one twice */
+static uint16 word;
+static uint8 word_bits;
+static frame_buffer buffer;
+static uint16 scans, flashed_at, random_state;
+
+sys_infrared_statistics infrared_statistics;
+
+/* ISRs alone, or with devices locked. */
+static void count(uint16 *counter)
+{
+    if (++*counter == 0) {
+        --*counter;
+    }
+}
+
+uint16 link_random(void)
+{
+    random_state = (uint16)(random_state * MULTIPLIER + INCREMENT);
+    return random_state >> 5;
+}
+
+static void draw_backoff(void)
+{
+    uint8 slots = (uint8)(FIRST_SLOTS + SLOTS_PER_NEIGHBOUR * neighbours_count());
+    backoff = (uint16)((uint16)(link_random() % slots) * SLOT);
+}
+
+static waiting_frame *reserve(void)
+{
+    waiting_frame *w = NULL;
+    hal_lock_state lock = hal_lock_devices();
+    if (queue_length < SYS_INFRARED_QUEUE) {
+        w = queue + (uint8)(queue_first + queue_length) % SYS_INFRARED_QUEUE;
+        queue_length++;
+    } else {
+        count(&infrared_statistics.refused);
+    }
+    hal_unlock(lock);
+    return w;
+}
+
+bool link_queue(frame_kind kind, const uint8 *payload, uint8 size)
+{
+    hal_lock_state lock = hal_lock_slice(); /* nobody is killed between reserving and filling */
+    waiting_frame *w = reserve();
+    if (w != NULL) {
+        w->kind = (uint8)kind;
+        w->size = size;
+        memcpy(w->payload, payload, size);
+        hal_barrier();
+        w->is_filled = true;
+    }
+    hal_unlock(lock);
+    return w != NULL;
+}
+
+/* -- sending ------------------------------------------------------------------------------------------------------- */
+
+static HAL_OUTLINE void begin_sending(void)
+{
+    waiting_frame *w = queue + queue_first;
+    frame f = {infrared_number, w->kind, w->size, w->payload};
+    frame_pack(&buffer, &f);
+    w->is_filled = false;
+    queue_first = (uint8)((queue_first + 1u) % SYS_INFRARED_QUEUE);
+    queue_length--;
+    word = PREAMBLE;
+    word_bits = PREAMBLE_BITS;
+    phase = 1;
+    state = SEND;
+}
+
+static void rest_for(uint8 how_long)
+{
+    hal_infrared_light(false);
+    phase = how_long;
+    state = RESTING;
+}
+
+static HAL_OUTLINE void send(void)
+{
+    if (--phase != 0) {
+        return;
+    }
+    phase = SCANS_PER_BIT;
+    if (word_bits == 0) {
+        if (!frame_next_word(&buffer, &word)) {
+            count(&infrared_statistics.sent);
+            draw_backoff();
+            rest_for(SCANS_PER_BIT);
+            return;
+        }
+        word_bits = CODE_BITS;
+    }
+    hal_infrared_light(word & 1u);
+    word >>= 1;
+    word_bits--;
+}
+
+/* -- receiving ----------------------------------------------------------------------------------------------------- */
+
+static HAL_OUTLINE void listen_again(void)
+{
+    detector_forget();
+    lit = 0;
+    quiet = 0;
+    if (backoff == 0) { /* others may have an answer as well */
+        draw_backoff();
+    }
+    state = LISTEN;
+}
+
+static void brighter(uint16 reading)
+{
+    bright = (uint16)(bright - (bright >> 2) + (reading >> 2));
+    slicer = (uint16)((dark >> 1) + (bright >> 1));
+}
+
+static HAL_OUTLINE void pick_sensor(void)
+{
+    sensor = detector_strongest();
+    dark = detector_background(sensor);
+    bright = detector_level(sensor);
+    slicer = (uint16)((dark >> 1) + (bright >> 1));
+    ones = PICK_AFTER;
+    falling = false;
+    state = ONES;
+}
+
+static HAL_OUTLINE void measure_ones(scan raw)
+{
+    uint16 reading = (uint16)(raw[sensor] << 4);
+    if (reading < slicer) {
+        ones = (uint8)(ones + 1u + falling);
+        falling = false;
+        brighter(reading);
+        if (ones > MOST_ONES) {
+            count(&infrared_statistics.adaptations);
+            detector_adapt(raw);
+            listen_again();
+        }
+    } else if (!falling) {
+        falling = true;
+    } else if (ones < LEAST_ONES) {
+        count(&infrared_statistics.false_starts);
+        listen_again();
+    } else {
+        frame_begin(&buffer);
+        random_state = (uint16)(random_state + scans); /* robots in the same state part here */
+        phase = 2;                                     /* of the zero */
+        word_bits = CODE_BITS + 1;
+        state = BITS;
+    }
+}
+
+static HAL_OUTLINE void end_of_word(void)
+{
+    word_bits = CODE_BITS;
+    switch (frame_word(&buffer, word >> 1)) {
+    case FRAME_MORE:
+        return;
+    case FRAME_WHOLE:
+        count(&infrared_statistics.received);
+        infrared_received(&buffer, sensor, (uint16)(dark - bright) >> 4);
+        break;
+    case FRAME_DAMAGED:
+        count(&infrared_statistics.damaged);
+        break;
+    }
+    rest_for(SCANS_PER_BIT);
+}
+
+static HAL_OUTLINE void receive(scan raw)
+{
+    uint16 reading = (uint16)raw[sensor];
+    if (++phase <= SCANS_PER_BIT - 1) {
+        sum = (uint16)(phase == 1 ? reading : sum + 2 * reading);
+        return;
+    }
+    phase = 0;
+    if (word_bits > CODE_BITS) { /* the zero behind the ones */
+        word_bits = CODE_BITS;
+        return;
+    }
+    sum = (uint16)((sum + reading) << 2);
+    word >>= 1;
+    if (sum < slicer) {
+        word |= 1u << CODE_BITS;
+        brighter(sum);
+    }
+    if (--word_bits == 0) {
+        end_of_word();
+    }
+}
+
+/* -- taking turns -------------------------------------------------------------------------------------------------- */
+
+static HAL_OUTLINE void flash(void)
+{
+    flashed_at = scans;
+    rest = (uint8)(link_random() & 15u);
+    hal_infrared_light(true);
+    phase = FLASH;
+    state = FLASHING;
+}
+
+/* Nobody has lit anything for long enough. */
+static HAL_OUTLINE void use_silence(void)
+{
+    if ((uint16)(scans - flashed_at) >= PROXIMITY_PERIOD) {
+        if (rest-- == 0) {
+            flash();
+        }
+    } else if (backoff != 0) {
+        backoff--;
+    } else if (queue_length != 0 && queue[queue_first].is_filled && infrared_number != 0) {
+        begin_sending();
+    }
+}
+
+static HAL_INLINE void listen(scan raw)
+{
+    if ((uint8)scans % FOLLOW_EVERY == 0) {
+        detector_follow();
+    }
+    if (detector_filter(raw)) {
+        quiet = 0;
+        if (++lit == PICK_AFTER) {
+            pick_sensor();
+        }
+        return;
+    }
+    lit = 0;
+    if (quiet == CLEAR) {
+        use_silence();
+    } else {
+        quiet++;
+    }
+}
+
+static HAL_OUTLINE void own_light(scan raw)
+{
+    if (--phase != 0) {
+        return;
+    }
+    if (state == RESTING) {
+        listen_again();
+    } else if (state == FLASHING) {
+        reflections_lit(raw);
+        hal_infrared_light(false);
+        phase = AFTERGLOW;
+        state = SETTLING;
+    } else {
+        if (detector_is_dark(raw)) {
+            reflections_use();
+        }
+        state = LISTEN;
+    }
+}
+
+static HAL_OUTLINE void act(scan raw)
+{
+    if (state == BITS) {
+        receive(raw);
+    } else if (state == ONES) {
+        measure_ones(raw);
+    } else if (state == SEND) {
+        send();
+    } else {
+        own_light(raw);
+    }
+}
+
+static HAL_OUTLINE void keep_house(scan raw)
+{
+    random_state = (uint16)(random_state * MULTIPLIER + raw[scans / HOUSEKEEPING % HAL_INFRARED_SENSORS]);
+    infrared_housekeeping();
+}
+
+void infrared_scanned(scan raw)
+{
+    scans++;
+    if (state == LISTEN) {
+        listen(raw);
+    } else {
+        act(raw);
+    }
+    if ((uint8)scans % HOUSEKEEPING == 0) {
+        keep_house(raw);
+    }
+}
+
+void link_init(void)
+{
+    draw_backoff();
+}

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/* Proximity between frames: all emitters are on for three scans, and what the last of them shows, less the background,
+ * is the reflection. How it becomes millimetres and an event is said once, for both devices, of which a program has
+ * one. */
+#include "../analog/proximity.c"
+
+#include "infrared_parts.h"
+
+static uint16 lit_readings[HAL_INFRARED_SENSORS];
+
+void reflections_init(void)
+{
+    proximity_init();
+}
+
+void reflections_lit(scan raw)
+{
+    for (uint8 i = 0; i < HAL_INFRARED_SENSORS; i++) {
+        lit_readings[i] = (uint16)raw[i];
+    }
+}
+
+void reflections_use(void)
+{
+    for (uint8 i = 0; i < HAL_INFRARED_SENSORS; i++) {
+        proximity_measured(i, detector_background(i) / 16, false);
+        proximity_measured(i, lit_readings[i], true);
+    }
+    proximity_send();
+}

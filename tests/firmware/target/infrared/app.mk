@@ -1,0 +1,1 @@
+DEVICES := infrared camera i2c

@@ -1,0 +1,62 @@
+"""Neighbour messages on the emulated robot: beside the camera, and between robots that talk (io/infrared/README.md)."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from arena.emulated import EmulatedBrain
+from arena.ether import Ether
+from arena.scene import FCY, load_scene
+from arena.world import Poses
+from emu.machine import Machine
+from tests.firmware.conftest import TARGET_APPS, Build
+from tests.firmware.test_drivers_on_target import captured, noise, robot, window
+
+SENT, RECEIVED = 0, 1
+"""Places in sys_infrared_statistics."""
+
+
+def statistics(machine: Machine) -> tuple[int, ...]:
+    at = machine.address_of("infrared_statistics")
+    return struct.unpack("<7H", bytes(machine.record.bytes[at : at + 14]))
+
+
+def test_the_camera_loses_no_pixel_while_frames_are_sent(image: Build) -> None:
+    """kernel.md §4; openswarm_infrared.h: the link is at IPL 4, below the capture."""
+    machine = robot(image("infrared", TARGET_APPS))
+    machine.board.camera.show(noise())
+    machine.run(cycles=FCY // 2)
+    for _ in range(3):
+        machine.run(cycles=1_600_000 + 137_000)
+        assert np.array_equal(captured(machine), window(noise()))
+    assert statistics(machine)[SENT] >= 5
+
+
+def test_a_number_in_the_data_eeprom_is_the_robots(image: Build) -> None:
+    """openswarm_infrared.h: the last word, if it holds 1 to 2047."""
+    machine = robot(image("neighbours"))
+    machine.program.put(0x7FFFFE, 42)
+    machine.run(cycles=FCY // 50)
+    assert machine.record.u16[machine.address_of("infrared_number") >> 1] == 42
+
+
+def test_two_robots_exchange_a_byte(image: Build) -> None:
+    """firmware/apps/neighbours/README.md: on the channel of the arena, with its noise."""
+    values = {"robots__count": 2, "objects__count": 0, "infrared__noise_counts": 2.0}
+    scene = load_scene("clustering").with_values(**values)
+    ether = Ether(2, scene.clock.quantum_tcy)
+    brains = [EmulatedBrain(scene, 1, number, image("neighbours"), 0, ether) for number in range(2)]
+    poses = Poses([(150.0, 150.0, math.pi / 2), (162.0, 150.0, math.pi / 2)], [])
+    for tick in range(math.ceil(1.25 * FCY / scene.clock.quantum_tcy)):
+        for brain in brains:
+            brain.think(tick, poses)
+    numbers = [one.machine.record.u16[one.machine.address_of("infrared_number") >> 1] for one in brains]
+    for brain, other, sensor in zip(brains, reversed(numbers), (2, 5), strict=True):
+        (line,) = brain.lines()
+        says, range_mm = line.text.rsplit(", ", 1)
+        assert says == f"{other} says 0, sensor {sensor}"
+        assert int(range_mm.removesuffix(" mm")) == pytest.approx(120, abs=15)
