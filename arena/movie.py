@@ -19,7 +19,7 @@ from arena.brain import STRIP_PIXELS
 from arena.look import COLOURS
 from arena.page import samples_of
 from arena.record import RecordError, Trial, reason_of
-from emu.outfile import whole_file
+from emu.files import whole_file
 
 SCALE: Final = 1.6
 """Pixels per cm."""

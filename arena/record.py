@@ -19,7 +19,7 @@ from arena.experiments import Experiment, Moments, experiment_of
 from arena.metrics import Course
 from arena.scene import Scene, scene_of
 from arena.trial import Rows
-from emu.outfile import whole_file
+from emu.files import is_standard, read_file, whole_file
 
 if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
     import pyarrow as pa
@@ -151,7 +151,7 @@ def read_trial(path: Path) -> Trial:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(path)
+        table = pq.read_table(pa.BufferReader(read_file(path)) if is_standard(path) else path)
         about = json.loads((table.schema.metadata or {})[b"arena"])
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise RecordError(f"{path}: is no recorded trial: {error}") from None

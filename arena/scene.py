@@ -41,6 +41,7 @@ from arena.scenery import (
     Start,
 )
 from emu.boards.epuck.remote import KEYS
+from emu.files import is_standard, read_file
 
 __all__ = ["FCY", "BatterySetting", "CameraSetting", "Scene", "SceneError", "Start", "load_scene", "scene_of", "scenes",
            "scripted"]  # fmt: skip
@@ -156,14 +157,14 @@ def scenes() -> list[str]:
 
 def load_scene(name: str) -> Scene:
     """A scene by name, or from the TOML file at a path. Raises SceneError."""
-    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    path = Path(name) if name.endswith(".toml") or is_standard(name) else FOLDER / f"{name}.toml"
     try:
-        text = path.read_bytes().decode()
+        text = read_file(path).decode()
         data = tomllib.loads(text.replace("\r\n", "\n"))
     except FileNotFoundError:
         raise SceneError(f"there is no scene {name!r}; known: {', '.join(scenes())}, or a path to a .toml") from None
     except UnicodeDecodeError as error:
-        raise SceneError(f"{path}:{path.read_bytes()[: error.start].count(10) + 1}: is no UTF-8 text") from None
+        raise SceneError(f"{path}:{error.object[: error.start].count(10) + 1}: is no UTF-8 text") from None
     except tomllib.TOMLDecodeError as error:
         line = re.search(r"at line (\d+)", str(error))
         at = int(line[1]) if line else text.count("\n") + 1

@@ -11,6 +11,7 @@ from typing import Final
 
 from emu.chips import chip_named
 from emu.chips.chip import Chip
+from emu.files import read_file
 from emu.image import Image, LoadError
 
 MAX_OCTETS: Final = 32 << 20
@@ -50,11 +51,9 @@ def parse_image(data: bytes, name: str, chip: Chip | None = None) -> Image:
 def _contents(name: str) -> bytes:
     """The file's octets. Raises LoadError when it cannot be read."""
     try:
-        path = Path(name)
-        if path.is_dir():
+        if Path(name).is_dir():
             raise LoadError(name, f"is a directory; {EXPECTED}")
-        with path.open("rb") as file:
-            data = file.read(MAX_OCTETS + 1)
+        data = read_file(name, MAX_OCTETS + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, LoadError):
             raise

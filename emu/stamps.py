@@ -6,8 +6,9 @@ The file is text, one line per arrival, `CYCLE UART HEX`, in order of time; line
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final, TextIO
+
+from emu.files import read_file
 
 HEADER: Final = "# input stamps: cycle, UART, bytes in hex"
 
@@ -28,7 +29,7 @@ class Stamp:
 def read_stamps(path: str, uarts: tuple[int, ...]) -> list[Stamp]:
     """The stamps of a record file. Raises ValueError with the line of the first mistake, OSError if unreadable."""
     stamps: list[Stamp] = []
-    for number, line in enumerate(Path(path).read_text(encoding="ascii", errors="replace").splitlines(), start=1):
+    for number, line in enumerate(read_file(path).decode("ascii", "replace").splitlines(), start=1):
         if not line.strip() or line.startswith("#"):
             continue
         try:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
@@ -12,7 +14,7 @@ import pytest
 
 from arena.record import write_bytes
 from emu.boards.picture import write_picture
-from emu.outfile import is_opened, whole_file, whole_text_file
+from emu.files import is_opened, whole_file, whole_text_file
 from toolchain.files import write_outputs
 
 
@@ -56,3 +58,28 @@ def test_names_of_open_files_are_opened(tmp_path: Path) -> None:
         assert is_opened(f"/proc/self/fd/{stream.fileno()}") == Path("/proc/self/fd").exists()
     link.symlink_to(plain)
     assert [is_opened(path) for path in (plain, link, tmp_path / "absent", os.devnull)] == [False, False, False, True]
+
+
+HEX = Path(__file__).resolve().parent / "emu" / "cli" / "hello.hex"
+
+
+@pytest.mark.parametrize(
+    ("line", "given", "start"),
+    [
+        ("emu info -", HEX.read_bytes(), b"-: Intel HEX"),
+        ("emu run - --cycles 200 --trace - --uart1 none", HEX.read_bytes(), b"#      cycle"),
+        ("emu screenshot - --output -", HEX.read_bytes(), b"\x89PNG"),
+        ("toolchain as - -o -", b"nop\n", b"\x7fELF"),
+        (
+            "arena run - --brain scripted --trials 1 --minutes 0.01 --out t",
+            b'name = "my"\n[robots]\ncount = 1',
+            b"trial-0001",
+        ),
+    ],
+)
+def test_a_dash_is_standard_input_or_output(line: str, given: bytes, start: bytes, tmp_path: Path) -> None:
+    """In every command, for every file that is read or written whole; no file of that name comes to be."""
+    done = subprocess.run([sys.executable, "-m", *line.split()], input=given, capture_output=True, cwd=tmp_path,
+                          env={**os.environ, "PYTHONPATH": str(HEX.parents[3])}, timeout=120, check=False)  # fmt: skip
+    assert (done.returncode, done.stdout[: len(start)]) == (0, start), done.stderr
+    assert not (tmp_path / "-").exists()

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
 CXX_OF = {"c": "c++", "cpp-output": "c++-cpp-output"}
-STANDARD_OUTPUT = Path("-")
 MAX_INVENTIONS = 4  # runs of the middle end; each forbids what the one before made up
 
 
@@ -97,10 +96,7 @@ def _run(options: CcOptions, scratch: Path) -> None:
     else:
         modules = _front_end(options, scratch)
         outputs = [_translate(options, item, modules, scratch) for item in options.inputs]
-        if options.output == STANDARD_OUTPUT:
-            sys.stdout.buffer.write(outputs[0][1])
-        else:
-            write_outputs(outputs)
+        write_outputs(outputs)
 
 
 def _preprocess(options: CcOptions) -> None:

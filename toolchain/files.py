@@ -7,14 +7,14 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from emu.outfile import is_opened
+from emu.files import is_opened, is_standard, read_file, write_standard
 from toolchain.errors import ToolError
 
 
 def read_bytes(path: str | Path) -> bytes:
     """Return the content of `path`; raise `ToolError` naming the file and the reason."""
     try:
-        return Path(path).read_bytes()
+        return read_file(path)
     except OSError as error:
         raise ToolError(f"cannot read {path}: {error.strerror or error}") from None
 
@@ -29,8 +29,8 @@ def read_text(path: str | Path) -> str:
 
 
 def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
-    """Write all files or none: each goes to a temporary beside its target, then all are renamed. Devices and pipes are
-    written last, as they are.
+    """Write all files or none: each goes to a temporary beside its target, then all are renamed. Standard output,
+    devices and pipes are written last, as they are.
 
     Raises `ToolError` when a target cannot be written; temporaries are removed in every case.
     """
@@ -40,7 +40,7 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
     try:
         for path, data in outputs:
             target = Path(path)
-            if is_opened(target):
+            if is_standard(target) or is_opened(target):
                 opened.append((target, data))
                 continue
             handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
@@ -51,7 +51,10 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
         for temporary, target in pending:
             os.replace(temporary, target)
         for target, data in opened:
-            target.write_bytes(data)
+            if is_standard(target):
+                write_standard(data)
+            else:
+                target.write_bytes(data)
     except OSError as error:
         raise ToolError(f"cannot write {target}: {error.strerror or error}") from None
     finally:

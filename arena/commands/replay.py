@@ -15,6 +15,7 @@ from arena.live import Follower
 from arena.movie import write_movie
 from arena.page import page
 from arena.record import RecordError, read_trial, write_text
+from emu.files import is_standard
 
 
 def parser() -> argparse.ArgumentParser:
@@ -44,16 +45,17 @@ def run(options: argparse.Namespace) -> int:
             with suppress(KeyboardInterrupt):
                 serving.serve_forever()
         return 0
-    if not options.trial.is_file():
+    if not is_standard(options.trial) and not options.trial.is_file():
         raise RecordError(f"{options.trial}: no such file; expected a trial-NNNN.parquet")
     trial = read_trial(options.trial)
+    beside = options.trial if is_standard(options.trial) else options.trial.with_suffix(".html")
+    out: Path = options.export or options.out or beside
     if options.export is not None:
-        write_movie(trial, options.export, options.speed, options.seconds)
-        print(options.export)
-        return 0
-    out = options.out or options.trial.with_suffix(".html")
-    write_text(out, page(trial))
-    print(out)
+        write_movie(trial, out, options.speed, options.seconds)
+    else:
+        write_text(out, page(trial))
+    if not is_standard(out):
+        print(out)
     return 0
 
 

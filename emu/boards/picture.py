@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from emu.outfile import whole_file
+from emu.files import whole_file
 
 if TYPE_CHECKING:
     import numpy as np

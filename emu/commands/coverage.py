@@ -13,8 +13,8 @@ from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.coverage import Counts, Report, counting
+from emu.files import whole_text_file
 from emu.image import Image
-from emu.outfile import whole_text_file
 from emu.status import DONE, FAULT
 
 DESCRIPTION: Final = """\

@@ -17,11 +17,11 @@ from typing import Final, TextIO
 from emu.command import CommandError, Parser
 from emu.commands.image_option import add_chip_option, image_of
 from emu.coverage import fingerprint
+from emu.files import whole_text_file
 from emu.image import Image
 from emu.inject.campaign import Campaign, CampaignError, read
 from emu.inject.report import lines, summary
 from emu.inject.trial import Outcome, Trials
-from emu.outfile import whole_text_file
 from emu.places import use_cache
 from emu.status import DONE
 

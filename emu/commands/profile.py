@@ -12,8 +12,8 @@ from typing import Any, Final
 from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
+from emu.files import whole_text_file
 from emu.image import Image
-from emu.outfile import whole_text_file
 from emu.profile import callgrind
 from emu.profile.shares import Profile, Profiler
 from emu.profile.timelines import perfetto, speedscope

@@ -16,8 +16,8 @@ from emu.command import CommandError, Parser, cycles, seconds
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.commands.image_option import add_chip_option, image_of
 from emu.console import SPECIFICATIONS, Port, open_port
+from emu.files import whole_text_file
 from emu.image import Image
-from emu.outfile import whole_text_file
 from emu.session import FOREVER, Session
 from emu.stamps import HEADER, Stamp, read_stamps
 from emu.status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS

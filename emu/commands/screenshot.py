@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
+from emu.files import is_standard
 from emu.status import DONE, FAULT
 
 if TYPE_CHECKING:
@@ -67,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
         raise CommandError("--buffer and --size belong together")
     if options.board == "none" and options.buffer is None:
         raise CommandError("a bare chip has no sensor; leave out --board none or give --buffer")
+    if options.json and is_standard(options.output):
+        raise CommandError("only one of --output and --json can have standard output")
     image = image_of(options)
     try:
         machine = Machine(image.chip, engine=options.engine, board=board_of(options))

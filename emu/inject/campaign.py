@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from emu.files import read_file
 from emu.inject.faults import KINDS
 
 UARTS: Final = ("uart1", "uart2")
@@ -110,7 +111,7 @@ class _Reader:
 def read(path: Path) -> Campaign:
     """The campaign in a file. Raises CampaignError, OSError."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_file(path).decode()
     except UnicodeDecodeError as error:
         raise CampaignError(f"{path}: expected UTF-8: {error}") from None
     reader = _Reader(str(path), text)

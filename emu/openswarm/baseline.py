@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from emu.outfile import whole_text_file
+from emu.files import read_file, whole_text_file
 
 GREW_SHOWN: Final = 4
 """Places shown for a number that grew."""
@@ -99,7 +99,7 @@ def save(path: str, numbers: Mapping[str, Number]) -> None:
 def load(path: str) -> dict[str, Number]:
     """Read a baseline. Raises ValueError if it is not one, OSError if it cannot be read."""
     try:
-        table: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+        table: dict[str, Any] = json.loads(read_file(path))
         return {
             name: Number(int(row["value"]), {str(k): int(v) for k, v in row["where"].items()})
             for name, row in table.items()

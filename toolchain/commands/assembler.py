@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from emu.files import is_standard
 from toolchain.arguments import definition
 from toolchain.asm.assemble import assemble
 from toolchain.asm.state import Options
@@ -38,11 +39,8 @@ def main(arguments: list[str]) -> int:
     """Assemble; returns 0.  Raises `ToolError` with every finding."""
     options = options_of().parse_args(arguments)
     chip = device(options.part)
-    if options.source == "-":
-        name, text = "<stdin>", sys.stdin.read()
-    else:
-        name, text = options.source, read_text(options.source)
-    output = options.output or ("a.out" if options.source == "-" else str(Path(name).with_suffix(".o").name))
+    name, text = "<stdin>" if is_standard(options.source) else options.source, read_text(options.source)
+    output = options.output or ("a.out" if is_standard(options.source) else str(Path(name).with_suffix(".o").name))
     if Path(output) == Path(name):
         raise ToolError(f"the output {output} would overwrite the source")
     asm_options = Options(include=options.include, define=dict(map(definition, options.defsym)), relax=options.relax,

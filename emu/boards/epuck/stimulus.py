@@ -37,6 +37,7 @@ from emu.boards.epuck.remote import KEYS
 from emu.boards.epuck.waveform import WaveformError, read_csv, read_vcd
 from emu.boards.part import Part
 from emu.boards.picture import read_picture
+from emu.files import read_file
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR
 
@@ -274,7 +275,7 @@ class Stimulus(Part):
         if path.suffix in (".vcd", ".csv"):
             self.play(waveform(self._board, path))
         else:
-            self.play(parse(self._board, path.read_text(encoding="utf-8"), str(path)))
+            self.play(parse(self._board, read_file(path).decode(), str(path)))
 
     def play(self, steps: list[Step]) -> None:
         """Do `steps`, in order of time, from now on; steps of the past happen at once. Replaces an earlier script."""
