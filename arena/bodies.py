@@ -49,6 +49,12 @@ FOCAL_PIXELS: Final = 602.0
 CENTRE_X, CENTRE_Y = 320.0, 240.0
 """Optical axis in that picture (epuck.md §7.6)."""
 
+RING_HEIGHTS: Final = (3.5, 4.5)
+FRONT_HEIGHTS: Final = (1.1, 1.9)
+"""Between which heights LEDs of the ring and the front one shine, UNVERIFIED."""
+LED_COS: Final = math.cos(0.5 / ROBOT_RADIUS)
+"""Cosine of half the angle of the edge one lights: 1 cm, UNVERIFIED."""
+
 IR_BEARINGS_DEG: Final = (18.0, 45.0, 90.0, 142.0, 218.0, 270.0, 315.0, 342.0)
 """Clockwise from the front (epuck.md §5); each sensor looks radially from the body's edge."""
 IR_RANGE: Final = 10.0

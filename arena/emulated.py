@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import emu
 from arena import bodies
 from arena.brain import STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, switched_on, told_at
-from arena.ether import Ether
+from arena.ether import LINES, Ether
 from arena.infrared import Ring
 from arena.look import colours_of
 from arena.scene import FCY, BatterySetting, Scene
@@ -86,7 +86,8 @@ class EmulatedBrain:
         self._board.camera.sample(self._pixels)
         self._begin(scene)
         self.machine.uart[1].on_byte = self._byte
-        self._ring = Ring(scene, seed, self._board, ether or Ether.of(scene), robot, self._on_at)
+        self._ether: Final = ether or Ether.of(scene)
+        self._ring = Ring(scene, seed, self._board, self._ether, robot, self._on_at)
         self._poses = self._before = Poses([], [])
         self._start = 0
         self._looked = -1
@@ -102,8 +103,9 @@ class EmulatedBrain:
         self._board.motors.remember()
         self._lights: list[Lights] = []
         self._leds = 0
+        self._sees_leds: Final = scene.camera.sees_leds
         for bit, pin in enumerate(LED_PINS.values()):
-            self.machine.peripherals.pins.watch(pin, partial(self._lit, 1 << bit), lazy=True)
+            self.machine.peripherals.pins.watch(pin, partial(self._lit, bit), lazy=not self._sees_leds)
         self._strip: tuple[NDArray[np.intp], NDArray[np.uint8]] | None = None
         self._said: list[Line] = []
         self._text = bytearray()
@@ -257,6 +259,8 @@ class EmulatedBrain:
 
     def _pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
         self._look_now()
+        if self._sees_leds:
+            self._sight.leds[:] = [self._ether.leds(other, self._on_at + cycle) for other in range(self._ether.robots)]
         self._sight.look(self._poses, self._before, (cycle - self._start) / self._quantum)
         first = int(self._rng.integers(_NOISE))
         dark = self._scene.camera.vignetting
@@ -282,7 +286,9 @@ class EmulatedBrain:
         """Changes in one cycle are one. What is run again has been noted."""
         if self.machine.events.quiet:
             return
-        self._leds = self._leds | led if levels & changed else self._leds & ~led
+        if self._sees_leds:
+            self._ether.switch(self._robot, self._on_at + cycle, LINES + led, bool(levels & changed))
+        self._leds = self._leds | 1 << led if levels & changed else self._leds & ~(1 << led)
         if self._lights and self._lights[-1].cycle == self._on_at + cycle:
             self._lights.pop()
         if len(self._lights) < LIGHTS_LIMIT:

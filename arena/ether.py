@@ -1,4 +1,5 @@
-"""What all robots' infrared emitters do, as far as other robots may know it, and how far receivers have followed."""
+"""What all robots' infrared emitters and LEDs do, as far as other robots may know it, and how far receivers have
+followed the emitters."""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ Shares = tuple[float, ...]
 
 
 class Switch(NamedTuple):
-    """A pulse line of a robot was switched in a cycle of the trial."""
+    """A pulse line of a robot, or from `LINES` on one of its LEDs, was switched in a cycle of the trial."""
 
     robot: int
     cycle: int
@@ -34,7 +35,7 @@ class Switch(NamedTuple):
 
 @dataclass
 class Ether:
-    """Per robot the trial's cycles at which its pulse lines changed, and to what."""
+    """Per robot the trial's cycles at which its pulse lines and its LEDs changed, and to what."""
 
     robots: int
     quantum: int
@@ -44,6 +45,8 @@ class Ether:
     """Time constant of the receivers in Tcy."""
     _cycles: list[list[int]] = field(init=False)
     _lines: list[list[int]] = field(init=False)
+    _led_cycles: list[list[int]] = field(init=False)
+    _leds: list[list[int]] = field(init=False)
     _news: list[Switch] = field(init=False)
     _at_switch: list[tuple[int, Shares]] = field(init=False)
     """Per robot the last answer about a switch: its cycle, and the shares in it."""
@@ -53,6 +56,8 @@ class Ether:
     def __post_init__(self) -> None:
         self._cycles = [[] for _ in range(self.robots)]
         self._lines = [[0] for _ in range(self.robots)]
+        self._led_cycles = [[] for _ in range(self.robots)]
+        self._leds = [[0] for _ in range(self.robots)]
         self._news = []
         self._at_switch = [(-1, _STEADY[0])] * self.robots
         self._settled = round(SETTLED * self.tau)
@@ -63,12 +68,14 @@ class Ether:
         return cls(scene.robots.count, scene.clock.quantum_tcy, tau=scene.infrared.tau_us * 1e-6 * FCY)
 
     def switch(self, robot: int, cycle: int, line: int, lit: bool) -> None:
-        """A pulse line of a robot is switched."""
+        """A pulse line or LED of a robot is switched."""
         self._add(Switch(robot, cycle, line, lit))
 
     def _add(self, switch: Switch) -> None:
         robot, cycle, line, lit = switch
         cycles, lines = self._cycles[robot], self._lines[robot]
+        if line >= LINES:
+            cycles, lines, line = self._led_cycles[robot], self._leds[robot], line - LINES
         state = lines[-1] | 1 << line if lit else lines[-1] & ~(1 << line)
         if len(cycles) > _KEPT and cycles[_KEPT // 2] < self._looked_back(min(cycle, self.slowest)):
             del cycles[: _KEPT // 2], lines[: _KEPT // 2]
@@ -90,6 +97,10 @@ class Ether:
         if age >= self._settled:
             return _STEADY[lit]
         return self._followed(self._shares_at(robot, index - 1), lit, age)
+
+    def leds(self, robot: int, cycle: int) -> int:
+        """What others see of a robot's LEDs in a cycle of the trial: bit n of those that were lit a quantum ago."""
+        return self._leds[robot][bisect_right(self._led_cycles[robot], cycle - self.quantum - _OVERRUN)]
 
     def is_dark(self, robot: int, first: int, last: int) -> bool:
         """Whether others see no light of a robot from one cycle to another: its emitters are off and forgotten."""

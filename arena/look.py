@@ -25,6 +25,16 @@ COLOURS: Final = np.array(
 """As the sensor shows them in the light of the experiment: made to lie near the references of the firmware's
 classifier, red (80,0,0), green (0,40,0), white (100,80,80) (openswarm-original.md §8). UNVERIFIED on a robot."""
 
+LED_COLOURS: Final = ((220, 24, 20), (16, 110, 24))
+"""A red LED that is lit, and a body that is lit by the green one within: red and green for the firmware's
+classifier. They go with the room's brightness like everything else. UNVERIFIED"""
+LAMPS: Final = (
+    *((math.cos(math.tau / 8 * led), -math.sin(math.tau / 8 * led), *bodies.RING_HEIGHTS) for led in range(8)),
+    (1.0, 0.0, *bodies.FRONT_HEIGHTS),
+)
+"""Where LEDs shine on a robot's edge, in the order of a record's `leds`: direction (forward, left), from and to which
+height. The ring's LED 0 is in front, the others go clockwise (epuck.md §2). The body's has no place of its own."""
+
 _REFERENCES: Final = {OBJECT: (80, 0, 0), ROBOT: (0, 40, 0), NOTHING: (100, 80, 80)}
 """Of the firmware's classifier (openswarm-original.md §8); dark is none of them."""
 
@@ -97,5 +107,15 @@ def _taken_for(colour: tuple[int, ...]) -> int:
 
 
 def colours_of(scene: Scene) -> NDArray[np.uint8]:
-    """Red, green and blue of every class of a scene."""
+    """Red, green and blue of every class of a scene, those of `led_kinds` behind the others."""
+    return np.concatenate((_plain_colours(scene), np.array(LED_COLOURS, dtype=np.uint8)))
+
+
+def _plain_colours(scene: Scene) -> NDArray[np.uint8]:
     return look_of(scene).colours if scene.is_furnished else COLOURS
+
+
+def led_kinds(scene: Scene) -> tuple[int, int]:
+    """Classes of a LED that is lit and of a body that is."""
+    count = len(_plain_colours(scene))
+    return count, count + 1

@@ -63,7 +63,7 @@ class Objects:
 @dataclass(frozen=True, slots=True)
 class CameraSetting:
     """The sensor in front; how it is mounted and its lens are explained in `lens.py`. `false_*` are chances per frame
-    and hold for scripted brains only."""
+    and hold for scripted brains only. With `sees_leds` other robots' LEDs show in the picture, a quantum late."""
 
     sensor: str = "PO6030K"
     frame_tcy: int = 1_600_000
@@ -73,6 +73,7 @@ class CameraSetting:
     distortion: float = 0.0
     vignetting: float = 0.0
     pixel_noise: float = 3.0
+    sees_leds: bool = False
     false_negative: float = 0.0
     false_positive: float = 0.0
 

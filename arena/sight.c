@@ -18,6 +18,13 @@ enum kind { NOTHING, OBJECT, ROBOT, WALL, FLOOR, ABOVE }; // as in look.py
 struct disc {
     f64 ahead, left, radius, height; // in a scene's list: x and y for the first two
     i64 kind;
+    i64 leds;     // of a robot, bit n: that of `struct lamp` n is lit; the last is the body's
+    f64 cos, sin; // of its heading, seen from the camera
+};
+
+// Where a robot's LED shines: its direction from the middle (forward, left), and heights.
+struct lamp {
+    f64 forward, left, low, high;
 };
 
 struct side {
@@ -36,6 +43,10 @@ struct view {
     f64 camera_ahead, camera_height, wall_height, nearest;
     f64 width, height, range, widest, yaw;
     i64 own, robots, objects, is_furnished;
+    const i64 *leds; // of each robot, null if cameras do not see them
+    const struct lamp *lamps;
+    i64 lamp_count, led_kind, body_kind;
+    f64 led_cos; // of half the angle a LED takes of the body's edge
     struct disc robot;
     const struct disc *things;
     const struct disc *fixed;
@@ -94,7 +105,8 @@ static void keep(struct view *v, f64 x, f64 y, const struct disc *like)
         return;
     f64 left = dy * v->cos - dx * v->sin;
     if (fabs(left) - 1.2 * radius < v->widest * (ahead + radius)) // 1.2: the ray's slope to the rim
-        v->discs[v->disc_count++] = (struct disc){ahead, left, radius, like->height, like->kind};
+        v->discs[v->disc_count++] =
+            (struct disc){ahead, left, radius, like->height, like->kind, like->leds, like->cos, like->sin};
 }
 
 // Look from a pose extrapolated by `quanta` beyond that in `poses`; both tables hold x, y, heading of the robots, then
@@ -112,9 +124,16 @@ void collect(struct view *v, const f64 *poses, const f64 *before, f64 quanta)
     const f64 *objects = poses + 3 * v->robots;
     for (i64 i = 0; i < v->objects; i++)
         keep(v, objects[2 * i], objects[2 * i + 1], &v->things[i]);
-    for (i64 i = 0; i < v->robots; i++)
-        if (i != v->own)
-            keep(v, poses[3 * i], poses[3 * i + 1], &v->robot);
+    for (i64 i = 0; i < v->robots; i++) {
+        if (i == v->own)
+            continue;
+        if (v->leds) {
+            f64 c = cos(poses[3 * i + 2]), s = sin(poses[3 * i + 2]);
+            v->robot.leds = v->leds[i];
+            v->robot.cos = c * v->cos + s * v->sin, v->robot.sin = s * v->cos - c * v->sin;
+        }
+        keep(v, poses[3 * i], poses[3 * i + 1], &v->robot);
+    }
     sort(v->discs, v->disc_count);
     for (i64 i = 0; i < v->outline_count; i++) {
         const struct side *one = &v->outlines[i];
@@ -205,13 +224,28 @@ struct pixel {
     i64 seen;
 };
 
-static void meet(const struct view *v, struct pixel *p, f64 depth, f64 height, i64 kind)
+static int meet(const struct view *v, struct pixel *p, f64 depth, f64 height, i64 kind)
 {
     f64 z = v->camera_height + p->rise * depth;
-    if (z <= height && depth < p->blocked) {
-        p->seen = z < 0 ? FLOOR : kind;
-        p->blocked = depth;
+    if (!(z <= height && depth < p->blocked))
+        return 0;
+    p->seen = z < 0 ? FLOOR : kind;
+    p->blocked = depth;
+    return 1;
+}
+
+// Class of the place where a ray meets a robot with LEDs lit.
+static i64 glow(const struct view *v, const struct disc *robot, f64 slope, f64 rise, f64 depth)
+{
+    f64 z = v->camera_height + rise * depth, ahead = depth - robot->ahead, left = slope * depth - robot->left;
+    f64 forward = ahead * robot->cos + left * robot->sin, aside = left * robot->cos - ahead * robot->sin;
+    for (i64 i = 0; i < v->lamp_count; i++) {
+        const struct lamp *one = &v->lamps[i];
+        if (robot->leds >> i & 1 && one->low <= z && z <= one->high &&
+            forward * one->forward + aside * one->left >= robot->radius * v->led_cos)
+            return v->led_kind;
     }
+    return robot->leds >> v->lamp_count & 1 ? v->body_kind : robot->kind;
 }
 
 // Classes of the pixels of some rays.
@@ -234,8 +268,9 @@ void classes(const struct view *v, const struct rays *rays, uint8_t *seen)
             if (!may_meet(&v->discs[d], rays->right_most, rays->left_most))
                 continue;
             f64 depth = disc_depth(v, &v->discs[d], slope, a);
-            if (depth > 0 && depth * length <= v->range)
-                meet(v, &p, depth, v->discs[d].height, v->discs[d].kind);
+            if (depth > 0 && depth * length <= v->range &&
+                meet(v, &p, depth, v->discs[d].height, v->discs[d].kind) && v->discs[d].leds && p.seen != FLOOR)
+                p.seen = glow(v, &v->discs[d], slope, p.rise, depth);
         }
         for (i64 d = 0; d < v->fixed_count; d++) {
             struct disc disc = seen_from(v, &v->fixed[d]);

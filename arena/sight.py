@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from arena import bodies
 from arena.lens import Floats, lens_of
-from arena.look import COLOURS, NOTHING, OBJECT, ROBOT, look_of
+from arena.look import COLOURS, LAMPS, NOTHING, OBJECT, ROBOT, led_kinds, look_of
 from arena.scene import Scene
 from arena.vision import NEAREST, VOTES, WINDOW_COLUMNS, WINDOW_ROWS
 from arena.world import Poses, Traits
@@ -26,7 +26,12 @@ ROWS_KEPT: Final = 2048
 
 
 class _Disc(Structure):
-    _fields_ = [(name, c_double) for name in ("ahead", "left", "radius", "height")] + [("kind", c_int64)]
+    _fields_ = [*((name, c_double) for name in ("ahead", "left", "radius", "height")), ("kind", c_int64),
+                ("leds", c_int64), ("cos", c_double), ("sin", c_double)]  # fmt: skip
+
+
+class _Lamp(Structure):
+    _fields_ = [(name, c_double) for name in ("forward", "left", "low", "high")]
 
 
 class _Side(Structure):
@@ -43,6 +48,8 @@ class _View(Structure):
         *((name, c_double) for name in ("camera_ahead", "camera_height", "wall_height", "nearest", "width", "height",
                                         "range", "widest", "yaw")),
         *((name, c_int64) for name in ("own", "robots", "objects", "is_furnished")),
+        ("leds", c_void_p), ("lamps", POINTER(_Lamp)),
+        *((name, c_int64) for name in ("lamp_count", "led_kind", "body_kind")), ("led_cos", c_double),
         ("robot", _Disc), ("things", POINTER(_Disc)),
         ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("outlines", POINTER(_Side)), ("outline_count", c_int64),
         ("patches", POINTER(_Patch)), ("patch_count", c_int64),
@@ -87,6 +94,8 @@ class _Things:
         self.sides: Final = (_Side * len(sides))()
         sensed = look.sensed if look is not None else range(len(COLOURS))
         self.sensed: Final = np.array(sensed, dtype=np.uint8)
+        self.lamps: Final = (_Lamp * len(LAMPS))(*(_Lamp(*one) for one in LAMPS))
+        self.kinds: Final = led_kinds(scene)
 
 
 _kept: dict[int, tuple[Scene, _Things]] = {}
@@ -124,10 +133,14 @@ class Sight:
         self.lens: Final = lens_of(scene.camera, traits.pitch_deg)
         things = _things_of(scene)
         self._things: Final = things
+        self.leds: Final = np.zeros(scene.robots.count, dtype=np.int64)
+        """Of each robot, bit n: LED n is lit as it is seen, 8 front, 9 body; for scenes that want it."""
         self._view: Final = _View(
             bodies.CAMERA_AHEAD, bodies.CAMERA_HEIGHT, bodies.WALL_HEIGHT, NEAREST,
             scene.arena.width_cm, scene.arena.height_cm, scene.camera.range_cm, self.lens.widest, traits.yaw,
             own, scene.robots.count, len(things.things), scene.is_furnished,
+            self.leds.ctypes.data if scene.camera.sees_leds else None, things.lamps, len(things.lamps), *things.kinds,
+            bodies.LED_COS,
             _Disc(0.0, 0.0, bodies.ROBOT_RADIUS, bodies.ROBOT_HEIGHT, ROBOT), things.things,
             things.fixed, len(things.fixed), things.outlines, len(things.outlines),
             things.patches, len(things.patches), things.discs, 0, things.sides, 0,

@@ -8,11 +8,12 @@ compiled, and the tests compare the two. Lengths cm; rows and columns are those 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from arena import bodies
 from arena.lens import lens_of
-from arena.look import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL, Look, look_of
+from arena.look import ABOVE, FLOOR, LAMPS, NOTHING, OBJECT, ROBOT, WALL, Look, led_kinds, look_of
 from arena.scene import Scene
 from arena.world import Poses, Traits
 
@@ -24,7 +25,7 @@ Disc = tuple[float, float, float, float, int]
 
 class Eye:
     """One robot's view at one pose of everything. `own` is the index of the robot that looks, at (x, y, heading);
-    `traits` say how its camera is mounted."""
+    `traits` say how its camera is mounted; `leds` what is lit on each robot, as in a record."""
 
     def __init__(
         self,
@@ -33,6 +34,7 @@ class Eye:
         own: int,
         pose: tuple[float, float, float] | None = None,
         traits: Traits = Traits(),  # noqa: B008 - never changes
+        leds: Sequence[int] = (),
     ) -> None:
         x, y, heading = pose if pose is not None else poses.robots[own]
         self._cos, self._sin = math.cos(heading), math.sin(heading)
@@ -54,6 +56,9 @@ class Eye:
         others = [(one[0], one[1]) for index, one in enumerate(poses.robots) if index != own]
         self._collect(others, bodies.ROBOT_RADIUS, bodies.ROBOT_HEIGHT, ROBOT)
         self.discs.sort()
+        self._lit = [(*self._seen_from(*poses.robots[index][:2]), poses.robots[index][2] - heading - traits.yaw, lit)
+                     for index, lit in enumerate(leds) if lit and index != own]  # fmt: skip
+        self._led_kind, self._body_kind = led_kinds(scene)
 
     @property
     def sensed(self) -> list[int] | None:
@@ -158,7 +163,7 @@ class Eye:
                     seen.append(self._floor(ray, rise))
                     break
                 if z <= height:
-                    seen.append(kind)
+                    seen.append(self._glow(depth, slope * depth, z) if kind == ROBOT and self._lit else kind)
                     break
             else:
                 if wall < 0:
@@ -167,6 +172,20 @@ class Eye:
                 kind = WALL if z <= bodies.WALL_HEIGHT else ABOVE
                 seen.append(self._floor(ray, rise) if z < 0 else kind)
         return seen
+
+    def _glow(self, ahead: float, left: float, z: float) -> int:
+        """Class of a place on a robot's edge."""
+        for x, y, heading, lit in self._lit:
+            forward = (ahead - x) * math.cos(heading) + (left - y) * math.sin(heading)
+            aside = (left - y) * math.cos(heading) - (ahead - x) * math.sin(heading)
+            if math.hypot(forward, aside) > 1.001 * bodies.ROBOT_RADIUS:
+                continue  # another robot's
+            for led, (to_front, to_left, low, high) in enumerate(LAMPS):
+                near = forward * to_front + aside * to_left >= bodies.ROBOT_RADIUS * bodies.LED_COS
+                if lit >> led & 1 and near and low <= z <= high:
+                    return self._led_kind
+            return self._body_kind if lit >> len(LAMPS) & 1 else ROBOT
+        return ROBOT
 
     def within(self, right: float, left: float) -> list[Disc]:
         """The discs that rays with slopes right..left can meet: a quick, generous choice."""

@@ -16,6 +16,7 @@ WORDS: Final = {
     "goto": " CYCLE        go to a cycle of the recording, or run on to one behind it",
     "cycle": " [N]         run for N cycles, one if N is left out; an instruction is not divided",
     "lastwrite": " PLACE   go back to the instruction that changed a place last",
+    "reverse-step": "      go back to the line before, also to the last of a function that has come back",
     "reverse-finish": "    go back to the call of this function, or to before the interrupt",
     "threads": "           OpenSwarm's threads with stack use",
     "world": "             what is around the machine: the other robots of a trial, at this very time",
@@ -38,6 +39,8 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
     if word == "cycle":
         count = _count(rest or "1")
         return lambda: target.go_to(machine.cycle + count)
+    if word == "reverse-step":
+        return target.back_into
     if word == "reverse-finish":
         return target.back_out
     if word == "lastwrite":

@@ -304,6 +304,31 @@ class Debuggee:
         self.history.seek(self.history.start)
         return START
 
+    def back_into(self) -> Halt:
+        """To the start of the line before, in whatever function that was; interrupts are passed by."""
+        now, line, depth = self.machine.pc, self._line(), len(self._interrupts())
+        here = (line.file, line.line, self.inside.start_of(now)) if line is not None and line.start == now else None
+        for positions in self.history.before():
+            at = len(positions)
+            while at:
+                at -= 1
+                cycle, pc = positions[at]
+                row = self.inside.image.lines.find(pc)
+                if row is None or row.start != pc or (row.file, row.line, self.inside.start_of(pc)) == here:
+                    continue
+                self.history.seek(cycle)
+                handlers = self._interrupts()
+                if len(handlers) <= depth:
+                    return Halt("step")
+                while at and positions[at][1] != handlers[0]:
+                    at -= 1
+        self.history.seek(self.history.start)
+        return START
+
+    def _interrupts(self) -> list[int | None]:
+        """Where the handlers begin in which the machine stands, innermost first."""
+        return [self.inside.start_of(one.raw.pc) for one in self.inside.frames() if one.kind == "interrupt"]
+
     def back_out(self) -> Halt:
         """To the call of this function, or to before the interrupt."""
         frame = next((one for one in self.inside.frames() if one.kind != "inlined"), None)

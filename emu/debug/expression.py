@@ -62,6 +62,8 @@ BINARY: Final[dict[str, tuple[int, Callable[[Any, Any], Any]]]] = {
     "/": (10, lambda a, b: a / b if isinstance(a, float) or isinstance(b, float) else _quotient(a, b)),
     "%": (10, lambda a, b: a - b * _quotient(a, b)),
 }
+WHOLE: Final = ("|", "^", "&", "<<", ">>", "%")
+"""Operators for whole numbers only."""
 ESCAPES: Final = {"n": 10, "r": 13, "t": 9, "0": 0, "\\": 92, "'": 39}
 
 
@@ -100,7 +102,7 @@ def number_of(result: Value | int | float) -> Any:
 
 
 class _Parser:
-    """Precedence climbing; values are computed on the way."""
+    """Precedence climbing; values are computed on the way, but for what C does not evaluate."""
 
     def __init__(self, inside: Inside, text: str, frame: Frame | None) -> None:
         self.inside: Final = inside
@@ -108,6 +110,8 @@ class _Parser:
         self.frame: Final = frame
         self.tokens: Final = tokens(text)
         self.at = self.depth = 0
+        self.skips = False
+        """What is read now is not evaluated: its value is 0."""
 
     def _peek(self) -> str:
         return self.tokens[self.at][1] if self.at < len(self.tokens) and self.tokens[self.at][0] == "sign" else ""
@@ -127,23 +131,38 @@ class _Parser:
         while (sign := self._peek()) in BINARY and BINARY[sign][0] > lowest:
             self.at += 1
             rank, compute = BINARY[sign]
-            right = self.expression(rank)
+            decides = {"||": True, "&&": False}.get(sign)
+            right = self._unless(decides is not None and bool(self._number(left)) == decides, rank)
             left = self._computed(sign, compute, left, right)
         if not lowest and self._take("?"):
-            yes = self.expression(0)
+            holds = bool(self._number(left))
+            yes = self._unless(not holds, 0)
             self._need(":")
-            no = self.expression(0)
-            return yes if self._number(left) else no
+            no = self._unless(holds, 0)
+            return yes if holds else no
         return left
 
+    def _unless(self, decided: bool, lowest: int) -> Any:
+        """An expression that is not evaluated if it is `decided` without it."""
+        before, self.skips = self.skips, self.skips or decided
+        try:
+            return self.expression(lowest)
+        finally:
+            self.skips = before
+
     def _computed(self, sign: str, compute: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
+        if self.skips:
+            return 0
         if sign in ("+", "-") and isinstance(left, Value) and left.type.bare.kind == "pointer":
             count = self._number(right)
             if isinstance(count, int) and not (isinstance(right, Value) and right.type.bare.kind == "pointer"):
                 step = max(left.type.bare.target.bytes, 1) if left.type.bare.target is not None else 1
                 return _constant(left.type, compute(self._number(left), count * step) & 0xFFFF, self.inside)
         try:
-            return compute(self._number(left), self._number(right))
+            one, other = self._number(left), self._number(right)
+            if sign in WHOLE:
+                self._whole(sign, one, other)
+            return compute(one, other)
         except (ArithmeticError, TypeError, ValueError) as error:
             raise ExpressionError(f"{self.text!r}: {error}") from None
 
@@ -155,6 +174,10 @@ class _Parser:
                 raise ExpressionError(f"{self.text!r}: a {value.type} is no number")
             return value.get()
         return value
+
+    def _whole(self, sign: str, *numbers: Any) -> None:
+        if any(isinstance(one, float) for one in numbers):
+            raise ExpressionError(f"{self.text!r}: {sign} needs whole numbers")
 
     def unary(self) -> Any:
         self.depth += 1
@@ -171,7 +194,9 @@ class _Parser:
         if self._take("+"):
             return self._number(self.unary())
         if self._take("~"):
-            return ~self._number(self.unary())
+            number = self._number(self.unary())
+            self._whole("~", number)
+            return ~number
         if self._take("!"):
             return int(not self._number(self.unary()))
         if self._take("*"):
@@ -180,7 +205,9 @@ class _Parser:
             return self._address(self.unary())
         return self.postfix()
 
-    def _address(self, value: Any) -> Value:
+    def _address(self, value: Any) -> Value | int:
+        if self.skips:
+            return 0
         if not isinstance(value, Value) or value.address is None:
             raise ExpressionError(f"{self.text!r}: that has no address")
         return _constant(Type("pointer", size=2, target=value.type), value.address, self.inside)
@@ -191,6 +218,7 @@ class _Parser:
             if self._take("["):
                 index = self._number(self.expression(0))
                 self._need("]")
+                self._whole("[]", index)
                 value = self._part(value, index)
             elif self._take("->"):
                 value = self._part(self._part(value, 0), self._name())
@@ -199,7 +227,9 @@ class _Parser:
             else:
                 return value
 
-    def _part(self, value: Any, part: str | int) -> Value:
+    def _part(self, value: Any, part: str | int) -> Value | int:
+        if self.skips:
+            return 0
         if isinstance(value, int) and part == 0:
             return Value(UNSIGNED[2], (Piece("memory", value & 0xFFFF),), self.inside.view(self.frame), "")
         if not isinstance(value, Value):
@@ -237,6 +267,8 @@ class _Parser:
         raise ExpressionError(f"{self.text!r}: {text!r} is not expected there")
 
     def named(self, name: str) -> Any:
+        if self.skips:
+            return 0
         inside = self.inside
         variable = inside.variable(name, self.frame) if not name.startswith("$") else None
         if variable is not None:

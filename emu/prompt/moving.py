@@ -98,6 +98,12 @@ def reverse_next_(session: Session, text: str) -> None:
     _repeat(session, text, "stepBack")
 
 
+@command("reverse-step [N]", "back to the line before, into functions from their end", "rs", repeats=True)
+def reverse_step_(session: Session, text: str) -> None:
+    for _ in range(_times(text)):
+        session.console("/reverse-step")
+
+
 @command("reverse-stepi [N]", "back by one instruction", "rsi", repeats=True)
 def reverse_stepi_(session: Session, text: str) -> None:
     _repeat(session, text, "stepBack", **FINE)

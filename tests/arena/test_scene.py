@@ -167,7 +167,7 @@ def test_two_ways_to_see_a_furnished_scene_agree(yard: Scene, pitch: float) -> N
             slow = [eye.column(int(u), (row,))[0] for u in columns]
             assert sight.classes(row, columns).tolist() == slow, f"seed {seed}, row {row}"
             kinds |= set(slow)
-    assert kinds >= {OBJECT, WALL, FLOOR} | set(range(6, len(colours_of(scene))))
+    assert kinds >= {OBJECT, WALL, FLOOR} | set(range(6, len(look_of(scene).colours)))
 
 
 def test_colours_and_heights_are_seen(yard: Scene) -> None:

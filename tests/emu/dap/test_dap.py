@@ -83,7 +83,17 @@ def test_a_breakpoint_shows_stack_scopes_and_values(stopped: Callable[..., Clien
     assert client.evaluate("4611686018427387905 / 1") == "4611686018427387905", "no float between"
     towards_zero = {"-7 / 2": "-3", "-7 % 2": "-1", "7 / -2": "-3", "7 % -2": "1"}
     assert {text: client.evaluate(text) for text in towards_zero} == towards_zero
+    decided = {
+        "0 && nonsense": "0", "1 || 1 / 0": "1", "1 ? sum : pairs[99].first": "6",
+        "0 ? 1 / 0 : 0 ? nonsense.x : 5": "5", "sum && (0 || *nonsense == 1 || 1) || 1": "refused",
+        "0 && (1 / 0 || &nonsense->x) || sum": "1",
+    }  # fmt: skip
+    for text, value in decided.items():
+        reply = client.asked("evaluate", expression=text, context="watch", frameId=frame)
+        assert reply["body"].get("result", "refused") == value, text
     for text, said in (
+        ("~1.5", "~ needs whole numbers"), ("1.5 | 1", "| needs whole"), ("1 << 1.0", "<< needs whole"),
+        ("pairs[0.5]", "[] needs whole"), ("0 && (", "ends too early"), ("1 ? 2", "expected ':'"),
         ("1 << 99999999999", "a shift by 99999999999 bits; expected 0 to 63"), ("sum >> -1", "a shift by -1 bits"),
         ("(" * 5000, "more than 50 brackets"), ("-" * 5000 + "1", "more than 50 brackets"), ("7 % 0", "zero"),
     ):  # fmt: skip

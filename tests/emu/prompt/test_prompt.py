@@ -170,6 +170,65 @@ def test_reverse_finish_goes_to_the_call(program: str) -> None:
     assert machine.pc == machine.program_address("add") != calls
 
 
+def test_reverse_step_goes_into_functions(play: type) -> None:
+    """From the second call of `add` through the end of the first into its caller."""
+    last = line_of("return add(once, n);")
+    played = play(f"break program.c:{last} if n == 2", "run", *["reverse-step"] * 7)
+    assert played.status == 0, played.err
+    places = [line.split(",")[0] for line in played.out.splitlines() if " at program.c:" in line]
+    first = line_of("int add(int a, int b)") + 1
+    assert places[-7:] == [f"add at program.c:{first + n}" for n in (3, 2, 1, 0)] + [
+        f"{name} at program.c:{line_of(text) + more}"
+        for name, text, more in (("twice", "int once", 0), ("twice", "int twice", 1), ("main", "twice(i)", 0))
+    ]
+
+
+TICKING = """
+extern volatile unsigned T1CON, PR1, IFS0, IEC0;
+volatile unsigned ticks, n;
+void more(void)
+{
+    ticks++;
+}
+void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void)
+{
+    IFS0 = 0;
+    more();
+}
+int main(void)
+{
+    PR1 = 150;
+    IEC0 = 8;
+    T1CON = 0x8000;
+    for (;;) {
+        n += 1;
+        n ^= 3;
+        n -= 2;
+    }
+}
+"""
+
+
+def test_reverse_step_passes_interrupts_by(tmp_path: Path) -> None:
+    source, image = tmp_path / "ticking.c", tmp_path / "ticking.elf"
+    source.write_text(TICKING)
+    assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
+    machine = emu.load(image)
+    prompt = Prompt("test", lambda _launch: machine)
+    prompt.session.write = lambda _text: None  # type: ignore[misc]
+    prompt.session.start({})
+    for line in ("break ticking.c:19 if ticks == 3", "run"):
+        carry_out(prompt.session, line)
+    lines = []
+    for _ in range(90):
+        carry_out(prompt.session, "reverse-step")
+        frame = prompt.session.frames[0]
+        assert frame["name"] == "main"
+        lines.append(frame["line"])
+    assert machine.var("ticks") == 1
+    assert lines == [18, 21, 20, 19] * 22 + [18, 21]
+
+
 def test_names_are_completed(program: str) -> None:
     prompt = Prompt("test", lambda _launch: emu.load(program))
     prompt.session.write = lambda _text: None  # type: ignore[misc]
@@ -186,7 +245,7 @@ def test_names_are_completed(program: str) -> None:
     assert names("p U1STA.TR") == {"p U1STA.TRMT"}
     assert names("p U1ST") == {"p U1STA", "p U1STAbits"}
     assert names("info l") == {"info locals"}
-    assert names("help rev") == {f"help reverse-{how}" for how in ("continue", "finish", "next", "stepi")}
+    assert names("help rev") == {f"help reverse-{how}" for how in ("continue", "finish", "next", "step", "stepi")}
     assert names("print nothing.x") == set()
 
 

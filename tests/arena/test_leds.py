@@ -1,0 +1,169 @@
+"""LEDs in other robots' cameras: where on a robot they shine, when, and firmware that goes by it (epuck.md §2)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from arena import bodies
+from arena.campaign import SELECTOR
+from arena.cli import main
+from arena.emulated import EmulatedBrain
+from arena.ether import LINES, Ether
+from arena.look import LED_COLOURS, ROBOT, colours_of, led_kinds
+from arena.record import read_trial
+from arena.scene import Scene, load_scene
+from arena.sight import Sight
+from arena.vision import Eye
+from arena.world import Poses
+from tests.arena.test_emulated import AT_ONCE
+
+BLINKER = """
+        .include "p30F6014A.inc"
+        .text
+        .global _main
+_main:  bclr    TRISA, #6
+1:      btg     LATA, #6                ; LED 0: 50 * 147,456 Tcy = 0.5 s
+        mov     #50, w1
+2:      mov     #49151, w0
+3:      dec     w0, w0
+        bra     nz, 3b
+        dec     w1, w1
+        bra     nz, 2b
+        bra     1b
+"""
+CAMERA = (20.0, 150.0, 0.0)
+LENS_X = CAMERA[0] + bodies.CAMERA_AHEAD
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return load_scene("clustering").with_values(
+        robots__count=2, objects__count=0, robots__wheel_noise=0.0, camera__sees_leds=True, camera__pixel_noise=0.0
+    )
+
+
+def facing(centimetres: float, turned_deg: float = 0.0) -> Poses:
+    """A camera, and a robot so far before its lens that shows its front to it, turned to its left from there."""
+    there = LENS_X + centimetres + bodies.ROBOT_RADIUS
+    return Poses([CAMERA, (there, 150.0, math.pi + math.radians(turned_deg))], [])
+
+
+@pytest.mark.parametrize("led", range(8))
+def test_a_led_of_the_ring_shines_at_its_bearing_and_height(scene: Scene, led: int) -> None:
+    """Clockwise from the front in steps of 45 degrees; a centimetre wide and high, in the middle of what it faces."""
+    red, _ = led_kinds(scene)
+    lens_to_edge = 20.0
+    eye = Eye(scene, facing(lens_to_edge, 45.0 * led), 0, leds=(0, 1 << led))
+    rows = tuple(range(480))
+    lit = [240 + (bodies.CAMERA_HEIGHT - z) / lens_to_edge * bodies.FOCAL_PIXELS for z in bodies.RING_HEIGHTS]
+    found = [row for row, kind in zip(rows, eye.column(320, rows), strict=True) if kind == red]
+    assert (found[0], found[-1]) == (pytest.approx(lit[1], abs=1), pytest.approx(lit[0], abs=1))
+    middle = round((lit[0] + lit[1]) / 2)
+    columns = [u for u in range(640) if eye.column(u, (middle,)) == [red]]
+    assert len(columns) == pytest.approx(bodies.FOCAL_PIXELS / lens_to_edge, abs=2)
+    assert np.mean(columns) == pytest.approx(320, abs=1)
+
+
+def test_a_body_is_lit_as_a_whole_and_a_led_behind_is_not_seen(scene: Scene) -> None:
+    _, green = led_kinds(scene)
+    kinds = {leds: set(Eye(scene, facing(20.0), 0, leds=(0, leds)).column(320, tuple(range(170, 300))))
+             for leds in (0, 1 << 9, 1 << 4, 1 << 8)}  # fmt: skip
+    assert green in kinds[1 << 9]
+    assert ROBOT not in kinds[1 << 9]
+    assert ROBOT in kinds[0]
+    assert kinds[1 << 4] == kinds[0]
+    assert len(kinds[1 << 8]) == len(kinds[0]) + 1
+    assert colours_of(scene)[list(led_kinds(scene))].tolist() == [list(one) for one in LED_COLOURS]
+
+
+def test_two_ways_to_see_leds_agree() -> None:
+    """The compiled rows and the plain columns, for robots and LEDs at random."""
+    scene = load_scene("clustering").with_values(
+        robots__count=6, objects__count=6, camera__sees_leds=True, camera__pitch_deg=1.0
+    )
+    rng = np.random.default_rng(4)
+    columns, found = np.arange(0, 640, 9), set()
+    for _ in range(60):
+        at = rng.uniform(-1, 1, (6, 3)) * (25, 25, math.pi) + (200, 150, 0)
+        at[0] = 160, 150, 0
+        poses = Poses([(float(x), float(y), float(a)) for x, y, a in at],
+                      [(float(x), float(y)) for x, y in rng.uniform((180, 130), (260, 170), (6, 2))])  # fmt: skip
+        leds = [int(one) for one in rng.integers(1 << 10, size=6)]
+        eye, sight = Eye(scene, poses, 0, leds=leds), Sight(scene, 0)
+        sight.leds[:] = leds
+        sight.look(poses)
+        for row in (200, 215, 225, 240, 262):
+            seen = sight.classes(row, columns).tolist()
+            assert seen == [eye.column(int(u), (row,))[0] for u in columns]
+            found |= set(seen)
+    assert found >= {ROBOT, *led_kinds(scene)}
+
+
+def test_leds_are_seen_a_quantum_late() -> None:
+    ether = Ether(2, 1000)
+    ether.switch(1, 5000, LINES + 9, lit=True)
+    assert [ether.leds(1, cycle) for cycle in (6063, 6064)] == [0, 1 << 9]
+    assert ether.is_dark(1, 0, 1 << 40)
+    for cycle in range(10_000, 900_000, 1000):
+        ether.switch(1, cycle, LINES, lit=bool(cycle // 1000 % 2))
+    assert ether.leds(1, 900_500) == 1 | 1 << 9
+    assert len(ether._leds[1]) <= 310
+
+
+def test_firmware_turns_to_another_robot_whose_red_led_is_lit(
+    clustering_image: Path, assembled: Callable[[str], Path], scene: Scene
+) -> None:
+    """The clustering firmware takes the robot before it for an object while its LED is lit, for a robot in between;
+    without the key it never does."""
+    blinker = assembled(BLINKER)
+    poses = facing(14.0)
+    for sees, until in ((True, 1200), (False, 800)):
+        one = scene.with_values(camera__sees_leds=sees)
+        ether = Ether.of(one)
+        sees_it = EmulatedBrain(one, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE, ether)
+        blinks = EmulatedBrain(one, 1, 1, blinker, 0, ether)
+        left = []
+        for tick in range(until):
+            left.append(sees_it.think(tick, poses)[0] / bodies.WHEEL_SPEED)
+            blinks.think(tick, poses)
+        blinks.reading()
+        assert [change.leds for change in blinks.lights()] == ([1, 0, 1] if sees else [1, 0])
+        lit = float(np.median(left[300:500])), float(np.median(left[750:800]))
+        assert lit == pytest.approx((1.0, 0.1) if sees else (0.1, 0.1), abs=0.05)
+
+
+def test_records_are_the_same_for_two_processes(
+    clustering_image: Path, assembled: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """Switches of LEDs travel between processes as those of emitters do."""
+    blinker = assembled(BLINKER)
+    text = f"""name = "leds"
+[camera]
+sees_leds = true
+[start]
+remote = ""
+[[robots]]
+image = "{clustering_image}"
+place = "poses"
+poses = [[200, 150, 0]]
+selector = {SELECTOR["A"] | AT_ONCE}
+[[robots]]
+image = "{blinker}"
+place = "poses"
+poses = [[221, 150, 180]]
+"""
+    path = tmp_path / "leds.toml"
+    path.write_text(text)
+    records = []
+    for processes in ("1", "2"):
+        out = tmp_path / processes
+        command = ["run", str(path), "--trials", "1", "--minutes", "0.02", "--processes", processes, "--out", str(out)]
+        assert main(command) == 0
+        records.append(out / "trial-0001.parquet")
+    assert records[0].read_bytes() == records[1].read_bytes()
+    assert any(read_trial(records[0]).columns["lights"])
