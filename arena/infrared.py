@@ -44,9 +44,8 @@ class Ring:
         self._on_at = on_at
         self._poses = Poses([], [])
         self._is_stale = True
-        self._near: Nearby | None = None
         self._unfelt = 0
-        """Bit n: nobody has asked for sensor n since what is near was found out."""
+        """Bit n: nobody has asked for sensor n since the poses changed."""
         self.is_read = False
         """Whether the firmware has ever converted one of the sensors."""
         self.look: Callable[[], Poses] | None = None
@@ -101,8 +100,9 @@ class Ring:
     def _sense(self, cycle: int) -> None:
         if self.look is not None and not self.is_read:
             self._poses = self.look()
-        self._is_stale, self.is_read = False, True
-        self._near, self._unfelt = nearby(self._scene, self._poses, self._robot), (1 << SENSORS) - 1
+        self._is_stale, self.is_read, self._unfelt = False, True, (1 << SENSORS) - 1
+        if self._optics is None:
+            self._optics = Optics(self._scene)
         ir = self._board.ir
         counts = ambient(self._scene, self._poses.robots[self._robot])
         for sensor, (one, offset) in enumerate(zip(counts, self._offsets, strict=True)):
@@ -110,15 +110,13 @@ class Ring:
         now, others = self._on_at + cycle, range(len(self._poses.robots))
         lit = [other for other in others if other != self._robot
                and not self._ether.is_dark(other, now, now + self._ether.quantum)]  # fmt: skip
-        if lit and self._optics is None:
-            self._optics = Optics(self._scene)
-        self._heard = self._optics.signals(self._poses, self._robot, lit) if self._optics is not None else []
+        self._heard = self._optics.signals(self._poses, self._robot, lit) if lit else []
 
     def _feel(self, sensor: int) -> None:
         """What a sensor sees of its own light, when it is first asked for."""
-        if self._near is not None and self._unfelt >> sensor & 1:
+        if self._optics is not None and self._unfelt >> sensor & 1:
             self._unfelt &= ~(1 << sensor)
-            distance, share = surface(self._scene, self._near, sensor)
+            distance, share = self._optics.surface(self._poses, self._robot, sensor)
             self._board.ir.reflection[sensor] = round(reflection_at(distance) * share)
 
 

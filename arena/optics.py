@@ -9,16 +9,17 @@ published calibration takes them; only robots that touch would notice a differen
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
 from functools import cache
-from typing import Final, NamedTuple
-
-import numpy as np
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 from arena import bodies, geometry
 from arena.scene import Scene
 from arena.world import Poses
-from emu.boards.epuck.analog import PULSE_PINS
+from emu.boards.epuck.analog import PULSE_PINS, SENSORS
+from emu.hostcode import ADDRESS, INT, functions
 
 PUBLISHED: Final = (
     (7.5, 3534.0), (8.0, 2104.0), (8.5, 1135.0), (9.0, 702.0), (9.5, 509.0), (10.0, 376.0), (10.5, 305.0),
@@ -70,58 +71,79 @@ def brightest(power: float) -> float:
     return max(sum(beam(math.radians(degrees / 4), power)) for degrees in range(4 * 360))
 
 
+class _Disc(Structure):
+    _fields_ = [(name, c_double) for name in ("x", "y", "radius", "share")]
+
+
+class _Side(Structure):
+    _fields_ = [(name, c_double) for name in ("ax", "ay", "bx", "by", "share")]
+
+
+class _Optics(Structure):
+    _fields_ = [
+        *((name, c_double) for name in ("law_counts", "law_from", "law_power", "most", "least", "gain", "per_emitter",
+                                        "emitter_power", "receiver_power", "width", "height", "wall_share", "range")),
+        ("bearings", c_double * SENSORS), ("robot", _Disc), ("objects", POINTER(_Disc)),
+        ("fixed", POINTER(_Disc)), ("fixed_count", c_int64), ("sides", POINTER(_Side)), ("side_count", c_int64),
+    ]  # fmt: skip
+
+
+class _Poses(Structure):
+    _fields_ = [("values", c_void_p), ("robots", c_int64), ("objects", c_int64)]
+
+
+@cache
+def _code() -> dict[str, Callable[..., Any]]:
+    return functions(Path(__file__).with_name("optics.c"), {
+        "signal": (INT, (ADDRESS, ADDRESS, INT, INT, ADDRESS)),
+        "surface": (None, (ADDRESS, ADDRESS, INT, INT, ADDRESS)),
+    })  # fmt: skip
+
+
 class Optics:
-    """A scene as light sees it."""
+    """A scene as light sees it, by compiled code (`optics.c`); the tests have the plain text beside it."""
 
     def __init__(self, scene: Scene) -> None:
-        setting = scene.infrared
-        self._emitter, self._receiver = setting.emitter_power, setting.receiver_power
-        self._gain = setting.signal_gain
-        self._per_emitter = 1 / brightest(setting.emitter_power)
-        self._objects = [scene.kind_of(number).radius_cm for number in range(scene.objects.count)]
-        fixed = [(one.x_cm, one.y_cm, one.radius_cm) for one in scene.obstacles if one.radius_cm]
-        self._fixed = np.array([one[:2] for one in fixed]).reshape(-1, 2)
-        self._fixed_radii = [one[2] for one in fixed]
-        shapes = [scene.arena.polygon, *(one.polygon for one in scene.obstacles)]
-        self._sides = [side for shape in shapes if shape for side in geometry.sides(shape)]
+        code, setting = _code(), scene.infrared
+        self._signal, self._surface = code["signal"], code["surface"]
+        kinds = map(scene.kind_of, range(scene.objects.count))
+        self._objects = (_Disc * scene.objects.count)(*(_Disc(0, 0, kind.radius_cm, kind.share) for kind in kinds))
+        fixed = [_Disc(one.x_cm, one.y_cm, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
+        self._fixed = (_Disc * len(fixed))(*fixed)
+        shapes = [(scene.arena.polygon, setting.wall_share), *((one.polygon, one.share) for one in scene.obstacles)]
+        sides = [_Side(*side, share) for shape, share in shapes if shape for side in geometry.sides(shape)]
+        self._sides = (_Side * len(sides))(*sides)
+        self._optics = _Optics(
+            LAW_COUNTS, LAW_FROM_CM, LAW_POWER, MOST_COUNTS, LEAST_COUNTS,
+            setting.signal_gain, 1 / brightest(setting.emitter_power), setting.emitter_power, setting.receiver_power,
+            scene.arena.width_cm, scene.arena.height_cm, setting.wall_share, bodies.IR_RANGE,
+            (c_double * SENSORS)(*_BEARINGS), _Disc(0, 0, bodies.ROBOT_RADIUS, setting.robot_share), self._objects,
+            self._fixed, len(fixed), self._sides, len(sides),
+        )  # fmt: skip
+        self._at = addressof(self._optics)
+        self._poses = _Poses()
+        self._poses_at = addressof(self._poses)
+        self._found = (c_double * (_LINES + SENSORS))()
+        self._found_at = addressof(self._found)
+
+    def _look(self, poses: Poses) -> None:
+        robots, objects = poses.counts
+        if objects > len(self._objects):
+            raise ValueError(f"{objects} objects are more than the scene has")
+        self._poses.values, self._poses.robots, self._poses.objects = poses.address, robots, objects
 
     def signals(self, poses: Poses, robot: int, others: Iterable[int]) -> list[Signal]:
         """What a robot can get of the light of others, of those of whom it gets any."""
-        x, y, heading = poses.robots[robot]
+        self._look(poses)
         found: list[Signal] = []
-        strong = [(other, self._gain * amplitude(math.dist(poses.robots[other][:2], (x, y)))) for other in others]
-        strong = [one for one in strong if one[1] >= LEAST_COUNTS]
-        hidden = self._hidden(poses, robot, [other for other, _ in strong])
-        for (other, strength), is_hidden in zip(strong, hidden, strict=True):
-            if is_hidden:
-                continue
-            to_x, to_y, other_heading = poses.robots[other]
-            towards = math.atan2(to_y - y, to_x - x)
-            sent = beam(towards + math.pi - other_heading, self._emitter)
-            scale = strength * self._per_emitter
-            counts = tuple([scale * (sent[line] + sent[line + _LINES]) for line in range(_LINES)])
-            found.append(Signal(other, counts, tuple(beam(towards - heading, self._receiver))))
+        for other in others:
+            if self._signal(self._at, self._poses_at, robot, other, self._found_at):
+                values = tuple(self._found)
+                found.append(Signal(other, values[:_LINES], values[_LINES:]))
         return found
 
-    def _hidden(self, poses: Poses, robot: int, others: list[int]) -> list[bool]:
-        """Whether a wall, an obstacle, an object or a third robot stands on the line to another robot's centre."""
-        if not others:
-            return []
-        robot_count, object_count = poses.counts
-        count = 3 * robot_count
-        radii = np.array([bodies.ROBOT_RADIUS] * robot_count + self._objects[:object_count] + self._fixed_radii)
-        robots = poses.values[:count].reshape(-1, 3)[:, :2]
-        here = robots[robot]
-        discs = np.concatenate((robots, poses.values[count:].reshape(-1, 2), self._fixed)) - here
-        lines = robots[others] - here
-        lengths2 = np.maximum((lines * lines).sum(axis=1), 1e-12)
-        along = lines @ discs.T / lengths2[:, None]
-        apart2 = (discs * discs).sum(axis=1) - along * along * lengths2[:, None]
-        between = (along > 0) & (along < 1) & (apart2 < radii**2)
-        between[:, robot] = False
-        between[np.arange(len(others)), others] = False
-        x, y = here.tolist()
-        return [
-            bool(covered) or any(geometry.meeting(x, y, dx, dy, side) < 1 for side in self._sides)
-            for covered, (dx, dy) in zip(between.any(axis=1), lines.tolist(), strict=True)
-        ]
+    def surface(self, poses: Poses, robot: int, sensor: int) -> tuple[float, float]:
+        """mm from the robot's edge to what a sensor's axis meets, and its share of a white surface's reflection."""
+        self._look(poses)
+        self._surface(self._at, self._poses_at, robot, sensor, self._found_at)
+        return 10 * self._found[0], self._found[1]

@@ -8,17 +8,19 @@ import random
 import statistics
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from arena import bodies, geometry
 from arena.cli import main
 from arena.emulated import EmulatedBrain, volts_after
 from arena.ether import Ether
 from arena.infrared import ambient, surfaces
-from arena.optics import PUBLISHED, Optics, amplitude, brightest, distance_of
+from arena.optics import PUBLISHED, Optics, amplitude, beam, brightest, distance_of
 from arena.scene import FCY, Scene, SceneError, load_scene
-from arena.world import Poses
+from arena.world import Poses, World
 from emu.boards.epuck.analog import reflection_at
 from emu.boards.noise import gaussian
 
@@ -164,6 +166,49 @@ def test_walls_objects_and_other_robots_hide_the_light(scene: Scene) -> None:
     bent = scene.with_values(arena__polygon=((0, 0), (300, 0), (300, 300), (115, 140), (110, 300), (0, 300)))
     assert received(bent, here, there) == 0
     assert received(bent, here, (100.0, 120.0, UP)) > 0
+
+
+def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, float, list[float]]]:
+    """(robot, all its counts on a sensor that faces it, shares of the sensors), as optics.py says it."""
+    x, y, heading = poses.robots[robot]
+    discs = [(*place[:2], bodies.ROBOT_RADIUS) for place in poses.robots]
+    discs += [(*place, scene.kind_of(number).radius_cm) for number, place in enumerate(poses.objects)]
+    discs += [(one.x_cm, one.y_cm, one.radius_cm) for one in scene.obstacles if one.radius_cm]
+    shapes = [scene.arena.polygon, *(one.polygon for one in scene.obstacles)]
+    found = []
+    for other, (to_x, to_y, turned) in enumerate(poses.robots):
+        strength = amplitude(math.dist((x, y), (to_x, to_y)))
+        line = (x, y, to_x, to_y)
+        hidden = any(geometry.distance_to(*disc[:2], line) < disc[2]
+                     for number, disc in enumerate(discs) if number not in (robot, other))  # fmt: skip
+        hidden |= any(geometry.meeting(x, y, to_x - x, to_y - y, side) < 1
+                      for shape in shapes if shape for side in geometry.sides(shape))  # fmt: skip
+        if other != robot and strength >= 0.1 and not hidden:
+            towards = math.atan2(to_y - y, to_x - x)
+            counts = strength / brightest(20.0) * sum(beam(towards + math.pi - turned, 20.0))
+            found.append((other, counts, beam(towards - heading, 3.3)))
+    return found
+
+
+def test_the_compiled_optics_is_the_plain_one() -> None:
+    """Signals and reflections of robots and things at random, about a yard with everything that stands fast."""
+    scene = load_scene("avoidance").with_values(infrared__wall_share=0.7)
+    kinds = load_scene("foraging").kinds
+    scene = replace(scene, kinds=kinds, objects=replace(scene.objects, count=6))
+    optics, count = Optics(scene), 0
+    for seed in range(100):
+        poses = World(scene, seed).poses
+        plain, found = plain_signals(scene, poses, 0), optics.signals(poses, 0, [1, 2, 3])
+        assert [one.robot for one in found] == [one[0] for one in plain]
+        for one, (_, counts, shares) in zip(found, plain, strict=True):
+            assert sum(one.counts) == pytest.approx(counts, rel=1e-9)
+            assert one.shares == pytest.approx(shares, rel=1e-9, abs=1e-12)
+        count += len(found)
+        for sensor, one in enumerate(surfaces(scene, poses, 0)):
+            assert optics.surface(poses, 0, sensor) == pytest.approx(tuple(one), rel=1e-9, abs=1e-9)
+    assert count > 50
+    with pytest.raises(ValueError, match="7 objects are more than the scene has"):
+        optics.surface(Poses([(9.0, 9.0, 0.0)], [(9.0, 9.0)] * 7), 0, 0)
 
 
 def test_light_arrives_a_quantum_late_whoever_lived_first() -> None:

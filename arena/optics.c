@@ -1,0 +1,158 @@
+// Infrared light in the world: from robot to robot as optics.py defines it, and what a sensor sees of its own light as
+// infrared.py does. The same arithmetic in the same order. Lengths cm.
+
+#include <stdint.h>
+
+typedef int64_t i64;
+typedef double f64;
+
+extern f64 atan2(f64, f64);
+extern f64 cos(f64);
+extern f64 fabs(f64);
+extern f64 pow(f64, f64);
+extern f64 sin(f64);
+extern f64 sqrt(f64);
+
+enum { SENSORS = 8, LINES = 4 };
+static const f64 PI = 3.14159265358979323846;
+
+struct disc {
+    f64 x, y, radius, share; // of the robot and of objects without x and y
+};
+
+struct side {
+    f64 ax, ay, bx, by, share;
+};
+
+struct optics {
+    f64 law_counts, law_from, law_power, most, least; // as in optics.py
+    f64 gain, per_emitter, emitter_power, receiver_power;
+    f64 width, height, wall_share, range;
+    f64 bearings[SENSORS];
+    struct disc robot;
+    const struct disc *objects;
+    const struct disc *fixed;
+    i64 fixed_count;
+    const struct side *sides;
+    i64 side_count;
+};
+
+// Everything in the world: robots as x, y, heading, then objects as x, y.
+struct poses {
+    const f64 *values;
+    i64 robots, objects;
+};
+
+// The discs in turn: robots, objects, what stands fast.
+static struct disc disc_of(const struct optics *o, const struct poses *p, i64 number)
+{
+    if (number < p->robots) {
+        struct disc robot = o->robot;
+        robot.x = p->values[3 * number], robot.y = p->values[3 * number + 1];
+        return robot;
+    }
+    number -= p->robots;
+    if (number >= p->objects)
+        return o->fixed[number - p->objects];
+    struct disc object = o->objects[number];
+    const f64 *place = p->values + 3 * p->robots + 2 * number;
+    object.x = place[0], object.y = place[1];
+    return object;
+}
+
+// How far along a ray a side is met, negative if it is not.
+static f64 meeting(const struct side *s, f64 x, f64 y, f64 east, f64 north)
+{
+    f64 ex = s->bx - s->ax, ey = s->by - s->ay, across = east * ey - north * ex;
+    if (across == 0)
+        return -1;
+    f64 along = ((s->ax - x) * ey - (s->ay - y) * ex) / across;
+    f64 part = ((s->ax - x) * north - (s->ay - y) * east) / across;
+    return along > 0 && 0 <= part && part <= 1 ? along : -1;
+}
+
+static int is_hidden(const struct optics *o, const struct poses *p, i64 own, i64 other)
+{
+    const f64 *here = p->values + 3 * own, *there = p->values + 3 * other;
+    f64 dx = there[0] - here[0], dy = there[1] - here[1], apart2 = dx * dx + dy * dy;
+    for (i64 i = 0; i < p->robots + p->objects + o->fixed_count; i++) {
+        if (i == own || i == other)
+            continue;
+        struct disc one = disc_of(o, p, i);
+        f64 ox = one.x - here[0], oy = one.y - here[1], along = (ox * dx + oy * dy) / apart2;
+        f64 aside_x = along * dx - ox, aside_y = along * dy - oy;
+        if (0 < along && along < 1 && aside_x * aside_x + aside_y * aside_y < one.radius * one.radius)
+            return 1;
+    }
+    for (i64 i = 0; i < o->side_count; i++) {
+        f64 along = meeting(&o->sides[i], here[0], here[1], dx, dy);
+        if (along >= 0 && along < 1)
+            return 1;
+    }
+    return 0;
+}
+
+static f64 beam(f64 angle, f64 power)
+{
+    f64 facing = cos(angle);
+    return facing > 0 ? pow(facing, power) : power == 0;
+}
+
+// What robot `own` can get of the light of another: counts of each pulse line, then shares of its sensors. Whether it
+// is anything.
+i64 signal(const struct optics *o, const struct poses *p, i64 own, i64 other, f64 *found)
+{
+    const f64 *here = p->values + 3 * own, *there = p->values + 3 * other;
+    f64 dx = there[0] - here[0], dy = there[1] - here[1], beyond = sqrt(dx * dx + dy * dy) - o->law_from;
+    f64 strength = beyond > 0 ? o->law_counts * pow(beyond, o->law_power) : o->most;
+    strength = o->gain * (strength < o->most ? strength : o->most);
+    if (strength < o->least || is_hidden(o, p, own, other))
+        return 0;
+    f64 towards = atan2(dy, dx);
+    for (i64 line = 0; line < LINES; line++) {
+        f64 back = towards + PI - there[2];
+        found[line] = strength * o->per_emitter * (beam(back + o->bearings[line], o->emitter_power) +
+                                                   beam(back + o->bearings[line + LINES], o->emitter_power));
+    }
+    for (i64 sensor = 0; sensor < SENSORS; sensor++)
+        found[LINES + sensor] = beam(towards - here[2] + o->bearings[sensor], o->receiver_power);
+    return 1;
+}
+
+static f64 to_wall(f64 at, f64 direction, f64 size)
+{
+    return direction == 0 ? __builtin_inf() : ((direction > 0 ? size : 0) - at) / direction;
+}
+
+// What the axis of a robot's sensor meets: cm from the robot's edge and share of a white surface's reflection, as
+// `infrared.surface`; infinity and 0 out of range.
+void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
+{
+    const f64 *here = p->values + 3 * own;
+    f64 x = here[0], y = here[1], angle = here[2] - o->bearings[sensor], east = cos(angle), north = sin(angle);
+    f64 to_x = to_wall(x, east, o->width), to_y = to_wall(y, north, o->height);
+    f64 distance = to_x < to_y ? to_x : to_y, share = o->wall_share * fabs(to_x < to_y ? east : north);
+    for (i64 i = 0; i < o->side_count; i++) {
+        const struct side *one = &o->sides[i];
+        f64 along = meeting(one, x, y, east, north);
+        if (along < 0 || along >= distance)
+            continue;
+        f64 dx = one->bx - one->ax, dy = one->by - one->ay;
+        distance = along;
+        share = one->share * fabs((east * dy - north * dx) / sqrt(dx * dx + dy * dy));
+    }
+    for (i64 i = 0; i < p->robots + p->objects + o->fixed_count; i++) {
+        if (i == own)
+            continue;
+        struct disc one = disc_of(o, p, i);
+        f64 dx = one.x - x, dy = one.y - y, along = dx * east + dy * north;
+        f64 root = one.radius * one.radius - (dx * dx + dy * dy - along * along);
+        if (root > 0 && along > 0 && along - sqrt(root) < distance) {
+            distance = along - sqrt(root);
+            share = one.share * sqrt(root) / one.radius;
+        }
+    }
+    f64 gap = distance - o->robot.radius > 0 ? distance - o->robot.radius : 0;
+    found[0] = gap <= o->range ? gap : __builtin_inf();
+    found[1] = gap <= o->range ? share : 0;
+}
