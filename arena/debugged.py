@@ -194,14 +194,16 @@ class Debugged:
 
     # In the trial's greenlets
 
-    def over(self) -> None:
-        """The trial is over: what is left is to look at the robot, and back. Raises AnewError."""
+    def over(self) -> bool:
+        """The trial is over: what is left is to look at the robot, and back. Whether the debugger has ever seen it.
+        Raises AnewError."""
         self._is_over = True
         if self._debugger and not self._debugger.dead:
             self._trial = self._debugger.parent = getcurrent()
             self._debugger.switch(Stop("limit", self.machine.pc, self.machine.cycle, OVER))
             if not self._debugger.dead:
                 raise AnewError
+        return bool(self._debugger.dead)
 
     def _end_at_cut(self) -> None:
         self._last = min(self._last, self._limit)

@@ -8,7 +8,7 @@ import sys
 import tempfile
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from arena.campaign import Plan, claimed, note_host_time, open_folder, run_one, trial_path
 from arena.commands.arguments import count_or_none, port
@@ -17,9 +17,12 @@ from arena.debugged import AnewError, Debugged, GivenUpError
 from arena.record import RecordError
 from emu.dap.server import Server
 from emu.dap.wire import Wire
+from emu.machine import Machine
 from emu.prompt.reader import Prompt
 from emu.status import DONE
 
+OF_ONE_ROBOT: Final = ("board", "selector", "camera", "engine", "strict")
+"""Launch arguments that `emu debug` has and a trial has not."""
 DESCRIPTION: Final = """\
 debug one robot of a trial, the whole world stands with it
 
@@ -73,7 +76,8 @@ def debugged(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
                 note_host_time(folder, done)
                 print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
                 is_recorded = True
-            robot.over()
+            if not robot.over():
+                print(f"arena debug: robot {options.robot} got no power before the trial was over", file=sys.stderr)
         except AnewError:
             continue
         except GivenUpError:
@@ -103,7 +107,13 @@ def served(debugged: Debugged, port: int | None) -> bool:
 
 
 def _served(debugged: Debugged, wire: Wire) -> bool:
-    server = Server(wire, lambda _arguments: debugged.machine, debugged.record)
+    def machine_of(arguments: dict[str, Any]) -> Machine:
+        for name in OF_ONE_ROBOT:
+            if name in arguments:
+                raise ValueError(f"`{name}` is for a robot alone; in a swarm the scene says it: --set KEY=VALUE")
+        return debugged.machine
+
+    server = Server(wire, machine_of, debugged.record)
     try:
         server.serve()
     finally:

@@ -11,15 +11,36 @@ function wordsOf(configuration) {
         return ['-m', 'emu', 'debug'];
     }
     const brain = configuration.program || configuration.brain;
-    const words = ['-m', 'arena', 'debug', configuration.scene, '--robot', String(configuration.robot || 0)];
-    return [...words, ...(brain ? ['--brain', brain] : []), ...(configuration.arenaOptions || [])];
+    const more = configuration.arenaOptions || [];
+    if (!Array.isArray(more) || more.some((word) => !['string', 'number'].includes(typeof word))) {
+        throw new Error('arenaOptions must be a list of words, for example ["--seed", "3"]');
+    }
+    const words = ['-m', 'arena', 'debug', String(configuration.scene), '--robot', String(whole(configuration, 'robot', 0, Infinity))];
+    return [...words, ...(brain ? ['--brain', String(brain)] : []), ...more.map(String)];
+}
+
+/** A whole number of a launch configuration, which may be a text that was asked for. */
+function whole(configuration, name, least, most) {
+    const number = Number(configuration[name] === undefined ? least : configuration[name] === '' ? NaN : configuration[name]);
+    if (!Number.isInteger(number) || number < least || number > most) {
+        throw new Error(`${name} must be a whole number from ${least}, not ${JSON.stringify(configuration[name])}`);
+    }
+    return number;
+}
+
+/** Where an attach configuration leads to: port and host. */
+function addressOf(configuration) {
+    if (configuration.port === undefined) {
+        throw new Error('attach needs the port of `emu debug --port` or `arena debug --port`');
+    }
+    return [whole(configuration, 'port', 1, 65535), configuration.host || '127.0.0.1'];
 }
 
 class Adapters {
     createDebugAdapterDescriptor(session) {
         const configuration = session.configuration;
         if (configuration.request === 'attach') {
-            return new vscode.DebugAdapterServer(configuration.port, configuration.host || '127.0.0.1');
+            return new vscode.DebugAdapterServer(...addressOf(configuration));
         }
         const folder = session.workspaceFolder;
         const settings = vscode.workspace.getConfiguration('openswarm', folder);
@@ -155,4 +176,4 @@ function activate(context) {
     );
 }
 
-module.exports = { activate, wordsOf };
+module.exports = { activate, addressOf, wordsOf };

@@ -100,15 +100,17 @@ def machine_of(arguments: dict[str, Any]) -> Machine:
     import emu
 
     program = arguments.get("program")
-    if not isinstance(program, str):
+    if not program:
         raise ValueError("launch needs `program`, the path of an ELF file")
     board: Any = arguments.get("board", BOARDS[0])
     if board == BOARDS[0]:
         from emu.boards.epuck.board import Epuck
 
-        board = partial(Epuck, selector=int(arguments.get("selector", 0)))
+        board = partial(Epuck, selector=arguments.get("selector", 0))
+    elif alone := [name for name in ("selector", "camera") if name in arguments]:
+        raise ValueError(f"`{alone[0]}` needs the board {BOARDS[0]}, not {board}")
     machine = emu.load(
-        program, board=board, engine=arguments.get("engine", "auto"), strict=bool(arguments.get("strict", False))
+        program, board=board, engine=arguments.get("engine", "auto"), strict=arguments.get("strict", False)
     )
     if arguments.get("camera"):
         from emu.boards.picture import read_picture

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from emu.dap.breakpoints import Breakpoint, bad_hit_condition
 from emu.dap.debuggee import Debuggee, Halt
+from emu.dap.launch import checked
 from emu.dap.looking import Looking, Refused
 from emu.dap.sights import Row, Sights, Sources
 from emu.dap.wire import Channel, Message
@@ -135,6 +136,7 @@ class Server(Looking):
         return CAPABILITIES
 
     def _do_launch(self, arguments: Row) -> Any:
+        arguments = checked(arguments)
         machine = self._make(arguments)
         if machine.image is None:
             raise Refused("no program")

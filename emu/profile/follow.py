@@ -84,6 +84,8 @@ class Tree:
         self._memory: Final[Any] = ctypes.create_string_buffer(self._code["tree_size"]())
         self._at: Final = ctypes.addressof(self._memory)
         self._parts: Final[list[Any]] = []
+        self._room = np.empty(0, dtype=_TURN)
+        """Where turns are written, again and again: fresh memory would cost more than writing them."""
         self._timed: Final = timed
         self._code["tree_begin"](self._at, cycle, entry)
 
@@ -92,9 +94,11 @@ class Tree:
         if not self._timed:
             self._code["tree_follow"](self._at, notes, count, None)
             return
-        room = np.zeros(2 * count + self._code["tree_open"](self._at) + _STACKS, dtype=_TURN)
-        made = self._code["tree_follow"](self._at, notes, count, int(room.ctypes.data))
-        self._parts.append(room[:made].copy())
+        most = 2 * count + self._code["tree_open"](self._at) + _STACKS
+        if len(self._room) < most:
+            self._room = np.empty(most, dtype=_TURN)
+        made = self._code["tree_follow"](self._at, notes, count, int(self._room.ctypes.data))
+        self._parts.append(self._room[:made].copy())
 
     def clear(self, cycle: int) -> None:
         """Count from now on; who is where stays. The turns up to now are dropped but for what is still open."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from arena.cli import main
-from tests.emu.dap.client import Client
+from tests.emu.dap.client import PATIENCE, ROOT, Client
 
 SEED = ("--seed", "3")
 
@@ -98,6 +101,40 @@ def test_who_changes_the_past_takes_the_world_back_and_who_leaves_ends_it(cluste
     assert world(client) != as_changed
     client.ask("terminate")
     client.close()
+
+
+def test_a_client_that_leaves_in_the_middle_and_a_second_one(
+    tmp_path: Path, clustering_image: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What is not a trial's is refused; who comes second too; a trial that is left while it runs goes to its end."""
+    trial = ["clustering", "--minutes", "0.005", "--brain", str(clustering_image), *SEED, "--set", "start.selector=8"]
+    client = Client("arena", "debug", *trial, "--robot", "1", "--out", str(tmp_path / "debugged"))
+    client.ask("initialize", adapterID="openswarm")
+    for name, value in (("selector", 3), ("strict", True), ("board", "epuck")):
+        assert f"`{name}` is for a robot alone" in client.asked("launch", **{name: value})["message"]
+    client.ask("launch", stopOnEntry=False)
+    client.ask("setFunctionBreakpoints", breakpoints=[{"name": "nowhere"}])
+    client.ask("configurationDone")
+    client.close()
+    assert main(["run", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
+    records = [(tmp_path / name / "trial-0001.parquet").read_bytes() for name in ("debugged", "alone")]
+    assert records[0] == records[1]
+
+    words = [sys.executable, "-m", "arena", "debug", *trial, "--robot", "1", "--port", "0"]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=ROOT) as serving:
+        assert serving.stderr is not None
+        port = int(serving.stderr.readline().rpartition(":")[2])
+        request = b'{"seq": 1, "type": "request", "command": "initialize"}'
+        with socket.create_connection(("127.0.0.1", port)) as first:
+            first.sendall(b"Content-Length: %d\r\n\r\n%s" % (len(request), request))
+            assert first.recv(1)
+            with pytest.raises(ConnectionRefusedError):
+                socket.create_connection(("127.0.0.1", port))
+        assert serving.wait(timeout=PATIENCE) == 0
+        assert "nothing is recorded" in serving.stderr.read()
+
+    assert main(["debug", *trial, "--minutes", "0.00001", "--robot", "1"]) == 0
+    assert "robot 1 got no power before the trial was over" in capfd.readouterr().err
 
 
 def test_at_a_prompt_by_a_script(

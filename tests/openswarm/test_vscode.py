@@ -91,6 +91,30 @@ def test_the_command_lines_it_starts_are_understood() -> None:
     assert (options.scene, options.robot, options.brain, options.seed) == ("clustering", 2, "a.elf", 3)
 
 
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
+def test_odd_values_of_a_configuration_are_refused_in_words() -> None:
+    script = """
+        require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? {} : load(name, ...rest))
+            (require('module')._load);
+        const { addressOf, wordsOf } = require('./extension.js');
+        const said = (work) => { try { return work().slice(-2).map(String); } catch (error) { return error.message; } };
+        const swarm = (values) => said(() => wordsOf({ scene: 'clustering', ...values }));
+        const attach = (values) => said(() => addressOf(values));
+        console.log(JSON.stringify([
+            ...['--seed 3', [{}], ['--seed', 3]].map((arenaOptions) => swarm({ arenaOptions })),
+            ...['two', -1, 1.5, '', '2'].map((robot) => swarm({ robot })),
+            attach({}), ...['x', 0, 70000, '4711'].map((port) => attach({ port }))]));
+    """
+    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=60, check=True)
+    words = 'arenaOptions must be a list of words, for example ["--seed", "3"]'
+    robot, port = "robot must be a whole number from 0, not ", "port must be a whole number from 1, not "
+    assert json.loads(done.stdout) == [
+        words, words, ["--seed", "3"], f'{robot}"two"', f"{robot}-1", f"{robot}1.5", f'{robot}""', ["--robot", "2"],
+        "attach needs the port of `emu debug --port` or `arena debug --port`", f'{port}"x"', f"{port}0", f"{port}70000",
+        ["4711", "127.0.0.1"],
+    ]  # fmt: skip
+
+
 def test_it_is_packaged(tmp_path: Path) -> None:
     """By VS Code's own tool; the package has the extension, its licence and nothing else."""
     npx = shutil.which("npx")

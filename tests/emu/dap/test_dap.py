@@ -265,14 +265,29 @@ def test_a_run_is_paused_and_breakpoints_change_while_it_runs(client: Client, tm
     assert client.top()["line"] == 5
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"), [({}, "needs `program`"), ({"program": "/nowhere.elf"}, "cannot be read")]
-)
-def test_a_bad_launch_is_refused_in_words(client: Client, arguments: dict[str, str], words: str) -> None:
+ODD: list[tuple[dict[str, Any], str]] = [
+    ({"program": None}, "needs `program`"),
+    ({"program": "/nowhere.elf"}, "cannot be read"),
+    ({"program": 5}, "`program` must be the path of an ELF file, not 5"),
+    ({"selector": "x"}, '`selector` must be a whole number, not "x"'),
+    ({"selector": 2.5}, "`selector` must be a whole number, not 2.5"),
+    ({"selector": True}, "`selector` must be a whole number, not true"),
+    ({"board": "none", "selector": 3}, "`selector` needs the board epuck, not none"),
+    ({"board": "none", "camera": "x.png"}, "`camera` needs the board epuck, not none"),
+    ({"board": ["none"]}, "`board` must be the name of a board"),
+    ({"stopOnEntry": "false"}, '`stopOnEntry` must be true or false, not "false"'),
+    ({"strict": 0}, "`strict` must be true or false, not 0"),
+    ({"sourceRoots": "src"}, '`sourceRoots` must be a list of folders, not "src"'),
+    ({"sourceRoots": [5]}, "`sourceRoots` must be a list of folders, not [5]"),
+]
+
+
+def test_a_bad_launch_is_refused_in_words(client: Client) -> None:
     client.ask("initialize", adapterID="emu")
-    reply = client.asked("launch", **arguments)
-    assert not reply["success"]
-    assert words in reply["message"]
+    for arguments, words in ODD:
+        reply = client.asked("launch", **({"program": "a.elf"} | arguments))
+        assert not reply["success"]
+        assert words in reply["message"]
     assert not client.asked("continue", threadId=1)["success"]
 
 
