@@ -7,7 +7,6 @@ UART1 (Bluetooth). Poses are extrapolated within the quantum to the cycle in whi
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -18,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import emu
-from arena import bodies
 from arena.brain import STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, switched_on, told_at
 from arena.ether import LINES, Ether
 from arena.infrared import Ring
 from arena.look import colours_of
 from arena.scene import FCY, BatterySetting, Scene
 from arena.sight import Sight
+from arena.wheels import Wheels
 from arena.world import STREAM_SENSORS, Poses, generator, traits_of
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.remote import REPEAT_SECONDS
@@ -32,8 +31,6 @@ from emu.boards.epuck.simple import LED_PINS, Battery
 from emu.boards.epuck.stimulus import parse
 from emu.faults import VECNUM
 
-WINDOW_S: Final = 0.010
-"""Motor steps are counted over at least this long to make a speed: single steps would jerk a drive of limited force."""
 PROBE_TCY: Final = 147_456
 """Mean time between two looks at whether the CPU is idle, at random cycles: 10 ms, 90,000 looks in 15 minutes."""
 LINE_LIMIT: Final = 200
@@ -49,8 +46,9 @@ FULL_VOLTS: Final = 4.2
 """epuck.md §6."""
 _STRIP_ROWS: Final = range(232, 249)
 """Rows of the whole picture that count as its middle."""
-_NOISE: Final = 1 << 14
-"""Values of pixel noise drawn once per robot; each line of pixels starts at a random one."""
+_NOISE_BITS: Final = 14
+"""2^14 values of pixel noise are drawn once per robot; each line of pixels starts at a random one."""
+_DRAWN_BITS: Final = 32
 
 
 LookAt = Callable[[int], tuple[Poses, Poses]]
@@ -75,9 +73,11 @@ class EmulatedBrain:
         self._sight = Sight(scene, robot, traits_of(scene, seed, robot))
         self._colours = colours_of(scene).astype(np.int16)
         self._colours_at: Final = self._colours.ctypes.data
-        noise = self._rng.normal(0.0, scene.camera.pixel_noise, _NOISE + 3 * 640)
+        noise = self._rng.normal(0.0, scene.camera.pixel_noise, (1 << _NOISE_BITS) + 3 * 640)
         self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
         self._noise_at: Final = self._noise.ctypes.data
+        generating = self._rng.bit_generator.ctypes  # its upper bits are what `integers` gives for a power of two
+        self._draw, self._drawn_from = generating.next_uint32, generating.state
         board = partial(Epuck, camera=scene.camera.sensor, selector=selector, seed=seed * 1000 + robot)
         self.machine = emu.load(image, board=board)
         self._board: Epuck = self.machine.board
@@ -96,10 +96,7 @@ class EmulatedBrain:
         """Quanta that are over for this robot."""
         self._cuts: list[int] = []
         self._told_cuts = 0
-        self._speeds: dict[int, tuple[float, float]] = {}
-        window = max(round(WINDOW_S / (self._quantum / FCY)), 1)
-        self._counts: deque[tuple[int, int]] = deque([(0, 0)], maxlen=window + 1)
-        self._rates = [0.0, *(bodies.CM_PER_STEP * FCY / (self._quantum * count) for count in range(1, window + 1))]
+        self.wheels: Final = Wheels(self._quantum)
         self._board.motors.remember()
         self._lights: list[Lights] = []
         self._leds = 0
@@ -152,13 +149,13 @@ class EmulatedBrain:
 
     def speed(self, tick: int) -> tuple[float, float]:
         """Wheel speeds (left, right) in cm/s during a quantum that is over; asked for once."""
-        return self._speeds.pop(tick)
+        return self.wheels.speed(tick)
 
     def live(self, ticks: int) -> None:
         """Live until so many quanta are over. A robot whose infrared sensors are read sees every one of them begin."""
         while self.lived < ticks:
             if self._fault or self._end_of(self.lived) <= 0:
-                self._speeds[self.lived] = 0.0, 0.0
+                self.wheels.rested(self.lived)
                 self.lived += 1
             elif self._look_at is not None and self._ring.is_read:
                 self._see(self.lived, *self._look_at(self.lived))
@@ -192,16 +189,10 @@ class EmulatedBrain:
     def _settle(self) -> None:
         """Speeds of the quanta that have ended in this run, by the steps made when they did."""
         new = self._cuts[self._told_cuts :]
-        if not new:
-            return
-        self._told_cuts += len(new)
-        counts, rates, speeds = self._counts, self._rates, self._speeds
-        for left, right in self._board.motors.steps_by(new):
-            counts.append((left, right))
-            left0, right0 = counts[0]
-            rate = rates[len(counts) - 1]
-            speeds[self.lived] = (left - left0) * rate, (right - right0) * rate
-            self.lived += 1
+        if new:
+            self._told_cuts += len(new)
+            self.wheels.turned(self.lived, self._board.motors.steps_by(new))
+            self.lived += len(new)
 
     def _see(self, tick: int, poses: Poses, before: Poses) -> None:
         """A quantum begins with `poses`; `before` are those a quantum ago."""
@@ -261,11 +252,9 @@ class EmulatedBrain:
         self._look_now()
         if self._sees_leds:
             self._sight.leds[:] = [self._ether.leds(other, self._on_at + cycle) for other in range(self._ether.robots)]
-        self._sight.look(self._poses, self._before, (cycle - self._start) / self._quantum)
-        first = int(self._rng.integers(_NOISE))
-        dark = self._scene.camera.vignetting
-        bright = self._sight.lens.vignetting(y, columns, dark) if dark else None
-        pixels = self._sight.pixels(y, columns, self._colours_at, self._noise_at + self._noise.itemsize * first, bright)
+        noise = self._noise_at + self._noise.itemsize * (self._draw(self._drawn_from) >> _DRAWN_BITS - _NOISE_BITS)
+        quanta = (cycle - self._start) / self._quantum
+        pixels = self._sight.line(self._poses, self._before, quanta, y, columns, self._colours_at, noise)
         if y in _STRIP_ROWS:
             self._strip = columns, pixels
         return pixels

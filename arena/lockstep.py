@@ -9,11 +9,13 @@ the same poses either way.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from ctypes import addressof, c_void_p
 from typing import Final, Protocol, runtime_checkable
 
 from greenlet import getcurrent, greenlet
 
 from arena.ether import Ether
+from arena.wheels import ROOM, Wheels
 from arena.world import Poses, World
 
 
@@ -27,8 +29,8 @@ class Runner(Protocol):
     def live(self, ticks: int) -> None:
         """Live until so many quanta are over."""
 
-    def speed(self, tick: int) -> tuple[float, float]:
-        """Wheel speeds in cm/s during a quantum that is over; asked for once, quantum after quantum."""
+    wheels: Wheels
+    """How fast they turned in quanta that are over."""
 
     def join(self, look_at: Callable[[int], tuple[Poses, Poses]]) -> None:
         """Get poses from `look_at` from now on: those at the beginning of a quantum, and a quantum before. All quanta
@@ -45,15 +47,18 @@ class LockStep:
         self._ether.slowest = 0
         self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
         self._hub: greenlet = getcurrent()
+        self._speeds: Final = (c_void_p * len(robots))(*(robot.wheels.address for robot in robots))
+        self._speeds_at: Final = addressof(self._speeds)
         for robot in robots:
             robot.join(self.look_at)
 
     def advance(self, ticks: int) -> list[tuple[float, float]]:
         """Let so many quanta be over for everybody; wheel speeds of the last of them."""
+        while ticks - self._world.ticks > ROOM:
+            self.advance(self._world.ticks + ROOM)
         self._hub = getcurrent()
         waiting = {greenlet(robot.live): self._world.ticks for robot in self._robots if robot.lived < ticks}
         asked: tuple[int, ...] = (ticks,)  # the first time a greenlet is switched to it gets the argument of `live`
-        wheels: list[tuple[float, float]] = []
         ready = list(waiting)
         while ready:
             for life in ready:
@@ -64,11 +69,11 @@ class LockStep:
                     waiting[life] = looks_at
             asked = ()
             until = min(waiting.values(), default=ticks)
-            wheels = self._step_to(until) or wheels
+            self._step_to(until)
             ready = [life for life, tick in waiting.items() if tick == until]
         for tick in [tick for tick in self._past if tick < ticks - 1]:
             del self._past[tick]
-        return wheels
+        return [robot.wheels.speed(ticks - 1) for robot in self._robots]
 
     def look_at(self, tick: int) -> tuple[Poses, Poses]:
         """Poses at the beginning of a quantum, and a quantum before."""
@@ -81,12 +86,9 @@ class LockStep:
         """Something was put somewhere else between two quanta."""
         self._past[self._world.ticks] = self._world.poses
 
-    def _step_to(self, ticks: int) -> list[tuple[float, float]]:
-        """Let the world make the quanta that all robots have lived; wheel speeds of the last."""
-        world, wheels = self._world, []
-        while world.ticks < ticks:
-            wheels = [robot.speed(world.ticks) for robot in self._robots]
-            world.step(wheels)
-            self._past[world.ticks] = world.poses
+    def _step_to(self, ticks: int) -> None:
+        """Let the world make the quanta that all robots have lived."""
+        world = self._world
+        first = world.ticks + 1
+        self._past.update(enumerate(world.go(self._speeds_at, ticks - world.ticks), first))
         self._ether.slowest = world.ticks * self._ether.quantum
-        return wheels

@@ -62,10 +62,13 @@ struct view {
     f64 x, y, cos, sin;
 };
 
+// Rays, with room for what they meet: a class each, and what it looks like. `bright` darkens each pixel, null for none.
 struct rays {
     const f64 *left, *up;
     i64 count;
     f64 right_most, left_most;
+    uint8_t *seen, *pixels;
+    const f64 *bright;
 };
 
 static int is_before(const struct disc *one, const struct disc *other)
@@ -249,7 +252,7 @@ static i64 glow(const struct view *v, const struct disc *robot, f64 slope, f64 r
 }
 
 // Classes of the pixels of some rays.
-void classes(const struct view *v, const struct rays *rays, uint8_t *seen)
+void classes(const struct view *v, const struct rays *rays)
 {
     f64 east = 1 / most(v->width - v->x, v->nearest), west = -1 / most(v->x, v->nearest);
     f64 north = 1 / most(v->height - v->y, v->nearest), south = -1 / most(v->y, v->nearest);
@@ -283,7 +286,7 @@ void classes(const struct view *v, const struct rays *rays, uint8_t *seen)
             if (depth > 0)
                 meet(v, &p, depth, v->sides[s].height, v->sides[s].kind);
         }
-        seen[i] = (uint8_t)(p.seen == FLOOR ? floor_of(v, slope, p.rise) : p.seen);
+        rays->seen[i] = (uint8_t)(p.seen == FLOOR ? floor_of(v, slope, p.rise) : p.seen);
     }
 }
 
@@ -352,17 +355,18 @@ i64 votes(const struct view *v, const struct rays *rays, const uint8_t *sensed)
     return found;
 }
 
-// Red, green and blue of pixels of some classes: `noise` goes on from value to value. `bright` darkens each pixel, null
-// for no vignetting.
-void paint(const uint8_t *seen, i64 count, const int16_t *colours, const int16_t *noise, const f64 *bright,
-           uint8_t *pixels)
+// A line of a picture for a pose: collected, classified and painted. `noise` goes on from value to value.
+void line(struct view *v, const f64 *poses, const f64 *before, f64 quanta, const struct rays *rays,
+          const int16_t *colours, const int16_t *noise)
 {
-    for (i64 i = 0; i < count; i++)
+    collect(v, poses, before, quanta);
+    classes(v, rays);
+    for (i64 i = 0; i < rays->count; i++)
         for (i64 c = 0; c < 3; c++) {
-            i64 value = colours[3 * seen[i] + c];
-            if (bright)
-                value = (i64)rint((f64)value * bright[i]);
+            i64 value = colours[3 * rays->seen[i] + c];
+            if (rays->bright)
+                value = (i64)rint((f64)value * rays->bright[i]);
             value += noise[3 * i + c];
-            pixels[3 * i + c] = (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
+            rays->pixels[3 * i + c] = (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
         }
 }

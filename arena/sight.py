@@ -60,16 +60,16 @@ class _View(Structure):
 
 class _Rays(Structure):
     _fields_ = [("left", c_void_p), ("up", c_void_p), ("count", c_int64), ("right_most", c_double),
-                ("left_most", c_double)]  # fmt: skip
+                ("left_most", c_double), ("seen", c_void_p), ("pixels", c_void_p), ("bright", c_void_p)]  # fmt: skip
 
 
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
     return functions(Path(__file__).with_name("sight.c"), {
         "collect": (None, (ADDRESS, ADDRESS, ADDRESS, DOUBLE)),
-        "classes": (None, (ADDRESS, ADDRESS, ADDRESS)),
+        "classes": (None, (ADDRESS, ADDRESS)),
         "votes": (INT, (ADDRESS, ADDRESS, ADDRESS)),
-        "paint": (None, (ADDRESS, INT, ADDRESS, ADDRESS, ADDRESS, ADDRESS)),
+        "line": (None, (ADDRESS, ADDRESS, ADDRESS, DOUBLE, ADDRESS, ADDRESS, ADDRESS)),
     })  # fmt: skip
 
 
@@ -111,16 +111,19 @@ def _things_of(scene: Scene) -> _Things:
 
 
 class _Fan:
-    """Rays in the form the code wants, with room for the class of each."""
+    """Rays in the form the code wants, with room for what they meet."""
 
-    def __init__(self, left: Floats, up: Floats) -> None:
-        self._arrays: Final = np.ascontiguousarray(left), np.ascontiguousarray(up)
-        self.count: Final = len(left)
-        self._rays: Final = _Rays(self._arrays[0].ctypes.data, self._arrays[1].ctypes.data, self.count,
-                                  float(left.min()), float(left.max()))  # fmt: skip
+    def __init__(self, left: Floats, up: Floats, columns: NDArray[np.intp] | None = None,
+                 bright: Floats | None = None) -> None:  # fmt: skip
+        self._arrays: Final = np.ascontiguousarray(left), np.ascontiguousarray(up), bright
+        self.columns: Final = columns
+        """What it is known by: it lives as long."""
+        self.seen: Final = np.zeros(len(left), dtype=np.uint8)
+        self.pixels: Final = np.zeros((len(left), 3), dtype=np.uint8)
+        self._rays: Final = _Rays(self._arrays[0].ctypes.data, self._arrays[1].ctypes.data, len(left),
+                                  float(left.min()), float(left.max()), self.seen.ctypes.data, self.pixels.ctypes.data,
+                                  None if bright is None else bright.ctypes.data)  # fmt: skip
         self.address: Final = addressof(self._rays)
-        self.seen: Final = np.zeros(self.count, dtype=np.uint8)
-        self.seen_address: Final = self.seen.ctypes.data
 
 
 class Sight:
@@ -129,7 +132,7 @@ class Sight:
     def __init__(self, scene: Scene, own: int, traits: Traits = Traits()) -> None:  # noqa: B008 - never changes
         code = _code()
         self._collect, self._classes = code["collect"], code["classes"]
-        self._votes, self._paint = code["votes"], code["paint"]
+        self._votes, self._line = code["votes"], code["line"]
         self.lens: Final = lens_of(scene.camera, traits.pitch_deg)
         things = _things_of(scene)
         self._things: Final = things
@@ -148,7 +151,8 @@ class Sight:
         self._address: Final = addressof(self._view)
         self._counts = scene.robots.count, len(things.things)
         self._sensed: Final = things.sensed.ctypes.data
-        self._fans: Final[dict[tuple[float, bytes], _Fan]] = {}
+        self._fans: Final[dict[tuple[float, int], _Fan]] = {}
+        self._dark: Final = scene.camera.vignetting
         self._window: _Fan | None = None
 
     def look(self, poses: Poses, before: Poses | None = None, quanta: float = 0.0) -> None:
@@ -169,19 +173,18 @@ class Sight:
     def classes(self, v: int, columns: NDArray[np.intp]) -> NDArray[np.uint8]:
         """Classes of the pixels of one row in some columns, until the next call for that row."""
         fan = self._fan(v, columns)
-        self._classes(self._address, fan.address, fan.seen_address)
+        self._classes(self._address, fan.address)
         return fan.seen
 
-    def pixels(self, v: int, columns: NDArray[np.intp], colours: int, noise: int,
-               bright: Floats | None = None) -> NDArray[np.uint8]:  # fmt: skip
-        """Red, green and blue of the pixels: `colours` is where 16-bit numbers for each class are, `noise` where those
-        are that are added to one value after the other."""
-        fan = self._fan(v, columns)
-        self._classes(self._address, fan.address, fan.seen_address)
-        painted = np.empty((fan.count, 3), dtype=np.uint8)
-        self._paint(fan.seen_address, fan.count, colours, noise, None if bright is None else bright.ctypes.data,
-                    painted.ctypes.data)  # fmt: skip
-        return painted
+    def line(self, poses: Poses, before: Poses, quanta: float, v: int, columns: NDArray[np.intp], colours: int,
+             noise: int) -> NDArray[np.uint8]:  # fmt: skip
+        """As `look`, then red, green and blue of the pixels of a row, until the next call for that row: `colours` is
+        where 16-bit numbers for each class are, `noise` where those are that are added to one value after the other."""
+        if poses.counts != self._counts:
+            self._adapt(poses)
+        fan = self._fans.get((v, id(columns))) or self._fan(v, columns)
+        self._line(self._address, poses.address, before.address, quanta, fan.address, colours, noise)
+        return fan.pixels
 
     def sensor(self) -> int:
         """OBJECT, ROBOT or NOTHING by the votes of the window's pixels with perfect colours (`vision.sensor_of`)."""
@@ -194,10 +197,11 @@ class Sight:
 
     def _fan(self, v: int, columns: NDArray[np.intp]) -> _Fan:
         """A camera asks for the same rows and columns again and again."""
-        key = v, columns.tobytes()
+        key = v, id(columns)
         fan = self._fans.get(key)
         if fan is None:
             if len(self._fans) >= ROWS_KEPT:
                 self._fans.clear()
-            fan = self._fans[key] = _Fan(*self.lens.line(v, columns))
+            bright = self.lens.vignetting(v, columns, self._dark) if self._dark else None
+            fan = self._fans[key] = _Fan(*self.lens.line(v, columns), columns, bright)
         return fan

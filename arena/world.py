@@ -7,7 +7,7 @@ steps is only the wheel speeds given to it. The same calls give the same numbers
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
@@ -22,10 +22,12 @@ from arena import bodies, geometry
 from arena.placement import place_all
 from arena.scene import Scene
 from arena.scenery import ObjectKind
-from emu.hostcode import ADDRESS, functions
+from emu.hostcode import ADDRESS, INT, functions
 
 ITERATIONS: Final = 20
 """Of the constraint solver (epuck.md §4)."""
+ROWS: Final = 256
+"""Poses that lie in one piece of memory."""
 WALL_THICKNESS: Final = 20.0
 """Half thickness of the walls' segments in cm: nothing tunnels through."""
 STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT, STREAM_INFRARED = range(7)
@@ -61,21 +63,23 @@ class Poses:
 
     def __init__(self, robots: Sequence[tuple[float, float, float]], objects: Sequence[tuple[float, float]]) -> None:
         numbers = [value for place in (*robots, *objects) for value in place]
-        self._begin(np.array(numbers, dtype=np.float64), len(robots))
+        values = np.array(numbers, dtype=np.float64)
+        self._begin(values, len(robots), values.ctypes.data)
 
-    def _begin(self, values: NDArray[np.float64], robots: int) -> None:
+    def _begin(self, values: NDArray[np.float64], robots: int, address: int) -> None:
         self.values = values
         """Robots, then objects, number after number."""
         self.counts = robots, (len(values) - 3 * robots) // 2
-        self.address: int = values.ctypes.data
+        self.address = address
+        """Where they are in the host's memory."""
         self._robots: list[tuple[float, float, float]] | None = None
         self._objects: list[tuple[float, float]] | None = None
 
     @classmethod
-    def of(cls, values: NDArray[np.float64], robots: int) -> Poses:
-        """What is in `values`, which is not copied, of so many robots."""
+    def of(cls, values: NDArray[np.float64], robots: int, address: int | None = None) -> Poses:
+        """What is in `values`, which is not copied, of so many robots. Who knows its address saves asking."""
         poses = cls.__new__(cls)
-        poses._begin(values, robots)
+        poses._begin(values, robots, values.ctypes.data if address is None else address)
         return poses
 
     @property
@@ -124,6 +128,7 @@ class _World(Structure):
 def _code() -> dict[str, Callable[..., Any]]:
     return functions(Path(__file__).with_name("world.c"), {
         "quantum": (None, (ADDRESS, ADDRESS)), "poses": (None, (ADDRESS, ADDRESS)),
+        "quanta": (None, (ADDRESS, ADDRESS, INT, INT, ADDRESS, ADDRESS, INT)),
     })  # fmt: skip
 
 
@@ -180,7 +185,7 @@ class World:
     def _hand_over(self, seed: int, drives: Sequence[pymunk.Body | None]) -> None:
         """Tell `world.c` what it moves. The bodies stay as long as the world does."""
         code = _code()
-        self._quantum, self._tell_poses = code["quantum"], code["poses"]
+        self._quantum, self._quanta, self._tell_poses = code["quantum"], code["quanta"], code["poses"]
         self._robots = (_Robot * len(self.robots))()
         parts = zip(self._robots, self.robots, drives, self._joints, strict=True)
         for number, (robot, body, drive, joints) in enumerate(parts):
@@ -199,6 +204,8 @@ class World:
         self._at = addressof(self._world)
         self._wheels = np.zeros((len(self.robots), 2))
         self._wheels_at = self._wheels.ctypes.data
+        self._numbers = 3 * len(self.robots) + 2 * len(self.objects)
+        self._sheet, self._sheet_at, self._row = np.empty((0, self._numbers)), 0, 0
 
     # -- building ----------------------------------------------------------------------------------------------------
 
@@ -278,6 +285,30 @@ class World:
         self.ticks += 1
         self.poses = self._read()
 
+    def go(self, speeds: int, count: int) -> Iterator[Poses]:
+        """So many quanta at the wheel speeds in each robot's `Wheels`, to whose addresses `speeds` is the address;
+        poses at the end of each. They are computed in rows, none before it is asked for."""
+        while count:
+            self._draw_noise()
+            row = self._room()
+            more = min(count, self._noise_ticks - self.ticks % self._noise_ticks, ROWS - row)
+            size = self._sheet.itemsize * self._numbers
+            at = self._sheet_at + row * size
+            self._quanta(self._at, speeds, self.ticks, more, self._wheels_at, at, self._numbers)
+            self._row += more
+            count -= more
+            for number in range(more):
+                self.ticks += 1
+                self.poses = Poses.of(self._sheet[row + number], len(self.robots), at + number * size)
+                yield self.poses
+
+    def _room(self) -> int:
+        """A free row for poses. Sheets are never written twice: poses stay what they were."""
+        if self._row == len(self._sheet):
+            self._sheet, self._row = np.empty((ROWS, self._numbers)), 0
+            self._sheet_at = self._sheet.ctypes.data
+        return self._row
+
     def move(self, body: pymunk.Body, x: float, y: float, heading: float | None = None) -> None:
         """Put a robot or object somewhere else, at rest; cm, rad."""
         body.position, body.velocity, body.angular_velocity = (x, y), (0.0, 0.0), 0.0
@@ -294,9 +325,11 @@ class World:
             robot.noise[:] = rng.uniform(1 - share, 1 + share, 2).tolist()
 
     def _read(self) -> Poses:
-        poses = Poses.of(np.empty(3 * len(self.robots) + 2 * len(self.objects)), len(self.robots))
-        self._tell_poses(self._at, poses.address)
-        return poses
+        row = self._room()
+        self._row += 1
+        at = self._sheet_at + row * self._sheet.itemsize * self._numbers
+        self._tell_poses(self._at, at)
+        return Poses.of(self._sheet[row], len(self.robots), at)
 
     @property
     def seconds(self) -> float:

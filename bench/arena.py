@@ -50,13 +50,13 @@ def measure(scene: Scene, brains: list[Brain], seconds: float, warm_up: float) -
     """CPU seconds per simulated second: all, physics, rendering."""
     world = World(scene, 1)
     physics, rendering = Clock(), Clock()
-    step = physics.around(world.step)
+    step, go = physics.around(world.step), world.go
     for brain in brains:
         if isinstance(brain, EmulatedBrain):
             sight = brain._sight  # not `_pixels`: other robots are run inside it
-            sight.look = rendering.around(sight.look)  # type: ignore[method-assign]
-            sight.pixels = rendering.around(sight.pixels)  # type: ignore[method-assign]
+            sight.line = rendering.around(sight.line)  # type: ignore[method-assign]
     world.step = step  # type: ignore[method-assign]
+    world.go = physics.around(lambda *how: list(go(*how)))  # type: ignore[method-assign]
     robots = [brain for brain in brains if isinstance(brain, EmulatedBrain)]
     lockstep = LockStep(world, robots) if robots else None
     sample = round(scene.clock.sample_s / world.dt)

@@ -1,6 +1,10 @@
 """The world: units, calibrations of components, repeatability (docs/experiment.md §3)."""
 
 import math
+import random
+from array import array
+from collections import deque
+from ctypes import addressof, c_void_p
 
 import numpy as np
 import pytest
@@ -11,6 +15,7 @@ from arena.controllers import steps_per_second
 from arena.look import NOTHING, OBJECT, ROBOT
 from arena.scene import Scene, SceneError, load_scene
 from arena.trial import run_trial
+from arena.wheels import ROOM, Wheels
 from arena.world import World
 
 
@@ -171,3 +176,40 @@ def test_a_stronger_drive_pushes_a_standing_robot() -> None:
     for _ in range(5000):
         world.step([(12.8, 12.8), (0.0, 0.0)])
     assert world.poses.robots[1][0] > 150
+
+
+def test_speeds_are_those_of_the_last_quanta_together() -> None:
+    """Against the plain text of it: steps of ten quanta of 1 ms over their time; asked for in pieces of any length."""
+    rng = random.Random(7)
+    quantum = 14_746
+    wheels, counts = Wheels(quantum), deque([(0, 0)], maxlen=11)
+    made, tick = (0, 0), 0
+    while tick < ROOM + 200:
+        new = []
+        for _ in range(rng.randrange(1, 9)):
+            made = made[0] + rng.choice((-1, 0, 0, 1)), made[1] + rng.choice((0, 1))
+            new.append(made)
+        wheels.turned(tick, array("q", [count for pair in new for count in pair]))
+        for left, right in new:
+            counts.append((left, right))
+            rate = bodies.CM_PER_STEP * 14_745_600 / (quantum * (len(counts) - 1))
+            assert wheels.speed(tick) == ((left - counts[0][0]) * rate, (right - counts[0][1]) * rate)
+            tick += 1
+    wheels.rested(tick)
+    assert wheels.speed(tick) == (0.0, 0.0)
+
+
+def test_quanta_in_a_row_are_quanta_one_by_one() -> None:
+    """Same speeds, same poses, also across the moments at which the wheels' noise is drawn."""
+    scene = load_scene("clustering").with_values(robots__count=2, objects__count=5, robots__wheel_noise=0.02)
+    rows, one = World(scene, 3), World(scene, 3)
+    wheels = [Wheels(scene.clock.quantum_tcy) for _ in range(2)]
+    for robot, speeds in enumerate(wheels):
+        speeds.turned(0, array("q", [count for tick in range(900) for count in (tick // 3, tick // (2 + robot))]))
+    addresses = (c_void_p * 2)(*(speeds.address for speeds in wheels))
+    for count in (1, 7, 300, 592):
+        for poses in rows.go(addressof(addresses), count):
+            one.step([speeds.speed(one.ticks) for speeds in wheels])
+            assert poses.values.tolist() == one.poses.values.tolist()
+    assert (rows.ticks, rows.poses.counts) == (900, (2, 5))
+    assert rows.poses.robots != World(scene, 3).poses.robots

@@ -7,6 +7,7 @@ over. The port reads a line that is on the bus from the record.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Final
@@ -25,7 +26,7 @@ if TYPE_CHECKING:  # loaded when the first picture is: most runs start faster wi
     import numpy as np
     from numpy.typing import NDArray
 
-    from emu.boards.epuck.pixels import Pixels
+    from emu.boards.epuck.pixels import Pixels, PixelSource, Readout
 
 ADDRESS: Final = 0x6E
 """7-bit I2C address: 0xDC to write, 0xDD to read (epuck.md §7.1)."""
@@ -36,8 +37,6 @@ RESET_PIN: Final = "RC13"
 
 RowSource = Callable[[int, int], "Pixels"]
 """rows(y, cycle): line y (0 = top) of the upright scene, 640 x 3 values, as seen in `cycle`."""
-PixelSource = Callable[[int, "NDArray[np.intp]", int], "Pixels"]
-"""pixels(y, columns, cycle): only these columns (0..639) of line y, len(columns) x 3 values."""
 
 
 class Camera(Part, I2cDevice):
@@ -57,6 +56,7 @@ class Camera(Part, I2cDevice):
         self._plugged: Final = self.cell("plugged", "B")
         self.pins.describe(SYNC_PORT, HREF | VSYNC | PCLK, self.scan, self._plugged.place)
         self._line: Final = self.array("line", "B", 2 * LINE_PIXELS)
+        self._line_at: Final = self.record.address + self.record.fields["camera.line"].offset
         self._line_from: Final = self.cell("line_from", "Q")
         self._line_to: Final = self.cell("line_to", "Q")
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
@@ -65,7 +65,7 @@ class Camera(Part, I2cDevice):
         self._pixels: PixelSource | None = None
         self._timing: Timing
         self._picture: Picture
-        self._columns: NDArray[np.intp] | None
+        self._readout: Readout | None
         self._load_defaults()
         self._interpret()
         self.scan.begin(course_of(self._timing), self.now, running=True)
@@ -122,26 +122,21 @@ class Camera(Part, I2cDevice):
         from emu.boards.epuck.pixels import decode
 
         at = self.now if cycle is None else cycle
-        lines = [decode(self._sent(line, at), self._picture.form) for line in range(self.scan.course.lines)]
+        room = (ctypes.c_uint8 * (2 * LINE_PIXELS))()
+        lines = []
+        for line in range(self.scan.course.lines):
+            count = self._sent(line, at, ctypes.addressof(room))
+            lines.append(decode(bytes(room[:count]), self._picture.form))
         return np.stack(lines) if lines else np.zeros((0, 0, 3), np.uint8)
 
-    def _sent(self, line: int, cycle: int) -> bytes:
-        """The bytes of a line read out in `cycle`."""
-        from emu.boards.epuck.pixels import encode
+    def _sent(self, line: int, cycle: int, address: int) -> int:
+        """Put the bytes of a line read out in `cycle` to an address of the host; how many there are."""
+        if self._readout is None:
+            from emu.boards.epuck.pixels import Readout
 
-        picture = self._picture
-        brightness = self._exposure.brightness(picture.exposure, cycle, self.scan.course.frame_tcy)
-        red, green, blue = (gain * brightness for gain in picture.gains)
-        return encode(self._seen(line, cycle), picture.form, (red, green, blue))
-
-    def _seen(self, line: int, cycle: int) -> Pixels:
-        """Scene pixels of a line of the frame."""
-        from emu.boards.epuck import pixels
-
-        if self._columns is None:
-            self._columns = pixels.scene_columns(self._timing, self._picture)
-        source = self._pixels or pixels.darkness
-        return source(pixels.scene_row(self._timing, self._picture, line), self._columns, cycle)
+            self._readout = Readout(self._timing, self._picture, self.scan.course.lines)
+        brightness = self._exposure.brightness(self._picture.exposure, cycle, self.scan.course.frame_tcy)
+        return self._readout.put(self._pixels, line, cycle, brightness, address)
 
     # -- connector ---------------------------------------------------------------------------------------------------
 
@@ -216,11 +211,11 @@ class Camera(Part, I2cDevice):
         if found is None:
             return False
         line, href = found
-        course, data = self.scan.course, self._sent(line, href)
-        self._line[: len(data)] = memoryview(data)
-        self._line_from.value = href - course.byte_tcy // 2
-        self._line_to.value = self._line_from.value + len(data) * course.byte_tcy
-        self._byte.value = course.byte_tcy
+        tcy = self.scan.course.byte_tcy
+        count = self._sent(line, href, self._line_at)
+        self._line_from.value = begin = href - tcy // 2
+        self._line_to.value = begin + count * tcy
+        self._byte.value = tcy
         return True
 
     # -- registers on I2C --------------------------------------------------------------------------------------------
@@ -270,7 +265,7 @@ class Camera(Part, I2cDevice):
         """What the registers mean; a line already rendered is out of date."""
         self._timing = self.sensor.timing(self.register)
         self._picture = self.sensor.picture(self.register)
-        self._columns = None
+        self._readout = None
         self._line_to.value = 0
 
     # -- reset -------------------------------------------------------------------------------------------------------

@@ -180,10 +180,11 @@ class Motors:
         with self.left.unremembered(), self.right.unremembered():
             yield
 
-    def steps_by(self, cycles: Sequence[int]) -> list[tuple[int, int]]:
-        """Steps of both (left, right) as they were in some cycles, which rise from call to call; see `remember`."""
+    def steps_by(self, cycles: Sequence[int]) -> array[int]:
+        """Steps of both (left, right, left and so on) as they were in some cycles, which rise from call to call; see
+        `remember`."""
         self.steps()
         count = len(cycles)
         asked, made = array("q", cycles), array("q", bytes(16 * count))
         self._both_by(self.left.at, self.right.at, asked.buffer_info()[0], count, made.buffer_info()[0])
-        return list(zip(made[::2], made[1::2], strict=True))
+        return made

@@ -17,6 +17,8 @@ from emu.hostcode import ADDRESS, INT, functions
 
 Pixels = NDArray[np.uint8]
 """n x 3 values, red, green, blue."""
+PixelSource = Callable[[int, NDArray[np.intp], int], Pixels]
+"""pixels(y, columns, cycle): only these columns (0..639) of line y, len(columns) x 3 values."""
 
 
 def scene_columns(timing: Timing, picture: Picture) -> NDArray[np.intp]:
@@ -37,12 +39,44 @@ def darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
     return np.zeros((len(columns), 3), dtype=np.uint8)
 
 
-def encode(pixels: Pixels, form: str, gains: tuple[float, float, float]) -> bytes:
-    """The bytes a sensor sends for a line of `pixels` after its gains (`line.c`)."""
-    whole = np.ascontiguousarray(pixels, dtype=np.uint8)
-    sent = ctypes.create_string_buffer(len(whole) * _SIZES[form])
-    _encoder()(whole.ctypes.data, len(whole), _FORMS.index(form), (ctypes.c_double * 3)(*gains), sent)
-    return sent.raw
+Gains = ctypes.c_double * 3
+"""Factors of red, green and blue."""
+
+
+def encode(pixels: int, count: int, form: str, gains: ctypes.Array[ctypes.c_double], address: int) -> int:
+    """Write the bytes a sensor sends for a line of `count` pixels after its gains to an address of the host, from
+    another (`line.c`); how many they are."""
+    _encoder()(pixels, count, _FORMS.index(form), gains, address)
+    return count * _SIZES[form]
+
+
+class Readout:
+    """Lines of the frame as one setting of a sensor sends them."""
+
+    def __init__(self, timing: Timing, picture: Picture, lines: int) -> None:
+        self._columns: Final = scene_columns(timing, picture)
+        self._rows: Final = [scene_row(timing, picture, line) for line in range(lines)]
+        self._gains: Final = picture.gains
+        self._form: Final = picture.form
+        self._factors: Final = Gains(*picture.gains)
+        self._brightness = 1.0
+        self._held: Final[dict[int, tuple[Pixels, int]]] = {}
+
+    def put(self, source: PixelSource | None, line: int, cycle: int, brightness: float, address: int) -> int:
+        """Write the bytes of a line in which a source's pixels come `brightness` times as bright to an address of the
+        host; how many bytes that were. Raises ValueError if the source has not as many pixels as it was asked for."""
+        seen = (source or darkness)(self._rows[line], self._columns, cycle)
+        if seen.shape != (len(self._columns), 3):
+            raise ValueError(f"a line of {len(self._columns)} pixels was asked for, not an array of shape {seen.shape}")
+        if brightness != self._brightness:
+            self._brightness = brightness
+            self._factors[:] = [gain * brightness for gain in self._gains]
+        held, at = self._held.get(line, (None, 0))
+        if seen is not held:  # who paints every line of a frame into the same array is not asked for its address again
+            whole = np.ascontiguousarray(seen, dtype=np.uint8)
+            at = whole.ctypes.data
+            self._held[line] = whole, at
+        return encode(at, len(seen), self._form, self._factors, address)
 
 
 @cache

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 import pytest
 
-from emu.boards.epuck.pixels import decode, encode
+from emu.boards.epuck.pixels import Gains, decode, encode
 from emu.boards.epuck.scan import HREF, PCLK, VSYNC, per_frame
 from emu.boards.epuck.sensors import SENSORS
 
@@ -456,10 +458,25 @@ def test_frame_is_the_picture_the_sensor_sends(robot):
 def test_decoding_gives_back_what_the_format_keeps(form):
     """Grey scales survive every format to its precision; colours survive RGB565 and, within 3, YUV pairs."""
     grey = np.repeat(np.arange(0, 256, 8, dtype=np.uint8)[:, None], 3, axis=1)
-    assert np.abs(decode(encode(grey, form, (1.0, 1.0, 1.0)), form).astype(int) - grey).max() <= 4
+
+
+    def there_and_back(pixels):
+        room = (ctypes.c_uint8 * 256)()
+        count = encode(pixels.ctypes.data, len(pixels), form, Gains(1.0, 1.0, 1.0), ctypes.addressof(room))
+        return decode(bytes(room[:count]), form).astype(int)
+
+    assert np.abs(there_and_back(grey) - grey).max() <= 4
     if form != "grey":
         red = np.tile(np.array([200, 96, 40], np.uint8), (4, 1))
-        assert np.abs(decode(encode(red, form, (1.0, 1.0, 1.0)), form).astype(int) - red).max() <= 4
+        assert np.abs(there_and_back(red) - red).max() <= 4
+
+
+def test_a_source_with_other_than_the_pixels_it_was_asked_for_is_refused(robot):
+    """Nothing is written behind the line in the record."""
+    robot.configure(po6030())
+    robot.board.camera.sample(lambda _y, columns, _cycle: np.zeros((len(columns) + 1, 3), np.uint8))
+    with pytest.raises(ValueError, match="a line of 101 pixels was asked for"):
+        robot.board.camera.frame()
 
 
 def test_turned_sensors_see_a_turned_picture(robot):
