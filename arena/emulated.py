@@ -147,6 +147,11 @@ class EmulatedBrain:
         self._look_at = look_at
         self._ring.look = self._sense_first
 
+    @property
+    def has_stopped(self) -> bool:
+        """Whether the firmware has stopped for good."""
+        return bool(self._fault)
+
     def speed(self, tick: int) -> tuple[float, float]:
         """Wheel speeds (left, right) in cm/s during a quantum that is over; asked for once."""
         return self.wheels.speed(tick)

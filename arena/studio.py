@@ -20,6 +20,7 @@ from typing import Any, Final, TypeVar
 
 from arena.campaign import Plan, brains_of
 from arena.emulated import EmulatedBrain
+from arena.handed import Handed
 from arena.page import samples_of
 from arena.record import Trial
 from arena.scene import SceneError
@@ -58,11 +59,14 @@ class Studio:
         self._deeds: list[Deed] = []
         self._again: deque[Deed] = deque()
         self._goal: int | None = None
+        self._returned = False
+        """The robot that was given to a debugger is wanted back."""
         self._pace = 1.0
         self._breaks: dict[tuple[int, str], Callable[[], None]] = {}
         self._held = ""
         self._broken = ""
         self._hold = False
+        self._handed: Handed | None = None
         self._ended = False
         self.epoch = 0
         """How often the trial was begun anew: samples of another one are not those of this."""
@@ -98,11 +102,14 @@ class Studio:
         if not pace > 0:
             raise RefusedError(f"{pace} times as fast as real time: expected a positive number")
         self._able()
+        if not self._held:
+            self._own()
         self._pace, self._hold = pace, False
         self._goal = self._running.quanta
 
     def stand(self) -> None:
         """Stand still at the end of this quantum. On the way back, what was done later is forgotten."""
+        self._own()
         self._goal = None
         self._forget(self._running.world.ticks)
 
@@ -164,15 +171,39 @@ class Studio:
         except (KeyError, ValueError) as error:
             raise RefusedError(f"robot {robot}: {error.args[0]}") from None
 
+    def debug(self, robot: int) -> None:
+        """Give a robot to a debugger, or take it back: `now` says on which port of this machine one client is served.
+        The world moves only as the client lets the robot move; then it stands. What a debugger changes in a robot is
+        not done again on the way back."""
+        if self._handed is not None and not self._held:
+            self._returned = True
+            return
+        self._free()
+        self._able()
+        if self._running.is_over:
+            raise RefusedError("the trial is over")
+        if self._emulated(robot).has_stopped:
+            raise RefusedError(f"robot {robot}: its firmware has stopped; go back first")
+        self._forget(self._running.world.ticks)
+        self._returned = False
+        try:
+            self._handed = Handed(robot, self._idle)
+        except OSError as error:
+            raise RefusedError(f"no port for a debugger: {error.strerror}") from None
+        self._handed.meet(self._running.world, self._running.brains)
+        self._pace, self._goal = 0.0, self._running.quanta
+
     def now(self) -> dict[str, Any]:
         """The present moment: cm, rad, s."""
-        world = self._running.world
+        world, handed = self._running.world, self._handed
         return {
             "tick": world.ticks, "t": world.seconds, "epoch": self.epoch, "quanta": self._running.quanta,
             "robots": world.poses.robots, "objects": world.poses.objects, "held": self._held,
             "breaks": [f"{robot} {place}" for robot, place in self._breaks],
+            "debugger": {"robot": handed.robot, "port": handed.port, "is_met": handed.is_met} if handed else None,
             "state": f"cannot go on: {self._broken}" if self._broken
-                     else "at a breakpoint" if self._held else "over" if self._running.is_over
+                     else "at a breakpoint" if self._held else "in a debugger" if handed
+                     else "over" if self._running.is_over
                      else "standing" if self._goal is None else "going back" if self._again else "running",
         }  # fmt: skip
 
@@ -237,6 +268,14 @@ class Studio:
         """To the next sample, or where something is to be done, no faster than wanted."""
         assert self._goal is not None
         running, start, before = self._running, time.monotonic(), self._running.world.seconds
+        if self._handed is not None:
+            running.go_on(running.world.ticks + 1)
+            if running.is_over:
+                self._handed.over()
+                self._handed.close()
+            if self._handed.is_over:
+                self._handed, self._goal = None, None
+            return
         running.go_on(min(self._goal, self._again[0].tick) if self._again else self._goal)
         self._do_again()
         self._answer(0)
@@ -256,6 +295,11 @@ class Studio:
             answer.set_result(what())
         except Exception as error:
             answer.set_exception(error)
+
+    def _idle(self, wait: float) -> bool:
+        """Answer while a debugger has a robot; whether it may keep it."""
+        self._answer(wait)
+        return not (self._ended or self._returned)
 
     def _begin(self) -> None:
         self._close()
@@ -300,7 +344,7 @@ class Studio:
 
     def _stands_at(self, robot: int, place: str) -> bool:
         """A robot has come to a breakpoint, in the middle of a quantum: whatever is asked for now is answered here."""
-        if self._again or self._ended:
+        if self._again or self._ended or self._emulated(robot).machine.events.quiet:
             return False
         self._held, self._hold = f"robot {robot} is at {place}", True
         while self._hold:
@@ -311,6 +355,11 @@ class Studio:
     def _free(self) -> None:
         if self._held:
             raise RefusedError(f"{self._held}; let it go on first")
+        self._own()
+
+    def _own(self) -> None:
+        if self._handed is not None:
+            raise RefusedError(f"a debugger has robot {self._handed.robot}; let it leave first")
 
     def _able(self) -> None:
         if self._broken:

@@ -31,7 +31,7 @@ HEADER: Final = "X-Studio-Token"
 DEEDS: Final[dict[str, dict[str, type]]] = {
     "go": {"pace": float}, "stand": {}, "step": {"quanta": int}, "back": {"tick": int},
     "move": {"kind": str, "number": int, "x": float, "y": float}, "tell": {"robot": int, "text": str},
-    "stop_at": {"robot": int, "place": str},
+    "stop_at": {"robot": int, "place": str}, "debug": {"robot": int},
 }  # fmt: skip
 """What can be asked for, methods of `Studio`, and the parameters it takes."""
 
