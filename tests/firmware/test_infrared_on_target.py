@@ -6,7 +6,6 @@ import math
 import struct
 
 import numpy as np
-import pytest
 
 from arena.emulated import EmulatedBrain
 from arena.ether import Ether
@@ -27,36 +26,36 @@ def statistics(machine: Machine) -> tuple[int, ...]:
 
 def test_the_camera_loses_no_pixel_while_frames_are_sent(image: Build) -> None:
     """kernel.md §4; openswarm_infrared.h: the link is at IPL 4, below the capture."""
-    machine = robot(image("infrared", TARGET_APPS))
+    machine = robot(image("infrared", TARGET_APPS), selector=15)
     machine.board.camera.show(noise())
     machine.run(cycles=FCY // 2)
-    for _ in range(3):
+    for _ in range(2):
         machine.run(cycles=1_600_000 + 137_000)
         assert np.array_equal(captured(machine), window(noise()))
-    assert statistics(machine)[SENT] >= 5
+    assert statistics(machine)[SENT] >= 3
 
 
 def test_a_number_in_the_data_eeprom_is_the_robots(image: Build) -> None:
     """openswarm_infrared.h: the last word, if it holds 1 to 2047."""
-    machine = robot(image("neighbours"))
+    machine = robot(image("infrared", TARGET_APPS))
     machine.program.put(0x7FFFFE, 42)
     machine.run(cycles=FCY // 50)
     assert machine.record.u16[machine.address_of("infrared_number") >> 1] == 42
 
 
-def test_two_robots_exchange_a_byte(image: Build) -> None:
-    """firmware/apps/neighbours/README.md: on the channel of the arena, with its noise."""
+def test_an_event_of_one_robot_is_sent_on_another(image: Build) -> None:
+    """openswarm_remote.h: the selector of one robot lights the body LED of the other too, over the arena's channel."""
     values = {"robots__count": 2, "objects__count": 0, "infrared__noise_counts": 2.0}
     scene = load_scene("clustering").with_values(**values)
     ether = Ether(2, scene.clock.quantum_tcy)
-    brains = [EmulatedBrain(scene, 1, number, image("neighbours"), 0, ether) for number in range(2)]
+    brains = [EmulatedBrain(scene, 1, number, image("infrared", TARGET_APPS), 0, ether) for number in range(2)]
     poses = Poses([(150.0, 150.0, math.pi / 2), (162.0, 150.0, math.pi / 2)], [])
-    for tick in range(math.ceil(1.25 * FCY / scene.clock.quantum_tcy)):
+    ticks = [math.ceil(seconds * FCY / scene.clock.quantum_tcy) for seconds in (0.4, 0.55)]
+    for tick in range(ticks[1]):
+        if tick == ticks[0]:
+            assert [brain.reading().leds for brain in brains] == [0, 0]
+            brains[0].machine.board.selector.position = 5
         for brain in brains:
             brain.think(tick, poses)
-    numbers = [one.machine.record.u16[one.machine.address_of("infrared_number") >> 1] for one in brains]
-    for brain, other, sensor in zip(brains, reversed(numbers), (2, 5), strict=True):
-        (line,) = brain.lines()
-        says, range_mm = line.text.rsplit(", ", 1)
-        assert says == f"{other} says 0, sensor {sensor}"
-        assert int(range_mm.removesuffix(" mm")) == pytest.approx(120, abs=15)
+    assert all("body" in brain.machine.board.leds.lit for brain in brains)
+    assert [statistics(brain.machine)[RECEIVED] for brain in brains] == [1, 2]  # the first beacons

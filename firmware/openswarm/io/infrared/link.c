@@ -15,7 +15,11 @@ enum {
     PREAMBLE = 0x3F,
     PREAMBLE_BITS = 7, /* as long as an own flash, faint light's way through the filter and LEAST_ONES */
     PICK_AFTER = 2,    /* scans of light */
-    LEAST_ONES = 5,    /* scans of light that begin a frame: proximity lights for 3 or 4 */
+    START_AFTER =
+        8, /* dark scans: what begins earlier is the middle of a frame that was not heard from its beginning */
+    LEAST_ONES = 10, /* scans of light that begin a frame: proximity lights for 3 or 4 */
+    LEAST_BEHIND_FLASH = 5,
+    FLASH_COUNTS = 24, /* scans: where an own flash may have hidden the first ones */
     MOST_ONES = 36,    /* then it is not a frame */
     CLEAR = 12,        /* dark scans: more than any usual word has in a row */
     SLOT = 3,          /* scans of back-off: a frame that begins is seen in the next */
@@ -23,6 +27,7 @@ enum {
     SLOTS_PER_NEIGHBOUR = 4,
     FLASH = 3,              /* scans of the own light: 0.5 ms settle the receivers, then they are read */
     AFTERGLOW = 2,          /* scans until the receivers have settled again */
+    MOST_BUSY = 1000,       /* scans of light without so many dark ones between: more than any frame has */
     PROXIMITY_PERIOD = 205, /* scans: 50 ms */
     FOLLOW_EVERY = 4,       /* scans */
     HOUSEKEEPING = 64,
@@ -42,6 +47,7 @@ static volatile uint8 queue_first, queue_length;
 static enum { LISTEN, ONES, BITS, SEND, FLASHING, SETTLING, RESTING } state;
 static uint8 phase;      /* scans until something is due, or of a bit */
 static uint8 lit, quiet; /* scans with light, without; in LISTEN */
+static uint16 busy;      /* scans of light that could begin nothing */
 static uint8 rest;       /* scans of silence on top before an own flash */
 static uint16 backoff;   /* scans of silence on top before an own frame */
 static uint8 sensor;     /* that hears the frame best */
@@ -155,6 +161,7 @@ static HAL_OUTLINE void listen_again(void)
     detector_forget();
     lit = 0;
     quiet = 0;
+    busy = 0;
     if (backoff == 0) { /* others may have an answer as well */
         draw_backoff();
     }
@@ -178,6 +185,13 @@ static HAL_OUTLINE void pick_sensor(void)
     state = ONES;
 }
 
+static HAL_OUTLINE void adapt(scan raw)
+{
+    count(&infrared_statistics.adaptations);
+    detector_adapt(raw);
+    listen_again();
+}
+
 static HAL_OUTLINE void measure_ones(scan raw)
 {
     uint16 reading = (uint16)(raw[sensor] << 4);
@@ -186,13 +200,11 @@ static HAL_OUTLINE void measure_ones(scan raw)
         falling = false;
         brighter(reading);
         if (ones > MOST_ONES) {
-            count(&infrared_statistics.adaptations);
-            detector_adapt(raw);
-            listen_again();
+            adapt(raw);
         }
     } else if (!falling) {
         falling = true;
-    } else if (ones < LEAST_ONES) {
+    } else if (ones < ((uint16)(scans - flashed_at) < FLASH_COUNTS ? LEAST_BEHIND_FLASH : LEAST_ONES)) {
         count(&infrared_statistics.false_starts);
         listen_again();
     } else {
@@ -275,10 +287,14 @@ static HAL_INLINE void listen(scan raw)
         detector_follow();
     }
     if (detector_filter(raw)) {
-        quiet = 0;
-        if (++lit == PICK_AFTER) {
+        if (lit == 0 && quiet < START_AFTER) {
+            if (++busy == MOST_BUSY) {
+                adapt(raw);
+            }
+        } else if (++lit == PICK_AFTER) {
             pick_sensor();
         }
+        quiet = 0;
         return;
     }
     lit = 0;
@@ -286,6 +302,9 @@ static HAL_INLINE void listen(scan raw)
         use_silence();
     } else {
         quiet++;
+        if (quiet == START_AFTER) {
+            busy = 0;
+        }
     }
 }
 

@@ -1,0 +1,31 @@
+/* The air between robots, for tests of the infra-red link: the test is the lower layer, sees what is lit, and says what the
+ * sensors read, scan by scan. */
+#ifndef INFRARED_AIR_H
+#define INFRARED_AIR_H
+
+#include "test.h"
+
+#include "../../../firmware/openswarm/io/infrared/infrared_parts.h"
+
+enum { DARK = 3800, LONGEST = 1200, EARLY = 1000 };
+
+extern unsigned int readings[HAL_INFRARED_SENSORS];
+extern bool own_light;
+extern uint16 fixed_number; /* of the robot, before it starts */
+
+void scan_isr(void);
+void scan_with(uint8 sensor, uint16 depth); /* one in which light takes so much from a sensor; 4,096 of them are a second */
+void scans_in_the_dark(unsigned n);
+void begin_link(void);
+
+/* The light of one frame, scan by scan; how many. Proximity is left out: it is three scans long and dark before and behind. */
+typedef struct {
+    bool lit[LONGEST];
+    unsigned length;
+} recording;
+
+void record(recording *r); /* the next frame that is sent */
+void play(const recording *r, uint8 sensor, uint16 depth);
+void say(const char *text, uint16 as, recording *r); /* record this message of a robot with this number */
+
+#endif
