@@ -52,11 +52,13 @@ def applied(text: str, chip: Chip) -> str:
     known, codes = settings(chip), values()
     words: dict[str, int] = {}
     findings: list[str] = []
+    given: dict[str, tuple[str, str]] = {}
     for pragma in _PRAGMA.finditer(text):
         for setting in pragma[1].split(","):
-            finding = _apply(setting, known, codes, words)
+            place = _place(text, pragma.start())
+            finding = _apply(setting, known, codes, words) or _contradicted(setting, place, given)
             if finding:
-                findings.append(f"{_place(text, pragma.start())}: error: {finding}")
+                findings.append(f"{place}: error: {finding}")
     if findings:
         raise ToolError.of(findings)
     definitions = [
@@ -86,6 +88,13 @@ def _apply(setting: str, known: dict[str, tuple[str, int]], codes: dict[str, int
         bits = bits * (mask & -mask) | ~mask
     words[register] = words.get(register, 0xFFFF) & ~mask & 0xFFFF | bits & mask
     return ""
+
+
+def _contradicted(setting: str, place: str, given: dict[str, tuple[str, str]]) -> str:
+    """Enter a setting and where it was made; returns what is wrong if it was made otherwise before."""
+    name, _, value = (word.strip() for word in setting.partition("="))
+    before, there = given.setdefault(name, (value, place))
+    return "" if before == value else f"#pragma config {name} = {value}, but {name} = {before} at {there}"
 
 
 def _hint(word: str, candidates: Iterable[str]) -> str:

@@ -130,6 +130,20 @@ def test_a_wrong_configuration_pragma_names_its_line(tmp_path: Path, capfd: pyte
     assert not (tmp_path / "main.elf").exists()
 
 
+def test_a_setting_made_twice_is_refused_unless_it_is_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Which of the two counts would depend on their order."""
+    main = tmp_path / "main.c"
+    twice = "#pragma config WDT = WDT_OFF\n#pragma config WDT = {}, GWRP = GWRP_OFF\nint main(void) {{ return 0; }}\n"
+    main.write_text(twice.format("WDT_ON"))
+    said = refusal(capsys, main)
+    assert "main.c:2: error: #pragma config WDT = WDT_ON, but WDT = WDT_OFF at" in said
+    assert "main.c:1" in said
+    main.write_text(twice.format("WDT_OFF"))
+    assert driver.main([str(main), "-o", str(tmp_path / "main.elf")]) == 0
+
+
 def test_every_value_macro_of_the_header_changes_one_word() -> None:
     """A mask has zeros only inside one setting's bits of some word, else a pragma could not use it."""
     masks = [mask for _, mask in config_pragma.settings(chip_named()).values()]
