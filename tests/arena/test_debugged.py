@@ -12,6 +12,7 @@ import pytest
 
 from arena.cli import main
 from tests.emu.dap.client import PATIENCE, ROOT, Client
+from toolchain import driver
 
 SEED = ("--seed", "3")
 
@@ -161,6 +162,26 @@ def test_at_a_prompt_by_a_script(
     assert played("stepi", "frob") == 2
     assert "line 2, frob: there is no command frob" in capsys.readouterr().err
     assert played(more=("--port", "0")) == 2
+
+
+def test_a_robot_that_ends_can_be_gone_back_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before its fault, at it, and when the trial is over: the way back leads to the same world."""
+    source, image = tmp_path / "bad.c", tmp_path / "bad.elf"
+    source.write_text("volatile int n;\nint main(void)\n{\n    n = 0x3001;\n    return *(volatile int *)n;\n}\n")
+    assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
+    back = ("reverse-continue", "world")
+    lines = ("break bad.c:4", "continue", "world", "continue", *back, "continue", "continue", *back, "detach")
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(lines)))
+    words = ["--set", "robots.count=2", "--set", "objects.count=1", "--minutes", "0.005", "--brain", str(image)]
+    assert main(["debug", "clustering", "--robot", "1", "--tui", *words]) == 0
+    told = capsys.readouterr().out
+    assert told.count("firmware fault: address error trap") == 2
+    assert "the trial is over" in told
+    worlds = [part.partition("state: ")[2][:64] for part in told.split("world: t = ")[1:]]
+    assert len(worlds) == 3
+    assert len(set(worlds)) == 1
 
 
 def test_a_robot_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
