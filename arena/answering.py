@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import suppress
 from http.server import BaseHTTPRequestHandler
 from typing import Any, Final
+
+from arena.jsontext import json_text
 
 HERE: Final = "127.0.0.1"
 """The only address that is listened on."""
@@ -31,7 +32,7 @@ class Answer(BaseHTTPRequestHandler):
 
     def send_json(self, value: Any) -> None:
         """A value."""
-        self.send(200, "application/json", json.dumps(value))
+        self.send(200, "application/json", json_text(value))
 
     def send_words(self, status: int, words: str) -> None:
         """Why it is not what was asked for."""

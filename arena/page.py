@@ -7,7 +7,6 @@ follows a running trial asks its server (`live.py`) for more of the same.
 from __future__ import annotations
 
 import base64
-import json
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from arena import bodies
 from arena.brain import STRIP_COLUMNS, STRIP_PIXELS
+from arena.jsontext import json_text
 from arena.look import colours_of
 from arena.record import Trial
 from arena.scene import Scene
@@ -32,7 +32,7 @@ def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None)
     """The page's text; `live`: it asks where it came from for more; `studio`: what it needs to take the trial in hand
     there (commands/studio.py)."""
     data = head_of(trial) | samples_of(trial) | {"live": live, "studio": studio}
-    text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
+    text = json_text(data, separators=(",", ":")).replace("</", "<\\/")
     return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, text)
 
 

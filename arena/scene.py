@@ -356,6 +356,9 @@ def _check_placed(errors: _Errors, table: str, one: Any, number: int) -> None:
 def _check_group(errors: _Errors, table: str, one: RobotGroup, number: int) -> None:
     _check_placed(errors, table, one, number)
     _check_key(errors, table, one.remote, number)
+    if abs(one.heading_deg) > 1e6:
+        words = f"{table}.heading_deg is {one.heading_deg}; expected -1e6 to 1e6, or nan for any"
+        raise errors.at(table, "heading_deg", words, number)
     if one.controller not in ("", "A", "B"):
         raise errors.at(table, "controller", f"{table}.controller is {one.controller!r}; expected A or B", number)
 

@@ -115,7 +115,7 @@ class Supervised:
             return hook(self.stage)
         except SceneError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             assert self._experiment is not None
             words = f"{type(error).__name__}: {error}{_last_line(error)}"
             raise SceneError(f"experiment {self._experiment.name}: {name}: {words}") from error

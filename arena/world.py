@@ -280,7 +280,7 @@ class World:
     def step(self, wheels: Sequence[tuple[float, float]]) -> None:
         """Act and physics: wheel speeds (left, right) in cm/s as commanded, for one quantum."""
         self._draw_noise()
-        self._wheels[:] = wheels
+        self._wheels[:] = np.reshape(wheels, (-1, 2))
         self._quantum(self._at, self._wheels_at)
         self.ticks += 1
         self.poses = self._read()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 from arena import bundle
 from arena.commands.arguments import count, count_or_none
+from arena.jsontext import json_text
 
 DIFFERENT = 1
 
@@ -64,7 +64,7 @@ def verify(options: argparse.Namespace) -> int:
         if not options.json:
             print(_said(one))
     if options.json:
-        print(json.dumps({"equal": status == 0, "trials": checks}))
+        print(json_text({"equal": status == 0, "trials": checks}))
     else:
         print(f"{len(checks)} trials computed again, all files as their hashes say")
     return status

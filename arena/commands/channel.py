@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from pathlib import Path
 from typing import Any, Final
@@ -12,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from arena.commands.run import changed
+from arena.jsontext import json_text
 from arena.optics import PUBLISHED, Optics, amplitude, distance_of
 from arena.scene import Scene, load_scene
 from arena.world import Poses
@@ -82,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     if options.figure:
         draw(optics).savefig(options.figure, dpi=100)
     if options.json:
-        print(json.dumps({"table": [dict(zip(("cm", "published", "model"), row, strict=True)) for row in rows],
+        print(json_text({"table": [dict(zip(("cm", "published", "model"), row, strict=True)) for row in rows],
                           "rms_log": error}))  # fmt: skip
         return 0
     print("| cm | published | model |\n|---|---|---|")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 from arena.commands.arguments import duration
 from arena.comparison import compared
+from arena.jsontext import json_text
 from arena.record import trials_in
 
 
@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
     """Print the table. Raises RecordError, ValueError."""
     result = compared(trials_in(options.first), trials_in(options.second), options.at)
     if options.json:
-        print(json.dumps(result))
+        print(json_text(result))
         return 0
     print(f"X = {options.first}\nY = {options.second}\n{len(result['seeds'])} seeds in common")
     for row in result["measures"]:

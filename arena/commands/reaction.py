@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -15,6 +14,7 @@ import emu
 from arena.commands.arguments import count, count_or_none
 from arena.controllers import CONTROLLERS
 from arena.firmware import image_for
+from arena.jsontext import json_text
 from arena.look import COLOURS, NOTHING, OBJECT, ROBOT
 from arena.scene import FCY
 from emu.boards.epuck.board import Epuck
@@ -132,7 +132,7 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"--brain {brain}: --word names the word that holds the left wheel's speed")
         results[Path(brain).stem] = reaction(image, word, selector, options.frames, options.seed)
     if options.json:
-        print(json.dumps(results))
+        print(json_text(results))
         return 0
     print("| | changes | median | 99 % | least | most | frames missed |\n|---|---|---|---|---|---|---|")
     for name, one in results.items():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import sys
@@ -17,6 +16,7 @@ from arena.commands.progress import Told
 from arena.controllers import CONTROLLERS
 from arena.experiments import experiment_file
 from arena.firmware import image_for
+from arena.jsontext import json_text
 from arena.record import EXPERIMENT, Trial, trials_in, write_bytes
 from arena.scene import Scene, load_scene, scripted
 from emu.places import use_cache
@@ -122,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
     results = [trial for trial in trials_in(folder) if trial.path.name in wanted]
     if options.json:
-        print(json.dumps({"folder": str(folder), "trials": list(map(summary, results)), "new": len(missing)}))
+        print(json_text({"folder": str(folder), "trials": list(map(summary, results)), "new": len(missing)}))
     else:
         print("\n".join(map(told, results)))
         print(f"{len(results)} trials in {folder}")

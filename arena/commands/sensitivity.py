@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from pathlib import Path
@@ -18,6 +17,7 @@ from arena.commands.run import changed, folder_name, with_progress
 from arena.comparison import courses
 from arena.controllers import CONTROLLERS
 from arena.experiments import experiment_file, experiment_of
+from arena.jsontext import json_text
 from arena.record import EXPERIMENT, trials_in, write_bytes, write_text
 from arena.scene import load_scene, scripted
 
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
     text = _markdown(rows, options)
     if options.save is not None:
         write_text(options.save, text)
-    print(json.dumps({"sensitivity": rows}) if options.json else text, end="" if not options.json else "\n")
+    print(json_text({"sensitivity": rows}) if options.json else text, end="" if not options.json else "\n")
     return 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from arena.commands import run as single
 from arena.comparison import courses
+from arena.jsontext import json_text
 from arena.record import trials_in
 
 EXAMPLE = "example: arena sweep clustering --brain scripted --vary camera.range_cm=100,150,inf --vary robots.count=3,5"
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
                    for name, values in ends.items()}  # fmt: skip
         rows.append({"values": settings, "n": len(done), "metrics": spreads})
     if options.json:
-        print(json.dumps({"sweep": rows}))
+        print(json_text({"sweep": rows}))
     else:
         for row in rows:
             shown = [f"{name} {one['mean']:.3g} sd {one['sd']:.2g}" for name, one in row["metrics"].items()]

@@ -128,7 +128,7 @@ class Experiment:
         try:
             found = self.all_curves(moments)
             values = {one.name: np.asarray(found[one.name], dtype=float) for one in self.curves}
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise SceneError(f"experiment {self.name}: metrics: {type(error).__name__}: {error}") from error
         wrong = [name for name, one in values.items() if one.shape != moments.times.shape]
         if wrong:
@@ -175,7 +175,7 @@ def _of_file(path: Path) -> Experiment:
     sys.modules[module.__name__] = module  # dataclasses look their module up
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         line = getattr(error, "lineno", None) or _line_in(path, error)
         raise SceneError(f"{path}:{line or 1}: {type(error).__name__}: {error}") from None
     return _experiment(path.stem, module, _digest(path))

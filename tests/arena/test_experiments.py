@@ -167,6 +167,8 @@ def test_a_supervisor_moves_things_notes_numbers_and_ends_the_trial(tmp_path: Pa
         (METRIC + "\ndef step(stage): stage.move_object(0, -1, 1)\n", "(-1, 1) cm is outside the walls"),
         (METRIC + "\ndef step(stage): stage.note('late', 1)\n", "names are noted in init first"),
         (METRIC + "\ndef init(stage): 1 / 0\n", "init: ZeroDivisionError: division by zero"),
+        ("import sys\nsys.exit(3)\n", "mine.py:2: SystemExit: 3"),
+        (METRIC + "\ndef step(stage): raise SystemExit(5)\n", "step: SystemExit: 5"),
     ],
 )
 def test_what_is_wrong_with_an_experiment_is_said_in_one_line(

@@ -16,6 +16,7 @@ from arena import campaign, cluster, versions
 from arena.campaign import Plan
 from arena.cli import main
 from arena.live import Follower, LiveFile, live_path
+from arena.page import page
 from arena.record import read_trial
 from arena.scene import load_scene, scripted
 
@@ -50,6 +51,37 @@ def test_numbers_that_are_none(words: list[str], tmp_path: Path, capsys: pytest.
     said = capsys.readouterr().err
     assert f"argument {words[0]}: {words[1]!r} must be" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_an_arena_without_robots_and_things_is_a_trial_like_any_other(tmp_path: Path) -> None:
+    """Run, drawn, told and shown."""
+    path, out = tmp_path / "empty.toml", tmp_path / "out"
+    path.write_text('name = "empty"\n[robots]\ncount = 0\n[objects]\ncount = 0\n')
+    assert main(["run", str(path), "--brain", "scripted", "--trials", "1", "--minutes", "0.02", "--out", str(out)]) == 0
+    assert main(["plot", str(out), "--out", str(tmp_path / "figures")]) == 0
+    assert main(["replay", str(out / "trial-0001.parquet"), "--export", str(tmp_path / "film.gif")]) == 0
+
+
+def test_json_knows_no_nan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A metric that is no number is null, in results and in the page."""
+    experiment = """from arena.experiments import Curve
+CURVES = [Curve("share", "share")]
+def metrics(sample): return {"share": float("nan")}
+"""
+    (tmp_path / "nan.py").write_text(experiment)
+    path, out = tmp_path / "nan.toml", tmp_path / "out"
+    path.write_text('name = "nan"\nexperiment = "nan.py"\n[[robots]]\ncount = 1\n')
+    words = ["run", str(path), "--brain", "scripted", "--trials", "1", "--minutes", "0.02", "--out", str(out), "--json"]
+    assert main(words) == 0
+
+    def refuse(name: str) -> None:
+        raise AssertionError(name)
+
+    told = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert told["trials"][0]["share"] is None
+    text = page(read_trial(out / "trial-0001.parquet"))
+    data = text.split('id="trial">')[1].split("</script>")[0]
+    assert set(json.loads(data, parse_constant=refuse)["curves"]["share"]) == {None}
 
 
 @pytest.mark.parametrize("name", ["../../evil", "/evil", "a/b", "..", "", ".hidden", "x" * 65, "a\nb"])

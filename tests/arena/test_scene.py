@@ -215,6 +215,7 @@ def test_infrared_feels_what_stands_fast_and_all_lamps(yard: Scene) -> None:
 @pytest.mark.parametrize(
     ("change", "line", "words"),
     [
+        (("count = 3", "count = 3\nheading_deg = inf"), 13, "robots.heading_deg is inf; expected -1e6 to 1e6"),
         (("count = 3", "count = -3"), 12, "robots.count is -3; expected 0 to 1000"),
         (("radius_cm = 3", 'radius_cm = "big"'), 34, "objects.radius_cm is 'big'; expected float"),
         (("height_cm = 30", "height = 30"), 41, "unknown key objects.height; expected"),
