@@ -78,7 +78,8 @@ def run(options: argparse.Namespace) -> int:
     setting = changed(load_scene(options.scene), options.set).infrared
     optics = Optics(Scene("channel", infrared=setting))
     rows = [(distance, counts, received(optics, distance, BEST_DEG, 90.0)) for distance, counts in PUBLISHED]
-    error = math.sqrt(sum(math.log(model / counts) ** 2 for _, counts, model in rows if model) / len(rows))
+    errors = [math.log(model / counts) if model else -math.inf for _, counts, model in rows]
+    error = math.sqrt(sum(one * one for one in errors) / len(rows))
     if options.figure:
         draw(optics).savefig(options.figure, dpi=100)
     if options.json:

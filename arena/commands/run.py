@@ -8,7 +8,7 @@ import re
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from arena.campaign import Done, Plan, claimed, note_host_time, open_folder, run_all
 from arena.commands.arguments import count, count_or_none, duration
@@ -113,6 +113,31 @@ def kept(plan: Plan, folder: Path) -> Plan:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
+    made = carried_out(options)
+    if options.json:
+        print(json_text({"folder": str(made.folder), "trials": list(map(summary, made.trials)), "new": made.new}))
+    else:
+        say(made)
+    return 1 if made.faults else 0
+
+
+class Made(NamedTuple):
+    """What a run has left: all its trials, of which so many are new, and whether something happened to a robot."""
+
+    folder: Path
+    trials: list[Trial]
+    new: int
+    faults: bool
+
+
+def say(made: Made) -> None:
+    """A line per trial, and how many there are."""
+    print("\n".join(map(told, made.trials)))
+    print(f"{len(made.trials)} trials in {made.folder}")
+
+
+def carried_out(options: argparse.Namespace) -> Made:
+    """Run what is missing. Raises as `run`."""
     plan = planned(options, options.trials)
     folder = options.out or Path("results") / f"{plan.scene.name}-{plan.brain}-{options.controller}"
     with claimed(folder):
@@ -120,13 +145,8 @@ def run(options: argparse.Namespace) -> int:
         plan = kept(plan, folder)
         faults = with_progress(plan, folder, missing, options.jobs, options.scheduler, options.processes)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
-    results = [trial for trial in trials_in(folder) if trial.path.name in wanted]
-    if options.json:
-        print(json_text({"folder": str(folder), "trials": list(map(summary, results)), "new": len(missing)}))
-    else:
-        print("\n".join(map(told, results)))
-        print(f"{len(results)} trials in {folder}")
-    return 1 if faults else 0
+    trials = [trial for trial in trials_in(folder) if trial.path.name in wanted]
+    return Made(folder, trials, len(missing), bool(faults))
 
 
 def summary(trial: Trial) -> dict[str, Any]:

@@ -40,8 +40,10 @@ def run(options: argparse.Namespace) -> int:
     for settings in itertools.product(*axes):
         quiet.set = [*options.set, *settings]
         quiet.out = base / "-".join(map(single.folder_name, settings))
-        status = max(status, single.run(quiet))
-        trials = trials_in(quiet.out)
+        made = single.carried_out(quiet)
+        status, trials = max(status, int(made.faults)), trials_in(quiet.out)
+        if not options.json:
+            single.say(made)
         done = [one for _, one in courses(trials).values()]
         curves = trials[0].experiment.curves
         ends = {one.name: [course.last(one.name) for course in done] for one in curves}

@@ -200,6 +200,9 @@ def test_sweeps_run_every_combination(tmp_path: Path, capsys: pytest.CaptureFixt
     assert len(list(tmp_path.glob("*/trial-0001.parquet"))) == 4
     assert read_trial(tmp_path / "robots.count=2-camera.range_cm=inf" / "trial-0001.parquet").robots.shape[1] == 2
     assert "robots.count=2, camera.range_cm=inf" in capsys.readouterr().out
+    assert main(["sweep", "clustering", *SHORT, *vary, *out, "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["sweep"]
+    assert [row["values"][0] for row in rows] == ["robots.count=1"] * 2 + ["robots.count=2"] * 2
 
 
 def test_plot_draws_the_figures(tmp_path: Path) -> None:
