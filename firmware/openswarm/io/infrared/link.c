@@ -22,8 +22,8 @@ enum {
     FLASH_COUNTS = 24, /* scans: where an own flash may have hidden the first ones */
     MOST_ONES = 36,    /* then it is not a frame */
     CLEAR = 12,        /* dark scans: more than any usual word has in a row */
-    SLOT = 3,          /* scans of back-off: a frame that begins is seen in the next */
-    FIRST_SLOTS = 8,
+    SLOT = 6,          /* scans of back-off: faint light is seen so late */
+    FIRST_SLOTS = 12,
     SLOTS_PER_NEIGHBOUR = 4,
     FLASH = 3,              /* scans of the own light: 0.5 ms settle the receivers, then they are read */
     AFTERGLOW = 2,          /* scans until the receivers have settled again */

@@ -40,8 +40,9 @@ void hal_infrared_light(bool on)
 /* The last word of the data EEPROM; erased it reads FFFF. */
 uint16_t hal_infrared_number(void)
 {
+    uint16_t number;
     TBLPAG = 0x7F;
-    uint16_t number = __builtin_tblrdl(0xFFFE);
+    __asm__ volatile("tblrdl [%1], %0" : "=r"(number) : "r"(0xFFFEu));
     return number > 0x07FF ? 0 : number;
 }
 
