@@ -79,7 +79,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     copied = is_standard(path) or is_opened(target)
     folder = None if copied else target.parent
-    handle, name = tempfile.mkstemp(dir=folder, prefix=f".{target.name}.", suffix=".part")
+    handle, name = tempfile.mkstemp(dir=folder, prefix=f"{target.name}.", suffix=".part")
     os.close(handle)
     part = Path(name)
     try:

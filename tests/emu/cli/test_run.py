@@ -247,7 +247,9 @@ def test_ctrl_c_ends_a_run_cleanly(build, tmp_path):
         [sys.executable, "-m", "emu", "run", build(SPIN), "--trace", str(trace)],
         stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT,
     )  # fmt: skip
+    deadline = time.monotonic() + 60
     while not list(tmp_path.glob("trace.txt*")):
+        assert time.monotonic() < deadline
         time.sleep(0.02)
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
