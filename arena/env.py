@@ -16,11 +16,13 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from arena import bodies, infrared
+from arena import bodies
 from arena.brain import Brain, ScriptedBrain
 from arena.emulated import EmulatedBrain
 from arena.ether import Ether
 from arena.experiments import Experiment, Moments, experiment_of
+from arena.infrared import ambient
+from arena.optics import Optics
 from arena.scene import FCY, Scene, load_scene, scripted
 from arena.sight import Sight
 from arena.stage import Stage, Supervised
@@ -104,7 +106,8 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         count = self.scene.robots.count
         self.agents = self.possible_agents[:]
         self._world = World(self.scene, chosen)
-        ether = Ether(count, self.scene.clock.quantum_tcy)
+        self._optics = Optics(self.scene)
+        ether = Ether.of(self.scene)
         if self._image is None:
             self._brains = [ScriptedBrain(self.scene, chosen, robot, "A") for robot in range(count)]
         else:
@@ -177,8 +180,8 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
             self._sights[robot].look(poses)
             sensed[self._sights[robot].sensor()] = 1.0
             near = [share * reflection_at(distance) / FULL_REFLECTION if math.isfinite(distance) else 0.0
-                    for distance, share in infrared.surfaces(self.scene, poses, robot)]  # fmt: skip
-            light = [counts / FULL_LIGHT for counts in infrared.ambient(self.scene, poses.robots[robot])]
+                    for distance, share in self._optics.surfaces(poses, robot)]  # fmt: skip
+            light = [counts / FULL_LIGHT for counts in ambient(self.scene, poses.robots[robot])]
             values = (*sensed, *near, *light, *self._speeds[robot])
             found[agent] = np.clip(np.array(values, dtype=np.float32), -1, 1)
         return found

@@ -63,15 +63,3 @@ def distance_to(x: float, y: float, side: Side) -> float:
     length2 = dx * dx + dy * dy
     along = 0.0 if length2 == 0 else min(max(((x - x1) * dx + (y - y1) * dy) / length2, 0.0), 1.0)
     return float(((x - x1 - along * dx) ** 2 + (y - y1 - along * dy) ** 2) ** 0.5)
-
-
-def meeting(x: float, y: float, east: float, north: float, side: Side) -> float:
-    """How far along a ray from a point it meets a side; inf if it does not."""
-    x1, y1, x2, y2 = side
-    ex, ey = x2 - x1, y2 - y1
-    across = east * ey - north * ex
-    if across == 0:
-        return float("inf")
-    along = ((x1 - x) * ey - (y1 - y) * ex) / across
-    part = ((x1 - x) * north - (y1 - y) * east) / across
-    return along if along > 0 and 0 <= part <= 1 else float("inf")

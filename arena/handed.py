@@ -13,12 +13,12 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Final
 
+from arena.answering import HERE
 from arena.debugged import Debugged, Recording
 from emu.dap.server import Server
 from emu.dap.wire import Message, Wire
 from emu.machine import Machine
 
-HERE: Final = "127.0.0.1"
 LOOK_S: Final = 0.01
 """How long the studio may wait for somebody before it is looked whether the client has said something."""
 PAST: Final = "this is the past, and the other robots have seen what came of it: go back to the present to change it"

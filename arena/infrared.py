@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Final, NamedTuple
+from typing import Final
 
-from arena import bodies, geometry
+from arena import bodies
 from arena.ether import Ether
 from arena.optics import Optics, Signal
 from arena.scene import FCY, Scene
@@ -24,13 +24,6 @@ LAMP_CM: Final = 100.0
 """Distance at which `light.lamp_counts` holds."""
 _RIPPLE: Final = math.tau * 100 / FCY
 """Of lamps on the mains, rad per Tcy."""
-
-
-class Surface(NamedTuple):
-    """What a sensor's axis meets: mm from the sensor, and reflection as a share of a white perpendicular surface's."""
-
-    millimetres: float
-    share: float
 
 
 class Ring:
@@ -120,102 +113,10 @@ class Ring:
             self._board.ir.reflection[sensor] = round(reflection_at(distance) * share)
 
 
-_BEARINGS: Final = tuple(math.radians(bearing) for bearing in bodies.IR_BEARINGS_DEG)
-
-
-def _axis(pose: tuple[float, float, float], sensor: int) -> tuple[float, float]:
-    """Unit vector of a sensor of a robot, which is also its emitter's."""
-    angle = pose[2] - _BEARINGS[sensor]
-    return math.cos(angle), math.sin(angle)
-
-
-def _axes(pose: tuple[float, float, float]) -> list[tuple[float, float]]:
-    """Of all of them."""
-    return [_axis(pose, sensor) for sensor in range(SENSORS)]
-
-
-def surfaces(scene: Scene, poses: Poses, robot: int) -> list[Surface]:
-    """What each sensor's axis meets from the body's edge: wall, object or robot, beyond IR_RANGE nothing (inf mm)."""
-    near = nearby(scene, poses, robot)
-    return [surface(scene, near, sensor) for sensor in range(SENSORS)]
-
-
-class Nearby(NamedTuple):
-    """What sensors of a robot can reach: discs as (x, y, radius, share) from its middle, sides with their shares."""
-
-    pose: tuple[float, float, float]
-    discs: list[tuple[float, float, float, float]]
-    outlines: list[tuple[geometry.Side, float]]
-
-
-def nearby(scene: Scene, poses: Poses, robot: int) -> Nearby:
-    """What is near a robot."""
-    x, y, _ = pose = poses.robots[robot]
-    ring = scene.infrared
-    discs = [(ox - x, oy - y, radius, share) for ox, oy, radius, share in _objects(scene, poses)]
-    discs += [(one.x_cm - x, one.y_cm - y, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
-    discs += [(one[0] - x, one[1] - y, bodies.ROBOT_RADIUS, ring.robot_share)
-              for i, one in enumerate(poses.robots) if i != robot]  # fmt: skip
-    reach = bodies.ROBOT_RADIUS + bodies.IR_RANGE
-    near = [disc for disc in discs if disc[0] * disc[0] + disc[1] * disc[1] < (reach + disc[2]) ** 2]
-    return Nearby(pose, near, [one for one in _outlines(scene) if geometry.distance_to(x, y, one[0]) < reach])
-
-
-def surface(scene: Scene, near: Nearby, sensor: int) -> Surface:
-    """What one sensor's axis meets. A surface that stands askew reflects by the cosine (Lambert, UNVERIFIED)."""
-    x, y, _ = near.pose
-    east, north = _axis(near.pose, sensor)
-    to_x, to_y = _to_wall(x, east, scene.arena.width_cm), _to_wall(y, north, scene.arena.height_cm)
-    distance, share = (to_x, abs(east)) if to_x < to_y else (to_y, abs(north))
-    share *= scene.infrared.wall_share
-    for side, white in near.outlines:
-        along = geometry.meeting(x, y, east, north, side)
-        if along < distance:
-            distance, share = along, white * abs(_facing(side, east, north))
-    for dx, dy, r, white in near.discs:
-        along = dx * east + dy * north
-        root = r * r - (dx * dx + dy * dy - along * along)
-        if root > 0 and along > 0 and along - math.sqrt(root) < distance:
-            distance, share = along - math.sqrt(root), white * math.sqrt(root) / r
-    gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
-    return Surface(10 * gap, share) if gap <= bodies.IR_RANGE else Surface(math.inf, 0.0)
-
-
-def _outlines(scene: Scene) -> list[tuple[geometry.Side, float]]:
-    """Sides of the room and of obstacles with their shares, made once for a scene."""
-    kept = _kept.get(id(scene))
-    if kept is None or kept[0] is not scene:
-        room = geometry.sides(scene.arena.polygon) if scene.arena.polygon else []
-        found = [(side, scene.infrared.wall_share) for side in room]
-        found += [(side, one.share) for one in scene.obstacles if one.polygon for side in geometry.sides(one.polygon)]
-        if len(_kept) > 16:
-            _kept.clear()
-        kept = _kept[id(scene)] = scene, found
-    return kept[1]
-
-
-_kept: dict[int, tuple[Scene, list[tuple[geometry.Side, float]]]] = {}
-
-
-def _objects(scene: Scene, poses: Poses) -> list[tuple[float, float, float, float]]:
-    """Place, radius and share of every object."""
-    if not scene.kinds:
-        return [(x, y, scene.objects.radius_cm, scene.infrared.object_share) for x, y in poses.objects]
-    kinds = map(scene.kind_of, range(len(poses.objects)))
-    return [(x, y, one.radius_cm, one.share) for (x, y), one in zip(poses.objects, kinds, strict=True)]
-
-
-def _facing(side: geometry.Side, east: float, north: float) -> float:
-    """Cosine between a ray and what stands upright on a side."""
-    dx, dy = side[2] - side[0], side[3] - side[1]
-    return (east * dy - north * dx) / math.hypot(dx, dy)
-
-
-def _to_wall(at: float, direction: float, size: float) -> float:
-    """Along a ray to the walls at 0 and `size` of one axis."""
-    if direction == 0:
-        return math.inf
-    return ((size if direction > 0 else 0.0) - at) / direction
+def _axes(heading: float) -> list[tuple[float, float]]:
+    """Unit vectors along which the sensors of a robot look."""
+    angles = [heading - math.radians(bearing) for bearing in bodies.IR_BEARINGS_DEG]
+    return [(math.cos(angle), math.sin(angle)) for angle in angles]
 
 
 def ambient(scene: Scene, pose: tuple[float, float, float]) -> list[int]:
@@ -232,6 +133,6 @@ def ambient(scene: Scene, pose: tuple[float, float, float]) -> list[int]:
         dx, dy = x - pose[0], y - pose[1]
         distance = max(math.hypot(dx, dy), bodies.ROBOT_RADIUS)
         full = counts * (LAMP_CM / distance) ** 2
-        for sensor, (east, north) in enumerate(_axes(pose)):
+        for sensor, (east, north) in enumerate(_axes(pose[2])):
             taken[sensor] += full * max((dx * east + dy * north) / distance, 0.0)
     return [round(max(light.ambient_counts - one, 0.0)) for one in taken]

@@ -90,5 +90,5 @@ class LockStep:
         """Let the world make the quanta that all robots have lived."""
         world = self._world
         first = world.ticks + 1
-        self._past.update(enumerate(world.go(self._speeds_at, ticks - world.ticks), first))
+        self._past.update(enumerate(world.go(self._speeds_at, ROOM, ticks - world.ticks), first))
         self._ether.slowest = world.ticks * self._ether.quantum

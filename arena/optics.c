@@ -1,5 +1,5 @@
-// Infrared light in the world: from robot to robot as optics.py defines it, and what a sensor sees of its own light as
-// infrared.py does. The same arithmetic in the same order. Lengths cm.
+// Infrared light in the world: from robot to robot, and what a sensor sees of its own light, as optics.py tells it. The
+// tests have the plain text. Lengths cm.
 
 #include <stdint.h>
 
@@ -124,8 +124,8 @@ static f64 to_wall(f64 at, f64 direction, f64 size)
     return direction == 0 ? __builtin_inf() : ((direction > 0 ? size : 0) - at) / direction;
 }
 
-// What the axis of a robot's sensor meets: cm from the robot's edge and share of a white surface's reflection, as
-// `infrared.surface`; infinity and 0 out of range.
+// What the axis of a robot's sensor meets: cm from the robot's edge and share of a white surface's reflection; infinity
+// and 0 out of range.
 void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
 {
     const f64 *here = p->values + 3 * own;

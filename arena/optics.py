@@ -39,6 +39,14 @@ _LINES: Final = len(PULSE_PINS)
 _BEARINGS: Final = tuple(math.radians(bearing) for bearing in bodies.IR_BEARINGS_DEG)
 
 
+class Surface(NamedTuple):
+    """What a sensor's axis meets: mm from the robot's edge, and reflection as a share of a white perpendicular
+    surface's. Askew it reflects by the cosine (Lambert, UNVERIFIED); beyond `bodies.IR_RANGE` is nothing (inf)."""
+
+    millimetres: float
+    share: float
+
+
 class Signal(NamedTuple):
     """What a robot can get of another's light: counts of each pulse line on a sensor that faces it, times the sensor's
     share."""
@@ -142,8 +150,12 @@ class Optics:
                 found.append(Signal(other, values[:_LINES], values[_LINES:]))
         return found
 
-    def surface(self, poses: Poses, robot: int, sensor: int) -> tuple[float, float]:
-        """mm from the robot's edge to what a sensor's axis meets, and its share of a white surface's reflection."""
+    def surface(self, poses: Poses, robot: int, sensor: int) -> Surface:
+        """What a sensor's axis meets: wall, object or robot."""
         self._look(poses)
         self._surface(self._at, self._poses_at, robot, sensor, self._found_at)
-        return 10 * self._found[0], self._found[1]
+        return Surface(10 * self._found[0], self._found[1])
+
+    def surfaces(self, poses: Poses, robot: int) -> list[Surface]:
+        """Of all sensors."""
+        return [self.surface(poses, robot, sensor) for sensor in range(SENSORS)]

@@ -5,11 +5,10 @@
 typedef int64_t i64;
 typedef double f64;
 
-enum { ROOM = 4096 }; // as in wheels.py
-
-// Counts (left, right) of the last quanta lie in a ring of `most`; `rates` makes a speed of the steps of n quanta.
+// Counts (left, right) of the last quanta lie in a ring of `most`, speeds in one of `room`; `rates` makes a speed of the
+// steps of n quanta.
 struct drive {
-    i64 most, filled, newest;
+    i64 room, most, filled, newest;
     i64 *counts;
     const f64 *rates;
     f64 *speeds;
@@ -26,7 +25,7 @@ void turned(struct drive *d, i64 first, i64 count, const i64 *steps)
             i64 now = steps[2 * i + side];
             d->counts[2 * d->newest + side] = now;
             i64 made = now - d->counts[2 * oldest + side];
-            d->speeds[2 * ((first + i) % ROOM) + side] = (f64)made * d->rates[d->filled - 1];
+            d->speeds[2 * ((first + i) % d->room) + side] = (f64)made * d->rates[d->filled - 1];
         }
     }
 }

@@ -20,11 +20,11 @@ from emu.hostcode import ADDRESS, INT, functions
 WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed."""
 ROOM: Final = 4096
-"""Quanta that are kept, as in world.c."""
+"""Quanta that are kept."""
 
 
 class _Drive(Structure):
-    _fields_ = [*((name, c_int64) for name in ("most", "filled", "newest")),
+    _fields_ = [*((name, c_int64) for name in ("room", "most", "filled", "newest")),
                 *((name, c_void_p) for name in ("counts", "rates", "speeds"))]  # fmt: skip
 
 
@@ -44,7 +44,7 @@ class Wheels:
         self._rates: Final = (c_double * (window + 1))(*rates)
         self._speeds: Final = (c_double * (2 * ROOM))()
         addresses = addressof(self._counts), addressof(self._rates), addressof(self._speeds)
-        self._drive: Final = _Drive(window + 1, 1, 0, *addresses)
+        self._drive: Final = _Drive(ROOM, window + 1, 1, 0, *addresses)
         self._at: Final = addressof(self._drive)
         self._turned: Final = _turned()
         self.address: Final = addressof(self._speeds)

@@ -6,8 +6,6 @@
 typedef int64_t i64;
 typedef double f64;
 
-enum { ROOM = 4096 }; // as in wheels.py
-
 extern f64 sin(f64);
 extern f64 cos(f64);
 
@@ -81,13 +79,14 @@ void quantum(struct world *w, const f64 *wheels)
     w->c.step(w->space, w->dt);
 }
 
-// Quanta in a row, from number `first` on. Speeds of robot r in quantum n: speeds[r] + 2 (n mod ROOM). What `wheels` and
+// Quanta in a row, from number `first` on. Speeds of robot r in quantum n: speeds[r] + 2 (n mod room). What `wheels` and
 // `out` hold: speeds of one quantum, poses at the end of each, `numbers` of them.
-void quanta(struct world *w, const f64 *const *speeds, i64 first, i64 count, f64 *wheels, f64 *out, i64 numbers)
+void quanta(struct world *w, const f64 *const *speeds, i64 room, i64 first, i64 count, f64 *wheels, f64 *out,
+            i64 numbers)
 {
     for (i64 n = first; n < first + count; n++, out += numbers) {
         for (i64 r = 0; r < w->robot_count; r++)
-            wheels[2 * r] = speeds[r][2 * (n % ROOM)], wheels[2 * r + 1] = speeds[r][2 * (n % ROOM) + 1];
+            wheels[2 * r] = speeds[r][2 * (n % room)], wheels[2 * r + 1] = speeds[r][2 * (n % room) + 1];
         quantum(w, wheels);
         poses(w, out);
     }

@@ -128,7 +128,7 @@ class _World(Structure):
 def _code() -> dict[str, Callable[..., Any]]:
     return functions(Path(__file__).with_name("world.c"), {
         "quantum": (None, (ADDRESS, ADDRESS)), "poses": (None, (ADDRESS, ADDRESS)),
-        "quanta": (None, (ADDRESS, ADDRESS, INT, INT, ADDRESS, ADDRESS, INT)),
+        "quanta": (None, (ADDRESS, ADDRESS, INT, INT, INT, ADDRESS, ADDRESS, INT)),
     })  # fmt: skip
 
 
@@ -285,16 +285,16 @@ class World:
         self.ticks += 1
         self.poses = self._read()
 
-    def go(self, speeds: int, count: int) -> Iterator[Poses]:
-        """So many quanta at the wheel speeds in each robot's `Wheels`, to whose addresses `speeds` is the address;
-        poses at the end of each. They are computed in rows, none before it is asked for."""
+    def go(self, speeds: int, room: int, count: int) -> Iterator[Poses]:
+        """So many quanta at wheel speeds that lie where `Wheels` keeps them, `room` per robot: `speeds` is the address
+        of a table of addresses. Poses at the end of each; they are computed in rows, none before it is asked for."""
         while count:
             self._draw_noise()
             row = self._room()
             more = min(count, self._noise_ticks - self.ticks % self._noise_ticks, ROWS - row)
             size = self._sheet.itemsize * self._numbers
             at = self._sheet_at + row * size
-            self._quanta(self._at, speeds, self.ticks, more, self._wheels_at, at, self._numbers)
+            self._quanta(self._at, speeds, room, self.ticks, more, self._wheels_at, at, self._numbers)
             self._row += more
             count -= more
             for number in range(more):

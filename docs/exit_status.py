@@ -15,8 +15,8 @@ Of `emu`, `toolchain`, `dspic-*`, `arena` and `openswarm`; written by `python do
 
 With `emu run --exit-code` every other status is the firmware's own: the low eight bits of what `main` returned.
 
-`-` is standard input where a file is read as a whole, and standard output where one is written. Exceptions: files that a command reads
-*and* writes (`--state`, `--update`, `--document`) and films, whose kind is in their name.
+`-` is standard input where a file is read as a whole, and standard output where one is written. Exceptions: files that
+a command reads *and* writes (`--state`, `--update`, `--document`) and films, whose kind is in their name.
 """
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from pathlib import Path
 from arena.emulated import EmulatedBrain
 from arena.ether import Ether
 from arena.firmware import image_for
+from arena.optics import amplitude
 from arena.scene import FCY, load_scene
 from arena.world import Poses
 
@@ -68,7 +69,7 @@ def measure(job: Job) -> Found:
     robots = len(job.poses.robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": job.noise}
     scene = load_scene("clustering").with_values(**values)
-    ether = Ether(robots, scene.clock.quantum_tcy)
+    ether = Ether.of(scene)
     image = image_for("chatter")
     assert image is not None
     brains = [EmulatedBrain(scene, 1, number, image, job.selector, ether) for number in range(robots)]
@@ -104,11 +105,6 @@ def ring(robots: int) -> Poses:
     radius = 5 / math.sin(math.pi / robots)
     turns = [2 * math.pi * number / robots for number in range(robots)]
     return Poses([(150 + radius * math.cos(a), 150 + radius * math.sin(a), 1.7 * a) for a in turns], [])
-
-
-def amplitude(distance: float) -> float:
-    """Counts, published (swarmcom.md §3.1, §7)."""
-    return 10_269 * (distance - 6) ** -2.354
 
 
 def expected(distance: float, noise: float) -> tuple[float, float]:

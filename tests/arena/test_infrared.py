@@ -17,7 +17,7 @@ from arena import bodies, geometry
 from arena.cli import main
 from arena.emulated import EmulatedBrain, volts_after
 from arena.ether import Ether
-from arena.infrared import ambient, surfaces
+from arena.infrared import ambient
 from arena.optics import PUBLISHED, Optics, amplitude, beam, brightest, distance_of
 from arena.scene import FCY, Scene, SceneError, load_scene
 from arena.world import Poses, World
@@ -98,7 +98,7 @@ def built(folder: Path, text: str, name: str) -> Path:
 def test_rays_measure_from_the_body_to_walls_and_discs_with_their_reflection(scene: Scene) -> None:
     """Bearings clockwise from the front, mm; share by body and angle; nothing beyond the response table."""
     scene = scene.with_values(infrared__object_share=0.6, infrared__wall_share=0.9)
-    seen = surfaces(scene, Poses([(8.7, 150.0, UP)], [(17.5, 150.0)]), 0)
+    seen = Optics(scene).surfaces(Poses([(8.7, 150.0, UP)], [(17.5, 150.0)]), 0)
     assert seen[2] == pytest.approx((10 * (8.8 - 3.7 - 5.0), 0.6))  # sensor 2 looks right, where the object is
     assert seen[5] == pytest.approx((10 * (8.7 - 3.7), 0.9))  # sensor 5 looks left, to the wall
     assert seen[0] == seen[7] == (math.inf, 0.0)
@@ -106,7 +106,8 @@ def test_rays_measure_from_the_body_to_walls_and_discs_with_their_reflection(sce
 
 def test_an_askew_wall_reflects_by_the_cosine(scene: Scene) -> None:
     """Sensor 2 looks 90 degrees to the right; turned by 30 degrees it sees 2/sqrt(3) as far and cos 30 as much."""
-    (straight, askew) = (surfaces(scene, Poses([(8.7, 150.0, a)], []), 0)[2] for a in (-UP, -UP + math.pi / 6))
+    optics = Optics(scene)
+    straight, askew = (optics.surface(Poses([(8.7, 150.0, a)], []), 0, 2) for a in (-UP, -UP + math.pi / 6))
     assert straight == pytest.approx((50.0, 1.0))
     assert askew.millimetres == pytest.approx(10 * (8.7 / math.cos(math.pi / 6) - 3.7))
     assert askew.share == pytest.approx(math.cos(math.pi / 6))
@@ -168,6 +169,18 @@ def test_walls_objects_and_other_robots_hide_the_light(scene: Scene) -> None:
     assert received(bent, here, (100.0, 120.0, UP)) > 0
 
 
+def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) -> float:
+    """How far along a ray from a point it meets a side; inf if it does not."""
+    x1, y1, x2, y2 = side
+    ex, ey = x2 - x1, y2 - y1
+    across = east * ey - north * ex
+    if across == 0:
+        return float("inf")
+    along = ((x1 - x) * ey - (y1 - y) * ex) / across
+    part = ((x1 - x) * north - (y1 - y) * east) / across
+    return along if along > 0 and 0 <= part <= 1 else float("inf")
+
+
 def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, float, list[float]]]:
     """(robot, all its counts on a sensor that faces it, shares of the sensors), as optics.py says it."""
     x, y, heading = poses.robots[robot]
@@ -181,12 +194,45 @@ def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, flo
         line = (x, y, to_x, to_y)
         hidden = any(geometry.distance_to(*disc[:2], line) < disc[2]
                      for number, disc in enumerate(discs) if number not in (robot, other))  # fmt: skip
-        hidden |= any(geometry.meeting(x, y, to_x - x, to_y - y, side) < 1
+        hidden |= any(meeting(x, y, to_x - x, to_y - y, side) < 1
                       for shape in shapes if shape for side in geometry.sides(shape))  # fmt: skip
         if other != robot and strength >= 0.1 and not hidden:
             towards = math.atan2(to_y - y, to_x - x)
             counts = strength / brightest(20.0) * sum(beam(towards + math.pi - turned, 20.0))
             found.append((other, counts, beam(towards - heading, 3.3)))
+    return found
+
+
+def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, float]]:
+    """What each sensor's axis meets: mm and share."""
+    x, y, heading = poses.robots[robot]
+    width, height = scene.arena.width_cm, scene.arena.height_cm
+    corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
+    room = geometry.sides(corners) + (geometry.sides(scene.arena.polygon) if scene.arena.polygon else [])
+    sides = [(side, scene.infrared.wall_share) for side in room]
+    sides += [(side, one.share) for one in scene.obstacles if one.polygon for side in geometry.sides(one.polygon)]
+    kinds = map(scene.kind_of, range(len(poses.objects)))
+    discs = [(*place, one.radius_cm, one.share) for place, one in zip(poses.objects, kinds, strict=True)]
+    discs += [(one.x_cm, one.y_cm, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
+    discs += [(*one[:2], bodies.ROBOT_RADIUS, scene.infrared.robot_share)
+              for i, one in enumerate(poses.robots) if i != robot]  # fmt: skip
+    found = []
+    for bearing in bodies.IR_BEARINGS_DEG:
+        east, north = math.cos(heading - math.radians(bearing)), math.sin(heading - math.radians(bearing))
+        met = []
+        for side, share in sides:
+            dx, dy = side[2] - side[0], side[3] - side[1]
+            askew = abs(east * dy - north * dx) / math.hypot(dx, dy)
+            met.append((meeting(x, y, east, north, side), share * askew))
+        for at_x, at_y, radius, share in discs:
+            dx, dy = at_x - x, at_y - y
+            along, aside = dx * east + dy * north, dx * north - dy * east
+            if along > 0 and abs(aside) < radius:
+                half = math.sqrt(radius * radius - aside * aside)
+                met.append((along - half, share * half / radius))
+        distance, share = min(met)
+        gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
+        found.append((10 * gap, share) if gap <= bodies.IR_RANGE else (math.inf, 0.0))
     return found
 
 
@@ -204,8 +250,8 @@ def test_the_compiled_optics_is_the_plain_one() -> None:
             assert sum(one.counts) == pytest.approx(counts, rel=1e-9)
             assert one.shares == pytest.approx(shares, rel=1e-9, abs=1e-12)
         count += len(found)
-        for sensor, one in enumerate(surfaces(scene, poses, 0)):
-            assert optics.surface(poses, 0, sensor) == pytest.approx(tuple(one), rel=1e-9, abs=1e-9)
+        for one, other in zip(plain_surfaces(scene, poses, 0), optics.surfaces(poses, 0), strict=True):
+            assert other == pytest.approx(one, rel=1e-9, abs=1e-9)
     assert count > 50
     with pytest.raises(ValueError, match="7 objects are more than the scene has"):
         optics.surface(Poses([(9.0, 9.0, 0.0)], [(9.0, 9.0)] * 7), 0, 0)
