@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+import emu
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import HEADERS
 from toolchain.bounds.notes import read_notes
@@ -37,6 +38,10 @@ PROMISES = {
 
 Behind a promise that was measured lie ways the bound cannot rule out: for a send, a payload among the constants and a
 scheduler that preempts."""
+LINK = ("Sys_Send_Neighbours", "Sys_Get_Neighbours", "Sys_Get_RobotNumber", "Sys_Set_RobotNumber",
+        "Sys_Set_InfraredThreshold", "Sys_Estimate_Range")  # fmt: skip
+"""Calls of openswarm_infrared.h; those that start something are made once."""
+RETURN_ADDRESS = 4
 DEVICES_MASKED = 56
 """Longest time levels 4 and 5 are held back: with the frame of a SYS_DSP thread (port/dspic30f/README.md)."""
 
@@ -61,6 +66,28 @@ def test_a_call_takes_no_longer_than_its_contract(calls, call: str) -> None:
     assert not bound.open
     assert bound.cycles <= slack * cycles
     assert cycles <= 1.6 * bound.cycles
+
+
+@pytest.mark.parametrize("call", LINK)
+def test_a_call_of_the_link_takes_no_longer_than_its_contract(image: Build, call: str) -> None:
+    """Of most by its bound; of a send, whose copy the bound cannot tell from a longer one, on the emulator."""
+    path = image("infrared-calls", TARGET_APPS, "OPTIMISE=-Os -fno-lto")
+    executable = read_executable(path.read_bytes(), str(path))
+    program = Program(executable, Annotations(), read_notes(executable, LOAD))
+    bound = Analyst(program).bound(call, program.address(call), "call")
+    line = (HEADERS / "openswarm_infrared.h").read_text().partition(f" {call}(")[0].rpartition("| no | ")[2]
+    cycles, stack = (int(word) for word in line.split(" | ")[:2])
+    assert stack == max(bound.stack.values()) + RETURN_ADDRESS
+    machine = emu.load(path)
+    assert machine.run(until=call, seconds=1).reason == "until"
+    start, top = machine.cycle, machine.w[15]
+    back = machine.peek(top - 4) | machine.peek(top - 2) << 16
+    assert machine.run(until=back, seconds=1).reason == "until"
+    assert machine.cycle - start <= cycles
+    if call == "Sys_Send_Neighbours":
+        assert machine.cycle - start == cycles
+    else:
+        assert bound.cycles <= cycles <= 1.6 * bound.cycles
 
 
 def test_everything_in_an_image_of_ours_is_bounded(image: Build, capsys: pytest.CaptureFixture[str]) -> None:

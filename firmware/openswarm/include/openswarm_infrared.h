@@ -63,25 +63,25 @@ sys_message_processor Sys_Set_MessageProcessor(sys_message_processor processor);
 typedef bool (*sys_sending_processor)(uint8 *payload, uint8 *size);
 sys_sending_processor Sys_Set_SendingProcessor(sys_sending_processor processor); /* MTHI */
 
-/* M | no | - | 40 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
+/* M | no | - | 38 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_Infrared(void);
 
-/* MTHI | no | ~250 | 40 | ARGUMENT, BUSY.  Queues a message of 1 to SYS_MESSAGE_BYTES bytes. BUSY: SYS_INFRARED_QUEUE wait. */
+/* MTHI | no | 126 | 30 | ARGUMENT, BUSY.  Queues a message of 1 to SYS_MESSAGE_BYTES bytes. BUSY: SYS_INFRARED_QUEUE wait. */
 bool Sys_Send_Neighbours(const void *payload, uint16 size);
 
-/* MTHI | no | ~30 + 20 each | 10 | none.  Copies up to most neighbours, in no order; how many. */
+/* MTHI | no | 321 | 12 | none.  Copies up to most neighbours, in no order; how many. */
 uint8 Sys_Get_Neighbours(sys_neighbour *neighbours, uint8 most);
 
-/* MTHI | no | 10 | 4 | none.  The own number: of the data EEPROM's last word if that holds 1 to 2047; otherwise drawn at random
+/* MTHI | no | 4 | 4 | none.  The own number: of the data EEPROM's last word if that holds 1 to 2047; otherwise drawn at random
  * 16 ms after the start, and again when somebody else is heard with it. 0: not drawn yet. */
 uint16 Sys_Get_RobotNumber(void);
-/* MTHI | no | 10 | 4 | ARGUMENT.  1 to 2047; kept whoever else has it. */
+/* MTHI | no | 31 | 14 | ARGUMENT.  1 to 2047; kept whoever else has it. */
 bool Sys_Set_RobotNumber(uint16 number);
 
-/* MTHI | no | 10 | 4 | ARGUMENT.  Counts (1 to 100, 4 to begin with) that light must take from a sensor, whatever its noise. */
+/* MTHI | no | 45 | 14 | ARGUMENT.  Counts (1 to 100, 4 to begin with) that light must take from a sensor, whatever its noise. */
 bool Sys_Set_InfraredThreshold(uint8 counts);
 
-/* MTHI | no | ~120 | 8 | none.  Millimetres between two robots' middles that face each other, 70 to 600, for a strength: the
+/* MTHI | no | 120 | 4 | none.  Millimetres between two robots' middles that face each other, 70 to 600, for a strength: the
  * amplitudes that libIrcom's authors measured (swarmcom.md 3.1). Askew sensors seem farther. */
 uint16 Sys_Estimate_Range(uint16 strength);
 

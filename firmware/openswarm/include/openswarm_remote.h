@@ -29,7 +29,7 @@ enum {
 #define SYS_REMOTE_MEMORY 12 /* arrivals of late, by which a second one is known */
 #endif
 
-/* MTH | no | as Sys_Subscribe_to_Event | 40 | EVENT, MEMORY, ARGUMENT, BUSY.  hops 1 to SYS_REMOTE_HOPS; again changes them.
+/* MTH | no | as Sys_Subscribe_to_Event | 44 | EVENT, MEMORY, ARGUMENT, BUSY.  hops 1 to SYS_REMOTE_HOPS; again changes them.
  * BUSY: SYS_REMOTE_EVENTS are shared. */
 bool Sys_Share_Event(uint16 event, uint8 hops);
 

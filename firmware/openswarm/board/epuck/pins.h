@@ -14,6 +14,7 @@
 #define PIN_MOTORS 0x00FFu     /* RD0-3 left, RD4-7 right */
 #define PIN_PULSE_IR_F 0x0180u /* RF7, RF8 */
 #define PIN_PULSE_IR_G 0x0003u /* RG0, RG1 */
+#define PIN_DEBUGGER 0x0003u   /* AN0, AN1; the other inputs of port B are analog */
 #define PIN_AUDIO_ON 0x0001u   /* RF0 */
 #define PIN_I2C 0x000Cu        /* RG2 SCL, RG3 SDA */
 #define PIN_SELECTOR_SHIFT 6   /* RG6-RG9 */

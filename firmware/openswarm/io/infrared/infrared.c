@@ -83,6 +83,7 @@ bool Sys_Send_Neighbours(const void *payload, uint16 size)
     }
     memcpy(changed, payload, size);
     sys_sending_processor processor = HAL_LOAD(sending_processor);
+    CALL_TARGETS(sys_sending_processor);
     if (processor != NULL && (!processor(changed, &bytes) || bytes == 0 || bytes > SYS_MESSAGE_BYTES)) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }

@@ -5,6 +5,11 @@
 
 #include "hal_port.h"
 
+/* The one vector whose name differs from its bits'. */
+#define _ADCIF _ADIF
+#define _ADCIE _ADIE
+#define _ADCIP _ADIP
+
 #define HAL_INTERRUPT_CLEAR(vector) (_##vector##IF = 0)
 #define HAL_INTERRUPT_RAISE(vector) (_##vector##IF = 1)
 #define HAL_INTERRUPT_DISABLE(vector) (_##vector##IE = 0, hal_barrier())

@@ -5,12 +5,7 @@
 #include "openswarm_interrupt.h"
 #include "pins.h"
 
-#define _ADCIF _ADIF /* the one vector whose name differs from its bits' */
-#define _ADCIE _ADIE
-#define _ADCIP _ADIP
-
 enum {
-    ALL_ANALOG = 0x0003, /* ADPCFG: AN0 and AN1 belong to the debugger */
     FIXED = 0x00FC,
     PAIR = 0x1100,       /* AN8 and AN12, to be shifted by the number of the pair */
     PAIRS = 4,
@@ -63,7 +58,7 @@ SYS_INTERRUPT(ADC, 4, scan_done)
 
 void hal_analog_start(void)
 {
-    ADPCFG = ALL_ANALOG;
+    ADPCFG = PIN_DEBUGGER;
     ADCON2 = SCAN_OF_8;
     ADCON3 = SLOWEST;
     Sys_Enable_Interrupt(ADC);

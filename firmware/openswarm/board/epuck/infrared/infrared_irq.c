@@ -5,12 +5,7 @@
 #include "openswarm_interrupt.h"
 #include "pins.h"
 
-#define _ADCIF _ADIF /* the one vector whose name differs from its bits' */
-#define _ADCIE _ADIE
-#define _ADCIP _ADIP
-
 enum {
-    ALL_ANALOG = 0x0003, /* ADPCFG: AN0 and AN1 belong to the debugger */
     RECEIVERS = 0xFF00,
     SCAN_IN_HALVES = 0x041E, /* ADCON2: CSCNA, interrupt after 8 conversions, BUFM */
     SECOND_HALF = 8,         /* which is filled while BUFS = 1 */
@@ -48,7 +43,7 @@ uint16_t hal_infrared_number(void)
 
 void hal_infrared_start(void)
 {
-    ADPCFG = ALL_ANALOG;
+    ADPCFG = PIN_DEBUGGER;
     ADCON2 = SCAN_IN_HALVES;
     ADCON3 = SAMPLING;
     ADCSSL = RECEIVERS;
