@@ -1,5 +1,6 @@
 // Starts the debugger of the Python package and shows what the protocol has no view for: registers by peripheral and bit
 // field, and the time. Everything comes from requests of the Debug Adapter Protocol; nothing is installed or fetched.
+const { execFile } = require('child_process');
 const vscode = require('vscode');
 
 const TYPE = 'openswarm';
@@ -36,8 +37,16 @@ function addressOf(configuration) {
     return [whole(configuration, 'port', 1, 65535), configuration.host || '127.0.0.1'];
 }
 
+/** An adapter that cannot start ends a session without a word, so it is looked before whether this Python can. */
+function started(python, words, cwd) {
+    return new Promise((resolve, reject) => execFile(python, [...words.slice(0, 3), '--help'], { cwd }, (error, _said, told) => {
+        const why = error && (error.code === 'ENOENT' ? 'there is no such program' : told.trim().split('\n').pop() || error.message);
+        return error ? reject(new Error(`${python} does not start the debugger: ${why}. Set openswarm.python to a Python that has OpenSwarm.`)) : resolve();
+    }));
+}
+
 class Adapters {
-    createDebugAdapterDescriptor(session) {
+    async createDebugAdapterDescriptor(session) {
         const configuration = session.configuration;
         if (configuration.request === 'attach') {
             return new vscode.DebugAdapterServer(...addressOf(configuration));
@@ -46,7 +55,9 @@ class Adapters {
         const settings = vscode.workspace.getConfiguration('openswarm', folder);
         const cwd = configuration.cwd || (folder && folder.uri.fsPath);
         const python = configuration.python || settings.get('python');
-        return new vscode.DebugAdapterExecutable(python, wordsOf(configuration), cwd ? { cwd } : undefined);
+        const words = wordsOf(configuration);
+        await started(python, words, cwd);
+        return new vscode.DebugAdapterExecutable(python, words, cwd ? { cwd } : undefined);
     }
 }
 
@@ -176,4 +187,4 @@ function activate(context) {
     );
 }
 
-module.exports = { activate, addressOf, wordsOf };
+module.exports = { activate, addressOf, started, wordsOf };

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
 import zipfile
 from pathlib import Path
@@ -89,6 +90,29 @@ def test_the_command_lines_it_starts_are_understood() -> None:
     assert swarm[:3] == ["-m", "arena", "debug"]
     options = arena_debug.parser().parse_args(swarm[3:])
     assert (options.scene, options.robot, options.brain, options.seed) == ("clustering", 2, "a.elf", 3)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
+def test_a_python_without_the_debugger_is_told(tmp_path: Path) -> None:
+    """VS Code says nothing of an adapter that ends at once."""
+    script = """
+        require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? {} : load(name, ...rest))
+            (require('module')._load);
+        const { started } = require('./extension.js');
+        const said = (python, module) => started(python, ['-m', module, 'debug'], process.argv[1])
+            .then(() => 'starts', (error) => error.message);
+        (async () => console.log(JSON.stringify([
+            await said(process.argv[2], 'emu'), await said(process.argv[2], 'emus'),
+            await said('no-such-python', 'emu')])))();
+    """
+    command = ["node", "-e", script, str(tmp_path), sys.executable]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=FOLDER, env=environment, capture_output=True, text=True, timeout=60, check=True)
+    good, other, none = json.loads(done.stdout)
+    assert good == "starts"
+    assert "does not start the debugger" in other
+    assert "No module named emus. Set openswarm.python" in other
+    assert "no-such-python does not start the debugger: there is no such program." in none
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
