@@ -66,7 +66,7 @@ sys_sending_processor Sys_Set_SendingProcessor(sys_sending_processor processor);
 /* M | no | - | 38 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_Infrared(void);
 
-/* MTHI | no | 126 | 30 | ARGUMENT, BUSY.  Queues a message of 1 to SYS_MESSAGE_BYTES bytes. BUSY: SYS_INFRARED_QUEUE wait. */
+/* MTHI | no | 128 | 30 | ARGUMENT, BUSY.  Queues a message of 1 to SYS_MESSAGE_BYTES bytes. BUSY: SYS_INFRARED_QUEUE wait. */
 bool Sys_Send_Neighbours(const void *payload, uint16 size);
 
 /* MTHI | no | 321 | 12 | none.  Copies up to most neighbours, in no order; how many. */

@@ -218,6 +218,7 @@ TEST(the_queue_is_bounded, "fixed pool of SYS_INFRARED_QUEUE frames; openswarm_i
     CHECK(!Sys_Send_Neighbours("123456789", 9));
     CHECK_EQ(Sys_Get_LastError(), SYS_ERROR_ARGUMENT);
     CHECK(!Sys_Send_Neighbours("", 0));
+    CHECK(!Sys_Send_Neighbours(NULL, 1));
     CHECK_EQ(Sys_Get_InfraredStatistics()->refused, 1);
     uint16 before = Sys_Get_InfraredStatistics()->sent;
     scans_in_the_dark(4096);

@@ -36,7 +36,7 @@ static void set_limit(uint8 sensor)
     filters[sensor].limit = (uint16)(dark > margin(sensor) ? dark - margin(sensor) : 0);
 }
 
-/* Backgroundground and spread take steps of fixed size, so that no single reading counts for much; only where a
+/* Background and spread take steps of fixed size, so that no single reading counts for much; only where a
  * light went out the background follows at once. */
 static HAL_INLINE void follow(uint8 sensor)
 {

@@ -78,7 +78,7 @@ bool Sys_Send_Neighbours(const void *payload, uint16 size)
 {
     uint8 changed[SYS_MESSAGE_BYTES];
     uint8 bytes = (uint8)size;
-    if (size == 0 || size > SYS_MESSAGE_BYTES) {
+    if (payload == NULL || size == 0 || size > SYS_MESSAGE_BYTES) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
     memcpy(changed, payload, size);
