@@ -49,7 +49,7 @@ def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., A
     builder = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
     for name in signatures:
         builder.export_symbol(name)
-    library = builder.link(llvm.create_lljit_compiler(), source.stem)
+    library = builder.link(llvm.create_lljit_compiler(use_jit_link=True), source.stem)
     _libraries.append(library)
     return {name: ctypes.PYFUNCTYPE(result, *arguments)(int(library[name]))
             for name, (result, arguments) in signatures.items()}  # fmt: skip

@@ -23,6 +23,7 @@ from functools import cache
 from pathlib import Path
 from threading import RLock
 from typing import Any, Final
+from weakref import WeakValueDictionary
 
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.worker import REFUSED, REPLY, REQUEST, Backend
@@ -41,6 +42,18 @@ class Statistics:
 
 PATIENCE: Final = 3
 """Compile processes in a row that may die without having compiled anything."""
+
+
+@dataclass(slots=True, weakref_slot=True, eq=False)
+class Loaded:
+    """Native code in memory: it stays as long as somebody holds this."""
+
+    address: int
+    """Of the one function `entry`."""
+    entries: Sequence[int]
+    """Program addresses at which it can be entered."""
+    library: Any
+    """Its owner within LLVM."""
 
 
 class Refused(RuntimeError):
@@ -69,7 +82,11 @@ def shared_compiler() -> Compiler:
 
 
 class Compiler:
-    """Objects by name. Every module exports one function, called `entry`. Threads may share one."""
+    """Objects by name. Every module exports one function, called `entry`. Threads may share one.
+
+    What is in memory is there once, however many machines run it, and no longer than the last of them: Linux allows a
+    process 65,530 mappings (vm.max_map_count), and each object takes two.
+    """
 
     def __init__(self, cache: ObjectCache | None = None) -> None:
         self.cache: Final = cache if cache is not None else ObjectCache()
@@ -78,7 +95,9 @@ class Compiler:
         self._process: subprocess.Popen[bytes] | None = None
         self._selector = selectors.DefaultSelector()
         self._received = bytearray()
-        self._waiting: dict[int, tuple[str, Sequence[int], object]] = {}
+        self._waiting: dict[int, tuple[str, Sequence[int]]] = {}
+        self._tags: dict[str, list[object]] = {}
+        """Who waits for a piece, by its name."""
         self._outbox: deque[tuple[int, int, bytes]] = deque()
         self._in_flight: tuple[int, int, bytes] | None = None
         """(ticket, level, text) the process is compiling."""
@@ -90,8 +109,8 @@ class Compiler:
         self._tickets = 0
         self._loader: Any = None
         self._modules = 0
-        self._ready: list[tuple[object, int]] = []
-        self._keep: dict[int, Any] = {}
+        self._ready: list[tuple[object, Loaded]] = []
+        self._loaded: WeakValueDictionary[str, Loaded] = WeakValueDictionary()
         self._backend: Backend | None = None
         self._host = b""
 
@@ -108,33 +127,40 @@ class Compiler:
         """Name of the object for a piece of code identified by what it is made from (not by its IR text)."""
         return self.cache.key(self._host_name(), bytes([level]), *identity)
 
-    def from_disk(self, key: str) -> tuple[int, list[int]] | None:
-        """Address of the cached code for `key` and the entries kept with it, or None."""
+    def kept(self, key: str) -> Loaded | None:
+        """The code called `key`, if it is in memory or on disk."""
+        loaded = self._loaded.get(key)
+        if loaded is not None:
+            return loaded
         blob = self.cache.get(key)
         if blob is None:
             return None
         self.statistics.from_disk += 1
         entries, code = unpacked(blob)
-        return self.load(code), entries
+        return self.load(code, key, entries)
 
-    def now(self, text: str, level: int, key: str, entries: Sequence[int] = ()) -> int:
-        """Compile `text` in this process and return its address."""
+    def now(self, text: str, level: int, key: str, entries: Sequence[int] = ()) -> Loaded:
+        """Compile `text` in this process."""
         if self._backend is None:
             self._backend = Backend()
         code = self._backend.compile(text, level)
         self.statistics.compiled += 1
         self.cache.put(key, packed(entries, code))
-        return self.load(code)
+        return self.load(code, key, entries)
 
     def request(self, text: str, level: int, key: str, entries: Sequence[int], tag: object) -> None:
-        """Have `text` compiled in the background; `poll` will yield (tag, address)."""
+        """Have `text` compiled in the background, once for all who ask; `poll` will yield (tag, code)."""
         with self._lock:
-            self._post(text, level, key, entries, tag)
+            if key in self._tags:
+                self._tags[key].append(tag)
+            else:
+                self._tags[key] = [tag]
+                self._post(text, level, key, entries)
 
-    def _post(self, text: str, level: int, key: str, entries: Sequence[int], tag: object) -> None:
+    def _post(self, text: str, level: int, key: str, entries: Sequence[int]) -> None:
         self.statistics.requested += 1
         self._tickets += 1
-        self._waiting[self._tickets] = (key, entries, tag)
+        self._waiting[self._tickets] = (key, entries)
         piece = (self._tickets, level, text.encode())
         if level:
             self._outbox.append(piece)
@@ -148,6 +174,7 @@ class Compiler:
             if self._deaths >= PATIENCE:
                 self._outbox.clear()
                 self._waiting.clear()
+                self._tags.clear()
                 return
             self._in_flight = ticket, level, data = self._outbox.popleft()
             try:
@@ -180,19 +207,21 @@ class Compiler:
             self._retried = piece[0]
             self._outbox.appendleft(piece)
             return
-        self._waiting.pop(piece[0], None)
+        lost = self._waiting.pop(piece[0], None)
+        if lost is not None:
+            del self._tags[lost[0]]
         if not self._warned:
             self._warned = True
             print(f"emu: warning: compile process died ({why}); code it has not made is interpreted", file=sys.stderr)
 
-    def poll(self) -> list[tuple[object, int]]:
+    def poll(self) -> list[tuple[object, Loaded]]:
         """Code that has arrived since the last call, loaded. Raises Refused on a translator defect."""
         if not self._waiting:
             return []
         with self._lock:
             return self._collect()
 
-    def _collect(self) -> list[tuple[object, int]]:
+    def _collect(self) -> list[tuple[object, Loaded]]:
         while self._selector.select(0):
             assert self._process is not None
             assert self._process.stdout is not None
@@ -214,25 +243,22 @@ class Compiler:
         """Number of pieces under way in the compile process."""
         return len(self._waiting)
 
-    def load(self, code: bytes) -> int:
-        """Address of `entry` in an object file."""
-        with self._lock:
-            return self._load(code)
-
-    def _load(self, code: bytes) -> int:
+    def load(self, code: bytes, key: str, entries: Sequence[int]) -> Loaded:
+        """The object file `code` in memory, called `key` from now on."""
         import llvmlite.binding as llvm
 
-        if self._loader is None:
-            llvm.initialize_native_target()
-            llvm.initialize_native_asmprinter()
-            self._loader = llvm.create_lljit_compiler()
-        self._modules += 1
-        library = llvm.JITLibraryBuilder().add_object_img(code).export_symbol("entry").link(
-            self._loader, f"m{self._modules}")
-        address = int(library["entry"])
-        self._keep[address] = library
-        self.statistics.loaded += 1
-        return address
+        with self._lock:
+            if self._loader is None:
+                llvm.initialize_native_target()
+                llvm.initialize_native_asmprinter()
+                # LLVM's older linker maps sections one by one: 2 GB apart in a fragmented process, it aborts
+                self._loader = llvm.create_lljit_compiler(use_jit_link=True)
+            self._modules += 1
+            library = llvm.JITLibraryBuilder().add_object_img(code).export_symbol("entry").link(
+                self._loader, f"m{self._modules}")
+            self.statistics.loaded += 1
+            loaded = self._loaded[key] = Loaded(int(library["entry"]), entries, library)
+            return loaded
 
     def _start(self) -> subprocess.Popen[bytes]:
         if self._process is None:
@@ -263,8 +289,9 @@ class Compiler:
         del received[:end]
         self._in_flight, self._deaths = None, 0
         self._send()
-        key, entries, tag = self._waiting.pop(ticket)
+        key, entries = self._waiting.pop(ticket)
         self.statistics.compiled += 1
         self.cache.put(key, packed(entries, code))
-        self._ready.append((tag, self.load(code)))
+        loaded = self.load(code, key, entries)
+        self._ready += [(tag, loaded) for tag in self._tags.pop(key)]
         return True

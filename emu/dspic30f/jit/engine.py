@@ -17,7 +17,7 @@ from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.compiler import shared_compiler
+from emu.dspic30f.jit.compiler import Loaded, shared_compiler
 from emu.dspic30f.jit.counting import LEDGER, BoundaryCounting, Counting, RowOf
 from emu.dspic30f.jit.pointed import POINTED, pointed_text
 from emu.dspic30f.jit.region import Region, discover
@@ -81,10 +81,12 @@ class Code:
     around: Surroundings
     identity: bytes
     """Hash of all that code depends on apart from program words."""
-    pointed: int
-    """Address of the function for registers that are reached by pointer."""
+    pointed: Loaded
+    """The function for registers that are reached by pointer."""
     blocks: Any
     steps: Any
+    held: list[Loaded] = field(default_factory=list)
+    """What the tables point into."""
     regions: dict[int, Region] = field(default_factory=dict)
     """Requested regions by where they start."""
     entries: set[int] = field(default_factory=set)
@@ -127,10 +129,11 @@ class JitEngine:
         self._env: Final = (ctypes.c_uint64 * ENV_WORDS)()
         self._env_address: Final = ctypes.addressof(self._env)
         self._codes: Final[dict[object, Code]] = {}
-        self._pointers: Final[dict[object, int]] = {}
+        self._pointers: Final[dict[object, Loaded]] = {}
         self._code: Code | None = None
         self._key: object = None
         self._dispatch: Any = None
+        self._dispatcher: Loaded | None = None
         self._native: Callable[..., Any] = lambda record, env: self._dispatch(record, env)
         self._interpret: Callable[[], None] = core.sequencer.execute
         self._run_cold: Callable[[int], None] = cold.run
@@ -319,8 +322,8 @@ class JitEngine:
         if self._state.repeat != NOT_REPEATING:
             self._core.sequencer.execute()
             return
-        for tag, address in self.compiler.poll():
-            self._install(tag, address)
+        for tag, loaded in self.compiler.poll():
+            self._install(tag, loaded)
         heat = code.heat.get(pc, 0) + 1
         code.heat[pc] = heat
         if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words:
@@ -343,22 +346,20 @@ class JitEngine:
         self._code = code
         self._env[BLOCKS] = ctypes.addressof(code.blocks)
         self._env[STEPS] = ctypes.addressof(code.steps)
-        self._env[POINTED] = code.pointed
+        self._env[POINTED] = code.pointed.address
 
     def _new_code(self, key: Key) -> Code:
         around = surroundings_of(self._core, key, frozenset(self._hooks), self._offset)
         table = ctypes.c_uint64 * self._words
         return Code(key.context, around, identity_of(key.context, around), self._pointed(around), table(), table())
 
-    def _pointed(self, around: Surroundings) -> int:
+    def _pointed(self, around: Surroundings) -> Loaded:
         """Native accesses to registers that are reached by pointer."""
         bus = self._core.bus
         key = bus.off, frozenset(bus.watched), around.limit_armed
         if key not in self._pointers:
             text = pointed_text(self._core, around)
-            name = self.compiler.key(STEP_LEVEL, text.encode())
-            kept = self.compiler.from_disk(name)
-            self._pointers[key] = kept[0] if kept is not None else self.compiler.now(text, STEP_LEVEL, name)
+            self._pointers[key] = self._at_once(text, STEP_LEVEL)
         return self._pointers[key]
 
     # -- translation ------------------------------------------------------------------------------------------------
@@ -366,11 +367,15 @@ class JitEngine:
         ledger = self._ledger
         counts = None if ledger is None else BoundaryCounting(ledger.words, ledger.tail, ENTERED)
         text = dispatch_text(self._core, 2 * self._words, counts)
-        key = self.compiler.key(BLOCK_LEVEL, text.encode())
-        kept = self.compiler.from_disk(key)
-        self._dispatch = Call(kept[0] if kept is not None else self.compiler.now(text, BLOCK_LEVEL, key))
+        self._dispatcher = self._at_once(text, BLOCK_LEVEL)
+        self._dispatch = Call(self._dispatcher.address)
         if self.seconds is None and ledger is None:
             self._native = self._dispatch
+
+    def _at_once(self, text: str, level: int) -> Loaded:
+        """Code the engine cannot start without."""
+        key = self.compiler.key(level, text.encode())
+        return self.compiler.kept(key) or self.compiler.now(text, level, key)
 
     def _fetch(self, pc: int) -> Insn | None:
         """Decoded instruction for the translator; none where nothing can be run."""
@@ -394,25 +399,25 @@ class JitEngine:
         identity = repr((region.words(), sorted(region.leaders), pc, hooked, rows)).encode()
         for exact, level in ((True, STEP_LEVEL), (False, BLOCK_LEVEL)):
             key = self.compiler.key(level, b"exact" if exact else b"block", code.identity, identity)
-            kept = self.compiler.from_disk(key)
+            kept = self.compiler.kept(key)
             if kept is not None:
-                address, entries = kept
-                self._install((code, entries, exact), address)
+                self._install((code, exact), kept)
                 continue
             count = None if ledger is None else Counting(ledger.words, ledger.tail, self._row_of)
             translator = Translator(region, code.around, code.context, exact, count)
             text, entries = translator.text(), translator.entries
             if self.wait:
-                self._install((code, entries, exact), self.compiler.now(text, level, key, entries))
+                self._install((code, exact), self.compiler.now(text, level, key, entries))
             else:
-                self.compiler.request(text, level, key, entries, (code, entries, exact))
+                self.compiler.request(text, level, key, entries, (code, exact))
 
-    def _install(self, tag: Any, address: int) -> None:
-        code, entries, exact = tag
+    def _install(self, tag: Any, loaded: Loaded) -> None:
+        code, exact = tag
+        code.held.append(loaded)
         table = code.steps if exact else code.blocks
-        for pc in entries:
+        for pc in loaded.entries:
             if not table[pc >> 1]:
-                table[pc >> 1] = address
+                table[pc >> 1] = loaded.address
 
     def _flash_changed(self, start: int, end: int) -> None:
         """Program words in [start, end) are new: whatever was made from the old ones is stale."""

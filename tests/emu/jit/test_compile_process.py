@@ -1,9 +1,12 @@
-"""A compile process that dies costs speed and nothing else; the folder of objects stays within its bound."""
+"""A compile process that dies costs speed and nothing else; objects on disk and in memory stay within their bounds."""
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -16,7 +19,8 @@ from twins import load
 
 from emu.dspic30f.jit import compiler as compiler_module
 from emu.dspic30f.jit.cache import SHELVES, ObjectCache
-from emu.dspic30f.jit.compiler import PATIENCE, Compiler
+from emu.dspic30f.jit.compiler import PATIENCE, Compiler, Loaded
+from emu.dspic30f.jit.engine import JitEngine
 from emu.machine import Machine
 
 IR = "define i64 @entry(ptr %rec, ptr %env) {{\n  ret i64 {}\n}}\n"
@@ -28,9 +32,9 @@ def compiler(tmp_path: Path) -> Compiler:
     return Compiler(ObjectCache(tmp_path))
 
 
-def collect(compiler: Compiler, count: int) -> dict[object, int]:
+def collect(compiler: Compiler, count: int) -> dict[object, Loaded]:
     """What arrives within ten seconds, until there are `count`."""
-    found: dict[object, int] = {}
+    found: dict[object, Loaded] = {}
     end = time.monotonic() + 30
     while len(found) < count and time.monotonic() < end:
         found.update(compiler.poll())
@@ -84,6 +88,90 @@ def test_without_any_process_the_run_goes_on_interpreted_with_one_warning(
     assert len(said) == 1, said
     assert "interpreted" in said[0]
     assert sys.executable == command
+
+
+def test_a_piece_wanted_by_many_is_compiled_once_and_is_in_memory_as_long_as_one_holds_it(compiler: Compiler) -> None:
+    """Robots of a swarm run the same image; a process that loads images for ever does not run out of mappings."""
+    for tag in ("first", "second"):
+        compiler.request(IR.format(1), 0, compiler.key(0, b"piece"), (4,), tag)
+    found = collect(compiler, 2)
+    assert found["first"] is found["second"]
+    assert compiler.statistics.requested == compiler.statistics.compiled == compiler.statistics.loaded == 1
+    assert compiler.kept(compiler.key(0, b"piece")) is found["first"]
+
+    def mappings() -> int:
+        return len(Path("/proc/self/maps").read_text().splitlines())
+
+    before = mappings()
+    held = [compiler.now(IR.format(number), 0, compiler.key(0, b"%d" % number)) for number in range(100)]
+    assert mappings() >= before + 100
+    assert [ctypes.CFUNCTYPE(ctypes.c_int64)(loaded.address)() for loaded in held] == list(range(100))
+    held.clear()
+    gc.collect()
+    assert mappings() < before + 50
+
+
+def test_the_code_of_a_machine_goes_with_it(compiler: Compiler) -> None:
+    """Two machines share it; hooks make all of it anew."""
+    machines = []
+    for _ in range(2):
+        machines.append(Machine(engine="jit"))
+        machines[-1].stop_on_fault = False
+        runner = machines[-1].runner
+        assert isinstance(runner, JitEngine)
+        runner.compiler, runner.threshold, runner.wait = compiler, 1, True
+        load(machines[-1], straight_firmware(3, Shape(instructions=100)))
+        machines[-1].run(cycles=20_000)
+        if len(machines) == 1:
+            loaded = compiler.statistics.loaded
+    assert compiler.statistics.loaded == loaded == len(compiler._loaded)
+    machines[0].run(cycles=20_000)
+    machines[1].run(cycles=20_000)
+    assert not difference(*machines)
+    machines.clear()
+    del runner
+    gc.collect()
+    assert not compiler._loaded
+
+
+FRAGMENTED = """
+import ctypes, mmap
+from pathlib import Path
+from emu.hostcode import DOUBLE, INT, functions
+
+c = ctypes.CDLL(None)
+c.mmap.restype = ctypes.c_void_p
+c.mmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_int, ctypes.c_int, ctypes.c_long]
+c.munmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
+
+def reserve(size):
+    return c.mmap(None, size, 0, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | 0x4000, -1, 0)
+
+source = Path({source!r})
+functions(source, {{"scaled": (DOUBLE, [DOUBLE, INT])}})  # all libraries are there now
+pages = [reserve(4096) for _ in range(20_000)]
+wall = reserve(5 << 30)
+for size in (1 << 20, 1 << 16, 1 << 14, 1 << 13, 1 << 12):
+    while reserve(size) > wall:
+        pass
+c.munmap(pages[15_000], 4096)  # one hole, 5 GB away from all other room
+scaled = functions(source, {{"scaled": (DOUBLE, [DOUBLE, INT])}})["scaled"]
+print([scaled(2.0, number) for number in range(4)])
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="builds its address space with Linux's mmap")
+def test_a_fragmented_process_can_load_native_code(tmp_path: Path) -> None:
+    """Code and its constants come to lie together."""
+    source = tmp_path / "scaled.c"
+    source.write_text("""
+static const double factors[] = {1.5, 2.5, 3.5, 4.5};
+static int calls;
+double scaled(double value, long which) { calls++; return value * factors[which & 3] + 0.25 * (calls > 0); }
+""")
+    run = [sys.executable, "-c", FRAGMENTED.format(source=str(source))]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "[3.25, 5.25, 7.25, 9.25]\n"), done.stderr
 
 
 def test_the_folder_keeps_what_was_used_last(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ that the native machine gave to Python are counted there and subtracted.
 from __future__ import annotations
 
 import ctypes
+import itertools
 import random
 from array import array
 from collections import Counter
@@ -22,7 +23,7 @@ from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.faults import Breakpoint, IllegalOpcode
 from emu.dspic30f.isa.flow import Branch, Return, Skip, Sleep
-from emu.dspic30f.jit.compiler import Compiler
+from emu.dspic30f.jit.compiler import Compiler, Loaded
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.worker import Backend
 from emu.dspic30f.state import DA, NOT_REPEATING, RA
@@ -108,8 +109,11 @@ class _NoCache:
 
     stores = hits = 0
 
+    def __init__(self) -> None:
+        self._numbers = itertools.count()
+
     def key(self, *_parts: bytes) -> str:
-        return ""
+        return str(next(self._numbers))
 
     def get(self, _key: str) -> None:
         return None
@@ -130,10 +134,10 @@ class QuickCompiler(Compiler):
         self._block_level = block_level
         self._backend = self.backend
 
-    def now(self, text: str, level: int, key: str, entries: Any = ()) -> int:
+    def now(self, text: str, level: int, key: str, entries: Any = ()) -> Loaded:
         if not entries:
             code = self.dispatchers.get(text) or self.dispatchers.setdefault(text, self.backend.compile(text, level))
-            return self.load(code)
+            return self.load(code, key, ())
         return super().now(text, min(level, self._block_level), key, entries)
 
 
