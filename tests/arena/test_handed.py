@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import time
 from pathlib import Path
 from queue import Queue
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ import pytest
 from arena.campaign import Plan, brains_of
 from arena.studio import RefusedError, Studio
 from arena.trial import run_trial
-from tests.arena.test_studio import do, scene_of, scripted_plan, settled, studio_of
+from tests.arena.test_studio import BROWSER, browsed, do, scene_of, scripted_plan, serving, settled, studio_of
 from tests.emu.dap.client import Client
 
 SECONDS = 2.0
@@ -93,3 +94,56 @@ def test_a_robot_is_taken_back_whether_a_client_came_or_not(clustering_image: Pa
 def test_a_script_is_not_debugged() -> None:
     with studio_of(scripted_plan()) as studio, pytest.raises(RefusedError, match="robot 0 is a script"):
         studio.ask(lambda: studio.debug(0))
+
+
+PROBE = """<pre id="result"></pre><script>
+const found = {}, rest = ms => new Promise(done => setTimeout(done, ms));
+const until = async seen => { while (!seen()) { await ask("inside?robot=0"); await rest(10); } };
+const word = id => el(id).textContent;
+(async () => {
+  found.button = word("debug");
+  el("debug").click(); await until(() => word("refused")); found.nobody = word("refused");
+  choose(1); el("debug").click(); await until(() => d.studio.now.debugger);
+  found.waits = word("standing"); found.port = d.studio.now.debugger.port; found.back = word("debug");
+  await until(() => d.studio.now.debugger.is_met && word("inside").includes("Sys_Send_Event"));
+  found.has = word("standing"); found.inside = word("inside");
+  el("quantum").click(); await until(() => word("refused")); found.refused = word("refused");
+  el("debug").click(); await until(() => !d.studio.now.debugger); found.given = word("standing");
+  found.tick = d.studio.now.tick; found.again = word("debug");
+  el("quantum").click(); await until(() => d.studio.now.tick > found.tick); found.stepped = d.studio.now.tick;
+  document.getElementById("result").textContent = JSON.stringify(found);
+  window.setTimeout = () => 0;           // nothing more is due: the browser need not wait
+})().catch(error => { document.getElementById("result").textContent = JSON.stringify({error: error.stack}); });
+</script></html>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+def test_the_page_gives_a_robot_to_a_debugger_and_takes_it_back(
+    clustering_image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The button, the port it shows, what a client's breakpoint shows in the page, and the button again."""
+    plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
+    with serving(plan) as one:
+        studio = one.studio
+        do(studio, lambda: studio.step(1100))
+
+        def debugs() -> None:
+            while (handed := studio.ask(studio.now)["debugger"]) is None:
+                time.sleep(0.05)
+            client = Connected(handed["port"])
+            client.ask("initialize", adapterID="openswarm")
+            client.ask("attach", stopOnEntry=False)
+            client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Sys_Send_Event"}])
+            client.ask("configurationDone")
+
+        threading.Thread(target=debugs, daemon=True).start()
+        found = browsed(one, PROBE, tmp_path, monkeypatch)
+    assert (found["button"], found["nobody"]) == ("Debug the robot", "choose a robot first")
+    assert found["back"] == "Take the robot back"
+    assert found["waits"].endswith(f"waits for a client of the Debug Adapter Protocol on 127.0.0.1:{found['port']}")
+    assert found["has"].startswith("in a debugger, quantum 1")
+    assert "robot 1 has a client" in found["has"]
+    assert "Sys_Send_Event" in found["inside"].splitlines()[0]
+    assert found["refused"] == "a debugger has robot 1; let it leave first"
+    assert found["given"].startswith("standing, quantum")
+    assert (found["again"], found["stepped"]) == ("Debug the robot", found["tick"] + 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 import signal
@@ -217,8 +218,8 @@ def step(world):
 
 
 @contextmanager
-def serving() -> Iterator[Serving]:
-    with studio_of(scripted_plan()) as studio, server(studio, 0) as one:
+def serving(plan: Plan | None = None) -> Iterator[Serving]:
+    with studio_of(plan or scripted_plan()) as studio, server(studio, 0) as one:
         threading.Thread(target=one.serve_forever, daemon=True).start()
         yield one
         one.shutdown()
@@ -328,15 +329,8 @@ const still = async () => { do await rest(100); while (d.studio.now.state !== "s
 @pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
 def test_the_page_takes_the_trial_in_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Step, run, stand, drag, back to the moment of the drag, look inside, and what is refused is told."""
-    assert BROWSER is not None
-    plain = command.page
-    monkeypatch.setattr(command, "page", lambda *one, **more: plain(*one, **more).replace("</html>", PROBE))
     with serving() as one:
-        words = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
-                 f"--user-data-dir={tmp_path}", "--virtual-time-budget=60000", "--dump-dom", one.address]  # fmt: skip
-        done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
-    found = json.loads(done.stdout.split('<pre id="result">')[1].split("</pre>")[0])
-    assert "error" not in found, found
+        found = browsed(one, PROBE, tmp_path, monkeypatch)
     assert (found["first"], found["stepped"]) == (0, 1)
     assert found["ran"] > 10
     assert found["backTick"] == found["ran"]
@@ -344,3 +338,15 @@ def test_the_page_takes_the_trial_in_hand(tmp_path: Path, monkeypatch: pytest.Mo
     assert found["before"] != found["moved"] == found["back"]
     assert found["inside"] == "a script: nothing is inside"
     assert "robot 1 is a script" in found["refused"]
+
+
+def browsed(one: Serving, probe: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What the studio's page found out when it ended in a probe. Timers do not wait for the clock, requests do."""
+    plain = command.page
+    monkeypatch.setattr(command, "page", lambda *given, **more: plain(*given, **more).replace("</html>", probe))
+    words = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
+             f"--user-data-dir={folder}", "--virtual-time-budget=60000", "--dump-dom", one.address]  # fmt: skip
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    found = json.loads(html.unescape(done.stdout.split('<pre id="result">')[1].split("</pre>")[0]))
+    assert "error" not in found, found
+    return found
