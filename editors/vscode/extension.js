@@ -128,10 +128,13 @@ function activate(context) {
     clock.command = 'openswarm.goToCycle';
 
     const said = async (session, text) => (await session.customRequest('evaluate', { expression: text, context: 'repl' })).result;
-    const stands = async (session) => {
-        registers.show(session);
+    const tick = async (session) => {
         clock.text = `$(watch) ${await said(session, '/time')}`;
         clock.show();
+    };
+    const stands = async (session) => {
+        registers.show(session);
+        await tick(session);
     };
     const gone = () => {
         registers.show(undefined);
@@ -160,6 +163,8 @@ function activate(context) {
                 onDidSendMessage: (message) => {
                     if (message.type === 'event' && message.event === 'stopped') {
                         stands(session).catch(gone);
+                    } else if (message.type === 'event' && message.event === 'invalidated') {
+                        tick(session).catch(gone); // the robot stands where it stood, which is the present now
                     }
                 },
                 onWillStopSession: gone,

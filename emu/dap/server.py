@@ -69,6 +69,8 @@ class Server(Looking):
         self._target: Debuggee | None = None
         self._views: tuple[Sights, Sources] | None = None
         self._launch: Row = {}
+        self._client: Row = {}
+        """What the client said of itself."""
         self._configured = self._over = False
         self._halt = Halt("entry")
         self._pause = False
@@ -105,6 +107,7 @@ class Server(Looking):
         arguments = message.get("arguments") or {}
         method = getattr(self, f"_do_{command}", None)
         after: Callable[[], None] | None = None
+        was_past = self._is_past
         try:
             if method is None:
                 raise Refused(f"{command} is not supported")
@@ -118,6 +121,14 @@ class Server(Looking):
             self._respond(message, False, {"error": {"id": 1, "format": text}}, text)
         if after is not None:
             after()
+        elif was_past and not self._is_past and self._client.get("supportsInvalidatedEvent"):
+            self._event("invalidated", {"areas": ["variables"]})
+
+    @property
+    def _is_past(self) -> bool:
+        """Whether the machine stands before its present. That ends where it stands when the past is changed, or what
+        is around it was brought there."""
+        return self._target is not None and self._target.history.is_past
 
     def _respond(self, message: Message, success: bool, body: Row, text: str = "") -> None:
         reply = {"type": "response", "request_seq": message.get("seq", 0), "success": success}
@@ -132,7 +143,8 @@ class Server(Looking):
 
     # Life
 
-    def _do_initialize(self, _arguments: Row) -> Row:
+    def _do_initialize(self, arguments: Row) -> Row:
+        self._client = arguments
         return CAPABILITIES
 
     def _do_launch(self, arguments: Row) -> Any:

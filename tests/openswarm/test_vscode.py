@@ -93,6 +93,44 @@ def test_the_command_lines_it_starts_are_understood() -> None:
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
+def test_the_status_bar_follows_stops_and_the_present() -> None:
+    """The time is asked for again when the robot stands somewhere else, and when the present has come to where it is;
+    only the former makes values of before."""
+    script = """
+        const seen = { trackers: [], clock: {}, trees: 0 }, nothing = () => ({});
+        class EventEmitter { constructor() { this.event = nothing; } fire() { seen.trees += 1; } }
+        const vscode = {
+            EventEmitter, StatusBarAlignment: {}, commands: { registerCommand: nothing },
+            window: { createStatusBarItem: () => Object.assign(seen.clock, { show: nothing, hide: nothing }),
+                registerTreeDataProvider: nothing },
+            debug: { registerDebugAdapterDescriptorFactory: nothing, registerDebugConfigurationProvider: nothing,
+                registerDebugAdapterTrackerFactory: (_type, one) => seen.trackers.push(one) },
+        };
+        require('module')._load = ((load) => (name, ...rest) => name === 'vscode' ? vscode : load(name, ...rest))
+            (require('module')._load);
+        require('./extension.js').activate({ subscriptions: [] });
+        let time = 'cycle 5, 3 before the present';
+        const session = { customRequest: async () => ({ result: time }) };
+        const tracker = seen.trackers[0].createDebugAdapterTracker(session), shown = [];
+        const told = async (message) => {
+            tracker.onDidSendMessage(message);
+            await new Promise((done) => setTimeout(done));
+            shown.push([seen.clock.text, seen.trees]);
+        };
+        (async () => {
+            await told({ type: 'event', event: 'stopped' });
+            time = 'cycle 5';
+            await told({ type: 'event', event: 'output' });
+            await told({ type: 'event', event: 'invalidated' });
+            console.log(JSON.stringify(shown));
+        })();
+    """
+    done = subprocess.run(["node", "-e", script], cwd=FOLDER, capture_output=True, text=True, timeout=60, check=True)
+    past = "$(watch) cycle 5, 3 before the present"
+    assert json.loads(done.stdout) == [[past, 1], [past, 1], ["$(watch) cycle 5", 1]]
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node here (Debian package nodejs)")
 def test_a_python_without_the_debugger_is_told(tmp_path: Path) -> None:
     """VS Code says nothing of an adapter that ends at once."""
     script = """
