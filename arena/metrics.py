@@ -63,7 +63,7 @@ def largest_share(places: Places, reach_cm: float) -> float:
     """Share of the objects that are in the largest cluster, 0..1; 0 without objects."""
     if not len(places):
         return 0.0
-    return int(np.bincount(clusters(places, reach_cm)).max()) / len(places)
+    return int(np.max(np.bincount(clusters(places, reach_cm)))) / len(places)
 
 
 SMALL: Final = 48
