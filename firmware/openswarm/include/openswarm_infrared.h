@@ -30,10 +30,10 @@ enum {
 };
 
 #ifndef SYS_NEIGHBOURS
-#define SYS_NEIGHBOURS 10 /* that are remembered */
+#define SYS_NEIGHBOURS 10 /* that are remembered; 1 to 255 */
 #endif
 #ifndef SYS_INFRARED_QUEUE
-#define SYS_INFRARED_QUEUE 4 /* frames that wait to be sent */
+#define SYS_INFRARED_QUEUE 4 /* frames that wait to be sent; 1 to 128 */
 #endif
 #define SYS_NEIGHBOUR_LIFETIME 7000 /* ms without a word after which a neighbour is lost */
 #define SYS_BEACON_PERIOD 2048      /* ms; who has sent nothing for so long, and up to a quarter more, sends an empty frame */
@@ -73,9 +73,10 @@ bool Sys_Send_Neighbours(const void *payload, uint16 size);
 uint8 Sys_Get_Neighbours(sys_neighbour *neighbours, uint8 most);
 
 /* MTHI | no | 4 | 4 | none.  The own number: of the data EEPROM's last word if that holds 1 to 2047; otherwise drawn at random
- * 16 ms after the start, and again when somebody else is heard with it. 0: not drawn yet. */
+ * a quarter of a second after the start, and again when somebody else is heard with it. 0: not drawn yet. */
 uint16 Sys_Get_RobotNumber(void);
-/* MTHI | no | 31 | 14 | ARGUMENT.  1 to 2047; kept whoever else has it. */
+/* MTHI | no | 32 | 14 | ARGUMENT.  1 to 2047; kept whoever else has it, and
+ * before Sys_Start_Infrared whatever the EEPROM holds. */
 bool Sys_Set_RobotNumber(uint16 number);
 
 /* MTHI | no | 45 | 14 | ARGUMENT.  Counts (1 to 100, 4 to begin with) that light must take from a sensor, whatever its noise. */

@@ -26,7 +26,7 @@ enum {
 #define SYS_REMOTE_EVENTS 8 /* that a robot shares */
 #endif
 #ifndef SYS_REMOTE_MEMORY
-#define SYS_REMOTE_MEMORY 12 /* arrivals of late, by which a second one is known */
+#define SYS_REMOTE_MEMORY 12 /* arrivals of the last SYS_NEIGHBOUR_LIFETIME, by which a second one is known; 1 to 255 */
 #endif
 
 /* MTH | no | as Sys_Subscribe_to_Event | 44 | EVENT, MEMORY, ARGUMENT, BUSY.  hops 1 to SYS_REMOTE_HOPS; again changes them.

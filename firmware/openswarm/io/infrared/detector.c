@@ -21,7 +21,7 @@ static struct {
 } filters[HAL_INFRARED_SENSORS];
 static uint16 background[HAL_INFRARED_SENSORS];
 static uint16 spread[HAL_INFRARED_SENSORS]; /* of the level: three in four are nearer to the background */
-static uint16 least;                        /* threshold, whatever the noise */
+static uint16 least = COUNT * FIRST_THRESHOLD; /* threshold, whatever the noise */
 static uint8 looked_at;
 
 static uint16 margin(uint8 sensor)
@@ -140,9 +140,4 @@ bool detector_set_threshold(uint8 counts)
     }
     HAL_STORE(least, (uint16)(COUNT * counts));
     return true;
-}
-
-void detector_init(void)
-{
-    least = COUNT * FIRST_THRESHOLD;
 }

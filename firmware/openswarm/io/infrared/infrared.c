@@ -12,7 +12,6 @@ void (*infrared_event_sink)(const frame *f);
 
 static bool number_is_kept;
 static uint8 housekeepings;
-static uint16 sent_before; /* frames sent when the beacon was last put off */
 static uint16 beacon_at;   /* low word of the system time */
 static sys_message_processor message_processor;
 static sys_sending_processor sending_processor;
@@ -39,13 +38,14 @@ void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength)
 {
     frame f;
     frame_unpack(b, &f);
+    if (f.number == 0) { /* nobody of ours */
+        return;
+    }
     if (f.number == infrared_number) {
         os_count(&infrared_statistics.conflicts);
         draw_number();
     }
-    if (f.number != 0) {
-        neighbours_heard(f.number, sensor, strength);
-    }
+    neighbours_heard(f.number, sensor, strength);
     if (f.kind == FRAME_EVENT && infrared_event_sink != NULL) {
         infrared_event_sink(&f);
     } else if (f.kind == FRAME_MESSAGE && f.size != 0 && f.size <= SYS_MESSAGE_BYTES) {
@@ -56,8 +56,7 @@ void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength)
 static void keep_alive(void)
 {
     uint16 now = clock_now();
-    if (infrared_statistics.sent != sent_before) {
-        sent_before = infrared_statistics.sent;
+    if (link_has_sent()) {
         beacon_at = (uint16)(now + SYS_BEACON_PERIOD + (link_random() & (SYS_BEACON_PERIOD / 4 - 1)));
     } else if ((sint16)(now - beacon_at) >= 0) {
         beacon_at = (uint16)(now + SYS_BEACON_PERIOD);
@@ -122,8 +121,9 @@ static bool keep_number(uint16 number)
     if (number == 0 || number > NUMBER_MASK) {
         return false;
     }
+    number_is_kept = true; /* first: from now on nobody draws another */
+    hal_barrier();
     HAL_STORE(infrared_number, number);
-    number_is_kept = true;
     return true;
 }
 
@@ -144,10 +144,11 @@ const sys_infrared_statistics *Sys_Get_InfraredStatistics(void)
 
 bool Sys_Start_Infrared(void)
 {
-    detector_init();
     reflections_init();
     link_init();
-    (void)keep_number(hal_infrared_number());
+    if (!number_is_kept) {
+        (void)keep_number(hal_infrared_number());
+    }
     hal_infrared_start();
     return Sys_Register_Event(SYS_IO_PROXIMITY) && Sys_Register_Event(SYS_NEIGHBOUR_MESSAGE) &&
            Sys_Register_Event(SYS_NEIGHBOUR_SEEN) && Sys_Register_Event(SYS_NEIGHBOUR_LOST) &&

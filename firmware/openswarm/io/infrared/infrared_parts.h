@@ -44,7 +44,6 @@ frame_state frame_word(frame_buffer *b, uint16 word); /* as received */
 void frame_unpack(const frame_buffer *b, frame *f);   /* of a whole one; payload points into b */
 
 /* ---- detector.c: light that comes and goes, sensor by sensor. Levels are sixteenths of a count ---- */
-void detector_init(void);
 bool detector_filter(scan raw);        /* one scan; whether any sensor is darkened below its threshold */
 void detector_follow(void);            /* one sensor's background and noise; not in every scan */
 uint8 detector_strongest(void);
@@ -59,6 +58,7 @@ bool detector_set_threshold(uint8 counts); /* any context */
 void link_init(void);
 bool link_queue(frame_kind kind, const uint8 *payload, uint8 size); /* any context */
 uint16 link_random(void);
+bool link_has_sent(void);              /* since the last call */
 extern sys_infrared_statistics infrared_statistics;
 
 /* ---- infrared.c ---- */

@@ -59,6 +59,7 @@ static uint16 word;
 static uint8 word_bits;
 static frame_buffer buffer;
 static uint16 scans, flashed_at, random_state;
+static bool has_sent;
 
 sys_infrared_statistics infrared_statistics;
 
@@ -78,7 +79,7 @@ uint16 link_random(void)
 
 static void draw_backoff(void)
 {
-    uint8 slots = (uint8)(FIRST_SLOTS + SLOTS_PER_NEIGHBOUR * neighbours_count());
+    uint16 slots = (uint16)(FIRST_SLOTS + SLOTS_PER_NEIGHBOUR * neighbours_count());
     backoff = (uint16)((uint16)(link_random() % slots) * SLOT);
 }
 
@@ -94,6 +95,13 @@ static waiting_frame *reserve(void)
     }
     hal_unlock(lock);
     return w;
+}
+
+bool link_has_sent(void)
+{
+    bool answer = has_sent;
+    has_sent = false;
+    return answer;
 }
 
 bool link_queue(frame_kind kind, const uint8 *payload, uint8 size)
@@ -143,6 +151,7 @@ static HAL_OUTLINE void send(void)
     if (word_bits == 0) {
         if (!frame_next_word(&buffer, &word)) {
             count(&infrared_statistics.sent);
+            has_sent = true;
             draw_backoff();
             rest_for(SCANS_PER_BIT);
             return;

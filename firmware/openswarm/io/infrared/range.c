@@ -3,7 +3,7 @@
  * their fit 10,269 (d - 6)^-2.354 counts for d cm between the middles. */
 #include "infrared_parts.h"
 
-enum { STEP_MM = 10, FIRST_MM = 80, POINTS = 14 };
+enum { STEP_MM = 10, FIRST_MM = 80, POINTS = 14, NO_LIGHT_MM = 600, TAIL = 23 /* mm a count */ };
 
 /* Counts at 80, 90, ... 210 mm; farther away the tail falls as a line. */
 static const uint16 counts_at[POINTS] = {2008, 773, 393, 232, 151, 106, 77, 58, 46, 36, 30, 24, 21, 17};
@@ -18,7 +18,7 @@ uint16 Sys_Estimate_Range(uint16 strength)
         i++;
     }
     if (i == POINTS) {
-        return (uint16)(FIRST_MM + STEP_MM * (POINTS - 1u) + 23u * (counts_at[POINTS - 1] - strength));
+        return (uint16)(NO_LIGHT_MM - TAIL * strength);
     }
     uint16 span = (uint16)(counts_at[i - 1] - counts_at[i]);
     return (uint16)(FIRST_MM + STEP_MM * i - STEP_MM * (strength - counts_at[i]) / span);

@@ -4,14 +4,22 @@
  * A frame names the event, the hops that are left, the robot it began at and a number of that robot, by which those who
  * hear it twice know it. What arrives is sent here like any event, and so comes to the handler that sends what is sent
  * here to neighbours: it knows an arrival by its contents. Two of the same contents may be exchanged for each other,
- * which nobody can tell. */
+ * which nobody can tell.
+ *
+ * Arrivals are forgotten in time: a robot that starts again counts from the beginning, and is to be heard. */
 #include "infrared_parts.h"
 #include "kernel.h"
 #include "openswarm_remote.h"
 
 #include <string.h>
 
-enum { HEADER = 4, EVENT_BITS = 13, NUMBER_BITS = 11, SEQUENCES = 32 };
+enum {
+    HEADER = 4,
+    EVENT_BITS = 13,
+    NUMBER_BITS = 11,
+    SEQUENCES = 32,
+    TIME_SHIFT = 8 /* arrivals are dated in 256 ms, whose 16 bits are four hours */
+};
 
 typedef struct {
     uint16 event;
@@ -21,6 +29,7 @@ typedef struct {
 typedef struct {
     uint16 origin;   /* number of the robot, and its sequence above */
     uint16 contents; /* their CRC */
+    uint16 when;
     bool is_pending; /* sent here, and our own handler has not had it yet */
 } arrival;
 
@@ -44,6 +53,16 @@ static shared_event *find(uint16 event)
     return NULL;
 }
 
+static uint16 date(void)
+{
+    return (uint16)(Sys_Get_SystemTime() >> TIME_SHIFT);
+}
+
+static bool is_recent(const arrival *a)
+{
+    return a->origin != 0 && (uint16)(date() - a->when) <= SYS_NEIGHBOUR_LIFETIME >> TIME_SHIFT;
+}
+
 /* Whether this is an arrival on its way to the listeners here. */
 static bool has_arrived(uint16 contents)
 {
@@ -52,14 +71,14 @@ static bool has_arrived(uint16 contents)
         hal_lock_state lock = hal_lock_devices();
         if (a->is_pending && a->contents == contents) {
             a->is_pending = false;
-            found = true;
+            found = is_recent(a);
         }
         hal_unlock(lock);
     }
     return found;
 }
 
-static void transmit(uint16 event, uint8 hops, uint16 origin, const void *data, uint8 size)
+static bool transmit(uint16 event, uint8 hops, uint16 origin, const void *data, uint8 size)
 {
     uint8 payload[HEADER + SYS_REMOTE_BYTES];
     uint16 first = (uint16)(event | (uint16)hops << EVENT_BITS);
@@ -68,7 +87,7 @@ static void transmit(uint16 event, uint8 hops, uint16 origin, const void *data, 
     payload[2] = (uint8)origin;
     payload[3] = (uint8)(origin >> 8);
     memcpy(payload + HEADER, data, size);
-    (void)link_queue(FRAME_EVENT, payload, (uint8)(HEADER + size));
+    return link_queue(FRAME_EVENT, payload, (uint8)(HEADER + size));
 }
 
 static bool on_event(uint16 pid, uint16 event, sys_event_data *data)
@@ -79,9 +98,10 @@ static bool on_event(uint16 pid, uint16 event, sys_event_data *data)
         os_count(&statistics.too_long);
     } else if (!has_arrived(contents_of(event, data->payload, data->size))) {
         sequence = (uint8)((sequence + 1u) % SEQUENCES);
-        os_count(&statistics.shared);
         uint16 origin = (uint16)(HAL_LOAD(infrared_number) | (uint16)sequence << NUMBER_BITS);
-        transmit(event, s->hops, origin, data->payload, (uint8)data->size);
+        if (transmit(event, s->hops, origin, data->payload, (uint8)data->size)) {
+            os_count(&statistics.shared);
+        }
     }
     return true;
 }
@@ -92,7 +112,7 @@ static bool is_known(uint16 origin)
         return true;
     }
     for (const arrival *a = arrivals; a != arrivals + SYS_REMOTE_MEMORY; a++) {
-        if (a->origin == origin) {
+        if (a->origin == origin && is_recent(a)) {
             return true;
         }
     }
@@ -111,17 +131,22 @@ static void arrive(const frame *f)
     uint16 origin = (uint16)(f->payload[2] | (uint16)f->payload[3] << 8);
     uint16 event = first & SYS_REMOTE_LAST_EVENT;
     uint8 hops = (uint8)(first >> EVENT_BITS);
+    if ((origin & NUMBER_MASK) == 0) { /* sent before the robot had a number, which it has now */
+        origin |= f->number;
+    }
     if (is_known(origin)) {
         os_count(&statistics.duplicates);
         return;
     }
     arrival *a = arrivals + next_arrival;
+    if (a->is_pending && is_recent(a)) { /* our handlers are far behind: forgotten, it would be taken for our own */
+        return;
+    }
     next_arrival = (uint8)((next_arrival + 1u) % SYS_REMOTE_MEMORY);
-    *a = (arrival){origin, contents_of(event, data, size), false};
+    *a = (arrival){origin, contents_of(event, data, size), date(), false};
     os_count(&statistics.arrived);
-    if (hops > 1) {
+    if (hops > 1 && transmit(event, (uint8)(hops - 1u), origin, data, size)) {
         os_count(&statistics.passed_on);
-        transmit(event, (uint8)(hops - 1u), origin, data, size);
     }
     if (find(event) != NULL) {
         a->is_pending = Sys_Send_Event(event, data, size);
