@@ -121,8 +121,8 @@ class _Fan:
         self.seen: Final = np.zeros(len(left), dtype=np.uint8)
         self.pixels: Final = np.zeros((len(left), 3), dtype=np.uint8)
         self._rays: Final = _Rays(self._arrays[0].ctypes.data, self._arrays[1].ctypes.data, len(left),
-                                  float(np.min(left)), float(np.max(left)), self.seen.ctypes.data, self.pixels.ctypes.data,
-                                  None if bright is None else bright.ctypes.data)  # fmt: skip
+                                  float(np.min(left)), float(np.max(left)), self.seen.ctypes.data,
+                                  self.pixels.ctypes.data, None if bright is None else bright.ctypes.data)  # fmt: skip
         self.address: Final = addressof(self._rays)
 
 
