@@ -9,9 +9,11 @@ import emu
 
 BUCKETS = 8
 MOST = 200
-"""Members of a list that is followed; in the middle of a change a list may be none."""
-NEXT_EVENT, SUBSCRIBERS, SIDES = 2, 4, (0, 2)
-"""Where links stand in event and hole (kernel.h, memory.c)."""
+"""Members of a list that is followed: more are none."""
+NEXT_EVENT, SUBSCRIBERS, SIDES, HOLE_SIZE = 2, 4, (0, 2), 4
+"""Where links stand in event and hole, and a hole's size (kernel.h, memory.c)."""
+HEAP_STEP = 2
+"""Bytes (kernel.h)."""
 
 
 @dataclass
@@ -26,10 +28,18 @@ class Structures:
     most: dict[str, int] = field(default_factory=lambda: dict.fromkeys("mbstqh", 0))
 
     def look(self) -> None:
-        """Count everything."""
+        """Count everything, unless some list is being changed: an ISR's call comes there, too."""
+        try:
+            found = self._found()
+        except _Torn:
+            return
+        for name, number in found.items():
+            self.most[name] = max(self.most[name], number)
+
+    def _found(self) -> dict[str, int]:
         buckets = [list(self._list(self._at("_events") + 2 * k, NEXT_EVENT)) for k in range(BUCKETS)]
         subscriptions = [sum(1 for _ in self._list(event + SUBSCRIBERS, 0)) for events in buckets for event in events]
-        found = {
+        return {
             "m": sum(map(len, buckets)),
             "b": max(map(len, buckets)),
             "s": max(subscriptions, default=0),
@@ -37,8 +47,6 @@ class Structures:
             "q": sum(1 for name in ("_event_queue", "_undelivered") for _ in self._list(self._at(name), 0)),
             "h": self._depth(self.machine.peek("_holes")),
         }
-        for name, number in found.items():
-            self.most[name] = max(self.most[name], number)
 
     def _at(self, name: str) -> int:
         assert self.machine.image is not None
@@ -46,16 +54,30 @@ class Structures:
         assert symbol is not None, name
         return symbol.address
 
+    def _word(self, address: int) -> int:
+        try:
+            return self.machine.peek(address)
+        except ValueError:  # no address of anything
+            raise _Torn from None
+
     def _list(self, link: int, step: int) -> Iterator[int]:
         """Addresses of the members of a list, from the word that points to its first."""
         for _ in range(MOST):
-            member = self.machine.peek(link)
+            member = self._word(link)
             if not member:
                 return
             yield member
             link = member + step
+        raise _Torn
 
-    def _depth(self, hole: int, most: int = 20) -> int:
-        if hole in (0, self._at("_no_hole")) or not most:
+    def _depth(self, hole: int) -> int:
+        if hole == self._at("_no_hole"):
             return 0
-        return 1 + max(self._depth(self.machine.peek(hole + side), most - 1) for side in SIDES)
+        size = self._word(hole + HOLE_SIZE)
+        if size < HOLE_SIZE + 2 or self._word(hole + size - HEAP_STEP) != size:  # a hole has its size at its end, too
+            raise _Torn
+        return 1 + max(self._depth(self._word(hole + side)) for side in SIDES)
+
+
+class _Torn(Exception):
+    """Something is being changed."""
