@@ -1,49 +1,37 @@
-"""A trial in somebody's hands: it runs, stands, goes on by single quanta and back, while robots and things are moved.
+"""A trial in a process of its own, told by others what to do, and the moments of it that are kept to go back to.
 
-In: a plan, a seed, and what is asked for (`ask` from any thread). Out: rows as they come, the present moment, and what
-one robot is doing inside. Everything that is done to the world is kept with its quantum, so a trial that is made again
-from its seed comes to the same state, to the byte: that is how it goes back.
+In: a plan, a seed, and what is asked for (`ask` from any thread): methods of `InHand`. Back means: wake the copy of the
+process that sleeps at the latest moment before, and let it do again what is missing; without one, from the seed.
 """
 
 from __future__ import annotations
 
-import queue
-import time
-from collections import deque
-from collections.abc import Callable
-from concurrent.futures import Future
-from contextlib import AbstractContextManager, suppress
-from dataclasses import dataclass
-from pathlib import Path
-from threading import Thread
-from typing import Any, Final, TypeVar
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from threading import Lock
+from typing import Any, Final, NamedTuple
 
-from arena.campaign import Plan, brains_of
-from arena.emulated import EmulatedBrain
-from arena.handed import Handed
-from arena.page import samples_of
-from arena.record import Trial
-from arena.scene import SceneError
-from arena.standing import digest, place_of
-from arena.trial import Running
-
-T = TypeVar("T")
-IDLE_S: Final = 0.05
-"""For which a trial that stands waits before it looks whether it is to end."""
-FRAMES: Final = 12
-"""Frames of a call stack that are told."""
+from arena.campaign import Plan
+from arena.inhand import RefusedError, serve
+from arena.moments import PATIENCE_S, GoneError, Line, Moment, Moments, context, line
 
 
-class RefusedError(ValueError):
-    """What was asked for cannot be done now, or not at all."""
+class Call(NamedTuple):
+    """A method of `InHand` that is wanted, and its arguments."""
+
+    name: str
+    arguments: tuple[Any, ...] = ()
+    named: Mapping[str, Any] = {}
 
 
-@dataclass(frozen=True)
-class Deed:
-    """What somebody did between two quanta, so that it can be done again."""
+class Reply(NamedTuple):
+    """What came of some calls, and when that was."""
 
+    results: list[Any]
+    end: Line | None
     tick: int
-    do: Callable[[Running], None]
+    seconds: float
+    may_keep: bool
 
 
 class Studio:
@@ -53,325 +41,74 @@ class Studio:
     """
 
     def __init__(self, plan: Plan, seed: int) -> None:
-        self._plan: Final = plan
-        self._seed: Final = seed
-        self._jobs: Final[queue.Queue[tuple[Callable[[], Any], Future[Any]]]] = queue.Queue()
-        self._deeds: list[Deed] = []
-        self._again: deque[Deed] = deque()
-        self._goal: int | None = None
-        self._returned = False
-        """The robot that was given to a debugger is wanted back."""
-        self._pace = 1.0
-        self._breaks: dict[tuple[int, str], Callable[[], None]] = {}
-        self._held = ""
-        self._broken = ""
-        self._hold = False
-        self._handed: Handed | None = None
-        self._ended = False
-        self.epoch = 0
-        """How often the trial was begun anew: samples of another one are not those of this."""
-        begun: Future[None] = Future()
-        self._thread: Final = Thread(target=self._live, args=(begun,), daemon=True)
-        self._thread.start()
-        begun.result()
+        self._lock: Final = Lock()
+        self._moments: Final = Moments()
+        self._line, there = line()
+        self._process: Final = context().Process(target=serve, args=(there.end, plan, seed), daemon=True)
+        self._process.start()
+        there.drop()
+        self._heard(self._line)
 
-    # -- for any thread ----------------------------------------------------------------------------------------------
+    def ask(self, name: str, *arguments: Any, **named: Any) -> Any:
+        """The result of a method of `InHand`, at the next moment at which the world stands between two quanta, or one
+        of its robots at a breakpoint. Raises what it raises, RefusedError if the studio is closed."""
+        return self.ask_all(Call(name, arguments, named))[0]
 
-    def ask(self, what: Callable[[], T]) -> T:
-        """The result of one of the methods below, at the next moment at which the world stands between two quanta, or
-        one of its robots at a breakpoint. Raises what it raises, RefusedError if the studio is closed."""
-        answer: Future[Any] = Future()
-        self._jobs.put((what, answer))
-        while True:
-            with suppress(TimeoutError):
-                result: T = answer.result(timeout=1.0)
-                return result
-            if not self._thread.is_alive():
-                raise RefusedError("the studio is closed")
+    def ask_all(self, *calls: Call) -> list[Any]:
+        """The results of some, between which nothing else happens."""
+        with self._lock:
+            try:
+                reply = (calls[0].name == "back" and self._woken(calls)) or self._told(self._line, calls)
+                if reply.may_keep and self._moments.is_due(reply.seconds):
+                    self._keep()
+            except GoneError:
+                raise RefusedError("the studio is closed") from None
+            return reply.results
 
     def close(self) -> None:
         """End the trial."""
-        with suppress(RefusedError):
-            self.ask(self._end)
-        self._thread.join()
+        with self._lock:
+            self._moments.forget(-1)
+            self._line.close()
+            self._process.join(PATIENCE_S)
 
-    # -- what can be asked for ---------------------------------------------------------------------------------------
+    @property
+    def kept(self) -> int:
+        """Moments that can be gone back to at once."""
+        return len(self._moments)
 
-    def go(self, pace: float = 1.0) -> None:
-        """Run until told otherwise, at most `pace` times as fast as real time. Leaves a breakpoint."""
-        if not pace > 0:
-            raise RefusedError(f"{pace} times as fast as real time: expected a positive number")
-        self._able()
-        if not self._held:
-            self._own()
-        self._pace, self._hold = pace, False
-        self._goal = self._running.quanta
+    def _told(self, to: Line, calls: Sequence[Call]) -> Reply:
+        to.send([tuple(call) for call in calls])
+        return self._heard(to)
 
-    def stand(self) -> None:
-        """Stand still at the end of this quantum. On the way back, what was done later is forgotten."""
-        self._own()
-        self._goal = None
-        self._forget(self._running.world.ticks)
+    def _heard(self, whom: Line) -> Reply:
+        (error, *about), end = whom.receive()
+        if error is not None:
+            raise error
+        return Reply(about[0], end, *about[1])
 
-    def step(self, quanta: int = 1) -> None:
-        """Let some quanta be over."""
-        self._free()
-        self._able()
-        if quanta < 1:
-            raise RefusedError(f"{quanta} quanta: expected 1 or more")
-        self._forget(self._running.world.ticks)
-        self._pace, self._goal = 0.0, min(self._running.world.ticks + quanta, self._running.quanta)
+    def _keep(self) -> None:
+        reply = self._told(self._line, [Call("keep")])
+        if reply.end is not None:
+            self._moments.add(Moment(reply.tick, reply.seconds, reply.end))
 
-    def back(self, tick: int) -> None:
-        """Back, or forth, to the moment at which `tick` quanta were over: by beginning anew with the same seed, doing
-        again what was done until then. What was done later is forgotten."""
-        self._free()
-        if not 0 <= tick <= self._running.quanta:
-            raise RefusedError(f"quantum {tick}: the trial has those from 0 to {self._running.quanta}")
-        self._forget(tick)
-        if tick < self._running.world.ticks:
-            self._begin()
-            self._again = deque(self._deeds)
-            self._do_again()
-        self._pace, self._goal = 0.0, tick
-
-    def move(self, kind: str, number: int, x: float, y: float) -> None:
-        """Put a robot or an object somewhere else; cm."""
-        self._free()
-        if kind not in ("robot", "object"):
-            raise RefusedError(f"{kind!r} cannot be moved; expected robot or object")
-        if not 0 <= number < len(getattr(self._running.world, f"{kind}s")):
-            raise RefusedError(f"there is no {kind} {number}")
-
-        def put(running: Running) -> None:
-            (running.stage.move_robot if kind == "robot" else running.stage.move_object)(number, x, y)
-            running.touched()
-
-        self._do(put)
-
-    def tell(self, robot: int, text: str) -> None:
-        """Send a robot something by Bluetooth."""
-        self._free()
-        self._brain(robot)
-        try:
-            text.encode("latin-1")
-        except UnicodeEncodeError:
-            raise RefusedError("Bluetooth carries bytes: letters of Latin-1 only") from None
-        self._do(lambda running: running.stage.tell(robot, text))
-
-    def stop_at(self, robot: int, place: str) -> None:
-        """Let the whole world stand still when a robot comes to a function, until `go`; again = no more."""
-        machine = self._emulated(robot).machine
-        key = robot, place
-        if key in self._breaks:
-            self._breaks.pop(key)()
-            return
-        try:
-            self._breaks[key] = machine.hook_pc(place, lambda *_: self._stands_at(robot, place))
-        except (KeyError, ValueError) as error:
-            raise RefusedError(f"robot {robot}: {error.args[0]}") from None
-
-    def debug(self, robot: int) -> None:
-        """Give a robot to a debugger, or take it back: `now` says on which port of this machine one client is served.
-        The world moves only as the client lets the robot move; then it stands. What a debugger changes in a robot is
-        not done again on the way back."""
-        if self._handed is not None and not self._held:
-            self._returned = True
-            return
-        self._free()
-        self._able()
-        if self._running.is_over:
-            raise RefusedError("the trial is over")
-        if self._emulated(robot).has_stopped:
-            raise RefusedError(f"robot {robot}: its firmware has stopped; go back first")
-        self._forget(self._running.world.ticks)
-        self._returned = False
-        try:
-            self._handed = Handed(robot, self._idle)
-        except OSError as error:
-            raise RefusedError(f"no port for a debugger: {error.strerror}") from None
-        self._handed.meet(self._running.world, self._running.brains)
-        self._pace, self._goal = 0.0, self._running.quanta
-
-    def now(self) -> dict[str, Any]:
-        """The present moment: cm, rad, s."""
-        world, handed = self._running.world, self._handed
-        return {
-            "tick": world.ticks, "t": world.seconds, "epoch": self.epoch, "quanta": self._running.quanta,
-            "robots": world.poses.robots, "objects": world.poses.objects, "held": self._held,
-            "breaks": [f"{robot} {place}" for robot, place in self._breaks],
-            "debugger": {"robot": handed.robot, "port": handed.port, "is_met": handed.is_met} if handed else None,
-            "state": f"cannot go on: {self._broken}" if self._broken
-                     else "at a breakpoint" if self._held else "in a debugger" if handed
-                     else "over" if self._running.is_over
-                     else "standing" if self._goal is None else "going back" if self._again else "running",
-        }  # fmt: skip
-
-    def more(self, first: int, epoch: int) -> dict[str, Any]:
-        """Samples from `first` on, or all if those are of another epoch, and `now`."""
-        columns = self._running.result.rows.columns
-        begin = first if epoch == self.epoch else 0
-        about = self._about | {"faults": [list(fault) for fault in self._running.result.faults]}
-        found: dict[str, Any] = {}
-        if begin < len(columns["t"]):
-            rows = {name: values[begin:] for name, values in columns.items()}
-            found = samples_of(Trial(Path("studio"), rows, about))
-        return found | {"from": begin, "now": self.now()}
-
-    def trial(self) -> Trial:
-        """What is recorded so far."""
-        faults = [list(fault) for fault in self._running.result.faults]
-        columns = {name: list(values) for name, values in self._running.result.rows.columns.items()}
-        return Trial(Path("studio"), columns, self._about | {"faults": faults})
-
-    def inside(self, robot: int) -> dict[str, Any]:
-        """What one robot is doing: registers, call stack, threads. A script has nothing inside."""
-        brain = self._brain(robot)
-        if not isinstance(brain, EmulatedBrain):
-            return {"robot": robot, "script": True}
-        machine = brain.machine
-        return {
-            "robot": robot, "pc": machine.pc, "place": place_of(machine), "cycle": machine.cycle,
-            "sr": machine.peek("SR"),
-            "asleep": machine.is_asleep, "w": [machine.peek(f"W{n}") for n in range(16)],
-            "frames": [str(frame) for frame in machine.backtrace()[:FRAMES]],
-            "threads": [{"name": one.name, "pid": one.pid, "state": one.state, "used": one.used,
-                         "size": one.stack and one.stack[1] - one.stack[0]} for one in machine.threads()],
-        }  # fmt: skip
-
-    def digest(self) -> str:
-        """SHA-256 of everything that lives: bodies with their speeds, and every machine's whole state."""
-        return digest(self._running.world, self._running.brains)
-
-    # -- the trial's own thread --------------------------------------------------------------------------------------
-
-    def _live(self, begun: Future[None]) -> None:
-        self._made: AbstractContextManager[Any] | None = None
-        try:
-            self._begin()
-            begun.set_result(None)
-        except Exception as error:
-            begun.set_exception(error)
-            return
-        while not self._ended:
-            if self._goal is None or self._running.is_over or self._running.world.ticks >= self._goal:
-                self._goal = None
-                self._answer(IDLE_S)
-            else:
-                try:
-                    self._go_on()
-                except Exception as error:  # a supervisor's, most often: the moment before can still be looked at
-                    self._goal, self._broken = None, f"{error}"
-        self._close()
-
-    def _go_on(self) -> None:
-        """To the next sample, or where something is to be done, no faster than wanted."""
-        assert self._goal is not None
-        running, start, before = self._running, time.monotonic(), self._running.world.seconds
-        if self._handed is not None:
-            running.go_on(running.world.ticks + 1)
-            if running.is_over:
-                self._handed.over()
-                self._handed.close()
-            if self._handed.is_over:
-                self._handed, self._goal = None, None
-            return
-        running.go_on(min(self._goal, self._again[0].tick) if self._again else self._goal)
-        self._do_again()
-        self._answer(0)
-        while self._pace and not self._ended and self._goal is not None:
-            left = (running.world.seconds - before) / self._pace - (time.monotonic() - start)
-            if left <= 0:
+    def _woken(self, calls: Sequence[Call]) -> Reply | None:
+        """What comes of calls that begin with `back`, if a moment before is kept; none: they are yet to be done."""
+        goal = (*calls[0].arguments, *calls[0].named.values())[0]
+        (state,) = self._told(self._line, [Call("leave", (goal,))]).results
+        if state is None:
+            return None  # it is yet to come
+        self._moments.forget(goal)
+        while (moment := self._moments.before(goal)) is not None:
+            self._moments.pop(moment)
+            with suppress(GoneError):
+                again = self._told(moment.line, [Call("keep", (state,))])
                 break
-            self._answer(min(left, IDLE_S))
-
-    def _answer(self, wait: float) -> None:
-        """Do what is asked for; wait for it so many seconds at most."""
-        try:
-            what, answer = self._jobs.get(timeout=wait) if wait else self._jobs.get_nowait()
-        except queue.Empty:
-            return
-        try:
-            answer.set_result(what())
-        except Exception as error:
-            answer.set_exception(error)
-
-    def _idle(self, wait: float) -> bool:
-        """Answer while a debugger has a robot; whether it may keep it."""
-        self._answer(wait)
-        return not (self._ended or self._returned)
-
-    def _begin(self) -> None:
-        self._close()
-        self._broken = ""
-        made = brains_of(self._plan, self._seed, 1)
-        brains, _, ether = made.__enter__()
-        self._made = made
-        plan = self._plan
-        self._running = Running(plan.scene, self._seed, brains, plan.seconds, ether=ether, experiment=plan.to_do)
-        self._about: dict[str, Any] = plan.key() | {"seed": self._seed}
-        self.epoch += 1
-        again, self._breaks = list(self._breaks), {}
-        for robot, place in again:
-            self.stop_at(robot, place)
-
-    def _close(self) -> None:
-        if self._made is not None:
-            self._made.__exit__(None, None, None)
-            self._made = None
-
-    def _end(self) -> None:
-        self._ended, self._hold = True, False
-
-    def _do(self, what: Callable[[Running], None]) -> None:
-        """Do something to the world, and keep it. Raises RefusedError where the scene has no room for it."""
-        if self._again:
-            raise RefusedError("the trial is on its way back; let it stand first")
-        try:
-            what(self._running)
-        except SceneError as error:
-            raise RefusedError(str(error)) from None
-        self._deeds.append(Deed(self._running.world.ticks, what))
-
-    def _forget(self, tick: int) -> None:
-        """What was done after `tick` quanta was never done."""
-        self._deeds = [deed for deed in self._deeds if deed.tick <= tick]
-        self._again = deque(deed for deed in self._again if deed.tick <= tick)
-
-    def _do_again(self) -> None:
-        while self._again and self._again[0].tick <= self._running.world.ticks:
-            self._again.popleft().do(self._running)
-
-    def _stands_at(self, robot: int, place: str) -> bool:
-        """A robot has come to a breakpoint, in the middle of a quantum: whatever is asked for now is answered here."""
-        if self._again or self._ended or self._emulated(robot).machine.events.quiet:
-            return False
-        self._held, self._hold = f"robot {robot} is at {place}", True
-        while self._hold:
-            self._answer(IDLE_S)
-        self._held = ""
-        return False
-
-    def _free(self) -> None:
-        if self._held:
-            raise RefusedError(f"{self._held}; let it go on first")
-        self._own()
-
-    def _own(self) -> None:
-        if self._handed is not None:
-            raise RefusedError(f"a debugger has robot {self._handed.robot}; let it leave first")
-
-    def _able(self) -> None:
-        if self._broken:
-            raise RefusedError(f"the trial cannot go on ({self._broken}); go back first")
-
-    def _brain(self, robot: int) -> Any:
-        if not 0 <= robot < len(self._running.brains):
-            raise RefusedError(f"there is no robot {robot}")
-        return self._running.brains[robot]
-
-    def _emulated(self, robot: int) -> EmulatedBrain:
-        brain = self._brain(robot)
-        if not isinstance(brain, EmulatedBrain):
-            raise RefusedError(f"robot {robot} is a script: it has no firmware to stop in")
-        return brain
+        else:
+            return None
+        left, self._line = self._line, moment.line
+        left.close()
+        if again.end is not None:
+            self._moments.add(moment._replace(line=again.end))
+        reply = self._told(self._line, calls[1:])
+        return reply._replace(results=[None, *reply.results])

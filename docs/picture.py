@@ -29,12 +29,12 @@ SHOWN_MS: Final = 3000
 
 def ready(studio: Studio) -> None:
     """Forty seconds on, at a breakpoint."""
-    studio.ask(lambda: studio.step(QUANTA))
-    while studio.ask(studio.now)["state"] != "standing":
+    studio.ask("step", QUANTA)
+    while studio.ask("now")["state"] != "standing":
         time.sleep(0.1)
-    studio.ask(lambda: studio.stop_at(ROBOT, PLACE))
-    studio.ask(lambda: studio.go(1.0))
-    while not studio.ask(studio.now)["held"]:
+    studio.ask("stop_at", ROBOT, PLACE)
+    studio.ask("go", 1.0)
+    while not studio.ask("now")["held"]:
         time.sleep(0.1)
 
 

@@ -20,9 +20,10 @@ from urllib.parse import parse_qs, urlsplit
 from arena.answering import HERE, Answer
 from arena.commands.arguments import port
 from arena.commands.run import add_plan, planned
+from arena.inhand import RefusedError
 from arena.page import page
 from arena.scene import FCY
-from arena.studio import RefusedError, Studio
+from arena.studio import Call, Studio
 
 EXAMPLE: Final = "example: arena studio clustering --controller A --seed 3"
 LIMIT: Final = 1 << 16
@@ -33,7 +34,7 @@ DEEDS: Final[dict[str, dict[str, type]]] = {
     "move": {"kind": str, "number": int, "x": float, "y": float}, "tell": {"robot": int, "text": str},
     "stop_at": {"robot": int, "place": str}, "debug": {"robot": int},
 }  # fmt: skip
-"""What can be asked for, methods of `Studio`, and the parameters it takes."""
+"""What can be asked for, methods of `InHand`, and the parameters it takes."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -94,18 +95,19 @@ class _Answer(Answer):
         studio = self.server.studio
         try:
             if place.path == "/":
-                head = studio.ask(lambda: (studio.trial(), studio.now()))
-                quantum = head[0].scene.clock.quantum_tcy / FCY
-                control = {"token": self.server.token, "header": HEADER, "now": head[1], "quantum": quantum}
-                self.send_page(page(head[0], studio=control))
+                trial, now = studio.ask_all(Call("trial"), Call("now"))
+                quantum = trial.scene.clock.quantum_tcy / FCY
+                control = {"token": self.server.token, "header": HEADER, "now": now, "quantum": quantum}
+                self.send_page(page(trial, studio=control))
             elif place.path == "/more":
                 first, epoch = _whole(query.get("from")), _whole(query.get("epoch"))
-                self.send_json(studio.ask(lambda: studio.more(first, epoch)))
+                self.send_json(studio.ask("more", first=first, epoch=epoch))
             elif place.path == "/inside":
                 robot = _whole(query.get("robot"))
-                self.send_json(studio.ask(lambda: studio.inside(robot)))
+                self.send_json(studio.ask("inside", robot=robot))
             elif place.path == "/digest":
-                self.send_json(studio.ask(lambda: {"digest": studio.digest(), "tick": studio.now()["tick"]}))
+                state, now = studio.ask_all(Call("digest"), Call("now"))
+                self.send_json({"digest": state, "tick": now["tick"]})
             else:
                 self.send_words(404, "there are /, /more?from=N&epoch=E, /inside?robot=N, /digest and /do")
         except RefusedError as error:
@@ -120,7 +122,7 @@ class _Answer(Answer):
             if urlsplit(self.path).path != "/do":
                 raise RefusedError("what is to be done goes to /do")
             name, arguments = _deed(self._body())
-            self.send_json(studio.ask(lambda: (getattr(studio, name)(**arguments), studio.now())[1]))
+            self.send_json(studio.ask_all(Call(name, (), arguments), Call("now"))[1])
         except RefusedError as error:
             self.send_words(409, str(error))
 

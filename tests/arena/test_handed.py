@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from arena.campaign import Plan, brains_of
-from arena.studio import RefusedError, Studio
+from arena.inhand import RefusedError
+from arena.studio import Studio
 from arena.trial import run_trial
 from tests.arena.test_studio import BROWSER, browsed, do, scene_of, scripted_plan, serving, settled, studio_of
 from tests.emu.dap.client import Client
@@ -36,8 +37,8 @@ class Connected(Client):
 
 def given(studio: Studio, robot: int) -> Connected:
     """A client that has a robot, which stands."""
-    studio.ask(lambda: studio.debug(robot))
-    client = Connected(studio.ask(studio.now)["debugger"]["port"])
+    studio.ask("debug", robot)
+    client = Connected(studio.ask("now")["debugger"]["port"])
     client.ask("initialize", adapterID="openswarm")
     client.ask("attach", stopOnEntry=True)
     client.ask("configurationDone")
@@ -51,20 +52,20 @@ def test_a_robot_is_debugged_from_the_present_on(clustering_image: Path) -> None
     with brains_of(plan, 3, 1) as (brains, _, ether):
         whole = run_trial(plan.scene, 3, brains, SECONDS, ether=ether, experiment=plan.to_do)
     with studio_of(plan) as studio:
-        do(studio, lambda: studio.step(1100))
+        do(studio, "step", 1100)
         client = given(studio, 1)
-        now = studio.ask(studio.now)
+        now = studio.ask("now")
         assert (now["tick"], now["state"]) == (1100, "in a debugger")
         assert (now["debugger"]["robot"], now["debugger"]["is_met"]) == (1, True)
-        for act in (studio.go, studio.stand, studio.step, lambda: studio.back(0)):
+        for act in (("go",), ("stand",), ("step",), ("back", 0)):
             with pytest.raises(RefusedError, match="a debugger has robot 1; let it leave first"):
-                studio.ask(act)
-        assert studio.ask(lambda: studio.inside(1))["pc"] == int(client.top()["instructionPointerReference"], 16)
+                studio.ask(*act)
+        assert studio.ask("inside", 1)["pc"] == int(client.top()["instructionPointerReference"], 16)
         client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Sys_Send_Event"}])
         client.send("continue", threadId=1)
         assert client.event("stopped")["reason"] == "breakpoint"
         assert client.top()["name"].startswith("Sys_Send_Event")
-        assert studio.ask(studio.now)["tick"] >= 1100
+        assert studio.ask("now")["tick"] >= 1100
         client.send("stepBack", threadId=1, granularity="instruction")
         client.event("stopped")
         refused = client.asked("evaluate", expression="W0 = 1", context="repl")
@@ -72,28 +73,28 @@ def test_a_robot_is_debugged_from_the_present_on(clustering_image: Path) -> None
         assert "the other robots have seen what came of it" in refused["message"]
         client.ask("disconnect")
         assert settled(studio)["debugger"] is None
-        studio.ask(lambda: studio.go(1000.0))
+        studio.ask("go", 1000.0)
         settled(studio, "over")
-        assert studio.ask(studio.trial).columns == whole.rows.columns
+        assert studio.ask("trial").columns == whole.rows.columns
         with pytest.raises(RefusedError, match="the trial is over"):
-            studio.ask(lambda: studio.debug(0))
+            studio.ask("debug", 0)
 
 
 def test_a_robot_is_taken_back_whether_a_client_came_or_not(clustering_image: Path) -> None:
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with studio_of(plan) as studio:
-        do(studio, lambda: studio.step(200))
-        studio.ask(lambda: studio.debug(0))
-        assert studio.ask(studio.now)["debugger"]["is_met"] is False
-        assert do(studio, lambda: studio.debug(0))["debugger"] is None
+        do(studio, "step", 200)
+        studio.ask("debug", 0)
+        assert studio.ask("now")["debugger"]["is_met"] is False
+        assert do(studio, "debug", 0)["debugger"] is None
         given(studio, 1)
-        assert do(studio, lambda: studio.debug(1))["debugger"] is None
+        assert do(studio, "debug", 1)["debugger"] is None
         given(studio, 0)  # and the studio is closed while a client has a robot
 
 
 def test_a_script_is_not_debugged() -> None:
     with studio_of(scripted_plan()) as studio, pytest.raises(RefusedError, match="robot 0 is a script"):
-        studio.ask(lambda: studio.debug(0))
+        studio.ask("debug", 0)
 
 
 PROBE = """<pre id="result"></pre><script>
@@ -125,10 +126,10 @@ def test_the_page_gives_a_robot_to_a_debugger_and_takes_it_back(
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with serving(plan) as one:
         studio = one.studio
-        do(studio, lambda: studio.step(1100))
+        do(studio, "step", 1100)
 
         def debugs() -> None:
-            while (handed := studio.ask(studio.now)["debugger"]) is None:
+            while (handed := studio.ask("now")["debugger"]) is None:
                 time.sleep(0.05)
             client = Connected(handed["port"])
             client.ask("initialize", adapterID="openswarm")

@@ -14,17 +14,20 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from arena import moments
 from arena.brain import ScriptedBrain
 from arena.campaign import Plan, brains_of
 from arena.commands import studio as command
 from arena.commands.studio import HEADER, Serving, server
+from arena.inhand import RefusedError
 from arena.scene import Scene, load_scene, scripted
-from arena.studio import RefusedError, Studio
+from arena.studio import Call, Studio
 from arena.trial import run_trial
 from tests.arena.images import ECHO
 
@@ -53,15 +56,15 @@ def studio_of(plan: Plan) -> Iterator[Studio]:
 def settled(studio: Studio, state: str = "standing") -> dict[str, Any]:
     """`now`, once the trial is in a state."""
     for _ in range(1200):
-        now = studio.ask(studio.now)
+        now = studio.ask("now")
         if now["state"] in (state, "over"):
             return now
         time.sleep(0.05)
     raise AssertionError(f"still {now['state']}, not {state}")
 
 
-def do(studio: Studio, what: Callable[[], Any]) -> dict[str, Any]:
-    studio.ask(what)
+def do(studio: Studio, name: str, *arguments: Any) -> dict[str, Any]:
+    studio.ask(name, *arguments)
     return settled(studio)
 
 
@@ -72,74 +75,131 @@ def test_a_trial_that_was_stopped_and_stepped_is_recorded_as_any_other() -> None
                       experiment=plan.to_do)  # fmt: skip
     with studio_of(plan) as studio:
         for quanta in (1, 7, 100, 33):
-            do(studio, lambda quanta=quanta: studio.step(quanta))
-        studio.ask(lambda: studio.go(1000.0))
+            do(studio, "step", quanta)
+        studio.ask("go", 1000.0)
         assert settled(studio, "over")["state"] == "over"
-        assert studio.ask(studio.trial).columns == whole.rows.columns
+        assert studio.ask("trial").columns == whole.rows.columns
 
 
 def test_going_back_leads_to_the_first_pass_to_the_byte(clustering_image: Path) -> None:
     """Two robots with firmware, an object moved on the way: bodies, speeds and whole machines by hash."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with studio_of(plan) as studio:
-        do(studio, lambda: studio.step(1300))
-        studio.ask(lambda: studio.move("object", 1, 100.0, 120.0))
-        here = do(studio, lambda: studio.step(301))
-        first, rows = studio.ask(studio.digest), studio.ask(studio.trial).columns
+        do(studio, "step", 1300)
+        studio.ask("move", "object", 1, 100.0, 120.0)
+        here = do(studio, "step", 301)
+        first, rows = studio.ask("digest"), studio.ask("trial").columns
         for _ in range(3):
-            do(studio, lambda: studio.step(1))
-        studio.ask(lambda: studio.move("robot", 0, 50.0, 50.0))
-        assert do(studio, lambda: studio.step(1))["tick"] == here["tick"] + 4
-        assert studio.ask(studio.digest) != first
-        again = do(studio, lambda: studio.back(here["tick"]))
+            do(studio, "step", 1)
+        studio.ask("move", "robot", 0, 50.0, 50.0)
+        assert do(studio, "step", 1)["tick"] == here["tick"] + 4
+        assert studio.ask("digest") != first
+        again = do(studio, "back", here["tick"])
         assert (again["tick"], again["epoch"]) == (here["tick"], here["epoch"] + 1)
-        assert studio.ask(studio.digest) == first
-        assert studio.ask(studio.trial).columns == rows
-        assert studio.ask(lambda: studio.more(2, here["epoch"]))["from"] == 0, "samples of another epoch"
+        assert studio.ask("digest") == first
+        assert studio.ask("trial").columns == rows
+        assert studio.ask("more", 2, here["epoch"])["from"] == 0, "samples of another epoch"
 
 
-def on_the_way_back(studio: Studio, goal: int, what: Callable[[], Any]) -> None:
+def on_the_way_back(studio: Studio, goal: int, name: str, *arguments: Any) -> None:
     """Begin to go back to `goal`, and do something before anything of that has been done again."""
-    studio.ask(lambda: (studio.back(goal), what()))
+    studio.ask_all(Call("back", (goal,)), Call(name, arguments))
 
 
 def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
     """Moved at 20 and 300; going back to 400, somebody stops at 0: neither move has happened, nor will it."""
     plan = scripted_plan()
     with studio_of(plan) as untouched:
-        do(untouched, lambda: untouched.step(1))
-        first = untouched.ask(untouched.digest)
-        do(untouched, lambda: untouched.step(399))
-        last = untouched.ask(untouched.digest)
+        do(untouched, "step", 1)
+        first = untouched.ask("digest")
+        do(untouched, "step", 399)
+        last = untouched.ask("digest")
 
     def moved(studio: Studio) -> None:
-        do(studio, lambda: studio.step(20))
-        studio.ask(lambda: studio.move("object", 1, 100.0, 120.0))
-        do(studio, lambda: studio.step(280))
-        studio.ask(lambda: studio.move("object", 2, 200.0, 120.0))
-        do(studio, lambda: studio.step(110))
+        do(studio, "step", 20)
+        studio.ask("move", "object", 1, 100.0, 120.0)
+        do(studio, "step", 280)
+        studio.ask("move", "object", 2, 200.0, 120.0)
+        do(studio, "step", 110)
 
     with studio_of(plan) as studio:
         moved(studio)
         with pytest.raises(RefusedError, match="on its way back; let it stand first"):
-            on_the_way_back(studio, 400, lambda: studio.move("object", 0, 50.0, 50.0))
+            on_the_way_back(studio, 400, "move", "object", 0, 50.0, 50.0)
         settled(studio)
-        on_the_way_back(studio, 390, studio.stand)
-        do(studio, lambda: studio.step(400))
-        assert studio.ask(studio.digest) == last
+        on_the_way_back(studio, 390, "stand")
+        do(studio, "step", 400)
+        assert studio.ask("digest") == last
     with studio_of(plan) as studio:
         moved(studio)
-        on_the_way_back(studio, 400, lambda: studio.step(1))
+        on_the_way_back(studio, 400, "step", 1)
         assert settled(studio)["tick"] == 1
-        assert studio.ask(studio.digest) == first
-        do(studio, lambda: studio.step(399))
-        assert studio.ask(studio.digest) == last
+        assert studio.ask("digest") == first
+        do(studio, "step", 399)
+        assert studio.ask("digest") == last
     with studio_of(plan) as studio:
         moved(studio)
-        on_the_way_back(studio, 400, lambda: studio.back(10))
+        on_the_way_back(studio, 400, "back", 10)
         assert settled(studio)["tick"] == 10
-        do(studio, lambda: studio.step(390))
-        assert studio.ask(studio.digest) == last, "what was done later is forgotten"
+        do(studio, "step", 390)
+        assert studio.ask("digest") == last, "what was done later is forgotten"
+
+
+@pytest.mark.skipif(not moments.CAN_COPY, reason="moments are kept on Linux only")
+def test_kept_moments_lead_to_the_first_pass_to_the_byte(
+    clustering_image: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thing moved after each moment that is kept: from there on as from the seed. What is gone back behind is no
+    longer kept, what was moved then is not moved again, breakpoints stay, nobody is left at the end."""
+    ended, close = [], moments.Line.close
+    monkeypatch.setattr(moments.Line, "close", lambda line: ended.append(close(line)))
+    monkeypatch.setattr(moments, "EVERY_S", 1e9)
+    plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
+    with studio_of(plan) as studio:
+        seen = {}
+        for quanta in (900, 100, 100, 100):
+            tick = do(studio, "step", quanta)["tick"]
+            with monkeypatch.context() as now:
+                now.setattr(moments, "EVERY_S", 0.0)
+                studio.ask("now")
+            studio.ask("move", "object", 1, 100.0 + tick / 50, 120.0)
+            seen[tick] = studio.ask("digest"), studio.ask("trial").columns
+        do(studio, "step", 10)
+        studio.ask("stop_at", 1, "main")
+        for tick, kept in ((1200, 4), (1150, 3), (1000, 2), (1000, 2)):
+            begun = studio.ask("now")
+            now = do(studio, "back", tick)
+            assert (now["tick"], studio.kept, now["breaks"]) == (tick, kept, ["1 main"])
+            assert now["epoch"] == begun["epoch"] + (tick < begun["tick"])
+            if tick in seen:
+                assert (studio.ask("digest"), studio.ask("trial").columns) == seen[tick]
+        do(studio, "step", 100)
+        assert studio.ask("digest") != seen[1100][0], "what was moved then is forgotten"
+        studio.ask("stop_at", 1, "Sys_Send_Event")
+        assert do(studio, "back", 900)["breaks"] == ["1 main", "1 Sys_Send_Event"]
+        assert studio.ask("digest") == seen[900][0]
+        studio.ask("go", 1000.0)
+        assert settled(studio, "at a breakpoint")["held"] == "robot 1 is at Sys_Send_Event"
+    assert len(ended) == 9
+    assert all(ended), "four moments, four that were left for one, and the last"
+
+
+def test_moments_are_kept_more_coarsely_the_older_they_are() -> None:
+    """At most so many; those that go are closed."""
+    kept, lines = moments.Moments(), []
+    for ten in range(1, 61):
+        assert kept.is_due(10.0 * ten)
+        assert not kept.is_due(10.0 * ten - 1)
+        here, there = moments.line()
+        there.drop()
+        lines.append(here)
+        kept.add(moments.Moment(ten * 1000, 10.0 * ten, here))
+    assert len(kept) == moments.KEPT
+    assert sum(line.fileno() >= 0 for line in lines) == moments.KEPT
+    times = [moment.seconds for moment in (kept.before(tick) for tick in range(0, 60001, 500)) if moment is not None]
+    ages = sorted({600.0 - one for one in times})
+    assert ages[:3] == [0.0, 10.0, 20.0]
+    assert all(far - near <= max(far * 0.6, 10.0) for near, far in pairwise(ages)), ages
 
 
 def test_a_breakpoint_holds_the_whole_world(clustering_image: Path) -> None:
@@ -148,37 +208,37 @@ def test_a_breakpoint_holds_the_whole_world(clustering_image: Path) -> None:
     with brains_of(plan, 3, 1) as (brains, _, ether):
         whole = run_trial(plan.scene, 3, brains, SECONDS, ether=ether, experiment=plan.to_do)
     with studio_of(plan) as studio:
-        do(studio, lambda: studio.step(1100))
-        studio.ask(lambda: studio.stop_at(1, "Sys_Send_Event"))
+        do(studio, "step", 1100)
+        studio.ask("stop_at", 1, "Sys_Send_Event")
         with pytest.raises(RefusedError, match="robot 0"):
-            studio.ask(lambda: studio.stop_at(0, "no_such_function"))
-        studio.ask(lambda: studio.go(1000.0))
+            studio.ask("stop_at", 0, "no_such_function")
+        studio.ask("go", 1000.0)
         now = settled(studio, "at a breakpoint")
         assert now["held"] == "robot 1 is at Sys_Send_Event"
-        inside = studio.ask(lambda: studio.inside(1))
+        inside = studio.ask("inside", 1)
         assert inside["place"] == "_Sys_Send_Event"
         assert any("Sys_Send_Event" in frame for frame in inside["frames"])
         assert len(inside["w"]) == 16
         with pytest.raises(RefusedError, match="let it go on first"):
-            studio.ask(lambda: studio.move("object", 0, 50.0, 50.0))
+            studio.ask("move", "object", 0, 50.0, 50.0)
         time.sleep(0.2)
-        assert studio.ask(studio.now)["tick"] == now["tick"]
-        studio.ask(lambda: studio.stop_at(1, "Sys_Send_Event"))
-        studio.ask(lambda: studio.go(1000.0))
+        assert studio.ask("now")["tick"] == now["tick"]
+        studio.ask("stop_at", 1, "Sys_Send_Event")
+        studio.ask("go", 1000.0)
         settled(studio, "over")
-        assert studio.ask(studio.trial).columns == whole.rows.columns
+        assert studio.ask("trial").columns == whole.rows.columns
 
 
 def test_what_is_told_arrives(assembled: Callable[[str], Path]) -> None:
     """A robot that echoes what it hears by Bluetooth."""
     plan = Plan(scene_of(1, 0), "echo", "A", assembled(ECHO), 1, SECONDS, 1)
     with studio_of(plan) as studio:
-        do(studio, lambda: studio.step(100))
-        studio.ask(lambda: studio.tell(0, "hello\r"))
+        do(studio, "step", 100)
+        studio.ask("tell", 0, "hello\r")
         with pytest.raises(RefusedError, match="Latin-1"):
-            studio.ask(lambda: studio.tell(0, "\u20ac"))
-        do(studio, lambda: studio.step(500))
-        assert [line["text"] for row in studio.ask(studio.trial).columns["log"] for line in row] == ["hello"]
+            studio.ask("tell", 0, "\u20ac")
+        do(studio, "step", 500)
+        assert [line["text"] for row in studio.ask("trial").columns["log"] for line in row] == ["hello"]
 
 
 def test_a_supervisor_that_fails_leaves_the_moment_before(tmp_path: Path) -> None:
@@ -187,15 +247,15 @@ def test_a_supervisor_that_fails_leaves_the_moment_before(tmp_path: Path) -> Non
     own.write_text(FAILING)
     plan = Plan(scripted(scene_of(2, 4)), "scripted", "A", None, 1, SECONDS, 3, own)
     with studio_of(plan) as studio:
-        studio.ask(lambda: studio.go(1000.0))
-        while (now := studio.ask(studio.now))["state"] == "running":
+        studio.ask("go", 1000.0)
+        while (now := studio.ask("now"))["state"] == "running":
             time.sleep(0.05)
         assert now["state"].startswith("cannot go on: ")
         assert "ouch" in now["state"]
         assert now["t"] == pytest.approx(1.1, abs=0.02)
         with pytest.raises(RefusedError, match="go back first"):
-            studio.ask(lambda: studio.step(1))
-        assert do(studio, lambda: studio.back(50))["tick"] == 50
+            studio.ask("step", 1)
+        assert do(studio, "back", 50)["tick"] == 50
 
 
 FAILING = """

@@ -23,7 +23,7 @@ from functools import cache
 from pathlib import Path
 from threading import RLock
 from typing import Any, Final
-from weakref import WeakValueDictionary
+from weakref import WeakSet, WeakValueDictionary
 
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.worker import REFUSED, REPLY, REQUEST, Backend
@@ -113,6 +113,7 @@ class Compiler:
         self._loaded: WeakValueDictionary[str, Loaded] = WeakValueDictionary()
         self._backend: Backend | None = None
         self._host = b""
+        _compilers.add(self)
 
     def _host_name(self) -> bytes:
         if not self._host:
@@ -222,6 +223,7 @@ class Compiler:
             return self._collect()
 
     def _collect(self) -> list[tuple[object, Loaded]]:
+        self._send()
         while self._selector.select(0):
             assert self._process is not None
             assert self._process.stdout is not None
@@ -270,6 +272,25 @@ class Compiler:
             self._selector.register(self._process.stdout, selectors.EVENT_READ)
         return self._process
 
+    def copied(self) -> None:
+        """This process is a copy of another, to which alone the compile process answers: what is under way is asked
+        for again from one's own."""
+        self._lock = RLock()
+        self._selector.close()
+        self._selector = selectors.DefaultSelector()
+        process, self._process = self._process, None
+        if process is not None:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            atexit.unregister(process.kill)
+            process.stdin.close()
+            process.stdout.close()
+            process.returncode = 0  # it is the other's to wait for
+        self._received.clear()
+        piece, self._in_flight = self._in_flight, None
+        if piece is not None:
+            self._outbox.appendleft(piece)
+
     def _take(self) -> bool:
         received = self._received
         if len(received) < REPLY.size:
@@ -295,3 +316,15 @@ class Compiler:
         loaded = self.load(code, key, entries)
         self._ready += [(tag, loaded) for tag in self._tags.pop(key)]
         return True
+
+
+_compilers: Final[WeakSet[Compiler]] = WeakSet()
+
+
+def _copied() -> None:
+    for one in _compilers:
+        one.copied()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_copied)

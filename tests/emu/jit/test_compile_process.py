@@ -62,6 +62,39 @@ def test_a_process_that_is_killed_is_replaced(compiler: Compiler, capfd: pytest.
     assert capfd.readouterr().err == ""
 
 
+COPIED = """
+import os, sys, time
+from pathlib import Path
+from emu.dspic30f.jit.cache import ObjectCache
+from emu.dspic30f.jit.compiler import Compiler
+
+IR = "define i64 @entry(ptr %rec, ptr %env) {{\\n  ret i64 {}\\n}}\\n"
+compiler, found = Compiler(ObjectCache(Path(sys.argv[1]))), {}
+for number in range(6):
+    compiler.request(IR.format(number), 0, compiler.key(0, b"%d" % number), (number,), number)
+process = compiler._process.pid
+child = os.fork()
+end = time.monotonic() + 60
+while len(found) < 6 and time.monotonic() < end:
+    found.update(compiler.poll())
+    time.sleep(0.01)
+is_own = compiler._process.pid == process
+if not child:
+    compiler._process.kill()
+    os._exit(0 if sorted(found) == list(range(6)) and not is_own else 1)
+assert sorted(found) == list(range(6)) and is_own
+assert os.waitpid(child, 0)[1] == 0
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system copies no processes")
+def test_a_copy_of_the_process_has_a_compile_process_of_its_own(tmp_path: Path) -> None:
+    """Forked with pieces under way, both get all of them, each from its own."""
+    words = [sys.executable, "-c", COPIED, str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("command", ["/bin/false", "/no/such/program"])
 def test_without_any_process_the_run_goes_on_interpreted_with_one_warning(
     compiler: Compiler, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], command: str
