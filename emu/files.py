@@ -5,7 +5,9 @@ A leaf: every part of the project reads and writes what a user names on a comman
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -15,6 +17,8 @@ from pathlib import Path
 from typing import Final, TextIO
 
 STANDARD: Final = "-"
+MOST_LETTERS: Final = 60
+"""Of four octets each they leave room for what makes a name temporary: a name has 255."""
 
 
 def is_standard(path: str | os.PathLike[str]) -> bool:
@@ -76,22 +80,51 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A new, empty file beside `path`, to be written by name. It becomes `path` when the block ends without an
     exception; for standard output, a pipe or a device what it holds is copied. Raises OSError as `open` does.
     """
-    target = Path(path)
-    copied = is_standard(path) or is_opened(target)
-    folder = None if copied else target.parent
-    handle, name = tempfile.mkstemp(dir=folder, prefix=f"{target.name}.", suffix=".part")
-    os.close(handle)
-    part = Path(name)
+    copied = is_standard(path) or is_opened(path)
+    part = _temporary(path) if copied else part_beside(path)
     try:
         yield part
         if is_standard(path):
             write_standard(part.read_bytes())
         elif copied:
-            target.write_bytes(part.read_bytes())
+            Path(path).write_bytes(part.read_bytes())
         else:
-            mask = os.umask(0)
-            os.umask(mask)
-            part.chmod(0o666 & ~mask)
-            part.replace(target)
+            put_in_place(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def part_beside(path: str | os.PathLike[str]) -> Path:
+    """A new, empty file that may become `path`. Raises OSError as `open` would for `path`."""
+    target = _followed(path)
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), os.fspath(path))
+    try:
+        return _temporary(target, target.parent)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from error
+
+
+def put_in_place(part: Path, path: str | os.PathLike[str]) -> None:
+    """What `part_beside` made becomes `path`, with the permissions of the file that was there. Raises OSError."""
+    target = _followed(path)
+    try:
+        mode = stat.S_IMODE(target.stat().st_mode)
+    except FileNotFoundError:
+        mask = os.umask(0)
+        os.umask(mask)
+        mode = 0o666 & ~mask
+    part.chmod(mode)
+    part.replace(target)
+
+
+def _followed(path: str | os.PathLike[str]) -> Path:
+    """The file that `open` would write: symbolic links stay."""
+    return Path(os.path.realpath(path))
+
+
+def _temporary(path: str | os.PathLike[str], folder: Path | None = None) -> Path:
+    """Begins with the name of what it becomes, as far as one name may be long."""
+    handle, name = tempfile.mkstemp(dir=folder, prefix=f"{Path(path).name[:MOST_LETTERS]}.", suffix=".part")
+    os.close(handle)
+    return Path(name)

@@ -41,6 +41,14 @@ def table() -> str:
     return "\n".join(["| status | meaning |", "|---:|---|", *rows])
 
 
+def _open_standard() -> None:
+    """A standard stream that is closed (`<&-`) is as the null device: empty to read, and nobody reads what is written.
+    Otherwise Python has None for it, and the next file that is opened its descriptor."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+
+
 def _drop_output() -> None:
     """What Python still holds for standard output goes nowhere when it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -48,13 +56,14 @@ def _drop_output() -> None:
 
 def unread_is_done(main: Callable[P, int]) -> Callable[P, int]:
     """Wrap a command line: that nobody reads its output to the end (`| head`) is no failure, and nothing is said of it;
-    a full disk under it is one line.
+    a full disk under it is one line, and who closed it before wants none.
 
     What is printed may only be refused when it is flushed, which Python does behind `main`, also behind `--help`.
     """
 
     @wraps(main)
     def wrapped(*arguments: P.args, **options: P.kwargs) -> int:
+        _open_standard()
         try:
             try:
                 return main(*arguments, **options)

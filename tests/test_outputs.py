@@ -12,9 +12,10 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from arena.record import write_bytes
+from arena.record import RecordError, write_bytes
 from emu.boards.picture import write_picture
 from emu.files import is_opened, whole_file, whole_text_file
+from toolchain.errors import ToolError
 from toolchain.files import write_outputs
 
 
@@ -49,6 +50,44 @@ def test_a_pipe_is_written_and_stays_a_pipe(kind: str, tmp_path: Path) -> None:
     reader.join(10)
     assert got[0].startswith(said)
     assert [path.name for path in tmp_path.iterdir()] == ["pipe"]
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_a_link_leads_on_and_permissions_stay(kind: str, tmp_path: Path) -> None:
+    """What was private does not become readable, a new file is as the mask says, and a long name may be written."""
+    write, said = WRITERS[kind]
+    secret, link, new = tmp_path / "secret", tmp_path / "folder" / "link", tmp_path / ("n" * 250)
+    link.parent.mkdir()
+    secret.write_bytes(b"old")
+    secret.chmod(0o600)
+    link.symlink_to(secret)
+    write(link)
+    write(new)
+    assert link.is_symlink()
+    assert secret.read_bytes().startswith(said)
+    assert [path.stat().st_mode & 0o777 for path in (secret, new)] == [0o600, 0o666 & ~umask()]
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_what_cannot_be_written_is_named(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By its own name, not that of an unfinished file; and who took the right to write from a file means it."""
+    write, _ = WRITERS[kind]
+    with pytest.raises((OSError, ToolError, RecordError), match=r"absent/name[':]"):
+        write(tmp_path / "absent" / "name")
+    kept = tmp_path / "kept"
+    kept.write_bytes(b"old")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # as it is for everybody but root
+    with pytest.raises((OSError, ToolError, RecordError), match=r"kept[':]"):
+        write(kept)
+    assert kept.read_bytes() == b"old"
+    assert [path.name for path in tmp_path.iterdir()] == ["kept"]
 
 
 def test_names_of_open_files_are_opened(tmp_path: Path) -> None:

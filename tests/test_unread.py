@@ -43,3 +43,22 @@ def test_a_full_disk_under_the_output_is_one_line(line: str) -> None:
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "No space left on device" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("line", "closed", "status", "said"),
+    [
+        ("emu --version", 1, 0, b""),
+        ("toolchain --version", 1, 0, b""),
+        ("arena scenes", 1, 0, b""),
+        ("openswarm --version", 1, 0, b""),
+        ("emu nothing", 2, 2, b""),
+        ("emu info -", 0, 2, b"emu info: -: is empty; expected an ELF executable for dsPIC30F or an Intel HEX file\n"),
+    ],
+)
+def test_a_stream_that_is_closed_is_empty_or_wants_nothing(line: str, closed: int, status: int, said: bytes) -> None:
+    """`<&-`, `>&-` and `2>&-` of a shell, and services without any: no traceback."""
+    done = subprocess.run([sys.executable, "-m", *line.split()], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
+                          stdin=subprocess.DEVNULL, preexec_fn=lambda: os.close(closed), cwd=ROOT, timeout=120,
+                          check=False)  # fmt: skip
+    assert (done.returncode, done.stderr) == (status, said)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from emu.files import is_opened, is_standard, read_file, write_standard
+from emu.files import is_opened, is_standard, part_beside, put_in_place, read_file, write_standard
 from toolchain.errors import ToolError
 
 
@@ -34,7 +32,7 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
 
     Raises `ToolError` when a target cannot be written; temporaries are removed in every case.
     """
-    pending: list[tuple[str, Path]] = []
+    pending: list[tuple[Path, Path]] = []
     opened: list[tuple[Path, bytes]] = []
     target = Path("output")
     try:
@@ -43,13 +41,11 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
             if is_standard(target) or is_opened(target):
                 opened.append((target, data))
                 continue
-            handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-            pending.append((temporary, target))
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(data)
-            os.chmod(temporary, 0o666 & ~_umask())
-        for temporary, target in pending:
-            os.replace(temporary, target)
+            part = part_beside(target)
+            pending.append((part, target))
+            part.write_bytes(data)
+        for part, target in pending:
+            put_in_place(part, target)
         for target, data in opened:
             if is_standard(target):
                 write_standard(data)
@@ -58,12 +54,5 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
     except OSError as error:
         raise ToolError(f"cannot write {target}: {error.strerror or error}") from None
     finally:
-        for temporary, _ in pending:
-            if os.path.exists(temporary):
-                os.unlink(temporary)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+        for part, _ in pending:
+            part.unlink(missing_ok=True)
