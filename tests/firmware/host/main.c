@@ -1,6 +1,7 @@
 #include "test.h"
 
 static test *first;
+uint32 test_seed = 1;
 
 void test_add(test *t)
 {
@@ -15,6 +16,9 @@ int main(int argc, char **argv)
             printf("%s\t%s\n", t->name, t->says);
         }
         return 0;
+    }
+    if (argc > 2) {
+        test_seed = (uint32)strtoul(argv[2], NULL, 10);
     }
     for (const test *t = first; t != NULL; t = t->next) {
         if (strcmp(t->name, argv[1]) == 0) {

@@ -1,5 +1,5 @@
 /* A kernel test: one function, run as PID 0 of a fresh kernel. On a host each has a process of its own and virtual time:
- *     ./kernel_tests            list        ./kernel_tests NAME   run one; exit status 0 = passed
+ *     ./kernel_tests            list        ./kernel_tests NAME [SEED]   run one; exit status 0 = passed
  * target/bugs runs the tests of original_bugs.c on the emulated robot, each from reset. */
 #ifndef TEST_H
 #define TEST_H
@@ -32,6 +32,7 @@ typedef struct test {
 } test;
 
 void test_add(test *t);
+extern uint32 test_seed; /* of tests that do something at random */
 
 /* says: the statement the test checks and where it is made. */
 #define TEST(identifier, statement)                                                  \

@@ -1,0 +1,60 @@
+"""Infra-red messages and shared events under any light: `python tests/fuzz/fuzz_infrared.py [--tries N] [--seconds S]`.
+
+Each seed is RUNS runs of the test `anything_seen_and_asked_is_survived` (tests/firmware/host/infrared_noise.c) under
+address and undefined-behaviour sanitizers: frames that are whole, damaged, cut or two at once, noise and light of the
+room, while the program makes every call; by seed with tables and queues of the usual size, of one entry, or of many.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tests.fuzz.seeds import SKIPPED, Course, parser  # noqa: E402
+
+HOST = ROOT / "tests/firmware/host"
+RUNS = 50
+TEST = "anything_seen_and_asked_is_survived"
+SANITIZE = "-fsanitize=address,undefined -fno-sanitize-recover=undefined"
+SIZES = (
+    "",
+    "-DSYS_NEIGHBOURS=1 -DSYS_INFRARED_QUEUE=1 -DSYS_REMOTE_EVENTS=1 -DSYS_REMOTE_MEMORY=1",
+    "-DSYS_NEIGHBOURS=64 -DSYS_INFRARED_QUEUE=32 -DSYS_REMOTE_EVENTS=64 -DSYS_REMOTE_MEMORY=100",
+)
+
+
+def build(sizes: str, out: Path) -> Path:
+    """The kernel's host tests with other limits."""
+    words = ["make", "-s", "-j2", "-C", str(HOST), f"OUT={out}", f"SANITIZE={SANITIZE} {sizes}".strip()]
+    subprocess.run(words, check=True)
+    return out / "kernel_tests"
+
+
+def main() -> int:
+    course = Course(parser(__doc__), "tries", 30, f"times {RUNS} runs")
+    course.parse()
+    if shutil.which("gcc") is None:
+        print("skipped: gcc is not installed")
+        return SKIPPED
+    with tempfile.TemporaryDirectory() as folder:
+        programs: dict[str, Path] = {}
+        for seed in course:
+            sizes = SIZES[seed % len(SIZES)]
+            if sizes not in programs:
+                programs[sizes] = build(sizes, Path(folder, str(len(programs))))
+            for run in range(RUNS):
+                words = [programs[sizes], TEST, str(seed * RUNS + run)]
+                done = subprocess.run(words, capture_output=True, text=True, check=False)
+                if done.returncode != 0:
+                    return course.failed(f"run {words[2]} with {sizes or 'the usual sizes'}: {done.stderr.strip()}")
+    return course.ended("nothing wrong arrived, everything was given back")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
