@@ -165,7 +165,7 @@ class Sight:
     def _adapt(self, poses: Poses) -> None:
         """Fewer robots or objects than the scene has: tests, and moments of a record."""
         robots, objects = poses.counts
-        if objects > len(self._things.things) or robots + objects > len(self._things.discs):
+        if objects > len(self._things.things) or robots > len(self.leds):
             raise ValueError(f"{robots} robots and {objects} objects are more than the scene has")
         self._counts = poses.counts
         self._view.robots, self._view.objects = poses.counts

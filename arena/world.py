@@ -82,6 +82,10 @@ class Poses:
         poses._begin(values, robots, values.ctypes.data if address is None else address)
         return poses
 
+    def __reduce__(self) -> tuple[Callable[..., Poses], tuple[NDArray[np.float64], int]]:
+        """Copies and other processes have the numbers elsewhere in memory."""
+        return Poses.of, (self.values, self.counts[0])
+
     @property
     def robots(self) -> list[tuple[float, float, float]]:
         """Poses of the robots."""

@@ -1,6 +1,8 @@
 """The world: units, calibrations of components, repeatability (docs/experiment.md §3)."""
 
+import copy
 import math
+import pickle
 import random
 from array import array
 from collections import deque
@@ -14,9 +16,10 @@ from arena.brain import ScriptedBrain
 from arena.controllers import steps_per_second
 from arena.look import NOTHING, OBJECT, ROBOT
 from arena.scene import Scene, SceneError, load_scene
+from arena.sight import Sight
 from arena.trial import run_trial
 from arena.wheels import ROOM, Wheels
-from arena.world import World
+from arena.world import Poses, World
 
 
 @pytest.fixture
@@ -197,6 +200,23 @@ def test_speeds_are_those_of_the_last_quanta_together() -> None:
             tick += 1
     wheels.rested(tick)
     assert wheels.speed(tick) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda poses: pickle.loads(pickle.dumps(poses))])
+def test_copied_poses_are_where_their_numbers_are(again) -> None:
+    """Compiled code reads them by address: that of the copy, not of what it was made of."""
+    poses = World(load_scene("clustering"), 1).poses
+    copied = again(poses)
+    assert (copied.robots, copied.objects, copied.counts) == (poses.robots, poses.objects, poses.counts)
+    assert copied.address == copied.values.ctypes.data
+
+
+@pytest.mark.parametrize(("robots", "objects"), [(3, 0), (0, 3), (3, 3)])
+def test_a_camera_has_room_for_its_scene_alone(robots: int, objects: int) -> None:
+    """Each of both is counted: the light of a robot's LEDs is found by its number."""
+    sight = Sight(load_scene("clustering").with_values(robots__count=2, objects__count=2), 0)
+    with pytest.raises(ValueError, match=f"{robots} robots and {objects} objects are more than the scene has"):
+        sight.look(Poses([(9.0 * n, 9.0, 0.0) for n in range(robots)], [(50.0, 50.0)] * objects))
 
 
 def test_quanta_in_a_row_are_quanta_one_by_one() -> None:
