@@ -117,12 +117,16 @@ class ScriptedBrain:
         self._missing = scene.camera.false_negative
         self._inventing = scene.camera.false_positive
         self._reading = Reading()
+        self._off_tick = scene.off_tick(robot)
         self._wheels = self._wanted = (0.0, 0.0)
         self._change_at = NEVER
         self._before: Poses | None = None
 
     def think(self, tick: int, poses: Poses) -> tuple[float, float]:
         """As `Brain.think`. A change in the middle of the quantum counts with its share."""
+        if tick >= self._off_tick:
+            self._reading = Reading()
+            return 0.0, 0.0
         start = tick * self._quantum
         end = start + self._quantum
         if self._next_look < end:

@@ -68,6 +68,7 @@ class EmulatedBrain:
         self._scene = scene
         self._robot = robot
         self._quantum = scene.clock.quantum_tcy
+        self._off_tick = scene.off_tick(robot)
         self._on_at = switched_on(scene, seed, robot)
         self._rng = generator(seed, STREAM_SENSORS, robot)
         self._sight = Sight(scene, robot, traits_of(scene, seed, robot))
@@ -137,7 +138,7 @@ class EmulatedBrain:
     def think(self, tick: int, poses: Poses) -> tuple[float, float]:
         """As `Brain.think`."""
         self.lived = tick
-        if self._end_of(tick) > 0 and not self._fault:
+        if self._end_of(tick) > 0 and not self._fault and tick < self._off_tick:
             self._see(tick, poses, self._poses if self._poses.counts[0] else poses)
         self.live(tick + 1)
         return self.speed(tick)
@@ -159,14 +160,25 @@ class EmulatedBrain:
     def live(self, ticks: int) -> None:
         """Live until so many quanta are over. A robot whose infrared sensors are read sees every one of them begin."""
         while self.lived < ticks:
-            if self._fault or self._end_of(self.lived) <= 0:
+            if self.lived == self._off_tick:
+                self._go_dark()
+            if self.lived >= self._off_tick or self._fault or self._end_of(self.lived) <= 0:
                 self.wheels.rested(self.lived)
                 self.lived += 1
             elif self._look_at is not None and self._ring.is_read:
                 self._see(self.lived, *self._look_at(self.lived))
                 self._run(self.lived + 1)
             else:
-                self._run(ticks)
+                self._run(min(ticks, self._off_tick))
+
+    def _go_dark(self) -> None:
+        """The battery has been taken out: emitters and LEDs go off."""
+        now = max(self._off_tick * self._quantum, self._on_at + self.machine.cycle)
+        for line in range(LINES + len(LED_PINS)):
+            self._ether.switch(self._robot, now, line, False)
+        if self._leds:
+            self._leds = 0
+            self._lights.append(Lights(now, 0))
 
     def _end_of(self, tick: int) -> int:
         """Cycle of the machine in which a quantum ends."""
@@ -243,6 +255,8 @@ class EmulatedBrain:
 
     def _listen(self) -> None:
         """Notice firmware that nothing is seen or heard of."""
+        if self.lived >= self._off_tick:
+            return
         now = self.machine.cycle
         steps = self._board.motors.steps()
         if steps != self._steps or self._lights or self._said or self._text:

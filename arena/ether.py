@@ -15,6 +15,9 @@ from emu.boards.epuck.analog import PULSE_PINS, TAU_SECONDS
 LINES: Final = len(PULSE_PINS)
 SETTLED: Final = 16.0
 """Time constants after which what an emitter did before is forgotten: e^-16 of full light is 4e-4 counts."""
+PAUSE_S: Final = 0.0029
+"""Darkness after which light is another transmission: 12 scans of the firmware's link, which begins nothing earlier
+(firmware/openswarm/io/infrared/link.c)."""
 _KEPT: Final = 256
 _OVERRUN: Final = 64
 """Tcy by which a robot may be ahead of the end of a quantum: it ends with a whole instruction."""
@@ -45,6 +48,8 @@ class Ether:
     """Time constant of the receivers in Tcy."""
     _cycles: list[list[int]] = field(init=False)
     _lines: list[list[int]] = field(init=False)
+    _begun: list[list[int]] = field(init=False)
+    """For each switch of the pulse lines, the cycle in which its transmission began."""
     _led_cycles: list[list[int]] = field(init=False)
     _leds: list[list[int]] = field(init=False)
     _news: list[Switch] = field(init=False)
@@ -56,6 +61,7 @@ class Ether:
     def __post_init__(self) -> None:
         self._cycles = [[] for _ in range(self.robots)]
         self._lines = [[0] for _ in range(self.robots)]
+        self._begun = [[] for _ in range(self.robots)]
         self._led_cycles = [[] for _ in range(self.robots)]
         self._leds = [[0] for _ in range(self.robots)]
         self._news = []
@@ -76,9 +82,15 @@ class Ether:
         cycles, lines = self._cycles[robot], self._lines[robot]
         if line >= LINES:
             cycles, lines, line = self._led_cycles[robot], self._leds[robot], line - LINES
+        begun = self._begun[robot] if cycles is self._cycles[robot] else None
         state = lines[-1] | 1 << line if lit else lines[-1] & ~(1 << line)
         if len(cycles) > _KEPT and cycles[_KEPT // 2] < self._looked_back(min(cycle, self.slowest)):
             del cycles[: _KEPT // 2], lines[: _KEPT // 2]
+            if begun is not None:
+                del begun[: _KEPT // 2]
+        if begun is not None:
+            is_new = not cycles or (not lines[-1] and cycle - cycles[-1] > PAUSE_S * FCY)
+            begun.append(cycle if is_new else begun[-1])
         cycles.append(cycle)
         lines.append(state)
         self._news.append(switch)
@@ -97,6 +109,11 @@ class Ether:
         if age >= self._settled:
             return _STEADY[lit]
         return self._followed(self._shares_at(robot, index - 1), lit, age)
+
+    def begun(self, robot: int, cycle: int) -> int:
+        """When the transmission began whose light others see in a cycle of the trial; -1: none yet."""
+        index = bisect_right(self._cycles[robot], cycle - self.quantum - _OVERRUN)
+        return self._begun[robot][index - 1] if index else -1
 
     def leds(self, robot: int, cycle: int) -> int:
         """What others see of a robot's LEDs in a cycle of the trial: bit n of those that were lit a quantum ago."""

@@ -18,10 +18,13 @@ from arena.scene import FCY, Scene
 from arena.world import STREAM_INFRARED, Poses, generator
 from emu.boards.epuck.analog import PULSE_PINS, SENSORS, reflection_at
 from emu.boards.epuck.board import Epuck
-from emu.boards.noise import gaussian
+from emu.boards.noise import gaussian, uniform
 
 LAMP_CM: Final = 100.0
 """Distance at which `light.lamp_counts` holds."""
+LOST_TCY: Final = (round(0.014 * FCY), round(0.030 * FCY))
+"""Of a transmission that is lost: 7 bits begin a frame, then words last 11 ms (firmware/openswarm/io/infrared), of
+which the second is within this."""
 _RIPPLE: Final = math.tau * 100 / FCY
 """Of lamps on the mains, rad per Tcy."""
 
@@ -45,6 +48,8 @@ class Ring:
         """Where poses come from before that; later `move` tells them."""
         self._optics: Optics | None = None
         self._heard: list[Signal] = []
+        self._missed: dict[int, tuple[int, bool]] = {}
+        """By robot its last transmission's begin, and whether it is lost here."""
         rng = generator(seed, STREAM_INFRARED, robot)
         self._seed = int(rng.integers(1 << 62))
         self._offsets = rng.normal(0.0, scene.light.ambient_sd_counts, SENSORS).tolist()
@@ -81,7 +86,7 @@ class Ring:
             self._feel(sensor)
         setting, now, light = self._scene.infrared, self._on_at + cycle, 0.0
         for other, counts, shares in self._heard:
-            if shares[sensor]:
+            if shares[sensor] and not (setting.lost_share and self._misses(other, now)):
                 lit = self._ether.shares(other, now)
                 light += shares[sensor] * sum([one * share for one, share in zip(counts, lit, strict=True)])
         if setting.ripple_counts:
@@ -89,6 +94,18 @@ class Ring:
         if setting.noise_counts:
             light += setting.noise_counts * gaussian(self._seed, sensor, now)
         return light
+
+    def _misses(self, other: int, now: int) -> bool:
+        """Whether another robot's light is lost here now: in so many of its transmissions, as the scene says, for the
+        time of a word, so that it is seen that somebody sends, but not what."""
+        begun = self._ether.begun(other, now)
+        if not LOST_TCY[0] <= now - begun < LOST_TCY[1]:
+            return False
+        known, missed = self._missed.get(other, (-1, False))
+        if known != begun:
+            missed = uniform(self._seed + other, SENSORS, begun) < self._scene.infrared.lost_share
+            self._missed[other] = begun, missed
+        return missed
 
     def _sense(self, cycle: int) -> None:
         if self.look is not None and not self.is_read:

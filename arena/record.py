@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from arena.experiments import Experiment, Moments, experiment_of
+from arena.experiments import Experiment, Moments, Said, experiment_of
 from arena.metrics import Course
-from arena.scene import Scene, scene_of
+from arena.scene import FCY, Scene, scene_of
 from arena.trial import Rows
 from emu.files import is_standard, read_file, whole_file
 
@@ -99,7 +99,11 @@ class Trial:
         headings = [np.asarray(self.columns[f"r{i}_heading"]) for i in range(self.robots.shape[1])]
         turned = np.stack(headings, axis=1)[:, :, None] if headings else np.zeros((len(self.times), 0, 1))
         noted = {name[2:]: np.asarray(values) for name, values in self.columns.items() if name.startswith("n_")}
-        return Moments(self.times, np.concatenate([self.robots, turned], axis=2), self.objects, self.scene, noted)
+        lines = [line for sample in self.columns.get("log", []) for line in sample or ()]
+        said = [Said(line["robot"], line["cycle"] / FCY, line["text"]) for line in lines]
+        said.sort(key=lambda one: one.seconds)
+        robots = np.concatenate([self.robots, turned], axis=2)
+        return Moments(self.times, robots, self.objects, self.scene, noted, said)
 
     def _places(self, letter: str, count: int) -> NDArray[np.float64]:
         if not count:

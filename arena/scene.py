@@ -110,6 +110,13 @@ class Scene:
             stimulus=stimulus.replace("{id}", str(self.id_of(robot))),
         )
 
+    def off_tick(self, robot: int) -> int:
+        """Quanta after which a robot's battery is taken out; beyond every trial if it is not."""
+        for one, seconds in self.start.off:
+            if one == robot:
+                return round(seconds * FCY / self.clock.quantum_tcy)
+        return 1 << 62
+
     def kind_of(self, number: int) -> ObjectKind:
         """What kind of object one is."""
         if self.kinds:
@@ -310,6 +317,7 @@ def _checked(scene: Scene, errors: _Errors) -> Scene:
         words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 1000 and 10000"
         raise errors.at("robots", "count", words)
     _check_links(errors, scene)
+    _check_off(errors, scene)
     if scene.arena.polygon:
         _check_polygon(errors, "arena", scene.arena.polygon, None)
         if min(value for point in scene.arena.polygon for value in point) < 0:
@@ -329,6 +337,15 @@ def _check_links(errors: _Errors, scene: Scene) -> None:
         if words:
             raise errors.at("bluetooth", "links", f"bluetooth.links: {[f'{end:g}' for end in link]}: {words}")
         taken.add(ends)
+
+
+def _check_off(errors: _Errors, scene: Scene) -> None:
+    taken: set[float] = set()
+    for one in scene.start.off:
+        if len(one) != 2 or one[0] not in range(scene.robots.count) or one[1] < 0 or one[0] in taken:
+            words = f"expected a robot of 0 to {scene.robots.count - 1}, once, and a second of the trial"
+            raise errors.at("start", "off", f"start.off: {[f'{value:g}' for value in one]}: {words}")
+        taken.add(one[0])
 
 
 def _check_limits(errors: _Errors, name: str, table: Any, number: int | None = None) -> None:

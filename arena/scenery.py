@@ -85,7 +85,10 @@ class InfraredSetting:
     Light between robots (optics.py) is `signal_gain` times the published amplitude. It falls off an emitter's and a
     receiver's axis as powers of the cosine: 20 and 3.3 halve it at 15 and 36 degrees. Receivers follow with `tau_us`.
     Each sample has Gaussian noise of `noise_counts` and `ripple_counts` of 100 Hz from lamps on the mains. UNVERIFIED:
-    nobody has published a measurement; 1 to 4 counts of noise and 0 to 5 of ripple are plausible (swarmcom.md §7)."""
+    nobody has published a measurement; 1 to 4 counts of noise and 0 to 5 of ripple are plausible (swarmcom.md §7).
+
+    `lost_share` of the messages of others a robot loses, drawn for each robot and message: it does not see that
+    robot's light from 14 to 30 ms after it began behind 2.9 ms of darkness, so a word of the frame stays dark."""
 
     wall_share: float = 1.0
     object_share: float = 0.8
@@ -96,6 +99,7 @@ class InfraredSetting:
     tau_us: float = 60.0
     noise_counts: float = 0.0
     ripple_counts: float = 0.0
+    lost_share: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +132,9 @@ class Start:
     `stimulus` is a script of more (emu/boards/epuck/stimulus.py): what the robot is told by UART, the state of its
     battery, another position of its switch; its times are those of the trial.
 
+    `off`: pairs of a robot, numbered from 0, and the second at which its battery is taken out: it stands, dark, till
+    the end.
+
     A robot without a motor step, a change of LEDs or a byte on UART1 for `silent_s` is reported."""
 
     spread_tcy: int = 1_600_000
@@ -136,6 +143,7 @@ class Start:
     remote_at_s: float = 1.0
     remote_held_s: float = 0.5
     stimulus: str = ""
+    off: Points = ()
     silent_s: float = 60.0
 
 
@@ -316,6 +324,7 @@ LIMITS: Final[Mapping[type[Any], Mapping[str, tuple[float, float]]]] = {
         "tau_us": (1, 1000),
         "noise_counts": (0, 1000),
         "ripple_counts": (0, 1000),
+        "lost_share": (0, 1),
     },
     Light: {"brightness": (0, 100), "ambient_counts": (0, 4095), "ambient_sd_counts": (0, 1000),
             "lamp_counts": (0, 1_000_000), "lamp_x_cm": _CENTRE, "lamp_y_cm": _CENTRE},

@@ -18,7 +18,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,14 @@ class Sample:
     noted: Mapping[str, float]
 
 
+class Said(NamedTuple):
+    """A line that a robot wrote to UART1; its first byte began to leave after `seconds` of the trial."""
+
+    robot: int
+    seconds: float
+    text: str
+
+
 @dataclass(frozen=True)
 class Moments:
     """All samples of a trial at once: `robots` is samples x n x 3, `objects` samples x n x 2."""
@@ -83,6 +91,8 @@ class Moments:
     objects: Floats
     scene: Scene
     noted: Mapping[str, Floats]
+    said: Sequence[Said] = ()
+    """What robots wrote to UART1, in its order."""
 
 
 def _nothing(_world: Any) -> None:
@@ -162,7 +172,7 @@ def _of_name(name: str) -> Experiment:
         if point.name == name:
             module = point.load()
             return _experiment(name, module, _digest(Path(str(module.__file__))))
-    known = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem != "__init__")
+    known = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem[0] != "_")
     raise SceneError(f"there is no experiment {name!r}; known: {', '.join(known)}, or the path of a .py file")
 
 

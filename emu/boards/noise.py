@@ -27,6 +27,11 @@ def gaussian(seed: int, channel: int, cycle: int) -> float:
     return math.sqrt(-2 * math.log(((x >> 32) + 1) / 2**32)) * math.cos(math.tau / 2**32 * (x & 0xFFFF_FFFF))
 
 
+def uniform(seed: int, channel: int, cycle: int) -> float:
+    """From 0 up to, not including, 1."""
+    return (_mixed(seed, channel, cycle) >> 11) / 2**53
+
+
 class Noise:
     """Gaussian noise for analog inputs. Its strength, 0 (off, the default) or 1 (as the reference says) or between,
     and its seed are in the record."""

@@ -352,6 +352,56 @@ def test_samples_have_the_scenes_noise_ripple_and_spread(scene: Scene, tmp_path:
         scene.with_values(infrared__tau_us=0)
 
 
+def test_a_share_of_the_transmissions_of_others_is_lost(scene: Scene, tmp_path: Path) -> None:
+    """Forty of 40 ms each: a lost one is dark from 14 to 30 ms, no other; the same again, another seed otherwise."""
+    listener = built(tmp_path, LISTENER, "listener")
+    poses = Poses([(100.0, 150.0, UP), (100 + 7.4 + 12.5, 150.0, -UP)], [(300.0, 20.0)])
+
+    def lost(seed: int, share: float) -> list[bool]:
+        ether = Ether.of(scene)
+        ears = EmulatedBrain(scene.with_values(infrared__lost_share=share), seed, 0, listener, 0, ether)
+        found: list[set[bool]] = []
+        for tick in range(150, 150 + 40 * 60):
+            number, since = divmod(tick - 150, 60)
+            if since in (0, 40):
+                ether.switch(1, tick * scene.clock.quantum_tcy, 2, since == 0)
+            ears.think(tick, poses)
+            if since == 0:
+                found.append(set())
+            is_seen = ears.machine.peek("dark") < 3790
+            if since == 13:
+                assert is_seen
+            elif 22 <= since < 28:
+                found[number].add(is_seen)
+            elif 38 <= since < 40:
+                assert is_seen
+        assert all(len(one) == 1 for one in found)
+        return [one == {False} for one in found]
+
+    half = lost(2, 0.5)
+    assert 12 <= sum(half) <= 28
+    assert lost(2, 0.5) == half != lost(3, 0.5)
+    assert not any(lost(2, 0.0))
+
+
+def test_a_robot_without_battery_stands_in_the_dark(scene: Scene, tmp_path: Path) -> None:
+    """From the second the scene names; nothing has happened to it that would be a fault."""
+    sender = built(tmp_path, SENDER, "sender")
+    scene = scene.with_values(start__off=[[1, 0.2]], start__silent_s=0.1)
+    ether = Ether.of(scene)
+    mouth = EmulatedBrain(scene, 1, 1, sender, 0, ether)
+    poses = Poses([(100.0, 150.0, UP), (200.0, 150.0, -UP)], [(300.0, 20.0)])
+    lit = []
+    for tick in range(300):
+        assert mouth.think(tick, poses) == (0.0, 0.0)
+        if tick % 4 == 0:
+            lit.append(not ether.is_dark(1, tick * scene.clock.quantum_tcy, (tick + 4) * scene.clock.quantum_tcy))
+    assert any(lit[:50])
+    assert not any(lit[52:])
+    assert mouth.machine.cycle < 0.201 * FCY
+    assert not mouth.reading().fault
+
+
 def test_noise_is_gaussian_with_its_tails() -> None:
     """300,000 draws: shares beyond 1, 3 and 4 deviations."""
     draws = [gaussian(7, cycle % 8, cycle) for cycle in range(300_000)]

@@ -116,7 +116,8 @@ def test_the_applications_are_gnu99(app: str) -> None:
 
 
 def check_gnu99(source: Path) -> None:
-    includes = [f"-I{folder}" for folder in [*HEADERS, FIRMWARE / "apps" / "clustering"]] + [
+    shared = [FIRMWARE / "apps" / app for app in ("clustering", "clocks")]
+    includes = [f"-I{folder}" for folder in [*HEADERS, *shared]] + [
         "-isystem",
         str(ROOT / "toolchain" / "include"),
     ]

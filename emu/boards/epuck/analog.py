@@ -21,6 +21,8 @@ TAU_SECONDS: Final = 60e-6
 """Time constant of the receiver behind its emitter (epuck.md §10)."""
 _SETTLED: Final = 9.2
 """Time constants after which less than half a count is missing of the largest reflection."""
+_GONE: Final = 45.0
+"""Time constants after which nothing of a switch is left in a sum of counts: 4095 e^-45 is 1e-16."""
 _FASTEST_HZ: Final = 30e6
 """The fastest clock (chip §3)."""
 AMBIENT: Final = 3800  # UNVERIFIED: 3500 to 4000 indoors (epuck.md §5)
@@ -108,10 +110,11 @@ class Infrared(Part):
 
     def _share(self, line: int, cycle: int) -> float:
         """How far the receivers of a line have settled to full light, 0..1."""
-        tau = self.tau_seconds * self.chip.fcy
-        target = 1.0 if self._lit[line] else 0.0
+        target, age = 1.0 if self._lit[line] else 0.0, cycle - self._since[line]
+        if age > _GONE * self.tau_seconds * _FASTEST_HZ:
+            return target
         start = self._from[line] / 0xFFFF
-        return target + (start - target) * math.exp(-max(cycle - self._since[line], 0) / tau)
+        return target + (start - target) * math.exp(-max(age, 0) / (self.tau_seconds * self.chip.fcy))
 
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
         self.chip.adc.catch_up(self.now)
