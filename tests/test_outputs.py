@@ -14,7 +14,7 @@ import pytest
 
 from arena.record import RecordError, write_bytes
 from emu.boards.picture import write_picture
-from emu.files import is_opened, whole_file, whole_text_file
+from emu.files import is_opened, read_file, whole_file, whole_text_file
 from toolchain.errors import ToolError
 from toolchain.files import write_outputs
 
@@ -88,6 +88,16 @@ def test_what_cannot_be_written_is_named(kind: str, tmp_path: Path, monkeypatch:
         write(kept)
     assert kept.read_bytes() == b"old"
     assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+
+
+def test_a_file_may_be_called_dash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As everywhere: by a folder in front of its name."""
+    monkeypatch.chdir(tmp_path)
+    write_outputs([("./-", b"object")])
+    assert (tmp_path / "-").read_bytes() == b"object"
+    with whole_text_file("./-") as stream:
+        stream.write("text")
+    assert read_file("./-") == b"text"
 
 
 def test_names_of_open_files_are_opened(tmp_path: Path) -> None:

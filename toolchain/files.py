@@ -32,12 +32,11 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
 
     Raises `ToolError` when a target cannot be written; temporaries are removed in every case.
     """
-    pending: list[tuple[Path, Path]] = []
-    opened: list[tuple[Path, bytes]] = []
-    target = Path("output")
+    pending: list[tuple[Path, str | Path]] = []
+    opened: list[tuple[str | Path, bytes]] = []
+    target: str | Path = "output"
     try:
-        for path, data in outputs:
-            target = Path(path)
+        for target, data in outputs:
             if is_standard(target) or is_opened(target):
                 opened.append((target, data))
                 continue
@@ -50,7 +49,7 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
             if is_standard(target):
                 write_standard(data)
             else:
-                target.write_bytes(data)
+                Path(target).write_bytes(data)
     except OSError as error:
         raise ToolError(f"cannot write {target}: {error.strerror or error}") from None
     finally:
