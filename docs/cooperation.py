@@ -15,7 +15,7 @@ import numpy as np
 from arena.experiments import experiment_of
 from arena.record import Trial, trials_in
 
-SETTLED = {"clocks": "agreed"}
+SETTLED = {"clocks": "agreed", "leader": "elected"}
 """The measure that is the time of agreement; nan: none at the end."""
 LOG = {"apart"}
 

@@ -67,7 +67,8 @@ def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
     text = (Path(__file__).parents[2] / "arena" / "scenes" / f"{scene}.toml").read_text()
     lines = [line for line in text.splitlines() if not line.startswith("off =")]
     path = tmp_path / f"{scene}.toml"
-    path.write_text("\n".join(lines).replace("count = 6", "count = 3").replace("= 40.0", "= 26.0"))
+    few = "\n".join(lines).replace("count = 6", "count = 3").replace("count = 4", "count = 1")
+    path.write_text(few.replace("= 40.0", "= 26.0"))
     command = ["run", str(path), "--trials", "1", "--minutes", f"{seconds / 60}", "--jobs", "1", *words]
     assert main([*command, "--out", str(tmp_path / "out")]) == 0
     return read_trial(tmp_path / "out" / "trial-0001.parquet")
@@ -79,3 +80,20 @@ def test_three_clocks_come_together(tmp_path: Path) -> None:
     begun = [switched_on(made.scene, 1, robot) / FCY for robot in range(3)]
     assert max(begun) - min(begun) > 0.1
     assert made.course.last("apart") < 50
+
+
+def test_a_leader_is_one_who_lives() -> None:
+    """Who follows the dead, or a rank that nobody has, does not count; a rank drawn anew replaces the one before."""
+    said = [Said(robot, 0.2, f"rank {10 - robot}") for robot in range(6)]
+    said += [Said(robot, 0.4, "leader 10") for robot in range(6)]
+    said += [Said(5, 2.5, "rank 20"), Said(5, 2.5, "leader 20"), Said(4, 2.6, "leader 77"), Said(3, 2.6, "leader 20")]
+    course = experiment_of("leader").course(moments("leader", [0.0, 1.0, 2.3, 3.0], said))
+    assert course.curves["following"].tolist() == [0.0, 1.0, 0.0, 2 / 5]
+    assert course.curves["leaders"].tolist() == [0, 1, 0, 1]
+
+
+def test_three_robots_elect_one(tmp_path: Path) -> None:
+    """The one whose selector says so."""
+    made = trial(tmp_path, "leader", 2.0, "--set", "start.spread_tcy=1474560")
+    assert made.course.last("following") == 1.0
+    assert made.moments.said[-1].text.startswith("leader 4")
