@@ -74,7 +74,7 @@ class Counter(Peripheral):
             return max(cycle - self.base.value, 0)
         if source == WAVE:
             waveform = self.kit.pins.waveform(self._port, self._pin)
-            if waveform is not None:  # an edge in cycle c is counted in c + 1 (§7 rule 9)
+            if waveform is not None and cycle > self.base.value:  # an edge in cycle c is counted in c + 1 (§7 rule 9)
                 return waveform.rises(self._pin, self.base.value - 1, cycle - 1)
         return 0
 

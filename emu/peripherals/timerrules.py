@@ -6,7 +6,7 @@ the flag is first 1. Wide, gated and pushed timers, and those that an output com
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from emu.events import NEVER
@@ -93,31 +93,53 @@ def write_period(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
+class ClockPin:
+    """Where a timer's clock comes in."""
+
+    pins: Mapping[tuple[int, int], tuple[Described, Place]]
+    name: tuple[int, int]
+
+    @property
+    def described(self) -> tuple[Described, Place] | None:
+        """The waveform on it that every engine can read, and the place that says whether it is there."""
+        return self.pins.get(self.name)
+
+    def __repr__(self) -> str:
+        """The same in every process: native code is named by it."""
+        wave = self.described
+        return f"ClockPin({self.name}, {wave and (type(wave[0]).__name__, wave[1])})"
+
+
+@dataclass(frozen=True, slots=True)
 class MatchPlaces:
     """What a match looks at, too."""
 
     timer: TimerPlaces
     con: Place
+    writable: int
+    ton: int
+    tcs: int
     tckps: int
     """Its lowest bit."""
     t32: int
-    """Bit of TxCON, 0 for a timer that has none."""
+    """T32, 0 for a timer that is not one of a pair."""
+    pair: Place
+    """The TxCON that T32 is in."""
     source: Place
-    described: Callable[[], tuple[Described, Place] | None]
-    """The waveform on the clock pin that every engine can read, and the place that says whether it is there."""
+    clock: ClockPin
     pin: int
 
 
 def fire_match(m: Reader, p: MatchPlaces) -> None:
     """A match of a timer that interrupts periodically (§7 rule 2), or on a described clock."""
-    t, clock = p.timer, p.described()
+    t, clock = p.timer, p.clock.described
     period = m.get(t.period)
     if clock is None:
         m.need(period != 0)
         m.post(t.match, m.now + period)
     else:
         wave, attached = clock
-        narrow = (m.get(p.con) & p.t32) == 0
+        narrow = (m.get(p.pair) & p.t32) == 0
         counts = (m.get(p.source) == WAVE) & narrow & (m.get(attached) != 0)
         waves = counts & (m.get(t.pr) != 0) & (m.get(t.listeners) == 0) & (period == 0)
         m.need((period != 0) | waves)
@@ -142,6 +164,40 @@ def next_edges(m: Reader, p: MatchPlaces, nth_rise: Callable[[Number, Number], N
         return m.select(edge == NEVER, NEVER, edge + 2)
 
     return due(m.now - 2, (limit + 1) * prescale), m.now, nth_rise(m.now, 1), due(m.now, limit * prescale)
+
+
+def switch(m: Reader, p: MatchPlaces, value: Number, lanes: int) -> bool:
+    """TON changes and nothing else, on a described clock. Off: the count is known if there was no edge since it was
+    written, or just those to the match. On: counting begins with the next cycle. The prescaler is empty (§7 rule 6)."""
+    t, clock = p.timer, p.clock.described
+    if clock is None or not lanes & p.ton:
+        return False
+    wave, attached = clock
+    old, source, tmr, limit = m.get(p.con), m.get(p.source), m.get(t.tmr), m.get(t.pr)
+    free = p.writable & lanes
+    new = (old & (0xFFFF & ~free)) | (value & free)
+    starts = (new & p.ton) != 0
+    counts = ((new & p.tcs) != 0) & (source == m.select(starts, STOPPED, WAVE)) & ((m.get(p.pair) & p.t32) == 0)
+    m.need(((old ^ new) == p.ton) & counts & (m.get(attached) != 0) & (limit != 0) & _alone(m, t))
+    prescale = m.table(PRESCALE, new >> p.tckps & len(PRESCALE) - 1)
+    clocks = _counts_until(m, tmr, limit) * prescale - m.select(starts, 0, m.get(t.phase))
+    after = m.select(starts, m.now, m.get(t.base) - 1)
+    edge = wave.text_of_rise(m, p.pin, after, clocks)
+    matched = m.select(starts, 0, m.below(m.now, edge) == 0)
+    following = wave.text_of_rise(m, p.pin, after, m.select(matched, clocks, 0) + 1)
+    m.need(starts | m.below(m.now, following))
+    count, due = m.select(matched, limit, tmr), m.get(t.match.due)
+    stands = (due == m.now + 1) | (starts & (due == m.now + 2) & (count == limit))
+    posted = m.select(starts & (edge != NEVER), edge + 2, NEVER)
+    m.put(p.con, new)
+    m.put(t.tmr, count)
+    m.put(t.base, m.now + 1)
+    m.put(t.before, count)
+    for place in (t.phase, t.tick, t.period, t.clear_until):
+        m.put(place, 0)
+    m.put(p.source, m.select(starts, WAVE, STOPPED))
+    m.post(t.match, m.select(stands, due, posted))
+    return True
 
 
 def _alone(m: Reader, t: TimerPlaces) -> Number:

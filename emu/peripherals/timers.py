@@ -21,11 +21,13 @@ from emu.peripherals.timerrules import (
     STOPPED,
     TCY,
     WAVE,
+    ClockPin,
     MatchPlaces,
     TimerPlaces,
     fire_match,
     next_edges,
     read_count,
+    switch,
     write_count,
     write_period,
 )
@@ -56,10 +58,8 @@ class Timer(Counter):
         places = self._registers()
         self.tmr.ruled(Rule(places, read_count, write_count))
         self.pr.ruled(Rule(places, None, write_period))
-        fields, clock = kit.chip.sfrs[self.con.name].fields, (self._port, self._pin)
-        t32 = 1 << fields["T32"][0] if site.kind == "B" else 0
-        self._places: Final = MatchPlaces(places, self.con.place, fields["TCKPS"][0], t32, self._source.place,
-                                          lambda: kit.pins.described.get(clock), self._pin)  # fmt: skip
+        self._places: Final = self._match_places(places)
+        self.con.ruled(Rule(self._places, None, switch))
         self.ruled(self._match, Rule(self._places, fires=fire_match))
         self.tmr.computed(self.read)
         self.tmr.written_by(self._tmr_written)
@@ -75,6 +75,24 @@ class Timer(Counter):
         places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
         match, line = slot_of(self.record, self._match), self.line.line
         return TimerPlaces(tmr=self.tmr.place, pr=self.pr.place, match=match, line=line, **places)
+
+    def _match_places(self, places: TimerPlaces) -> MatchPlaces:
+        sfrs, kind = self.kit.chip.sfrs, self.site.kind
+        con, pair = sfrs[self.con.name], self.con if kind != "C" else self.register(f"T{self.site.partner}CON")
+        ton, tcs = (1 << con.fields[name][0] for name in ("TON", "TCS"))
+        return MatchPlaces(
+            timer=places,
+            con=self.con.place,
+            writable=con.writable,
+            ton=ton,
+            tcs=tcs,
+            tckps=con.fields["TCKPS"][0],
+            t32=1 << sfrs[pair.name].fields["T32"][0] if kind != "A" else 0,
+            pair=pair.place,
+            source=self._source.place,
+            clock=ClockPin(self.kit.pins.described, (self._port, self._pin)),
+            pin=self._pin,
+        )
 
     def pair(self, high: Timer) -> None:
         """Join with the type C partner (T2 with T3, T4 with T5)."""

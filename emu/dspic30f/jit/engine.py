@@ -155,6 +155,8 @@ class JitEngine:
         if state.edt:
             sequencer.execute()
             return
+        if self.compiler.busy:
+            self._collect()
         self._select()
         if self._dispatch is None:
             if not self.counts.regions:
@@ -186,6 +188,8 @@ class JitEngine:
         start = before = u64[now]
         if self._dispatch is None or not start or self._u16[self._edt]:  # native boundaries count with the cycle before
             return False
+        if self.compiler.busy:
+            self._collect()
         self._select()
         env, native, record, surroundings = self._env, self._native, self._core.record.address, self._env_address
         env[LIMIT] = min(limit, start + self._longest)
@@ -322,8 +326,6 @@ class JitEngine:
         if self._state.repeat != NOT_REPEATING:
             self._core.sequencer.execute()
             return
-        for tag, loaded in self.compiler.poll():
-            self._install(tag, loaded)
         heat = code.heat.get(pc, 0) + 1
         code.heat[pc] = heat
         if heat >= self.threshold and pc not in code.regions and pc >> 1 < self._words:
@@ -410,6 +412,11 @@ class JitEngine:
                 self._install((code, exact), self.compiler.now(text, level, key, entries))
             else:
                 self.compiler.request(text, level, key, entries, (code, exact))
+
+    def _collect(self) -> None:
+        """Install what the compile process has made meanwhile, for whichever machine, and let it go on."""
+        for tag, loaded in self.compiler.poll():
+            self._install(tag, loaded)
 
     def _install(self, tag: Any, loaded: Loaded) -> None:
         code, exact = tag

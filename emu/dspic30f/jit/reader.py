@@ -76,6 +76,13 @@ class NativeReader(LlvmReader):
         """Leave before the instruction unless this holds."""
         self._b.guard(condition)
 
+    def table(self, values: tuple[int, ...], index: Number) -> Number:
+        """A choice for each value: an access has no constants of its own, and tables are short."""
+        found: Number = values[-1]
+        for number, value in enumerate(values[:-1]):
+            found = self.select(index == number, value, found)
+        return found
+
     def post(self, slot: Slot, due: Number) -> None:
         """Store the due cycle; the deadline may come nearer, so the function is left behind the instruction."""
         deadline = self.get(slot.deadline)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import random
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from emu.boards.epuck.pixels import Gains, decode, encode
 from emu.boards.epuck.scan import HREF, PCLK, VSYNC, per_frame
 from emu.boards.epuck.sensors import SENSORS
+from emu.peripherals.timerrules import switch
 
 from .conftest import Robot
 
@@ -526,3 +528,56 @@ def test_unplugging_in_the_middle_of_a_line_ends_it_at_once(robot):
     camera.unplug()
     assert robot.read("PORTD") >> 8 == 0
     assert robot.machine.record.u64[robot.machine.record.fields["camera.line_to"].index] <= robot.events.now
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_timers_on_sync_lines_are_switched_alike_with_and_without_the_rule(seed):
+    """TON around edges and matches: the rule of native code and the device's hooks leave the same record."""
+    robots = [Robot(), Robot()]
+    bus, events = robots[0].machine.bus, [robot.events for robot in robots]
+    hooks = robots[1].machine.bus
+    hooks.rules[:] = [None if rule and rule.writes is switch else rule for rule in hooks.rules]
+    followed, write = [], bus.integers.write
+
+    def counted(rule, value, lanes):
+        done = write(rule, value, lanes)
+        followed.extend([done] * (rule.writes is switch))
+        return done
+
+    bus.integers.write = counted
+    draw = random.Random(seed)
+    for robot in robots:
+        robot.configure(po6030())
+        robot.write("PR5", 1)
+        robot.later(20)
+    for step in range(200):
+        register, bits = draw.choice(("T4CON", "T5CON")), 0x8002
+        kind = draw.random()
+        if kind < 0.55:
+            on = draw.random() < 0.5
+            value, lanes = (0x8002 if on else 2), draw.choice((0xFFFF, 0xFF00))
+        elif kind < 0.6:
+            value, lanes = draw.choice((0x8002, 0x800A, 0x0012, 0x8030, 0x8012, 0x2002, 0x8022)), 0xFFFF
+        elif kind < 0.8:
+            register, value, lanes = draw.choice(("TMR4", "TMR5")), draw.choice((0, 0, 1, 2, 3, 50)), 0xFFFF
+        elif kind < 0.9:
+            register, value, lanes = draw.choice(("PR4", "PR5")), draw.choice((0, 1, 1, 2, 3, 9)), 0xFFFF
+        else:
+            value, lanes = bits, 0xFFFF
+        camera = robots[0].board.camera
+        now = events[0].now
+        edge = camera.scan.nth_rise(draw.choice((HREF, HREF, VSYNC)), now, draw.choice((1, 1, 2)))
+        later = draw.choice((1, 1, 2, 3, 40, max(edge - now + draw.randrange(-2, 4), 1)))
+        for robot in robots:
+            robot.machine.bus.write(robot.machine.chip.sfrs[register].address, value, lanes)
+            robot.later(later)
+            robot.machine.peripherals.pins.flush()
+            robot.machine.record.u64[robot.events.deadline_index] = 0  # derived
+        counts = [[robot.read(name) for name in ("TMR4", "TMR5")] for robot in robots]
+        assert counts[0] == counts[1], (step, register, hex(value), counts)
+        record = robots[0].machine.record
+        both = record.snapshot(), robots[1].machine.record.snapshot()
+        if both[0] != both[1]:
+            fields = {record.field_at(i) for i, (one, other) in enumerate(zip(*both, strict=True)) if one != other}
+            pytest.fail(f"step {step}, {register} = {value:#x}, lanes {lanes:#x}: {fields}")
+    assert sum(followed) > 20
