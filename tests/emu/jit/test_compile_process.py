@@ -167,6 +167,24 @@ def test_the_code_of_a_machine_goes_with_it(compiler: Compiler) -> None:
     assert not compiler._loaded
 
 
+def test_code_arrives_while_no_address_is_missed(compiler: Compiler) -> None:
+    """Exact code of a loop is there first, and has no gaps: what makes it fast must not wait for one."""
+    machine = Machine(engine="jit")
+    runner = machine.runner
+    assert isinstance(runner, JitEngine)
+    runner.compiler, runner.threshold = compiler, 1
+    load(machine, straight_firmware(3, Shape(instructions=100)))
+    machine.stop_on_fault = False
+    machine.run(cycles=2000)
+    assert compiler.busy
+    missed, end = runner._miss, time.monotonic() + 60
+    runner._miss = lambda limit: runner._run_cold(limit)  # type: ignore[method-assign]
+    while compiler.busy and time.monotonic() < end:
+        machine.run(cycles=100)
+    assert not compiler.busy
+    runner._miss = missed  # type: ignore[method-assign]
+
+
 FRAGMENTED = """
 import ctypes, mmap
 from pathlib import Path
