@@ -8,6 +8,7 @@ Per curve the median of the trials and the bands that hold 50 and 90 % of them; 
 from __future__ import annotations
 
 import argparse
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,7 @@ def draw(path: Path, name: str, trials: list[Trial]) -> None:
         for _, second in trials[0].scene.start.off:
             axis.axvline(second, color="tab:red", linestyle=":", linewidth=1)
         axis.set(xlabel="s", xlim=(0, times[-1]))
-        axis.set_ylabel(f"{curve.label}, {curve.unit}".rstrip(", "), fontsize=8)
+        axis.set_ylabel(textwrap.fill(f"{curve.label}, {curve.unit}".rstrip(", "), 45), fontsize=8)
         if curve.name in LOG:
             axis.set_yscale("log")
     axes[0][0].set_title(f"{len(trials)} trials: median, 50 and 90 %; red: a robot dies", fontsize=9)
