@@ -86,8 +86,8 @@ def test_a_leader_is_one_who_lives() -> None:
     """Who follows the dead, or a rank that nobody has, does not count; a rank drawn anew replaces the one before."""
     said = [Said(robot, 0.2, f"rank {10 - robot}") for robot in range(6)]
     said += [Said(robot, 0.4, "leader 10") for robot in range(6)]
-    said += [Said(5, 2.5, "rank 20"), Said(5, 2.5, "leader 20"), Said(4, 2.6, "leader 77"), Said(3, 2.6, "leader 20")]
-    course = experiment_of("leader").course(moments("leader", [0.0, 1.0, 2.3, 3.0], said))
+    said += [Said(5, 4.5, "rank 20"), Said(5, 4.5, "leader 20"), Said(4, 4.6, "leader 77"), Said(3, 4.6, "leader 20")]
+    course = experiment_of("leader").course(moments("leader", [0.0, 1.0, 4.3, 5.0], said))
     assert course.curves["following"].tolist() == [0.0, 1.0, 0.0, 2 / 5]
     assert course.curves["leaders"].tolist() == [0, 1, 0, 1]
 
