@@ -317,7 +317,7 @@ def alive(process: str) -> bool:
     return stat.rpartition(")")[2].split()[0] != "Z"  # a container without init may leave the dead unburied
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only /proc tells a process's children")
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="only Linux's /proc tells a killed process's children")
 def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
     """SIGKILL cannot be handled by the run itself; its workers would compute on for nobody."""
     command = [sys.executable, "-m", "arena", "run", "clustering", "--brain", "scripted", "--minutes", "600"]

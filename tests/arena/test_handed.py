@@ -16,7 +16,8 @@ from arena.campaign import Plan, brains_of
 from arena.inhand import RefusedError
 from arena.studio import Studio
 from arena.trial import run_trial
-from tests.arena.test_studio import BROWSER, browsed, do, scene_of, scripted_plan, serving, settled, studio_of
+from tests.arena.browser import needs_browser
+from tests.arena.test_studio import browsed, do, scene_of, scripted_plan, serving, settled, studio_of
 from tests.emu.dap.client import Client
 
 SECONDS = 2.0
@@ -118,7 +119,7 @@ const word = id => el(id).textContent;
 </script></html>"""
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+@needs_browser
 def test_the_page_gives_a_robot_to_a_debugger_and_takes_it_back(
     clustering_image: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -27,8 +26,8 @@ from arena.page import samples_of
 from arena.record import RecordError, read_trial, write_trial
 from arena.scene import load_scene, scripted
 from arena.trial import Rows, run_trial
+from tests.arena.browser import BROWSER, needs_browser
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 PROBE = """<pre id="result"></pre><script>
 const found = {before: d.t.length, title: document.title};
 setTimeout(() => {
@@ -177,7 +176,7 @@ def test_live_needs_a_run_that_goes_on(tmp_path: Path, capsys: pytest.CaptureFix
     assert "no trial is running here" in capsys.readouterr().err
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+@needs_browser
 def test_the_page_grows_in_a_browser(tmp_path: Path, recorded: tuple[dict[str, Any], list[dict[str, Any]]]) -> None:
     """It begins with four samples, asks, and follows to the last one when the trial is done."""
     about, rows = recorded

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,8 @@ import pytest
 from arena.cli import main
 from arena.page import page
 from arena.record import read_trial
+from tests.arena.browser import BROWSER, needs_browser
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 SAMPLE = 7
 PROBE = """<pre id="result"></pre><script>
 const found = {before: sample, samples: d.t.length};
@@ -63,7 +62,7 @@ def test_text_from_robots_cannot_end_the_page(trial: Path) -> None:
     assert page(record).count("</script>") == 2
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+@needs_browser
 def test_the_page_loads_scrubs_and_plays_in_a_browser(trial: Path, tmp_path: Path) -> None:
     """Issue "Must show" 6."""
     main(["replay", str(trial)])
@@ -93,7 +92,7 @@ document.getElementById("result").textContent = JSON.stringify({
 </script></html>"""
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+@needs_browser
 def test_the_page_shows_strips_leds_and_what_was_said(trial: Path, tmp_path: Path) -> None:
     """A robot blinks its front LED within a sample and says a line; its camera's line has three colours."""
     record = read_trial(trial)
@@ -147,7 +146,7 @@ document.getElementById("result").textContent = JSON.stringify(found);
 </script></html>"""
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+@needs_browser
 @pytest.mark.parametrize("size", ["1280,720", "700,900"])
 def test_everything_can_be_reached_by_hand_and_key(trial: Path, tmp_path: Path, size: str) -> None:
     """Controls, arena, plot and log are all on the screen; keys and clicks do what they say; robots move between

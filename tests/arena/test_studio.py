@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-import shutil
 import signal
 import subprocess
 import sys
@@ -30,10 +29,10 @@ from arena.inhand import RefusedError
 from arena.scene import Scene, load_scene, scripted
 from arena.studio import Call, Studio
 from arena.trial import run_trial
+from tests.arena.browser import BROWSER, needs_browser
 from tests.arena.images import ECHO
 
 ROOT = Path(__file__).resolve().parents[2]
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 SECONDS = 6.0
 
 
@@ -392,7 +391,7 @@ const still = async () => { await rest(100); await until(() => d.studio.now.stat
 </script></html>"""
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no chromium here (Debian package chromium)")
+@needs_browser
 def test_the_page_takes_the_trial_in_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Step, run, stand, drag, back to the moment of the drag, look inside, and what is refused is told."""
     with serving(replace(scripted_plan(), seconds=600.0)) as one:  # it is not over before it stands

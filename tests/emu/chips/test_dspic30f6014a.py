@@ -13,6 +13,7 @@ from emu.peripherals.pins import parse_pin
 REFERENCE = Path(__file__).parents[4] / "shared" / "reference" / "sfr.csv"
 
 
+# The list is not this project's to publish; the table was made from it, and is compared wherever a checkout has it.
 @pytest.mark.skipif(not REFERENCE.exists(), reason="the reference list of registers is not beside the checkout")
 def test_registers_agree_with_the_reference_list():
     """sfr.csv: names, addresses, sizes, resets, masks, fields, ownership."""

@@ -59,7 +59,7 @@ def test_standard_output_is_for_one(spin, other):
 
 def test_completion_knows_commands_options_and_choices():
     bash = shutil.which("bash")
-    if bash is None:
+    if bash is None:  # only it can say what the script makes it offer
         pytest.skip("there is no bash (Debian package bash)")
     script = emu("completion", "bash").stdout
     ask = 'COMP_WORDS=(emu {words}); COMP_CWORD={last}; _shtab_emu; echo "${{COMPREPLY[@]}}"'
