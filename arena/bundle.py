@@ -23,7 +23,8 @@ import numpy as np
 
 from arena.campaign import Plan, run_one, trial_path
 from arena.controllers import CONTROLLERS
-from arena.record import EXPERIMENT, MANIFEST, RecordError, read_trial, write_bytes
+from arena.manifest import MANIFEST, read_manifest
+from arena.record import EXPERIMENT, RecordError, read_trial, write_bytes
 from arena.scene import scene_of
 
 CONTENTS: Final = "bundle.json"
@@ -81,7 +82,7 @@ def digest_of(record: Path) -> Digest:
     """The digest of a trial's file. Raises RecordError."""
     trial = read_trial(record)
     columns = {name: hashlib.sha256(_plain(values)).hexdigest() for name, values in trial.columns.items()}
-    return Digest(hashlib.sha256(record.read_bytes()).hexdigest(), columns, trial.about.get("versions", {}))
+    return Digest(hashlib.sha256(record.read_bytes()).hexdigest(), columns, trial.about.get("versions") or {})
 
 
 def _plain(values: Any) -> bytes:
@@ -149,11 +150,11 @@ def unpack(bundle: Path, folder: Path) -> list[Path]:
 def plan_of(folder: Path) -> Plan:
     """The plan of an unpacked run, from its manifest. Raises RecordError, SceneError."""
     try:
-        key: dict[str, Any] = json.loads((folder / MANIFEST).read_text())["key"]
+        key: dict[str, Any] = read_manifest(folder)["key"]
         scene = scene_of(key["scene"])
         own = dict.fromkeys(group.image for group in scene.groups if group.image)
         firmware = {path.stem: path for path in folder.glob("firmware*")}
-        hashes = key.get("images_sha256", {})
+        hashes = key.get("images_sha256") or {}
         images = tuple((name, firmware[f"firmware-{place}"] if hashes.get(name) else None)
                        for place, name in enumerate(own, start=1))  # fmt: skip
         image = firmware["firmware"] if key["image_sha256"] else None
@@ -167,15 +168,13 @@ def plan_of(folder: Path) -> Plan:
 
 def _plausible(key: dict[str, Any]) -> None:
     """Raises ValueError for what no plan has."""
-    seconds, seed = key["seconds"], key["seed"]
-    for name, value, good in (
-        ("brain", key["brain"], isinstance(key["brain"], str)),
-        ("controller", key["controller"], key["controller"] in CONTROLLERS),
-        ("seconds", seconds, isinstance(seconds, int | float) and 0 < seconds < math.inf),
-        ("seed", seed, isinstance(seed, int) and seed >= 0),
+    for name, good in (
+        ("controller", key["controller"] in CONTROLLERS),
+        ("seconds", 0 < key["seconds"] < math.inf),
+        ("seed", key["seed"] >= 0),
     ):
         if not good:
-            raise ValueError(f"{name}: {value!r:.40} is none")
+            raise ValueError(f"{name}: {key[name]!r:.40} is none")
 
 
 def verify(bundle: Path, chosen: Callable[[list[int]], list[int]], processes: int) -> Iterator[Check]:

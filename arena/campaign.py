@@ -28,7 +28,8 @@ from arena.crew import Crew
 from arena.ether import Ether
 from arena.experiments import Experiment, experiment_of
 from arena.live import LiveFile, live_path
-from arena.record import MANIFEST, FolderInUseError, RecordError, write_json, write_trial
+from arena.manifest import MANIFEST, read_manifest, write_manifest
+from arena.record import FolderInUseError, RecordError, write_trial
 from arena.scene import Scene
 from arena.trial import run_trial
 from arena.versions import host, versions
@@ -206,24 +207,18 @@ def open_folder(plan: Plan, folder: Path, arguments: list[str]) -> list[int]:
     Raises RecordError if it holds another run.
     """
     key = plan.key() | {"seed": plan.seed}
-    manifest = folder / MANIFEST
-    try:
-        before = json.loads(manifest.read_text()) if manifest.exists() else None
-    except (OSError, ValueError) as error:
-        raise RecordError(f"{manifest}: {error}") from None
-    if before is not None and before.get("key") != key:
-        raise RecordError(f"{folder}: holds another run (different {', '.join(_changed(before.get('key'), key))}); "
+    before = read_manifest(folder) if (folder / MANIFEST).exists() else None
+    if before is not None and before["key"] != key:
+        raise RecordError(f"{folder}: holds another run (different {', '.join(_changed(before['key'], key))}); "
                           "choose another --out")  # fmt: skip
-    write_json(manifest, (before or {"host": []}) | {"key": key, "made_on": host(), "command": ["arena", *arguments]})
+    write_manifest(folder, (before or {"host": []}) | {"key": key, "made_on": host(), "command": ["arena", *arguments]})
     return [number for number in range(1, plan.trials + 1) if not trial_path(folder, number).exists()]
 
 
-def _changed(before: Any, now: dict[str, Any]) -> list[str]:
+def _changed(before: dict[str, Any], now: dict[str, Any]) -> list[str]:
     """Which parts of two keys differ, in the words of people."""
-    before = before if isinstance(before, dict) else {}
     changed = [name for name in now if name != "versions" and before.get(name) != now[name]]
-    old = before.get("versions") or {}
-    new = now["versions"]
+    old, new = before["versions"], now["versions"]
     return changed + [f"version of {name}" for name in new if old.get(name) != new[name]]
 
 
@@ -270,11 +265,3 @@ def _end_with_parent() -> None:
 
 def _work(plan: Plan, number: int, folder: Path) -> Done:
     return run_one(plan, number, folder, lambda trial, seconds: _queue.put((trial, seconds)))
-
-
-def note_host_time(folder: Path, done: Done) -> None:
-    """Keep how long a trial took, and its faults, in the manifest: a trial's bytes must not depend on host time."""
-    manifest = folder / MANIFEST
-    value = json.loads(manifest.read_text())
-    value["host"].append({"trial": done.trial, "host_s": round(done.host_s, 2), "faults": done.faults})
-    write_json(manifest, value)

@@ -21,7 +21,7 @@ MARGIN_PART = 0.10
 
 def courses(trials: list[Trial]) -> dict[int, tuple[Trial, Course]]:
     """Metrics of each trial by seed."""
-    return {int(trial.about["seed"]): (trial, trial.course) for trial in trials}
+    return {trial.about["seed"]: (trial, trial.course) for trial in trials}
 
 
 def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def _apart(pairs: list[Any]) -> list[dict[str, float]]:
 
 def mean_load(trials: list[Trial]) -> float | None:
     """CPU load averaged over robots, trials and time; None without robots or for scripted brains, which have no CPU."""
-    robots = range(trials[0].about["scene"]["robots"]["count"])
+    robots = range(trials[0].scene.robots.count)
     if not robots or trials[0].is_scripted:
         return None
     return float(np.mean([trial.columns[f"r{robot}_load"][1:].mean() for trial in trials for robot in robots]))

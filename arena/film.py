@@ -94,12 +94,12 @@ def film(trial: Trial, robot: int) -> Figure:
 
 
 def _from_above(axis: Any, trial: Trial, data: dict[str, Any], robot: int, sample: int) -> None:
-    radius = trial.about["scene"]["objects"]["radius_cm"]
     x, y = trial.robots[sample][robot]
     heading = data["robots"][robot]["heading"][sample]
     path = trial.robots[: sample + 1, robot]
     axis.plot(path[:, 0], path[:, 1], color="0.6", linewidth=0.8)
-    for ox, oy in trial.objects[sample]:
+    for thing, (ox, oy) in enumerate(trial.objects[sample]):
+        radius = trial.scene.kind_of(thing).radius_cm
         axis.add_patch(Circle((ox, oy), radius, facecolor=_FACES[OBJECT], edgecolor="k"))
     for rx, ry in trial.robots[sample]:
         axis.add_patch(Circle((rx, ry), bodies.ROBOT_RADIUS, facecolor=_FACES[ROBOT], edgecolor="k"))

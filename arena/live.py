@@ -14,7 +14,7 @@ from typing import Any, TextIO
 from filelock import FileLock, Timeout
 
 from arena.page import page, samples_of
-from arena.record import RecordError, Trial, read_trial
+from arena.record import RecordError, Trial, checked, read_trial
 
 
 def live_path(folder: Path, number: int) -> Path:
@@ -110,7 +110,7 @@ class Follower:
         self._offset += len(complete.encode())
         for line in complete.splitlines():
             if not self._about:
-                self._about = json.loads(line)
+                self._about = checked(self._path, json.loads(line))
             else:
                 self._rows.append(_decoded(json.loads(line)))
         return "running" if self._is_written() else "gone"

@@ -19,6 +19,7 @@ from arena.brain import STRIP_PIXELS
 from arena.look import COLOURS
 from arena.page import samples_of
 from arena.record import RecordError, Trial, reason_of
+from arena.scene import Scene
 from emu.files import whole_file
 
 SCALE: Final = 1.6
@@ -60,18 +61,17 @@ def write_movie(trial: Trial, path: Path, speed: float, seconds: float | None = 
 def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
     """A picture for each time in s: arena from above, the robots' camera strips below, time and share."""
     data = samples_of(trial)
-    scene = trial.about["scene"]
     metrics = trial.experiment.curves[:2]
     sample = 0
     for time in times:
         while sample + 1 < len(data["t"]) and data["t"][sample + 1] <= time + 1e-3:
             sample += 1
         said = "   ".join(f"{one.label} {one.shown(data['curves'][one.name][sample])}" for one in metrics)
-        yield _frame(scene, data, sample, said)
+        yield _frame(trial.scene, data, sample, said)
 
 
-def _frame(scene: dict[str, Any], data: dict[str, Any], sample: int, said: str) -> Image.Image:
-    width, height = round(scene["arena"]["width_cm"] * SCALE), round(scene["arena"]["height_cm"] * SCALE)
+def _frame(scene: Scene, data: dict[str, Any], sample: int, said: str) -> Image.Image:
+    width, height = round(scene.arena.width_cm * SCALE), round(scene.arena.height_cm * SCALE)
     rows = len(data["robots"])
     total = height + _LINE * (rows + 1) + 4
     image = Image.new("RGB", (width + width % 2, total + total % 2), _PAPER)
@@ -83,8 +83,8 @@ def _frame(scene: dict[str, Any], data: dict[str, Any], sample: int, said: str) 
         draw.ellipse((left - r, low - r, left + r, low + r), fill=fill, outline=_INK)
 
     labels = data["clusters"][sample]
-    for (x, y), label in zip(data["objects"][sample], labels, strict=True):
-        disc(x, y, scene["objects"]["radius_cm"],
+    for thing, ((x, y), label) in enumerate(zip(data["objects"][sample], labels, strict=True)):
+        disc(x, y, scene.kind_of(thing).radius_cm,
              _CLUSTERS[label % len(_CLUSTERS)] if labels.count(label) > 1 else _PALE)  # fmt: skip
     for number, robot in enumerate(data["robots"]):
         x, y, heading = robot["x"][sample], robot["y"][sample], robot["heading"][sample]

@@ -39,11 +39,10 @@ def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None)
 def head_of(trial: Trial) -> dict[str, Any]:
     """What does not change during a trial."""
     about = trial.about
-    scene = about["scene"]
     return {
-        "title": f"{scene['name']}, {about['brain']}, controller {about['controller']}, seed {about['seed']}",
-        "width": scene["arena"]["width_cm"],
-        "height": scene["arena"]["height_cm"],
+        "title": f"{trial.scene.name}, {about['brain']}, controller {about['controller']}, seed {about['seed']}",
+        "width": trial.scene.arena.width_cm,
+        "height": trial.scene.arena.height_cm,
         "polygon": trial.scene.arena.polygon,
         "kinds": [
             {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour) if trial.scene.kinds else "#ddd"}
@@ -111,8 +110,8 @@ def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     shown what stands before it at that moment; a script, which has no camera, gets a strip in perfect colours."""
     scene = trial.scene
     colours = colours_of(scene)
-    seed = int(trial.about["seed"])
-    count = int(trial.about["scene"]["robots"]["count"])
+    seed = trial.about["seed"]
+    count = scene.robots.count
     views: list[tuple[list[int], list[bytes]]] = []
     headings = [trial.columns[f"r{robot}_heading"] for robot in range(count)]
     robots, objects = trial.robots.tolist(), trial.objects.tolist()

@@ -147,7 +147,7 @@ def cpu_load(runs: Runs) -> Figure | None:
     for name, trials in runs.items():
         samples = min(len(trial.times) for trial in trials)
         loads = [trial.columns[f"r{robot}_load"][1:samples] for trial in trials if not trial.is_scripted
-                 for robot in range(trial.about["scene"]["robots"]["count"])]  # fmt: skip
+                 for robot in range(trial.scene.robots.count)]  # fmt: skip
         if loads:
             axis.plot(trials[0].times[1:samples], 100 * np.mean(loads, axis=0), label=name, linewidth=0.7)
     if not axis.lines:

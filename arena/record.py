@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.experiments import Experiment, Moments, Said, experiment_of
+from arena.jsontext import misfit
+from arena.look import NOTHING, OBJECT, ROBOT
 from arena.metrics import Course
 from arena.scene import FCY, Scene, scene_of
 from arena.trial import Rows
@@ -24,9 +26,17 @@ from emu.files import is_standard, read_file, whole_file
 if TYPE_CHECKING:  # pyarrow is 30 MB in every process that loads it; those that only carry robots need none
     import pyarrow as pa
 
-MANIFEST: Final = "manifest.json"
 EXPERIMENT: Final = "experiment.py"
 """The experiment's file as it was when the run began, if it is one's own."""
+
+
+FAULT: Final = (int, float, str)
+"""A robot, s, why."""
+MOST: Final = 1e7
+"""No place in cm, time in s, speed or share of a trial comes near; what does not hold for nan, either."""
+_HEAD: Final = {"scene": dict, "brain": str, "controller": str, "seed": int, "faults": [FAULT], "image_sha256?": str,
+                "images_sha256?": dict, "versions?": dict}  # fmt: skip
+"""What a record says of itself, at least."""
 
 
 class RecordError(Exception):
@@ -64,17 +74,17 @@ class Trial:
     @property
     def objects(self) -> NDArray[np.float64]:
         """samples x objects x 2, cm."""
-        return self._places("o", int(self.about["scene"]["objects"]["count"]))
+        return self._places("o", self.scene.objects.count)
 
     @property
     def robots(self) -> NDArray[np.float64]:
         """samples x robots x 2, cm."""
-        return self._places("r", int(self.about["scene"]["robots"]["count"]))
+        return self._places("r", self.scene.robots.count)
 
     @property
     def is_scripted(self) -> bool:
         """Whether no robot had firmware."""
-        return not any((self.about.get("image_sha256"), *self.about.get("images_sha256", {}).values()))
+        return not any((self.about.get("image_sha256"), *(self.about.get("images_sha256") or {}).values()))
 
     @cached_property
     def scene(self) -> Scene:
@@ -84,7 +94,7 @@ class Trial:
     @cached_property
     def experiment(self) -> Experiment:
         """What it is measured by. Records of before scenes named their experiment are of clustering."""
-        name = self.about["scene"].get("experiment", "clustering")
+        name = str(self.about["scene"].get("experiment", "clustering"))
         beside = self.path.parent / EXPERIMENT
         return experiment_of(str(beside.resolve()) if name.endswith(".py") and beside.exists() else name)
 
@@ -157,19 +167,47 @@ def read_trial(path: Path) -> Trial:
     try:
         table = pq.read_table(pa.BufferReader(read_file(path)) if is_standard(path) else path)
         about = json.loads((table.schema.metadata or {})[b"arena"])
-    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+    except (OSError, pa.ArrowException, KeyError, ValueError, RecursionError) as error:
         raise RecordError(f"{path}: is no recorded trial: {error}") from None
     columns = Columns(path)
-    columns.update({name: _values(table[name]) for name in table.column_names})
-    return Trial(path, columns, about)
+    columns.update({name: _values(path, name, table[name]) for name in table.column_names})
+    return Trial(path, columns, checked(path, about))
 
 
-def _values(column: Any) -> Any:
-    """Numbers as an array, anything else as a list."""
+def checked(path: Path, about: Any) -> dict[str, Any]:
+    """What a record says of itself. Raises RecordError if something is missing or of another kind."""
+    if wrong := misfit(about, _HEAD):
+        raise RecordError(f"{path}: is no whole trial: {wrong}")
+    return dict(about)
+
+
+def _values(path: Path, name: str, column: Any) -> Any:
+    """Numbers as an array, anything else as a list. Raises RecordError for a column of another kind."""
     import pyarrow as pa
 
-    plain = pa.types.is_integer(column.type) or pa.types.is_floating(column.type)
-    return column.to_numpy() if plain else column.to_pylist()
+    filled = column.drop_null() if name.endswith("_infrared") else column  # no round of conversions since the last
+    if column.type != kind_of(name) or _has_gaps(filled):
+        raise RecordError(f"{path}: is no whole trial: column {name} is not whole or not of {kind_of(name)}")
+    if not pa.types.is_integer(column.type) and not pa.types.is_floating(column.type):
+        return column.to_pylist()
+    values = column.to_numpy()
+    if name.endswith("_seen") and not np.isin(values, (-1, NOTHING, OBJECT, ROBOT)).all():
+        raise RecordError(f"{path}: is no whole trial: column {name} is not of -1 to {ROBOT}")
+    if not name.startswith("n_") and not (np.abs(values) < MOST).all():
+        raise RecordError(f"{path}: is no whole trial: column {name} is not of numbers below {MOST:g}")
+    return values
+
+
+def _has_gaps(column: Any) -> bool:
+    """Whether a value is missing, in whatever depth."""
+    import pyarrow as pa
+
+    return any(
+        part.null_count
+        or (pa.types.is_list(part.type) and _has_gaps(part.flatten()))
+        or (pa.types.is_struct(part.type) and any(map(_has_gaps, part.flatten())))
+        for part in getattr(column, "chunks", [column])
+    )
 
 
 def trials_in(folder: Path) -> list[Trial]:

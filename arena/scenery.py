@@ -87,8 +87,9 @@ class InfraredSetting:
     Each sample has Gaussian noise of `noise_counts` and `ripple_counts` of 100 Hz from lamps on the mains. UNVERIFIED:
     nobody has published a measurement; 1 to 4 counts of noise and 0 to 5 of ripple are plausible (swarmcom.md §7).
 
-    `lost_share` of the messages of others a robot loses, drawn for each robot and message: it does not see that
-    robot's light from 14 to 30 ms after it began behind 2.9 ms of darkness, so a word of the frame stays dark."""
+    `lost_share` of the messages of others a robot loses, drawn for each robot and transmission: what that robot's
+    light does until it has been dark for 15.5 ms. Of one that is lost it sees 0.8 ms in each 2.4, so that somebody
+    sends, but never enough to begin a frame."""
 
     wall_share: float = 1.0
     object_share: float = 0.8

@@ -57,7 +57,7 @@ class Counts:
             raise ValueError("these are counts of another image")
         try:
             return cls(*(Counter({int(pc): int(n) for pc, n in facts[key].items()}) for key in ("executed", "taken")))
-        except (TypeError, AttributeError):
+        except (TypeError, AttributeError, OverflowError):
             raise ValueError("expected counts of an earlier run") from None
 
 

@@ -14,6 +14,8 @@ from typing import Final
 
 CAPACITY: Final = 0x80000
 """Bytes set aside for one record; `Record.used` says how many are taken."""
+HOSTS: Final = 0x1000
+"""Bytes at its end for addresses in the host's memory."""
 
 SIZES: Final = {"B": 1, "H": 2, "I": 4, "Q": 8, "q": 8}
 
@@ -49,6 +51,7 @@ class Record:
         self.s64: Final = self.bytes.cast("q")
         self.fields: Final[dict[str, Field]] = {}
         self.used = data_end
+        self._hosts = CAPACITY
 
     def reserve(self, name: str, kind: str, count: int = 1) -> Field:
         """Set aside `count` elements of `kind` ("B", "H", "I", "Q" unsigned, "q" signed) under `name`, zeroed.
@@ -59,12 +62,20 @@ class Record:
             raise ValueError(f"record field {name!r} is reserved already")
         size = SIZES[kind]
         offset = -(-self.used // size) * size
-        if offset + size * count > CAPACITY:
+        if offset + size * count > CAPACITY - HOSTS:
             raise ValueError(f"record field {name!r} does not fit: {size * count} bytes at {offset:#x}")
         self.used = offset + size * count
         field = Field(name, offset, kind, count)
         self.fields[name] = field
         return field
+
+    def reserve_addresses(self, count: int) -> int:
+        """Set aside `count` 64-bit words for addresses in the host's memory, zeroed: the first one's byte offset.
+        They are no state: snapshots are without them. Raises ValueError when there is no room."""
+        if self._hosts - 8 * count < CAPACITY - HOSTS:
+            raise ValueError(f"no room for {count} addresses")
+        self._hosts -= 8 * count
+        return self._hosts
 
     def snapshot(self) -> bytes:
         """A copy of the whole state."""

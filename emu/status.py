@@ -25,7 +25,8 @@ INTERRUPTED: Final = 130
 MEANING: Final = {
     DONE: "done; for `emu run` also: the limit of `--seconds` or `--cycles` was reached",
     FAULT: "what was looked at is wrong: a fault of the firmware, a robot that something happened to, errors in the C "
-    "source, a number over its baseline or limit, something that `openswarm doctor` misses and that is needed",
+    "source, a number over its baseline or limit, something that `openswarm doctor` misses and that is needed, "
+    "a robot that does not answer `openswarm flash` or refuses a row",
     BAD_INPUT: "bad input or usage, or an extra that is not installed; the message says what was expected",
     CANNOT_GO_ON: "`arena`: cluster lost, or folder in use by another run; finished trials are kept",
     LIMIT_AS_STATUS: "`emu run --exit-code`: the limit was reached before the firmware ended",

@@ -10,10 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from arena.campaign import Plan, claimed, note_host_time, open_folder, run_one, trial_path
+from arena.campaign import Plan, claimed, open_folder, run_one, trial_path
 from arena.commands.arguments import count_or_none, port
 from arena.commands.run import add_plan, kept, planned
 from arena.debugged import AnewError, Debugged, GivenUpError
+from arena.manifest import note_host_time
 from arena.record import RecordError
 from emu.dap.server import Server
 from emu.dap.wire import Wire
@@ -73,7 +74,7 @@ def debugged(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
         try:
             done = run_one(plan, 1, folder, meet=robot.meet)
             if options.out is not None and not is_recorded:
-                note_host_time(folder, done)
+                note_host_time(folder, done.trial, done.host_s, done.faults)
                 print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
                 is_recorded = True
             if not robot.over():

@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _film(runs: dict[str, list[Trial]], options: argparse.Namespace) -> int:
     for name, trials in runs.items():
-        robots = int(trials[0].about["scene"]["robots"]["count"])
+        robots = trials[0].scene.robots.count
         if not 0 <= options.film < robots:
             raise ValueError(f"--film {options.film}: {name} has robots 0 to {robots - 1}")
         path = options.out / f"{name}-film.{options.format}"

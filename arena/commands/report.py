@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from pathlib import Path
 
@@ -11,7 +10,8 @@ import numpy as np
 
 from arena import plots
 from arena.commands.arguments import duration
-from arena.record import MANIFEST, RecordError, trials_in, write_text
+from arena.manifest import read_manifest
+from arena.record import trials_in, write_text
 from arena.report import by_controller, report, with_results
 
 
@@ -53,8 +53,5 @@ def run(options: argparse.Namespace) -> int:
 
 def _host_s(folder: Path) -> float:
     """Seconds a trial took on average; nan if nobody noted it."""
-    try:
-        noted = json.loads((folder / MANIFEST).read_text())["host"]
-    except (OSError, ValueError, KeyError) as error:
-        raise RecordError(f"{folder / MANIFEST}: {error}") from None
+    noted = read_manifest(folder)["host"]
     return float(np.mean([one["host_s"] for one in noted])) if noted else float("nan")

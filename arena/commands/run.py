@@ -10,13 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arena.campaign import Done, Plan, claimed, note_host_time, open_folder, run_all
+from arena.campaign import Done, Plan, claimed, open_folder, run_all
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.progress import Told
 from arena.controllers import CONTROLLERS
 from arena.experiments import experiment_file
 from arena.firmware import image_for
 from arena.jsontext import json_text
+from arena.manifest import note_host_time
 from arena.record import EXPERIMENT, Trial, trials_in, write_bytes
 from arena.scene import Scene, load_scene, scripted
 from emu.places import use_cache
@@ -175,7 +176,7 @@ def with_progress(
         def done(one: Done) -> None:
             nonlocal stopped
             telling.finished(one.trial, one.host_s)
-            note_host_time(folder, one)
+            note_host_time(folder, one.trial, one.host_s, one.faults)
             for robot, seconds, why in one.faults:
                 stopped = True
                 telling.line(f"trial {one.trial}, {seconds:.1f} s: robot {robot} {why}")

@@ -20,8 +20,9 @@ from emu.coverage import fingerprint
 from emu.files import whole_text_file
 from emu.image import Image
 from emu.inject.campaign import Campaign, CampaignError, read
+from emu.inject.faults import KINDS
 from emu.inject.report import lines, summary
-from emu.inject.trial import Outcome, Trials
+from emu.inject.trial import OUTCOMES, Outcome, Trials
 from emu.places import use_cache
 from emu.status import DONE
 
@@ -106,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
 def _all(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[Outcome]:
     """Every outcome in the order of the numbers; those of the state file are not run again."""
     header = {"image": fingerprint(image), "campaign": campaign.fingerprint}
-    done = _kept(options.state, header) if options.state is not None and options.state.exists() else {}
+    done = _kept(options.state, header, campaign.trials) if options.state is not None and options.state.exists() else {}
     missing = [number for number in range(campaign.trials) if number not in done]
     with ExitStack() as stack:
         state: TextIO | None = None
@@ -123,9 +124,12 @@ def _all(image: Image, campaign: Campaign, options: argparse.Namespace) -> list[
     return [done[number] for number in sorted(done)]
 
 
-def _kept(path: Path, header: dict[str, str]) -> dict[int, Outcome]:
+def _kept(path: Path, header: dict[str, str], trials: int) -> dict[int, Outcome]:
     """What a state file holds; an unfinished last line is cut off."""
-    text = path.read_text(encoding="utf-8")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise CommandError(f"{path}: offset {error.start}: expected a state file of emu inject") from None
     whole = text[: text.rfind("\n") + 1]
     found: dict[int, Outcome] = {}
     for number, line in enumerate(whole.splitlines(), 1):
@@ -136,7 +140,11 @@ def _kept(path: Path, header: dict[str, str]) -> dict[int, Outcome]:
                     raise CommandError(f"{path}:1: this is the state of another image or campaign")
                 continue
             outcome = Outcome(**facts)
-        except (ValueError, TypeError):
+            if any(type(getattr(outcome, one.name)).__name__ != one.type for one in fields(Outcome)):
+                raise TypeError
+            if outcome.kind not in KINDS or outcome.outcome not in OUTCOMES or not 0 <= outcome.number < trials:
+                raise ValueError
+        except (ValueError, TypeError, RecursionError):
             raise CommandError(f"{path}:{number}: expected a state file of emu inject") from None
         found[outcome.number] = outcome
     if whole != text:

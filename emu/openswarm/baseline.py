@@ -104,7 +104,7 @@ def load(path: str) -> dict[str, Number]:
             name: Number(int(row["value"]), {str(k): int(v) for k, v in row["where"].items()})
             for name, row in table.items()
         }
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
         raise ValueError(f"{path}: is not a baseline written by --update") from None
 
 

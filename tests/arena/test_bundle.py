@@ -172,9 +172,9 @@ def test_only_runs_can_be_packed(study: Path, tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ({"seconds": "6"}, "seconds: '6' is none"), ({"seconds": -1.0}, "seconds: -1.0 is none"),
-    ({"seed": "x"}, "seed: 'x' is none"), ({"controller": "Z"}, "controller: 'Z' is none"),
-    ({"controller": ["A"]}, "manifest.json: "), ({"brain": None}, "brain: None is none"),
+    ({"seconds": "6"}, "seconds is '6'; expected float"), ({"seconds": -1.0}, "seconds: -1.0 is none"),
+    ({"seed": "x"}, "seed is 'x'; expected int"), ({"controller": "Z"}, "controller: 'Z' is none"),
+    ({"controller": ["A"]}, "manifest.json: "), ({"brain": None}, "brain is None; expected str"),
 ])  # fmt: skip
 def test_a_manifest_that_is_no_plan_is_refused(
     change: dict[str, object], said: str, packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,18 @@ def test_frames_show_the_objects_where_the_record_has_them(trial: Path) -> None:
     x, y = record.robots[-1][0]
     assert last.getpixel((x * SCALE, 300 * SCALE - y * SCALE)) != (255, 255, 255)
     assert first.tobytes() != last.tobytes()
+
+
+def test_an_object_of_a_kind_is_as_large_as_its_kind(trial: Path) -> None:
+    """Whatever radius `[objects]` gives."""
+    record = read_trial(trial)
+    kind = record.scene.kind_of(0)
+    large = replace(kind, radius_cm=3 * kind.radius_cm, count=record.scene.objects.count)
+    object.__setattr__(record, "scene", replace(record.scene, kinds=(large,)))
+    (picture,) = frames(record, [0.0])
+    x, y = record.objects[0][0]
+    beside = (x + 2 * kind.radius_cm * (1 if x < 200 else -1)) * SCALE, 300 * SCALE - y * SCALE
+    assert picture.getpixel(beside) != (255, 255, 255)
 
 
 def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> None:

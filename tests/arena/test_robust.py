@@ -10,14 +10,17 @@ import sys
 import time
 from pathlib import Path
 
+import pyarrow
 import pytest
+from pyarrow import parquet
 
 from arena import campaign, cluster, versions
 from arena.campaign import Plan
 from arena.cli import main
+from arena.jsontext import misfit
 from arena.live import Follower, LiveFile, live_path
 from arena.page import page
-from arena.record import read_trial
+from arena.record import RecordError, read_trial
 from arena.scene import load_scene, scripted
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -150,7 +153,8 @@ WRITER = """
 import os, sys, time
 from pathlib import Path
 from arena.live import LiveFile
-live = LiveFile(Path(sys.argv[1]), {"a": 1})
+about = {"scene": {}, "brain": "scripted", "controller": "A", "seed": 1, "faults": []}
+live = LiveFile(Path(sys.argv[1]), about)
 live.write({"t": 0.0})
 print("written", flush=True)
 time.sleep(600)
@@ -163,10 +167,12 @@ def test_a_page_that_follows_a_killed_run_says_that_it_is_gone(tmp_path: Path) -
     with subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, cwd=ROOT) as writer:
         assert writer.stdout is not None
         writer.stdout.readline()
-        follower = Follower(tmp_path)
-        assert follower.more(99)["state"] == "running"
-        os.kill(writer.pid, signal.SIGKILL)
-        writer.wait()
+        try:
+            follower = Follower(tmp_path)
+            assert follower.more(99)["state"] == "running"
+        finally:
+            os.kill(writer.pid, signal.SIGKILL)
+            writer.wait()
     assert path.exists()
     assert follower.more(99)["state"] == "gone"
 
@@ -272,3 +278,46 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_finished_stays(tmp_path: 
         for process in (scheduler, worker):
             process.kill()
             process.wait()
+
+
+@pytest.mark.parametrize(
+    ("value", "wrong"),
+    [
+        ({"seed": 3, "faults": [[0, 1.5, "a trap"]]}, ""),
+        ({"seed": 3, "faults": [], "note": None}, ""),
+        ([], "it is []; expected a table"),
+        ({"faults": []}, "seed is None; expected int"),
+        ({"seed": True, "faults": []}, "seed is True; expected int"),
+        ({"seed": 1, "faults": {}}, "faults is {}; expected a list"),
+        ({"seed": 1, "faults": [[0, 1.5]]}, "faults[0] is [0, 1.5]; expected a list of 3"),
+        ({"seed": 1, "faults": [[0, 1, ""], [0, "1", ""]]}, "faults[1][1] is '1'; expected float"),
+        ({"seed": 1, "faults": [], "note": 5}, "note is 5; expected str"),
+    ],
+)
+def test_the_first_thing_that_is_wrong_with_a_json_text(value: object, wrong: str) -> None:
+    """Of a record's metadata, a manifest."""
+    assert misfit(value, {"seed": int, "faults": [(int, float, str)], "note?": str}) == wrong
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "message"),
+    [
+        ("r0_x", ["left"] * 2, "not of double"),
+        ("r0_x", [1.0, None], "not whole"),
+        ("r0_x", [1.0, float("nan")], "not of numbers below 1e+07"),
+        ("r0_x", [1.0, 1e308], "not of numbers below 1e+07"),
+        ("r0_seen", pyarrow.array([0, 7], pyarrow.int16()), "not of -1 to 2"),
+        ("log", [[], [{"robot": 0, "cycle": None, "text": "x"}]], "not of list<"),
+    ],
+)
+def test_a_record_with_a_damaged_column_is_refused(column: str, values: list[object], message: str,
+                                                   tmp_path: Path) -> None:  # fmt: skip
+    """With the file and the column."""
+    assert main([*SHORT, "--robots", "1", "--objects", "0", "--out", str(tmp_path)]) == 0
+    path = tmp_path / "trial-0001.parquet"
+    table = parquet.read_table(path).slice(0, 2)
+    place = table.column_names.index(column)
+    parquet.write_table(table.set_column(place, column, pyarrow.array(values)), path)
+    with pytest.raises(RecordError, match=f"column {column} is not") as refused:
+        read_trial(path)
+    assert message in str(refused.value)

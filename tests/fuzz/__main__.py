@@ -1,7 +1,8 @@
 """Every campaign of this folder, one after the other: `python -m tests.fuzz [--seconds S] [--seed N] [NAME...]`.
 
-With --seconds the campaigns share S seconds evenly, else each takes its own number of tries. A failure does not stop
-the others. Seeds come from the commit unless --seed gives the first. Exit status 1 if any campaign failed.
+With --seconds the campaigns share S seconds evenly, else each takes its own number of tries. With --jobs several run
+at once, and each is printed when it ends. A failure does not stop the others. Seeds come from the commit unless --seed
+gives the first. Exit status 1 if any campaign failed.
 
 Example: python -m tests.fuzz --seconds 600; python -m tests.fuzz --seconds 60 --seed 7 devices jit
 """
@@ -12,8 +13,11 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import IO
 
 from tests.fuzz.seeds import ROOT, SKIPPED, base_seed, parser
 
@@ -28,12 +32,12 @@ def campaigns() -> dict[str, Path]:
     return {script.stem.removeprefix("fuzz_").removesuffix("_campaign"): script for script in scripts}
 
 
-def run(script: Path, seed: int, seconds: float | None) -> str:
-    """One campaign, from the folder of the project; "passed", "skipped" or why it failed."""
+def run(script: Path, seed: int, seconds: float | None, output: IO[bytes] | None = None) -> str:
+    """One campaign, from the folder of the project, told on `output`; "passed", "skipped" or why it failed."""
     command = [sys.executable, str(script), "--seed", str(seed)]
     if seconds is not None:
         command += ["--seconds", f"{seconds:g}"]
-    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
+    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, stdout=output, stderr=output)
     try:
         status = process.wait(None if seconds is None else seconds + PATIENCE)
     except subprocess.TimeoutExpired:
@@ -51,6 +55,7 @@ def main() -> int:
     options.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(known)} (default: all)")
     options.add_argument("--seconds", type=float, metavar="S", help="time for all of them together")
     options.add_argument("--seed", type=int, help="first seed of each (default: from the commit's hash)")
+    options.add_argument("--jobs", type=int, default=1, metavar="N", help="campaigns that run at once (default 1)")
     given = options.parse_args()
     if unknown := set(given.names) - known.keys():
         options.error(f"no such campaign: {', '.join(sorted(unknown))}")
@@ -58,12 +63,30 @@ def main() -> int:
     seed = base_seed() if given.seed is None else given.seed
     share = None if given.seconds is None else given.seconds / len(names)
     results: dict[str, tuple[str, float]] = {}
-    for name in names:
-        print(f"== {name}", flush=True)
+
+    def one(name: str) -> None:
         start = time.monotonic()
-        results[name] = run(known[name], seed, share), time.monotonic() - start
+        if given.jobs <= 1:
+            print(f"== {name}", flush=True)
+            results[name] = run(known[name], seed, share), time.monotonic() - start
+            return
+        with tempfile.TemporaryFile() as told:
+            results[name] = run(known[name], seed, share, told), time.monotonic() - start
+            told.seek(0)
+            print(f"== {name}\n{told.read().decode(errors='replace')}", end="", flush=True)
+
+    if given.jobs <= 1:
+        for name in names:
+            one(name)
+    else:
+        pool = ThreadPoolExecutor(given.jobs)
+        try:
+            list(pool.map(one, names))
+        finally:
+            pool.shutdown(cancel_futures=True)
     print(f"== summary, seed {seed}")
-    for name, (result, spent) in results.items():
+    for name in names:
+        result, spent = results[name]
         print(f"{name:12} {spent:7.0f} s  {result}")
     failed = [name for name, (result, _) in results.items() if result not in ("passed", "skipped")]
     print(f"failed: {', '.join(failed)}" if failed else "no failure")

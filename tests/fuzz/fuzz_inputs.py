@@ -2,8 +2,8 @@
 
 `python tests/fuzz/fuzz_inputs.py [--inputs N] [--seed S] [--seconds T] [--format NAME]`; exits 1 with the first input
 that made something else happen. Scenes, stimuli, recorded input, pictures, baselines, counts, records, manifests,
-bundles, annotations, linker scripts, archives, C sources, option files and messages of the debug protocol; ELF, HEX and
-assembly have `fuzz_loader.py` and `fuzz_asm.py`.
+bundles, annotations, archives, C sources, option files, states of fault campaigns, and messages of the debug
+protocol; ELF, HEX and assembly have `fuzz_loader.py` and `fuzz_asm.py`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import os
 import random
 import re
@@ -23,11 +24,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
+import pyarrow  # noqa: E402
 from PIL import Image  # noqa: E402
+from pyarrow import parquet  # noqa: E402
 
 import arena.cli  # noqa: E402
 import emu.cli  # noqa: E402
@@ -102,7 +106,23 @@ ODD = (
     *NUMBERS, "true", '""', "[]", "{}", "null", "'", '"', "\\", "[[", "]]", "../../x", "\u0000", "\ud7ff", "é", "=",
     "#", "\n\n", "0x", "1s", "[" * 600, "{" * 600,
 )  # fmt: skip
+VALUES: tuple[Any, ...] = (
+    None, True, False, 0, -1, 7, 65536, 10**20, 0.5, 1e308, math.nan, -math.inf, "", "x", "0", [], [[]], {}, {"": 0},
+)  # fmt: skip
 STAMPS = b"# cycle uart bytes\n100 1 616263\n900 1 0d\n2000 2 ff00\n"
+CAMPAIGN = b"""seed = 1
+trials = 4
+[run]
+seconds = 0.001
+[detect]
+uart1 = ["h"]
+[input]
+uart1 = [[0.0001, "go"]]
+[faults]
+ram = 4
+register = 2
+flash = 1
+"""
 ANNOTATIONS = b"calls main: step, *\ndepth step 40\nrecursion step 3\nthread step\n"
 MOST_MEMORY = 8 << 30
 """Bytes of address space: an input that makes a command want more fails."""
@@ -134,6 +154,30 @@ def mutate_text(data: bytes, rng: random.Random) -> bytes:
     return "".join(tokens).encode()
 
 
+def mutate_json(data: bytes, rng: random.Random) -> bytes:
+    """One value anywhere in a JSON text, or in one of several line by line, replaced by an odd one or by one beside it,
+    dropped or doubled."""
+    lines = data.splitlines() if data.startswith(b"{") and data.count(b"\n{") else [data]
+    line = rng.randrange(len(lines))
+    whole = json.loads(lines[line])
+    held: Any = [whole]
+    key: Any = 0
+    while isinstance(held[key], (dict, list)) and held[key] and rng.random() < 0.85:
+        held = held[key]
+        key = rng.choice(list(held)) if isinstance(held, dict) else rng.randrange(len(held))
+    choice = rng.randrange(4)
+    if choice == 0:
+        held[key] = rng.choice(VALUES)
+    elif choice == 1:
+        held[key] = held[rng.choice(list(held))] if isinstance(held, dict) else rng.choice(held)
+    elif isinstance(held, dict):
+        del held[key]
+    else:
+        held[key : key + 1] = [held[key]] * (choice - 2) * 2
+    lines[line] = json.dumps(whole).encode()
+    return b"\n".join(lines) + b"\n" * (len(lines) > 1)
+
+
 @dataclass(frozen=True)
 class Format:
     """A kind of file: a valid one, its name, and the command that reads it, as arguments with {} for its path."""
@@ -143,6 +187,8 @@ class Format:
     file: str
     command: tuple[str, ...]
     is_text: bool = True
+    wrapped: Callable[[bytes], bytes] = bytes
+    """The file around the text that is damaged; raises ValueError or ArrowException for one no such file can hold."""
 
 
 class Bench:
@@ -157,6 +203,9 @@ class Bench:
         self._must("toolchain", "ar", "rcs", str(folder / "library.a"), str(folder / "program.o"))
         self._must("emu", "footprint", str(self.image), "--update", str(folder / "footprint.json"))
         self._must("emu", "coverage", str(self.image), "--seconds", "0.0003", "--counts", str(folder / "counts.json"))
+        (folder / "faults.toml").write_bytes(CAMPAIGN)
+        self._must("emu", "inject", str(self.image), "--campaign", str(folder / "faults.toml"),
+                   "--state", str(folder / "faults.state"))  # fmt: skip
         self.run = folder / "run"
         picture = io.BytesIO()
         Image.new("RGB", (8, 6), (200, 30, 40)).save(picture, "PNG")
@@ -165,6 +214,8 @@ class Bench:
         small = ("--robots", "2", "--objects", "2", "--minutes", "0.005", *short)
         self._must("arena", "run", "clustering", *small, str(self.run))
         self._must("arena", "bundle", str(folder / "study.zip"), str(self.run))
+        self.trial = parquet.read_table(self.run / "trial-0001.parquet")
+        page = ("arena", "replay", "{}", "--out", str(folder / "page.html"))
         manifest = ((self.run / "manifest.json").read_bytes(), "run/manifest.json")
         self.formats = (
             Format("scene", SCENE.encode(), "scene.toml",
@@ -181,13 +232,21 @@ class Bench:
                    is_text=False),
             Format("options", b"-Os -g \"-DX=1\" '-DY' -Wall\n", "options",
                    ("toolchain", "cc", "@{}", "-c", str(folder / "program.c"), "-o", str(folder / "again.o"))),
-            Format("record", (self.run / "trial-0001.parquet").read_bytes(), "trial-0001.parquet",
-                   ("arena", "replay", "{}", "--out", str(folder / "page.html")), is_text=False),
+            Format("record", (self.run / "trial-0001.parquet").read_bytes(), "trial-0001.parquet", page, is_text=False),
+            Format("record's head", _head(self.trial), "headed.parquet", page, wrapped=self._headed),
+            Format("record's rows", _rows(self.trial), "rows.parquet", page, wrapped=self._filled),
+            Format("record's head drawn", _head(self.trial), "headed.parquet",
+                   ("arena", "plot", "{}", "--out", str(folder / "plots")), wrapped=self._headed),
+            Format("record's rows filmed", _rows(self.trial), "rows.parquet",
+                   ("arena", "replay", "{}", "--export", str(folder / "trial.gif")), wrapped=self._filled),
             Format("manifest", *manifest, ("arena", "bundle", str(folder / "again.zip"), str(self.run))),
             Format("manifest again", *manifest, ("arena", "run", "clustering", *small, str(self.run))),
             Format("manifest reported", *manifest, ("arena", "report", str(self.run))),
             Format("bundle", (folder / "study.zip").read_bytes(), "study.zip", ("arena", "verify", "{}"),
                    is_text=False),
+            Format("state of faults", (folder / "faults.state").read_bytes(), "again.state",
+                   ("emu", "inject", str(self.image), "--campaign", str(folder / "faults.toml"), "--state", "{}")),
+            Format("C source", PROGRAM.encode(), "odd.c", ("toolchain", "cc", "-c", "{}", "-o", str(folder / "odd.o"))),
             Format("protocol", _conversation(self.image), "messages", ()),
         )  # fmt: skip
 
@@ -196,17 +255,34 @@ class Bench:
         if status:
             raise RuntimeError(f"{' '.join(words)} ended with {status}: {said}")
 
+    def _headed(self, head: bytes) -> bytes:
+        """The trial with other metadata."""
+        return _parquet(self.trial.replace_schema_metadata({"arena": head}))
+
+    def _filled(self, rows: bytes) -> bytes:
+        """The trial with other columns: of the types they had, or else those of their values."""
+        columns = json.loads(rows)
+        if not isinstance(columns, dict):
+            raise ValueError("no columns")
+        for name in columns.keys() & set(self.trial.column_names):
+            with contextlib.suppress(ValueError, TypeError, OverflowError, pyarrow.ArrowException):
+                columns[name] = pyarrow.array(columns[name], self.trial.schema.field(name).type)
+        return _parquet(pyarrow.table(columns).replace_schema_metadata(self.trial.schema.metadata))
+
     def attempt(self, kind: Format, data: bytes) -> str:
         """Give a damaged file to its command; "done", "refused" or what else the table of statuses has."""
         if kind.name == "protocol":
             return converse(data)
         path = self.folder / kind.file
-        path.write_bytes(data)
+        try:
+            path.write_bytes(kind.wrapped(data))
+        except (ValueError, TypeError, RecursionError, OverflowError, pyarrow.ArrowException):
+            return "not made"
         shutil.rmtree(self.folder / "out", ignore_errors=True)
         try:
             status, said = call([word.replace("{}", str(path)) for word in kind.command])
         finally:
-            path.write_bytes(kind.sample)
+            path.write_bytes(kind.wrapped(kind.sample))
         assert status in MEANING, f"status {status}"
         assert "Traceback" not in said, said
         assert not status or said.strip(), f"status {status} without a word"
@@ -231,6 +307,24 @@ def call(words: Iterable[str]) -> tuple[int, str]:
         except SystemExit as ended:
             status = ended.code if isinstance(ended.code, int) else 1
     return status, said.getvalue()
+
+
+def _head(trial: pyarrow.Table) -> bytes:
+    """What a record says of itself."""
+    return bytes(trial.schema.metadata[b"arena"])
+
+
+def _rows(trial: pyarrow.Table) -> bytes:
+    """The columns of a record as JSON; pictures of bytes are left out."""
+    shown = [name for name in trial.column_names if not name.endswith("_strip")]
+    empty = {name: [""] * len(trial) for name in trial.column_names if name not in shown}
+    return json.dumps(trial.select(shown).to_pydict() | empty).encode()
+
+
+def _parquet(table: pyarrow.Table) -> bytes:
+    sink = io.BytesIO()
+    parquet.write_table(table, sink)
+    return sink.getvalue()
 
 
 def _conversation(image: Path) -> bytes:
@@ -300,6 +394,8 @@ def campaign(seeds: Iterable[int], only: str | None = None) -> Counter[str]:
                 rng = random.Random(seed)
                 kind = chosen[seed % len(chosen)]
                 change = mutate_text if kind.is_text and rng.random() < 0.7 else mutate
+                if kind.sample[:1] == b"{" and kind.name != "protocol" and rng.random() < 0.5:
+                    change = mutate_json
                 data = change(kind.sample, rng)
                 try:
                     outcomes[f"{kind.name} {bench.attempt(kind, data)}"] += 1
