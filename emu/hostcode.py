@@ -55,6 +55,11 @@ def functions(source: Path, signatures: Signatures) -> dict[str, Callable[..., A
             for name, (result, arguments) in signatures.items()}  # fmt: skip
 
 
+def address_of(function: Callable[..., Any]) -> int:
+    """Where a function that `functions` gave begins, for other compiled code."""
+    return ctypes.cast(function, ctypes.c_void_p).value or 0  # type: ignore[arg-type]
+
+
 def _compiled(source: Path) -> bytes:
     """The object file of a C file."""
     spec = importlib.util.find_spec("ziglang")

@@ -101,6 +101,13 @@ class Reader(Protocol):
     def table(self, values: tuple[int, ...], index: Number) -> Number:
         """values[index], of a table that never changes."""
 
+    def can_ask(self, code: Number) -> Number:
+        """Whether `code`, an address of host code that the record names (`Record.reserve_addresses`), can be asked: it
+        is not 0, and whoever reads is native code. The others leave it to the device's hooks."""
+
+    def ask(self, code: Number, data: Number, *numbers: Number) -> Number:
+        """What host code answers: int64 code(record, data, numbers...). It changes nothing that a rule sees."""
+
     def either(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number
     ) -> tuple[Number, ...]:
@@ -155,6 +162,12 @@ class Numbers:
 
     def table(self, values: tuple[int, ...], index: int) -> int:
         return values[index]
+
+    def can_ask(self, _code: int) -> bool:
+        return False
+
+    def ask(self, _code: int, _data: int, *_numbers: int) -> int:
+        raise Rare
 
     def either(self, condition: Number, costly: Callable[[], tuple[int, ...]], *others: int) -> tuple[int, ...]:
         return costly() if condition else others

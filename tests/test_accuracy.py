@@ -10,7 +10,7 @@ PAGE = (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8")
 
 
 def sources():
-    for folder in ("emu", "toolchain", "firmware", "arena"):
+    for folder in ("emu", "toolchain", "firmware", "arena", "openswarm"):
         for suffix in ("py", "c", "h", "s", "S"):
             yield from (path for path in (ROOT / folder).rglob(f"*.{suffix}") if "build" not in path.parts)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Final
 
@@ -19,17 +18,6 @@ def _mixed(seed: int, channel: int, cycle: int) -> int:
     x = (x ^ x >> 30) * 0xBF58_476D_1CE4_E5B9 & _ONES
     x = (x ^ x >> 27) * 0x94D0_49BB_1331_11EB & _ONES
     return x ^ x >> 31
-
-
-def gaussian(seed: int, channel: int, cycle: int) -> float:
-    """Standard normal with its tails, to 6.6 deviations (Box and Muller): where rare errors are counted."""
-    x = _mixed(seed, channel, cycle)
-    return math.sqrt(-2 * math.log(((x >> 32) + 1) / 2**32)) * math.cos(math.tau / 2**32 * (x & 0xFFFF_FFFF))
-
-
-def uniform(seed: int, channel: int, cycle: int) -> float:
-    """From 0 up to, not including, 1."""
-    return (_mixed(seed, channel, cycle) >> 11) / 2**53
 
 
 class Noise:

@@ -59,6 +59,10 @@ class Adc(Peripheral):
         self._buffers: Final = [self.register(f"ADCBUF{index:X}") for index in range(16)]
         for register in (*self._buffers, self.con1, self.con2):
             register.computed(partial(self._read, register))
+        word = self.con1.address >> 1
+        self._clear_only: Final = self.bus.clear_only[word]
+        self.bus.writable[word] |= self._clear_only  # whether DONE is set is known once time is caught up
+        self.bus.clear_only[word] = 0
         self.con1.written_by(self._con1_written)
         for register in (self.con2, self.con3, self.chs, self.cssl):
             register.written_by(partial(self._setting_written, register))
@@ -100,8 +104,8 @@ class Adc(Peripheral):
     def _places(self) -> AdcPlaces:
         sfrs, record = self.kit.chip.sfrs, self.record
         adon, samp, done = (1 << sfrs["ADCON1"].fields[name][0] for name in ("ADON", "SAMP", "DONE"))
-        cells = ("native", "frozen", "sampling", "conversion", "results", "length", "state", "mark", "half", "scan",
-                 "use_b", "next", "count", "held", "channels", "level_from")  # fmt: skip
+        cells = ("native", "frozen", "sampling", "conversion", "results", "halves", "length", "state", "mark", "half",
+                 "scan", "use_b", "next", "count", "held", "channels", "level_from")  # fmt: skip
         return AdcPlaces(
             register=self.con1.place,
             until=self._stands.place,
@@ -118,6 +122,7 @@ class Adc(Peripheral):
             buffer=self._buffers[0].place,
             level=place_of(record, "adc.input"),
             step=slot_of(record, self._step),
+            asked=self.source.asked,
             line=self._line.line,
             **{name: place_of(record, f"adc.{name}") for name in cells},
         )
@@ -128,6 +133,11 @@ class Adc(Peripheral):
         """Apply an analog level (0..65535 of AVDD) to a channel from the next cycle on."""
         self.catch_up(self.now)
         self.input[channel] = level
+
+    @property
+    def samples_from(self) -> int | None:
+        """No conversion that was not carried out samples before this cycle; None: none is under way."""
+        return self._mark.value if self._state.value > WAITING and not self.is_frozen else None
 
     def set_references(self, low: int, high: int) -> None:
         """Levels on VREF- and VREF+ (0..65536 of AVDD), used when VCFG selects them."""
@@ -146,7 +156,7 @@ class Adc(Peripheral):
         return course if not self.con3["ADRC"] else self._read_course()  # Fcy is no register
 
     def _read_course(self) -> Course:
-        tad = round(2 * _RC_TAD_SECONDS * self.kit.fcy()) if self.con3["ADRC"] else self.con3["ADCS"] + 1
+        tad = max(round(2 * _RC_TAD_SECONDS * self.kit.fcy()), 1) if self.con3["ADRC"] else self.con3["ADCS"] + 1
         con2, chs = self.con2, self.chs
         return Course(
             tad=tad,
@@ -192,7 +202,13 @@ class Adc(Peripheral):
             channel, negative, self._scan.value, self._use_b.value = course.turn(self._scan.value, self._use_b.value)
             self._held.value = self._sampled(course, channel, negative, halves + 1 >> 1)
 
-    def catch_up(self, cycle: int) -> bool:
+    def catch_up(self, cycle: int) -> None:
+        """Carry out every conversion that ends at or before `cycle`, but for the one that raises the interrupt: that is
+        its event's, which has not happened yet if it is due now. Nothing ends while the converter's clock stands."""
+        if not self.is_frozen:
+            self._convert_by(min(cycle, self.events.due(self._step) - 1))
+
+    def _convert_by(self, cycle: int) -> bool:
         """Carry out every conversion that ends at or before `cycle`. True if one of them raised the interrupt."""
         state = self._state.value
         if state <= WAITING:
@@ -253,16 +269,19 @@ class Adc(Peripheral):
             self._stands.value = FOREVER
             return
         end = 2 * self._mark.value + self._half.value + duration
+        if end + 1 >> 1 <= self.now:  # a shorter setting: the state has been long enough, and ends with the next cycle
+            end = 2 * (self.now + 1)
+            self._mark.value, self._half.value = end - duration >> 1, end - duration & 1
         self._stands.value = end + 1 >> 1
         if state == SAMPLING:
             end += course.conversion
         if course.again and course.sampling != NEVER:
             missing = max(course.results - 1 - self._count.value, 0)
             end += missing * (course.sampling + course.conversion)
-        self.events.set(self._step, max(end + 1 >> 1, self.now + 1))  # a shorter setting may end it in the past
+        self.events.set(self._step, end + 1 >> 1)
 
     def _due(self, due: int) -> None:
-        if self.catch_up(due):
+        if self._convert_by(due):
             self._line.request()
         self._plan()
 
@@ -272,15 +291,16 @@ class Adc(Peripheral):
 
     def _catch_up_now(self) -> None:
         """Bring the registers to the current cycle; an interrupt cannot fall due here before its event."""
-        if self._state.value > WAITING and not self.is_frozen:
+        if self._state.value > WAITING:
             self.catch_up(self.now)
 
     # -- control -----------------------------------------------------------------------------------------------------
 
-    def _con1_written(self, old: int, new: int, _lanes: int) -> None:
+    def _con1_written(self, old: int, new: int, lanes: int) -> None:
+        left = self._settle(self.con1, old, new, lanes)
+        new = self.con1.value = self.con1.value & (left | ~self._clear_only)
         fields = self.kit.chip.sfrs["ADCON1"].fields
         adon, samp = (1 << fields[name][0] for name in ("ADON", "SAMP"))
-        self._settle(self.con1, old, new)
         start = 2 * (self.now + 1)
         if not new & adon:
             self._switch_off()
@@ -312,17 +332,19 @@ class Adc(Peripheral):
         self.con1["SAMP"] = 0
         self.events.cancel(self._step)
 
-    def _setting_written(self, register: Register, old: int, new: int, _lanes: int) -> None:
-        self._settle(register, old, new)
+    def _setting_written(self, register: Register, old: int, new: int, lanes: int) -> None:
+        self._settle(register, old, new, lanes)
         self._plan()
 
-    def _settle(self, register: Register, old: int, new: int) -> None:
-        """What happened before this write happened under the old setting."""
+    def _settle(self, register: Register, old: int, new: int, lanes: int) -> int:
+        """What happened before this write happened under the old setting. Returns what the register held in the end,
+        which is what it keeps outside `lanes`."""
         register.value = old
         self._catch_up_now()
-        hardware = self.con2["BUFS"]
-        register.value = new
+        left, hardware = register.value, self.con2["BUFS"]
+        register.value = left & ~lanes | new & lanes
         self.con2["BUFS"] = hardware
+        return left
 
     def int0(self, due: int) -> None:
         """INT0 rose in cycle `due`."""
@@ -341,6 +363,16 @@ class Adc(Peripheral):
         """Sampling ends, conversion begins (SSRC = 1, 2)."""
         if self._state.value == SAMPLING and not self.is_frozen:
             self._enter(CONVERTING, 2 * cycle)
+            self._plan()
+
+    def clock_changes(self) -> None:
+        """Carry out what ends at the present clock; a reset has cleared ADON, and nothing ends."""
+        if self.con1["ADON"]:
+            self.catch_up(self.now)
+
+    def clock_changed(self) -> None:
+        """The internal RC oscillator has another number of Tcy to a TAD."""
+        if self.con1["ADON"] and self.con3["ADRC"] and not self.is_frozen:
             self._plan()
 
     def _route(self, cycle: int) -> None:

@@ -1,7 +1,7 @@
 """What the converter's control registers ask for, and the same as numbers in the record for native code.
 
 Native code may carry out a whole round of conversions by itself (`adc.native`) if it is of the common kind: automatic
-sampling and conversion, one multiplexer, supplies as references, plain results from ADCBUF0 on.
+sampling and conversion, one multiplexer, supplies as references, plain results from ADCBUF0 on or in halves.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Final
 
 from emu.events import NEVER
 from emu.peripherals.kit import Peripheral
+from emu.straight import Place
 
 CONVERSION_TAD: Final = 14
 SHORTEST_SAMPLING: Final = 2
@@ -65,7 +66,7 @@ class Course:
     @property
     def is_plain(self) -> bool:
         """Whether native code can follow it."""
-        odd = self.alternates or self.in_halves or self.form or self.references or self.inputs[0][1]
+        odd = self.alternates or self.form or self.references or self.inputs[0][1]
         return self.again and SHORTEST_SAMPLING <= self.sampling < NEVER and not odd
 
 
@@ -80,6 +81,9 @@ class Inputs:
         """0..65535 of AVDD; of a function what it was foretold to be."""
         self._holds_from: Final = device.array("level_from", "Q", channels)
         """First cycle from which `level` is what the channel shows; FOREVER while that is not known."""
+        self.asked: Final = Place(device.record.reserve_addresses(2 * channels), 64)
+        """For rules: host code that knows the level of a channel, and that code's data."""
+        self._asked: Final = device.record.u64[self.asked.index : self.asked.index + 2 * channels]
         self._source: Final[list[AnalogSource | None]] = [None] * channels
 
     def __getitem__(self, channel: int) -> AnalogSource | None:
@@ -88,6 +92,7 @@ class Inputs:
     def __setitem__(self, channel: int, source: AnalogSource | None) -> None:
         self._source[channel] = source
         self._holds_from[channel] = 0 if source is None else FOREVER
+        self._asked[2 * channel] = 0
 
     def foretell(self, channel: int, source: AnalogSource, level: int | None, cycle: int = 0) -> None:
         """`source` will return `level` in every cycle from `cycle` on (None: nobody knows), unless it was replaced."""
@@ -96,6 +101,12 @@ class Inputs:
         self._holds_from[channel] = FOREVER if level is None else cycle
         if level is not None:
             self.level[channel] = level
+
+    def answer(self, channel: int, source: AnalogSource, code: int, data: int) -> None:
+        """Host code at address `code` (0: none) answers what `source` does, unless that was replaced: int64
+        code(record, data, channel, cycle), for all cycles native code may come to."""
+        if self._source[channel] == source:
+            self._asked[2 * channel], self._asked[2 * channel + 1] = code, data
 
     def at(self, channel: int, cycle: int) -> int:
         """Level of a channel in a cycle."""
@@ -106,13 +117,14 @@ class Inputs:
 
 class Published:
     """The course as numbers: `adc.native` (u8), `adc.sampling` and `adc.conversion` (u32, half Tcy), `adc.results`,
-    `adc.length` (u8) and `adc.channels` (u8 each)."""
+    `adc.halves`, `adc.length` (u8) and `adc.channels` (u8 each)."""
 
     def __init__(self, device: Peripheral, channels: int) -> None:
         self._native: Final = device.cell("native", "B")
         self._sampling: Final = device.cell("sampling", "I")
         self._conversion: Final = device.cell("conversion", "I")
         self._results: Final = device.cell("results", "B")
+        self._halves: Final = device.cell("halves", "B")
         self._length: Final = device.cell("length", "B")
         self._channels: Final = device.array("channels", "B", channels)
 
@@ -124,5 +136,6 @@ class Published:
             return
         self._sampling.value, self._conversion.value = course.sampling, course.conversion
         self._results.value, self._length.value = course.results, len(course.channels)
+        self._halves.value = course.in_halves
         for place, channel in enumerate(course.channels):
             self._channels[place] = channel

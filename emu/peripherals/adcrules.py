@@ -52,6 +52,8 @@ class AdcPlaces:
     sampling: Place
     conversion: Place
     results: Place
+    halves: Place
+    """Whether every interrupt turns to the other half of the results."""
     state: Place
     mark: Place
     half: Place
@@ -67,6 +69,8 @@ class AdcPlaces:
     """Of channel 0."""
     level_from: Place
     """Of channel 0: first cycle in which `level` is what it shows."""
+    asked: Place
+    """Of channel 0: host code that knows its level before that, and behind it that code's data."""
     buffer: Place
     """ADCBUF0."""
     done: int
@@ -115,8 +119,8 @@ def write_scan(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
 
 
 def fire_round(m: Reader, p: AdcPlaces) -> None:
-    """All conversions up to the interrupt that is due: automatic, one multiplexer, results from ADCBUF0 on, inputs that
-    hold or were foretold to."""
+    """All conversions up to the interrupt that is due: automatic, one multiplexer, inputs that hold, were foretold to,
+    or are known to host code."""
     sampling, results, length = m.get(p.sampling), m.get(p.results), m.get(p.length)
     step, scan, count, following = sampling + m.get(p.conversion), m.get(p.scan), m.get(p.count), m.get(p.next)
     begun, missing = (m.get(p.mark) << 1) + m.get(p.half), results - count
@@ -128,17 +132,26 @@ def fire_round(m: Reader, p: AdcPlaces) -> None:
         return m.select(place + 1 < length, place + 1, 0)
 
     def known(_turn: Number, place: Number, cycle: Number) -> tuple[Number, ...]:
-        m.need(m.get(p.level_from, m.get(p.channels, place)) <= (cycle + sampling + 1) >> 1)
+        channel = m.get(p.channels, place)
+        holds = m.get(p.level_from, channel) <= (cycle + sampling + 1) >> 1
+        m.need(holds | m.can_ask(m.get(p.asked, channel << 1)))
         return behind(place), cycle + step
 
-    def convert(turn: Number, place: Number, _held: Number) -> tuple[Number, ...]:
-        code = m.get(p.level, m.get(p.channels, place)) >> 4
-        m.put(p.buffer, code, (following + turn) & (BUFFERS - 1))
-        return behind(place), code
+    def convert(turn: Number, place: Number, cycle: Number, _held: Number) -> tuple[Number, ...]:
+        channel, sampled = m.get(p.channels, place), (cycle + sampling + 1) >> 1
+        code, data = m.get(p.asked, channel << 1), m.get(p.asked, (channel << 1) + 1)
+        (level,) = m.either(m.get(p.level_from, channel) > sampled,
+                            lambda: (m.ask(code, data, channel, sampled),), m.get(p.level, channel))  # fmt: skip
+        m.put(p.buffer, level >> 4, (following + turn) & (BUFFERS - 1))
+        return behind(place), cycle + step, level >> 4
 
     m.loop(missing, known, scan, begun)
-    _place, held = m.loop(missing, convert, scan, 0)
-    for cell, value in ((p.held, held), (p.scan, 0), (p.count, 0), (p.next, 0), (p.mark, end >> 1), (p.half, end & 1)):
+    _place, _cycle, held = m.loop(missing, convert, scan, begun, 0)
+    con2, halves = m.get(p.con2), m.get(p.halves) != 0
+    turned = m.select(halves, con2 ^ p.bufs, con2)
+    first = m.select(halves & ((turned & p.bufs) != 0), BUFFERS // 2, 0)
+    for cell, value in ((p.held, held), (p.scan, 0), (p.count, 0), (p.next, first), (p.con2, turned),
+                        (p.mark, end >> 1), (p.half, end & 1)):  # fmt: skip
         m.put(cell, value)
     m.put(p.register, m.get(p.register) | p.samp | p.done)
     m.put(p.until, (end + sampling + 1) >> 1)

@@ -6,6 +6,7 @@ then are kept, in picoseconds, together with the cycle of the change.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from emu.peripherals.kit import Kit, Peripheral
@@ -79,6 +80,10 @@ class Oscillator(Peripheral):
         self._current: Final = self.cell("current", "Q")
         """Clock selection in force: COSC, POST and OSCTUN packed, so that `fcy` is a function of the record."""
         self._switch: Final = self.slot("switch", self._switched)
+        self.on_change: Final[list[Callable[[], None]]] = []
+        """Called once another `fcy` holds."""
+        self.before_change: Final[list[Callable[[], None]]] = []
+        """Called while the `fcy` before that still holds."""
         kit.fcy = self.fcy
 
     # -- rates -------------------------------------------------------------------------------------------------------
@@ -86,8 +91,7 @@ class Oscillator(Peripheral):
     def _config(self, name: str) -> int:
         return self.kit.chip.config["FOSC"].field(self.kit.program.setting("FOSC"), name)
 
-    def _source_hz(self, code: int) -> float:
-        tune = self.tun.value & 0xF
+    def _source_hz(self, code: int, tune: int) -> float:
         frc = FRC_HZ * (1 + _TUNE * (tune - 16 if tune & 8 else tune))
         if code == _PLL:
             source, multiplier = _MULTIPLIERS.get(self._config("FPR"), _UNPROGRAMMED)
@@ -97,17 +101,21 @@ class Oscillator(Peripheral):
     def fcy(self) -> float:
         """Instruction cycles per second at present: a quarter of the oscillator behind the postscaler (§3)."""
         packed = self._current.value
-        return self._source_hz(packed >> 2 & 7) / 4 / _POST[packed & 3]
+        return self._source_hz(packed >> 2 & 7, packed >> 5) / 4 / _POST[packed & 3]
 
     def seconds(self, cycle: int) -> float:
         """Seconds from power-on to `cycle`, which is not before the last change of the clock."""
         return self._elapsed.value / _PS + (cycle - self._since.value) / self.fcy()
 
     def _rate_changed(self, cycle: int) -> None:
+        for told in self.before_change:
+            told()
         self._elapsed.value = round(self.seconds(cycle) * _PS)
         self._since.value = cycle
-        self._current.value = self.con["COSC"] << 2 | self.con["POST"]
+        self._current.value = (self.tun.value & 0xF) << 5 | self.con["COSC"] << 2 | self.con["POST"]
         self._tcy_fs.value = round(10**15 / self.fcy())
+        for told in self.on_change:
+            told()
 
     # -- OSCCON ------------------------------------------------------------------------------------------------------
 

@@ -1,4 +1,5 @@
-"""Random register accesses, pin changes, resets and naps on the peripherals alone; snapshots must continue identically.
+"""Random register accesses, pin changes, resets and naps on the peripherals alone; snapshots must continue identically,
+and the converter do what a plain one does.
 
 `python tests/fuzz/fuzz_peripherals.py [--rounds N] [--seed S] [--seconds T]`; exits 1 at the first failure.
 """
@@ -14,12 +15,15 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
 from peripherals.conftest import Rig  # noqa: E402
+from peripherals.plain_adc import difference  # noqa: E402
 from peripherals.test_fuzz import WORDS, act  # noqa: E402
 
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 ACTIONS = 8000
 """Accesses per round."""
+CONVERTERS = 20
+"""Comparisons with the plain converter per round."""
 REPLAYED = 1000
 """Accesses done twice from one snapshot."""
 
@@ -41,6 +45,8 @@ def check(seed: int) -> None:
             act(rig, again)
         ends.append(rig.record.snapshot())
     places = {rig.record.field_at(i) for i, (a, b) in enumerate(zip(*ends, strict=True)) if a != b}
+    for converter in range(CONVERTERS * seed, CONVERTERS * (seed + 1)):
+        assert (found := difference(converter)) is None, f"the converter of seed {converter}: {found}"
     assert not places, f"a restored snapshot went another way in {', '.join(sorted(places))}"
 
 

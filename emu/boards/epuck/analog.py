@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import struct
 from bisect import bisect_left
 from collections.abc import Callable, Iterable
-from functools import partial
+from ctypes import Structure, addressof, c_double, c_int64, c_uint16, c_void_p
+from functools import cache, partial
 from itertools import pairwise
+from pathlib import Path
 from typing import Final
 
 from emu.boards.noise import Noise
 from emu.boards.part import Part
+from emu.hostcode import ADDRESS, DOUBLE, INT, address_of, functions
 from emu.peripherals import Peripherals
 
 SENSORS: Final = 8
@@ -51,15 +55,34 @@ def reflection_at(distance_mm: float) -> float:
     return RESPONSE[place][1] * math.exp(_SLOPE[place] * (distance_mm - _NEAR[place]))
 
 
+class _Ring(Structure):
+    """`struct ring` of ring.c."""
+
+    _fields_ = [
+        *((name, c_int64) for name in ("ambient", "reflection", "lit", "since", "from", "tau", "seed", "strength")),
+        *((name, c_double) for name in ("gone", "noise_counts", "noise_share")), ("begin", c_int64),
+        ("past_ambient", c_uint16 * SENSORS), ("past_reflection", c_uint16 * SENSORS),
+        ("outside", c_void_p), ("light", c_void_p),
+    ]  # fmt: skip
+
+
+@cache
+def _code() -> dict[str, Callable[..., int]]:
+    return functions(Path(__file__).with_name("ring.c"), {
+        "level": (INT, (ADDRESS, ADDRESS, INT, INT)),
+        "settled": (DOUBLE, (ADDRESS, ADDRESS, INT, INT)),
+    })  # fmt: skip
+
+
 class Infrared(Part):
-    """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled - `shine`'s."""
+    """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled - `shine`'s (ring.c)."""
 
     def __init__(self, chip: Peripherals, noise: Noise) -> None:
         super().__init__("ir", chip)
         self._noise: Final = noise
-        self.tau_seconds = TAU_SECONDS
-        """Time constant of all receivers; set it before the robot runs."""
-        self._outside: Callable[[int, int], float] | None = None
+        self._tau_seconds = TAU_SECONDS
+        self._prepare: Callable[[int], None] | None = None
+        self._is_ready = False
         self.ambient: Final = self.array("ambient", "H", SENSORS)
         """Raw counts with the emitter off, per sensor. Falls with light."""
         self.reflection: Final = self.array("reflection", "H", SENSORS)
@@ -68,6 +91,17 @@ class Infrared(Part):
         self._since: Final = self.array("since", "Q", len(PULSE_PINS))
         self._from: Final = self.array("from", "H", len(PULSE_PINS))
         """Settled share at the last switch, in 1/65535."""
+        self._tau: Final = self.cell("tau", "Q")
+        """`tau_seconds` in Tcy, the bits of a double."""
+        own = ("ir.ambient", "ir.reflection", "ir.lit", "ir.since", "ir.from", "ir.tau")
+        places = [self.record.fields[name].offset for name in (*own, "noise.seed", "noise.strength")]
+        gone = _GONE * self._tau_seconds * _FASTEST_HZ
+        self._ring: Final = _Ring(*places, gone, NOISE_COUNTS, NOISE_SHARE)
+        self._ring_at: Final = addressof(self._ring)
+        self._level_of, self._settled = _code()["level"], _code()["settled"]
+        self._answers: Final = address_of(self._level_of)
+        self._retime()
+        chip.oscillator.on_change.append(self._retime)
         self._sources: Final = [partial(self._level, sensor) for sensor in range(SENSORS)]
         for sensor in range(SENSORS):
             self.ambient[sensor] = AMBIENT
@@ -75,13 +109,48 @@ class Infrared(Part):
         for line, pin in enumerate(PULSE_PINS):
             self.pins.watch(pin, partial(self._switched, line))
             self._foretell(line)
+        self.answer(True)
         noise.on_change.append(self._foretell_all)
 
-    def shine(self, outside: Callable[[int, int], float]) -> None:
-        """From now on each conversion asks `outside(sensor, cycle)` for the counts taken off by whatever else shines on
-        the sensor; it may set `ambient` and `reflection`, which are looked at afterwards."""
-        self._outside = outside
+    @property
+    def tau_seconds(self) -> float:
+        """Time constant of all receivers; set it before the robot runs."""
+        return self._tau_seconds
+
+    @tau_seconds.setter
+    def tau_seconds(self, seconds: float) -> None:
+        self._tau_seconds = seconds
+        self._ring.gone = _GONE * seconds * _FASTEST_HZ
+        self._retime()
+
+    def _retime(self) -> None:
+        (self._tau.value,) = struct.unpack("<Q", struct.pack("<d", self._tau_seconds * self.chip.fcy))
+
+    def shine(self, prepare: Callable[[int], None], light: int, data: int) -> None:
+        """From now on each conversion asks host code for the counts taken off by whatever else shines on a sensor:
+        double light(data, sensor, cycle). Before, `prepare(cycle)` is called, which may set `ambient` and `reflection`,
+        unless `answer` has said that there is no need."""
+        self._prepare = prepare
+        self._ring.outside, self._ring.light = light, data
+        self.answer(False)
         self._foretell_all()
+
+    def answer(self, is_ready: bool) -> None:
+        """Whether the levels of all cycles up to the next call are known without preparation, so that native code may
+        ask for them by itself."""
+        if is_ready == self._is_ready:
+            return
+        self._is_ready = is_ready
+        for sensor, source in enumerate(self._sources):
+            code = self._answers if is_ready else 0
+            self.chip.adc.source.answer(_FIRST_CHANNEL + sensor, source, code, self._ring_at)
+
+    def part_from(self, cycle: int) -> None:
+        """What `ambient` and `reflection` become now holds from `cycle` on; for conversions before it they stay what
+        they are. Those before the cycle said last must have been carried out."""
+        ring = self._ring
+        ring.begin = cycle
+        ring.past_ambient[:], ring.past_reflection[:] = self.ambient, self.reflection
 
     def set_distance(self, sensor: int, millimetres: float, share: float = 1.0) -> None:
         """Put a surface in front of a sensor (0..7); `share` scales for colour and angle (0..1, black about 0.2)."""
@@ -108,17 +177,9 @@ class Infrared(Part):
         """Whether each pulse line lights its two emitters."""
         return [bool(lit) for lit in self._lit]
 
-    def _share(self, line: int, cycle: int) -> float:
-        """How far the receivers of a line have settled to full light, 0..1."""
-        target, age = 1.0 if self._lit[line] else 0.0, cycle - self._since[line]
-        if age > _GONE * self.tau_seconds * _FASTEST_HZ:
-            return target
-        start = self._from[line] / 0xFFFF
-        return target + (start - target) * math.exp(-max(age, 0) / (self.tau_seconds * self.chip.fcy))
-
     def _switched(self, line: int, cycle: int, changed: int, levels: int) -> None:
         self.chip.adc.catch_up(self.now)
-        share = self._share(line, cycle)
+        share = self._settled(self.record.address, self._ring_at, line, cycle)
         self._from[line] = round(share * 0xFFFF)
         self._since[line] = cycle
         self._lit[line] = bool(levels & changed)
@@ -133,16 +194,14 @@ class Infrared(Part):
         """Tell the converter what the receivers of a line will show once they have settled: without noise a number."""
         for sensor in (line, line + len(PULSE_PINS)):
             raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
-            level = None if self._noise.strength or self._outside else min(max(raw, 0), 4095) << 4
-            settled = self._since[line] + round(_SETTLED * self.tau_seconds * _FASTEST_HZ)
+            level = None if self._noise.strength or self._prepare else min(max(raw, 0), 4095) << 4
+            settled = self._since[line] + round(_SETTLED * self._tau_seconds * _FASTEST_HZ)
             self.chip.adc.source.foretell(_FIRST_CHANNEL + sensor, self._sources[sensor], level, settled)
 
     def _level(self, sensor: int, cycle: int) -> int:
-        light = self._outside(sensor, cycle) if self._outside is not None else 0.0
-        lowered = self.reflection[sensor] * self._share(sensor % len(PULSE_PINS), cycle)
-        deviation = max(NOISE_COUNTS, NOISE_SHARE * lowered)
-        raw = self.ambient[sensor] - lowered - light + self._noise.at(_FIRST_CHANNEL + sensor, cycle, deviation)
-        return min(max(round(raw), 0), 4095) << 4
+        if self._prepare is not None:
+            self._prepare(cycle)
+        return self._level_of(self.record.address, self._ring_at, _FIRST_CHANNEL + sensor, cycle)
 
 
 class Accelerometer(Part):

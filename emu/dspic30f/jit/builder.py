@@ -51,6 +51,8 @@ class LlvmBuilder:
         self.reach: Callable[[], Number] | None = None
         """Truth of "no event is due up to the access", for pointers that turn out to lead to a register. None: such an
         access is the interpreter's."""
+        self.loads_ahead = 0
+        """Loads that follow the next one of the instruction: each is made a cycle later (design §4.2)."""
         self.several_stores = False
         """Of one instruction: a register's is then the interpreter's, who alone can do all or none."""
         self._slow: str | None = None
@@ -178,6 +180,7 @@ class LlvmBuilder:
     # -- data memory ------------------------------------------------------------------------------------------------
     def load(self, ea: Number, size: Size, side: Side = "src", ptr: int | None = None) -> Number:
         """Data read."""
+        ahead, self.loads_ahead = self.loads_ahead, max(self.loads_ahead - 1, 0)
         if isinstance(ea, int):
             return self._load_static(ea, size)
         in_ram = self._in_ram(ea, size, ptr)
@@ -185,7 +188,7 @@ class LlvmBuilder:
         if ptr == STACK_POINTER or not (window or self.reach):
             self.guard(in_ram)
             return self.e.load(pointer(self.e, ea), 8 * size)
-        return self._load_pointed(ea, size, in_ram, window)
+        return self._load_pointed(ea, size, in_ram, window, self.now - ahead)
 
     def _in_ram(self, ea: Value, size: int, ptr: int | None) -> Value:
         """Aligned, in RAM and, for the stack pointer, not above SPLIM: one comparison plus one (design §4.3)."""
@@ -200,8 +203,8 @@ class LlvmBuilder:
             return ok & (ea <= limit)
         return ok
 
-    def _load_pointed(self, ea: Value, size: Size, in_ram: Value, window: bool) -> Value:
-        """From RAM, from the PSV window if it is open, or from a register."""
+    def _load_pointed(self, ea: Value, size: Size, in_ram: Value, window: bool, now: Number) -> Value:
+        """From RAM, from the PSV window if it is open, or from a register in cycle `now`."""
         e = self.e
         ram, other, done = (e.fresh(s) for s in ("ram", "other", "done"))
         e.end(f"br i1 {truth(in_ram)}, label %{ram}, label %{other}, !prof !0")
@@ -218,7 +221,7 @@ class LlvmBuilder:
             e.end(f"br label %{self.slow_label}")
         else:
             self.guard(self.reach() & ((ea & (size - 1)) == 0))
-            word = self._pointed(ea & 0xFFFE, 0, 0, "memory(read)")
+            word = self._pointed(now, ea & 0xFFFE, 0, 0, "memory(read)")
             self.guard(word >= 0)
             found.append((wide(word if size == 2 else (word >> ((ea & 1) << 3)) & 0xFF), e.block.label))
             e.end(f"br label %{done}")
@@ -244,12 +247,12 @@ class LlvmBuilder:
         shifted = code >> ((ea & 1) << 3) if size == 1 else code
         return wide(shifted & (0xFF if size == 1 else 0xFFFF)), window, elsewhere
 
-    def _pointed(self, word: Number, lanes: Number, value: Number, effect: str = "") -> Value:
+    def _pointed(self, now: Number, word: Number, lanes: Number, value: Number, effect: str = "") -> Value:
         """Call what `pointed.py` makes."""
         e, place, function = self.e, self.e.name(), self.e.name()
         e.line(f"{place} = getelementptr i64, ptr %env, i64 {POINTED}")
         e.line(f"{function} = load ptr, ptr {place}")
-        numbers = ", ".join(f"i64 {wide(one)}" for one in (self.now, word, lanes, value))
+        numbers = ", ".join(f"i64 {wide(one)}" for one in (now, word, lanes, value))
         return e.let(f"call {CONVENTION} i64 {function}(ptr %rec, {numbers}) cold nounwind {effect}")
 
     def _load_static(self, ea: int, size: Size) -> Number:
@@ -302,7 +305,7 @@ class LlvmBuilder:
         self.guard(self.reach() & ((s.address & (s.size - 1)) == 0))
         odd = s.address & 1
         lanes, placed = (0xFFFF, s.value) if s.size == 2 else (0xFF << (odd << 3), s.value << (odd << 3))
-        self.guard(self._pointed(s.address & 0xFFFE, lanes, placed) != 0)
+        self.guard(self._pointed(self.now, s.address & 0xFFFE, lanes, placed) != 0)
         written = e.block.label
         e.end(f"br label %{done}")
         e.start(ram)

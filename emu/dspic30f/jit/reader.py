@@ -175,6 +175,17 @@ class BoundaryReader(LlvmReader):
         self.e.line(f"{place} = getelementptr [{len(values)} x i64], ptr {name}, i64 0, i64 {wide(index)}")
         return self.e.let(f"load i64, ptr {place}")
 
+    def can_ask(self, code: Number) -> Number:
+        """Native code can."""
+        return code != 0
+
+    def ask(self, code: Number, data: Number, *numbers: Number) -> Value:
+        """A call; what it reads has been stored."""
+        address = self.e.name()
+        self.e.line(f"{address} = inttoptr i64 {wide(code)} to ptr")
+        passed = "".join(f", i64 {wide(number)}" for number in (data, *numbers))
+        return self.e.let(f"call i64 {address}(ptr %rec{passed})")
+
     def constants(self) -> str:
         """IR of the tables used so far."""
         return "\n".join(

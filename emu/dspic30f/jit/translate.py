@@ -238,6 +238,7 @@ class Translator:
         start = self.v.get("cycle")
         b.now = start + stall + step.facts.access
         b.several_stores = step.facts.stores > 1
+        b.loads_ahead = max(step.facts.loads - 1, 0)
         if step.pc not in self._polled:  # iterations that are skipped may not read what time changes
             b.reach = lambda: self.fits(row.cycles + stall, start) if self.exact else 1
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]

@@ -31,7 +31,7 @@ def random_settings(generator: random.Random) -> dict[str, int]:
     if generator.random() < 0.25:
         con1, con2 = generator.randrange(0x10000) & 0x03E6, generator.randrange(0x10000) & 0xE43F
     else:
-        con1, con2 = 0x00E4, 0x0400 | generator.randrange(16) << 2
+        con1, con2 = 0x00E4, 0x0400 | generator.randrange(16) << 2 | generator.randrange(2) << 1
     return {
         "con1": con1,
         "con2": con2,

@@ -22,6 +22,7 @@ AT = {name: f"{sfr.address:#x}" for name, sfr in DSPIC30F6014A.sfrs.items()}
 
 NATIVE = {
     "a count": ("TMR2", ["mov [w8], w2", "mov.b [w8], w3", "mov.b [w8+1], w3", "add w3, [w8], w3", "mov w1, [w8]"]),
+    "two counts": ("TMR2", ["mov.d [w8++], w2", "mov.d [--w8], w4", "mov.d [w8], w2"]),
     "a period": ("PR2", ["mov [w8++], w2", "mov [--w8], w3", "mov #0xFF00, w5", "mov w5, [w8]"]),
     "a latch": ("LATD", ["mov w1, [w8]", "mov.b w1, [++w8]", "btg.b [w8--], #3", "ior w1, [w8], [w8]"]),
     "a port": ("PORTD", ["mov [w8++], w2", "mov w1, [--w8]", "mov.b w1, [w8+1]", "btss [w8], #3", "mov [w8], [w9]"]),

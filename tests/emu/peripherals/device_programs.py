@@ -32,6 +32,7 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.specialised import SpecialisedEngine
 from emu.machine import Machine
+from emu.stops import Stop
 
 from .device_scenes import SCENES
 
@@ -355,7 +356,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
 
 def disturb(draw: random.Random, machine: Machine) -> None:
     """Something happens outside, now or soon."""
-    kind, cycle = draw.randrange(6), machine.cycle
+    kind, cycle, board = draw.randrange(10), machine.cycle, machine.board
     if machine.is_asleep:
         for level in (0, 1, 0):
             machine.pins.set("RF6", level, cycle)
@@ -365,12 +366,32 @@ def disturb(draw: random.Random, machine: Machine) -> None:
     elif kind == 1:
         for name in draw.sample(_INPUTS, 3):
             machine.pins.set(name, draw.randrange(2), cycle)
-    elif kind == 2 and machine.board is None:
+    elif kind == 2 and board is None:
         machine.peripherals.adc.set_input(draw.randrange(16), draw.randrange(0x10000))
-    elif kind == 3 and machine.board is not None:
-        machine.board.ir.set_distance(draw.randrange(8), draw.randrange(5, 100))
-    elif kind == 4 and machine.board is not None:
-        machine.board.remote.press(draw.randrange(64))
+    elif kind == 3 and board is not None:
+        board.ir.set_distance(draw.randrange(8), draw.randrange(5, 100))
+    elif kind == 4 and board is not None:
+        board.remote.press(draw.randrange(64))
+    elif kind == 5:
+        machine.peripherals.adc.set_references(draw.randrange(0x8000), draw.randrange(0x8000, 0x10001))
+    elif kind == 6 and board is not None:
+        board.noise.strength = draw.choice((0.0, 0.5, 1.0))
+    elif kind == 7 and board is not None:
+        board.ir.set_ambient(draw.randrange(8), draw.randrange(4096))
+    elif kind == 8 and board is not None:
+        period = draw.randrange(2, 1000)
+        board.microphones.play(draw.randrange(3), draw.choice((None, lambda now: now % period - period / 2)))
+    elif kind == 9 and draw.random() < 0.2:
+        machine.reset("EXTR")
+
+
+def run(machine: Machine, cycles: int, cuts: random.Random | None) -> Stop:
+    """As `Machine.run`, in pieces if there is somebody to draw them: where a run is cut must not show."""
+    limit = machine.cycle + cycles
+    stop = machine.run(cycles if cuts is None else min(cycles, cuts.randrange(1, 400)))
+    while cuts is not None and stop.reason == "limit" and machine.cycle < limit:
+        stop = machine.run(min(limit - machine.cycle, cuts.choice((1, 2, 9, cuts.randrange(1, 400)))))
+    return stop
 
 
 def difference(
@@ -380,7 +401,8 @@ def difference(
     chip: Chip = DSPIC30F6014A,
     tally: Counter[tuple[str, str]] | None = None,
 ) -> str | None:
-    """Run engines side by side with the plain one, with bytes, edges and levels from outside; what differs first."""
+    """Run engines side by side with the plain one, with bytes, edges and levels from outside, the plain one of every
+    third seed in pieces; what differs first."""
     text, writer = program(seed, chip)
     stretches = flash(text, chip)
     subjects = [subject(seed, engine, stretches, chip) for engine in ("plain", *engines)]
@@ -388,7 +410,8 @@ def difference(
     for chunk in range(chunks):
         draw = random.Random(f"{seed} {chunk}")
         cycles = draw.choice((draw.randrange(1, 300), draw.randrange(1, 3000), 2500))
-        stops = [one.machine.run(cycles) for one in subjects]
+        cuts = [random.Random(f"{seed} {chunk} cuts") if seed % 3 == 0 else None, *(None for _ in engines)]
+        stops = [run(one.machine, cycles, cut) for one, cut in zip(subjects, cuts, strict=True)]
         states = [one.machine.snapshot() for one in subjects]
         for one, name, stop, state in zip(subjects[1:], engines, stops[1:], states[1:], strict=True):
             where = f"by cycle {stops[0].cycle}, chunk {chunk}"

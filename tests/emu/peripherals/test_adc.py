@@ -7,6 +7,7 @@ import random
 import pytest
 
 from .conftest import Rig
+from .plain_adc import difference
 
 ADON, ASAM, SAMP, DONE = 0x8000, 4, 2, 1
 AUTO, TIMER3, INT0 = 7 << 5, 2 << 5, 1 << 5
@@ -260,3 +261,73 @@ def test_the_scan_starts_again_behind_every_interrupt(rig):
         rig.first_cycle(lambda: rig.flag("ADIF"), rig.events.now, rig.events.now + 200)
         rig.clear_flags()
         assert [rig.read(f"ADCBUF{n}") for n in range(3)] == [800, 900, 1000]
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+def test_levels_may_change_while_the_converter_stands(rig, mode):
+    """§17: neither Idle with ADSIDL nor Sleep converts anything, whatever happens outside: two results of 15 TAD."""
+    rig.write("ADCON2", 4)
+    rig.write("ADCON3", 0x0109)
+    rig.write("ADCON1", ADON | 0x2000 | ASAM | AUTO)
+    rig.at(20).dev.sleep(mode, 20)
+    assert rig.dev.adc.samples_from is None
+    code(rig.at(500), 0, 77)
+    rig.dev.adc.set_references(0, 0x8000)
+    assert rig.read("ADCBUF0") == 0
+    rig.at(1020).dev.wake(1020)
+    assert not rig.at(1150).flag("ADIF")
+    assert rig.at(1151).flag("ADIF")
+    assert rig.read("ADCBUF1") == 77
+
+
+def test_a_shorter_setting_ends_sampling_but_not_in_the_past(rig):
+    """§13: sampling by hand for 1000 Tcy, then automatic: one conversion of 14 TAD begins, there was none before."""
+    rig.write("ADCON3", 0x0109)
+    rig.write("ADCON1", ADON | ASAM)
+    rig.at(1000).write("ADCON1", ADON | ASAM | SAMP | AUTO)
+    code(rig, 0, 55)
+    assert rig.at(1070).read("ADCON1") == ADON | ASAM | AUTO
+    assert not rig.flag("ADIF")
+    assert rig.at(1071).read("ADCON1") == ADON | ASAM | AUTO | SAMP | DONE
+    assert rig.flag("ADIF")
+    assert rig.read("ADCBUF0") == 55
+
+
+@pytest.mark.parametrize("looks", [False, True])
+@pytest.mark.parametrize(("cycle", "done"), [(75, 0), (76, DONE), (80, DONE), (81, 0)])
+@pytest.mark.parametrize("lanes", [0xFFFF, 0xFF00])
+def test_done_in_a_write_is_what_it_was_in_that_cycle(rig, looks, cycle, done, lanes):
+    """§13: SAMC = 1, TAD 5 Tcy, so the first result is there from cycle 76 to 81 and sampling lasts 5. Writing 1 keeps
+    DONE as it is, and so does a byte write above it, looked at before or not."""
+    rig.write("ADCON2", 15 << 2)
+    rig.write("ADCON3", 0x0109)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.at(cycle)
+    if looks:
+        rig.read("ADCON1")
+    rig.write("ADCON1", ADON | ASAM | AUTO | SAMP | DONE, lanes)
+    assert rig.read("ADCON1") & DONE == done
+
+
+@pytest.mark.parametrize(("fosc", "post"), [(0xFFE6, 3), (0xFCE6, 3), (0xFAE6, 0), (0xF8E6, 0)])
+def test_own_oscillator_at_slow_clocks(fosc, post):
+    """§13 ADRC: 1.5 us are less than half a Tcy at 230 kHz and below, where a TAD is half a Tcy; the clock changes in
+    the middle of a conversion."""
+    rig = Rig(fosc=fosc)
+    rig.write("ADCON3", 0x0180)
+    rig.write("ADCON1", ADON | ASAM | AUTO)
+    rig.at(100)
+    for byte in (0x46, 0x57, post << 6):
+        rig.write("OSCCON", byte, 0x00FF)
+        rig.at(rig.events.now + 1)
+    rig.first_cycle(lambda: rig.flag("ADIF"), 103, 112)
+    rig.clear_flags()
+    first = rig.first_cycle(lambda: rig.flag("ADIF"), rig.events.now, 130)
+    rig.clear_flags()
+    assert first + 7 <= rig.first_cycle(lambda: rig.flag("ADIF"), first, 140) <= first + 8
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_converter_is_the_plain_one(seed):
+    """Half Tcy by half Tcy, in any setting, changed at any time, asleep or not, and looked at often or seldom."""
+    assert difference(seed) is None

@@ -87,6 +87,15 @@ def test_clock_switch_to_the_frc():
     assert rig.dev.seconds(23 + 1_842_500) == pytest.approx(23 / 14_745_600 + 1.0, rel=1e-9)
 
 
+def test_tuning_does_not_change_the_seconds_that_have_passed():
+    """§3: OSCTUN = 7 makes the internal oscillator 10.5 % faster from now on."""
+    rig = Rig(fosc=0x79E6)
+    before = rig.at(1_842_500).dev.seconds(1_842_501)
+    rig.write("OSCTUN", 7)
+    assert rig.dev.seconds(1_842_501) == pytest.approx(before, rel=1e-9)
+    assert rig.dev.seconds(1_842_501 + 1_842_500) == pytest.approx(before + 1 / 1.105, rel=1e-9)
+
+
 def test_clock_switch_back_to_the_pll_waits_for_crystal_and_lock():
     """§3: 1024 crystal periods and 20 us, counted in Tcy of the FRC: 0.15889 ms x 1.8425 MHz = 293 Tcy."""
     rig = Rig(fosc=0x4106 | 0x0100)

@@ -188,6 +188,36 @@ def test_polling_the_converter_takes_the_time_of_the_conversion(engine):
     assert rig.machine.w[1] == 777
 
 
+def test_an_input_that_changes_in_the_cycle_of_its_interrupt_does_not_take_it(engine):
+    """§13, §17: whoever sets levels between two runs of a CPU in Idle, at any cycle, gets every interrupt in time."""
+    program = """
+        mov #0x001C, w0
+        mov w0, {ADCSSL}
+        mov #0x0408, w0
+        mov w0, {ADCON2}
+        mov #0x0113, w0
+        mov w0, {ADCON3}
+        mov #0x80E4, w0
+        mov w0, {ADCON1}
+        bset {IEC0}, #11
+        mov #0x00E0, w0
+        mov w0, {SR}
+        wait: pwrsav #1
+        bclr {IFS0}, #11
+        inc w5, w5
+        bra wait
+        """.format(**A)
+    left, changed = Rig(program, engine), Rig(program, engine)
+    w5 = left.machine.w[5]
+    left.machine.run(5000)
+    while changed.machine.cycle < left.machine.cycle:
+        changed.machine.peripherals.adc.set_input(2, 100)
+        changed.machine.run(1)
+    assert left.machine.cycle == changed.machine.cycle
+    assert left.machine.w[5] == changed.machine.w[5]
+    assert left.machine.w[5] - w5 > 8
+
+
 def test_uart_bytes_written_by_polling_follow_without_gaps(engine):
     """§10.1: UTXBF keeps the FIFO full: frames start every 1280 Tcy on the bit clock begun by UARTEN."""
     rig = Rig(
