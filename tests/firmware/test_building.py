@@ -71,6 +71,16 @@ def test_drivers_and_files_that_come_and_go_build_anew(make) -> None:
     (make.app / "own.h").unlink()
     assert make()
     assert not make()
+    (make.app.parent / "shared").mkdir()
+    (make.app.parent / "shared" / "shared.h").write_text("\n")
+    (make.app / "app.mk").write_text("INCLUDES = -I$(APPS)/shared\n")
+    assert make()
+    assert not make()
+    (make.app.parent / "shared" / "other.h").write_text("\n")
+    assert make()
+    (make.app / "app.mk").unlink()
+    assert make()
+    assert not make()
     assert make.image.read_bytes() == plain
 
 

@@ -43,6 +43,17 @@ def test_a_number_in_the_data_eeprom_is_the_robots(image: Build) -> None:
     assert machine.record.u16[machine.address_of("infrared_number") >> 1] == 42
 
 
+def test_what_touches_is_near(image: Build) -> None:
+    """openswarm_infrared.h: proximity goes on; analog.h: mm. Behind a strong reflection receivers settle late."""
+    machine = robot(image("infrared", TARGET_APPS))
+    at = machine.address_of("millimetres")
+    for counts, millimetres in ((300, 39), (1744, 15), (3700, 3)):
+        for sensor in range(8):
+            machine.board.ir.reflection[sensor] = counts
+        machine.run(cycles=FCY // 5)
+        assert all(abs(found - millimetres) <= 1 for found in machine.record.bytes[at : at + 8])
+
+
 def test_an_event_of_one_robot_is_sent_on_another(image: Build) -> None:
     """openswarm_remote.h: the selector of one robot lights the body LED of the other too, over the arena's channel."""
     values = {"robots__count": 2, "objects__count": 0, "infrared__noise_counts": 2.0}

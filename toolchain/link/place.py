@@ -239,9 +239,17 @@ class Placer:
             data = "near data memory" if high == self.near.end else "data memory"
             kind = "EEPROM" if space_of(failed) == "eeprom" else data
             reason = f"{kind} {what} overflows by {missing} bytes"
-        return ToolError(
-            f"{self._name(failed)} does not fit: {reason}{largest_symbols(self.resolution, rivals or group)}"
-        )
+        largest = largest_symbols(self.resolution, rivals or group)
+        return ToolError(f"{self._name(failed)} does not fit: {reason}{self._reserved(failed, low, high)}{largest}")
+
+    def _reserved(self, failed: Section, low: int, high: int) -> str:
+        """What has taken part of the same memory because it wants to lie there."""
+        found = []
+        for section, at in self.layout.placed.items():
+            is_rival = section.flags & SectionFlag.ABSOLUTE and space_of(section) == space_of(failed)
+            if is_rival and at.size and low <= at.load < high:
+                found.append(f"{section.name} {at.load:#x}..{at.load + at.size - 1:#x}")
+        return f"; at fixed addresses: {', '.join(sorted(found))}" if found else ""
 
 
 _XY = SectionFlag.XMEM | SectionFlag.YMEM

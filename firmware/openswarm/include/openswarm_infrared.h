@@ -63,6 +63,11 @@ sys_message_processor Sys_Set_MessageProcessor(sys_message_processor processor);
 typedef bool (*sys_sending_processor)(uint8 *payload, uint8 *size);
 sys_sending_processor Sys_Set_SendingProcessor(sys_sending_processor processor); /* MTHI */
 
+/* Sees each message when its turn has come, a scan (244 us) before its first light, however long it waited; may change its bytes, not
+ * their number: so it can say when it left. ISR context. The default leaves every one as it is. */
+typedef void (*sys_leaving_processor)(uint8 *payload, uint8 size);
+sys_leaving_processor Sys_Set_LeavingProcessor(sys_leaving_processor processor); /* MTHI */
+
 /* M | no | - | 38 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_Infrared(void);
 

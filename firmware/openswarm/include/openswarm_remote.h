@@ -30,7 +30,8 @@ enum {
 #endif
 
 /* MTH | no | as Sys_Subscribe_to_Event | 44 | EVENT, MEMORY, ARGUMENT, BUSY.  hops 1 to SYS_REMOTE_HOPS; again changes them.
- * BUSY: SYS_REMOTE_EVENTS are shared. */
+ * BUSY: SYS_REMOTE_EVENTS are shared. Sharing is a subscription of the system thread: it ends with
+ * Sys_Unsubscribe_from_Event(event, 0), as the event's other handlers there do. */
 bool Sys_Share_Event(uint16 event, uint8 hops);
 
 typedef struct {

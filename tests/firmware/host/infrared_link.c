@@ -293,6 +293,37 @@ bool mute(sys_neighbour_message *m)
     return false;
 }
 
+static uint8 moment, departures;
+void tell_moment(uint8 *payload, uint8 size);
+void tell_moment(uint8 *payload, uint8 size)
+{
+    payload[0] = moment;
+    payload[2] = size;
+    departures++;
+}
+
+TEST(a_message_says_when_it_leaves, "a processor on the way out sees a message when its turn has come, and no beacon")
+{
+    recording r;
+    begin_link();
+    CHECK(Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, hear, NULL));
+    CHECK(Sys_Set_RobotNumber(9));
+    CHECK(Sys_Set_LeavingProcessor(tell_moment) == NULL);
+    moment = 10;
+    CHECK(Sys_Send_Neighbours("abc", 3));
+    moment = 20;
+    record(&r);
+    moment = 30;
+    CHECK_EQ(departures, 1);
+    CHECK(Sys_Set_RobotNumber(5));
+    play(&r, 6, 80);
+    Sys_Yield();
+    CHECK(messages == 1 && heard.size == 3 && memcmp(heard.payload, "\24b\3", 3) == 0);
+    scans_in_the_dark(4096 * 3);
+    CHECK(Sys_Get_InfraredStatistics()->sent >= 2 && departures == 1);
+    CHECK(Sys_Set_LeavingProcessor(NULL) == tell_moment);
+}
+
 TEST(neighbours_are_seen_and_lost, "a table of fixed size with ageing: the oldest goes, silence is loss")
 {
     recording r;

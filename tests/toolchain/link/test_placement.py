@@ -73,6 +73,16 @@ def test_program_memory_overflow_counts_bytes_and_words(image):
     assert "instruction words); largest symbols: f" in str(error.value)
 
 
+def test_what_is_kept_free_is_named_when_the_rest_has_no_room(image):
+    """A section that is never loaded keeps its place: code ends below, and the message says who is above."""
+    kept = ".section .kept,code,address(0x16000),noload\n.space 0x2000\n"
+    out = image(kept, ".section much,code\n.space 0x15E00\n")
+    used = [s for s in out.linked.image.sections if s.is_code and s.name != ".kept" and s.load < 0x18000]
+    assert 0x15E00 < max(s.load + s.units for s in used) <= 0x16000
+    with pytest.raises(ToolError, match=r"overflows by \d+ bytes .*; at fixed addresses: \.kept 0x16000\.\.0x17fff"):
+        image(kept, ".section much,code\n.space 0x15F00\n")
+
+
 def test_common_symbols_merge_to_the_largest(image):
     """ELF common symbols; a definition wins."""
     out = image(

@@ -15,6 +15,7 @@ static uint8 housekeepings;
 static uint16 beacon_at;   /* low word of the system time */
 static sys_message_processor message_processor;
 static sys_sending_processor sending_processor;
+static sys_leaving_processor leaving_processor;
 
 static void draw_number(void)
 {
@@ -50,6 +51,13 @@ void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength)
         infrared_event_sink(&f);
     } else if (f.kind == FRAME_MESSAGE && f.size != 0 && f.size <= SYS_MESSAGE_BYTES) {
         pass_on(&f, b->repairs, sensor, strength);
+    }
+}
+
+void infrared_leaving(uint8 *payload, uint8 size)
+{
+    if (leaving_processor != NULL) {
+        leaving_processor(payload, size);
     }
 }
 
@@ -108,6 +116,13 @@ sys_sending_processor Sys_Set_SendingProcessor(sys_sending_processor processor)
 {
     sys_sending_processor before = sending_processor;
     HAL_STORE(sending_processor, processor);
+    return before;
+}
+
+sys_leaving_processor Sys_Set_LeavingProcessor(sys_leaving_processor processor)
+{
+    sys_leaving_processor before = leaving_processor;
+    HAL_STORE(leaving_processor, processor);
     return before;
 }
 

@@ -64,6 +64,7 @@ extern sys_infrared_statistics infrared_statistics;
 /* ---- infrared.c ---- */
 extern uint16 infrared_number;
 void infrared_received(const frame_buffer *b, uint8 sensor, uint16 strength);
+void infrared_leaving(uint8 *payload, uint8 size); /* a message, before its first light */
 void infrared_housekeeping(void);      /* 64 times a second */
 /* Takes frames of kind FRAME_EVENT; NULL unless remote_events.c is used. */
 extern void (*infrared_event_sink)(const frame *f);

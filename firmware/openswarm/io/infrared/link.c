@@ -26,7 +26,8 @@ enum {
     FIRST_SLOTS = 12,
     SLOTS_PER_NEIGHBOUR = 4,
     FLASH = 3,              /* scans of the own light: 0.5 ms settle the receivers, then they are read */
-    AFTERGLOW = 2,          /* scans until the receivers have settled again */
+    AFTERGLOW = 3, /* scans until the receivers have settled: a reading is a scan old, and light that touches, 3700
+                    * counts, has fallen to 63 after one scan and to 1 after two (60 us) */
     MOST_BUSY = 1000,       /* scans of light without so many dark ones between: more than any frame has */
     PROXIMITY_PERIOD = 205, /* scans: 50 ms */
     FOLLOW_EVERY = 4,       /* scans */
@@ -124,6 +125,9 @@ bool link_queue(frame_kind kind, const uint8 *payload, uint8 size)
 static HAL_OUTLINE void begin_sending(void)
 {
     waiting_frame *w = queue + queue_first;
+    if (w->kind == FRAME_MESSAGE && w->size != 0) {
+        infrared_leaving(w->payload, w->size);
+    }
     frame f = {infrared_number, w->kind, w->size, w->payload};
     frame_pack(&buffer, &f);
     w->is_filled = false;

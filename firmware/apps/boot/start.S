@@ -1,0 +1,11 @@
+; Reset leads here. Sets up the stack and goes on in C, which has the address behind these words.
+#include "boot.h"
+
+    .section .boot, code, address(BOOT_START), keep
+    .global __reset
+__reset:
+    mov #__SP_init, w15
+    mov #__SPLIM_init, w0
+    mov w0, SPLIM
+    nop
+    bra _boot

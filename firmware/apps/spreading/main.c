@@ -1,0 +1,104 @@
+/* Robots that reprogram each other by infra-red (README.md): one thread keeps the stores and talks, a handler keeps what is
+ * heard for it. */
+#include <openswarm.h>
+#include <openswarm_infrared.h>
+#include <openswarm_io.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "spread.h"
+
+enum { LOOK_MS = 20, HEARD = 8, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS = 8000, LINE = 24, STACK = 700 };
+
+/* What it spreads: BSET LATC,#2; RETURN. The body LED is on from then on. */
+static const uint8 program[] = {0xD0, 0x42, 0xA8, 0x00, 0x00, 0x06};
+
+static uint8 messages[HEARD][SYS_SPREAD_BYTES];
+static volatile uint8 first, last; /* of those that wait */
+
+static bool on_message(uint16 pid, uint16 event, sys_event_data *data)
+{
+    const sys_neighbour_message *m = data->payload;
+    uint8 next = (uint8)((last + 1u) % HEARD);
+    (void)pid;
+    (void)event;
+    if (m->size == SYS_SPREAD_BYTES && (m->payload[0] & SYS_SPREAD_KIND) != 0 && next != first) {
+        memcpy(messages[last], m->payload, SYS_SPREAD_BYTES);
+        last = next;
+    }
+    return true;
+}
+
+static void say(const char *what, uint16 version)
+{
+    char line[LINE];
+    snprintf(line, sizeof line, "%s %u\n", what, version);
+    Sys_Send_Event(SYS_SEND_UART1, line, (uint16)strlen(line));
+}
+
+/* The robot whose selector is not 0 has a program of that version, if it has none. */
+static void provide(uint16 version)
+{
+    uint8 row[HAL_UPDATE_ROW];
+    memset(row, 0xFF, sizeof row);
+    memcpy(row, program, sizeof program);
+    sys_update facts = {version, 1, ~Sys_Add_UpdateCrc(0xFFFFFFFFu, row, sizeof row)};
+    if (version != 0 && Sys_Begin_Update(&facts) && Sys_Put_UpdateRow(0, row)) {
+        Sys_End_Update();
+    }
+}
+
+static void spread(void *unused)
+{
+    (void)unused;
+    uint16 running = Sys_Start_Update(), stored = 0;
+    uint32 next = 0, restart_at = 0;
+    bool is_active = false;
+    say("runs", running);
+    while (Sys_Get_RobotNumber() == 0) {
+        Sys_Sleep(LOOK_MS);
+    }
+    provide((uint16)Sys_Get_Selector());
+    Sys_Start_Spreading(Sys_Get_RobotNumber());
+    for (;;) {
+        uint8 message[SYS_SPREAD_BYTES];
+        Sys_Sleep(LOOK_MS);
+        for (; first != last; first = (uint8)((first + 1u) % HEARD)) {
+            Sys_Hear_Update(messages[first]);
+        }
+        uint32 now = Sys_Get_SystemTime();
+        if (now >= CONFIRM_MS && running != 0) {
+            Sys_Confirm_Update();
+        }
+        if (now >= next && Sys_Spread(now, message)) {
+            Sys_Send_Neighbours(message, sizeof message);
+            next = now + SYS_SPREAD_TICK;
+        }
+        uint16 version = Sys_Get_StoredVersion(&is_active);
+        if (version != stored) {
+            stored = version;
+            say("has", version);
+        }
+        if (Sys_Get_Selector() != 0 && version != 0 && !is_active && now >= OFFER_MS) {
+            Sys_Offer_Activation(version);
+        }
+        if (version != running && is_active) {
+            restart_at = restart_at != 0 ? restart_at : now + RESTART_MS; /* while the word goes round */
+            if (now >= restart_at && Sys_Get_NextVersion() != running) { /* else it has been tried, in vain */
+                __asm__ volatile("reset");
+            }
+        }
+    }
+}
+
+int main(void)
+{
+    Sys_Init_Kernel();
+    SYS_ASSERT(Sys_Start_Infrared());
+    Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, on_message, NULL);
+    const sys_process_config thread = {.entry = spread, .stack = STACK};
+    SYS_ASSERT(Sys_Start_ProcessWith(&thread) != 0);
+    Sys_Start_Kernel();
+    Sys_Run_SystemThread();
+    return 0;
+}

@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: MIT */
+/* Rows of updates at 016000 to 01787F of flash, flags in two words of the data EEPROM. */
+#include "../flash/flash_cells.h"
+#include "hal_update.h"
+#include "update_slots.h"
+
+enum {
+    ALL_LEVELS = 0xE0, /* IPL in SR */
+    PAGE = UPDATE_SLOTS >> 16, /* of program memory */
+    RUN = UPDATE_SLOTS & 0xFFFF,
+    STORE = RUN + HAL_UPDATE_ROWS * FLASH_ROW_UNITS,
+    STORE_UNITS = (HAL_UPDATE_ROWS + 1) * FLASH_ROW_UNITS,
+    EEPROM_PAGE = 0x7F,
+    FLAGS = 0xFFF0
+};
+
+static uint16_t address_of(uint8_t slot, uint8_t row)
+{
+    uint16_t base = slot == HAL_UPDATE_RUN ? RUN : (uint16_t)(STORE + slot * (uint16_t)STORE_UNITS);
+    return (uint16_t)(base + row * (uint16_t)FLASH_ROW_UNITS);
+}
+
+/* With what the table writes before it have named and latched. Flash stalls the CPU meanwhile, EEPROM does not. No interrupt,
+ * of whatever level, may come between the writes of the key. */
+static void __attribute__((noinline)) operate(uint16_t operation)
+{
+    uint16_t level = SR & ALL_LEVELS;
+    SR |= ALL_LEVELS;
+    flash_begin(operation);
+    SR = (SR & (uint16_t)~ALL_LEVELS) | level;
+    flash_wait();
+}
+
+void hal_update_read(uint8_t slot, uint8_t row, uint8_t *bytes)
+{
+    uint16_t offset = address_of(slot, row);
+    TBLPAG = PAGE;
+    for (uint16_t end = (uint16_t)(offset + FLASH_ROW_UNITS); offset != end; offset += 2) {
+        uint16_t low = __builtin_tblrdl(offset);
+        *bytes++ = (uint8_t)low;
+        *bytes++ = (uint8_t)(low >> 8);
+        *bytes++ = (uint8_t)__builtin_tblrdh(offset);
+    }
+}
+
+void hal_update_erase(uint8_t slot, uint8_t row)
+{
+    TBLPAG = PAGE;
+    __builtin_tblwtl(address_of(slot, row), 0);
+    operate(FLASH_ERASE_ROW);
+}
+
+void hal_update_write(uint8_t slot, uint8_t row, const uint8_t *bytes)
+{
+    TBLPAG = PAGE;
+    flash_latch_row(address_of(slot, row), bytes);
+    operate(FLASH_PROGRAM_ROW);
+}
+
+uint16_t hal_update_flags(uint8_t store)
+{
+    TBLPAG = EEPROM_PAGE;
+    return __builtin_tblrdl((uint16_t)(FLAGS + 2u * store));
+}
+
+void hal_update_clear(uint8_t store, uint16_t bits)
+{
+    TBLPAG = EEPROM_PAGE;
+    __builtin_tblwtl((uint16_t)(FLAGS + 2u * store), (uint16_t)~bits);
+    operate(EEPROM_PROGRAM_WORD);
+}
+
+void hal_update_renew(uint8_t store)
+{
+    TBLPAG = EEPROM_PAGE;
+    __builtin_tblwtl((uint16_t)(FLAGS + 2u * store), 0);
+    operate(EEPROM_ERASE_WORD);
+}
+
+void hal_update_run(void)
+{
+    __asm__ volatile("call %0" : : "i"(UPDATE_SLOTS) : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "memory");
+}

@@ -1,0 +1,250 @@
+/* SPDX-License-Identifier: MIT */
+/* Advertisement, request, data, and when to keep quiet (spread.h; README.md). Deluge's rules, with rows for pages. */
+#include "spread.h"
+
+#include <string.h>
+
+enum {
+    ADVERTISEMENT = 0x80, /* +1: activated.  version 2, rows, CRC 4 */
+    REQUEST = 0xA0,       /* + row.  version 2, parts that are missing 2 */
+    DATA = 0xC0,          /* + row.  part * 16 + low 4 bits of the version, 6 bytes */
+    KINDS = 0xE0,
+    ROW = 0x1F,
+    PART = 6,
+    PARTS = HAL_UPDATE_ROW / PART,
+    ALL_PARTS = 0xFFFF,
+    SHORTEST = 1000, /* ms between advertisements, doubled while nothing is new */
+    LONGEST = 60000,
+    PATIENCE = 3 * SYS_SPREAD_TICK, /* without data before a request is made again, and up to twice that more */
+    ENOUGH = 1,                     /* equal advertisements heard that make the own one needless */
+    MOST_ASKED = 30                 /* requests without data after which another program may take the place */
+};
+
+static sys_update have; /* version 0: nothing */
+static bool is_active;
+static sys_update want; /* version 0: nothing */
+static uint8 row, asked, buffer[HAL_UPDATE_ROW];
+static uint16 lacking;  /* parts of `row`; bit n: part n */
+static uint8 wanted_row;
+static uint16 wanted_parts; /* of `wanted_row`, by others */
+static uint32 clock, interval, begun, advertise_at, ask_at;
+static uint8 heard;
+static uint32 noise;
+
+static uint16 draw(uint16 below)
+{
+    noise = noise * 1664525u + 1013904223u;
+    return (uint16)((noise >> 16) % below);
+}
+
+static void begin_interval(uint32 length)
+{
+    interval = length;
+    begun = clock;
+    heard = 0;
+    advertise_at = clock + length / 2 + draw((uint16)(length / 2));
+}
+
+static void something_is_new(void)
+{
+    if (interval != SHORTEST) {
+        begin_interval(SHORTEST);
+    }
+}
+
+static void ask_later(void)
+{
+    ask_at = clock + PATIENCE + draw(2 * PATIENCE);
+}
+
+static void next_row(void)
+{
+    uint32 missing = Sys_Get_MissingRows();
+    for (row = 0; (missing & 1u) == 0; row++) {
+        missing >>= 1;
+    }
+    lacking = ALL_PARTS;
+}
+
+static void refresh(void)
+{
+    wanted_parts = 0; /* of what was here before */
+    if (!Sys_Get_StoredUpdate(&have, &is_active)) {
+        have = (sys_update){0, 0, 0};
+    }
+}
+
+void Sys_Start_Spreading(uint16 number)
+{
+    noise = number * 2654435761u;
+    want.version = 0;
+    refresh();
+    begin_interval(SHORTEST);
+}
+
+uint16 Sys_Get_StoredVersion(bool *is_activated)
+{
+    *is_activated = is_active;
+    return have.version;
+}
+
+bool Sys_Offer_Activation(uint16 version)
+{
+    if (have.version != version || version == 0 || !Sys_Activate_Update(version)) {
+        return false;
+    }
+    is_active = true;
+    something_is_new();
+    return true;
+}
+
+static bool is_another(const sys_update *facts)
+{
+    return facts->version != want.version || facts->rows != want.rows || facts->crc != want.crc;
+}
+
+static void on_advertisement(const uint8 *m)
+{
+    sys_update their = {(uint16)(m[1] | (uint16)m[2] << 8), m[3],
+                        m[4] | (uint32)m[5] << 8 | (uint32)m[6] << 16 | (uint32)m[7] << 24};
+    bool theirs_is_active = (m[0] & 1u) != 0;
+    if (their.version > have.version && (their.version > want.version || (asked == MOST_ASKED && is_another(&their)))) {
+        if (Sys_Begin_Update(&their)) {
+            want = their;
+            asked = 0;
+            refresh(); /* the store may be that of a program that is not activated */
+            next_row();
+            ask_later();
+            something_is_new();
+        }
+    } else if (their.version < have.version || (their.version == have.version && is_active && !theirs_is_active)) {
+        something_is_new(); /* for them */
+    } else if (their.version == have.version && theirs_is_active && !is_active) {
+        Sys_Offer_Activation(have.version);
+    } else if (their.version == have.version) {
+        heard += heard != 0xFF;
+    }
+}
+
+static void on_request(const uint8 *m)
+{
+    uint16 version = (uint16)(m[1] | (uint16)m[2] << 8), parts = (uint16)(m[3] | (uint16)m[4] << 8);
+    uint8 their_row = m[0] & ROW;
+    if (version == have.version && version != 0 && their_row < have.rows) {
+        if (wanted_parts == 0 || their_row < wanted_row) { /* who is behind first: the others fill their gaps as well */
+            wanted_row = their_row;
+            wanted_parts = parts;
+        } else if (their_row == wanted_row) {
+            wanted_parts |= parts;
+        }
+    } else if (version == want.version && want.version != 0 && their_row <= row) {
+        ask_later(); /* the answer is for us too, or comes first */
+    }
+}
+
+static void on_data(const uint8 *m)
+{
+    uint8 their_row = m[0] & ROW, part = m[1] >> 4;
+    uint16 bit = (uint16)(1u << part);
+    if ((m[1] & 0x0Fu) == (have.version & 0x0Fu) && their_row == wanted_row) {
+        wanted_parts &= (uint16)~bit; /* somebody else has sent it */
+    }
+    if (want.version == 0 || (m[1] & 0x0Fu) != (want.version & 0x0Fu)) {
+        return;
+    }
+    asked = 0;
+    ask_later();
+    if (their_row != row || (lacking & bit) == 0) {
+        return;
+    }
+    memcpy(buffer + part * PART, m + 2, PART);
+    lacking &= (uint16)~bit;
+    if (lacking != 0) {
+        return;
+    }
+    Sys_Put_UpdateRow(row, buffer);
+    if (Sys_Get_MissingRows() != 0) {
+        next_row();
+        return;
+    }
+    want.version = 0; /* a program whose CRC is wrong is begun anew by the next advertisement */
+    if (Sys_End_Update()) {
+        refresh();
+    }
+    begin_interval(SHORTEST);
+}
+
+void Sys_Hear_Update(const uint8 *message)
+{
+    switch (message[0] & KINDS) {
+    case ADVERTISEMENT:
+        on_advertisement(message);
+        break;
+    case REQUEST:
+        on_request(message);
+        break;
+    case DATA:
+        on_data(message);
+        break;
+    default:
+        break;
+    }
+}
+
+static bool send_part(uint8 *m)
+{
+    uint8 whole[HAL_UPDATE_ROW], part = 0;
+    while ((wanted_parts >> part & 1u) == 0) {
+        part++;
+    }
+    wanted_parts &= (uint16)~(1u << part);
+    Sys_Get_UpdateRow(wanted_row, whole);
+    m[0] = (uint8)(DATA | wanted_row);
+    m[1] = (uint8)(part << 4 | (have.version & 0x0Fu));
+    memcpy(m + 2, whole + part * PART, PART);
+    return true;
+}
+
+static bool ask(uint8 *m)
+{
+    m[0] = (uint8)(REQUEST | row);
+    m[1] = (uint8)want.version;
+    m[2] = (uint8)(want.version >> 8);
+    m[3] = (uint8)lacking;
+    m[4] = (uint8)(lacking >> 8);
+    asked += asked != MOST_ASKED;
+    ask_later();
+    return true;
+}
+
+static bool advertise(uint8 *m)
+{
+    m[0] = (uint8)(ADVERTISEMENT | (is_active ? 1u : 0u));
+    m[1] = (uint8)have.version;
+    m[2] = (uint8)(have.version >> 8);
+    m[3] = have.rows;
+    for (uint8 i = 0; i < 4; i++) {
+        m[4 + i] = (uint8)(have.crc >> 8 * i);
+    }
+    return true;
+}
+
+bool Sys_Spread(uint32 now, uint8 *message)
+{
+    clock = now;
+    memset(message, 0, SYS_SPREAD_BYTES);
+    if (now - begun >= interval) {
+        begin_interval(interval * 2 < LONGEST ? interval * 2 : LONGEST);
+    }
+    if (wanted_parts != 0) {
+        return send_part(message);
+    }
+    if (want.version != 0 && ask_at - now - 1u >= 3u * PATIENCE) { /* now or before: later than that it never is */
+        return ask(message);
+    }
+    if (advertise_at != begun && (sint32)(now - advertise_at) >= 0) {
+        advertise_at = begun; /* once an interval */
+        return heard < ENOUGH && advertise(message);
+    }
+    return false;
+}

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: MIT */
+/* Updates from robot to robot in messages of eight bytes, over whatever carries them (by infra-red: openswarm_infrared.h).
+ * Who has a program says so, seldom when all agree (Trickle, RFC 6206); who lacks it asks for a row, and for its parts by a bit
+ * each; who has the row sends those, for all in sight. README.md has the messages.
+ *
+ *     Sys_Start_Spreading(number);                  after Sys_Start_Update; number: any, but not all alike
+ *     Sys_Spread(now, message)                      every SYS_SPREAD_TICK ms; true: send these eight bytes
+ *     Sys_Hear_Update(message)                      with each message of this kind (SYS_SPREAD_KIND set in its first byte)
+ *     Sys_Offer_Activation(version)                 on one robot, when it is to be: all that have the version whole follow
+ */
+#ifndef OPENSWARM_SPREAD_H
+#define OPENSWARM_SPREAD_H
+
+#include "update.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { SYS_SPREAD_BYTES = 8, SYS_SPREAD_KIND = 0x80, SYS_SPREAD_TICK = 120 /* ms: a frame of eight bytes by infra-red is 105 */ };
+
+void Sys_Start_Spreading(uint16 number);
+/* ms of any clock that does not jump. One message at a time: the caller sends it before it asks again. */
+bool Sys_Spread(uint32 now, uint8 *message);
+void Sys_Hear_Update(const uint8 *message);
+/* false: there is no such program here that is whole. */
+bool Sys_Offer_Activation(uint16 version);
+/* The newest program that is whole here, or 0, and whether it is activated. */
+uint16 Sys_Get_StoredVersion(bool *is_active);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

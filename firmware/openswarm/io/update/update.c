@@ -1,0 +1,253 @@
+/* SPDX-License-Identifier: MIT */
+/* Two stores, one of which always keeps the program that works (README.md has the order of writes and why it is safe). */
+#include "update.h"
+
+#include <string.h>
+
+/* Flags are 1 until something has happened. */
+enum { NOT_ACTIVE = 0x8000, NOT_CONFIRMED = 0x4000, TRIES = (1 << SYS_UPDATE_TRIES) - 1 };
+
+enum { FACTS = 8, MARK = 0xA7, NONE = 0xFF };
+
+static uint8 target = NONE; /* store that is being filled */
+static uint8 running = NONE;
+static uint8 stored = NONE; /* store that Sys_Get_StoredUpdate found last */
+static sys_update coming;
+static uint32 missing;
+
+uint32 Sys_Add_UpdateCrc(uint32 crc, const uint8 *bytes, uint8 count)
+{
+    while (count-- != 0) {
+        crc ^= *bytes++;
+        for (uint8 bit = 0; bit < 8; bit++) {
+            crc = (crc & 1u) != 0 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
+        }
+    }
+    return crc;
+}
+
+static bool is_possible(const sys_update *facts)
+{
+    return facts->version != 0 && facts->rows != 0 && facts->rows <= HAL_UPDATE_ROWS;
+}
+
+static void pack(uint8 *row, const sys_update *facts)
+{
+    const uint8 plain[FACTS] = {MARK,
+                                (uint8)facts->version,
+                                (uint8)(facts->version >> 8),
+                                facts->rows,
+                                (uint8)facts->crc,
+                                (uint8)(facts->crc >> 8),
+                                (uint8)(facts->crc >> 16),
+                                (uint8)(facts->crc >> 24)};
+    memset(row, 0xFF, HAL_UPDATE_ROW);
+    for (uint8 i = 0; i < FACTS; i++) {
+        row[i] = plain[i];
+        row[FACTS + i] = (uint8)~plain[i]; /* a write that was cut short leaves 1s, which show in one of both */
+    }
+}
+
+static bool read_facts(uint8 store, sys_update *facts)
+{
+    uint8 row[HAL_UPDATE_ROW];
+    hal_update_read(store, 0, row);
+    for (uint8 i = 0; i < FACTS; i++) {
+        if ((row[i] ^ row[FACTS + i]) != 0xFF) {
+            return false;
+        }
+    }
+    facts->version = (uint16)(row[1] | (uint16)row[2] << 8);
+    facts->rows = row[3];
+    facts->crc = row[4] | (uint32)row[5] << 8 | (uint32)row[6] << 16 | (uint32)row[7] << 24;
+    return row[0] == MARK && is_possible(facts);
+}
+
+static bool holds(uint8 store, const sys_update *facts)
+{
+    uint8 row[HAL_UPDATE_ROW];
+    uint32 crc = 0xFFFFFFFFu;
+    for (uint8 i = 1; i <= facts->rows; i++) {
+        hal_update_read(store, i, row);
+        crc = Sys_Add_UpdateCrc(crc, row, HAL_UPDATE_ROW);
+    }
+    return (crc ^ 0xFFFFFFFFu) == facts->crc;
+}
+
+static bool is_whole(uint8 store, sys_update *facts)
+{
+    return read_facts(store, facts) && holds(store, facts);
+}
+
+static bool is_confirmed(uint8 store)
+{
+    return (hal_update_flags(store) & NOT_CONFIRMED) == 0;
+}
+
+/* The store whose program is to run, or NONE. */
+static uint8 choose(sys_update *best)
+{
+    uint8 chosen = NONE;
+    for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
+        sys_update facts;
+        uint16 flags = hal_update_flags(store);
+        bool may_start = (flags & NOT_ACTIVE) == 0 && ((flags & NOT_CONFIRMED) == 0 || (flags & TRIES) != 0);
+        if (may_start && is_whole(store, &facts) && (chosen == NONE || facts.version > best->version)) {
+            chosen = store;
+            *best = facts;
+        }
+    }
+    return chosen;
+}
+
+static bool write_row(uint8 slot, uint8 row, const uint8 *bytes)
+{
+    uint8 there[HAL_UPDATE_ROW];
+    hal_update_read(slot, row, there);
+    if (memcmp(there, bytes, HAL_UPDATE_ROW) != 0) {
+        hal_update_erase(slot, row);
+        hal_update_write(slot, row, bytes);
+        hal_update_read(slot, row, there);
+    }
+    return memcmp(there, bytes, HAL_UPDATE_ROW) == 0;
+}
+
+bool Sys_Begin_Update(const sys_update *facts)
+{
+    sys_update other;
+    uint8 kept = choose(&other);
+    if (!is_possible(facts) || (kept != NONE && !is_confirmed(kept)) || (running != NONE && !is_confirmed(running))) {
+        return false; /* the last try has none left, and is still one */
+    }
+    for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
+        if (is_whole(store, &other) && facts->version <= other.version) {
+            return false;
+        }
+    }
+    uint8 store = kept == 0 ? 1 : 0;
+    target = NONE; /* power may fail in what follows: nothing is begun until it is done */
+    missing = 0;
+    stored = stored == store ? NONE : stored;
+    hal_update_erase(store, 0); /* first: from here on the store holds nothing, whatever its flags say */
+    hal_update_renew(store);
+    coming = *facts;
+    missing = 0xFFFFFFFFu >> (HAL_UPDATE_ROWS - facts->rows);
+    target = store;
+    return true;
+}
+
+bool Sys_Put_UpdateRow(uint8 row, const uint8 *bytes)
+{
+    if (target == NONE || row >= coming.rows) {
+        return false;
+    }
+    uint32 bit = (uint32)1 << row;
+    if ((missing & bit) != 0 && write_row(target, (uint8)(row + 1u), bytes)) {
+        missing &= ~bit;
+    }
+    return (missing & bit) == 0;
+}
+
+uint32 Sys_Get_MissingRows(void)
+{
+    return missing;
+}
+
+bool Sys_End_Update(void)
+{
+    uint8 row[HAL_UPDATE_ROW];
+    uint8 store = target;
+    if (store == NONE || missing != 0) {
+        return false;
+    }
+    target = NONE;
+    if (!holds(store, &coming)) {
+        return false;
+    }
+    pack(row, &coming);
+    return write_row(store, 0, row); /* last: now it holds a program */
+}
+
+static uint8 newest(sys_update *best)
+{
+    uint8 found = NONE;
+    for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
+        sys_update facts;
+        if (store != target && is_whole(store, &facts) && (found == NONE || facts.version > best->version)) {
+            found = store;
+            *best = facts;
+        }
+    }
+    return found;
+}
+
+bool Sys_Get_StoredUpdate(sys_update *facts, bool *is_active)
+{
+    uint8 store = newest(facts);
+    *is_active = store != NONE && (hal_update_flags(store) & NOT_ACTIVE) == 0;
+    stored = store;
+    return store != NONE;
+}
+
+void Sys_Get_UpdateRow(uint8 row, uint8 *bytes)
+{
+    if (stored != NONE && row < HAL_UPDATE_ROWS) {
+        hal_update_read(stored, (uint8)(row + 1u), bytes);
+    }
+}
+
+bool Sys_Activate_Update(uint16 version)
+{
+    sys_update facts;
+    for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
+        if (is_whole(store, &facts) && facts.version == version) {
+            hal_update_clear(store, NOT_ACTIVE);
+            return true;
+        }
+    }
+    return false;
+}
+
+uint16 Sys_Get_NextVersion(void)
+{
+    sys_update facts;
+    return choose(&facts) == NONE ? 0 : facts.version;
+}
+
+uint16 Sys_Start_Update(void)
+{
+    sys_update facts;
+    uint8 row[HAL_UPDATE_ROW];
+    running = choose(&facts);
+    if (running == NONE) {
+        return 0;
+    }
+    if (!is_confirmed(running)) {
+        uint16 tries = hal_update_flags(running) & TRIES, one = tries & (uint16)-tries;
+        hal_update_clear(running, one); /* before it can do any harm */
+        if ((hal_update_flags(running) & one) != 0) {
+            running = NONE; /* tries that are not counted would go on for ever */
+            return 0;
+        }
+    }
+    for (uint8 i = 0; i < facts.rows; i++) {
+        hal_update_read(running, (uint8)(i + 1u), row);
+        if (!write_row(HAL_UPDATE_RUN, i, row)) {
+            running = NONE;
+            return 0;
+        }
+    }
+    hal_update_run();
+    return facts.version;
+}
+
+bool Sys_Confirm_Update(void)
+{
+    if (running == NONE) {
+        return false;
+    }
+    if (!is_confirmed(running)) {
+        hal_update_clear(running, NOT_CONFIRMED);
+    }
+    return true;
+}

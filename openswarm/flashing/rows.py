@@ -1,0 +1,69 @@
+"""Which rows of flash an image needs beside a boot loader, and in which order they keep the robot reachable."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from typing import Final
+
+from emu.image import ERASED, Image
+from openswarm.flashing.loaders import LOADERS, ROW_UNITS, ROW_WORDS, Loader
+
+_GOTO: Final = 0x04
+"""Upper byte of GOTO's first word; its second has the upper bits of the target in 0x0000HH (dspic30f6014a.md)."""
+_ENTRY_WORDS: Final = 4
+
+Row = tuple[int, list[int]]
+"""Program address and `ROW_WORDS` words."""
+
+
+def goto(target: int) -> list[int]:
+    """The two words of GOTO."""
+    return [_GOTO << 16 | target & 0xFFFE, target >> 16]
+
+
+def checked(image: Image) -> None:
+    """Raise ValueError for an image that no boot loader can start, or for a chip without one."""
+    if not all(loader.start in image.chip.program["flash"] for loader in LOADERS.values()):
+        raise ValueError(f"{image.path}: is for the {image.chip.name}, for which no boot loader is known")
+    first, second = image.word(0), image.word(2)
+    if first is None or second is None or first >> 16 != _GOTO or second > 0x7F:
+        raise ValueError(f"{image.path}: has no GOTO at its reset vector, so that a boot loader could not start it")
+
+
+def rows(image: Image, loader: Loader) -> list[Row]:
+    """The rows to write, in order. Raises ValueError if the image wants words that are the loader's.
+
+    First the entry's row without the GOTO: its four erased words are NOPs that lead into the loader, so that a robot
+    which is cut off in the middle waits in its loader at every start. Then all others, the reset vector with a GOTO to
+    the loader. Last the entry's row whole.
+    """
+    checked(image)
+    flash = image.chip.program["flash"]
+    for address, word in image.words(flash):
+        if address >= loader.entry and word != ERASED:
+            raise ValueError(
+                f"{image.path}: has words at {address:#08x}, where the robot's boot loader ({loader.name}) is:"
+                f" {loader.entry:#08x} and up are its own"
+            )
+    words = image.flash()
+    entry = words[:2].tolist()
+    words[:2] = array("I", goto(loader.start))
+    first = loader.entry // 2
+    words[first : first + _ENTRY_WORDS] = array("I", [ERASED] * _ENTRY_WORDS)
+
+    def row(address: int) -> Row:
+        return address, words[address // 2 : address // 2 + ROW_WORDS].tolist()
+
+    used = {address // ROW_UNITS * ROW_UNITS for address, _ in image.words(flash)} - {loader.entry_row}
+    order = [row(loader.entry_row), *(row(address) for address in sorted(used) if address < loader.start)]
+    words[first : first + 2] = array("I", entry)
+    return [*order, row(loader.entry_row)]
+
+
+def left_out(image: Image) -> Iterator[str]:
+    """What the image has that a boot loader does not write, in words."""
+    for name, text in (("config", "configuration words"), ("eedata", "words of data EEPROM"), ("unitid", "ID words")):
+        count = image.used(image.chip.program[name])
+        if count:
+            yield f"{count} {text}"

@@ -1,0 +1,114 @@
+"""A serial port by its device: raw bytes, a time limit for reading, nothing else.
+
+Python's `termios` is enough for that; a package such as pyserial would add Windows, on which nothing else here runs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import termios
+import time
+import tty
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Final, Protocol
+
+_STUCK_SECONDS: Final = 10.0
+"""A port that takes no byte for so long takes none: a block is on the wire for 9 ms."""
+
+
+class Line(Protocol):
+    """Bytes both ways, and a clock."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of it."""
+
+    def read(self, seconds: float) -> bytes:
+        """The next byte, waited for at most so long; empty if none came."""
+
+    def drop(self) -> None:
+        """Forget what has arrived."""
+
+    def now(self) -> float:
+        """Seconds since some moment."""
+
+
+class SerialPort:
+    """The device of a serial port, 8N1 without flow control; use it in `with`."""
+
+    def __init__(self, device: str, baud: int) -> None:
+        """Raises OSError if it cannot be opened, ValueError if it is no serial port or the terminal of this process."""
+        self.device: Final = device
+        self._file: Final = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            if not os.isatty(self._file):
+                raise ValueError(f"{device} is no serial port")
+            with contextlib.suppress(OSError):  # no other terminal has a process group that we may ask for
+                os.tcgetpgrp(self._file)
+                raise ValueError(f"{device} is the terminal in which this runs, no serial port")
+            self._set(baud)
+        except BaseException:
+            os.close(self._file)
+            raise
+
+    def _set(self, baud: int) -> None:
+        speed = getattr(termios, f"B{baud}")
+        try:
+            tty.setraw(self._file)
+            attributes = termios.tcgetattr(self._file)
+            attributes[2] |= termios.CLOCAL | termios.CREAD
+            attributes[2] &= ~(termios.CSTOPB | getattr(termios, "CRTSCTS", 0))
+            attributes[4] = attributes[5] = speed
+            termios.tcsetattr(self._file, termios.TCSANOW, attributes)
+        except termios.error as error:
+            raise ValueError(f"{self.device}: cannot be set to {baud} baud: {error.args[-1]}") from None
+
+    def __enter__(self) -> SerialPort:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._file)
+
+    @contextlib.contextmanager
+    def _named(self) -> Iterator[None]:
+        """An error of the system says which port it was."""
+        try:
+            yield
+        except BlockingIOError:
+            raise
+        except OSError as error:
+            raise OSError(f"{self.device} is gone: {error.strerror}") from None
+
+    def write(self, data: bytes) -> None:
+        """Send all of it. Raises OSError when the port is gone or takes nothing."""
+        while data:
+            if not select.select([], [self._file], [], _STUCK_SECONDS)[1]:
+                raise OSError(f"{self.device} takes no bytes: its other end does not read, or the radio is gone")
+            with contextlib.suppress(BlockingIOError), self._named():
+                data = data[os.write(self._file, data) :]
+
+    def read(self, seconds: float) -> bytes:
+        """The next byte, waited for at most so long. Raises OSError when the port is gone."""
+        if not select.select([self._file], [], [], max(seconds, 0.0))[0]:
+            return b""
+        try:
+            with self._named():
+                byte = os.read(self._file, 1)
+        except BlockingIOError:
+            return b""
+        if not byte:
+            raise OSError(f"{self.device} was closed at its other end")
+        return byte
+
+    def drop(self) -> None:
+        """Forget what has arrived. A port that is gone is told by what is written next."""
+        with contextlib.suppress(termios.error):
+            termios.tcflush(self._file, termios.TCIFLUSH)
+
+    def now(self) -> float:
+        """The monotonic clock."""
+        return time.monotonic()

@@ -1,0 +1,154 @@
+"""The boot loader `firmware/apps/boot` in an emulated robot takes what `openswarm flash` sends, and keeps itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import threading
+import tty
+
+import pytest
+
+import emu
+from emu.image import Image
+from emu.loader import load_image
+from emu.machine import Machine
+from openswarm.cli import main
+from openswarm.flashing.loaders import LOADERS, ROW_UNITS, block
+from openswarm.flashing.rows import goto, rows
+from openswarm.flashing.talk import Talk
+
+LOADER = LOADERS[0x91]
+SLICE = 4_000
+"""Tcy between looks at the line."""
+PROGRAM = """
+#include <p30F6014A.h>
+int main(void)
+{
+    static const char text[] = "it runs\\n";
+    U1BRG = 7;
+    U1MODE = 0x8000;
+    U1STA = 0x0400;
+    for (const char *c = text;; c = c[1] ? c + 1 : text) {
+        while (U1STAbits.UTXBF) {
+        }
+        U1TXREG = *c;
+    }
+}
+"""
+
+
+class Line:
+    """A robot's Bluetooth as a line, on the robot's own clock: the same run every time."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.heard = bytearray()
+        machine.board.bluetooth.on_byte = lambda byte, _cycle: self.heard.append(byte)
+
+    def write(self, data: bytes) -> None:
+        self.machine.board.bluetooth.feed(data)
+
+    def drop(self) -> None:
+        self.heard.clear()
+
+    def now(self) -> float:
+        return self.machine.cycle / emu.FCY_HZ
+
+    def read(self, seconds: float) -> bytes:
+        limit = self.machine.cycle + round(seconds * emu.FCY_HZ) + 1
+        while not self.heard and self.machine.cycle < limit:
+            self.machine.run(cycles=min(SLICE, limit - self.machine.cycle))
+        return bytes([self.heard.pop(0)]) if self.heard else b""
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Image:
+    folder = tmp_path_factory.mktemp("flashed")
+    (folder / "main.c").write_text(PROGRAM)
+    return load_image(emu.build(folder / "main.c", output=folder / "main.elf"))
+
+
+@pytest.fixture
+def robot(image) -> Machine:
+    """A robot that has nothing but the boot loader."""
+    return emu.load(image("boot"))
+
+
+def loader_rows(machine: Machine) -> list[int]:
+    return [machine.program.word(address) for address in range(LOADER.start, 0x18000, 2)]
+
+
+def test_it_lies_where_the_host_knows_it(image):
+    """Rows of its own up to the end of flash, none before, and reset leads there."""
+    loader = load_image(image("boot"))
+    assert [loader.word(0), loader.word(2)] == goto(LOADER.start)
+    assert all(address < 0x100 or address >= LOADER.start for address, _ in loader.words(loader.chip.program["flash"]))
+    assert LOADER.start % ROW_UNITS == 0
+
+
+def test_damage_and_a_cut_in_the_middle_leave_a_robot_that_can_be_reached(robot, program):
+    """A wrong sum is refused and nothing is erased; cut off, the robot waits for the host after every reset, until all
+    rows are there. Its own rows never change."""
+    own = loader_rows(robot)
+    line = Line(robot)
+    talk = Talk(line, 2.0)
+    wanted = rows(program, talk.loader)
+    assert talk.loader == LOADER
+    before = robot.program.word(0x100)
+    spoiled = bytearray(block(*wanted[2]))
+    spoiled[40] ^= 0x10
+    line.write(bytes(spoiled))
+    assert line.read(1.0) == b"N"
+    assert robot.program.word(0x100) == before
+    for address in (LOADER.start, 0x17FC0, 0x018000, 0x7FF000, 0x000020):
+        line.write(block(address, [0] * 32))
+        assert line.read(1.0) == b"N", hex(address)
+    line.write(block(0, [0] * 32))
+    assert line.read(1.0) == b"N"  # word 0 has to lead to the loader
+
+    talk.write(wanted[:4], lambda done, total: None)
+    line.write(block(*wanted[4])[:50])
+    robot.run(seconds=0.01)
+    robot.reset()
+    again = Talk(line, 1.0)  # after more than it waits: without a program it waits again
+    again.write(wanted, lambda done, total: None)
+    again.start()
+    robot.run(seconds=0.02)
+    assert b"it runs\nit runs\n" in line.heard
+    assert loader_rows(robot) == own
+    line.drop()
+    robot.reset()
+    robot.run(seconds=1.02)
+    assert b"it runs\nit runs\n" in line.heard  # after a second in which no host has greeted
+
+
+def test_the_command_flashes_a_robot_behind_a_pseudo_terminal(robot, program, capsys):
+    """The whole way: command line, serial port, boot loader; and the program greets on the same port."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    said = bytearray()
+    robot.board.bluetooth.on_byte = lambda byte, _cycle: (said.append(byte), os.write(master, bytes([byte])))
+    words = ["flash", program.path, "--port", os.ttyname(slave), "--wait", "60", "--json"]
+    status: list[int] = []
+    host = threading.Thread(target=lambda: status.append(main(words)))
+    host.start()
+    try:
+        while host.is_alive():
+            if select.select([master], [], [], 0)[0]:
+                robot.board.bluetooth.feed(os.read(master, 4096))
+            robot.run(cycles=SLICE)
+        while select.select([master], [], [], 0)[0]:
+            robot.board.bluetooth.feed(os.read(master, 4096))
+        said.clear()
+        robot.run(seconds=0.02)
+    finally:
+        host.join()
+        os.close(master)
+        os.close(slave)
+    assert status == [0]
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["loader"]["name"], facts["rows"]) == ("OpenSwarm's", len(rows(program, LOADER)))
+    assert b"it runs\nit runs\n" in said

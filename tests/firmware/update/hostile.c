@@ -1,0 +1,284 @@
+/* One robot among neighbours that say anything: true and false advertisements, requests, data of every program in any order,
+ * half of them of two programs with one version; power fails in the middle of operations, clocks wrap, bytes of flash stick.
+ * Whatever has happened, only whole programs are called, and only parts of whole programs are sent. */
+#include "update.c"
+
+#include "spread.c"
+
+#include <setjmp.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { PROGRAMS = 14, SLOTS = HAL_UPDATE_STORES + 1, HISTORIES = 150, STEPS = 3000, NEVER = 1 << 30 };
+
+static struct {
+    sys_update facts;
+    uint8 rows[HAL_UPDATE_ROWS][HAL_UPDATE_ROW];
+} programs[PROGRAMS];
+
+static uint8 cells[SLOTS][HAL_UPDATE_ROWS + 1][HAL_UPDATE_ROW];
+static uint16 flags[HAL_UPDATE_STORES];
+static jmp_buf power_off;
+static int cut_in, history;
+static const uint8 *stuck; /* a row of which a byte does not change */
+static bool sticks;
+static uint32 seed, now;
+static long sent, calls, reads;
+
+static uint32 chance(uint32 below)
+{
+    seed = seed * 1664525u + 1013904223u;
+    return (seed >> 8) % below;
+}
+
+static void check(bool is_true, const char *what)
+{
+    if (!is_true) {
+        printf("failed: %s (history %d)\n", what, history);
+        exit(1);
+    }
+}
+
+static void operated(void)
+{
+    if (cut_in != NEVER && cut_in-- == 0) {
+        longjmp(power_off, 1);
+    }
+}
+
+static void change(uint8 *row_of_cells, const uint8 *to)
+{
+    for (int i = row_of_cells == stuck ? 1 : 0; i < HAL_UPDATE_ROW; i++) {
+        uint8 bits = cut_in == 0 ? (uint8)chance(256) : 0xFF;
+        row_of_cells[i] = (uint8)((row_of_cells[i] & ~bits) | (to[i] & bits));
+    }
+    operated();
+}
+
+void hal_update_read(uint8_t slot, uint8_t r, uint8_t *bytes)
+{
+    memcpy(bytes, cells[slot][r], HAL_UPDATE_ROW);
+    reads++;
+}
+
+void hal_update_erase(uint8_t slot, uint8_t r)
+{
+    uint8 ones[HAL_UPDATE_ROW];
+    memset(ones, 0xFF, sizeof ones);
+    change(cells[slot][r], ones);
+}
+
+void hal_update_write(uint8_t slot, uint8_t r, const uint8_t *bytes)
+{
+    uint8 both[HAL_UPDATE_ROW];
+    for (int i = 0; i < HAL_UPDATE_ROW; i++) {
+        both[i] = bytes[i] & cells[slot][r][i];
+    }
+    change(cells[slot][r], both);
+}
+
+uint16_t hal_update_flags(uint8_t store)
+{
+    return flags[store];
+}
+
+void hal_update_clear(uint8_t store, uint16_t bits)
+{
+    flags[store] &= (uint16)~bits;
+    operated();
+}
+
+void hal_update_renew(uint8_t store)
+{
+    flags[store] = 0xFFFF;
+    operated();
+}
+
+void hal_update_run(void)
+{
+    bool is_whole_one = false;
+    for (int n = 0; n < PROGRAMS; n++) {
+        is_whole_one |= memcmp(cells[HAL_UPDATE_RUN], programs[n].rows, programs[n].facts.rows * HAL_UPDATE_ROW) == 0;
+    }
+    check(is_whole_one, "what is called is a program");
+    calls++;
+}
+
+static void draw_programs(void)
+{
+    for (int n = 0; n < PROGRAMS; n++) {
+        uint8 rows = (uint8)(1 + chance(chance(4) != 0 ? 4 : HAL_UPDATE_ROWS));
+        uint32 crc = 0xFFFFFFFFu;
+        for (uint8 r = 0; r < rows; r++) {
+            for (int i = 0; i < HAL_UPDATE_ROW; i++) {
+                programs[n].rows[r][i] = (uint8)chance(256);
+            }
+            crc = Sys_Add_UpdateCrc(crc, programs[n].rows[r], HAL_UPDATE_ROW);
+        }
+        programs[n].facts = (sys_update){(uint16)(1 + n / 2), rows, ~crc};
+    }
+}
+
+static void boot(void)
+{
+    target = running = stored = NONE;
+    missing = 0;
+    clock = 0;
+    memset(&want, 0, sizeof want);
+    now = chance(2) != 0 ? 0 : 0u - chance(200000);
+    Sys_Start_Update();
+    Sys_Start_Spreading((uint16)chance(1000));
+}
+
+static void tick(void)
+{
+    uint8 m[SYS_SPREAD_BYTES];
+    long before = reads;
+    now += SYS_SPREAD_TICK;
+    bool is_known = !Sys_Spread(now, m) || (m[0] & KINDS) != DATA;
+    for (int n = 0; n < PROGRAMS && !is_known; n++) {
+        uint8 r = m[0] & ROW;
+        is_known = (programs[n].facts.version & 0x0F) == (m[1] & 0x0F) && r < programs[n].facts.rows &&
+                   memcmp(programs[n].rows[r] + (m[1] >> 4) * PART, m + 2, PART) == 0;
+    }
+    check(is_known || sticks, "what is sent is part of a program");
+    check((m[0] & KINDS) != DATA || reads != before, "what is sent comes out of a store");
+    sent++;
+}
+
+static void hear_advertisement(sys_update facts, bool active)
+{
+    sys_update own = have;
+    bool own_active = is_active;
+    uint8 m[SYS_SPREAD_BYTES];
+    have = facts;
+    is_active = active;
+    advertise(m);
+    have = own;
+    is_active = own_active;
+    Sys_Hear_Update(m);
+}
+
+static void hear_part(int n, uint8 r, uint8 part)
+{
+    uint8 m[SYS_SPREAD_BYTES] = {(uint8)(DATA | r), (uint8)(part << 4 | (programs[n].facts.version & 0x0F))};
+    memcpy(m + 2, programs[n].rows[r] + part * PART, PART);
+    Sys_Hear_Update(m);
+}
+
+/* What it asks for, as a neighbour that has it would send it. */
+static void hear_what_is_wanted(uint32 one_lost_of)
+{
+    for (int n = 0; n < PROGRAMS; n++) {
+        bool is_it = want.version == programs[n].facts.version && want.crc == programs[n].facts.crc;
+        uint8 r = row;
+        for (uint8 part = 0; is_it && part < PARTS && r < programs[n].facts.rows; part++) {
+            if (chance(one_lost_of) != 0) {
+                hear_part(n, r, part);
+            }
+        }
+    }
+}
+
+static void something(void)
+{
+    int n = (int)chance(PROGRAMS);
+    sys_update facts = programs[n].facts;
+    uint8 m[SYS_SPREAD_BYTES];
+    for (int i = 0; i < SYS_SPREAD_BYTES; i++) {
+        m[i] = (uint8)chance(256);
+    }
+    switch (chance(16)) {
+    case 0:
+    case 1:
+        hear_advertisement(facts, chance(2));
+        break;
+    case 2: /* false ones */
+        facts.rows = (uint8)chance(256);
+        facts.version = (uint16)(chance(3) == 0 ? 65535 : chance(20));
+        hear_advertisement(facts, chance(2));
+        break;
+    case 3: /* for the program that is here */
+        m[0] = (uint8)(REQUEST | (m[0] & ROW));
+        m[1] = (uint8)have.version;
+        m[2] = (uint8)(have.version >> 8);
+        Sys_Hear_Update(m);
+        break;
+    case 4:
+        hear_part(n, (uint8)chance(facts.rows), (uint8)chance(PARTS));
+        break;
+    case 5:
+    case 6:
+    case 7:
+        hear_what_is_wanted(8);
+        break;
+    case 8:
+        Sys_Offer_Activation(have.version);
+        break;
+    case 9:
+        Sys_Confirm_Update();
+        break;
+    case 10:
+        cut_in = chance(4) == 0 ? (int)chance(12) : cut_in;
+        break;
+    case 11:
+        stuck = sticks && chance(8) == 0 ? cells[chance(SLOTS)][chance(5)] : NULL;
+        break;
+    case 12:
+        if (chance(8) == 0) {
+            boot();
+        }
+        break;
+    case 13:
+        Sys_Hear_Update(m);
+        break;
+    default:
+        for (uint32 ticks = chance(6); ticks-- != 0;) {
+            tick();
+        }
+    }
+}
+
+/* A promise that nobody keeps does not shut out the program that is really there. */
+static void promise(void)
+{
+    sys_update false_one = {65535, HAL_UPDATE_ROWS, 1};
+    hear_advertisement(false_one, false);
+    check(want.version == 65535, "it is believed at first");
+    for (int n = 0; n < 1000 && have.version != programs[PROGRAMS - 1].facts.version; n++) {
+        tick();
+        hear_advertisement(programs[PROGRAMS - 1].facts, false);
+        hear_what_is_wanted(8);
+    }
+    check(have.version == programs[PROGRAMS - 1].facts.version, "the true one comes in two minutes");
+}
+
+static void begin_history(bool with_stuck_bytes)
+{
+    seed = (uint32)++history;
+    sticks = with_stuck_bytes;
+    stuck = NULL;
+    cut_in = NEVER;
+    memset(cells, 0xFF, sizeof cells);
+    memset(flags, 0xFF, sizeof flags);
+    draw_programs();
+}
+
+int main(void)
+{
+    while (history < HISTORIES) {
+        static int steps;
+        begin_history(history % 3 == 2);
+        steps = 0;
+        setjmp(power_off);
+        cut_in = NEVER;
+        for (boot(); steps < STEPS; steps++) {
+            something();
+        }
+    }
+    begin_history(false);
+    boot();
+    promise();
+    printf("%ld messages, %ld calls\n", sent, calls);
+    return 0;
+}
