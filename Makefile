@@ -23,8 +23,9 @@ bench: $(STAMP)
 	$(PY) -m bench
 
 campaigns: SECONDS = 300
+campaigns: JOBS = 1
 campaigns: $(STAMP)
-	$(PY) -m tests.fuzz --seconds $(SECONDS)
+	$(PY) -m tests.fuzz --seconds $(SECONDS) --jobs $(JOBS)
 
 site: $(STAMP)
 	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -126,7 +126,7 @@ static f64 to_wall(f64 at, f64 direction, f64 size)
 
 // What the axis of a robot's sensor meets: cm from the robot's edge and share of a white surface's reflection; infinity
 // and 0 out of range.
-void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
+static void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor, f64 *found)
 {
     const f64 *here = p->values + 3 * own;
     f64 x = here[0], y = here[1], angle = here[2] - o->bearings[sensor], east = cos(angle), north = sin(angle);
@@ -155,4 +155,11 @@ void surface(const struct optics *o, const struct poses *p, i64 own, i64 sensor,
     f64 gap = distance - o->robot.radius > 0 ? distance - o->robot.radius : 0;
     found[0] = gap <= o->range ? gap : __builtin_inf();
     found[1] = gap <= o->range ? share : 0;
+}
+
+// Those of all sensors in turn.
+void surfaces(const struct optics *o, const struct poses *p, i64 own, f64 *found)
+{
+    for (i64 sensor = 0; sensor < SENSORS; sensor++)
+        surface(o, p, own, sensor, found + 2 * sensor);
 }

@@ -104,7 +104,7 @@ class _Poses(Structure):
 def _code() -> dict[str, Callable[..., Any]]:
     return functions(Path(__file__).with_name("optics.c"), {
         "signal": (INT, (ADDRESS, ADDRESS, INT, INT, ADDRESS)),
-        "surface": (None, (ADDRESS, ADDRESS, INT, INT, ADDRESS)),
+        "surfaces": (None, (ADDRESS, ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 
 
@@ -113,7 +113,7 @@ class Optics:
 
     def __init__(self, scene: Scene) -> None:
         code, setting = _code(), scene.infrared
-        self._signal, self._surface = code["signal"], code["surface"]
+        self._signal, self._surfaces = code["signal"], code["surfaces"]
         kinds = map(scene.kind_of, range(scene.objects.count))
         self._objects = (_Disc * scene.objects.count)(*(_Disc(0, 0, kind.radius_cm, kind.share) for kind in kinds))
         fixed = [_Disc(one.x_cm, one.y_cm, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
@@ -131,7 +131,7 @@ class Optics:
         self._at = addressof(self._optics)
         self._poses = _Poses()
         self._poses_at = addressof(self._poses)
-        self._found = (c_double * (_LINES + SENSORS))()
+        self._found = (c_double * (2 * SENSORS))()
         self._found_at = addressof(self._found)
 
     def _look(self, poses: Poses) -> None:
@@ -147,15 +147,12 @@ class Optics:
         for other in others:
             if self._signal(self._at, self._poses_at, robot, other, self._found_at):
                 values = tuple(self._found)
-                found.append(Signal(other, values[:_LINES], values[_LINES:]))
+                found.append(Signal(other, values[:_LINES], values[_LINES : _LINES + SENSORS]))
         return found
 
-    def surface(self, poses: Poses, robot: int, sensor: int) -> Surface:
-        """What a sensor's axis meets: wall, object or robot."""
-        self._look(poses)
-        self._surface(self._at, self._poses_at, robot, sensor, self._found_at)
-        return Surface(10 * self._found[0], self._found[1])
-
     def surfaces(self, poses: Poses, robot: int) -> list[Surface]:
-        """Of all sensors."""
-        return [self.surface(poses, robot, sensor) for sensor in range(SENSORS)]
+        """What the sensors' axes meet: wall, object or robot."""
+        self._look(poses)
+        self._surfaces(self._at, self._poses_at, robot, self._found_at)
+        found = iter(self._found)
+        return [Surface(10 * centimetres, share) for centimetres, share in zip(found, found, strict=True)]

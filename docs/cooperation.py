@@ -16,7 +16,7 @@ import numpy as np
 from arena.experiments import experiment_of
 from arena.record import Trial, trials_in
 
-SETTLED = {"clocks": "agreed", "leader": "elected"}
+SETTLED = {"average": "agreed", "clocks": "agreed", "halt": "together", "leader": "elected", "search": "found"}
 """The measure that is the time of agreement; nan: none at the end."""
 LOG = {"apart"}
 
@@ -29,7 +29,8 @@ def table(name: str, trials: list[Trial]) -> None:
     seeds = [one.about["seed"] for one, time in zip(trials, times, strict=True) if np.isnan(time)]
     print(f"{len(done)} of {len(trials)} trials settled; not: seeds {seeds or 'none'}")
     if len(done):
-        print(f"after {np.median(done):.2f} s (median), {done.min():.2f} to {done.max():.2f} s")
+        label = settled.label.format(at=float(trials[0].times[-1]))
+        print(f"{label}: median {np.median(done):.3g}, {done.min():.3g} to {done.max():.3g}")
     for curve in experiment.curves:
         last = curve.scale * np.array([one.course.last(curve.name) for one in trials])
         least, middle, most = np.nanpercentile(last, [0, 50, 100])

@@ -15,7 +15,7 @@ AGREED_MS = 20.0
 
 CURVES = [
     Curve("apart", "greatest difference between two clocks", "ms"),
-    Curve("drift", "mean of the clocks less true time, since they first agreed", "ms"),
+    Curve("drift", "mean of the clocks less true time, since they agree for good", "ms"),
 ]
 
 
@@ -37,7 +37,8 @@ def all_curves(moments: Moments) -> Mapping[str, Floats]:
     differ = apart(leads, living)
     sums, count = np.where(living, leads, 0.0).sum(axis=1), np.maximum(living.sum(axis=1), 1)
     means = sums / count
-    agreed = np.flatnonzero(differ <= AGREED_MS)
-    begin = means[agreed[0]] if len(agreed) else np.nan
-    drift = np.where(np.arange(len(means)) >= (agreed[0] if len(agreed) else 0), means - begin, np.nan)
+    apart_at = np.flatnonzero(~(differ <= AGREED_MS))  # until then somebody may know better and not have said so
+    begin = int(apart_at[-1]) + 1 if len(apart_at) else 0
+    drift = np.full(len(means), np.nan)
+    drift[begin:] = means[begin:] - means[begin : begin + 1]
     return {"apart": differ, "drift": drift}

@@ -73,7 +73,7 @@ def test_a_trial_says_what_it_was_made_from(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["run", "nowhere", *SHORT], "there is no scene 'nowhere'; known: aggregation, avoidance, "),
+        (["run", "nowhere", *SHORT], "there is no scene 'nowhere'; known: aggregation, average, avoidance, "),
         (["run", "clustering", *SHORT, "--objects", "200"], "no room: 205 robots and objects on 165 marks"),
         (["run", "clustering", "--brain", "lost.elf"], "no such file"),
         (["run", "clustering", "--brain", __file__], "test_campaign.py"),

@@ -184,7 +184,7 @@ def test_what_is_wrong_with_an_experiment_is_said_in_one_line(
 def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By name and by file."""
     run(tmp_path, scene=SCENE.replace("mine.py", "nothing"), status=2)
-    assert "there is no experiment 'nothing'; known: aggregation, avoidance, clocks, " in (
+    assert "there is no experiment 'nothing'; known: aggregation, average, avoidance, clocks, " in (
         capsys.readouterr().err
     )
     run(tmp_path, scene=SCENE.replace("mine.py", "lost.py"), status=2)

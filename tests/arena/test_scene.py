@@ -202,7 +202,7 @@ def test_infrared_feels_what_stands_fast_and_all_lamps(yard: Scene) -> None:
         ((60 - 8 - 3.7 - 5, 150.0, math.radians(18)), 50, 0.2),
         ((180 - 3.7 - 6, 200.0, math.radians(18)), 60, 1.0),
     ):
-        found = Optics(yard).surface(Poses([pose, *[(20.0, 20.0, 0.0)] * 3], far), 0, 0)
+        found = Optics(yard).surfaces(Poses([pose, *[(20.0, 20.0, 0.0)] * 3], far), 0)[0]
         assert found.millimetres == pytest.approx(gap, abs=0.5)
         assert found.share == pytest.approx(share, abs=0.01)
     lit = ambient(yard, (25 + 100, 25.0, math.pi + math.radians(18)))

@@ -1,25 +1,41 @@
-/* Electing a leader, and another when it dies (README.md): the robot of the highest rank that is heard of. An event that
- * robots share carries who leads; the leader sends it all the time, so it is missed when it stops. */
+/* Electing a leader, and another when it dies (README.md): the robot of the highest rank that is heard of. The leader counts;
+ * followers pass its counts on, so a new count from anybody is its sign of life, and an old one is none. */
 #include "rove.h"
 
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
-#include <openswarm_remote.h>
 #include <stdio.h>
 #include <string.h>
 
 enum {
-    I_LEAD = SYS_FIRST_USER_EVENT, /* [uint16 rank] */
-    HOPS = 1,          /* six robots that pass it on fill the air */
-    PERIOD_MS = 300,   /* of the leader, give or take a quarter: a third of the air's time */
-    FIRST_MS = 1000,   /* the first words come at random within it, or not at all if a better one is heard before */
-    PATIENCE_MS = 2000, /* without a word of the leader: six or seven of which each is lost with about 0.5 */
-    LOOK_MS = 50, LINE = 16, STACK = 240
+    PERIOD_MS = 450,    /* of the leader's counts, give or take a quarter */
+    RELAY_MS = 350,     /* within which a count is passed on, */
+    ENOUGH = 2,         /* unless it was heard so often by then */
+    FIRST_MS = 1000,    /* the first claims come at random within it, or not at all if a better one is heard before */
+    ANSWER_MS = 150,    /* within which a leader answers who follows a lower rank */
+    PATIENCE_MS = 5000, /* without a new count: some eleven of them, or robots that are out of each other's sight */
+    SPREAD_MS = 500,    /* and at random up to so much more, so that one claims first */
+    LOOK_MS = 25, LINE = 16, STACK = 240
 };
 
-static uint16 mine, leader;
-static uint16 heard_at; /* low word of the system time */
+typedef struct {
+    uint16 rank;
+    uint8 count;
+} word;
+
+enum { WORD_BYTES = 3 };
+
+static word leader, given_up; /* given_up: its count is the last one known when it was missed */
+static uint16 mine, heard_at, given_up_at, patience, next; /* low words of the system time */
+static uint8 copies; /* heard of the leader's count */
+static uint16 random_state;
+
+static uint16 draw(uint16 below)
+{
+    random_state = (uint16)(random_state * 25173u + 13849u + mine);
+    return (uint16)((random_state >> 4) % below);
+}
 
 /* Selector above, so that a user can say who is to lead; the number of the robot decides among equals. */
 static uint16 rank(void)
@@ -27,14 +43,68 @@ static uint16 rank(void)
     return (uint16)((uint16)Sys_Get_Selector() << 11 | Sys_Get_RobotNumber());
 }
 
-static bool on_lead(uint16 pid, uint16 event, sys_event_data *data)
+static bool is_newer(uint8 count, uint8 than)
 {
+    return (sint8)(count - than) > 0;
+}
+
+/* Who was missed says nothing by what others still pass on. After some time it may have begun anew. */
+static bool is_stale(const word *w, uint16 now)
+{
+    return w->rank == given_up.rank && !is_newer(w->count, given_up.count) && (uint16)(now - given_up_at) < PATIENCE_MS;
+}
+
+static void follow(const word *w, uint16 now)
+{
+    leader = *w;
+    heard_at = now;
+    copies = 1;
+    patience = (uint16)(PATIENCE_MS + draw(SPREAD_MS));
+    next = (uint16)(now + draw(RELAY_MS));
+}
+
+static bool on_message(uint16 pid, uint16 event, sys_event_data *data)
+{
+    const sys_neighbour_message *m = data->payload;
+    uint16 now = (uint16)Sys_Get_SystemTime();
+    word w = {0, m->payload[2]};
     (void)pid;
     (void)event;
-    if (data->value >= leader) {
-        leader = data->value;
-        heard_at = (uint16)Sys_Get_SystemTime();
+    memcpy(&w.rank, m->payload, sizeof w.rank);
+    if (m->size != WORD_BYTES || mine == 0 || w.rank == mine) {
+        return true;
     }
+    if (w.rank > leader.rank ? !is_stale(&w, now) : w.rank == leader.rank && is_newer(w.count, leader.count)) {
+        follow(&w, now);
+    } else if (w.rank == leader.rank && w.count == leader.count && copies < ENOUGH) {
+        copies++;
+    } else if (w.rank < leader.rank && leader.rank == mine && (sint16)(next - now) > ANSWER_MS) {
+        next = (uint16)(now + draw(ANSWER_MS));
+    }
+    return true;
+}
+
+/* What is due now, if anything: the own count, or the leader's for those who have not heard it. */
+static bool is_due(word *w, uint16 now)
+{
+    if (leader.rank != mine && (uint16)(now - heard_at) > patience) {
+        given_up = leader;
+        given_up_at = now;
+        leader = (word){mine, (uint8)draw(256)};
+        next = now;
+    }
+    if ((sint16)(now - next) < 0) {
+        return false;
+    }
+    if (leader.rank == mine) {
+        leader.count++;
+        next = (uint16)(now + PERIOD_MS * 3 / 4 + draw(PERIOD_MS / 2));
+    } else if (copies < ENOUGH) {
+        copies = ENOUGH; /* once */
+    } else {
+        return false;
+    }
+    *w = leader;
     return true;
 }
 
@@ -45,32 +115,38 @@ static void say(const char *what, uint16 who)
     Sys_Send_Event(SYS_SEND_UART1, line, (uint16)strlen(line));
 }
 
+/* The robot's number was drawn, or anew, or somebody has turned the selector. */
+static void stand_anew(void)
+{
+    mine = rank();
+    random_state += mine;
+    leader = (word){mine, (uint8)draw(256)};
+    next = (uint16)(Sys_Get_SystemTime() + draw(FIRST_MS));
+}
+
 static void lead(void *unused)
 {
-    uint16 random = 0, next = 0, said = 0;
+    uint16 said = 0;
     (void)unused;
     for (;;) {
+        word w;
         Sys_Sleep(LOOK_MS);
-        uint16 now = (uint16)Sys_Get_SystemTime();
         if (Sys_Get_RobotNumber() == 0) {
             continue; /* not drawn yet */
         }
-        if (mine != rank()) {
-            mine = rank();
-            random = (uint16)(mine * 25173u + 13849u);
-            next = (uint16)(Sys_Get_SystemTime() + random % FIRST_MS);
-            say("rank", mine);
-        }
+        bool is_new = mine != rank();
         Sys_Start_CriticalSection();
-        if (leader < mine || (leader != mine && (uint16)(now - heard_at) > PATIENCE_MS)) {
-            leader = mine; /* until a better one is heard */
+        if (is_new) {
+            stand_anew();
         }
-        uint16 who = leader;
+        bool speaks = is_due(&w, (uint16)Sys_Get_SystemTime());
+        uint16 who = leader.rank;
         Sys_End_CriticalSection();
-        if (who == mine && (sint16)(now - next) >= 0) {
-            random = (uint16)(random * 25173u + 13849u + mine);
-            next = (uint16)(now + PERIOD_MS * 3 / 4 + random % (PERIOD_MS / 2));
-            Sys_Send_IntEvent(I_LEAD, who);
+        if (speaks) {
+            (void)Sys_Send_Neighbours(&w, WORD_BYTES);
+        }
+        if (is_new) {
+            say("rank", mine);
         }
         if (who != said) {
             said = who;
@@ -84,8 +160,7 @@ int main(void)
 {
     Sys_Init_Kernel();
     SYS_ASSERT(Sys_Start_Infrared() && rove_begin());
-    SYS_ASSERT(Sys_Register_Event(I_LEAD) && Sys_Share_Event(I_LEAD, HOPS));
-    Sys_Subscribe_to_Event(I_LEAD, 0, on_lead, NULL);
+    Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, on_message, NULL);
     const sys_process_config thread = {.entry = lead, .stack = STACK};
     SYS_ASSERT(Sys_Start_ProcessWith(&thread) != 0);
     Sys_Start_Kernel();

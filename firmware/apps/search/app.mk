@@ -1,0 +1,2 @@
+DEVICES := infrared
+INCLUDES = -Iapps/clocks # rove.h
