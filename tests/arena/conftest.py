@@ -11,18 +11,15 @@ from pathlib import Path
 import pytest
 
 from tests.arena.images import BEGIN
+from tests.firmware.conftest import built_once
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="session")
 def clustering_image(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The project's clustering firmware, built in a folder of its own."""
-    out = tmp_path_factory.mktemp("clustering")
-    command = ["make", "-C", str(ROOT / "firmware"), "APP=clustering", f"OUT={out}", f"PYTHON={sys.executable}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
-    return out / "firmware.elf"
+    """The project's clustering firmware, built once per run of tests."""
+    return built_once(tmp_path_factory, "clustering")
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import hashlib
 import os
 import shutil
 import subprocess
@@ -26,19 +28,27 @@ def run_make(folder: Path, *words: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+def built_once(factory: pytest.TempPathFactory, app: str, *words: str) -> Path:
+    """An application's image for the e-puck, built once for all processes that share a run of tests."""
+    run = factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        run = run.parent  # a worker's own folder lies in the run's
+    out = run / f"{app}-{hashlib.sha256(repr(words).encode()).hexdigest()[:16]}"
+    image = out / "firmware.elf"
+    with out.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not image.exists():
+            run_make(FIRMWARE, f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *words)
+    return image
+
+
 @pytest.fixture(scope="session")
 def image(tmp_path_factory: pytest.TempPathFactory) -> Build:
     """`image("listing1")` builds an application for the e-puck; `apps=` names another folder of applications."""
-    built: dict[tuple[str | Path | None, ...], Path] = {}
 
     def build(app: str, apps: Path | None = None, *words: str) -> Path:
-        key = (app, apps, *words)
-        if key not in built:
-            out = tmp_path_factory.mktemp(app)
-            folder = [f"APPS={os.path.relpath(apps, FIRMWARE)}"] if apps else []
-            run_make(FIRMWARE, f"APP={app}", f"OUT={out}", f"PYTHON={sys.executable}", *folder, *words)
-            built[key] = out / "firmware.elf"
-        return built[key]
+        folder = [f"APPS={os.path.relpath(apps, FIRMWARE)}"] if apps else []
+        return built_once(tmp_path_factory, app, *folder, *words)
 
     return build
 
