@@ -439,11 +439,13 @@ class Machine(Contents, BySource):
     # State
 
     def snapshot(self) -> bytes:
-        """A copy of the whole state. Whoever continues from it looks for work first: the deadline is derived data.
+        """A copy of the whole state. Whoever continues from it looks for work first: the deadline is derived data, and
+        so is when a request that is held back becomes acceptable, which is known to who has looked since.
 
         Equal machines give equal copies whatever their engines: pin changes that wait to be told are told first.
         """
         self.pins.flush()
+        self.core.exceptions.forget()
         self.events.kick()
         return self.record.snapshot()
 

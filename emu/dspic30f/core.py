@@ -59,4 +59,4 @@ class Core:
     def reset(self) -> None:
         """Core state after any reset; SFRs have their reset values already."""
         self.state.reset()
-        self.exceptions.reset()
+        self.exceptions.forget()

@@ -116,8 +116,8 @@ class Exceptions(Integers):
                     self._u16[self._slip_words + number] = old if index == word else self._u16[index]
         self._events.kick()
 
-    def reset(self) -> None:
-        """Nothing is awaited any more."""
+    def forget(self) -> None:
+        """Nothing is awaited any more: after a reset, or because the engine looks at the next boundary anyway."""
         self._events.cancel(self._look)
 
     def acceptable(self, last: int) -> Accepted | None:

@@ -172,3 +172,19 @@ def test_peek_and_poke_have_no_side_effects(engine: str) -> None:
     assert rig.machine.peek(RAM + 1, size=1) == 0xAB
     rig.machine.poke("IFS0", 8)
     assert rig.machine.peek("IFS0") == 8
+
+
+def test_a_run_in_pieces_is_the_run_in_one_go(engine: str) -> None:
+    """engine contract: what a run that stopped looked at, here a request that DISI holds back, is not in a snapshot."""
+    text = "loop: disi #29\nnop\nnop\nrepeat #11\nnop\nbra loop\nisr: bclr 0x84, #3\nretfie"
+    whole, pieces = Rig(text, engine), Rig(text, engine)
+    for rig in whole, pieces:
+        rig.vector(0x1A, "isr")
+        rig.enable(3, 4)
+        for cycle in range(50, 1300, 97):
+            rig.interrupt_at(cycle)
+    for step in (1 + 7 * number % 40 for number in range(60)):
+        whole.machine.run(step)
+        while pieces.machine.cycle < whole.machine.cycle:
+            pieces.machine.run(1)
+        assert pieces.machine.snapshot() == whole.machine.snapshot(), whole.machine.cycle

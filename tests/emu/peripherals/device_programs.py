@@ -401,8 +401,8 @@ def difference(
     chip: Chip = DSPIC30F6014A,
     tally: Counter[tuple[str, str]] | None = None,
 ) -> str | None:
-    """Run engines side by side with the plain one, with bytes, edges and levels from outside, the plain one of every
-    third seed in pieces; what differs first."""
+    """Run engines side by side with the plain one, with bytes, edges and levels from outside, each of them in pieces in
+    every third seed; what differs first."""
     text, writer = program(seed, chip)
     stretches = flash(text, chip)
     subjects = [subject(seed, engine, stretches, chip) for engine in ("plain", *engines)]
@@ -410,7 +410,8 @@ def difference(
     for chunk in range(chunks):
         draw = random.Random(f"{seed} {chunk}")
         cycles = draw.choice((draw.randrange(1, 300), draw.randrange(1, 3000), 2500))
-        cuts = [random.Random(f"{seed} {chunk} cuts") if seed % 3 == 0 else None, *(None for _ in engines)]
+        cuts = [random.Random(f"{seed} {chunk} cuts {name}") if (seed + number) % 3 == 0 else None
+                for number, name in enumerate(("plain", *engines))]  # fmt: skip
         stops = [run(one.machine, cycles, cut) for one, cut in zip(subjects, cuts, strict=True)]
         states = [one.machine.snapshot() for one in subjects]
         for one, name, stop, state in zip(subjects[1:], engines, stops[1:], states[1:], strict=True):
