@@ -29,6 +29,11 @@ def checked(image: Image) -> None:
     first, second = image.word(0), image.word(2)
     if first is None or second is None or first >> 16 != _GOTO or second > 0x7F:
         raise ValueError(f"{image.path}: has no GOTO at its reset vector, so that a boot loader could not start it")
+    target = second << 16 | first & 0xFFFF
+    if target % 2 != 0 or image.word(target) is None or target not in image.chip.program["flash"]:
+        raise ValueError(
+            f"{image.path}: the GOTO at its reset vector leads to {target:#08x}, where the image has no program"
+        )
 
 
 def rows(image: Image, loader: Loader) -> list[Row]:

@@ -147,7 +147,7 @@ def test_the_entry_leads_into_the_loader_until_all_is_there():
 
 
 def test_the_image_keeps_what_lies_before_the_entry():
-    what = image((TINYBLD.entry_row, [7] * 4))
+    what = image((0x100, [0]), (TINYBLD.entry_row, [7] * 4))
     assert [words[:4] for address, words in rows(what, TINYBLD) if address == TINYBLD.entry_row] == [[7] * 4] * 2
 
 
@@ -215,8 +215,8 @@ def test_nobody_answers_or_somebody_else():
 def test_an_image_over_the_loader_is_refused(loader: Loader):
     for address in (loader.entry, loader.start, 0x017FFE):
         with pytest.raises(ValueError, match=rf"words at {address:#08x}, where the robot's boot loader"):
-            rows(image((address, [1])), loader)
-    rows(image((loader.entry - 2, [1]), (0x017FFE, [0xFFFFFF])), loader)
+            rows(image((0x100, [0]), (address, [1])), loader)
+    rows(image((0x100, [0]), (loader.entry - 2, [1]), (0x017FFE, [0xFFFFFF])), loader)
 
 
 def test_what_cannot_be_flashed_is_one_line(tmp_path, capsys):
@@ -236,6 +236,16 @@ def test_what_cannot_be_flashed_is_one_line(tmp_path, capsys):
     for wrong in ("0", "-1", "nan", "inf", "x"):
         with pytest.raises(SystemExit):
             main(["flash", str(HELLO_HEX), "--port", "x", f"--wait={wrong}"])
+
+
+@pytest.mark.parametrize("target", [0x101, 0x102, 0x018000, 0x7FFFFE])
+def test_a_goto_has_to_lead_to_a_program(target: int):
+    """To a word of the image, which is one of flash: not beside it, nor between two."""
+    wrong = image((0x100, [0]))
+    wrong.blocks[0].words[0] = 0x040000 | target & 0xFFFF
+    wrong.blocks[0].words[1] = target >> 16
+    with pytest.raises(ValueError, match=rf"the GOTO .* leads to {target:#08x}, where the image has no program"):
+        rows(wrong, TINYBLD)
 
 
 def test_a_line_with_an_echo_acknowledges_nothing():

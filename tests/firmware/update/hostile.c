@@ -22,6 +22,9 @@ static jmp_buf power_off;
 static int cut_in, history;
 static const uint8 *stuck; /* a row of which a byte does not change */
 static bool sticks;
+static uint8 worn_stores; /* bit n: nothing in store n changes any more */
+static uint16 stuck_flags; /* bits of all flags that stay as they are */
+static long changes;
 static uint32 seed, now;
 static long sent, calls, reads;
 
@@ -46,8 +49,21 @@ static void operated(void)
     }
 }
 
+static bool is_worn(const uint8 *row_of_cells)
+{
+    bool is = false;
+    for (int store = 0; store < HAL_UPDATE_STORES; store++) {
+        is |= (worn_stores >> store & 1) != 0 && row_of_cells >= cells[store][0] && row_of_cells < cells[store + 1][0];
+    }
+    return is;
+}
+
 static void change(uint8 *row_of_cells, const uint8 *to)
 {
+    changes++;
+    if (is_worn(row_of_cells)) {
+        return;
+    }
     for (int i = row_of_cells == stuck ? 1 : 0; i < HAL_UPDATE_ROW; i++) {
         uint8 bits = cut_in == 0 ? (uint8)chance(256) : 0xFF;
         row_of_cells[i] = (uint8)((row_of_cells[i] & ~bits) | (to[i] & bits));
@@ -84,13 +100,15 @@ uint16_t hal_update_flags(uint8_t store)
 
 void hal_update_clear(uint8_t store, uint16_t bits)
 {
-    flags[store] &= (uint16)~bits;
+    flags[store] &= (uint16)~(bits & ~stuck_flags);
+    changes++;
     operated();
 }
 
 void hal_update_renew(uint8_t store)
 {
-    flags[store] = 0xFFFF;
+    flags[store] |= (uint16)~stuck_flags;
+    changes++;
     operated();
 }
 
@@ -138,8 +156,9 @@ static void tick(void)
     bool is_known = !Sys_Spread(now, m) || (m[0] & KINDS) != DATA;
     for (int n = 0; n < PROGRAMS && !is_known; n++) {
         uint8 r = m[0] & ROW;
-        is_known = (programs[n].facts.version & 0x0F) == (m[1] & 0x0F) && r < programs[n].facts.rows &&
-                   memcmp(programs[n].rows[r] + (m[1] >> 4) * PART, m + 2, PART) == 0;
+        int at = (m[1] >> 3) * PART, size = at + PART <= HAL_UPDATE_ROW ? PART : HAL_UPDATE_ROW - at;
+        is_known = identity(&programs[n].facts) == ((m[1] & 7) << 8 | m[2]) && r < programs[n].facts.rows &&
+                   memcmp(programs[n].rows[r] + at, m + DATA_HEADER, (size_t)size) == 0;
     }
     check(is_known || sticks, "what is sent is part of a program");
     check((m[0] & KINDS) != DATA || reads != before, "what is sent comes out of a store");
@@ -161,8 +180,11 @@ static void hear_advertisement(sys_update facts, bool active)
 
 static void hear_part(int n, uint8 r, uint8 part)
 {
-    uint8 m[SYS_SPREAD_BYTES] = {(uint8)(DATA | r), (uint8)(part << 4 | (programs[n].facts.version & 0x0F))};
-    memcpy(m + 2, programs[n].rows[r] + part * PART, PART);
+    uint16 program = identity(&programs[n].facts);
+    uint8 m[SYS_SPREAD_BYTES] = {(uint8)(DATA | r), (uint8)(part << 3 | program >> 8), (uint8)program};
+    uint8 whole[PARTS * PART] = {0};
+    memcpy(whole, programs[n].rows[r], HAL_UPDATE_ROW);
+    memcpy(m + DATA_HEADER, whole + part * PART, PART);
     Sys_Hear_Update(m);
 }
 
@@ -202,6 +224,8 @@ static void something(void)
         m[0] = (uint8)(REQUEST | (m[0] & ROW));
         m[1] = (uint8)have.version;
         m[2] = (uint8)(have.version >> 8);
+        m[6] = (uint8)identity(&have);
+        m[7] = (uint8)(identity(&have) >> 8);
         Sys_Hear_Update(m);
         break;
     case 4:
@@ -239,6 +263,17 @@ static void something(void)
     }
 }
 
+static void begin_history(bool with_stuck_bytes)
+{
+    seed = (uint32)++history;
+    sticks = with_stuck_bytes;
+    stuck = NULL;
+    cut_in = NEVER;
+    memset(cells, 0xFF, sizeof cells);
+    memset(flags, 0xFF, sizeof flags);
+    draw_programs();
+}
+
 /* A promise that nobody keeps does not shut out the program that is really there. */
 static void promise(void)
 {
@@ -253,15 +288,118 @@ static void promise(void)
     check(have.version == programs[PROGRAMS - 1].facts.version, "the true one comes in two minutes");
 }
 
-static void begin_history(bool with_stuck_bytes)
+/* Of two programs of one version the one that was begun comes whole, whatever is heard of the other before. */
+static void namesakes(int wanted, int other)
 {
-    seed = (uint32)++history;
-    sticks = with_stuck_bytes;
-    stuck = NULL;
-    cut_in = NEVER;
-    memset(cells, 0xFF, sizeof cells);
-    memset(flags, 0xFF, sizeof flags);
-    draw_programs();
+    sys_update facts = programs[other].facts;
+    check(facts.version == programs[wanted].facts.version && facts.crc != programs[wanted].facts.crc, "two of one version");
+    hear_advertisement(programs[wanted].facts, false);
+    for (int n = 0; n < 100 && have.version != facts.version; n++) {
+        for (uint8 part = 0; part < PARTS && row < facts.rows; part++) {
+            hear_part(other, row, part);
+        }
+        hear_what_is_wanted(8);
+        hear_advertisement(facts, true);
+        tick();
+    }
+    check(have.version == facts.version && have.crc == programs[wanted].facts.crc, "the one that was begun");
+    check(!is_active, "that the other one is activated does not concern it");
+    begin_interval(SHORTEST);
+    hear_advertisement(facts, false);
+    check(heard == 0, "nor has anybody said the same by naming the other");
+    for (uint8 r = 0; r < facts.rows; r++) { /* who asks for the other's rows does not get these */
+        uint8 m[SYS_SPREAD_BYTES];
+        sys_update own = want;
+        want = facts, row = r, lacking = ALL_PARTS;
+        ask(m);
+        want = own;
+        Sys_Hear_Update(m);
+        check(wanted_parts == 0, "requests are for one program");
+    }
+}
+
+/* Neighbours that have a program, as long as it is asked for; how many requests that took. */
+static int serve(int n, int ticks)
+{
+    int requests = 0;
+    for (uint8 m[SYS_SPREAD_BYTES]; ticks-- != 0;) {
+        if (ticks % 8 == 0) {
+            hear_advertisement(programs[n].facts, false);
+        }
+        now += SYS_SPREAD_TICK;
+        if (Sys_Spread(now, m) && (m[0] & KINDS) == REQUEST) {
+            requests++;
+            hear_what_is_wanted(1000);
+        }
+    }
+    return requests;
+}
+
+/* Flash that holds nothing any more is not asked for, nor written, without end; the store that does is used. */
+static void worn_out(void)
+{
+    worn_stores = 1;
+    serve(PROGRAMS - 1, 4000);
+    check(have.version == programs[PROGRAMS - 1].facts.version, "where one store does not change the other one is used");
+    begin_history(false);
+    boot();
+    worn_stores = 3;
+    serve(PROGRAMS - 1, 1000);
+    changes = 0;
+    check(serve(PROGRAMS - 1, 4000) == 0 && changes == 0, "who has no store that changes asks for nothing");
+    worn_stores = 0;
+    check(serve(PROGRAMS - 1, 4000) == 0, "until the next start");
+    boot();
+    serve(PROGRAMS - 1, 4000);
+    check(have.version == programs[PROGRAMS - 1].facts.version, "which tries again");
+}
+
+/* A CRC that no program has is not asked for without end. */
+static void false_sum(void)
+{
+    programs[PROGRAMS - 1].facts.crc ^= 1;
+    serve(PROGRAMS - 1, 4000);
+    check(serve(PROGRAMS - 1, 4000) == 0, "what has failed some times is not asked for");
+    programs[PROGRAMS - 1].facts.crc ^= 1;
+    serve(PROGRAMS - 1, 4000);
+    check(have.version == programs[PROGRAMS - 1].facts.version, "but the true one is");
+}
+
+static void take(int n)
+{
+    serve(n, 4000);
+    check(have.version == programs[n].facts.version, "it comes");
+}
+
+/* Flags that do not change: what cannot be tried is not in the way of the one that works, nor of the next. */
+static void stuck_bits(void)
+{
+    enum { FIRST = 0, SECOND = 2, THIRD = 4 };
+    take(FIRST);
+    check(Sys_Offer_Activation(1), "activated");
+    boot();
+    check(running != NONE && Sys_Confirm_Update(), "it runs, confirmed");
+    take(SECOND);
+    check(Sys_Offer_Activation(2), "activated");
+    stuck_flags = 1;
+    check(Sys_Start_Update() == 2, "a try that cannot be counted in one bit is counted in another");
+    stuck_flags = TRIES;
+    check(Sys_Start_Update() == 1, "tries that cannot be counted are none: the one before runs");
+    check(Sys_Get_NextVersion() == 1, "and is known to");
+    stuck_flags = 0;
+    Sys_Start_Spreading(1);
+    take(THIRD);
+    stuck_flags = NOT_ACTIVE;
+    check(!Sys_Activate_Update(3), "what is not active is not said to be");
+    hear_advertisement(programs[THIRD].facts, true);
+    changes = 0;
+    hear_advertisement(programs[THIRD].facts, true);
+    check(changes == 0, "nor is it tried each time that somebody says so");
+    stuck_flags = 0;
+    check(Sys_Activate_Update(3) && Sys_Start_Update() == 3, "it runs");
+    stuck_flags = NOT_CONFIRMED;
+    check(!Sys_Confirm_Update(), "what is not confirmed is not said to be");
+    stuck_flags = 0;
 }
 
 int main(void)
@@ -279,6 +417,18 @@ int main(void)
     begin_history(false);
     boot();
     promise();
+    begin_history(false);
+    boot();
+    namesakes(6, 7);
+    begin_history(false);
+    boot();
+    worn_out();
+    begin_history(false);
+    boot();
+    false_sum();
+    begin_history(false);
+    boot();
+    stuck_bits();
     printf("%ld messages, %ld calls\n", sent, calls);
     return 0;
 }

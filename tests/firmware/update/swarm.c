@@ -13,10 +13,9 @@ enum { MOST = 30, STEP = 15, FRAME = 105, ROWS_MOST = HAL_UPDATE_ROWS + 1 };
 typedef struct {
     uint8 rows[HAL_UPDATE_STORES + 1][ROWS_MOST][HAL_UPDATE_ROW];
     uint16 flags[HAL_UPDATE_STORES];
-    uint8 target, running, stored, row, asked, wanted_row, heard, buffer[HAL_UPDATE_ROW];
-    sys_update coming, have, want;
-    uint32 missing, clock, interval, begun, advertise_at, ask_at, noise;
-    uint16 lacking, wanted_parts;
+    uint8 target, running, stored, row, asked, wanted_row, heard, failures, worn, refused, buffer[PARTS * PART];
+    sys_update coming, have, want, failed;
+    uint32 missing, clock, interval, begun, advertise_at, ask_at, noise, lacking, wanted_parts;
     bool is_active;
     uint8 frame[SYS_SPREAD_BYTES];
     int sends_until, waits_until; /* ms */
@@ -72,7 +71,7 @@ void hal_update_run(void)
 #define EACH(move)                                                                                                          \
     move(target) move(running) move(stored) move(row) move(asked) move(wanted_row) move(heard) move(coming) move(have) move(want)      \
         move(missing) move(clock) move(interval) move(begun) move(advertise_at) move(ask_at) move(noise) move(lacking)     \
-            move(wanted_parts) move(is_active)
+            move(wanted_parts) move(is_active) move(failures) move(failed) move(worn) move(refused)
 #define TAKE(name) name = me->name;
 #define KEEP(name) me->name = name;
 
@@ -224,7 +223,8 @@ static void babble(void)
         }
         if (n % 3 != 0) { /* what fits: the version that it wants, and rows that it has */
             message[0] = (uint8)(DATA | row);
-            message[1] = (uint8)((message[1] & 0xF0) | (want.version & 0x0F));
+            message[1] = (uint8)((message[1] & 0xF8) | identity(&want) >> 8);
+            message[2] = (uint8)identity(&want);
         }
         Sys_Hear_Update(message);
         Sys_Spread((uint32)(n * SYS_SPREAD_TICK), message);

@@ -6,27 +6,33 @@
 
 enum {
     ADVERTISEMENT = 0x80, /* +1: activated.  version 2, rows, CRC 4 */
-    REQUEST = 0xA0,       /* + row.  version 2, parts that are missing 2 */
-    DATA = 0xC0,          /* + row.  part * 16 + low 4 bits of the version, 6 bytes */
+    REQUEST = 0xA0,       /* + row.  version 2, parts that are missing 3, identity 2 */
+    DATA = 0xC0,          /* + row.  part * 8 + identity above its low byte, that, 5 bytes */
     KINDS = 0xE0,
     ROW = 0x1F,
-    PART = 6,
-    PARTS = HAL_UPDATE_ROW / PART,
-    ALL_PARTS = 0xFFFF,
+    IDENTITY = 0x07FF, /* of a program, in its CRC: two of one version share no rows */
+    DATA_HEADER = 3,
+    PART = 5,
+    PARTS = (HAL_UPDATE_ROW + PART - 1) / PART,
     SHORTEST = 1000, /* ms between advertisements, doubled while nothing is new */
     LONGEST = 60000,
     PATIENCE = 3 * SYS_SPREAD_TICK, /* without data before a request is made again, and up to twice that more */
     ENOUGH = 1,                     /* equal advertisements heard that make the own one needless */
-    MOST_ASKED = 30                 /* requests without data after which another program may take the place */
+    MOST_ASKED = 30,                /* requests without data after which another program may take the place */
+    MOST_FAILED = 3                 /* times that all rows of a program came and its CRC was wrong */
 };
+
+static const uint32 ALL_PARTS = 0xFFFFFFFFu >> (32 - PARTS);
 
 static sys_update have; /* version 0: nothing */
 static bool is_active;
 static sys_update want; /* version 0: nothing */
-static uint8 row, asked, buffer[HAL_UPDATE_ROW];
-static uint16 lacking;  /* parts of `row`; bit n: part n */
+static sys_update failed; /* what failed last, */
+static uint8 failures;    /* and how often */
+static uint8 row, asked, buffer[PARTS * PART];
+static uint32 lacking; /* parts of `row`; bit n: part n */
 static uint8 wanted_row;
-static uint16 wanted_parts; /* of `wanted_row`, by others */
+static uint32 wanted_parts; /* of `wanted_row`, by others */
 static uint32 clock, interval, begun, advertise_at, ask_at;
 static uint8 heard;
 static uint32 noise;
@@ -78,6 +84,7 @@ void Sys_Start_Spreading(uint16 number)
 {
     noise = number * 2654435761u;
     want.version = 0;
+    failures = 0;
     refresh();
     begin_interval(SHORTEST);
 }
@@ -98,9 +105,20 @@ bool Sys_Offer_Activation(uint16 version)
     return true;
 }
 
-static bool is_another(const sys_update *facts)
+static bool is_same(const sys_update *one, const sys_update *other)
 {
-    return facts->version != want.version || facts->rows != want.rows || facts->crc != want.crc;
+    return one->version == other->version && one->rows == other->rows && one->crc == other->crc;
+}
+
+static uint16 identity(const sys_update *facts)
+{
+    return (uint16)facts->crc & IDENTITY;
+}
+
+static bool is_newer(const sys_update *their)
+{
+    return their->version > have.version && (failures < MOST_FAILED || !is_same(their, &failed)) &&
+           (their->version > want.version || (asked == MOST_ASKED && !is_same(their, &want)));
 }
 
 static void on_advertisement(const uint8 *m)
@@ -108,7 +126,8 @@ static void on_advertisement(const uint8 *m)
     sys_update their = {(uint16)(m[1] | (uint16)m[2] << 8), m[3],
                         m[4] | (uint32)m[5] << 8 | (uint32)m[6] << 16 | (uint32)m[7] << 24};
     bool theirs_is_active = (m[0] & 1u) != 0;
-    if (their.version > have.version && (their.version > want.version || (asked == MOST_ASKED && is_another(&their)))) {
+    bool is_ours = is_same(&their, &have);
+    if (is_newer(&their)) {
         if (Sys_Begin_Update(&their)) {
             want = their;
             asked = 0;
@@ -117,39 +136,42 @@ static void on_advertisement(const uint8 *m)
             ask_later();
             something_is_new();
         }
-    } else if (their.version < have.version || (their.version == have.version && is_active && !theirs_is_active)) {
+    } else if (their.version < have.version || (is_ours && is_active && !theirs_is_active)) {
         something_is_new(); /* for them */
-    } else if (their.version == have.version && theirs_is_active && !is_active) {
-        Sys_Offer_Activation(have.version);
-    } else if (their.version == have.version) {
+    } else if (is_ours && theirs_is_active && !is_active) {
+        (void)Sys_Offer_Activation(have.version);
+        is_active = true; /* a flag that sticks is not tried at each word of it */
+    } else if (is_ours) {
         heard += heard != 0xFF;
     }
 }
 
 static void on_request(const uint8 *m)
 {
-    uint16 version = (uint16)(m[1] | (uint16)m[2] << 8), parts = (uint16)(m[3] | (uint16)m[4] << 8);
+    uint16 version = (uint16)(m[1] | (uint16)m[2] << 8), program = (uint16)(m[6] | (uint16)m[7] << 8);
+    uint32 parts = (m[3] | (uint32)m[4] << 8 | (uint32)m[5] << 16) & ALL_PARTS;
     uint8 their_row = m[0] & ROW;
-    if (version == have.version && version != 0 && their_row < have.rows) {
+    if (version == have.version && version != 0 && program == identity(&have) && their_row < have.rows) {
         if (wanted_parts == 0 || their_row < wanted_row) { /* who is behind first: the others fill their gaps as well */
             wanted_row = their_row;
             wanted_parts = parts;
         } else if (their_row == wanted_row) {
             wanted_parts |= parts;
         }
-    } else if (version == want.version && want.version != 0 && their_row <= row) {
+    } else if (version == want.version && version != 0 && program == identity(&want) && their_row <= row) {
         ask_later(); /* the answer is for us too, or comes first */
     }
 }
 
 static void on_data(const uint8 *m)
 {
-    uint8 their_row = m[0] & ROW, part = m[1] >> 4;
-    uint16 bit = (uint16)(1u << part);
-    if ((m[1] & 0x0Fu) == (have.version & 0x0Fu) && their_row == wanted_row) {
-        wanted_parts &= (uint16)~bit; /* somebody else has sent it */
+    uint8 their_row = m[0] & ROW, part = m[1] >> 3;
+    uint16 program = (uint16)((uint16)(m[1] & 7u) << 8 | m[2]);
+    uint32 bit = (uint32)1 << part;
+    if (program == identity(&have) && their_row == wanted_row) {
+        wanted_parts &= ~bit; /* somebody else has sent it */
     }
-    if (want.version == 0 || (m[1] & 0x0Fu) != (want.version & 0x0Fu)) {
+    if (want.version == 0 || program != identity(&want)) {
         return;
     }
     asked = 0;
@@ -157,20 +179,23 @@ static void on_data(const uint8 *m)
     if (their_row != row || (lacking & bit) == 0) {
         return;
     }
-    memcpy(buffer + part * PART, m + 2, PART);
-    lacking &= (uint16)~bit;
+    memcpy(buffer + part * PART, m + DATA_HEADER, PART);
+    lacking &= ~bit;
     if (lacking != 0) {
         return;
     }
-    Sys_Put_UpdateRow(row, buffer);
-    if (Sys_Get_MissingRows() != 0) {
+    bool is_put = Sys_Put_UpdateRow(row, buffer);
+    if (is_put && Sys_Get_MissingRows() != 0) {
         next_row();
         return;
     }
-    want.version = 0; /* a program whose CRC is wrong is begun anew by the next advertisement */
-    if (Sys_End_Update()) {
+    if (is_put && Sys_End_Update()) {
         refresh();
+    } else { /* the next advertisement begins it anew, if there is a store for it */
+        failures = (uint8)(is_same(&want, &failed) ? failures + (failures != MOST_FAILED) : 1);
+        failed = want;
     }
+    want.version = 0;
     begin_interval(SHORTEST);
 }
 
@@ -193,15 +218,16 @@ void Sys_Hear_Update(const uint8 *message)
 
 static bool send_part(uint8 *m)
 {
-    uint8 whole[HAL_UPDATE_ROW], part = 0;
+    uint8 whole[PARTS * PART] = {0}, part = 0;
     while ((wanted_parts >> part & 1u) == 0) {
         part++;
     }
-    wanted_parts &= (uint16)~(1u << part);
+    wanted_parts &= ~((uint32)1 << part);
     Sys_Get_UpdateRow(wanted_row, whole);
     m[0] = (uint8)(DATA | wanted_row);
-    m[1] = (uint8)(part << 4 | (have.version & 0x0Fu));
-    memcpy(m + 2, whole + part * PART, PART);
+    m[1] = (uint8)(part << 3 | identity(&have) >> 8);
+    m[2] = (uint8)identity(&have);
+    memcpy(m + DATA_HEADER, whole + part * PART, PART);
     return true;
 }
 
@@ -212,6 +238,9 @@ static bool ask(uint8 *m)
     m[2] = (uint8)(want.version >> 8);
     m[3] = (uint8)lacking;
     m[4] = (uint8)(lacking >> 8);
+    m[5] = (uint8)(lacking >> 16);
+    m[6] = (uint8)identity(&want);
+    m[7] = (uint8)(identity(&want) >> 8);
     asked += asked != MOST_ASKED;
     ask_later();
     return true;

@@ -5,13 +5,15 @@
 #include <string.h>
 
 /* Flags are 1 until something has happened. */
-enum { NOT_ACTIVE = 0x8000, NOT_CONFIRMED = 0x4000, TRIES = (1 << SYS_UPDATE_TRIES) - 1 };
+enum { ALL = 0xFFFF, NOT_ACTIVE = 0x8000, NOT_CONFIRMED = 0x4000, TRIES = (1 << SYS_UPDATE_TRIES) - 1 };
 
-enum { FACTS = 8, MARK = 0xA7, NONE = 0xFF };
+enum { FACTS = 8, MARK = 0xA7, NONE = 0xFF, WRITES = 3 /* before a row counts as worn out */ };
 
 static uint8 target = NONE; /* store that is being filled */
 static uint8 running = NONE;
 static uint8 stored = NONE; /* store that Sys_Get_StoredUpdate found last */
+static uint8 worn;    /* bit n: store n has not held what was written since the last start: nothing more is */
+static uint8 refused; /* bit n: the program of store n could not be tried at the last start */
 static sys_update coming;
 static uint32 missing;
 
@@ -91,7 +93,7 @@ static uint8 choose(sys_update *best)
     for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
         sys_update facts;
         uint16 flags = hal_update_flags(store);
-        bool may_start = (flags & NOT_ACTIVE) == 0 && ((flags & NOT_CONFIRMED) == 0 || (flags & TRIES) != 0);
+        bool may_start = (refused >> store & 1u) == 0 && (flags & NOT_ACTIVE) == 0 && ((flags & NOT_CONFIRMED) == 0 || (flags & TRIES) != 0);
         if (may_start && is_whole(store, &facts) && (chosen == NONE || facts.version > best->version)) {
             chosen = store;
             *best = facts;
@@ -104,12 +106,30 @@ static bool write_row(uint8 slot, uint8 row, const uint8 *bytes)
 {
     uint8 there[HAL_UPDATE_ROW];
     hal_update_read(slot, row, there);
-    if (memcmp(there, bytes, HAL_UPDATE_ROW) != 0) {
+    for (uint8 n = 0; n < WRITES && memcmp(there, bytes, HAL_UPDATE_ROW) != 0; n++) {
         hal_update_erase(slot, row);
         hal_update_write(slot, row, bytes);
         hal_update_read(slot, row, there);
     }
     return memcmp(there, bytes, HAL_UPDATE_ROW) == 0;
+}
+
+static bool write_store(uint8 store, uint8 row, const uint8 *bytes)
+{
+    if (write_row(store, row, bytes)) {
+        return true;
+    }
+    worn |= (uint8)(1u << store);
+    target = NONE;
+    missing = 0;
+    return false;
+}
+
+/* The flags of a store; whether they are now. */
+static bool clear(uint8 store, uint16 bits)
+{
+    hal_update_clear(store, bits);
+    return (hal_update_flags(store) & bits) == 0;
 }
 
 bool Sys_Begin_Update(const sys_update *facts)
@@ -124,12 +144,19 @@ bool Sys_Begin_Update(const sys_update *facts)
             return false;
         }
     }
-    uint8 store = kept == 0 ? 1 : 0;
+    uint8 store = kept == 0 || (kept == NONE && (worn & 1u) != 0) ? 1 : 0;
+    if ((worn >> store & 1u) != 0) {
+        return false;
+    }
     target = NONE; /* power may fail in what follows: nothing is begun until it is done */
     missing = 0;
     stored = stored == store ? NONE : stored;
     hal_update_erase(store, 0); /* first: from here on the store holds nothing, whatever its flags say */
     hal_update_renew(store);
+    if (hal_update_flags(store) != ALL) {
+        worn |= (uint8)(1u << store);
+        return false;
+    }
     coming = *facts;
     missing = 0xFFFFFFFFu >> (HAL_UPDATE_ROWS - facts->rows);
     target = store;
@@ -142,10 +169,13 @@ bool Sys_Put_UpdateRow(uint8 row, const uint8 *bytes)
         return false;
     }
     uint32 bit = (uint32)1 << row;
-    if ((missing & bit) != 0 && write_row(target, (uint8)(row + 1u), bytes)) {
+    if ((missing & bit) != 0) {
+        if (!write_store(target, (uint8)(row + 1u), bytes)) {
+            return false;
+        }
         missing &= ~bit;
     }
-    return (missing & bit) == 0;
+    return true;
 }
 
 uint32 Sys_Get_MissingRows(void)
@@ -165,7 +195,7 @@ bool Sys_End_Update(void)
         return false;
     }
     pack(row, &coming);
-    return write_row(store, 0, row); /* last: now it holds a program */
+    return write_store(store, 0, row); /* last: now it holds a program */
 }
 
 static uint8 newest(sys_update *best)
@@ -201,8 +231,7 @@ bool Sys_Activate_Update(uint16 version)
     sys_update facts;
     for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
         if (is_whole(store, &facts) && facts.version == version) {
-            hal_update_clear(store, NOT_ACTIVE);
-            return true;
+            return clear(store, NOT_ACTIVE);
         }
     }
     return false;
@@ -214,31 +243,43 @@ uint16 Sys_Get_NextVersion(void)
     return choose(&facts) == NONE ? 0 : facts.version;
 }
 
+/* Before the program can do any harm: tries that are not counted would go on for ever. A bit that sticks leaves the others. */
+static bool count_try(uint8 store)
+{
+    uint16 tries = hal_update_flags(store) & TRIES;
+    while (tries != 0) {
+        uint16 one = tries & (uint16)-tries;
+        if (clear(store, one)) {
+            return true;
+        }
+        tries ^= one;
+    }
+    return false;
+}
+
+static bool install(uint8 store, uint8 rows)
+{
+    uint8 bytes[HAL_UPDATE_ROW];
+    bool is_there = true;
+    for (uint8 row = 0; row < rows && is_there; row++) {
+        hal_update_read(store, (uint8)(row + 1u), bytes);
+        is_there = write_row(HAL_UPDATE_RUN, row, bytes);
+    }
+    return is_there;
+}
+
 uint16 Sys_Start_Update(void)
 {
     sys_update facts;
-    uint8 row[HAL_UPDATE_ROW];
-    running = choose(&facts);
-    if (running == NONE) {
-        return 0;
-    }
-    if (!is_confirmed(running)) {
-        uint16 tries = hal_update_flags(running) & TRIES, one = tries & (uint16)-tries;
-        hal_update_clear(running, one); /* before it can do any harm */
-        if ((hal_update_flags(running) & one) != 0) {
-            running = NONE; /* tries that are not counted would go on for ever */
-            return 0;
+    worn = refused = 0;
+    while ((running = choose(&facts)) != NONE) {
+        if ((is_confirmed(running) || count_try(running)) && install(running, facts.rows)) {
+            hal_update_run();
+            return facts.version;
         }
+        refused |= (uint8)(1u << running);
     }
-    for (uint8 i = 0; i < facts.rows; i++) {
-        hal_update_read(running, (uint8)(i + 1u), row);
-        if (!write_row(HAL_UPDATE_RUN, i, row)) {
-            running = NONE;
-            return 0;
-        }
-    }
-    hal_update_run();
-    return facts.version;
+    return 0;
 }
 
 bool Sys_Confirm_Update(void)
@@ -246,8 +287,5 @@ bool Sys_Confirm_Update(void)
     if (running == NONE) {
         return false;
     }
-    if (!is_confirmed(running)) {
-        hal_update_clear(running, NOT_CONFIRMED);
-    }
-    return true;
+    return is_confirmed(running) || clear(running, NOT_CONFIRMED);
 }

@@ -32,9 +32,10 @@ typedef struct {
 uint32 Sys_Add_UpdateCrc(uint32 crc, const uint8 *bytes, uint8 count);
 
 /* Makes room for a program. false, and what was begun goes on: its facts are wrong, it is not newer than one that is whole,
- * or the one that runs is not confirmed yet. */
+ * the one that runs is not confirmed yet, or the store it would come to has not held what was written to it since the start. */
 bool Sys_Begin_Update(const sys_update *facts);
-/* Stores a row, in any order; one that is there already is left alone. false: no such row, or flash does not hold it. */
+/* Stores a row, in any order; one that is there already is left alone. false: no such row, or flash does not hold
+ * it after three writes; then nothing is begun any more, and no more asked of that store until the next start. */
 bool Sys_Put_UpdateRow(uint8 row, const uint8 *bytes);
 /* Bit n: row n is not there yet; 0 when nothing was begun. */
 uint32 Sys_Get_MissingRows(void);
@@ -44,13 +45,15 @@ bool Sys_End_Update(void);
 bool Sys_Get_StoredUpdate(sys_update *facts, bool *is_active);
 /* Copies a row of the program that the last call before has told. */
 void Sys_Get_UpdateRow(uint8 row, uint8 *bytes);
-/* The program with this version is to run from the next start on. false: there is none that is whole. */
+/* The program with this version is to run from the next start on. false: there is none that is whole, or its
+ * flag sticks. */
 bool Sys_Activate_Update(uint16 version);
 /* The version that the next start calls, or 0. One that did not start well is stored and activated, and not it. */
 uint16 Sys_Get_NextVersion(void);
-/* Puts the program that is to run where it belongs and calls it. Its version, or 0: none was called. */
+/* Puts the program that is to run where it belongs and calls it; where its tries cannot be counted, or its rows not written,
+ * the one before. Its version, or 0: none was called. */
 uint16 Sys_Start_Update(void);
-/* The program that was called last works. false: none was. */
+/* The program that was called last works. false: none was, or its flag sticks. */
 bool Sys_Confirm_Update(void);
 
 #ifdef __cplusplus
