@@ -110,6 +110,7 @@ def _preprocess(options: CcOptions) -> None:
 def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     """Unoptimised IR of every input that has any; all C files are compiled before an error ends the run."""
     from toolchain.clang import ir_job, repaired, run_jobs
+    from toolchain.first_values import marked
     from toolchain.record_shapes import mark
     from toolchain.whole_program import is_bitcode
 
@@ -121,7 +122,7 @@ def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     for item in options.inputs:
         if item in targets:
             layouts = targets[item].with_suffix(".layouts").read_text(errors="replace")
-            modules[item] = mark(repaired(targets[item].read_bytes()), layouts)
+            modules[item] = mark(marked(repaired(targets[item].read_bytes())), layouts)
         elif item.language in ("ir", "object"):
             content = read_bytes(item.path)
             if item.language == "ir" or is_bitcode(content):

@@ -352,7 +352,7 @@ class ModuleCompiler:
     def header(self, f: Function, interrupt: str) -> None:
         """Section, symbol and type. Each function has a section of its own for --gc-sections."""
         name = symbol(self.module, f.name)
-        own = "" if f.section in data.PLACES else f.section  # near and far say how to call, which -mlarge-code decides
+        own = "" if data.place_of(f.section) else f.section  # near, far: how to call, which -mlarge-code decides
         section = own or (".isr.text." if interrupt else ".text.") + name
         modifiers = isr.section_modifiers(f.name, self.notes.get(f.name, set()))
         keep = used.KEEP if f.name in self.used else ""

@@ -13,9 +13,11 @@ from dataclasses import dataclass, field
 
 UNSIGNED = ("u8", "u16", "u32")
 SIGNED = ("i8", "i16", "i32")
-TYPES = UNSIGNED + SIGNED
-WORK = {"u8": "unsigned", "i8": "unsigned", "u16": "unsigned", "i16": "unsigned", "u32": "u32", "i32": "u32"}
-BITS = {"u8": 8, "i8": 8, "u16": 16, "i16": 16, "u32": 32, "i32": 32}
+TYPES = UNSIGNED * 2 + SIGNED * 2 + ("u64", "i64")
+WORK = {"u8": "unsigned", "i8": "unsigned", "u16": "unsigned", "i16": "unsigned", "u32": "u32", "i32": "u32",
+        "u64": "u64", "i64": "u64"}  # fmt: skip
+BITS = {"u8": 8, "i8": 8, "u16": 16, "i16": 16, "u32": 32, "i32": 32, "u64": 64, "i64": 64}
+SUFFIX = {8: "u", 16: "u", 32: "ul", 64: "ull"}
 STRUCTS: dict[str, list[tuple[str, str]]] = {
     "rgb": [("r", "u8"), ("g", "u8"), ("b", "u8")],
     "pair": [("x", "i16"), ("y", "i16")],
@@ -34,7 +36,7 @@ HEADER = """#ifndef SHAPES_H
 #include <stdint.h>
 #include <stdio.h>
 typedef uint8_t u8; typedef int8_t i8; typedef uint16_t u16; typedef int16_t i16; typedef uint32_t u32;
-typedef int32_t i32;
+typedef int32_t i32; typedef uint64_t u64; typedef int64_t i64;
 extern u16 ports[9];
 void seen(int port, char what);
 static inline u16 port_read(int k) { seen(k, 'r'); return ports[k]; }
@@ -60,7 +62,7 @@ void handler(void);
 #define HANDLED() (void)0
 #else
 typedef unsigned char u8; typedef signed char i8; typedef unsigned u16; typedef int i16; typedef unsigned long u32;
-typedef long i32;
+typedef long i32; typedef unsigned long long u64; typedef long long i64;
 #include <dspic30f6014a.h>
 #define ADDRESS(k) ((k) == 0 ? 0x0102u : (k) < 3 ? 0x010Au + 2 * (k) : (k) < 5 ? 0x0114u + 2 * (k) : \\
                     (k) < 7 ? 0x0176u + 2 * (k) : 0x0178u + 2 * (k))
@@ -163,7 +165,7 @@ class Program:
         bits = BITS[t]
         value = self.rng.choice((0, 1, 2, 5, (1 << bits) - 1, 1 << (bits - 1), (1 << (bits - 1)) - 1,
                                  self.rng.randrange(1 << bits), self.rng.randrange(64)))  # fmt: skip
-        return f"({t}){value}{'ul' if bits == 32 else 'u'}"
+        return f"({t}){value}{SUFFIX[bits]}"
 
     def expression(self, t: str, s: Scope, depth: int = 3) -> str:
         """A value of type t without side effects on plain memory; it may read ports."""
@@ -247,9 +249,9 @@ class Program:
         """One statement, perhaps of several lines."""
         kind = self.rng.choices(
             ("scalar", "array", "pointer", "select", "escape", "struct", "field", "port", "interrupt", "if", "loop",
-             "switch", "call", "memory", "mix"),
-            (14, 12, 8, 8, 6, 8, 10, 14, 4, 8, 6, 3, 8, 4, 6))[0]  # fmt: skip
-        if kind in ("if", "loop", "switch") and depth == 0:
+             "switch", "call", "memory", "mix", "sized"),
+            (14, 12, 8, 8, 6, 8, 10, 14, 4, 8, 6, 3, 8, 4, 6, 2))[0]  # fmt: skip
+        if kind in ("if", "loop", "switch", "sized") and depth == 0:
             kind = "scalar"
         made: list[str] = getattr(self, f"_{kind}")(s, depth, calls)
         return made or [f"mix({self.expression('u32', s, 2)});"]
@@ -409,6 +411,20 @@ class Program:
 
     def _mix(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
         return [f"mix({self.expression('u32', s, 2)});"]
+
+    def _sized(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
+        """An array whose length is computed, or room from alloca: W14 holds the frame."""
+        if not s.port and not s.pointers:
+            return []  # the frames of interrupt functions and of start() stay small
+        name, n, k, t = self.fresh("q"), self.fresh("n"), self.fresh("k"), self.pick(("u8", "u16", "i32"))
+        room = f"{t} {name}[{n}];" if self.rng.random() < 0.5 else f"{t} *{name} = __builtin_alloca({n} * sizeof({t}));"
+        inner = Scope(s.scalars, s.arrays, s.pointers, s.structs, s.port, s.counters)
+        return [
+            f"{{   u16 {n} = ({self.expression('u16', s, 1)} & 7) + 1;", f"    {room}",
+            f"    for (u16 {k} = 0; {k} < {n}; {k}++) {name}[{k}] = ({t})({k} * 3u);",
+            *self.block(inner, self.rng.randrange(1, 4), 0, [], "    "),
+            f"    mix((u32){name}[(u16){self.expression('u16', s, 1)} % {n}]);", "}",
+        ]  # fmt: skip
 
     # -- functions and files ------------------------------------------------------------------------------------------
 

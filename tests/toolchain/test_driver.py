@@ -161,7 +161,7 @@ def test_xc16_attributes(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
         ".eedata.0,eedata,keep", ".eedata.1,eedata,keep", ".xmemory._x_line,bss,xmemory",
         ".ymemory._y_line,bss,ymemory",
         ".pbss,persist", ".near._close,bss,near", ".far._distant,bss", ".nbss._untouched,bss,near,noload",
-        ".nbss._fft,bss,near,reverse(0x40)", ".bss._fixed,bss,address(0x1000),keep", ".prog.2,code",
+        ".nbss._fft,bss,near,reverse(0x40)", ".bss._fixed,bss,address(0x1000),keep", ".prog.7,code",
         ".text._moved,code,address(0x8000),keep",
     ):  # fmt: skip
         assert f"\t.section {line}\n" in said, line

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+import emu
 from emu.chips import NAMES as CHIPS
 from emu.chips import chip_named
 from emu.loader import load_image
@@ -349,3 +350,57 @@ def test_an_interrupt_number_that_is_none(tmp_path: Path, capsys: pytest.Capture
     )
     said = refusal(capsys, tmp_path / "main.c", "-o", tmp_path / "x.elf")
     assert "interrupt function 'f': irq(99) is not an interrupt number of this chip (expected 0 to 53)" in said
+
+
+@pytest.mark.parametrize("alone", ["", "-fno-lto"], ids=["whole program", "file by file"])
+@pytest.mark.parametrize("level", LEVELS)
+def test_what_start_up_leaves_alone_has_no_known_first_value(level: str, alone: str, tmp_path: Path) -> None:
+    """`persistent` and `noload` variables begin with what RAM holds, though a program only sets them to one value."""
+    (tmp_path / "main.c").write_text("""
+    static int __attribute__((persistent)) magic, boots;
+    static unsigned __attribute__((noload)) kept;
+    static int __attribute__((section(".mine,persist"))) mine;
+    void __attribute__((user_init)) early(void) { boots = boots + 1; }
+    int main(void)
+    {
+        int seen = boots + (magic == 0x1234) * 16 + (kept == 0x4321) * 32 + (mine == 0x5678) * 64;
+        magic = 0x1234;
+        kept = 0x4321;
+        mine = 0x5678;
+        return seen;
+    }
+    """)
+    image = tmp_path / "main.elf"
+    assert driver.main([level, *alone.split(), str(tmp_path / "main.c"), "-o", str(image)]) == 0
+    machine = emu.load(image, engine="interp")
+    for values, seen in (((0x0101, 3, 0x0101, 0x0101), 4), ((0x1234, 7, 0x4321, 0x5678), 8 + 16 + 32 + 64)):
+        machine.reset()
+        for name, value in zip(("_magic", "_boots", "_kept", "_mine"), values, strict=True):
+            machine.poke(name, value)
+        assert machine.run(cycles=5000).reason == "halt"
+        assert machine.w[0] == seen
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_file(level: str, tmp_path: Path) -> None:
+    """The front end takes them for sections, and one section holds only one kind."""
+    source = """
+    extern int __attribute__((far)) one;
+    int __attribute__((far)) one = 1;
+    const int __attribute__((far)) two = 2;
+    int __attribute__((far, noinline)) three(int x) { return x + 3; }
+    int __attribute__((near)) four = 4;
+    const int __attribute__((near)) five = 5;
+    int __attribute__((near, noinline)) six(int x) { return x + 6; }
+    int __attribute__((space(xmemory))) seven[2] = {7, 7};
+    const int __attribute__((space(xmemory))) eight[2] = {8, 8};
+    int __attribute__((space(ymemory))) nine[2] = {9, 9};
+    const int __attribute__((space(ymemory))) ten[2] = {10, 10};
+    int __attribute__((section(".eleven,bss,near"), unordered)) eleven;
+    int main(void)
+    {
+        eleven = 11;
+        return six(three(one + two)) + four + five + seven[0] + eight[1] + nine[0] + ten[1] + eleven;
+    }
+    """
+    assert status_of(tmp_path, source, level) == 66

@@ -2,7 +2,7 @@
 /* XC16's attributes (abi-elf.md §1.4, §2.5) in clang's words. Inside `__attribute__((...))` only, so that a program may
  * use `space` or `interrupt` as names: each attribute is looked up as a macro __dspic_a_NAME; those that have none stay as
  * they are. What only a definition says becomes an annotation; what declarations repeat, a section. toolchain/lower/data.py and
- * isr.py read them. Constants and variables cannot share a section, hence the counters. */
+ * isr.py read them. Constants, variables and functions cannot share a section, hence the counters. */
 #ifndef DSPIC_ATTRIBUTES_H
 #define DSPIC_ATTRIBUTES_H
 #pragma GCC system_header
@@ -45,14 +45,15 @@
 #define __dspic_a_auto_psv ~, (__annotate__("auto_psv"))
 #define __dspic_a_no_auto_psv ~, (__annotate__("no_auto_psv"))
 #define __dspic_a_shadow ~, (__annotate__("shadow"))
-#define __dspic_a_near ~, (__section__(".near"))
-#define __dspic_a_far ~, (__section__(".far"))
+#define __dspic_a_near ~, (__section__(".near." __dspic_number(__COUNTER__)))
+#define __dspic_a_far ~, (__section__(".far." __dspic_number(__COUNTER__)))
 #define __dspic_a_persistent ~, (__section__(".pbss"))
 #define __dspic_a_noload ~, (__annotate__("noload"))
 #define __dspic_a_address(number) ~, (__used__, __annotate__("address(" __dspic_text(number) ")"))
 #define __dspic_a_keep ~, (__used__, __retain__)
 #define __dspic_a_reverse(number) ~, (__annotate__("reverse(" __dspic_text(number) ")"))
 #define __dspic_a_user_init ~, (__constructor__)
+#define __dspic_a_unordered ~, () /* where a variable lies within its section, which is the linker's choice anyway */
 /* What XC16 has for other parts, or does not do here, would change where things are: an error, not a warning. */
 #define __dspic_refused(text) __aligned__(sizeof(struct { int i; _Static_assert(0, text " is not supported"); }))
 #define __unused__(...) __unused__ /* takes what follows in parentheses, as `__used__` does above */
@@ -70,8 +71,8 @@
 #define __dspic_s_prog ~, (__section__(".prog." __dspic_number(__COUNTER__)))
 #define __dspic_s_psv ~, (__section__(".psv." __dspic_number(__COUNTER__)))
 #define __dspic_s_eedata ~, (__used__, __section__(".eedata." __dspic_number(__COUNTER__)))
-#define __dspic_s_xmemory ~, (__section__(".xmemory"))
-#define __dspic_s_ymemory ~, (__section__(".ymemory"))
+#define __dspic_s_xmemory ~, (__section__(".xmemory." __dspic_number(__COUNTER__)))
+#define __dspic_s_ymemory ~, (__section__(".ymemory." __dspic_number(__COUNTER__)))
 
 #define __dspic_a___interrupt__ __dspic_a_interrupt
 #define __dspic_a___auto_psv__ __dspic_a_auto_psv
@@ -85,6 +86,7 @@
 #define __dspic_a___keep__ __dspic_a_keep
 #define __dspic_a___reverse__ __dspic_a_reverse
 #define __dspic_a___user_init__ __dspic_a_user_init
+#define __dspic_a___unordered__ __dspic_a_unordered
 #define __dspic_a___space__ __dspic_a_space
 #define __dspic_a___sfr__ __dspic_a_sfr
 #define __dspic_a___boot__ __dspic_a_boot

@@ -34,9 +34,15 @@ SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near
                  ".xbss": "bss,xmemory,near", ".xdata": "data,xmemory,near", ".ybss": "bss,ymemory",
                  ".ydata": "data,ymemory", ".note": "info",
                  ".pbss": "persist", ".eedata": "eedata", ".prog": "code", ".psv": "psv,page"}  # fmt: skip
-# Sections that dspic_attributes.h names; the first word, bss or data, depends on the initialiser.
+# Sections that dspic_attributes.h names and numbers; the first word, bss or data, depends on the initialiser.
 PLACES = {".near": ",near", ".far": "", ".xmemory": ",xmemory", ".ymemory": ",ymemory"}
 CONFIG_SECTION = re.compile(r"__\w+\.sec")  # configuration words are program words (abi-elf.md §6.6)
+
+
+def place_of(section: str) -> str:
+    """The key of PLACES that a section of dspic_attributes.h, `.far.12`, stands for; "" for any other section."""
+    stem, _, number = section.rpartition(".")
+    return stem if number.isdigit() and stem in PLACES else ""
 
 
 def is_near(module: Module, name: str) -> bool:
@@ -117,8 +123,11 @@ class DataEmitter:
     def _section(self, var: GlobalVar, name: str, zero: bool, modifiers: str) -> str:
         suffix = name.removeprefix(".L")
         kind = "bss" if zero else "data"
-        if var.section in PLACES:
-            return f"{var.section}.{suffix},{kind}{PLACES[var.section]}"
+        place = place_of(var.section)
+        if place:
+            return f"{place}.{suffix},{kind}{PLACES[place]}"
+        if "," in var.section:  # the section's attributes beside its name, as in assembly
+            return var.section
         if CONFIG_SECTION.fullmatch(var.section):
             return f"{var.section},code"
         if var.section:

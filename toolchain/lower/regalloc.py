@@ -111,8 +111,8 @@ class Graph:
         return mask.bit_count() + (mask & self.pair_mask).bit_count()
 
     def limit(self, n: int) -> int:
-        """Colours in n's class."""
-        return 7 if n in self.m.pairs else 15
+        """Colours in n's class; W14 is none where it is the frame pointer."""
+        return 7 if n in self.m.pairs else 15 - self.m.uses_fp
 
     # -- coalescing ---------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,34 @@
+"""Tells the middle end which variables do not start with the value that their definition gives.
+
+Start-up leaves `persistent` and `noload` variables alone: they begin with what RAM held. Enters: unoptimised IR text.
+Leaves: it with `externally_initialized` on their definitions, without which a variable that is only ever compared with
+and set to one constant becomes a byte that is 0 or 1, and a store in a `user_init` function an initial value.
+"""
+
+from __future__ import annotations
+
+import re
+
+DEFINITION = re.compile(
+    rb'^@("[^"]+"|[\w$.]+) = (?P<words>(?:\w+(?:\([^)]*\))? )*?)(?P<kind>global|constant) (?P<rest>.*)$', re.MULTILINE
+)
+UNTOUCHED_SECTION = re.compile(rb', section "(?:\.pbss[".]|[^",]*,[^"]*\b(?:persist|noload)\b)')
+NOLOAD_TEXT = re.compile(rb'^(@[\w$.]+) = .*constant \[7 x i8\] c"noload\\00", section "llvm.metadata"', re.MULTILINE)
+ANNOTATIONS = re.compile(rb"^@llvm\.global\.annotations = .*$", re.MULTILINE)
+ENTRY = re.compile(rb'\{ ptr @("[^"]+"|[\w$.]+), ptr (@[\w$.]+), ')
+
+
+def marked(ir: bytes) -> bytes:
+    """The module with its untouched variables marked."""
+    texts = set(NOLOAD_TEXT.findall(ir))
+    noted = ANNOTATIONS.search(ir)
+    names = {name for name, text in ENTRY.findall(noted[0]) if text in texts} if texts and noted is not None else set()
+
+    def mark(found: re.Match[bytes]) -> bytes:
+        if b"externally_initialized " in found["words"] or found[1].startswith(b"llvm."):
+            return found[0]
+        if found[1] not in names and UNTOUCHED_SECTION.search(found["rest"]) is None:
+            return found[0]
+        return b"@%s = %sexternally_initialized %s %s" % (found[1], found["words"], found["kind"], found["rest"])
+
+    return DEFINITION.sub(mark, ir)
