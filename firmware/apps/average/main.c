@@ -1,5 +1,5 @@
-/* The mean of a number that each robot has, by gossip (README.md). A message carries the sender's number and two that it has
- * heard of; each robot keeps a table and takes the mean of those robots that still count. */
+/* The mean of a number that each robot has, by gossip (README.md). A message carries the sender's number and those of two
+ * others, with how long ago each of them spoke; each robot keeps a table and takes the mean of those who have of late. */
 #include "rove.h"
 
 #include <openswarm.h>
@@ -9,99 +9,94 @@
 #include <string.h>
 
 enum {
-    OTHERS = 10,      /* robots that are remembered beside the own */
-    TOLD = 2,         /* of them in a message */
-    PACE_MS = 200,    /* between two robots' messages, so the air is busy for half of the time, however many there are */
-    RELAY_MS = 1500,  /* for which a count is passed on */
-    FORGET_MS = 8000, /* without a new count: a robot that is silent for so long is gone, and its number with it */
-    NUMBER_BITS = 11, /* of a robot */
-    COUNTS = 32,      /* a robot counts its messages, modulo so many */
+    OTHERS = 10,       /* robots that are remembered beside the own */
+    TOLD = 2,          /* of them in a message */
+    PACE_MS = 200,     /* between two robots' messages, so the air is busy for half of the time, however many there are */
+    TICK_SHIFT = 6,    /* signs of life are dated in ticks of 64 ms */
+    HOP = 3,           /* ticks: more than a message takes from its first light to its handler, dates being rounded down */
+    FORGET = 208,      /* 13.3 s without a sign of life: that robot is gone, and its number with it */
+    NEAR = 78,         /* 5 s after its last own message a robot is taken to be out of sight */
+    MOST_AGE = 0xFF,   /* ticks, in a message */
+    NUMBER_BITS = 11,  /* of a robot */
+    VALUE_MOST = 15,   /* the selector: so number and value share two bytes */
     LOOK_MS = 50, LINE = 16, STACK = 280
 };
 
+enum { VALUE, QUEUED_AT, OWN_BYTES }; /* the own value, and while the message waits, when it was written */
+enum { WHO_LOW, WHO_HIGH, AGE, ITEM_BYTES };
+enum { MESSAGE_BYTES = OWN_BYTES + TOLD * ITEM_BYTES };
+
 typedef struct {
-    uint16 who; /* number, count above; 0: nobody */
+    uint16 number; /* 0: nobody */
     uint8 value;
-} item;
-
-enum { ITEM_BYTES = 3, OWN_BYTES = 2, MESSAGE_BYTES = OWN_BYTES + TOLD * ITEM_BYTES };
-
-typedef struct {
-    item last;    /* kept when it is forgotten, so that its old counts do not come back */
     bool counts;  /* among those of whom the mean is */
-    uint16 heard; /* low word of the system time */
+    uint16 alive; /* tick of the last sign of life that is known of */
+    uint16 heard; /* tick of its last message that came here */
+    bool is_near; /* `heard` is no older than NEAR */
 } entry;
 
 static entry others[OTHERS];
 
-static uint16 number_of(const item *i)
+static uint16 tick(void)
 {
-    return i->who & ((1u << NUMBER_BITS) - 1u);
+    return (uint16)(Sys_Get_SystemTime() >> TICK_SHIFT);
 }
 
-static uint8 count_of(const item *i)
-{
-    return (uint8)(i->who >> NUMBER_BITS);
-}
-
-static bool is_newer(uint8 count, uint8 than)
-{
-    uint8 ahead = (uint8)((count - than) % COUNTS);
-    return ahead != 0 && ahead < COUNTS / 2;
-}
-
-static uint16 age(const entry *e, uint16 now)
-{
-    return (uint16)(now - e->heard);
-}
-
-/* Its own place, or that of the one who has been silent for longest among those who do not count. */
-static entry *place_of(uint16 number, uint16 now)
+/* The place of a robot, or of one that does not count. */
+static entry *place_of(uint16 number)
 {
     entry *best = NULL;
     for (entry *e = others; e != others + OTHERS; e++) {
-        if (number_of(&e->last) == number) {
+        if (e->counts && e->number == number) {
             return e;
         }
-        if (!e->counts && (best == NULL || age(e, now) > age(best, now))) {
+        if (!e->counts) {
             best = e;
         }
     }
     return best;
 }
 
-/* What a robot itself says is new; what others say of it only if its count is. */
-static void learn(const item *i, bool is_own_word, uint16 now)
+/* A sign of life, so many ticks ago, told by the robot itself or by another: ages only ever grow on their way, so none of a
+ * robot that is gone is younger than itself. */
+static entry *learn(uint16 number, uint8 value, uint16 age, uint16 now)
 {
-    uint16 number = number_of(i);
-    if (number == 0 || number == Sys_Get_RobotNumber()) {
-        return;
+    uint16 alive = (uint16)(now - age);
+    if (number == 0 || number == Sys_Get_RobotNumber() || age >= FORGET) {
+        return NULL;
     }
-    entry *e = place_of(number, now);
-    if (e != NULL && (is_own_word || number_of(&e->last) != number || is_newer(count_of(i), count_of(&e->last)))) {
-        *e = (entry){*i, true, now};
+    entry *e = place_of(number);
+    if (e != NULL && !e->counts) {
+        *e = (entry){number, value, true, alive, 0, false};
+    } else if (e != NULL && (sint16)(alive - e->alive) > 0) {
+        e->value = value;
+        e->alive = alive;
     }
+    return e;
 }
 
 static bool on_message(uint16 pid, uint16 event, sys_event_data *data)
 {
     const sys_neighbour_message *m = data->payload;
     const uint8 *from = m->payload + OWN_BYTES;
-    uint16 now = (uint16)Sys_Get_SystemTime();
+    uint16 now = tick();
     (void)pid;
     (void)event;
     if (m->size == MESSAGE_BYTES) {
-        item own = {(uint16)(m->source | (uint16)m->payload[1] << NUMBER_BITS), m->payload[0]};
-        learn(&own, true, now);
+        entry *sender = learn(m->source, m->payload[VALUE] & VALUE_MOST, HOP, now);
+        if (sender != NULL) {
+            sender->heard = now;
+            sender->is_near = true;
+        }
         for (uint8 told = 0; told < TOLD; told++, from += ITEM_BYTES) {
-            item i = {(uint16)(from[0] | (uint16)from[1] << 8), from[2]};
-            learn(&i, false, now);
+            uint16 who = (uint16)(from[WHO_LOW] | (uint16)from[WHO_HIGH] << 8);
+            (void)learn(who & ((1u << NUMBER_BITS) - 1u), (uint8)(who >> NUMBER_BITS) & VALUE_MOST, from[AGE] + HOP, now);
         }
     }
     return true;
 }
 
-/* Others in turn, as long as what is known of them is fresh. */
+/* Others in turn. */
 static void tell_others(uint8 *to, uint16 now)
 {
     static uint8 turn;
@@ -109,27 +104,39 @@ static void tell_others(uint8 *to, uint16 now)
     for (uint8 looked = 0, told = 0; looked < OTHERS && told < TOLD; looked++) {
         turn = (uint8)((turn + 1u) % OTHERS);
         const entry *e = others + turn;
-        if (e->counts && age(e, now) < RELAY_MS) {
-            to[0] = (uint8)e->last.who;
-            to[1] = (uint8)(e->last.who >> 8);
-            to[2] = e->last.value;
+        if (e->counts) {
+            uint16 who = (uint16)(e->number | (uint16)e->value << NUMBER_BITS);
+            to[WHO_LOW] = (uint8)who;
+            to[WHO_HIGH] = (uint8)(who >> 8);
+            to[AGE] = (uint8)(now - e->alive);
             to += ITEM_BYTES;
             told++;
         }
     }
 }
 
-/* Hundredths; and how many robots it is of. */
-static uint16 mean(uint8 own, uint16 now, uint8 *robots)
+/* ISR: a message leaves. What it says has grown older while it waited. */
+static void leaves(uint8 *payload, uint8 size)
+{
+    uint8 waited = (uint8)((uint8)tick() - payload[QUEUED_AT]);
+    for (uint8 *age = payload + OWN_BYTES + AGE; age < payload + size; age += ITEM_BYTES) {
+        *age = (uint8)(*age > MOST_AGE - waited ? MOST_AGE : *age + waited);
+    }
+}
+
+/* Hundredths; and how many robots it is of, and how many are near. */
+static uint16 mean(uint8 own, uint16 now, uint8 *robots, uint8 *near)
 {
     uint16 sum = own;
-    *robots = 1;
+    *robots = *near = 1;
     for (entry *e = others; e != others + OTHERS; e++) {
-        e->counts = e->counts && age(e, now) < FORGET_MS;
+        e->counts = e->counts && (uint16)(now - e->alive) < FORGET;
+        e->is_near = e->is_near && e->counts && (uint16)(now - e->heard) < NEAR;
         if (e->counts) {
-            sum = (uint16)(sum + e->last.value);
+            sum = (uint16)(sum + e->value);
             ++*robots;
         }
+        *near = (uint8)(*near + e->is_near);
     }
     return (uint16)(((uint32)sum * 100u + *robots / 2u) / *robots);
 }
@@ -144,26 +151,25 @@ static void say(const char *what, uint16 number)
 static void gossip(void *unused)
 {
     uint16 random = 0, next = 0, said_mean = 0xFFFF;
-    uint8 said_value = 0xFF, count = 0;
+    uint8 said_value = 0xFF;
     (void)unused;
     for (;;) {
-        uint8 message[MESSAGE_BYTES], robots, value = (uint8)Sys_Get_Selector();
+        uint8 message[MESSAGE_BYTES], robots, near, value = (uint8)Sys_Get_Selector();
         Sys_Sleep(LOOK_MS);
-        uint16 now = (uint16)Sys_Get_SystemTime();
+        uint16 now = (uint16)Sys_Get_SystemTime(), now_tick = tick();
         bool speaks = (sint16)(now - next) >= 0 && Sys_Get_RobotNumber() != 0;
         Sys_Start_CriticalSection();
-        uint16 is = mean(value, now, &robots);
+        uint16 is = mean(value, now_tick, &robots, &near);
         if (speaks) {
-            tell_others(message + OWN_BYTES, now);
+            tell_others(message + OWN_BYTES, now_tick);
         }
         Sys_End_CriticalSection();
         if (speaks) {
-            uint16 pace = (uint16)(PACE_MS * robots);
+            uint16 pace = (uint16)(PACE_MS * near);
             random = (uint16)(random * 25173u + 13849u + Sys_Get_RobotNumber());
             next = (uint16)(now + pace * 3u / 4u + (random >> 4) % (pace / 2u));
-            message[0] = value;
-            message[1] = count;
-            count = (uint8)((count + 1u) % COUNTS);
+            message[VALUE] = value;
+            message[QUEUED_AT] = (uint8)now_tick;
             (void)Sys_Send_Neighbours(message, sizeof message);
         }
         if (value != said_value) {
@@ -180,6 +186,7 @@ int main(void)
     Sys_Init_Kernel();
     SYS_ASSERT(Sys_Start_Infrared() && rove_begin());
     Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, on_message, NULL);
+    Sys_Set_LeavingProcessor(leaves);
     const sys_process_config talker = {.entry = gossip, .stack = STACK};
     SYS_ASSERT(Sys_Start_ProcessWith(&talker) != 0);
     Sys_Start_Kernel();
