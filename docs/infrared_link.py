@@ -2,8 +2,8 @@
 
     python docs/infrared_link.py [--seconds 3] [--noise 2] [--jobs 2] [--figure docs/figures/infrared-link.png]
 
-Two robots that send all the time, over distance and angle; then 2 and 10 in a ring that send now and then. The same
-arguments give the same figures.
+Two robots that send all the time, over distance and angle. The same arguments give the same figures. Of more robots:
+infrared_swarm.py.
 """
 
 from __future__ import annotations
@@ -26,11 +26,8 @@ DISTANCES = (12.0, 18.0, 22.0, 25.0, 28.0, 30.0, 32.0, 35.0)
 """cm between the middles; sensor 2 of one faces sensor 5 of the other."""
 ANGLES = tuple(range(0, 360, 30))
 """Degrees by which one of them is turned, at 15 cm."""
-RINGS = (2, 10)
-"""Robots; 10 cm from one to the next. They send every 0.75 to 2.25 s, and are watched for twice the time."""
-RING_SELECTOR = 6
-SENDERS, ENTRY, WORDS, CODE = 10, 14, 9, 15
-"""Of firmware/apps/chatter: entries, bytes of each; words of a frame and their bits."""
+SENDERS, ENTRY, WORDS, CODE = 30, "<5Hih", 9, 15
+"""Of firmware/apps/chatter: entries, one of them; words of a frame and their bits."""
 BEACONS = 1
 """Frames without a message that each robot sends, before it begins to talk."""
 WARM_S = 0.5
@@ -40,20 +37,17 @@ WARM_S = 0.5
 @dataclass(frozen=True)
 class Job:
     poses: Poses
-    selector: int
     seconds: float
     noise: float
 
 
 @dataclass(frozen=True)
 class Found:
-    """Frames sent, arrivals (one per robot that hears one), those twice, bits repaired, mean ms to the handler."""
+    """Frames sent, arrivals, bits repaired."""
 
     sent: int
     arrived: int
-    twice: int
     repaired: int
-    ms: float
 
     @property
     def share(self) -> float:
@@ -72,23 +66,20 @@ def measure(job: Job) -> Found:
     ether = Ether.of(scene)
     image = image_for("chatter")
     assert image is not None
-    brains = [EmulatedBrain(scene, 1, number, image, job.selector, ether) for number in range(robots)]
+    brains = [EmulatedBrain(scene, 1, number, image, 0, ether) for number in range(robots)]
     for tick in range(math.ceil((WARM_S + job.seconds) * FCY / scene.clock.quantum_tcy)):
         for brain in brains:
             brain.think(tick, job.poses)
     machines = [brain.machine for brain in brains]
     sent = [struct.unpack("<H", _bytes(machine, "infrared_statistics", 2))[0] - BEACONS for machine in machines]
-    clocks = [struct.unpack("<H", _bytes(machine, "now_ms", 2))[0] for machine in machines]
     numbers = [struct.unpack("<H", _bytes(machine, "infrared_number", 2))[0] for machine in machines]
-    arrived = twice = repaired = 0
-    ms = 0.0
-    for me, machine in enumerate(machines):
-        entries = _bytes(machine, "senders", SENDERS * ENTRY)
-        for source, received, again, _, bits, total in struct.iter_unpack("<5HI", entries):
+    arrived = repaired = 0
+    for machine in machines:
+        entries = _bytes(machine, "senders", SENDERS * struct.calcsize(ENTRY))
+        for source, received, again, _, bits, _, _ in struct.iter_unpack(ENTRY, entries):
             if source in numbers:
-                arrived, twice, repaired = arrived + received - again, twice + again, repaired + bits
-                ms += total - received * (clocks[me] - clocks[numbers.index(source)])
-    return Found(sum(sent), arrived, twice, repaired, ms / max(arrived, 1))
+                arrived, repaired = arrived + received - again, repaired + bits
+    return Found(sum(sent), arrived, repaired)
 
 
 def _bytes(machine, name: str, size: int) -> bytes:
@@ -99,12 +90,6 @@ def _bytes(machine, name: str, size: int) -> bytes:
 def facing(distance: float, turned: float = 0.0) -> Poses:
     """Two robots: the first's right sensor towards the second's left one, the second turned by degrees."""
     return Poses([(150.0, 150.0, math.pi / 2), (150.0 + distance, 150.0, math.pi / 2 + math.radians(turned))], [])
-
-
-def ring(robots: int) -> Poses:
-    radius = 5 / math.sin(math.pi / robots)
-    turns = [2 * math.pi * number / robots for number in range(robots)]
-    return Poses([(150 + radius * math.cos(a), 150 + radius * math.sin(a), 1.7 * a) for a in turns], [])
 
 
 def expected(distance: float, noise: float) -> tuple[float, float]:
@@ -144,12 +129,10 @@ def main() -> None:
     chosen = parser.parse_args()
     image_for("chatter")  # built once
     poses = [facing(one) for one in DISTANCES] + [facing(15.0, one) for one in ANGLES]
-    jobs = [Job(one, 0, chosen.seconds, chosen.noise) for one in poses]
-    jobs += [Job(ring(one), RING_SELECTOR, 2 * chosen.seconds, chosen.noise) for one in RINGS]
+    jobs = [Job(one, chosen.seconds, chosen.noise) for one in poses]
     with ProcessPoolExecutor(chosen.jobs) as pool:
         found = list(pool.map(measure, jobs))
-    far, rest = found[: len(DISTANCES)], found[len(DISTANCES) :]
-    around, rings = rest[: len(ANGLES)], rest[len(ANGLES) :]
+    far, around = found[: len(DISTANCES)], found[len(DISTANCES) :]
     print("cm    sent arrived  share  repaired/bit  expected: bits  frames")
     for distance, one in zip(DISTANCES, far, strict=True):
         wrong, frames = expected(distance, chosen.noise)
@@ -158,9 +141,6 @@ def main() -> None:
     print("deg   sent arrived  share")
     for angle, one in zip(ANGLES, around, strict=True):
         print(f"{angle:4} {one.sent:5} {one.arrived:7} {one.share:6.2f}")
-    print("robots  sent arrived  per frame  twice  ms")
-    for robots, one in zip(RINGS, rings, strict=True):
-        print(f"{robots:6} {one.sent:5} {one.arrived:7} {one.share:10.2f} {one.twice:6} {one.ms:4.0f}")
     if chosen.figure is not None:
         draw(chosen.figure, far, around, chosen.noise)
 

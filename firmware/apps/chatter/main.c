@@ -1,9 +1,9 @@
-/* Numbered frames by infra-red, and what of others' arrives: read by docs/infrared_link.py (README.md). */
+/* Numbered frames by infra-red, and what of others' arrives: read by docs/infrared_link.py and infrared_swarm.py (README.md). */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
 
-enum { SENDERS = 10, STEP_MS = 125, RETRY_MS = 4 };
+enum { SENDERS = 30, STEP_MS = 125, RETRY_MS = 4 };
 
 typedef struct {
     uint16 number, sent_ms; /* when it was queued, low word of the sender's clock */
@@ -12,7 +12,8 @@ typedef struct {
 
 typedef struct {
     uint16 source, received, twice, last, repaired;
-    uint32 ms; /* my clock when it came less the sender's when it was queued, summed up */
+    sint32 ms; /* my clock when it came less the sender's when it was queued, summed up */
+    sint16 longest; /* the greatest of these differences */
 } from_sender;
 
 from_sender senders[SENDERS];
@@ -27,12 +28,14 @@ static bool on_message(uint16 pid, uint16 event, sys_event_data *data)
     (void)event;
     for (from_sender *s = senders; s != senders + SENDERS; s++) {
         if (s->source == m->source || s->source == 0) {
+            sint16 ms = (sint16)(Sys_Get_SystemTime() - sent_ms);
             s->twice = (uint16)(s->twice + (s->received != 0 && s->last == number));
             s->source = m->source;
+            s->longest = s->received == 0 || ms > s->longest ? ms : s->longest;
             s->received++;
             s->last = number;
             s->repaired = (uint16)(s->repaired + m->corrected);
-            s->ms += (uint16)(Sys_Get_SystemTime() - sent_ms);
+            s->ms += ms;
             return true;
         }
     }
