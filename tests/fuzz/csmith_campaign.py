@@ -49,7 +49,7 @@ GENERATOR = [
 ]
 AVR = ["avr-gcc", "-mmcu=atmega1284p", "-Os", "-w"]
 AVR_SECONDS = 20
-BATCH = 16
+BATCH = 6
 """Programs between two looks at the clock."""
 MEMORY = re.compile(r"does not fit|no room for the stack|overflow")
 MEMBER_ADDRESS = re.compile(r"&\w+(\[\w+\])*(\.|->)f\d")

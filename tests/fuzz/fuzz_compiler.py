@@ -131,7 +131,7 @@ def main() -> int:
     counts: Counter[str] = Counter()
     seeds = iter(course)
     with ProcessPoolExecutor(given.jobs) as pool:
-        while batch := list(islice(seeds, 4 * given.jobs)):
+        while batch := list(islice(seeds, 2 * given.jobs)):
             for seed, verdict in zip(batch, pool.map(partial(examine, keep=given.keep), batch), strict=True):
                 counts[f"{verdict.kind} {verdict.reason}".strip()] += 1
                 if verdict.kind == "failed":
