@@ -76,6 +76,9 @@ class Bus:
         self.report: Callable[[int, bool], None] | None = None
         """Called as report(address, is_write) at the first touch of a register nobody models."""
         self._reported: set[int] = set()
+        self.note: Callable[[str], None] | None = None
+        """Called as note(what) the first time firmware asks a device for something that has no model."""
+        self._noted: set[str] = set()
 
     def read(self, address: int) -> int:
         """The word at even SFR `address` (below `end`) as an instruction reads it, side effects included."""
@@ -118,6 +121,13 @@ class Bus:
     def poke(self, address: int, value: int) -> None:
         """Set the stored word at even SFR `address`, telling nobody."""
         self.record.u16[address >> 1] = value & 0xFFFF
+
+    def lacks(self, what: str) -> None:
+        """Firmware has asked for `what` (register, field, and what happens instead), which has no model: told once."""
+        if what not in self._noted and not self.events.quiet:
+            self._noted.add(what)
+            if self.note is not None:
+                self.note(what)
 
     def _first_touch(self, word: int, is_write: bool) -> None:
         self._reported.add(word)

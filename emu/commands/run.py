@@ -202,15 +202,14 @@ def _machine(options: argparse.Namespace, image: Image) -> Machine:
 
     def report(address: int, is_write: bool) -> None:
         name = image.register_names.get(address, f"address {address:#06x}")
-        what = "written" if is_write else "read"
+        tell(f"{name} is {'written' if is_write else 'read'}", "but has no model; it behaves as plain memory")
+
+    def tell(what: str, how: str) -> None:
         here = machine.pc - 2  # PC has moved on already; no two-word instruction accesses a register
-        print(
-            f"emu run: note: {name} is {what} at {here:#08x} ({image.symbols.text(here)}) but has no model;"
-            " it behaves as plain memory",
-            file=sys.stderr,
-        )
+        print(f"emu run: note: {what} at {here:#08x} ({image.symbols.text(here)}) {how}", file=sys.stderr)
 
     machine.bus.report = report
+    machine.bus.note = lambda what: tell("a device is set up", f"for what has no model: {what}")
     return machine
 
 

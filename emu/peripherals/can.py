@@ -43,7 +43,7 @@ class Can(Peripheral):
         self.ctrl, self.intf, self.inte, self.ec = (self._r[name] for name in ("CTRL", "INTF", "INTE", "EC"))
         self.idle_bit = (self.ctrl, "CANSIDL")
         self.ctrl.written_by(self._ctrl_written)
-        self.inte.written_by(lambda _old, _new, _lanes: self._signal(self.intf.value & 0xFF))
+        self.inte.written_by(lambda _old, _new, _lanes: self._enables_written())
         self.intf.written_by(lambda _old, _new, _lanes: self._show_icode())
         for number in range(3):
             self._r[f"TX{number}CON"].written_by(lambda _old, _new, _lanes: self._requested())
@@ -65,6 +65,8 @@ class Can(Peripheral):
         return quantum * (1 + cfg2["PRSEG"] + 1 + cfg2["SEG1PH"] + 1 + cfg2["SEG2PH"] + 1)
 
     def _ctrl_written(self, old: int, new: int, _lanes: int) -> None:
+        if self.ctrl["CANCAP"]:
+            self.bus.lacks(f"{self.ctrl.name}.CANCAP, no timer captures frames")
         if self.ctrl["ABAT"]:
             self._abort_all()
         if self.ctrl["REQOP"] != self.ctrl["OPMODE"] and self.events.due(self._mode) == NEVER:
@@ -203,6 +205,11 @@ class Can(Peripheral):
 
     # -- interrupts --------------------------------------------------------------------------------------------------
 
+    def _enables_written(self) -> None:
+        if self.inte["WAKIE"]:
+            self.bus.lacks(f"{self.inte.name}.WAKIE, activity on the bus does not wake the chip")
+        self._signal(self.intf.value & 0xFF)
+
     def _raise(self, flag: str) -> None:
         self.intf[flag] = 1
         self._signal(1 << self.kit.chip.sfrs[self.intf.name].fields[flag][0])
@@ -216,6 +223,10 @@ class Can(Peripheral):
     def _show_icode(self) -> None:
         pending = (code for flag, code in _ICODES if self.intf[flag] and self.inte[flag[:-1] + "E"])
         self.ctrl["ICODE"] = next(pending, 0)
+
+    def give_back(self) -> None:
+        """CiTX."""
+        self._tx_port.disown(self._tx_pin)
 
     def reset(self, power_on: bool) -> None:
         """Configuration mode (CiCTRL resets to 0x0480)."""

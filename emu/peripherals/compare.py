@@ -162,6 +162,17 @@ class Compare(Peripheral):
         self._phase.value = _RISE
         self.restored()
 
+    def thaw(self, cycle: int) -> None:
+        """The time base may have gone on alone. A change decided when the clock stopped still happens (§9)."""
+        waiting = self.held_since(self._pin_event)
+        super().thaw(cycle)
+        if waiting != 0:
+            self._plan()
+
+    def give_back(self) -> None:
+        """The channel's pin."""
+        self._port.disown(self._pin)
+
     def restored(self) -> None:
         """Follow the time base only while the channel is on."""
         on, chosen = self.con["OCM"] != _OFF, self._timer

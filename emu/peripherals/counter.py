@@ -69,7 +69,7 @@ class Counter(Peripheral):
 
     def _ticks(self, cycle: int) -> int:
         """Clocks (before the prescaler) from `base` to `cycle`."""
-        source = self._source.value
+        source, cycle = self._source.value, min(cycle, self._frozen.value)
         if source == TCY:
             return max(cycle - self.base.value, 0)
         if source == WAVE:
@@ -94,7 +94,7 @@ class Counter(Peripheral):
 
     def next_cycle_at(self, target: int, after: int) -> int:
         """First cycle behind `after` in which the count *becomes* `target`, or NEVER."""
-        if self.is_taken:
+        if self.is_taken or self.is_frozen:
             return NEVER
         source = self._source.value
         if source == PIN:  # only an edge that is on its way is known

@@ -37,6 +37,8 @@ class Dci(Peripheral):
         self._rxbuf: Final = [self.register(f"RXBUF{index}") for index in range(_BUFFERS)]
         self._txbuf: Final = [self.register(f"TXBUF{index}") for index in range(_BUFFERS)]
         self.con1.written_by(self._con1_written)
+        for register in (self.con2, self.con3, self.tscon, self.rscon):
+            register.written_by(lambda _old, _new, _lanes: self._course_written())
         self.stat.computed(self._read_stat)
         for register in self._rxbuf:
             register.read_by(partial(self._rx_read, register))
@@ -79,6 +81,7 @@ class Dci(Peripheral):
         enabled = self.tscon.value | self.rscon.value
         slots = self.con2["COFSG"] + 1
         if not self.frame_time or not enabled & (1 << slots) - 1:
+            self._frame.value = NEVER
             self.events.cancel(self._word_event)
             return
         slot = first
@@ -151,10 +154,27 @@ class Dci(Peripheral):
 
     def _con1_written(self, old: int, new: int, _lanes: int) -> None:
         enable = 1 << self.kit.chip.sfrs["DCICON1"].fields["DCIEN"][0]
+        if new & enable and self.con1["CSCKD"]:
+            self.bus.lacks("DCICON1.CSCKD, nobody clocks the codec port from outside: it stands still")
+        if new & enable and self.con1["COFSM"] & 2:
+            self.bus.lacks("DCICON1.COFSM, AC-Link frames are those of the multichannel mode")
         if new & ~old & enable:
             self._start()
-        elif old & ~new & enable and self._frame.value != NEVER:
+        elif old & ~new & enable:
             self._finish_frame()
+        else:
+            self._course_written()
+
+    def _course_written(self) -> None:
+        """The bit clock or the slots may have been chosen only now, or the clock stopped; else what changed holds from
+        the next word on."""
+        if not self.con1["DCIEN"]:
+            return
+        if self._frame.value == NEVER:
+            self._post(self.now + 1, 0)
+        elif not self.frame_time:
+            self._frame.value = NEVER
+            self.events.cancel(self._word_event)
 
     def _start(self) -> None:
         self._stop.value = NEVER
@@ -170,7 +190,7 @@ class Dci(Peripheral):
 
     def _finish_frame(self) -> None:
         """DCIEN = 0: the frame on the wire is the last (§14); without a clock it ends at once."""
-        if not self.frame_time:
+        if not self.frame_time or self._frame.value == NEVER:
             self._frame.value = NEVER
             self._release()
             return
@@ -180,6 +200,10 @@ class Dci(Peripheral):
             self._frame.value = NEVER
             self.events.cancel(self._word_event)
             self._release()
+
+    def give_back(self) -> None:
+        """All four pins."""
+        self._release()
 
     def _release(self) -> None:
         self.events.cancel(self._word_event)

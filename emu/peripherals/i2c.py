@@ -34,6 +34,7 @@ class I2c(Peripheral):
         self.rcv, self.trn, self.brg = (self.register(name) for name in ("I2CRCV", "I2CTRN", "I2CBRG"))
         self.con, self.stat, self.add = (self.register(name) for name in ("I2CCON", "I2CSTAT", "I2CADD"))
         self.idle_bit = (self.con, "I2CSIDL")
+        self._sclrel: Final = 1 << kit.chip.sfrs["I2CCON"].fields["SCLREL"][0]
         self.con.written_by(self._con_written)
         self.trn.written_by(self._trn_written)
         self.rcv.read_by(self._rcv_read)
@@ -119,6 +120,9 @@ class I2c(Peripheral):
 
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
         enable = 1 << self.kit.chip.sfrs["I2CCON"].fields["I2CEN"][0]
+        if old & ~new & self._sclrel and not self.con["STREN"]:  # UNVERIFIED: §11 does not say who may clear SCLREL
+            new |= self._sclrel
+            self.con.value = new
         if (old ^ new) & enable:
             self._enabled(bool(new & enable))
         busy = self._operation.value != _NONE
@@ -159,8 +163,8 @@ class I2c(Peripheral):
         self.events.cancel(self._step)
         self._deselect()
 
-    def _trn_written(self, _old: int, new: int, _lanes: int) -> None:
-        if not self.con["I2CEN"]:
+    def _trn_written(self, _old: int, new: int, lanes: int) -> None:
+        if not self.con["I2CEN"] or not lanes & 0xFF:
             return
         if self.slave.transmits:
             self.stat["TBF"] = 1
@@ -194,14 +198,13 @@ class I2c(Peripheral):
         self._begun.value = cycle
         stuck = not self.wire.sda_high
         self._collides.value = self._first_collision() if stuck else 0
-        if not self._collides.value:
-            self._exchange(cycle, stuck)
-        if self._operation.value == _SEND and not self._collides.value:
-            self.events.set(self._step, self._edge(_EIGHTH_EDGE))
-        else:
-            end = self._collides.value - 1 if self._collides.value else _LENGTH[self._operation.value]
-            self.events.set(self._step, self._edge(end))
-        self._log_edges()
+        self._ack.value = 0
+        if self._operation.value == _RECEIVE and not self._collides.value:
+            self._byte.value = 0 if stuck else self._asked(cycle)
+        end = _EIGHTH_EDGE if self._operation.value == _SEND else _LENGTH[self._operation.value]
+        end = self._collides.value - 1 if self._collides.value else end
+        self.events.set(self._step, self._edge(end))
+        self._log_edges(0, end)
 
     def _first_collision(self) -> int:
         """1 + Tbrg at which the module finds SDA low that it let go, 0 if it never lets go (§11)."""
@@ -213,18 +216,13 @@ class I2c(Peripheral):
             return 2 if self.con["ACKDT"] else 0
         return {_RESTART: 2, _STOP: 4}.get(operation, 0)
 
-    def _exchange(self, cycle: int, stuck: bool) -> None:
-        """Ask the slaves for the byte or the acknowledge of this operation."""
-        operation, device = self._operation.value, self._device()
-        if operation == _SEND:
-            self._ack.value = stuck or self._offer(cycle)
-        elif operation == _RECEIVE:
-            byte = device.read(cycle) if device is not None and self._reading.value else 0xFF
-            self._byte.value = 0 if stuck else byte & 0xFF
-            self._ack.value = 0
+    def _asked(self, cycle: int) -> int:
+        """The byte of the addressed slave; nobody there leaves SDA high."""
+        device = self._device()
+        return device.read(cycle) & 0xFF if device is not None and self._reading.value else 0xFF
 
     def _offer(self, cycle: int) -> bool:
-        """The addressed slave's answer to the byte on the wire."""
+        """The addressed slave's answer to the byte it has just got whole."""
         byte = self._byte.value
         if self._address_next.value:
             self._address_next.value = 0
@@ -243,7 +241,9 @@ class I2c(Peripheral):
             self._collision()
         elif operation == _SEND and self.stat["TBF"]:
             self.stat["TBF"] = 0  # the eighth falling edge; the ninth ends it
+            self._ack.value = not self.wire.sda_high or self._offer(due)
             self.events.set(self._step, self._edge(_LENGTH[_SEND]))
+            self._log_edges(_EIGHTH_EDGE, _LENGTH[_SEND])
         else:
             self._finish(operation, due)
 
@@ -308,19 +308,22 @@ class I2c(Peripheral):
             self._disturb()
             self._run(cycle + 1)
 
-    def _log_edges(self) -> None:
-        """Write the operation's own edges to the pins' log."""
+    def _log_edges(self, first: int, end: int) -> None:
+        """Write the operation's own edges to the pins' log, from Tbrg `first` on."""
         log = self.kit.pins.edges
         if log is None:
             return
         port, both = self.wire.port, self.wire.sda | self.wire.scl
         others = self.kit.pins.level[port] & ~both
-        length = self._collides.value - 1 if self._collides.value else _LENGTH[self._operation.value]
-        for count in range(length):
+        for count in range(first, end):
             cycle = self._edge(count)
             log.append((cycle, port, others | self.bits(cycle)))
 
     # -- power and reset ---------------------------------------------------------------------------------------------
+
+    def give_back(self) -> None:
+        """Both lines."""
+        self._port.disown(self.wire.sda | self.wire.scl)
 
     def reset(self, power_on: bool) -> None:
         """Off; the lines were given back by the port."""

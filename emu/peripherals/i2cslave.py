@@ -73,12 +73,15 @@ class I2cSlave:
 
     def start(self) -> None:
         """Start or repeated start."""
-        self._state.value = _ADDRESS
-        self._r.stat["S"], self._r.stat["P"] = 1, 0
+        if self.is_enabled:
+            self._state.value = _ADDRESS
+            self._r.stat["S"], self._r.stat["P"] = 1, 0
 
     def stop(self) -> None:
         """Stop."""
         self.reset()
+        if not self.is_enabled:
+            return
         stat = self._r.stat
         stat["S"], stat["P"] = 0, 1
         stat["GCSTAT"] = stat["ADD10"] = 0

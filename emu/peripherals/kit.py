@@ -8,7 +8,7 @@ its moments and pending events move by the time lost, and the device never notic
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from emu.bus import Bus
@@ -85,6 +85,8 @@ class Kit:
     """Tcy per second at present; supplied by the oscillator."""
     power_mode: Callable[[], int] = lambda: 0
     """0 while the CPU runs, IDLE or SLEEP; supplied by the watchdog."""
+    in_seconds: list[int] = field(default_factory=list)
+    """Event slots that are due after a time in seconds: the oscillator moves them when it changes the Tcy."""
 
 
 class Peripheral(Device):
@@ -126,10 +128,13 @@ class Peripheral(Device):
         self._moments.append(cell)
         return cell
 
-    def slot(self, purpose: str, fire: Callable[[int], None]) -> int:
-        """Claim an event slot that belongs to this device's clock."""
+    def slot(self, purpose: str, fire: Callable[[int], None], *, in_seconds: bool = False) -> int:
+        """Claim an event slot that belongs to this device's clock. `in_seconds`: another Tcy does not change how long
+        it takes."""
         slot = self.events.slot(f"{self.name}.{purpose}", fire)
         self._slots.append((slot, self.cell(f"{purpose}.held", "Q", NEVER)))
+        if in_seconds:
+            self.kit.in_seconds.append(slot)
         return slot
 
     def ruled(self, slot: int, rule: Rule) -> None:
@@ -149,9 +154,21 @@ class Peripheral(Device):
             held.value = NEVER
         self.reset(power_on)
 
+    def held_since(self, slot: int) -> int:
+        """How many Tcy behind the stop of this device's clock `slot` is due, NEVER if nothing of it waits."""
+        held = next(cell.value for one, cell in self._slots if one == slot)
+        return NEVER if held == NEVER else held - self._frozen.value
+
     def restart(self) -> None:
-        """As after a reset of this device alone."""
+        """As after a reset of this device alone, which has lost what its registers held."""
         self.power_up(power_on=False)
+        self.give_back()
+
+    def give_back(self) -> None:
+        """Leave pins the device has taken to LAT and TRIS. A reset of the chip does that by itself (§6)."""
+
+    def switched_off(self) -> None:
+        """PMD is about to clear the device's registers."""
 
     def stops_in(self, mode: int) -> bool:
         """Whether the device's clock stands in power mode `mode`."""

@@ -25,7 +25,9 @@ class LowVoltageDetect(Peripheral):
         self._line: Final = interrupts.line(irq)
         self._rcon: Final = rcon
         self._supply: Final = self.cell("supply", "H", 5000)
-        self._stable: Final = self.slot("stable", self._band_gap_stable)
+        self._stable: Final = self.slot("stable", self._band_gap_stable, in_seconds=True)
+        self._below: Final = self.cell("below", "B")
+        """The supply was below the threshold when somebody last looked."""
         before = kit.bus.on_write[rcon.address >> 1]
 
         def written(old: int, new: int, lanes: int) -> None:
@@ -41,10 +43,15 @@ class LowVoltageDetect(Peripheral):
 
     def set_supply(self, millivolts: int) -> None:
         """The supply voltage changes now (0..65535 mV; LVDIN when LVDL = 15)."""
-        was_low = self._is_low
         self._supply.value = millivolts
-        if self._is_low and not was_low:
+        self._look()
+
+    def _look(self) -> None:
+        """Supply, threshold or band gap have changed: LVDIF rises when the supply comes to be too low."""
+        low = self._is_low
+        if low and not self._below.value:
             self._line.request()
+        self._below.value = low
 
     @property
     def _is_low(self) -> bool:
@@ -58,12 +65,13 @@ class LowVoltageDetect(Peripheral):
             self.events.cancel(self._stable)
         elif not self._rcon["BGST"] and self.events.due(self._stable) == NEVER:
             self.events.set(self._stable, self.now + 1 + round(_BAND_GAP_SECONDS * self.kit.fcy()))
+        self._look()
 
     def _band_gap_stable(self, _due: int) -> None:
         self._rcon["BGST"] = 1
-        if self._is_low:
-            self._line.request()
+        self._look()
 
     def reset(self, power_on: bool) -> None:
         """A band gap that was on stays on, RCON is kept by every reset but power-on."""
+        self._below.value = self._is_low
         self._enable_changed()

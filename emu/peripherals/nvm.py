@@ -52,7 +52,7 @@ class Nvm(Peripheral):
         self._operation: Final = self.cell("operation", "H")
         self._address: Final = self.cell("address", "I")
         self._data: Final = self.array("data", "I", FLASH_LATCHES)
-        self._done: Final = self.slot("done", self._finish)
+        self._done: Final = self.slot("done", self._finish, in_seconds=True)
         self._wr, self._wren = (1 << kit.chip.sfrs["NVMCON"].fields[name][0] for name in ("WR", "WREN"))
         kit.program.captured_in = self.adr.address, self.adru.address
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from emu.events import NEVER
 from emu.peripherals.kit import Kit, Peripheral
 
 FRC_HZ: Final = 7_370_000
@@ -79,7 +80,7 @@ class Oscillator(Peripheral):
         """Length of a Tcy in femtoseconds, for reports; `fcy` is exact."""
         self._current: Final = self.cell("current", "Q")
         """Clock selection in force: COSC, POST and OSCTUN packed, so that `fcy` is a function of the record."""
-        self._switch: Final = self.slot("switch", self._switched)
+        self._switch: Final = self.slot("switch", self._switched, in_seconds=True)
         self.on_change: Final[list[Callable[[], None]]] = []
         """Called once another `fcy` holds."""
         self.before_change: Final[list[Callable[[], None]]] = []
@@ -112,10 +113,21 @@ class Oscillator(Peripheral):
             told()
         self._elapsed.value = round(self.seconds(cycle) * _PS)
         self._since.value = cycle
+        before = self.fcy()
         self._current.value = (self.tun.value & 0xF) << 5 | self.con["COSC"] << 2 | self.con["POST"]
         self._tcy_fs.value = round(10**15 / self.fcy())
+        self._stretch(cycle, self.fcy() / before)
         for told in self.on_change:
             told()
+
+    def _stretch(self, cycle: int, factor: float) -> None:
+        """What is due after a time in seconds takes `factor` times as many Tcy from `cycle` on."""
+        if factor == 1:
+            return
+        for slot in self.kit.in_seconds:
+            due = self.events.due(slot)
+            if cycle < due != NEVER:
+                self.events.set(slot, cycle + max(round((due - cycle) * factor), 1))
 
     # -- OSCCON ------------------------------------------------------------------------------------------------------
 
@@ -141,6 +153,8 @@ class Oscillator(Peripheral):
         free = self._free & lanes
         flags = self._flags & lanes
         self.con.value = (old & ~free | new & free) & (new | ~flags)
+        if self.con["LPOSCEN"]:
+            self.bus.lacks("OSCCON.LPOSCEN, no 32 kHz crystal is fitted: timer 1 counts what others drive on its pin")
         if self.con["OSWEN"] and not old & 1:
             self._request_switch()
         elif not self.con["OSWEN"]:
@@ -149,8 +163,9 @@ class Oscillator(Peripheral):
             self._rate_changed(self.now + 1)
 
     def _request_switch(self) -> None:
-        """FCKSM = 1x ignores the request, OSWEN reads 0 at once (§3). UNVERIFIED on silicon."""
-        if self._config("FCKSM") & 2:
+        """FCKSM = 1x ignores the request, OSWEN reads 0 at once (§3). UNVERIFIED on silicon. So does a request for the
+        source that runs."""
+        if self._config("FCKSM") & 2 or self.con["NOSC"] == self.con["COSC"]:
             self.con["OSWEN"] = 0
             return
         self.events.set(self._switch, self.now + 1 + self._start_tcy(self.con["NOSC"]))
@@ -177,9 +192,20 @@ class Oscillator(Peripheral):
         self.con["LOCK"] = code == _PLL
         self._rate_changed(cycle)
 
+    def abandon_switch(self) -> None:
+        """Sleep and the clock monitor end a switch that is under way; the source in force stays (§3)."""
+        self.events.cancel(self._switch)
+        self.con["OSWEN"] = 0
+
+    def reselect(self) -> None:
+        """A brown-out takes the source of the configuration, as a power-on does. UNVERIFIED: §4 does not say."""
+        self.con["NOSC"] = self._config("FOS")
+        self._run_from(self.con["NOSC"], self.now)
+
     def fail(self) -> None:
         """The clock source dies: with the monitor enabled (FCKSM = 00) the chip runs on from the FRC and traps (§3)."""
         if self._config("FCKSM") == 0:
+            self.abandon_switch()
             self._run_from(_FRC, self.now + 1)
             self.con["CF"] = 1
             self.kit.wires.trap("OSCFAIL")
@@ -190,10 +216,18 @@ class Oscillator(Peripheral):
         """Never: it is the clock."""
         return False
 
+    def power_up(self, power_on: bool) -> None:
+        """Resets that keep OSCCON keep a switch that is under way (§4)."""
+        pending = self.events.due(self._switch)
+        super().power_up(power_on)
+        if self.con["OSWEN"] and pending != NEVER:
+            self.events.set(self._switch, pending)
+
     def reset(self, power_on: bool) -> None:
         """Power-on takes the source from FOSC; other resets keep it (§4). Emulation starts with the PLL locked."""
         code = self._config("FOS") if power_on else self._current.value >> 2 & 7
-        self.con["NOSC"] = code
+        if power_on:
+            self.con["NOSC"] = code
         self.con["COSC"] = code
         self.con["LOCK"] = code == _PLL
         self._key_count.value = 0

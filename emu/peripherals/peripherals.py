@@ -15,7 +15,7 @@ from emu.peripherals.compare import Compare
 from emu.peripherals.dci import Dci
 from emu.peripherals.i2c import I2c
 from emu.peripherals.interrupts import Interrupts
-from emu.peripherals.kit import IDLE, Cell, Kit, Peripheral, Wires
+from emu.peripherals.kit import IDLE, SLEEP, Cell, Kit, Peripheral, Wires
 from emu.peripherals.lvd import LowVoltageDetect
 from emu.peripherals.nvm import Nvm
 from emu.peripherals.oscillator import Oscillator
@@ -135,11 +135,13 @@ class Peripherals:
         for word in range(first, len(bus.reset_value)):
             bus.record.u16[word] = bus.reset_value[word]
         self.resets.record_cause(cause, kept)
-        if cause != "POR":  # the clock selection survives (§4)
+        if cause not in ("POR", "BOR"):  # the clock selection survives (§4)
             self.oscillator.con.value = osccon
         self._stopped.value = 0
         for device in self.all:
             device.power_up(power_on=cause == "POR")
+        if cause == "BOR":
+            self.oscillator.reselect()
 
     def sleep(self, mode: int, cycle: int) -> None:
         """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""
@@ -150,6 +152,8 @@ class Peripherals:
         if mode == IDLE and not self.watchdog.stops_devices:
             return
         self._stopped.value = 1
+        if mode == SLEEP:
+            self.oscillator.abandon_switch()
         for device in self.all:
             if device.stops_in(mode):
                 device.freeze(cycle, mode)

@@ -76,10 +76,13 @@ class ModuleDisable(Peripheral):
 
     def _clear(self, module: str) -> None:
         """The module loses its state, as by a reset of its own."""
+        device = self._modules.get(module)
+        if device is not None:
+            device.switched_off()
         for word in self._words[module]:
             self.record.u16[word] = self.bus.reset_value[word]
-        if module in self._modules:
-            self._modules[module].restart()
+        if device is not None:
+            device.restart()
 
     def restored(self) -> None:
         """Wire the registers of each module as its bit says."""

@@ -47,7 +47,7 @@ class Watchdog(Peripheral):
         super().__init__("wdt", kit)
         self._resets: Final = resets
         self._mode: Final = self.cell("mode", "B")
-        self._timeout: Final = self.slot("timeout", self._expired)
+        self._timeout: Final = self.slot("timeout", self._expired, in_seconds=True)
         resets.rcon.written_by(self._rcon_written)
         kit.power_mode = lambda: self._mode.value
         fields = kit.chip.sfrs["RCON"].fields

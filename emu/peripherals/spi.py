@@ -32,7 +32,7 @@ class Spi(Peripheral):
         self.buf: Final = self.register(prefix + "BUF")
         self.idle_bit = (self.stat, "SPISIDL")
         self.stat.written_by(self._stat_written)
-        self.con.written_by(lambda _old, _new, _lanes: self._take_pins())
+        self.con.written_by(self._con_written)
         self.buf.written_by(self._buf_written)
         self.buf.read_by(self._buf_read)
         self.buf.computed(lambda: self._received.value)
@@ -176,6 +176,11 @@ class Spi(Peripheral):
 
     # -- control -----------------------------------------------------------------------------------------------------
 
+    def _con_written(self, _old: int, _new: int, _lanes: int) -> None:
+        if self.con["FRMEN"]:
+            self.bus.lacks(f"{self.con.name}.FRMEN, frame sync pulses are neither made nor awaited")
+        self._take_pins()
+
     def _stat_written(self, old: int, new: int, _lanes: int) -> None:
         enable = 1 << self.kit.chip.sfrs[self.stat.name].fields["SPIEN"][0]
         if (old ^ new) & enable:
@@ -190,6 +195,27 @@ class Spi(Peripheral):
         self._busy.value = 0
         self._start.value = NEVER
         self.events.cancel(self._step)
+
+    def give_back(self) -> None:
+        """All pins: SPIEN is 0."""
+        self._take_pins()
+
+    def stops_in(self, mode: int) -> bool:
+        """A slave lives by the outside's clock and goes on. UNVERIFIED: §12 says nothing of Sleep."""
+        return bool(self.con["MSTEN"]) and super().stops_in(mode)
+
+    def freeze(self, cycle: int, mode: int) -> None:
+        """A word under way is cut off for good; the one in TXB waits. UNVERIFIED as above."""
+        self._busy.value = 0
+        self._start.value = NEVER
+        self.events.cancel(self._step)
+        super().freeze(cycle, mode)
+
+    def thaw(self, cycle: int) -> None:
+        """The word that waited is sent."""
+        super().thaw(cycle)
+        if self.stat["SPITBF"]:
+            self.events.set(self._step, cycle + 1)
 
     def reset(self, power_on: bool) -> None:
         """Off and empty."""

@@ -50,6 +50,8 @@ class Timer(Counter):
         self.clear_until: Final = self.moment("clear_until")
         self.clear_due: Final = self.moment("clear_due", NEVER)
         """On a described clock: when the match comes if TMR is cleared in clear_from <= cycle < clear_until."""
+        self.closed: Final = self.moment("closed", NEVER)
+        """When the flag of the gate's last falling edge is due."""
         self._match: Final = self.slot("match", self._fire)
         self._on_match: Final[list[Callable[[int], None]]] = []
         self._on_change: Final[list[Callable[[], None]]] = []
@@ -119,13 +121,16 @@ class Timer(Counter):
             self.period.value = 0  # the one behind it is not a period away: let Python plan it
         else:
             self._post(self.now)
+        self._tell()
+
+    def _tell(self) -> None:
         for listener in self._on_change:
             listener()
 
     def _match_stands(self, rewritten: bool) -> bool:
         """Whether the posted match happens in the current cycle, or in the next whatever was just written."""
         due = self.events.due(self._match)
-        if due == self.now + 1:
+        if due in (self.now + 1, self.closed.value) and due != NEVER:
             return True
         running = self._source.value in (TCY, WAVE)
         return due == self.now + 2 and running and not rewritten and self.count(self.now + 1) == self.limit
@@ -272,8 +277,7 @@ class Timer(Counter):
         self._start = count = advance(start, 1, self.limit, self.top)
         if count == self.limit and count != 0:
             self.events.set(self._match, cycle + 2)
-        for listener in self._on_change:
-            listener()
+        self._tell()
 
     def _gate(self, cycle: int, opened: bool) -> None:
         """The gate is synchronised for one Tcy; its falling edge raises the flag (§7)."""
@@ -281,6 +285,7 @@ class Timer(Counter):
         self._source.value = TCY if opened else STOPPED
         self._plan()
         if not opened:
+            self.closed.value = cycle + 2
             self.events.set(self._match, cycle + 2)
 
     def _waveform_changes(self, cycle: int) -> None:
@@ -327,6 +332,7 @@ class Timer(Counter):
         """Stopped; the count survives every reset but power-on in silicon, and reads 0 here."""
         for cell in (self.base, self.tick, self.period, self._source, self._phase, self._before):
             cell.value = 0
+        self.closed.value = NEVER
 
     def stops_in(self, mode: int) -> bool:
         """Only timer 1 as asynchronous counter runs in Sleep (§7)."""
@@ -340,6 +346,31 @@ class Timer(Counter):
         self.clear_until.value = 0
         self._fold(max(cycle, self.base.value), self._prescale, self.limit)
         super().freeze(cycle, mode)
+        self._tell()
+
+    def thaw(self, cycle: int) -> None:
+        """Gate and described clocks did not wait: what they are now decides how it goes on. A match that had been
+        counted when the clock stopped still raises its flag."""
+        waiting = self.held_since(self._match)
+        super().thaw(cycle)
+        if not self.is_taken and self.con["TON"] and (self.con["TCS"] or self.con["TGATE"]):
+            self._source.value = self._choose_source()
+            self.tick.value = self._prescale if self._source.value == TCY and not self.is_wide else 0
+            if self.con["TCS"] and (waiting == NEVER or waiting > 1):
+                self._post(self.now)
+        self._tell()
+
+    def switched_off(self) -> None:
+        """The upper half of a pair is a timer of its own without the lower one."""
+        if self.is_wide:
+            joined = self.con.value
+            self.con.value = joined & ~self._t32
+            self._join_changed(joined, self.con.value)
+
+    def restart(self) -> None:
+        """Nobody can plan by a timer that is off."""
+        super().restart()
+        self._tell()
 
     def _read_and_latch(self) -> int:
         """Reading the lower half latches the upper half, in 32-bit mode (§7)."""

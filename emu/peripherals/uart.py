@@ -75,6 +75,8 @@ class Uart(Peripheral):
         self._start: Final = self.moment("start", NEVER)
         """Cycle the start bit in TSR began or begins."""
         self._end: Final = self.moment("end", NEVER)
+        self._bit_began: Final = self.moment("bit_began", NEVER)
+        """Cycle the bit in bit 0 of the wave begins in: the start bit, or the one in which BRG was written."""
         self._tx_event: Final = self.slot("tx", self._tx_due)
         self._pin: Final = TxPin(kit.pins, tx_port, self._tx_pin, self._tx_level)
 
@@ -196,18 +198,17 @@ class Uart(Peripheral):
             start += bit
         self._frame.value = data
         self._wave.value = bits
-        self._start.value = start
+        self._start.value = self._bit_began.value = start
         self._end.value = start + length * bit
         self._shifting.value = 1
         self.events.set(self._tx_event, self._end.value)
         self._pin.log_frame(start, bits, length, bit)
         if self.mode["LPBACK"]:
-            self._arrive(start, data, 0)
+            self._arrive(start, data | (BREAK if self.sta["UTXBRK"] else 0), 0)
 
     def _sent(self, start: int) -> None:
-        data = 0 if self.sta["UTXBRK"] else self._frame.value
-        if not self.mode["LPBACK"]:
-            self._sent_to(data, start)
+        """A frame has left the pin, in loopback too: that cuts off the receive pin only (§10)."""
+        self._sent_to(0 if self.sta["UTXBRK"] else self._frame.value, start)
 
     def _tx_level(self, cycle: int) -> int:
         """Level of TX in `cycle`, 1 = idle."""
@@ -215,7 +216,7 @@ class Uart(Peripheral):
             return 0
         if not self._shifting.value or cycle < self._start.value:
             return 1
-        return self._wave.value >> (cycle - self._start.value) // self.bit_time & 1
+        return self._wave.value >> (cycle - self._bit_began.value) // self.bit_time & 1
 
     def drain(self) -> None:
         """Deliver what is still in the transmitter as a robot would: the pins outlive a stopped program."""
@@ -367,6 +368,8 @@ class Uart(Peripheral):
                 self._sender_switched(self.is_sending_enabled)
             else:
                 self._abort()
+        if "ALTIO" in self.kit.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
+            self.bus.lacks(f"{self.mode.name}.ALTIO, the UART keeps the pins it has")  # UNVERIFIED (§10)
         self.restored()
         self._plan_line()
 
@@ -404,16 +407,47 @@ class Uart(Peripheral):
         self._rx_port.disown(self._rx_pin)
         self._rx_count.value = 0
         self._held.value = 0
+        self._stop_receiving()
+        for flag in ("URXDA", "OERR", "FERR", "PERR", "UTXEN", "UTXBRK"):
+            self.sta[flag] = 0
+
+    def _stop_receiving(self) -> None:
+        """A character on its way is lost."""
         self._receiving.value = _QUIET
         for slot in (self._rx_event, self._edge_event):
             self.events.cancel(slot)
-        for flag in ("URXDA", "OERR", "FERR", "PERR", "UTXEN", "UTXBRK"):
-            self.sta[flag] = 0
         self.sta["RIDLE"] = 1
 
-    def _brg_written(self, _old: int, _new: int, _lanes: int) -> None:
-        """Writing BRG restarts the baud counter (§10)."""
-        self._clock.value = self.now + 1
+    def give_back(self) -> None:
+        """TX and RX."""
+        self._tx_port.disown(self._tx_pin)
+        self._rx_port.disown(self._rx_pin)
+
+    def _brg_written(self, old: int, _new: int, _lanes: int) -> None:
+        """Writing BRG restarts the baud counter (§10), so the bit on the line lasts one bit time more.
+
+        UNVERIFIED: a character that arrives goes on at the rate it began with.
+        """
+        following, before, bit = self.now + 1, 16 * (old + 1), self.bit_time
+        self._clock.value = following
+        if not self._shifting.value or following >= self._end.value:
+            return
+        heard = bool(self.mode["LPBACK"]) and self._receiving.value and self._rx_start.value == self._start.value
+        began = self._bit_began.value
+        passed = max(following - began, 0) // before
+        bits = (self._end.value - began) // before - passed
+        if following > began:
+            self._wave.value >>= passed
+            self._bit_began.value = following
+        else:  # the start bit has not begun
+            self._start.value = self._bit_began.value = following + bit
+        self._end.value = self._bit_began.value + bits * bit
+        self.events.set(self._tx_event, self._end.value)
+        if heard:  # in loopback the receiver follows
+            self._rx_start.value = self._start.value
+            self._done.value = self._end.value - self._format.stops * bit + bit // 2
+            is_coming = self._receiving.value == _COMING
+            self.events.set(self._rx_event, self._start.value if is_coming else self._done.value)
 
     # -- power and reset ---------------------------------------------------------------------------------------------
 
@@ -427,13 +461,16 @@ class Uart(Peripheral):
         self._plan_line()
 
     def freeze(self, cycle: int, mode: int) -> None:
-        """In Idle with USIDL everything waits; Sleep cuts a transmission off, TX rests high."""
+        """In Idle with USIDL everything waits; Sleep cuts off what is under way, TX rests high. UNVERIFIED: §10 does
+        not say what becomes of a reception."""
         if mode == SLEEP and (self._shifting.value or self._tx_count.value):
             self.events.cancel(self._tx_event)
             self._tx_count.value = self._shifting.value = 0
             self._start.value = self._end.value = NEVER
             self.sta["UTXBF"] = 0
             self.sta["TRMT"] = 1
+        if mode == SLEEP:
+            self._stop_receiving()
         super().freeze(cycle, mode)
 
     def restored(self) -> None:

@@ -1,5 +1,5 @@
 """Random register accesses, pin changes, resets and naps on the peripherals alone; snapshots must continue identically,
-and the converter do what a plain one does.
+the converter do what a plain one does, and no two devices contradict each other (who owns a pin, when a timer matches).
 
 `python tests/fuzz/fuzz_peripherals.py [--rounds N] [--seed S] [--seconds T]`; exits 1 at the first failure.
 """
@@ -16,7 +16,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
 
 from peripherals.conftest import Rig  # noqa: E402
 from peripherals.plain_adc import difference  # noqa: E402
-from peripherals.test_fuzz import WORDS, act  # noqa: E402
+from peripherals.test_fuzz import WORDS, act, contradictions  # noqa: E402
 
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
@@ -34,6 +34,7 @@ def check(seed: int) -> None:
     rig = Rig(fosc=draw.choice((0x7FE6, 0xFFE6)), fwdt=draw.choice((0x7FFF, 0x8000, 0x803F)))
     for _ in range(ACTIONS):
         act(rig, draw)
+        assert not (found := contradictions(rig)), found
     for sfr in WORDS:
         assert not rig.peek(sfr.name) & ~sfr.mask, f"{sfr.name} holds bits it does not have"
     state, ends = rig.record.snapshot(), []

@@ -7,13 +7,65 @@ import random
 import pytest
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A, SFRS
-from emu.peripherals.pins import PORTS
+from emu.events import NEVER
+from emu.peripherals.pins import PORTS, parse_pin
 
 from .conftest import Rig
 
 CPU_END = SFRS["INTCON1"].address
 WORDS = [sfr for sfr in SFRS.values() if sfr.size == 2 and sfr.address >= CPU_END and not sfr.name.startswith("IFS")]
 ENABLES = [(sfr.name, bit) for sfr in WORDS for bit in (15, 0, 1, 3) if sfr.mask >> bit & 1]
+
+
+def keyed(rig: Rig, draw: random.Random) -> None:
+    """A byte of OSCCON behind its key (§3): other sources, other Tcy."""
+    shift, lanes, keys = draw.choice(((0, 0x00FF, (0x46, 0x57)), (8, 0xFF00, (0x78, 0x9A))))
+    for byte in (*keys, draw.choice((0, 1, 0x41, 0x81, 0xC1, draw.randrange(256)))):
+        rig.at(rig.events.now + 1).write("OSCCON", byte << shift, lanes)
+
+
+def owners(rig: Rig) -> dict[int, int]:
+    """Pins by port that some module which is on may own."""
+    dev = rig.dev
+    pins = dict.fromkeys(dev.ports, 0)
+
+    def add(is_on: object, *places: tuple[int, int]) -> None:
+        for port, mask in places if is_on else ():
+            pins[port] |= mask
+
+    for uart in dev.uart.values():
+        add(uart.is_enabled, parse_pin(uart.site.tx_pin), parse_pin(uart.site.rx_pin))
+    for spi in dev.spi.values():
+        add(spi.stat["SPIEN"], *spi._pins.values())
+    for compare in dev.compare.values():
+        add(compare.con["OCM"], (compare._port.index, compare._pin))
+    for can in dev.can.values():
+        add(can.ctrl["OPMODE"] in (0, 2), (can._tx_port.index, can._tx_pin))
+    add(dev.i2c.con["I2CEN"], (dev.i2c.wire.port, dev.i2c.wire.sda | dev.i2c.wire.scl))
+    add(dev.dci.con1["DCIEN"] or dev.dci._frame.value != NEVER, *dev.dci._pins.values())
+    return pins
+
+
+def contradictions(rig: Rig) -> list[str]:
+    """What two devices, or a register and what is posted, do not agree about."""
+    dev, now, due = rig.dev, rig.events.now, rig.events.due
+    pins = owners(rig)
+    found = [f"{port.name}: {port._owned.value & ~pins[index]:#x} owned by nobody"
+             for index, port in dev.ports.items() if port._owned.value & ~pins[index]]  # fmt: skip
+    oscillator = dev.oscillator
+    if bool(oscillator.con["OSWEN"]) != (due(oscillator._switch) != NEVER):
+        found.append(f"OSWEN is {oscillator.con['OSWEN']}, the switch is due at {due(oscillator._switch)}")
+    for timer in dev.timer.values():
+        posted, match = due(timer._match), timer.next_cycle_at(timer.limit, now)
+        if not timer.is_frozen and posted not in (now + 1, timer.closed.value):
+            expected = NEVER if match == NEVER or timer._is_gated else match + 1
+            if posted != expected:
+                found.append(f"{timer.name} matches at {posted}, its count says {expected}")
+    for compare in dev.compare.values():
+        posted, change = due(compare._pin_event), compare._next_change(now) if compare.con["OCM"] else NEVER
+        if not compare.is_frozen and posted not in (now + 1, change):
+            found.append(f"{compare.name} changes at {posted}, its timer says {change}")
+    return found
 
 
 def act(rig: Rig, draw: random.Random) -> None:
@@ -38,6 +90,14 @@ def act(rig: Rig, draw: random.Random) -> None:
         rig.dev.wake(rig.events.now)
     elif kind < 0.945:
         rig.dev.reset(draw.choice(("EXTR", "SWR", "WDTO", "BOR", "POR")))
+    elif kind < 0.946:
+        keyed(rig, draw)
+    elif kind < 0.948:
+        rig.dev.spi[draw.choice((1, 2))].clock_word(draw.randrange(0x10000), draw.randrange(1, 40))
+    elif kind < 0.949:
+        rig.dev.oscillator.fail()
+    elif kind < 0.9495:
+        rig.dev.lvd.set_supply(draw.randrange(1000, 6000))
     elif kind < 0.95:
         rig.program.table_write(draw.choice((0x1000, 0x7FF000)) + 2 * draw.randrange(64), 7, draw.randrange(1 << 24))
     rig.at(rig.events.now + draw.choice((0, 1, 1, 2, 3, 10, 100, draw.randrange(3000))))
@@ -47,8 +107,9 @@ def act(rig: Rig, draw: random.Random) -> None:
 def test_random_accesses_never_fail_and_keep_to_the_masks(seed):
     """What is stored stays inside each register's implemented bits."""
     rig, draw = Rig(fosc=0x7FE6 if seed % 2 else 0xFFE6), random.Random(seed)
-    for _ in range(4000):
+    for step in range(4000):
         act(rig, draw)
+        assert step % 8 or not contradictions(rig)
     for sfr in WORDS:
         assert not rig.peek(sfr.name) & ~sfr.mask, sfr.name
 

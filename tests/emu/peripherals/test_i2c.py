@@ -315,7 +315,7 @@ def test_disabling_in_the_middle_forgets_the_operation(bus):
     bus.at(50).write("I2CCON", 0)
     bus.at(1000)
     assert not bus.flag("MI2CIF")
-    assert bus.read("I2CCON") == 0
+    assert bus.read("I2CCON") == 0x1000
 
 
 # -- slave ------------------------------------------------------------------------------------------------------------

@@ -1,0 +1,285 @@
+"""Devices of which one stands in Idle or Sleep and another goes on; times in seconds while the Tcy changes (§3, §7-§17)."""
+
+from __future__ import annotations
+
+import pytest
+
+from .conftest import Rig
+
+LOW, HIGH = 0x00FF, 0xFF00
+
+
+def unlock(rig: Rig, start: int, byte: int, lanes: int) -> None:
+    """Key and byte for one half of OSCCON in three consecutive cycles (§3)."""
+    shift, keys = (8, (0x78, 0x9A)) if lanes == HIGH else (0, (0x46, 0x57))
+    for step, value in enumerate((*keys, byte)):
+        rig.at(start + step).write("OSCCON", value << shift, lanes)
+
+
+def nap(rig: Rig, start: int, end: int, mode: int = 1) -> None:
+    """PWRSAV so that clocks stand from `start` to `end`."""
+    rig.at(start).dev.sleep(mode, start)
+    rig.at(end).dev.wake(end)
+
+
+# -- timers and those that live by them --------------------------------------------------------------------------------
+
+
+def test_an_output_compare_waits_for_a_timer_that_stands():
+    """§7, §9: TSIDL stops the time base in Idle: no match, no edge; TMR2 = 19 when it goes on in cycle 200."""
+    rig = Rig()
+    for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 3), ("T2CON", 0xA000)):
+        rig.write(name, value)
+    rig.at(20).dev.sleep(1, 20)
+    for cycle in range(21, 200):
+        assert rig.at(cycle).dev.pins.get("RD0") == 0, cycle
+    rig.dev.wake(200)
+    assert rig.first_cycle(lambda: rig.dev.pins.get("RD0"), 200, 400) == 200 + 50 - 19 + 1
+
+
+def test_an_output_compare_that_stands_follows_its_timer_when_it_goes_on():
+    """§9: OCSIDL stops the channel only: it goes on with the match of the timer that went on without it."""
+    rig = Rig()
+    for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 0x2003), ("T2CON", 0x8000)):
+        rig.write(name, value)
+    nap(rig, 20, 210)
+    cycle = rig.first_cycle(lambda: rig.dev.pins.get("RD0"), 211, 500)
+    assert rig.at(cycle).read("TMR2") == 51
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+def test_a_match_of_the_cycle_in_which_both_stop_still_moves_the_pin(mode):
+    """§9: the pin changes one Tcy behind the match; a match in the last cycle before Idle or Sleep is not lost."""
+    rig = Rig()
+    for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 0x2003), ("T2CON", 0xA000)):
+        rig.write(name, value)
+    cycle = rig.first_cycle(lambda: rig.read("TMR2") == 50, 1, 99)
+    nap(rig, cycle + 1, cycle + 300, mode)
+    assert rig.first_cycle(lambda: rig.dev.pins.get("RD0"), cycle + 300, cycle + 400) <= cycle + 301
+
+
+def test_pwm_stands_with_its_timer():
+    """§9: neither edge of a PWM comes while the time base stands."""
+    rig = Rig()
+    for name, value in (("PR2", 99), ("OC1R", 30), ("OC1RS", 30), ("OC1CON", 6), ("T2CON", 0xA000)):
+        rig.write(name, value)
+    rig.at(110)
+    assert rig.dev.pins.get("RD0") == 1
+    count = rig.read("TMR2")
+    rig.dev.sleep(1, 110)
+    assert rig.at(500).dev.pins.get("RD0") == 1
+    rig.dev.wake(500)
+    assert rig.first_cycle(lambda: not rig.dev.pins.get("RD0"), 500, 700) == 500 + 30 - count
+
+
+def test_a_capture_takes_the_count_of_a_timer_that_stands():
+    """§8: the count at which TSIDL stopped timer 2."""
+    rig = Rig()
+    rig.write("IC1CON", 0x83)
+    rig.write("T2CON", 0xA000)
+    rig.at(20).dev.sleep(1, 20)
+    count = rig.read("TMR2")
+    rig.at(100).dev.pins.set("RD8", 1)
+    assert rig.at(110).read("IC1BUF") == count
+
+
+@pytest.mark.parametrize(("before", "after"), [(1, 0), (0, 1)])
+def test_a_gate_that_moved_while_the_timer_stood(before, after):
+    """§7: a gated timer counts while its gate is high, whatever the gate did in between."""
+    rig = Rig()
+    rig.dev.pins.set("RC1", before)
+    rig.write("T2CON", 0xA040)
+    rig.at(20).dev.sleep(1, 20)
+    rig.at(50).dev.pins.set("RC1", after)
+    rig.at(60).dev.wake(60)
+    first = rig.at(61).read("TMR2")
+    assert rig.at(161).read("TMR2") - first == (100 if after else 0)
+
+
+@pytest.mark.parametrize(("register", "value"), [("PR2", 77), ("TMR2", 7), ("T2CON", 0x8050), ("T2CON", 0x8040)])
+def test_a_closing_gate_interrupts_whatever_is_written_in_its_cycle(register, value):
+    """§7: the flag comes with the falling edge of the gate."""
+    rig = Rig()
+    rig.dev.pins.set("RC1", 1)
+    rig.write("T2CON", 0x8040)
+    rig.at(20).dev.pins.set("RC1", 0)
+    rig.write(register, value)
+    assert rig.at(22).flag("T2IF") == 1
+
+
+def test_timer_three_is_on_its_own_when_its_partner_is_switched_off():
+    """§17, §7: without timer 2 there is no pair; T3CON holds again."""
+    rig = Rig()
+    rig.write("T3CON", 0x8000)
+    rig.write("T2CON", 0x8008)
+    rig.at(20).write("PMD1", 1 << 12)
+    first = rig.at(100).read("TMR3")
+    assert rig.at(150).read("TMR3") == first + 50
+
+
+def test_an_output_compare_stands_when_its_timer_is_switched_off():
+    """§17: a timer that is off reaches no match."""
+    rig = Rig()
+    for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 3), ("T2CON", 0x8000)):
+        rig.write(name, value)
+    rig.at(20).write("PMD1", 1 << 12)
+    assert rig.at(400).dev.pins.get("RD0") == 0
+
+
+# -- seconds -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_watchdog_keeps_its_seconds_when_the_tcy_changes():
+    """§4: 2 ms of the LPRC, which no postscaler divides."""
+    rig = Rig(fwdt=0x8000)
+    expired = []
+    rig.wires.reset = lambda _cause: expired.append(rig.dev.seconds(rig.events.now))
+    unlock(rig, 100, 0xC0, LOW)
+    rig.at(3000)
+    assert expired == [pytest.approx(2e-3, rel=1e-2)]
+
+
+def test_programming_takes_its_seconds_when_the_tcy_changes():
+    """§16: 2 ms of the array's own timer."""
+    rig = Rig()
+    for cycle, name, value in ((1, "NVMADRU", 0x7F), (2, "NVMADR", 0xF000), (3, "NVMCON", 0x4044),
+                               (4, "NVMKEY", 0x55), (5, "NVMKEY", 0xAA), (6, "NVMCON", 0xC044)):  # fmt: skip
+        rig.at(cycle).write(name, value)
+    unlock(rig, 10, 0xC0, LOW)
+    cycle = rig.first_cycle(lambda: rig.flag("NVMIF"), 20, 1000)
+    assert rig.dev.seconds(cycle) == pytest.approx(2e-3, rel=1e-2)
+
+
+def test_a_slower_tcy_does_not_delay_a_clock_switch():
+    """§3: 1024 periods of the crystal and the lock, 0.159 ms, divided by 64 in between."""
+    rig = Rig(fosc=0x4106)
+    unlock(rig, 10, 0x07, HIGH)
+    unlock(rig, 20, 0xC1, LOW)
+    cycle = rig.first_cycle(lambda: not rig.field("OSCCON", "OSWEN"), 30, 1000)
+    assert rig.dev.seconds(cycle) == pytest.approx(23 / 1_842_500 + 1024 / 7_372_800 + 20e-6, rel=0.2)
+
+
+# -- clock switches that something cuts short ------------------------------------------------------------------------------
+
+
+def switching(fosc: int = 0x7FE6) -> Rig:
+    """A switch from the PLL to the crystal alone has been asked for in cycle 22."""
+    rig = Rig(fosc=fosc)
+    unlock(rig, 10, 0x03, HIGH)
+    unlock(rig, 20, 0x01, LOW)
+    assert rig.at(30).read("OSCCON") == 0x7321
+    return rig
+
+
+def test_a_reset_leaves_a_pending_switch_to_end():
+    """§3, §4: a reset that keeps the clock selection keeps the request, too: it ends by itself."""
+    rig = switching()
+    rig.dev.reset("SWR")
+    assert rig.at(40).read("OSCCON") == 0x7321
+    assert rig.at(10_000).read("OSCCON") == 0x3300
+
+
+def test_sleep_abandons_a_pending_switch():
+    """§3: the old clock stays, OSWEN falls."""
+    rig = switching()
+    rig.dev.sleep(2, 30)
+    assert rig.at(10_000).read("OSCCON") == 0x7320
+
+
+def test_a_clock_failure_abandons_a_pending_switch():
+    """§3: the monitor takes the FRC and clears OSWEN."""
+    rig = switching(0x3FE6)
+    rig.dev.oscillator.fail()
+    assert rig.at(10_000).read("OSCCON") == 0x1308
+
+
+def test_a_switch_to_the_clock_in_force_ends_at_once():
+    """§3: nothing has to start."""
+    rig = Rig(fosc=0x7FE6)
+    unlock(rig, 10, 0x01, LOW)
+    assert rig.at(13).read("OSCCON") == 0x7720
+
+
+def test_a_brown_out_takes_the_clock_of_the_configuration():
+    """§3, §4: as a power-on does; the seconds go on."""
+    rig = Rig(fosc=0x7FE6)
+    unlock(rig, 10, 0x01, HIGH)
+    unlock(rig, 20, 0x81, LOW)
+    rig.at(60_000)
+    seconds = rig.dev.seconds(60_000)
+    rig.dev.reset("BOR")
+    assert rig.read("OSCCON") == 0x7720
+    assert rig.dev.fcy == 14_745_600
+    assert rig.dev.seconds(60_000) == pytest.approx(seconds)
+
+
+# -- serial devices in Sleep -----------------------------------------------------------------------------------------------
+
+
+def test_sleep_cuts_a_reception_off():
+    """§10: the receiver's clock is gone in the middle of the character."""
+    rig = Rig()
+    rig.write("U1BRG", 7)
+    rig.write("U1MODE", 0x8000)
+    rig.dev.uart[1].feed(b"A")
+    nap(rig, 600, 10_000, 2)
+    assert rig.field("U1STA", "RIDLE") == 1
+    rig.at(20_000)
+    assert rig.field("U1STA", "URXDA") == 0
+    rig.dev.uart[1].feed(b"B")
+    assert rig.at(30_000).read("U1RXREG") == ord("B")
+
+
+def test_a_master_does_not_go_on_with_a_word_that_sleep_cut_off():
+    """§12: the word under way is lost, the one that waits in TXB is sent afterwards."""
+    rig = Rig()
+    sent = []
+    rig.dev.spi[1].exchange = lambda word, _bits: sent.append(word) or 0
+    rig.write("SPI1CON", 0x20)
+    rig.write("SPI1STAT", 0x8000)
+    rig.write("SPI1BUF", 0x11)
+    rig.at(5).write("SPI1BUF", 0x22)
+    nap(rig, 600, 10_000, 2)
+    rig.at(30_000)
+    assert sent == [0x22]
+
+
+@pytest.mark.parametrize("mode", [1, 2])
+def test_a_slave_works_on_the_outside_clock_while_the_chip_sleeps(mode):
+    """§12: SCK comes from outside, so a word arrives in Sleep and wakes the chip by its flag."""
+    rig = Rig()
+    rig.write("SPI1STAT", 0xA000)
+    rig.at(20).dev.sleep(mode, 20)
+    assert rig.at(100).dev.spi[1].clock_word(0x5A)
+    assert rig.at(1000).flag("SPI1IF") == 1
+    assert rig.read("SPI1BUF") == 0x5A
+
+
+class Square:
+    """A waveform on RC3: rises every 100 Tcy, from 100 on."""
+
+    def bits(self, cycle: int) -> int:
+        return 8 if cycle % 100 < 50 else 0
+
+    def rises(self, mask: int, after: int, until: int) -> int:
+        return max(until, 0) // 100 - max(after, 0) // 100
+
+    def nth_rise(self, mask: int, after: int, count: int) -> int:
+        return (max(after, 0) // 100 + count) * 100
+
+    def stands_until(self, cycle: int) -> int:
+        return cycle
+
+
+@pytest.mark.parametrize("start", [350, 299, 300, 301, 302])
+def test_a_counter_that_stands_misses_edges_of_a_waveform(start):
+    """§7: edges between PWRSAV and the wake-up are not counted, and the match comes with the edge that is the fourth."""
+    rig = Rig()
+    rig.dev.pins.attach(2, 8, Square())
+    rig.write("PR4", 4)
+    rig.write("T4CON", 0xA002)
+    nap(rig, start, 1020)
+    counted = (start - 1) // 100
+    cycle = rig.first_cycle(lambda: rig.flag("T4IF"), 1020, 2000)
+    assert cycle == 1000 + 100 * (4 - counted) + 2
+    assert rig.at(1960).read("TMR4") == (counted + 9) % 5
