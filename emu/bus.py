@@ -8,6 +8,7 @@ The CPU's own registers are hooked by the CPU like any device's.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from emu.events import Events
@@ -19,12 +20,26 @@ WriteHook = Callable[[int, int, int], None]
 """Called as hook(old, new, lanes) after the new word is in the record; lanes = 0xFFFF, 0x00FF or 0xFF00."""
 
 
+@dataclass(frozen=True, slots=True)
+class Access:
+    """How a register word is wired on the bus; the parts are those of `Bus`."""
+
+    writable: int
+    clear_only: int
+    compute: ReadHook | None
+    on_read: ReadHook | None
+    on_write: WriteHook | None
+    rule: Rule | None
+
+
 class Tap:
     """Somebody outside listens to every access of instructions to one register; see `tap`."""
 
-    def __init__(self, remove: Callable[[], None]) -> None:
+    def __init__(self, remove: Callable[[], None], under: Access) -> None:
         self.hooks: tuple[Callable[[bool, int], object], ...] = ()
         self.remove: Final = remove
+        self.under = under
+        """What the register itself does."""
 
     def __bool__(self) -> bool:
         return bool(self.hooks)
@@ -71,6 +86,8 @@ class Bus:
         """Set for registers a device or the CPU stands behind; others are reported once when touched."""
         self.off: frozenset[int] = frozenset()
         """Registers of modules that are switched off: they read 0 and ignore writes."""
+        self.taps: Final[dict[int, Tap]] = {}
+        """Who listens, by register; see `tap`."""
         self.watched: Final[set[int]] = set()
         """Registers every access of which somebody outside wants to see."""
         self.report: Callable[[int, bool], None] | None = None
@@ -122,6 +139,23 @@ class Bus:
         """Set the stored word at even SFR `address`, telling nobody."""
         self.record.u16[address >> 1] = value & 0xFFFF
 
+    def access(self, word: int) -> Access:
+        """How the register with index `word` is wired, whoever listens to it."""
+        under = self.taps[word].under if word in self.taps else None
+        return under or Access(
+            self.writable[word], self.clear_only[word], self.compute[word], self.on_read[word], self.on_write[word],
+            self.rules[word],
+        )  # fmt: skip
+
+    def rewire(self, word: int, access: Access) -> None:
+        """Wire it anew; who listens goes on listening."""
+        self.writable[word], self.clear_only[word], self.compute[word] = (
+            access.writable, access.clear_only, access.compute)  # fmt: skip
+        if word in self.taps:
+            self.taps[word].under = access
+        else:
+            self.on_read[word], self.on_write[word], self.rules[word] = access.on_read, access.on_write, access.rule
+
     def lacks(self, what: str) -> None:
         """Firmware has asked for `what` (register, field, and what happens instead), which has no model: told once."""
         if what not in self._noted and not self.events.quiet:
@@ -137,17 +171,18 @@ class Bus:
 
 def tap(bus: Bus, word: int) -> Tap:
     """Put a `Tap` between the instructions and the register with index `word`, until its `remove` is called."""
-    on_read, compute, written, rule = bus.on_read[word], bus.compute[word], bus.on_write[word], bus.rules[word]
-    read = on_read or compute
     u16, events = bus.record.u16, bus.events
 
     def remove() -> None:
-        bus.on_read[word], bus.on_write[word], bus.rules[word] = on_read, written, rule
+        under = bus.access(word)
+        del bus.taps[word]
+        bus.rewire(word, under)
         bus.watched.discard(word)
 
-    heard = Tap(remove)
+    heard = Tap(remove, bus.access(word))
 
     def tapped_read() -> int:
+        read = heard.under.on_read or heard.under.compute
         value = read() if read is not None else u16[word]
         if not events.quiet:
             for hook in heard.hooks:
@@ -155,6 +190,7 @@ def tap(bus: Bus, word: int) -> Tap:
         return value
 
     def tapped_write(old: int, new: int, lanes: int) -> None:
+        written = heard.under.on_write
         if written is not None:
             written(old, new, lanes)
         if not events.quiet:
@@ -162,5 +198,6 @@ def tap(bus: Bus, word: int) -> Tap:
                 hook(True, u16[word])
 
     bus.on_read[word], bus.on_write[word], bus.rules[word] = tapped_read, tapped_write, None
+    bus.taps[word] = heard
     bus.watched.add(word)
     return heard

@@ -41,9 +41,7 @@ class Ear:
         if self._wanted is not None and self._wanted.search(self.heard, self.place):
             self._wires.end_run()
 
-    def expect(
-        self, pattern: Pattern, within: float, drain: Callable[[], None]
-    ) -> re.Match[bytes]:
+    def expect(self, pattern: Pattern, within: float, drain: Callable[[], None]) -> re.Match[bytes]:
         """See `Uart.expect`."""
         wanted = compiled(pattern)
         cycles = max(1, round(within * self._fcy() / 1000))

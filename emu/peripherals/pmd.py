@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
-from emu.bus import ReadHook, WriteHook
+from emu.bus import Access
 from emu.peripherals.kit import Kit, Peripheral
-from emu.straight import Rule
 
 _PREFIXES: Final = {
     "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
@@ -21,16 +19,7 @@ def _zero() -> int:
     return 0
 
 
-@dataclass(frozen=True, slots=True)
-class _Access:
-    """How a register word is wired on the bus."""
-
-    writable: int
-    clear_only: int
-    compute: ReadHook | None
-    on_read: ReadHook | None
-    on_write: WriteHook | None
-    rule: Rule | None
+_OFF: Final = Access(0, 0, _zero, None, None, None)
 
 
 class ModuleDisable(Peripheral):
@@ -39,7 +28,7 @@ class ModuleDisable(Peripheral):
     def __init__(self, kit: Kit, modules: dict[str, Peripheral]) -> None:
         super().__init__("pmd", kit)
         self._modules: Final = modules
-        self._off: Final[dict[int, _Access]] = {}
+        self._off: Final[dict[int, Access]] = {}
         self._bits: Final[list[tuple[Callable[[], int], str]]] = []
         self._words: Final[dict[str, list[int]]] = {}
         """Word indices of each module's registers."""
@@ -99,25 +88,13 @@ class ModuleDisable(Peripheral):
         self.restored()
 
     def _cut(self, word: int) -> None:
-        bus = self.bus
-        self._off[word] = _Access(
-            bus.writable[word], bus.clear_only[word], bus.compute[word], bus.on_read[word], bus.on_write[word],
-            bus.rules[word],
-        )  # fmt: skip
-        bus.writable[word] = bus.clear_only[word] = 0
-        bus.compute[word] = _zero
-        bus.on_read[word] = None
-        bus.on_write[word] = None
-        bus.rules[word] = None
-        bus.off |= {word}
+        self._off[word] = self.bus.access(word)
+        self.bus.rewire(word, _OFF)
+        self.bus.off |= {word}
 
     def _mend(self, word: int) -> None:
-        access = self._off.pop(word)
-        bus = self.bus
-        bus.off -= {word}
-        bus.writable[word], bus.clear_only[word] = access.writable, access.clear_only
-        bus.compute[word], bus.on_read[word], bus.on_write[word] = access.compute, access.on_read, access.on_write
-        bus.rules[word] = access.rule
+        self.bus.off -= {word}
+        self.bus.rewire(word, self._off.pop(word))
 
 
 def register_fields(kit: Kit, name: str) -> list[str]:

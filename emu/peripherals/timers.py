@@ -110,9 +110,8 @@ class Timer(Counter):
         self.clear_until.value = 0
         source = self._source.value
         simple = source == TCY and not self.is_taken
-        if simple:  # an empty prescaler lets native code compute the count from base and tick alone
-            self.base.value -= self._phase.value
-            self._phase.value = 0
+        if simple:
+            self._empty_prescaler()
         narrow = simple and not self.is_wide  # a wide timer reads and interrupts through its partner
         self.tick.value = self._prescale if narrow else 0
         periodic = narrow and self.limit != 0 and not self._is_gated and not self._on_match
@@ -122,6 +121,11 @@ class Timer(Counter):
         else:
             self._post(self.now)
         self._tell()
+
+    def _empty_prescaler(self) -> None:
+        """What is in it counts as Tcy since an earlier base: rules compute the count from base and tick alone."""
+        self.base.value -= self._phase.value
+        self._phase.value = 0
 
     def _tell(self) -> None:
         for listener in self._on_change:
@@ -358,6 +362,8 @@ class Timer(Counter):
             self.tick.value = self._prescale if self._source.value == TCY and not self.is_wide else 0
             if self.con["TCS"] and (waiting == NEVER or waiting > 1):
                 self._post(self.now)
+        if self._source.value == TCY:
+            self._empty_prescaler()
         self._tell()
 
     def switched_off(self) -> None:

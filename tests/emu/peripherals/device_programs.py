@@ -32,6 +32,8 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.specialised import SpecialisedEngine
 from emu.machine import Machine
+from emu.peripherals.i2cbus import I2cDevice
+from emu.peripherals.i2cslave import OutsideMaster
 from emu.stops import Stop
 
 from .device_scenes import SCENES
@@ -210,6 +212,8 @@ class Writer:
             return [f"mov #{draw.choice((0, 0, draw.randrange(0x10000)))}, w0", f"mov w0, {self.at(name)}"]
         if kind < 0.97:
             return self.setting()
+        if kind < 0.98:
+            return self.clock()
         return [f"add {self.data()}, {self.data()}, {self.data()}"]
 
     def nap(self) -> list[str]:
@@ -222,6 +226,14 @@ class Writer:
             levels = self.at(sources[name].priority[0])
             wake += [f"bset {self.at(word)}, #{bit}", "mov #0x4444, w0", f"mov w0, {levels}"]
         return [*wake, "pwrsav #0" if self.draw.random() < 0.04 else "pwrsav #1"]
+
+    def clock(self) -> list[str]:
+        """A byte of OSCCON behind its key: another source, another Tcy (§3)."""
+        low, high = f"{self.note(self.chip.sfrs['OSCCON'], 'keyed'):s}", f"{self.chip.sfrs['OSCCON'].address + 1:#x}"
+        address, first, second = self.draw.choice(((low, 0x46, 0x57), (low, 0x46, 0x57), (high, 0x78, 0x9A)))
+        value = self.draw.choice((0, 1, 1, 0x40, 0x41, 0x80, 0x02))
+        return [f"mov #{address}, w8", f"mov #{first:#x}, w0", f"mov #{second:#x}, w1", f"mov #{value:#x}, w2",
+                "mov.b w0, [w8]", "mov.b w1, [w8]", "mov.b w2, [w8]"]  # fmt: skip
 
     def setting(self) -> list[str]:
         """A device is put to work."""
@@ -302,6 +314,29 @@ class Subject:
     machine: Machine
     heard: list[tuple[int, int, int]] = field(default_factory=list)
     rendered: list[tuple[int, int]] = field(default_factory=list)
+    master: OutsideMaster | None = None
+
+
+@dataclass
+class Scribe(I2cDevice):
+    """A device on the bus that acknowledges some bytes and tells of all."""
+
+    subject: Subject
+
+    def start(self, read: bool, cycle: int) -> bool:
+        self.subject.heard.append((-1, int(read), cycle))
+        return True
+
+    def write(self, byte: int, cycle: int) -> bool:
+        self.subject.heard.append((-2, byte, cycle))
+        return bool(byte & 7)
+
+    def read(self, cycle: int) -> int:
+        self.subject.heard.append((-3, 0, cycle))
+        return cycle & 0xFF
+
+    def stop(self, cycle: int) -> None:
+        self.subject.heard.append((-4, 0, cycle))
 
 
 def flash(text: str, chip: Chip = DSPIC30F6014A) -> dict[int, list[int]]:
@@ -338,7 +373,12 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
     machine.stop_on_fault = False
     if draw.random() < 0.9:
         machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
+    if draw.random() < 0.4:
+        machine.program.put(0xF80000, draw.choice((0x7FE6, 0x3FE6)))  # FCKSM: clocks can be switched
     machine.reset("POR")
+    if not robot and machine.peripherals.i2c is not None:
+        machine.peripherals.i2c.wire.attach(0x6E, Scribe(made))
+        made.master = OutsideMaster(machine.peripherals.i2c.slave, machine.events)
     for address, words in stretches.items():
         machine.program.put_flash(address, words)
     for port in machine.uart:
@@ -354,9 +394,10 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
     return made
 
 
-def disturb(draw: random.Random, machine: Machine) -> None:
+def disturb(draw: random.Random, subject: Subject) -> None:
     """Something happens outside, now or soon."""
-    kind, cycle, board = draw.randrange(10), machine.cycle, machine.board
+    machine = subject.machine
+    kind, cycle, board = draw.randrange(14), machine.cycle, machine.board
     if machine.is_asleep:
         for level in (0, 1, 0):
             machine.pins.set("RF6", level, cycle)
@@ -382,7 +423,16 @@ def disturb(draw: random.Random, machine: Machine) -> None:
         period = draw.randrange(2, 1000)
         board.microphones.play(draw.randrange(3), draw.choice((None, lambda now: now % period - period / 2)))
     elif kind == 9 and draw.random() < 0.2:
-        machine.reset("EXTR")
+        machine.reset(draw.choice(("EXTR", "BOR")))
+    elif kind == 10:
+        machine.peripherals.spi[draw.choice(sorted(machine.peripherals.spi))].clock_word(draw.randrange(0x10000))
+    elif kind == 11 and machine.peripherals.lvd is not None:
+        machine.peripherals.lvd.set_supply(draw.randrange(1000, 6000))
+    elif kind == 13 and subject.master is not None:
+        address = 2 * (machine.peek("I2CADD") & 0x7F) if draw.random() < 0.8 else 0
+        subject.master.transfer([address, draw.randrange(256)], [address | 1], draw.randrange(3))
+    elif kind == 12 and draw.random() < 0.2:
+        machine.peripherals.oscillator.fail()
 
 
 def run(machine: Machine, cycles: int, cuts: random.Random | None) -> Stop:
@@ -431,7 +481,7 @@ def difference(
                for one in subjects):  # fmt: skip
             break
         for one in subjects:
-            disturb(random.Random(f"{seed} {chunk} outside"), one.machine)
+            disturb(random.Random(f"{seed} {chunk} outside"), one)
     if tally is not None:
         tally.update(writer.touched)
     return None

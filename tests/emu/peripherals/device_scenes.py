@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 
 Scene = list[tuple[str, int]]
+_STANDS = (0, 0x2000, 0x2000)
+"""xSIDL of every control register: the device's clock stands in Idle."""
 
 
 def _timer(draw: random.Random) -> Scene:
@@ -21,7 +23,7 @@ def _pair(draw: random.Random) -> Scene:
     return [
         (f"PR{low}", draw.randrange(400)),
         (f"PR{high}", draw.choice((0, 0, 1))),
-        (f"T{low}CON", 0x8008 | draw.randrange(2) << 4),
+        (f"T{low}CON", 0x8008 | draw.randrange(2) << 4 | draw.choice(_STANDS)),
     ]
 
 
@@ -51,16 +53,16 @@ def _compare(draw: random.Random) -> Scene:
         (f"PR{timer}", draw.choice((9, 40, 99, 300))),
         (f"OC{n}R", draw.randrange(120)),
         (f"OC{n}RS", draw.randrange(120)),
-        (f"OC{n}CON", draw.randrange(8) | (timer == 3) << 3),
-        (f"T{timer}CON", 0x8000),
+        (f"OC{n}CON", draw.randrange(8) | (timer == 3) << 3 | draw.choice(_STANDS)),
+        (f"T{timer}CON", 0x8000 | draw.choice(_STANDS) | draw.choice((0, 0, 0x10))),
     ]
 
 
 def _capture(draw: random.Random) -> Scene:
     n = draw.randrange(1, 9)
     return [
-        (f"T{draw.choice((2, 3))}CON", 0x8000),
-        (f"IC{n}CON", draw.randrange(8) | draw.randrange(4) << 5 | draw.choice((0, 0x80))),
+        (f"T{draw.choice((2, 3))}CON", 0x8000 | draw.choice(_STANDS)),
+        (f"IC{n}CON", draw.randrange(8) | draw.randrange(4) << 5 | draw.choice((0, 0x80)) | draw.choice(_STANDS)),
     ]
 
 
@@ -68,9 +70,10 @@ def _uart(draw: random.Random) -> Scene:
     n = draw.choice((1, 2))
     return [
         (f"U{n}BRG", draw.choice((0, 1, 7))),
-        (f"U{n}MODE", 0x8000 | draw.choice((0, 0x40, 0x20, 0x06, 0x01))),
-        (f"U{n}STA", 0x0400 | draw.choice((0, 0x8000, 0x20, 0xC0))),
-        (f"U{n}TXREG", draw.randrange(256)),
+        (f"U{n}MODE", 0x8000 | draw.choice((0, 0x40, 0x40, 0x20, 0x06, 0x01, 0x80)) | draw.choice(_STANDS)),
+        (f"U{n}STA", 0x0400 | draw.choice((0, 0x8000, 0x20, 0xC0, 0x0800))),
+        *((f"U{n}TXREG", draw.randrange(256)) for _ in range(draw.choice((1, 1, 3, 6)))),
+        *([(f"U{n}BRG", draw.randrange(9))] if draw.random() < 0.4 else []),
     ]
 
 
@@ -78,7 +81,8 @@ def _spi(draw: random.Random) -> Scene:
     n = draw.choice((1, 2))
     return [
         (f"SPI{n}CON", draw.randrange(0x800) | draw.choice((0x20, 0x20, 0))),
-        (f"SPI{n}STAT", 0x8000),
+        (f"SPI{n}STAT", 0x8000 | draw.choice(_STANDS)),
+        (f"SPI{n}BUF", draw.randrange(0x10000)),
         (f"SPI{n}BUF", draw.randrange(0x10000)),
     ]
 
@@ -87,13 +91,15 @@ def _bus(draw: random.Random) -> Scene:
     return [
         ("I2CBRG", draw.randrange(40)),
         ("I2CADD", draw.randrange(0x80)),
-        ("I2CCON", 0x9000 | draw.choice((0, 1, 1, 8, 4))),
+        ("I2CCON", draw.choice((0x8000, 0x9000, 0x9040, 0x9080, 0xB000)) | draw.choice((0, 1, 1, 8, 4))),
         ("I2CTRN", draw.choice((0xDC, 0xDD, 0))),
+        *([("I2CTRN", draw.randrange(256))] if draw.random() < 0.3 else []),
     ]
 
 
 def _codec(draw: random.Random) -> Scene:
-    return [
+    """In any order: what is chosen last may be what the port has waited for."""
+    settings = [
         ("DCICON3", draw.randrange(16)),
         ("TSCON", draw.randrange(0x10000)),
         ("RSCON", draw.randrange(0x10000)),
@@ -101,6 +107,9 @@ def _codec(draw: random.Random) -> Scene:
         ("DCICON1", 0x8000 | draw.choice((0, 0x800, draw.randrange(0x800)))),
         ("TXBUF0", draw.randrange(0x10000)),
     ]
+    if draw.random() < 0.5:
+        draw.shuffle(settings)
+    return settings
 
 
 def _can(draw: random.Random) -> Scene:
@@ -160,6 +169,16 @@ def _programming(draw: random.Random) -> Scene:
     ]
 
 
+def _off_and_on(draw: random.Random) -> Scene:
+    """Modules are switched off while they work, and on again (§17)."""
+    name = draw.choice(("PMD1", "PMD2"))
+    return [
+        *SCENES[draw.choice(("timer", "pair", "compare", "capture", "uart", "spi", "bus", "codec", "can"))](draw),
+        (name, draw.choice((0xFFFF, draw.randrange(0x10000), 1 << draw.randrange(16)))),
+        (name, 0),
+    ]
+
+
 def _supply(draw: random.Random) -> Scene:
     return [("RCON", draw.choice((0x1000, 0x0020, 0, draw.randrange(0x10000)))), ("OSCTUN", draw.randrange(16))]
 
@@ -181,4 +200,5 @@ SCENES = {
     "camera": _camera,
     "programming": _programming,
     "supply": _supply,
+    "off and on": _off_and_on,
 }

@@ -1,4 +1,4 @@
-"""Devices of which one stands in Idle or Sleep and another goes on; times in seconds while the Tcy changes (§3, §7-§17)."""
+"""Devices of which one stands in Idle or Sleep and another goes on; times in seconds while the Tcy changes."""
 
 from __future__ import annotations
 
@@ -83,6 +83,17 @@ def test_a_capture_takes_the_count_of_a_timer_that_stands():
     assert rig.at(110).read("IC1BUF") == count
 
 
+@pytest.mark.parametrize("start", [20, 63, 64, 65, 100])
+def test_a_prescaler_keeps_what_it_has_counted_while_the_timer_stands(start):
+    """§7: 64 Tcy of running make a count, whatever time the timer stood in between."""
+    rig = Rig()
+    rig.write("T3CON", 0xA020)
+    nap(rig, start, 1000)
+    running = start - 1
+    for cycle in range(1000, 1300):
+        assert rig.at(cycle).read("TMR3") == (running + cycle - 1000) // 64, cycle
+
+
 @pytest.mark.parametrize(("before", "after"), [(1, 0), (0, 1)])
 def test_a_gate_that_moved_while_the_timer_stood(before, after):
     """§7: a gated timer counts while its gate is high, whatever the gate did in between."""
@@ -159,7 +170,7 @@ def test_a_slower_tcy_does_not_delay_a_clock_switch():
     assert rig.dev.seconds(cycle) == pytest.approx(23 / 1_842_500 + 1024 / 7_372_800 + 20e-6, rel=0.2)
 
 
-# -- clock switches that something cuts short ------------------------------------------------------------------------------
+# -- clock switches that something cuts short --------------------------------------------------------------------------
 
 
 def switching(fosc: int = 0x7FE6) -> Rig:
@@ -213,7 +224,7 @@ def test_a_brown_out_takes_the_clock_of_the_configuration():
     assert rig.dev.seconds(60_000) == pytest.approx(seconds)
 
 
-# -- serial devices in Sleep -----------------------------------------------------------------------------------------------
+# -- serial devices in Sleep -------------------------------------------------------------------------------------------
 
 
 def test_sleep_cuts_a_reception_off():
@@ -273,7 +284,7 @@ class Square:
 
 @pytest.mark.parametrize("start", [350, 299, 300, 301, 302])
 def test_a_counter_that_stands_misses_edges_of_a_waveform(start):
-    """§7: edges between PWRSAV and the wake-up are not counted, and the match comes with the edge that is the fourth."""
+    """§7: edges between PWRSAV and the wake-up are not counted; the match comes with the fourth counted edge."""
     rig = Rig()
     rig.dev.pins.attach(2, 8, Square())
     rig.write("PR4", 4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from emu.machine import Machine
 from emu.peripherals.i2cbus import I2cDevice
 from emu.peripherals.i2cslave import OutsideMaster
 
@@ -223,3 +224,27 @@ def test_the_crystal_of_timer_one_is_told(rig):
         rig.at(rig.events.now + 1).write("OSCCON", byte, 0x00FF)
     assert len(told) == 1
     assert told[0].startswith("OSCCON.LPOSCEN")
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0, 1), (1, 2), (0, 2), (1, 3), (2, 3)])
+def test_a_listener_and_a_switch_do_not_lose_each_other(begin, end):
+    """§17: who listens to a register comes and goes while PMD1 switches timer 1 off (step 1) and on (step 2)."""
+    machine = Machine(engine="plain")
+    machine.reset("POR")
+    bus, at = machine.bus, machine.chip.sfrs
+    heard, remove = [], None
+    for step, off in enumerate((0, 1, 0, 0)):
+        bus.write(at["PMD1"].address, off << 11)
+        if step == begin:
+            remove = machine.hook_sfr("T1CON", lambda is_write, word: heard.append((is_write, word)))
+        if step == end:
+            remove()
+        count = len(heard)
+        bus.write(at["T1CON"].address, 0x8000)
+        assert bus.read(at["T1CON"].address) == (0 if off else 0x8000)
+        told = [(True, 0 if off else 0x8000), (False, 0 if off else 0x8000)] if begin <= step < end else []
+        assert heard[count:] == told
+        machine.events.now += 50
+        assert bus.read(at["TMR1"].address) == (0 if off else 49)
+        bus.write(at["T1CON"].address, 0)
+        bus.write(at["TMR1"].address, 0)
