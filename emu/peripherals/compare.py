@@ -65,7 +65,7 @@ class Compare(Peripheral):
         """Post the next change of the pin from what the timer will do."""
         if self.con["OCM"] == _OFF or self.is_frozen:
             return
-        if self.events.due(self._pin_event) == self.now + 1:
+        if self.events.due(self._pin_event) == self.now + 1 and not (self._is_pwm and self._timer.is_frozen):
             return  # decided in the current cycle
         cycle = self._next_change(self.now)
         self.events.set(self._pin_event, cycle) if cycle != NEVER else self.events.cancel(self._pin_event)
@@ -163,10 +163,11 @@ class Compare(Peripheral):
         self.restored()
 
     def thaw(self, cycle: int) -> None:
-        """The time base may have gone on alone. A change decided when the clock stopped still happens (§9)."""
+        """The time base may have gone on alone. A change decided when the clock stopped still happens (§9): with PWM
+        the pin moves in the cycle of the match, else in the next."""
         waiting = self.held_since(self._pin_event)
         super().thaw(cycle)
-        if waiting != 0:
+        if waiting > (not self._is_pwm):
             self._plan()
 
     def give_back(self) -> None:

@@ -110,6 +110,11 @@ class Nvm(Peripheral):
         if operation in _FLASH:
             self.kit.wires.stall_until(end)
 
+    def clock_changed(self) -> None:
+        """A switch ended while the CPU stands: it stands until the array is done, however many Tcy that is now."""
+        if self.is_busy and self._operation.value in _FLASH:
+            self.kit.wires.stall_until(self.events.due(self._done))
+
     def _finish(self, _due: int) -> None:
         self._apply()
         self.con["WR"] = 0

@@ -47,29 +47,31 @@ def test_an_output_compare_that_stands_follows_its_timer_when_it_goes_on():
     assert rig.at(cycle).read("TMR2") == 51
 
 
+@pytest.mark.parametrize("late", [0, 1])
 @pytest.mark.parametrize("mode", [1, 2])
-def test_a_match_of_the_cycle_in_which_both_stop_still_moves_the_pin(mode):
+def test_a_match_of_the_cycle_in_which_both_stop_still_moves_the_pin(mode, late):
     """§9: the pin changes one Tcy behind the match; a match in the last cycle before Idle or Sleep is not lost."""
     rig = Rig()
     for name, value in (("PR2", 99), ("OC1R", 50), ("OC1CON", 0x2003), ("T2CON", 0xA000)):
         rig.write(name, value)
     cycle = rig.first_cycle(lambda: rig.read("TMR2") == 50, 1, 99)
-    nap(rig, cycle + 1, cycle + 300, mode)
+    nap(rig, cycle + late, cycle + 300, mode)
     assert rig.first_cycle(lambda: rig.dev.pins.get("RD0"), cycle + 300, cycle + 400) <= cycle + 301
 
 
-def test_pwm_stands_with_its_timer():
+@pytest.mark.parametrize("start", [110, 129, 130, 131, 199, 200, 201])
+@pytest.mark.parametrize("stands", [0, 0x2000])
+def test_pwm_stands_with_its_timer(start, stands):
     """§9: neither edge of a PWM comes while the time base stands."""
     rig = Rig()
-    for name, value in (("PR2", 99), ("OC1R", 30), ("OC1RS", 30), ("OC1CON", 6), ("T2CON", 0xA000)):
+    for name, value in (("PR2", 99), ("OC1R", 30), ("OC1RS", 30), ("OC1CON", 6 | stands), ("T2CON", 0xA000)):
         rig.write(name, value)
-    rig.at(110)
-    assert rig.dev.pins.get("RD0") == 1
-    count = rig.read("TMR2")
-    rig.dev.sleep(1, 110)
-    assert rig.at(500).dev.pins.get("RD0") == 1
+    level, count = rig.at(start).dev.pins.get("RD0"), rig.read("TMR2")
+    rig.dev.sleep(1, start)
+    assert rig.at(500).dev.pins.get("RD0") == level == (count < 30)
     rig.dev.wake(500)
-    assert rig.first_cycle(lambda: not rig.dev.pins.get("RD0"), 500, 700) == 500 + 30 - count
+    for cycle in range(500, 900):
+        assert rig.at(cycle).dev.pins.get("RD0") == ((cycle - 500 + count) % 100 < 30), cycle
 
 
 def test_a_capture_takes_the_count_of_a_timer_that_stands():
@@ -159,6 +161,18 @@ def test_programming_takes_its_seconds_when_the_tcy_changes():
     unlock(rig, 10, 0xC0, LOW)
     cycle = rig.first_cycle(lambda: rig.flag("NVMIF"), 20, 1000)
     assert rig.dev.seconds(cycle) == pytest.approx(2e-3, rel=1e-2)
+
+
+def test_the_cpu_stands_until_flash_is_programmed_whatever_the_tcy_becomes():
+    """§16, §3: a switch to the crystal ends while a row is erased: the rest takes an eighth of the Tcy."""
+    rig, held = switching(), []
+    rig.wires.stall_until = held.append
+    for cycle, name, value in ((31, "NVMADRU", 0), (32, "NVMADR", 0x4000), (33, "NVMCON", 0x4041),
+                               (34, "NVMKEY", 0x55), (35, "NVMKEY", 0xAA), (36, "NVMCON", 0xC041)):  # fmt: skip
+        rig.at(cycle).write(name, value)
+    done = rig.first_cycle(lambda: rig.flag("NVMIF"), 37, 30_000)
+    assert held[-1] == done
+    assert rig.dev.seconds(done) == pytest.approx(2e-3, rel=1e-2)
 
 
 def test_a_slower_tcy_does_not_delay_a_clock_switch():
