@@ -381,3 +381,12 @@ def test_a_register_without_a_model_is_named_once(build, capfd, engine):
     assert len(notes) == 2
     assert "BSRAM is written at 0x000102 (_main+0x2) but has no model" in notes[0]
     assert "SSRAM is read at 0x000104 (_main+0x4) but has no model" in notes[1]
+
+
+@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+def test_a_setting_without_a_model_is_named_once(build, capfd, engine):
+    """Frame sync of SPI1 is on the list of docs/accuracy.md."""
+    source = "main:\nmov #0x4020, w0\nmov w0, {SPI1CON}\nmov w0, {SPI1CON}\npwrsav #1\n"
+    main(["run", build(source), "--engine", engine])
+    (note,) = [line for line in capfd.readouterr().err.splitlines() if "note:" in line]
+    assert "at 0x000102 (_main+0x2) for what has no model: SPI1CON.FRMEN" in note
