@@ -303,7 +303,7 @@ class I2c(Peripheral):
 
     def _scl_moved(self, cycle: int, _changed: int, levels: int) -> None:
         """SCL is free again: an operation that waited for it goes on."""
-        if levels & self.wire.scl and self._stalled.value:
+        if levels & self.wire.scl and self._stalled.value and not self.is_frozen:
             self._stalled.value = 0
             self._disturb()
             self._run(cycle + 1)
@@ -320,6 +320,11 @@ class I2c(Peripheral):
             log.append((cycle, port, others | self.bits(cycle)))
 
     # -- power and reset ---------------------------------------------------------------------------------------------
+
+    def thaw(self, cycle: int) -> None:
+        """SCL may have come free meanwhile."""
+        super().thaw(cycle)
+        self._scl_moved(cycle, 0, self.wire.scl if self.wire.scl_high else 0)
 
     def give_back(self) -> None:
         """Both lines."""

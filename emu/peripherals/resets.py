@@ -37,6 +37,7 @@ class Resets(Peripheral):
             self.rcon.value = self.kit.chip.sfrs["RCON"].reset
             return
         self.rcon.value = kept
+        self.rcon["SWDTEN"] = 0  # the watchdog that software switched on ends with every reset
         self.rcon[cause] = 1
 
 

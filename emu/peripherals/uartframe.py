@@ -47,7 +47,7 @@ class Format:
         return bits | ((1 << self.stops) - 1) << self.first_stop
 
     def judge(self, sampled: int) -> int:
-        """Data and error marks of a sampled frame."""
+        """Data and error marks of a sampled frame. UNVERIFIED: with two stop bits the first one decides."""
         data = sampled >> 1 & (1 << self.data_bits) - 1
         parity = self.parity(data)
         marks = 0 if sampled >> self.first_stop & 1 else FRAMING_MARK

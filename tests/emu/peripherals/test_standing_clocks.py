@@ -184,6 +184,17 @@ def test_a_slower_tcy_does_not_delay_a_clock_switch():
     assert rig.dev.seconds(cycle) == pytest.approx(23 / 1_842_500 + 1024 / 7_372_800 + 20e-6, rel=0.2)
 
 
+def test_a_watchdog_that_software_switched_on_ends_with_a_reset():
+    """§4: SWDTEN is 0 after every reset; FWDTEN is not software's."""
+    rig, expired = Rig(fwdt=0x0000), []
+    rig.wires.reset = expired.append
+    rig.at(10).write("RCON", 0x0520)
+    rig.at(100).dev.reset("WDTO")
+    assert rig.read("RCON") == 0x0510
+    rig.at(100_000)
+    assert not expired
+
+
 # -- clock switches that something cuts short --------------------------------------------------------------------------
 
 
@@ -253,6 +264,25 @@ def test_sleep_cuts_a_reception_off():
     assert rig.field("U1STA", "URXDA") == 0
     rig.dev.uart[1].feed(b"B")
     assert rig.at(30_000).read("U1RXREG") == ord("B")
+
+
+@pytest.mark.parametrize("freed", [200, 400])
+def test_an_i2c_clock_that_comes_free_while_the_module_stands(freed):
+    """§11: the Start that waits for SCL begins when the module runs again, in the cycle behind the later of both."""
+    rig = Rig()
+    rig.write("I2CBRG", 150)
+    rig.write("I2CCON", 0xB000)
+    rig.at(5).write("I2CCON", 0xB001)
+    rig.at(1000).write("I2CCON", 0xB002)
+    rig.at(1001).dev.i2c.wire.hold(scl=True)
+    rig.at(3000)
+    rig.clear_flags()
+    rig.write("I2CTRN", 0x55)
+    rig.at(3100).dev.sleep(1, 3100)
+    rig.at(3100 + freed).dev.i2c.wire.release()
+    assert rig.at(9000).flag("MI2CIF") == 0
+    rig.dev.wake(9000)
+    assert rig.first_cycle(lambda: rig.flag("MI2CIF"), 9001, 12_000) == 9001 + 9 * 151
 
 
 def test_a_master_does_not_go_on_with_a_word_that_sleep_cut_off():
