@@ -102,7 +102,7 @@ class Nvm(Peripheral):
         program = self.kit.program
         self._operation.value = operation
         self._address.value = self.adru.value << 16 | self.adr.value
-        latches = program.flash_latch if operation in _FLASH else program.eeprom_latch
+        latches = program.eeprom_latch if operation in _EEPROM else program.flash_latch
         for index, word in enumerate(latches):
             self._data[index] = word
         end = self.now + 1 + round(BUSY_SECONDS * self.kit.fcy())
@@ -129,7 +129,7 @@ class Nvm(Peripheral):
         elif operation in _EEPROM:
             self._apply_eeprom(operation, address)
         elif address in self.kit.chip.program["config"]:
-            self.kit.program.put(address & ~1, self._data[address >> 1 & EEPROM_LATCHES - 1])
+            self.kit.program.put(address & ~1, self._data[address >> 1 & FLASH_LATCHES - 1])
         if not operation & _ERASING:
             self.kit.program.clear_latches()
 

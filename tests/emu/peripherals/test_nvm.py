@@ -145,3 +145,13 @@ def test_rows_outside_the_array_are_ignored(rig):
     rig.at(100000)
     assert bytes(rig.program.flash) == before
     assert rig.flag("NVMIF")
+
+
+@pytest.mark.parametrize(("address", "value"), [(0xF80002, 0x7FFF), (0xF80006, 0x310F), (0xF8000C, 0x4003)])
+def test_a_configuration_word_gets_what_a_table_write_left(rig, address, value):
+    """§16 NVMCON 0x4008: the latch of its address, in which 0xFFFF would switch the watchdog on (§2)."""
+    latch(rig, address, value)
+    begun = start(rig, 100, 0x4008)
+    rig.at(begun + 1 + TWO_MS)
+    assert rig.flag("NVMIF")
+    assert rig.program.word(address) == value
