@@ -71,7 +71,7 @@ def test_pixels_are_the_colours_of_what_is_seen_with_noise(
 
 
 def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering_image: Path, alone: Scene) -> None:
-    """docs/experiment.md §2: both were measured on the firmware, the look to a tenth of a millisecond; the latency
+    """docs/experiment.md §2: both were measured on the firmware, the look to a fifth of a millisecond; the latency
     changes with the kernel, to a quarter."""
     brain = EmulatedBrain(alone, 1, 0, clustering_image, SELECTOR["A"] | AT_ONCE)
     world = World(alone, 1)
@@ -90,7 +90,7 @@ def test_the_scripted_sensor_has_the_firmwares_first_look_and_latency(clustering
         tick += 1
         assert tick < 1000
     middle = (WINDOW_ROWS[0] + WINDOW_ROWS[-1]) // 2
-    assert rows[middle] == pytest.approx(FIRST_LOOK_TCY, abs=FCY // 10_000)
+    assert rows[middle] == pytest.approx(FIRST_LOOK_TCY, abs=FCY // 5_000)
     seen = brain.machine.cycle  # within the quantum in which it happened
     margin = FCY // 4_000
     assert seen - alone.clock.quantum_tcy - margin <= FIRST_LOOK_TCY + LATENCY_TCY <= seen + margin
