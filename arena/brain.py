@@ -19,8 +19,8 @@ LATENCY_TCY: Final = 258_484
 """From the middle of the window's rows to the new wheel speed, 17.5 ms, and"""
 FIRST_LOOK_TCY: Final = 853_232
 """from power-on to the first such row: both as the `clustering` firmware does it, which reads the region to its end
-(16.4 ms) before it answers. tests/arena/test_emulated.py measures both. Published trials were run with these numbers, so
-they stay; the firmware's first look is at 855,484, 0.15 ms later, since its camera has a register's value with the last bit.
+(16.4 ms) before it answers. tests/arena/test_emulated.py measures both. Published trials were run with these numbers,
+so they stay; the firmware looks at 855,484, 0.15 ms later, since its camera has a register's value with the last bit.
 """
 OK_DECODED_TCY: Final = 354_275
 """From there until the `clustering` firmware has understood it, 24.0 ms; the bare one needs 345,804."""
