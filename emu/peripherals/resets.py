@@ -73,11 +73,11 @@ class Watchdog(Peripheral):
 
     @property
     def period(self) -> int:
-        """Time-out in Tcy: 2 ms x A x B (§4)."""
+        """Time-out in Tcy, at least 1: 2 ms x A x B (§4), where a Tcy may take 8 ms."""
         word = self.kit.chip.config["FWDT"]
         stored = self.kit.program.setting("FWDT")
         counts = _COUNTER * _PRESCALE_A[word.field(stored, "FWPSA")] * (word.field(stored, "FWPSB") + 1)
-        return round(counts / WDT_HZ * self.kit.fcy())
+        return max(round(counts / WDT_HZ * self.kit.fcy()), 1)
 
     def clear(self, cycle: int) -> None:
         """CLRWDT or PWRSAV in `cycle`: counter and prescalers restart, WDTO falls (§4)."""

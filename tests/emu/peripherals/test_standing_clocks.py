@@ -184,6 +184,17 @@ def test_a_slower_tcy_does_not_delay_a_clock_switch():
     assert rig.dev.seconds(cycle) == pytest.approx(23 / 1_842_500 + 1024 / 7_372_800 + 20e-6, rel=0.2)
 
 
+def test_a_watchdog_faster_than_the_cpu_ends_idle_at_once():
+    """§3, §4: 32 kHz through 64: a Tcy is 7.8 ms, the time-out 2 ms."""
+    rig, woken = Rig(fosc=0x4006, fwdt=0x8000), []
+    rig.wires.wake = lambda: woken.append(rig.events.now)
+    unlock(rig, 5, 0xC0, LOW)
+    assert rig.dev.fcy == 128
+    rig.dev.sleep(1, 7)
+    rig.at(10)
+    assert woken == [8, 9, 10]
+
+
 def test_a_watchdog_that_software_switched_on_ends_with_a_reset():
     """§4: SWDTEN is 0 after every reset; FWDTEN is not software's."""
     rig, expired = Rig(fwdt=0x0000), []
