@@ -61,7 +61,7 @@ class Peripherals:
         self.adc: Final = Adc(chip.adc, kit, self.interrupts, self.timer)
         self.external.on_int0 = self.adc.int0
         self.oscillator.before_change.append(self.adc.clock_changes)
-        self.oscillator.on_change += [self.adc.clock_changed, self.nvm.clock_changed]
+        self.oscillator.on_change.extend((self.adc.clock_changed, self.nvm.clock_changed))
         self.spi: Final = {site.number: Spi(site, kit, self.interrupts, self.ports) for site in chip.spis}
         self.capture: Final = {site.number: Capture(site, kit, self.interrupts, self.timer) for site in chip.captures}
         self.compare: Final = {
