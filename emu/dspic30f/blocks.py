@@ -116,8 +116,8 @@ class BlockWriter:
         start = self._cycle + flowrules.stall(source.stall if self._visited else 0, facts.source_pointers)
         source.begin(pc, self._cycle, start + facts.access)
         flow: Flow = insn.row.does(source, insn.x)
-        if last_of_loop and source.writes_modes:
-            raise _Ends  # where the loop goes on is in the registers, not in this translation
+        if self._loop is not None and source.writes_modes:
+            raise _Ends  # where the loop goes on, or that it ends here, is in the registers, not in this translation
         source.commit()
         source.at_entry = False
         self._visited.add(pc)
