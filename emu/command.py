@@ -49,6 +49,20 @@ def seconds(text: str) -> Fraction:
     raise argparse.ArgumentTypeError(f"expected seconds above 0, like 5 or 0.25, not {text!r}")
 
 
+def count(text: str) -> int:
+    """A number of things, 0 or more. Raises argparse's error otherwise."""
+    if re.fullmatch(r"\d{1,9}", text, re.ASCII):
+        return int(text)
+    raise argparse.ArgumentTypeError(f"expected a number, 0 or more, not {text!r}")
+
+
+def port(text: str) -> int:
+    """A TCP port of this machine. Raises argparse's error for anything else."""
+    if re.fullmatch(r"\d{1,5}", text, re.ASCII) and int(text) < 1 << 16:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"expected a port from 0 to 65535, not {text!r}")
+
+
 def cycles(text: str) -> int:
     """A number of instruction cycles above 0, decimal or 0x. Raises argparse's error otherwise."""
     if re.fullmatch(r"\d{1,18}|0x[0-9a-fA-F]{1,15}", text):

@@ -109,7 +109,7 @@ def set_up(machine: Machine, options: argparse.Namespace) -> None:
 
         try:
             board.stimulus.load(Path(options.stimulus))
-        except (StimulusError, UnicodeDecodeError) as error:
+        except StimulusError as error:
             raise CommandError(str(error)) from None
 
 

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.boards import BOARDS
-from emu.command import CommandError, Parser
+from emu.command import CommandError, Parser, port
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.status import DONE
 
@@ -37,7 +37,7 @@ input."""
 
 def parser() -> Parser:
     made = Parser("debug", DESCRIPTION, "emu debug --port 4711    or    emu debug --tui firmware.elf --selector 3")
-    made.add_argument("--port", metavar="N", type=int, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
+    made.add_argument("--port", metavar="N", type=port, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
     made.add_argument("--once", action="store_true", help="with --port: end after the first client")
     made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file here; what follows is for that")
     made.add_argument("--engine", default="auto", help="auto, jit, interp or plain (default auto)")

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any
 
-from emu.command import CommandError, Parser
+from emu.command import CommandError, Parser, count
 from emu.commands.cycles import add_baseline_arguments, verdict
 from emu.footprint import UNKNOWN, Piece, pieces, totals
 from emu.image import Image
@@ -32,7 +32,7 @@ def parser() -> Parser:
         "emu footprint firmware.elf --symbols 20",
     )
     made.add_argument("image", metavar="IMAGE", help="ELF executable")
-    made.add_argument("--symbols", metavar="N", type=int, default=15, help="how many symbols to list (default 15)")
+    made.add_argument("--symbols", metavar="N", type=count, default=15, help="how many symbols to list (default 15)")
     made.add_argument("--json", action="store_true", help="print one JSON object with every symbol")
     add_baseline_arguments(made)
     return made

@@ -14,7 +14,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final, TextIO
 
-from emu.command import CommandError, Parser
+from emu.command import CommandError, Parser, count
 from emu.commands.image_option import add_chip_option, image_of
 from emu.coverage import fingerprint
 from emu.files import whole_text_file
@@ -62,7 +62,7 @@ def parser() -> Parser:
     made.add_argument("--jobs", metavar="N", type=_jobs, default=1, help="processes (default 1)")
     made.add_argument("--state", metavar="FILE", type=Path, help="keep what is done, and go on from it")
     made.add_argument("--out", metavar="FILE", help="write one line for every trial, CSV")
-    made.add_argument("--only", metavar="N", type=int, help="run trial N alone and print it")
+    made.add_argument("--only", metavar="N", type=count, help="run trial N alone and print it")
     made.add_argument("--json", action="store_true", help="print one JSON object")
     made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep native code there, not in the cache")
     return made

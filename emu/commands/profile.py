@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
 
-from emu.command import CommandError, Parser, seconds
+from emu.command import CommandError, Parser, count, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.files import whole_text_file
@@ -46,7 +46,7 @@ def parser() -> Parser:
     )
     made.add_argument("--seconds", metavar="S", type=seconds, default=Fraction(1), help="simulated time (default 1)")
     made.add_argument("--group", metavar="NAME=PATTERN,...", action="append", default=[], type=_group, help="see above")
-    made.add_argument("--top", metavar="N", type=int, default=20, help="functions to print (default 20; 0: all)")
+    made.add_argument("--top", metavar="N", type=count, default=20, help="functions to print (default 20; 0: all)")
     made.add_argument("--callgrind", metavar="FILE", help="write calls and lines in Callgrind's format")
     made.add_argument("--speedscope", metavar="FILE", help="write a timeline for speedscope")
     made.add_argument("--perfetto", metavar="FILE", help="write a timeline for Perfetto (Trace Event Format)")

@@ -103,6 +103,7 @@ def run(options: argparse.Namespace) -> int:
     for warning in image.warnings:
         print(f"emu run: warning: {image.path}: {warning}", file=sys.stderr)
     machine = _machine(options, image)
+    native = _native(machine, options.dump_native) if options.dump_native else None
     replay = _replay(options, machine) if options.replay else []
     captured: dict[int, bytearray] = {}
     with ExitStack() as stack:
@@ -146,23 +147,30 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(facts | {"status": status}))
     else:
         _print_end(facts, stop)
-    if options.dump_native:
-        _dump_native(machine, image, options.dump_native)
+    if native is not None:
+        _dump_native(native, machine, image, options.dump_native)
     return status
 
 
-def _dump_native(machine: Machine, image: Image, text: str) -> None:
-    """Print what native code was made for a place. Raises CommandError if there is no such place or no such code."""
-    from emu.disassembly import instruction
-    from emu.dspic30f.jit.dump import dump
+def _native(machine: Machine, text: str) -> int:
+    """The place of which native code is wanted. Raises CommandError if there is none, or there will be no such code."""
     from emu.dspic30f.jit.engine import JitEngine
 
     if not isinstance(machine.runner, JitEngine):
         raise CommandError(f"--dump-native: the engine {machine.engine} makes no native code")
     try:
-        address = machine.program_address(int(text, 16) if text.lower().startswith("0x") else text)
+        return machine.program_address(int(text, 16) if text.lower().startswith("0x") else text)
     except (KeyError, ValueError) as error:
         raise CommandError(f"--dump-native: {error.args[0]}") from None
+
+
+def _dump_native(address: int, machine: Machine, image: Image, text: str) -> None:
+    """Print what native code was made for a place. Raises CommandError if none was."""
+    from emu.disassembly import instruction
+    from emu.dspic30f.jit.dump import dump
+    from emu.dspic30f.jit.engine import JitEngine
+
+    assert isinstance(machine.runner, JitEngine)  # _native has looked
 
     def naming(pc: int, insn: Insn) -> str:
         item = instruction(image, pc, insn.word1, insn.word2)

@@ -212,6 +212,7 @@ class Debuggee:
         frames = self.inside.frames()
         entry = frames[0].raw.entry if frames else None
         line = self._line()
+        has_entered = False
         for _ in range(LOOK_STEPS * 100):
             if self._wanted():
                 return Halt("pause")
@@ -222,11 +223,15 @@ class Debuggee:
             top = self.machine.w[STACK_POINTER]
             if here is None:
                 continue
+            start = self.inside.start_of(self.machine.pc)
+            if start is not None and self.machine.pc < self.inside.body_of(start):
+                has_entered = True
+                continue
             if entry is not None and top < entry:
                 return Halt("step")
             if (here.file, here.line) != (line and (line.file, line.line)) and here.start == self.machine.pc:
                 return Halt("step")
-            if into and self.machine.pc == self.inside.start_of(self.machine.pc):
+            if into and (has_entered or self.machine.pc == start):
                 return Halt("step")
         return Halt("step")
 

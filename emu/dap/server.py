@@ -339,7 +339,8 @@ class Server(Looking):
         made = []
         for one in arguments["breakpoints"]:
             try:
-                places: tuple[int, ...] = (self._debuggee.machine.program_address(one["name"]),)
+                start = self._debuggee.machine.program_address(one["name"])
+                places: tuple[int, ...] = (self._debuggee.inside.body_of(start),)
             except KeyError:
                 places = ()
             made.append(self._breakpoint(one, "function", places, problem=f"there is no function {one['name']}"))

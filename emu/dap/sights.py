@@ -222,7 +222,8 @@ class Sources:
         for row in rows:
             if row.line == behind[0]:
                 start = self._inside.start_of(row.start)
-                found[start] = min(found.get(start, row.start), row.start)
+                place = row.start if row.start != start else self._inside.body_of(start)
+                found[start] = min(found.get(start, place), place)
         return behind[0], tuple(sorted(found.values()))
 
 

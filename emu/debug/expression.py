@@ -2,69 +2,37 @@
 
 What enters: a text and the frame it is meant in. What leaves: a `Value` where it names a place, else a number. Nothing
 is changed. Names are looked up in this order: locals, the file's own, globals, symbols without type, enumerators,
-registers (SFRs by their names and fields, `W0` to `W15`, `PC`), and `cycle`.
+registers (SFRs by their names and fields, `W0` to `W15`, `PC`), and `cycle`. Numbers are computed as C does
+(`numbers.py`): `now - then` of two unsigned ints is one, pointers count in what they point to.
 """
 
 from __future__ import annotations
 
-import operator
 import re
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, Final
 
 from emu.debug.inside import Frame, Inside, Value
 from emu.debug.locate import Piece
+from emu.debug.numbers import BINARY, FLOATING, INT, Number, complemented, computed, negated, promoted, whole
 from emu.debug.types import UNSIGNED, Type
 
 TOKEN: Final = re.compile(
-    r"\s*(?:(0[xX][0-9a-fA-F]+|0[bB][01]+|\d+\.\d+|\d+)[uUlL]*|'(\\?.)'|(\$?[A-Za-z_]\w*)"
+    r"\s*(?:((?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?[fFlL]?|\d+[eE][-+]?\d+[fFlL]?)|((?:0[xX][0-9a-fA-F]+|0[bB][01]+|\d+)[uUlL]*)"
+    r"|'(\\x[0-9a-fA-F]+|\\[0-7]{1,3}|\\.|[^'\\])'|(\$?[A-Za-z_]\w*)"
     r"|(->|<<|>>|<=|>=|==|!=|&&|\|\||[-+*/%&|^~!<>()\[\].?:]))"
 )
-WIDEST: Final = 64
-"""Bits of the longest type: a shift by as many means nothing in C, and one by 10^10 would fill the memory."""
+KINDS: Final = ("fraction", "number", "letter", "name", "sign")
+"""Of the groups of TOKEN."""
 DEEPEST: Final = 50
-"""Brackets and signs inside one another."""
+"""Brackets, signs and choices inside one another."""
+ESCAPES: Final = dict(zip("abfnrtv\\'\"?", (7, 8, 12, 10, 13, 9, 11, 92, 39, 34, 63), strict=True))
 
 
-def _within(bits: int) -> int:
-    """A count of a shift. Raises ValueError."""
-    if not 0 <= bits < WIDEST:
-        raise ValueError(f"a shift by {bits} bits; expected 0 to {WIDEST - 1}")
-    return bits
-
-
-def _quotient(a: Any, b: Any) -> int:
-    """Towards zero, as C divides; exact for whole numbers of any size."""
-    if isinstance(a, float) or isinstance(b, float):
-        return int(a / b)
-    size: int = abs(a) // abs(b)
-    return size if (a < 0) == (b < 0) else -size
-
-
-BINARY: Final[dict[str, tuple[int, Callable[[Any, Any], Any]]]] = {
-    "||": (1, lambda a, b: int(bool(a) or bool(b))),
-    "&&": (2, lambda a, b: int(bool(a) and bool(b))),
-    "|": (3, operator.or_),
-    "^": (4, operator.xor),
-    "&": (5, operator.and_),
-    "==": (6, lambda a, b: int(a == b)),
-    "!=": (6, lambda a, b: int(a != b)),
-    "<": (7, lambda a, b: int(a < b)),
-    ">": (7, lambda a, b: int(a > b)),
-    "<=": (7, lambda a, b: int(a <= b)),
-    ">=": (7, lambda a, b: int(a >= b)),
-    "<<": (8, lambda a, b: operator.lshift(a, _within(b))),
-    ">>": (8, lambda a, b: operator.rshift(a, _within(b))),
-    "+": (9, operator.add),
-    "-": (9, operator.sub),
-    "*": (10, operator.mul),
-    "/": (10, lambda a, b: a / b if isinstance(a, float) or isinstance(b, float) else _quotient(a, b)),
-    "%": (10, lambda a, b: a - b * _quotient(a, b)),
-}
-WHOLE: Final = ("|", "^", "&", "<<", ">>", "%")
-"""Operators for whole numbers only."""
-ESCAPES: Final = {"n": 10, "r": 13, "t": 9, "0": 0, "\\": 92, "'": 39}
+NOTHING: Final = Number(0)
+"""What is not evaluated."""
 
 
 class ExpressionError(ValueError):
@@ -79,7 +47,7 @@ def tokens(text: str) -> tuple[tuple[str, str], ...]:
         match = TOKEN.match(text, place)
         if match is None:
             raise ExpressionError(f"{text!r}: {text[place:].strip()!r} is not understood")
-        kind = ("number", "letter", "name", "sign")[(match.lastindex or 1) - 1]
+        kind = KINDS[(match.lastindex or 1) - 1]
         found.append((kind, match[match.lastindex or 1]))
         place = match.end()
     if not found:
@@ -90,10 +58,11 @@ def tokens(text: str) -> tuple[tuple[str, str], ...]:
 def evaluate(inside: Inside, text: str, frame: Frame | None = None) -> Value | int | float:
     """What `text` means in `frame`. Raises ExpressionError, locate.Unavailable."""
     parser = _Parser(inside, text, frame)
-    result: Value | int | float = parser.expression(0)
+    result = parser.expression(0)
     if parser.at < len(parser.tokens):
         raise ExpressionError(f"{text!r}: {parser.tokens[parser.at][1]!r} is too much")
-    return result
+    found: Value | int | float = result.value if isinstance(result, Number) else result
+    return found
 
 
 def number_of(result: Value | int | float) -> Any:
@@ -130,17 +99,28 @@ class _Parser:
         left = self.unary()
         while (sign := self._peek()) in BINARY and BINARY[sign][0] > lowest:
             self.at += 1
-            rank, compute = BINARY[sign]
             decides = {"||": True, "&&": False}.get(sign)
-            right = self._unless(decides is not None and bool(self._number(left)) == decides, rank)
-            left = self._computed(sign, compute, left, right)
+            right = self._unless(decides is not None and bool(self._number(left).value) == decides, BINARY[sign][0])
+            left = self._computed(sign, left, right)
         if not lowest and self._take("?"):
-            holds = bool(self._number(left))
-            yes = self._unless(not holds, 0)
-            self._need(":")
-            no = self._unless(holds, 0)
-            return yes if holds else no
+            with self._deeper():
+                holds = bool(self._number(left).value)
+                yes = self._unless(not holds, 0)
+                self._need(":")
+                no = self._unless(holds, 0)
+                return yes if holds else no
         return left
+
+    @contextmanager
+    def _deeper(self) -> Iterator[None]:
+        """Inside of something. Raises ExpressionError beyond DEEPEST."""
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise ExpressionError(f"more than {DEEPEST} brackets or signs inside one another")
+        try:
+            yield
+        finally:
+            self.depth -= 1
 
     def _unless(self, decided: bool, lowest: int) -> Any:
         """An expression that is not evaluated if it is `decided` without it."""
@@ -150,65 +130,71 @@ class _Parser:
         finally:
             self.skips = before
 
-    def _computed(self, sign: str, compute: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
+    def _computed(self, sign: str, left: Any, right: Any) -> Any:
         if self.skips:
-            return 0
-        if sign in ("+", "-") and isinstance(left, Value) and left.type.bare.kind == "pointer":
-            count = self._number(right)
-            if isinstance(count, int) and not (isinstance(right, Value) and right.type.bare.kind == "pointer"):
-                step = max(left.type.bare.target.bytes, 1) if left.type.bare.target is not None else 1
-                return _constant(left.type, compute(self._number(left), count * step) & 0xFFFF, self.inside)
+            return NOTHING
+        one, other = self._decayed(left), self._decayed(right)
+        if sign == "+" and _points(other) and not _points(one):
+            one, other = other, one
         try:
-            one, other = self._number(left), self._number(right)
-            if sign in WHOLE:
-                self._whole(sign, one, other)
-            return compute(one, other)
+            if sign in ("+", "-") and _points(one):
+                step = max(one.type.bare.target.bytes, 1) if one.type.bare.target is not None else 1
+                if not _points(other):
+                    distance = self._whole(sign, self._number(other)) * step
+                    address = one.get() + (distance if sign == "+" else -distance)
+                    return _constant(one.type, address & 0xFFFF, self.inside)
+                if sign == "-":
+                    return computed("/", Number(one.get() - other.get()), Number(step))
+            return computed(sign, self._number(one), self._number(other))
         except (ArithmeticError, TypeError, ValueError) as error:
             raise ExpressionError(f"{self.text!r}: {error}") from None
 
-    def _number(self, value: Any) -> Any:
-        if isinstance(value, Value):
-            if value.type.bare.kind == "array" and value.address is not None:
-                return value.address
-            if not value.type.is_number:
-                raise ExpressionError(f"{self.text!r}: a {value.type} is no number")
-            return value.get()
+    def _decayed(self, value: Any) -> Any:
+        """An array is a pointer to its first element where a number is meant."""
+        if isinstance(value, Value) and value.type.bare.kind == "array" and value.address is not None:
+            pointer = Type("pointer", size=2, target=value.type.bare.target)
+            return _constant(pointer, value.address, self.inside)
         return value
 
-    def _whole(self, sign: str, *numbers: Any) -> None:
-        if any(isinstance(one, float) for one in numbers):
+    def _number(self, value: Any) -> Number:
+        value = self._decayed(value)
+        if isinstance(value, Value):
+            if not value.type.is_number:
+                raise ExpressionError(f"{self.text!r}: a {value.type} is no number")
+            return promoted(value.get(), value.type, value.bits[0] if value.bits is not None else 0)
+        assert isinstance(value, Number)
+        return value
+
+    def _whole(self, sign: str, number: Number) -> int:
+        if not isinstance(number.value, int):
             raise ExpressionError(f"{self.text!r}: {sign} needs whole numbers")
+        return number.value
 
     def unary(self) -> Any:
-        self.depth += 1
-        if self.depth > DEEPEST:
-            raise ExpressionError(f"more than {DEEPEST} brackets or signs inside one another")
-        try:
+        with self._deeper():
             return self._signed()
-        finally:
-            self.depth -= 1
 
     def _signed(self) -> Any:
         if self._take("-"):
-            return -self._number(self.unary())
+            return negated(self._number(self.unary()))
         if self._take("+"):
             return self._number(self.unary())
         if self._take("~"):
             number = self._number(self.unary())
             self._whole("~", number)
-            return ~number
+            return complemented(number)
         if self._take("!"):
-            return int(not self._number(self.unary()))
+            return Number(int(not self._number(self.unary()).value))
         if self._take("*"):
             return self._part(self.unary(), 0)
         if self._take("&"):
             return self._address(self.unary())
         return self.postfix()
 
-    def _address(self, value: Any) -> Value | int:
+    def _address(self, value: Any) -> Value | Number:
         if self.skips:
-            return 0
-        if not isinstance(value, Value) or value.address is None:
+            return NOTHING
+        if not isinstance(value, Value) or value.address is None or value.bits is not None:
             raise ExpressionError(f"{self.text!r}: that has no address")
         return _constant(Type("pointer", size=2, target=value.type), value.address, self.inside)
 
@@ -216,10 +202,11 @@ class _Parser:
         value = self.primary()
         while True:
             if self._take("["):
-                index = self._number(self.expression(0))
+                index = self.expression(0)
                 self._need("]")
-                self._whole("[]", index)
-                value = self._part(value, index)
+                if isinstance(value, Number) and _points(self._decayed(index)):
+                    value, index = index, value
+                value = self._part(value, self._whole("[]", self._number(index)))
             elif self._take("->"):
                 value = self._part(self._part(value, 0), self._name())
             elif self._take("."):
@@ -227,11 +214,11 @@ class _Parser:
             else:
                 return value
 
-    def _part(self, value: Any, part: str | int) -> Value | int:
+    def _part(self, value: Any, part: str | int) -> Value | Number:
         if self.skips:
-            return 0
-        if isinstance(value, int) and part == 0:
-            return Value(UNSIGNED[2], (Piece("memory", value & 0xFFFF),), self.inside.view(self.frame), "")
+            return NOTHING
+        if isinstance(value, Number) and isinstance(value.value, int) and part == 0:
+            return Value(UNSIGNED[2], (Piece("memory", value.value & 0xFFFF),), self.inside.view(self.frame), "")
         if not isinstance(value, Value):
             raise ExpressionError(f"{self.text!r}: a number has no parts")
         sfr = self.inside.image.chip.sfrs.get(value.name) if isinstance(part, str) else None
@@ -258,17 +245,43 @@ class _Parser:
             raise ExpressionError(f"{self.text!r}: it ends too early")
         kind, text = self.tokens[self.at]
         self.at += 1
+        if kind == "fraction":
+            return Number(float(text.rstrip("fFlL")), FLOATING)
         if kind == "number":
-            return float(text) if "." in text else int(text, 0) if text.strip("0") else 0
+            return self._literal(text)
         if kind == "letter":
-            return ESCAPES.get(text[1], ord(text[1])) if len(text) == 2 else ord(text)
+            return self._letter(text)
         if kind == "name":
             return self.named(text)
         raise ExpressionError(f"{self.text!r}: {text!r} is not expected there")
 
+    def _literal(self, text: str) -> Number:
+        digits = text.rstrip("uUlL")
+        suffix = text[len(digits) :].lower()
+        is_decimal = not digits.startswith("0")
+        try:
+            value = int(digits, 10 if is_decimal else 0 if digits[1:2].lower() in ("x", "b") else 8)
+            return whole(
+                value, unsigned="u" in suffix, size=(INT, 4, 8)[min(suffix.count("l"), 2)],
+                may_be_unsigned=not is_decimal or value >= 1 << 63,
+            )  # fmt: skip
+        except ValueError:
+            raise ExpressionError(f"{text[:40]!r} is no number of C, or too large for any type") from None
+
+    def _letter(self, text: str) -> Number:
+        if text[:1] != "\\":
+            code = ord(text)
+        elif text[1] in "x01234567":
+            code = int(text[2:], 16) if text[1] == "x" else int(text[1:], 8)
+        else:
+            code = ESCAPES.get(text[1], -1)
+        if not 0 <= code < 256:
+            raise ExpressionError(f"{self.text!r}: '{text}' is no char")
+        return Number(code - 256 if code >= 128 else code)
+
     def named(self, name: str) -> Any:
         if self.skips:
-            return 0
+            return NOTHING
         inside = self.inside
         variable = inside.variable(name, self.frame) if not name.startswith("$") else None
         if variable is not None:
@@ -280,20 +293,24 @@ class _Parser:
         if symbol is not None:
             return symbol
         if name in inside.debug.constants:
-            return inside.debug.constants[name]
+            return whole(inside.debug.constants[name], may_be_unsigned=True)
         if register is not None:
             return Value(UNSIGNED[2], (Piece("register", int(register[1])),), inside.view(self.frame), bare)
         if sfr is not None:
             place = (Piece("memory", sfr.address),)
             return Value(UNSIGNED[sfr.size], place, inside.view(self.frame), bare.removesuffix("bits"))
         if bare.lower() == "pc":
-            return self.frame.pc if self.frame is not None else inside.machine.pc
+            return Number(self.frame.pc if self.frame is not None else inside.machine.pc, UNSIGNED[4])
         if bare == "cycle":
-            return inside.machine.cycle
+            return Number(inside.machine.cycle, UNSIGNED[8])
         function = inside.image.symbols.find(name)
         if function is not None:
-            return function.address
+            return Number(function.address, UNSIGNED[4])
         raise ExpressionError(f"there is nothing called {name!r} here")
+
+
+def _points(value: Any) -> bool:
+    return isinstance(value, Value) and value.type.bare.kind == "pointer"
 
 
 def _constant(kind: Type, number: int, inside: Inside) -> Value:

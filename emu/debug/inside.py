@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 REGISTERS: Final = 16
 STACK_POINTER: Final = 15
+FRAME_BASED: Final = bytes([locate.FBREG])
+"""What the location of a variable in a frame begins with."""
 ABSENT: Final = bytes(locate.ADDR_0)
 """Where the linker puts what it leaves out."""
 
@@ -42,6 +44,8 @@ class Frame:
     scopes: tuple[Scope, ...]
     """Blocks and functions around `pc` that belong to this entry, outermost first; empty without debug information."""
     raw: Raw
+    at: int
+    """Where its variables are looked up: `pc`, but inside the call for a frame that waits for one."""
 
     def __str__(self) -> str:
         where = f" ({self.line})" if self.line is not None else ""
@@ -57,6 +61,7 @@ class Inside:
         self.machine: Final = machine
         self.image: Final[Image] = machine.image
         self._starts: Final = [block.base for block in self.image.blocks if block.is_code]
+        self._bodies: Final[dict[int, int]] = {}
         self._ends: Final = [block.end for block in self.image.blocks if block.is_code]
 
     @cached_property
@@ -90,6 +95,20 @@ class Inside:
             return next(start for start, end in function.ranges if start <= pc < end)
         symbol = self.image.symbols.code(pc)
         return symbol[0].address if symbol is not None else None
+
+    def body_of(self, start: int) -> int:
+        """Where the function that begins at `start` has its frame, parameters stored; `start` if it needs none.
+
+        What makes a frame is a row of its own in the line table, that of the function's opening line."""
+        if start not in self._bodies:
+            self._bodies[start] = self._behind_frame(start)
+        return self._bodies[start]
+
+    def _behind_frame(self, start: int) -> int:
+        function, first = self.debug.function(start), self.image.lines.find(start)
+        if function is None or first is None or first.start != start or not has_frame(function):
+            return start
+        return first.end if (start, first.end) not in function.ranges else start
 
     def is_handler(self, start: int | None) -> bool:
         """Whether exceptions enter at `start`."""
@@ -139,7 +158,7 @@ class Inside:
         function = self.debug.function(at)
         kind = "interrupt" if raw.is_handler else "call"
         if function is None:
-            yield Frame(raw.pc, self.name_of(at), line, kind, (), raw)
+            yield Frame(raw.pc, self.name_of(at), line, kind, (), raw, at)
             return
         scopes = function.chain(at)
         while True:
@@ -147,7 +166,7 @@ class Inside:
             own = scopes[first]
             inlined = own.kind == "inlined"
             name = own.name or self.name_of(at)
-            yield Frame(raw.pc, name, line, "inlined" if inlined else kind, tuple(scopes[first:]), raw)
+            yield Frame(raw.pc, name, line, "inlined" if inlined else kind, tuple(scopes[first:]), raw, at)
             if not inlined:
                 return
             line = Line(at, at + 2, own.call_file, own.call_line) if own.call_line else line
@@ -197,6 +216,8 @@ class Inside:
             raise locate.Unavailable("optimised out")
         if code == ABSENT:
             raise locate.Unavailable("not in the program: nothing uses it")
+        if lives_in_frame(variable) and (start := self.start_of(view.pc)) is not None and view.pc < self.body_of(start):
+            raise locate.Unavailable("not set yet: the function is being entered")
         return Value(variable.type, locate.pieces_of(code, view, lambda: self._frame_base(frame)), view, variable.name)
 
     def _frame_base(self, frame: Frame | None) -> int:
@@ -224,6 +245,17 @@ class Inside:
         return Value(kind, (locate.Piece("memory", found.address),), self.view(), name)
 
 
+def lives_in_frame(variable: Variable) -> bool:
+    """Whether its place is one of the function's frame, all the time."""
+    entries = variable.location.entries if variable.location is not None else ()
+    return len(entries) == 1 and entries[0][0] is None and entries[0][2][:1] == FRAME_BASED
+
+
+def has_frame(scope: Scope) -> bool:
+    """Whether some variable of a function lives in its frame."""
+    return any(map(lives_in_frame, scope.variables)) or any(map(has_frame, scope.inner))
+
+
 class FrameView:
     """`locate.View` of one frame: registers as it left them, memory as it is."""
 
@@ -237,9 +269,7 @@ class FrameView:
     @property
     def pc(self) -> int:
         """Where variables are looked up: inside the call of a frame that waits for one."""
-        if self.frame is None:
-            return self._machine.pc
-        return self.frame.pc if self._is_innermost else self.frame.pc - 2
+        return self._machine.pc if self.frame is None else self.frame.at
 
     def register(self, number: int) -> int | None:
         """Wn, None if it is not known in this frame."""
@@ -308,8 +338,10 @@ class Value:
         """Change it. Raises locate.Unavailable, ValueError for what does not fit, TypeError for aggregates."""
         if self.bits is not None:
             count, lsb = self.bits
-            mask = (1 << count) - 1 << lsb
-            word = int.from_bytes(self.data, "little") & ~mask | int(value) << lsb & mask
+            number, mask = int(value), (1 << count) - 1 << lsb
+            if not -(1 << count - 1) <= number < 1 << count:
+                raise ValueError(f"{number} does not fit into the {count} bits of {self.name}")
+            word = int.from_bytes(self.data, "little") & ~mask | number << lsb & mask
             locate.write(self.pieces, word.to_bytes(self.type.bytes, "little"), self._view)
             return
         locate.write(self.pieces, encode(self.type, value), self._view)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 LIT0, REG0, BREG0 = 0x30, 0x50, 0x70
+FBREG: Final = 0x91
 ADDR_0: Final = (0x03, 0, 0, 0, 0)
 """The expression that says address 0."""
 REGISTERS: Final = 32
@@ -192,7 +193,7 @@ class _Evaluation:
                 self.simple = Piece("register", self._leb(False))
             case 0x92:  # bregx
                 stack.append(self._based(self._leb(False)))
-            case 0x91:  # fbreg
+            case 0x91:  # FBREG
                 stack.append(self.frame_base() + self._leb(True))
             case 0x9C:  # call_frame_cfa
                 stack.append(self.frame_base())

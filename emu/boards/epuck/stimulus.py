@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import ast
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
@@ -34,7 +34,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.remote import KEYS
-from emu.boards.epuck.waveform import WaveformError, read_csv, read_vcd
+from emu.boards.epuck.waveform import WaveformError, moment, read_csv, read_vcd
 from emu.boards.part import Part
 from emu.boards.picture import read_picture
 from emu.files import read_file
@@ -76,14 +76,29 @@ def parse(board: Epuck, text: str, name: str = "stimulus") -> list[Step]:
     return sorted(steps, key=lambda step: step.cycle)
 
 
+def decoded(data: bytes, name: str) -> str:
+    """Text of a stimulus file. Raises StimulusError."""
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        raise StimulusError(f"{name}: offset {error.start}: expected text, in UTF-8") from None
+
+
+def _lines(path: Path) -> Iterator[tuple[int, Fraction, list[str]]]:
+    data = path.read_bytes()
+    return read_vcd(data) if path.suffix == ".vcd" else read_csv(decoded(data, str(path)))
+
+
 def waveform(board: Epuck, path: Path) -> list[Step]:
-    """Steps of a VCD or CSV file in order of time. Raises StimulusError, OSError, UnicodeDecodeError."""
+    """Steps of a VCD or CSV file in order of time. Raises StimulusError, OSError."""
     steps: list[Step] = []
     number = 1
     try:
-        lines = read_vcd(path.read_bytes()) if path.suffix == ".vcd" else read_csv(path.read_text(encoding="utf-8"))
+        lines = _lines(path)
         for number, time, words in lines:
-            steps.append(Step(round(time * Fraction(board.chip.fcy)), number, _action(board, words)))
+            steps.append(Step(_cycle(board, time), number, _action(board, words)))
+    except StimulusError:
+        raise
     except WaveformError as error:
         raise StimulusError(f"{path}:{error.line}: {error}") from None
     except (ValueError, LookupError) as error:
@@ -91,19 +106,25 @@ def waveform(board: Epuck, path: Path) -> list[Step]:
     return sorted(steps, key=lambda step: step.cycle)
 
 
+LATEST: Final = 10**18
 _UNITS: Final = {"ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000), "s": Fraction(1)}
 
 
 def _time(board: Epuck, word: str) -> int:
     """Cycle of a time. Fractions are exact, so 0.1s is the same cycle on every host."""
     unit = next((unit for unit in _UNITS if word.endswith(unit)), "")
-    try:
-        value = Fraction(word.removesuffix(unit))
-    except (ValueError, ZeroDivisionError):
-        value = Fraction(-1)
+    value = moment(word.removesuffix(unit))
     if value < 0 or not (unit or value.denominator == 1):
         raise ValueError(f"a line begins with its time, like 1.5s, 200ms, 50us or a number of cycles, not {word!r}")
-    return round(value * _UNITS[unit] * Fraction(board.chip.fcy)) if unit else int(value)
+    return _cycle(board, value * _UNITS[unit]) if unit else int(value)
+
+
+def _cycle(board: Epuck, seconds: Fraction) -> int:
+    """Raises ValueError for a time that no clock reaches."""
+    cycle = round(seconds * Fraction(board.chip.fcy))
+    if cycle > LATEST:
+        raise ValueError("that is later than 10^18 cycles")
+    return cycle
 
 
 def _action(board: Epuck, words: list[str]) -> Action:
@@ -271,11 +292,11 @@ class Stimulus(Part):
 
     def load(self, path: Path) -> None:
         """Play the file at `path`, a script or a waveform. Call it when the machine has its image, whose clock
-        setting turns seconds into cycles. Raises StimulusError, OSError, UnicodeDecodeError."""
+        setting turns seconds into cycles. Raises StimulusError, OSError."""
         if path.suffix in (".vcd", ".csv"):
             self.play(waveform(self._board, path))
         else:
-            self.play(parse(self._board, read_file(path).decode(), str(path)))
+            self.play(parse(self._board, decoded(read_file(path), str(path)), str(path)))
 
     def play(self, steps: list[Step]) -> None:
         """Do `steps`, in order of time, from now on; steps of the past happen at once. Replaces an earlier script."""

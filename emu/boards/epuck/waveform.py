@@ -11,12 +11,17 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from fractions import Fraction
 from io import BytesIO, StringIO
 
 from emu.peripherals.pins import parse_pin
 
 UARTS = ("uart1", "uart2")
+MOMENT = re.compile(
+    r"\s*\+?(?:(?:\d{1,18}(?:\.\d{0,40})?|\.\d{1,40})(?:[eE][-+]?\d{1,2})?|\d{1,18}/\d{1,18})\s*", re.ASCII
+)
+"""A time. Its exponent has an end: 1e999999999 would be computed for hours."""
 Line = tuple[int, Fraction, list[str]]
 """Line of the file, time in s, and what happens, in the words of a script."""
 
@@ -29,35 +34,51 @@ class WaveformError(ValueError):
         self.line = line
 
 
+def moment(text: str) -> Fraction:
+    """A time as it is written, exactly; -1 for what is none, or not below 10^18."""
+    if MOMENT.fullmatch(text):
+        with suppress(ZeroDivisionError):
+            time = Fraction(text)
+            return time if time < 10**18 else Fraction(-1)
+    return Fraction(-1)
+
+
+def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Number of the last line and cells of each row. Raises WaveformError."""
+    rows = csv.reader(StringIO(text), skipinitialspace=True)
+    try:
+        for row in rows:
+            yield rows.line_num, row
+    except csv.Error as error:
+        raise WaveformError(rows.line_num, str(error)) from None
+
+
 def read_csv(text: str) -> Iterator[Line]:
     """Raises WaveformError."""
-    rows = csv.reader(StringIO(text), skipinitialspace=True)
-    names = next(rows, [])
+    rows = _rows(text)
+    _, names = next(rows, (1, []))
     if not names or names[0] != "time" or len(names) < 2:
         raise WaveformError(1, "expected names of columns: time, then pins, uart1 or uart2")
     for name in names[1:]:
         if name not in UARTS:
             _pin(name, 1)
-    for row in rows:
+    for line, row in rows:
         if not row:
             continue
         if len(row) != len(names):
-            raise WaveformError(rows.line_num, f"expected {len(names)} cells, found {len(row)}")
-        try:
-            time = Fraction(row[0])
-        except (ValueError, ZeroDivisionError):
-            time = Fraction(-1)
+            raise WaveformError(line, f"expected {len(names)} cells, found {len(row)}")
+        time = moment(row[0])
         if time < 0:
-            raise WaveformError(rows.line_num, f"expected a time in s, not {row[0]!r}")
+            raise WaveformError(line, f"expected a time in s, not {row[0]!r}")
         for name, cell in zip(names[1:], row[1:], strict=True):
             if cell and name in UARTS:
                 if not cell.isdecimal() or int(cell) > 255:
-                    raise WaveformError(rows.line_num, f"{name}: expected a byte, 0 to 255, not {cell!r}")
-                yield rows.line_num, time, [name, repr(chr(int(cell)))]
+                    raise WaveformError(line, f"{name}: expected a byte, 0 to 255, not {cell!r}")
+                yield line, time, [name, repr(chr(int(cell)))]
             elif cell:
                 if cell not in ("0", "1"):
-                    raise WaveformError(rows.line_num, f"{name}: a level is 0 or 1, not {cell!r}")
-                yield rows.line_num, time, ["pin", name, cell]
+                    raise WaveformError(line, f"{name}: a level is 0 or 1, not {cell!r}")
+                yield line, time, ["pin", name, cell]
 
 
 def read_vcd(data: bytes) -> Iterator[Line]:

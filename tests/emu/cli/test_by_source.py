@@ -9,6 +9,7 @@ import pytest
 
 import emu
 from emu.debug.calls import CallError
+from emu.debug.history import History
 from emu.debug.locate import Unavailable
 from emu.peripherals.expect import ExpectError
 from toolchain import driver
@@ -68,7 +69,26 @@ GLOBALS = [
     ("robot.name[1]", ord("p")),
     ("robot.big", 0x123456789ABC),
     ("robot.u.parts[1]", 0x41),
-    ("&robot.speed[1] - &robot.speed[0]", 2),
+    ("&robot.speed[1] - &robot.speed[0]", 1),
+    ("*(robot.speed + 1)", 300),
+    ("*(1 + &robot.speed[0])", 300),
+    ("1[robot.speed]", 300),
+    ("*(hidden + 2)", [5, 6]),
+    ("*(hidden[1] + 1) - *(robot.name + 1)", 4 - ord("p")),
+    ("&hidden[2][1] - hidden[0]", 5),
+    ("small - 201 < 0 && robot.place.flags - 6 < 0", 1),
+    ("U1MODE - 0x8001 == 0xFFFF && U1MODE - 0x8001 > 0", 1),
+    ("~U1MODE", 0x7FFF),
+    ("-U1MODE", 0x8000),
+    ("negative < U1MODE", 0),
+    ("0x8000 + 0x8001", 1),
+    ("30000 + 30000", 60000),
+    ("robot.big << 32", 0x56789ABC00000000),
+    ("robot.big * 0x10000 / 0x10000", 0x123456789ABC),
+    ("010 + 0b11 + 0x1fuL", 42),
+    ("'\\a' + '\\x41' + '\\101'", 137),
+    ("'\\xff'", -1),
+    ("1.5e1 + .5 + 2.f", 17.5),
     ("*(&robot.speed[0] + 1)", 300),
     ("hidden[2][0]", 5),
     ("table[3]", 40),
@@ -138,7 +158,12 @@ def test_what_is_set_is_had_back_and_nothing_else_changes(machine, expression, v
     ("expression", "words"),
     [("nobody", "nothing called 'nobody'"), ("robot.weight", "no member 'weight'"), ("robot +", "ends too early"),
      ("robot * 2", "is no number"), ("hidden[3]", "elements 0 to 2"), ("1 / 0", "zero"), ("small small", "too much"),
-     ("", "empty"), ("a ` b", "not understood"), ("&5", "no address"), ("5", "names no place")],
+     ("", "empty"), ("a ` b", "not understood"), ("&5", "no address"),
+     ("&robot.place.mode", "no address"), ("09", "no number of C"), ("9" * 5000, "no number of C"),
+     ("'\\q'", "no char"),
+     ("1?" * 4000 + "1" + ":1" * 4000, "inside one another"), ("robot.speed + 1.5", "needs whole numbers"),
+     ("robot.speed[1e0]", "needs whole numbers"),
+     ("5", "names no place")],
 )  # fmt: skip
 def test_what_means_nothing_is_refused(machine, expression, words):
     with pytest.raises(ValueError, match=re.escape(words)):
@@ -152,11 +177,55 @@ def test_what_the_linker_left_out_is_said_to_be(build):
 
 
 def test_values_that_do_not_fit_are_refused(machine):
-    for expression, value in (("small", 256), ("robot.speed[0]", -40000)):
+    long = [("small", 256), ("robot.speed[0]", -40000), ("robot.place.flags", 9), ("robot.place.low", 16)]
+    for expression, value in long:
         with pytest.raises(ValueError, match="does not fit"):
             machine.set_var(expression, value)
     with pytest.raises(TypeError, match="only numbers"):
         machine.set_var("robot", 1)
+
+
+INTERRUPTED = """
+extern volatile unsigned T1CON, PR1, IFS0, IEC0; volatile unsigned seen, sink, one = 1;
+void __attribute__((interrupt, no_auto_psv)) _T1Interrupt(void) { IFS0 = 0; seen++; }
+int main(void)
+{
+    PR1 = 60; IEC0 = 8; T1CON = 0x8000;
+    for (unsigned n = 0;; n++) {
+        unsigned a = n * 3 + one, b = a ^ 0x55, c = b + n;
+        sink = a; sink = b; if (c & one) { sink = c * a; } sink = c;
+    }
+}
+"""
+
+
+def test_who_is_interrupted_has_what_it_had_just_before(build):
+    """Also where a variable changes its place at that very instruction: there the frame does not wait for a call."""
+    machine = emu.load(build("-Os", source=INTERRUPTED), board=None)
+    machine.run(until="main")
+    inside = machine.inside
+
+    def locals_of(frame):
+        return [(one.name, shown(one, frame)) for one in inside.variables(frame)]
+
+    def shown(one, frame):
+        with contextlib.suppress(Unavailable):
+            return inside.value(one, frame).get()
+        return None
+
+    handler, history = machine.program_address("_T1Interrupt"), History(machine)
+    interrupted: set[int] = set()
+    before: list[tuple[str, int | None]] = []
+    while len(interrupted) < 12:
+        pc = machine.pc
+        history.step()
+        top, *callers = machine.backtrace()
+        if machine.pc == handler:
+            assert callers[0].pc == pc
+            assert locals_of(callers[0]) == before, hex(pc)
+            interrupted.add(pc)
+        elif top.function == "main":
+            before = locals_of(top)
 
 
 def test_locals_of_every_frame_at_O0(build):

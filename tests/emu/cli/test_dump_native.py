@@ -31,6 +31,12 @@ def test_the_code_of_a_place_shows_guest_addresses(spin: str, place: str, capsys
     assert re.search(r"# %b102\b", host)
 
 
+def test_what_is_nowhere_is_said_before_the_run(spin: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which has no end here."""
+    monkeypatch.setattr("emu.session.Session.run", lambda _session: pytest.fail("it ran"))
+    assert main(["run", spin, "--dump-native", "_nobody"]) == 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 import emu
+from emu.cli import main
 from emu.debug.history import History
 from emu.prompt.looking import TOPICS
 from emu.prompt.reader import Prompt, candidates, carry_out
@@ -69,6 +70,22 @@ def test_a_script_stops_looks_and_goes_back(play: type) -> None:
     assert out.endswith("no breakpoints\n")
 
 
+def test_a_function_has_its_parameters_where_it_stops(play: type) -> None:
+    """Also in a condition; before they are stored, they are not told from what was there."""
+    played = play("break add if a == 3", "run", "info locals", "reverse-stepi", "info locals", "delete",
+                  f"break {line_of('int twice(int n)') + 1} if n == 2", "restart", "run", "info locals", "step",
+                  "backtrace", "info locals")  # fmt: skip
+    assert played.status == 0, played.err
+    out = played.out
+    assert f"breakpoint 1\nadd at program.c:{line_of('int sum = a + b;')}, cycle " in out
+    assert "\na = 3\nb = 0\nsum = " in out
+    assert out.count(" = <not set yet: the function is being entered>\n") == 3
+    assert f"breakpoint 2\ntwice at program.c:{line_of('int once')}, cycle " in out
+    assert "\nn = 2\nonce = " in out
+    assert f"* #0 add at program.c:{line_of('int sum')}\n  #1 twice" in out
+    assert re.search(r"\na = 2\nb = 0\nsum = -?\d+\n$", out)
+
+
 def test_a_script_ends_with_the_first_command_that_fails(play: type) -> None:
     played = play("break main", "run", "print nonsense", "print total")
     assert played.status == 2
@@ -104,6 +121,16 @@ def test_what_cannot_be_done_is_told_in_one_line(play: type, line: str, told: st
     assert played.status == 2
     assert told in played.err
     assert played.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words", ["debug --port 99999", "profile x --top -1", "footprint x --symbols -1", "inject x --campaign x --only -1"]
+)
+def test_numbers_out_of_range_are_refused(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words.split())
+    assert ended.value.code == 2
+    assert re.search(r"expected a (port|number)\D", capsys.readouterr().err)
 
 
 def test_a_script_that_ends_at_a_fault_has_its_status(play: type) -> None:
@@ -144,7 +171,7 @@ def test_memory_registers_instructions_sources(play: type) -> None:
     assert ": 0x01 0x00 0x0a 0x00 0x00 0x00 0x02 0x00\n" in out
     assert ": 1 10\n" in out
     assert ": '\\x01'\n" in out
-    assert re.search(r"> 0x0001\w\w  \w{6}  add.w w15, #0x6, w15", out)
+    assert re.search(r"> 0x0001\w\w  \w{6}  mov.w \[w15-6\], w6", out)
     assert "W14=0x27f0" in out.replace(" ", "")
     assert "U1STA     0x020e  0x0110  UTXISEL=0" in out
     assert "T1CON" in out
@@ -307,13 +334,13 @@ def test_at_a_terminal(program: str, tmp_path: Path) -> None:
     terminal.type("\r")
     terminal.expect("breakpoint 1: twice\n")
     terminal.type("run\r")
-    terminal.expect("twice at program.c:18")
+    terminal.expect(f"twice at program.c:{line_of('int once')}")
     terminal.type("print nonsense\r")
     terminal.expect("there is nothing called 'nonsense' here")
     terminal.type("stepi\r")
-    terminal.expect("cycle 283")
+    terminal.expect("cycle 285")
     terminal.type("\r")
-    terminal.expect("cycle 284")
+    terminal.expect("cycle 286")
     terminal.type("delete\r")
     terminal.type("set total = 0\r")
     terminal.expect("total = 0")
