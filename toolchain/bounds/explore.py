@@ -44,6 +44,7 @@ CHOICE: Final = 6
 """Most instructions of a block that tells them apart."""
 EPILOGUE: Final = 12
 """Most instructions of a block that returns and is run for every way there."""
+MOVED: Final = "room of a length that is not known is taken from the stack (alloca, array of variable length)"
 LOOP: Final = "no bound of this loop is known"
 """The one reason that leaves the stack bounded: its rounds have been followed until nothing new came of them."""
 
@@ -96,6 +97,7 @@ class Explorer:
         if entry not in self.codes:
             self.codes[entry] = code = self.graph.code(entry)
             code.order = joined(code.order, self.rules.same(code))
+            code.framed = any(step.insn.row.mnemonic == "LNK" for b in code.blocks.values() for step in b.steps)
             for block in code.blocks.values():
                 if block.steps[-1].flow is Branch:
                     block.tested = tested(block.steps)
@@ -283,7 +285,7 @@ class _Run:
         if state.repeat is not None:
             return self._repeated(step, state)
         abstract = self.explorer.abstract
-        level = state.ipl
+        level, top = state.ipl, state.w[15]
         state.time += step.cycles + (state.stall & step.pointers != 0)
         abstract.begin(step.pc, state)
         flow: Flow = step.insn.row.does(abstract, step.insn.x)
@@ -293,6 +295,8 @@ class _Run:
             state.time += step.window
         if abstract.wild:
             self.outcome.wild, abstract.wild = True, False
+        if self.code.framed and exact(top) and not exact(state.w[15]):
+            self.outcome.open[step.pc] = MOVED  # what changes stacks has no frame
         self._peak(state)
         match flow:
             case Repeat(count):
@@ -536,6 +540,8 @@ class _Run:
                 key = number, state.ipl[0]
                 if lo <= top <= hi and top > self.outcome.peak.get(key, (-1,))[0]:
                     self.outcome.peak[key] = top, (self.code.entry,)
+        elif self.code.framed and self.area.inside(top):
+            self.outcome.open.setdefault(self.code.entry, MOVED)
 
     def _levels(self, state: State, pc: int) -> None:
         """Begin and end the stretches in which levels are held back."""

@@ -65,6 +65,8 @@ class Code:
     """Addresses it leads to where no instruction is."""
     tails: dict[int, int] = field(default_factory=dict)
     """Jumps to other functions: place -> target."""
+    framed: bool = False
+    """It has a frame of its own (LNK), in which alloca takes room."""
 
 
 def step_at(item: Item) -> Step:
