@@ -48,19 +48,35 @@ class Pointer(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """`delta` in bytes; `target` is a program address for BRANCH, JUMP and CALL."""
+    """`delta` in bytes; `target` is a program address for BRANCH, JUMP and CALL; `register` what W15 is copied to or
+    from for SAVED and RESTORED; `pushed` and `popped` are registers that go to the stack and come from it whole."""
 
     flow: Flow
     pointer: Pointer = Pointer.MOVED
     delta: int = 0
     target: int = 0
+    register: int = 0
+    pushed: int | None = None
+    popped: int | None = None
 
 
 def effect_of(insn: Insn, address: int) -> Effect:
     """Return the effect of the instruction at program address `address`."""
     flow, target = _flow(insn, address)
     pointer, delta = _pointer(insn)
-    return Effect(flow, pointer, delta, target)
+    register = {Pointer.SAVED: "d", Pointer.RESTORED: "s"}.get(pointer)
+    pushed, popped = _passed(insn)
+    return Effect(flow, pointer, delta, target, getattr(insn.x, register) if register else 0, pushed, popped)
+
+
+def _passed(insn: Insn) -> tuple[int | None, int | None]:
+    """`mov wn, [w15++]`, `mov [--w15], wn`."""
+    x = insn.x
+    if insn.row.mnemonic != "MOV" or "g" not in insn.row.fields or x.B:
+        return None, None
+    pushed = x.s if (x.g, x.h, x.d) == (0, 3, SP) else None
+    popped = x.d if (x.g, x.h, x.s) == (4, 0, SP) else None
+    return pushed, popped
 
 
 def _flow(insn: Insn, address: int) -> tuple[Flow, int]:

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from emu.dspic30f.facts import facts_of
+from emu.dspic30f.isa.row import Insn
 from toolchain.elf.disassemble import Item
 from toolchain.stack.effects import SP, Effect, Flow, Pointer, effect_of
+
+CALLER_SAVED = 0x00FF
+"""W0 to W7 (abi-elf.md §2.1)."""
 
 MAX_VISITS = 12  # times one instruction may be reached with an ever deeper stack before its loop counts as unbounded
 
@@ -39,13 +44,15 @@ class Function:
 @dataclass(frozen=True, slots=True)
 class _State:
     """One point of a path: `depth` of the stack in use, `frame` where W14 points, `outer` the depth left behind on the
-    stack that was in use before, `saved` what a copy of W15 in a register is worth: (depth, outer)."""
+    stack that was in use before, `saved` where a copy of W15 is and what it is worth: (register, depth, outer);
+    `shelved` the same of one that was pushed: depth and outer of its place, and what it is worth."""
 
     pc: int
     depth: int = 0
     frame: int | None = None
     outer: int | None = None
-    saved: tuple[int, int | None] | None = None
+    saved: tuple[int, int, int | None] | None = None
+    shelved: tuple[int, int | None, int, int | None] | None = None
     lost: bool = False  # W15 was replaced by an unknown value: what follows cannot be balanced
 
 
@@ -84,7 +91,7 @@ class Walker:
         assert item.insn is not None
         effect = effect_of(item.insn, item.address)
         following = item.address + 2 * len(item.words)
-        after = replace(self._stack(result, item, effect, state), pc=following)
+        after = replace(self._stack(result, item, effect, self._kept(item.insn, effect, state)), pc=following)
         result.frame = max(result.frame, after.depth)
         if item.insn.row.mnemonic == "REPEAT":
             return [self._repeated(result, item, after)]
@@ -115,6 +122,26 @@ class Walker:
                 self._note(result, f"{where}with {after.depth} bytes still on the stack")
         return []
 
+    @staticmethod
+    def _kept(insn: Insn, effect: Effect, state: _State) -> _State:
+        """The state without a copy of W15 that the instruction computes with, or a callee may overwrite: what is put
+        into W15 then is not what it was (alloca)."""
+        shelved = state.shelved
+        if shelved is not None and shelved[1] == state.outer and state.depth <= shelved[0]:
+            state, shelved = replace(state, shelved=None), None  # its place has been given back
+        if effect.popped is not None and shelved is not None and shelved[:2] == (state.depth - 2, state.outer):
+            return replace(state, saved=(effect.popped, *shelved[2:]))
+        if state.saved is None:
+            return state
+        register, depth, outer = state.saved
+        if effect.pushed == register:
+            return replace(state, shelved=(state.depth, state.outer, depth, outer))
+        facts = facts_of(insn)
+        changed = facts.writes | facts.source_pointers
+        if effect.flow in (Flow.CALL, Flow.CALL_POINTER):
+            changed |= CALLER_SAVED
+        return replace(state, saved=None) if changed >> register & 1 else state
+
     def _stack(self, result: Function, item: Item, effect: Effect, state: _State) -> _State:
         """Return the state with depth, frame and stack after the instruction."""
         match effect.pointer:
@@ -128,9 +155,9 @@ class Walker:
             case Pointer.UNLINK | Pointer.FROM_FRAME:
                 self._note(result, f"W15 restored from an unknown W14 at {item.address:#x}")
             case Pointer.SAVED:
-                return replace(state, saved=(state.depth, state.outer))
-            case Pointer.RESTORED if state.saved is not None:
-                return replace(state, depth=state.saved[0], outer=state.saved[1])
+                return replace(state, saved=(effect.register, state.depth, state.outer))
+            case Pointer.RESTORED if state.saved is not None and state.saved[0] == effect.register:
+                return replace(state, depth=state.saved[1], outer=state.saved[2])
             case Pointer.FRESH if state.outer is None:
                 if state.depth:
                     result.switch = max(result.switch or 0, state.depth)

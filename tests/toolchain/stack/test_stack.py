@@ -175,6 +175,24 @@ def test_a_saved_stack_pointer_brings_the_depth_back(image):
 
 
 @pytest.mark.parametrize(
+    ("lines", "known"),
+    [
+        (["mov w15, w8", "push w0", "rcall _leaf", "mov w8, w15", "return"], True),
+        (["mov w15, w1", "push w0", "rcall _leaf", "mov w1, w15", "return"], False),
+        (["lnk #0", "mov w15, w1", "add w0, w1, w1", "mov w1, w15", "ulnk", "return"], False),
+        (["lnk #0", "mov w15, w1", "mov [w1++], w2", "mov w1, w15", "ulnk", "return"], False),
+        (["lnk #0", "mov w15, w1", "mov w0, w15", "ulnk", "return"], False),
+        (["mov w15, w1", "push w1", "push w0", "pop w0", "pop w2", "mov w2, w15", "return"], True),
+        (["lnk #0", "mov w15, w1", "push w1", "pop w2", "push w0", "pop w3", "mov w3, w15", "ulnk", "return"], False),
+    ],
+)
+def test_only_an_unchanged_copy_of_the_stack_pointer_is_known(image, lines, known):
+    """alloca and arrays of computed length put another value back, callees overwrite W0 to W7."""
+    found = analyse(image, func("_main", *lines) + func("_leaf", "return"))
+    assert any("unknown value" in note for note in found["_main"].unknown) != known
+
+
+@pytest.mark.parametrize(
     ("text", "message"), [("frob x 1\n", "notes:1"), ("\ndepth f x\n", "notes:2"), ("calls\n", "expected")]
 )
 def test_annotation_mistakes_name_file_and_line(text, message):
