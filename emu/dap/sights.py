@@ -5,6 +5,7 @@ References to variables and frames hold until the machine goes on; their numbers
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +18,8 @@ from emu.lines import Line
 
 REGISTERS: Final = 16
 FLAGS: Final = ("C", "Z", "OV", "N", "RA", "DC", "DA", "SAB", "OAB", "SB", "SA", "OB", "OA")
+POSTFIX: Final = re.compile(r"[\w$][\w$.\[\]>-]*|\(\*\(.*\)\)[\w.\[\]]*")
+"""Expressions whose parts can be named without brackets around them."""
 Row = dict[str, Any]
 
 
@@ -166,14 +169,16 @@ class Sights:
         if not members and not pointed:
             return
 
+        whole = path if POSTFIX.fullmatch(path) else f"({path})"
+
         def rows() -> Iterator[tuple[str, Value | None, str]]:
             for part in value.parts():
                 if bare.kind == "pointer":
                     yield f"*{value.name}", part, f"(*({path}))"
                 elif bare.kind == "array":
-                    yield part.name, part, f"{path}{part.name}"
+                    yield part.name, part, f"{whole}{part.name}"
                 else:
-                    yield part.name, part, f"{path}.{part.name}"
+                    yield part.name, part, f"{whole}.{part.name}"
 
         row["variablesReference"] = self._keep(rows)
         row["indexedVariables" if bare.kind == "array" else "namedVariables"] = len(members) or 1

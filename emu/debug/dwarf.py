@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 from weakref import WeakKeyDictionary
 
-from emu.debug.types import VOID, Member, Type
+from emu.debug.types import TAGGED, VOID, Member, Type
 from emu.image import Image
 from emu.lines import dwarf_of, file_names, undoubled
 
@@ -108,8 +108,8 @@ class DebugInfo:
         """Variables outside functions by name; several files may have one of the same name."""
         self.statics: Final[dict[int, dict[str, Variable]]] = {}
         """The same by unit and name."""
-        self.types: Final[dict[str, Type]] = {}
-        """Structs, unions, enums and typedefs by name, the complete ones."""
+        self.types: Final[dict[str, dict[int, Type]]] = {}
+        """Base types and typedefs by name, tags as `struct node`, by unit; the complete ones."""
         self.constants: Final[dict[str, int]] = {}
         """Enumerators by name."""
         sections = undoubled({s.name: s.octets for s in image.sections if s.name.startswith(".debug_")})
@@ -117,6 +117,11 @@ class DebugInfo:
             _Reader(self, sections).read()
         self.functions.sort(key=lambda one: one.ranges[0])
         self._starts: Final = [one.ranges[0][0] for one in self.functions]
+
+    def type(self, name: str, unit: int = -1) -> Type | None:
+        """What `name` names (`node`, `struct node`): in that unit, else in any."""
+        known = self.types.get(name, {})
+        return known.get(unit) or next(iter(known.values()), None)
 
     def function(self, pc: int) -> Scope | None:
         """The function whose code `pc` is in."""
@@ -185,11 +190,17 @@ class _Reader:
             if ranges:
                 self.info.functions.append(self._scope(die, "function", ranges))
         elif die.tag in TYPE_KINDS:
-            made = self._type(die)
-            if made.name and made.kind in ("struct", "union", "enum", "typedef") and (made.bytes or made.members):
-                self.info.types.setdefault(made.name, made)
-            if made.kind == "enum":
-                self.info.constants.update({name: value for value, name in made.names.items()})
+            self._named(die)
+
+    def _named(self, die: Any, is_local: bool = False) -> None:
+        """A type that may have a name. One of a function hides none of a file."""
+        made = self._type(die)
+        if made.name and (made.bytes or made.members):
+            known = self.info.types.setdefault(f"{made.kind} {made.name}" if made.kind in TAGGED else made.name, {})
+            known[self.unit] = known.get(self.unit, made) if is_local else made
+        if made.kind == "enum":
+            names = {name: value for value, name in made.names.items()}
+            self.info.constants.update(names | self.info.constants if is_local else names)
 
     # Scopes and variables
 
@@ -210,6 +221,8 @@ class _Reader:
             elif child.tag in ("DW_TAG_lexical_block", "DW_TAG_inlined_subroutine"):
                 inside = self._ranges(child) or ranges
                 scope.inner.append(self._scope(child, "block" if "lexical" in child.tag else "inlined", inside))
+            elif child.tag in TYPE_KINDS:
+                self._named(child, is_local=True)
         return scope
 
     def _variable(self, die: Any) -> Variable | None:

@@ -6,7 +6,9 @@ overflow undefined, it is the exact number as long as a type holds it.
 
 from __future__ import annotations
 
+import math
 import operator
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
@@ -17,6 +19,7 @@ INT: Final = 2
 """Bytes of an int."""
 SIGNED: Final = {size: Type("signed", f"int{8 * size}", size, is_signed=True) for size in (2, 4, 8)}
 FLOATING: Final = Type("float", "double", 8)
+FLOAT: Final = Type("float", "float", 4)
 WIDEST: Final = 64
 """Bits of the longest type: a shift by as many means nothing in C, and one by 10^10 would fill the memory."""
 
@@ -59,7 +62,7 @@ def promoted(value: Any, kind: Type, bits: int = 0) -> Number:
 def fitted(value: int | float, kind: Type) -> Number:
     """A result of that type."""
     if isinstance(value, float):
-        return Number(value, kind if kind.kind == "float" else FLOATING)
+        return Number(_rounded(value, kind), kind)
     if kind.kind == "unsigned":
         return Number(value & (1 << 8 * kind.size) - 1, kind)
     for size in (2, 4, 8):
@@ -68,10 +71,38 @@ def fitted(value: int | float, kind: Type) -> Number:
     return Number((value + (1 << 63)) % (1 << 64) - (1 << 63), SIGNED[8])
 
 
-def _common(one: Type, other: Type) -> Type:
+def _rounded(value: float, kind: Type) -> float:
+    """What a floating type of that size holds."""
+    if kind.size != FLOAT.size:
+        return value
+    try:
+        found: float = struct.unpack("<f", struct.pack("<f", value))[0]
+    except OverflowError:
+        return math.copysign(math.inf, value)
+    return found
+
+
+def converted(value: int | float, kind: Type) -> int | float:
+    """`value` as a number, pointer or enumerator of that type (C11 §6.3.1). Raises ValueError for NaN and infinity as
+    whole numbers."""
+    bare = kind.bare
+    if bare.kind == "float":
+        return _rounded(float(value), bare)
+    if bare.kind == "bool":
+        return int(bool(value))
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is no whole number")
+        value = int(value)
+    bits = 8 * bare.size
+    value &= (1 << bits) - 1
+    return value - (1 << bits) if bare.is_signed and value >> bits - 1 else value
+
+
+def common(one: Type, other: Type) -> Type:
     """The type in which two are computed."""
     if "float" in (one.kind, other.kind):
-        return FLOATING
+        return max((kind for kind in (one, other) if kind.kind == "float"), key=lambda kind: kind.size)
     if one.size != other.size:
         return max(one, other, key=lambda kind: kind.size)
     return one if one.kind == "unsigned" else other
@@ -125,9 +156,9 @@ def computed(sign: str, one: Number, other: Number) -> Number:
         return Number(int(compute(one.value, other.value)))
     if sign in SHIFTS:
         return fitted(compute(one.value, other.value), one.kind)
-    kind = _common(one.kind, other.kind)
+    kind = common(one.kind, other.kind)
     if kind.kind == "float":
-        left, right = one.value, other.value
+        left, right = converted(one.value, kind), converted(other.value, kind)
     else:
         left, right = fitted(one.value, kind).value, fitted(other.value, kind).value
     result = compute(left, right)

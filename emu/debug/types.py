@@ -15,6 +15,8 @@ LONGEST_TEXT: Final = 16
 """Elements of an array shown in one line."""
 FLOATS: Final = {4: "<f", 8: "<d"}
 QUALIFIERS: Final = ("typedef", "const", "volatile")
+TAGGED: Final = ("struct", "union", "enum")
+"""Kinds of types whose names are tags."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +93,7 @@ class Type:
                 return f"{self.kind} {self.target or 'void'}"
             case "function":
                 return f"{self.target or 'void'}()"
-            case "struct" | "union" | "enum":
+            case kind if kind in TAGGED:
                 return f"{self.kind} {self.name or '<unnamed>'}"
         return self.name or self.kind
 

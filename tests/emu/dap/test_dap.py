@@ -75,6 +75,15 @@ def test_a_breakpoint_shows_stack_scopes_and_values(stopped: Callable[..., Clien
     members = client.ask("variables", variablesReference=second[0]["variablesReference"])["variables"]
     assert {one["name"]: one["value"] for one in members} == {"first": "2", "second": "20"}
     assert [one["evaluateName"] for one in members] == ["pairs[1].first", "pairs[1].second"]
+    for whole, part in (
+        ("*(struct pair *)&pairs[2]", "second"), ("(struct pair *)&pairs[2]", "*"), ("pairs[1 + 1]", "second"),
+        ("*(struct pair (*)[2])&pairs[1]", "[1]"),
+    ):  # fmt: skip
+        shown = client.ask("evaluate", expression=whole, context="watch", frameId=frame)
+        one = client.ask("variables", variablesReference=shown["variablesReference"])["variables"][-1]
+        assert one["name"] == part
+        assert client.evaluate(one["evaluateName"]) == one["value"]
+        assert "30" in one["value"]
     sfrs = client.ask("variables", variablesReference=scopes["SFRs"]["variablesReference"])["variables"]
     sr = next(one for one in sfrs if one["name"] == "U1MODE")
     fields = client.ask("variables", variablesReference=sr["variablesReference"])["variables"]
@@ -162,7 +171,7 @@ def test_data_breakpoints_and_the_last_write(stopped: Callable[..., Client]) -> 
     client.ask("continue", threadId=1)
     halt = client.event("stopped")
     assert halt["reason"] == "data breakpoint"
-    assert client.evaluate("(int)1" if False else "pairs[1].second & 0xff") == "8"
+    assert client.evaluate("(unsigned char)pairs[1].second") == "8"
     client.ask("setDataBreakpoints", breakpoints=[])
     client.ask("evaluate", expression="/lastwrite total", context="repl")
     halt = client.event("stopped")
