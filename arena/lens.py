@@ -18,6 +18,8 @@ from arena.scene import CameraSetting
 
 _LAST_COLUMN, _LAST_ROW = 639, 479
 Floats = NDArray[np.float64]
+
+
 class Lens:
     """A camera as it is mounted: `pitch_deg` up positive, `mirrored` as if the sensor stood on its head, `distortion`
     k: a pixel at distance r (in focal lengths) from the axis shows what is at r (1 + k r^2); positive is a barrel."""

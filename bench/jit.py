@@ -44,8 +44,11 @@ def build(source: Path, output: Path, *flags: str) -> None:
 
 def build_kernel(output: Path) -> None:
     """The kernel with eight computing threads (firmware/apps/compute)."""
-    subprocess.run(["make", "-s", "-C", str(ROOT / "firmware"), "APP=compute", f"PYTHON={sys.executable}"],
-                   check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        ["make", "-s", "-C", str(ROOT / "firmware"), "APP=compute", f"PYTHON={sys.executable}"],
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     shutil.copy(ROOT / "firmware" / "build" / "compute" / "firmware.elf", output)
 
 
@@ -70,8 +73,11 @@ def measure(image: Path, cycles: int, repeat: int) -> dict[str, float]:
     native, plain = machine(image, "jit"), machine(image, "interp")
     pairs = [(times_real(native, cycles), times_real(plain, cycles // INTERPRETER_SHARE)) for _ in range(repeat)]
     fast = statistics.median(pair[0] for pair in pairs)
-    return {"jit": fast, "interp": statistics.median(pair[1] for pair in pairs),
-            "ratio": statistics.median(a / b for a, b in pairs)}
+    return {
+        "jit": fast,
+        "interp": statistics.median(pair[1] for pair in pairs),
+        "ratio": statistics.median(a / b for a, b in pairs),
+    }
 
 
 def two_at_once(image: Path, cycles: int) -> float:
@@ -110,8 +116,19 @@ def cycles_per_round(image: Path, rounds: int) -> float:
 def avr_image(folder: Path, rounds: int) -> Path:
     """compute.c for the AVR emulators."""
     output = folder / f"avr{rounds}.elf"
-    subprocess.run(["avr-gcc", "-mmcu=atmega2560", "-Os", "-fno-lto", f"-DROUNDS={rounds}",
-                    str(HERE / "c" / "compute_avr.c"), "-o", str(output)], check=True)
+    subprocess.run(
+        [
+            "avr-gcc",
+            "-mmcu=atmega2560",
+            "-Os",
+            "-fno-lto",
+            f"-DROUNDS={rounds}",
+            str(HERE / "c" / "compute_avr.c"),
+            "-o",
+            str(output),
+        ],
+        check=True,
+    )
     return output
 
 
@@ -180,8 +197,10 @@ def main() -> int:
     print(f"{'cold start':>13}{'warm start':>12}")
     for image in ("compute", "kernel", "storm"):
         row = report[image]
-        print(f"{image:10}{row['jit']:>9.1f} x {row['interp']:>12.3f} x{row['ratio']:>9.0f}"
-              f"{row['two']:>11.2f} x{row['cold_s']:>11.2f} s{row['warm_s']:>10.2f} s")
+        print(
+            f"{image:10}{row['jit']:>9.1f} x {row['interp']:>12.3f} x{row['ratio']:>9.0f}"
+            f"{row['two']:>11.2f} x{row['cold_s']:>11.2f} s{row['warm_s']:>10.2f} s"
+        )
     for name, rate in report["rounds_per_s"].items():
         print(f"{name:18}{rate:10.1f} rounds of compute.c per second, ours is {ours / rate:.1f} times that")
     for note in report["notes"]:

@@ -31,8 +31,13 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--trials", type=count, default=10, metavar="N")
     add_plan(made)
     made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes")
-    made.add_argument("--processes", type=count, default=1, metavar="N",
-                      help="run one trial after the other, its robots in N processes (default 1): see arena/README.md")
+    made.add_argument(
+        "--processes",
+        type=count,
+        default=1,
+        metavar="N",
+        help="run one trial after the other, its robots in N processes (default 1): see arena/README.md",
+    )
     made.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
     )

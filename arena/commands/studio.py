@@ -158,7 +158,7 @@ def _deed(request: Any) -> tuple[str, dict[str, Any]]:
     """Name and arguments, of the types that are wanted. Raises RefusedError."""
     name = request.get("do") if isinstance(request, dict) else None
     if not isinstance(name, str) or name not in DEEDS:
-        raise RefusedError(f"expected an object with \"do\", one of {', '.join(DEEDS)}")
+        raise RefusedError(f'expected an object with "do", one of {", ".join(DEEDS)}')
     wanted = DEEDS[name]
     given = {key: value for key, value in request.items() if key != "do"}
     if set(given) != set(wanted):

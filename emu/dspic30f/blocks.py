@@ -178,8 +178,9 @@ class BlockWriter:
         ways = PythonWays(source.emit, {flow.edt: 0})
 
         def leave(again: bool) -> None:
-            source.leave(loop[0] if again else after, self._cycle, source.stall, DONE if again else CHANGED,
-                         write=ways.line)
+            source.leave(
+                loop[0] if again else after, self._cycle, source.stall, DONE if again else CHANGED, write=ways.line
+            )
 
         ways.each(lambda m: flowrules.loop_again(m, flow), leave)
 

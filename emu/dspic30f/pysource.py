@@ -118,7 +118,12 @@ class Source:
         self._sr = ""
 
     def leave(
-        self, pc: Number, cycle: int, stall: int, status: int, under: str = "",
+        self,
+        pc: Number,
+        cycle: int,
+        stall: int,
+        status: int,
+        under: str = "",
         write: Callable[[str], None] | None = None,
     ) -> None:
         """Return from the function with the next instruction at `pc`, starting `cycle` behind `c`.

@@ -24,9 +24,7 @@ LEVEL_TRACKS: Final = 10
 """Thread number of level 0; the threads' come behind the levels'."""
 
 
-def speedscope(
-    tracks: Tracks, place_of: Callable[[int], Place], name: str, start: int, end: int
-) -> Iterator[str]:
+def speedscope(tracks: Tracks, place_of: Callable[[int], Place], name: str, start: int, end: int) -> Iterator[str]:
     """A speedscope file, in pieces."""
     frames: list[dict[str, Any]] = []
     known: dict[int, int] = {}

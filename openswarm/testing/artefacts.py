@@ -1,9 +1,9 @@
 """What a failed test leaves: a folder that says where the firmware stood and how it came there.
 
-    report.txt     the fault, or where the robot stood: thread, call stack with source lines, last branches
-    waves.vcd      pins and UART bytes of the last stretch, or since the last input, for GTKWave
-    uart1.txt      all that was said, one file for each UART that said anything
-    state.bin      the whole state, for `Machine.restore`
+report.txt     the fault, or where the robot stood: thread, call stack with source lines, last branches
+waves.vcd      pins and UART bytes of the last stretch, or since the last input, for GTKWave
+uart1.txt      all that was said, one file for each UART that said anything
+state.bin      the whole state, for `Machine.restore`
 """
 
 from __future__ import annotations

@@ -215,9 +215,7 @@ def test_nesting_encryption_and_other_compressions_are_refused(
         assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_a_run_without_trials_proves_nothing(
-    packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_without_trials_proves_nothing(packed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Status 2, not "0 trials computed again"."""
     with zipfile.ZipFile(packed) as archive:
         names = [name for name in archive.namelist() if name.startswith("script/trial-")]

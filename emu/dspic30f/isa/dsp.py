@@ -186,9 +186,7 @@ class Prefetch:
         return None if self.y_ea is None else self.m.yload(self.y_ea, self.y_pointer)
 
 
-def mac_class(
-    op: Callable[[Value, Value], Value] | None, square: bool = False, write_back: bool = True
-) -> Does:
+def mac_class(op: Callable[[Value, Value], Value] | None, square: bool = False, write_back: bool = True) -> Does:
     """Acc <- op(Acc, product), with prefetch and write-back; ``op`` None leaves the accumulator alone (MOVSAC)."""
 
     def does(m: Builder, x: Operands) -> None:

@@ -90,6 +90,4 @@ class ClearWatchdog:
     """Clear the watchdog counter and its prescalers (isa.md §11)."""
 
 
-Flow: TypeAlias = (
-    Goto | Branch | Call | Return | Skip | Repeat | Do | Sleep | Reset | Disi | ClearWatchdog | None
-)
+Flow: TypeAlias = Goto | Branch | Call | Return | Skip | Repeat | Do | Sleep | Reset | Disi | ClearWatchdog | None

@@ -81,9 +81,7 @@ class Parsed:
             if value is None:
                 continue
             try:
-                fields |= {
-                    letter: number + slot.addend for letter, number in slot.kind.number(value, site).items()
-                }
+                fields |= {letter: number + slot.addend for letter, number in slot.kind.number(value, site).items()}
             except OperandError as error:
                 raise StatementError(f"{self.statement}: {error}") from None
         try:

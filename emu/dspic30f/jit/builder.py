@@ -410,8 +410,10 @@ class LlvmBuilder:
         self.pending.touches_sfr = True
 
         def now() -> None:
-            for place, count, size, here in ((to.flash, to.flash_count, 4, stored == 0),
-                                             (to.eeprom, to.eeprom_count, 2, stored)):
+            for place, count, size, here in (
+                (to.flash, to.flash_count, 4, stored == 0),
+                (to.eeprom, to.eeprom_count, 2, stored),
+            ):
                 latch = pointer(self.e, (address >> 1 & count - 1) * size + place)
                 old = self.e.load(latch, 8 * size)
                 self.e.store(latch, self.select(here, (old & (bits ^ 0xFFFFFF)) | (v & bits), old), 8 * size)

@@ -256,8 +256,12 @@ class Compiler:
                 # LLVM's older linker maps sections one by one: 2 GB apart in a fragmented process, it aborts
                 self._loader = llvm.create_lljit_compiler(use_jit_link=True)
             self._modules += 1
-            library = llvm.JITLibraryBuilder().add_object_img(code).export_symbol("entry").link(
-                self._loader, f"m{self._modules}")
+            library = (
+                llvm.JITLibraryBuilder()
+                .add_object_img(code)
+                .export_symbol("entry")
+                .link(self._loader, f"m{self._modules}")
+            )
             self.statistics.loaded += 1
             loaded = self._loaded[key] = Loaded(int(library["entry"]), entries, library)
             return loaded
@@ -266,7 +270,10 @@ class Compiler:
         if self._process is None:
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "emu.dspic30f.jit.worker"],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                start_new_session=True,
+            )
             atexit.register(self._process.kill)
             assert self._process.stdout is not None
             self._selector.register(self._process.stdout, selectors.EVENT_READ)

@@ -147,7 +147,22 @@ def dispatch_text(core: Core, flash_end: int, counts: BoundaryCount | None = Non
     counts = counts if counts is not None else BoundaryCount()
     offset = {name: core.record.fields[f"cpu.{name}"].offset for name in ("pc", "repeat", "cycle")}
     return service_text(core, counts) + DISPATCH.format(
-        **offset, third=counts.third_cycle(), flash_end=flash_end, blocks=BLOCKS, steps=STEPS, entered=ENTERED,
+        **offset,
+        third=counts.third_cycle(),
+        flash_end=flash_end,
+        blocks=BLOCKS,
+        steps=STEPS,
+        entered=ENTERED,
         begin=BOUNDARY,
-        next=NEXT, retfie=RETFIE, deadline=DEADLINE, service=SERVICE, miss=MISS, done=DONE,
-        period=PERIOD, last=LAST, noted=NOTED, notes=NOTES, rooms=ROOM)
+        next=NEXT,
+        retfie=RETFIE,
+        deadline=DEADLINE,
+        service=SERVICE,
+        miss=MISS,
+        done=DONE,
+        period=PERIOD,
+        last=LAST,
+        noted=NOTED,
+        notes=NOTES,
+        rooms=ROOM,
+    )

@@ -48,10 +48,12 @@ def service_text(core: Core, counts: BoundaryCount) -> str:
 def _head(core: Core, counts: BoundaryCount) -> str:
     """From the call to an event that is due (`fire`), through the time spent in Idle."""
     offsets = {name: core.record.fields[field].offset for name, field in PLACES.items()}
-    return "\n".join([
-        "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {", "first:",
-        *(f"  %p.{name} = getelementptr i8, ptr %rec, i64 {offset}" for name, offset in offsets.items()),
-        f"""  %hold = load i64, ptr %p.hold
+    return "\n".join(
+        [
+            "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {",
+            "first:",
+            *(f"  %p.{name} = getelementptr i8, ptr %rec, i64 {offset}" for name, offset in offsets.items()),
+            f"""  %hold = load i64, ptr %p.hold
   %waits = icmp ne i64 %hold, 0
   br i1 %waits, label %python, label %again
 python:
@@ -101,7 +103,9 @@ doze:
 jump:
   store i64 %deadline, ptr %p.cycle
 {counts.idle("jump", "%deadline")}
-  br label %again"""])
+  br label %again""",
+        ]
+    )
 
 
 def _events(core: Core) -> str:
@@ -109,15 +113,20 @@ def _events(core: Core) -> str:
     lanes, groups = f"<{LANES} x i64>", range(-(-len(core.events.names) // LANES))
     looked, hits, least = [], [], "%dues0"
     for g in groups:  # slots behind the last one are never due
-        looked += [f"  %p.group{g} = getelementptr i64, ptr %p.due, i64 {LANES * g}",
-                   f"  %dues{g} = load {lanes}, ptr %p.group{g}, align 8"]
+        looked += [
+            f"  %p.group{g} = getelementptr i64, ptr %p.due, i64 {LANES * g}",
+            f"  %dues{g} = load {lanes}, ptr %p.group{g}, align 8",
+        ]
         if g:
             looked.append(f"  %min{g} = call {lanes} @llvm.umin.v{LANES}i64({lanes} {least}, {lanes} %dues{g})")
             least = f"%min{g}"
-        hits += [f"  %equal{g} = icmp eq {lanes} %dues{g}, %least.all",
-                 f"  %bits{g} = bitcast <{LANES} x i1> %equal{g} to i{LANES}",
-                 f"  %wide{g} = zext i{LANES} %bits{g} to i128", f"  %placed{g} = shl i128 %wide{g}, {LANES * g}",
-                 f"  %hits{g} = or i128 %placed{g}, {f'%hits{g - 1}' if g else 0}"]
+        hits += [
+            f"  %equal{g} = icmp eq {lanes} %dues{g}, %least.all",
+            f"  %bits{g} = bitcast <{LANES} x i1> %equal{g} to i{LANES}",
+            f"  %wide{g} = zext i{LANES} %bits{g} to i128",
+            f"  %placed{g} = shl i128 %wide{g}, {LANES * g}",
+            f"  %hits{g} = or i128 %placed{g}, {f'%hits{g - 1}' if g else 0}",
+        ]
     newline = "\n"
     return f"""fire:
 {newline.join(looked)}

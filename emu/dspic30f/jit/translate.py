@@ -35,7 +35,7 @@ declare i16 @llvm.cttz.i16(i16, i1)
 declare i64 @llvm.umin.i64(i64, i64)
 define i64 @entry(ptr noalias %rec, ptr noalias %env) {
 """
-EPILOGUE: Final = "\n}\n!0 = !{!\"branch_weights\", i32 2000, i32 1}\n"
+EPILOGUE: Final = '\n}\n!0 = !{!"branch_weights", i32 2000, i32 1}\n'
 
 
 class Translator:

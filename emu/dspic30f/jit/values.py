@@ -106,8 +106,13 @@ class Value:
         self.bit: Final = bit
 
     def _op(self, op: str, left: Number, right: Number) -> Value:
-        if isinstance(left, Value) and isinstance(right, Value) and left.bit and right.bit \
-                and op in ("and", "or", "xor"):
+        if (
+            isinstance(left, Value)
+            and isinstance(right, Value)
+            and left.bit
+            and right.bit
+            and op in ("and", "or", "xor")
+        ):
             return self.emitter.let(f"{op} i1 {left.text}, {right.text}", bit=True)
         return self.emitter.let(f"{op} i64 {wide(left)}, {wide(right)}")
 

@@ -113,8 +113,11 @@ class Variables:
     def _home(self, name: str) -> tuple[int, int]:
         if name[0] == "W":
             return 2 * int(name[1:]), 16
-        return {"cycle": (self._offset["cpu.cycle"], 64), "stall": (self._offset["cpu.stall"], 16),
-                "pc": (self._offset["cpu.pc"], 32)}[name]
+        return {
+            "cycle": (self._offset["cpu.cycle"], 64),
+            "stall": (self._offset["cpu.stall"], 16),
+            "pc": (self._offset["cpu.pc"], 32),
+        }[name]
 
 
 class MemoryVariables(Variables):

@@ -33,8 +33,12 @@ class Backend:
         if level not in self._machines:
             llvm = self._llvm
             self._machines[level] = llvm.Target.from_default_triple().create_target_machine(
-                cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(),
-                opt=level, reloc="pic", codemodel="small")
+                cpu=llvm.get_host_cpu_name(),
+                features=llvm.get_host_cpu_features().flatten(),
+                opt=level,
+                reloc="pic",
+                codemodel="small",
+            )
         return self._machines[level]
 
     def compile(self, text: str, level: int) -> bytes:

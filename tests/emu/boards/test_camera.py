@@ -461,7 +461,6 @@ def test_decoding_gives_back_what_the_format_keeps(form):
     """Grey scales survive every format to its precision; colours survive RGB565 and, within 3, YUV pairs."""
     grey = np.repeat(np.arange(0, 256, 8, dtype=np.uint8)[:, None], 3, axis=1)
 
-
     def there_and_back(pixels):
         room = (ctypes.c_uint8 * 256)()
         count = encode(pixels.ctypes.data, len(pixels), form, Gains(1.0, 1.0, 1.0), ctypes.addressof(room))

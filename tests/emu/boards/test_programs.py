@@ -196,7 +196,7 @@ def test_start_up_program_finds_the_robot_the_reference_describes(program):
     assert machine.peek("eeprom_word") == 0xFFF7
     assert (machine.peek("battery_ok"), machine.peek("remote_idle")) == (1, 1)
     assert bytes(said) == (
-        b"\f\aWELCOME to the SerCom protocol on e-Puck\r\nthe EPFL education robot type \"H\" for help\r\n"
+        b'\f\aWELCOME to the SerCom protocol on e-Puck\r\nthe EPFL education robot type "H" for help\r\n'
     )
 
 

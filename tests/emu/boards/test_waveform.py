@@ -44,7 +44,7 @@ def edges(path, pin: str):
 def test_our_own_waveform_read_back_gives_the_same_edges(tmp_path, capsys):
     """One robot's pins into another whose own are inputs: every edge to the picosecond."""
     first, second = tmp_path / "first.vcd", tmp_path / "second.vcd"
-    idle = compiled(tmp_path, "idle", '#include <p30F6014A.h>\nint main(void) { ADPCFG = 0xFFFF; for (;;) {} }')
+    idle = compiled(tmp_path, "idle", "#include <p30F6014A.h>\nint main(void) { ADPCFG = 0xFFFF; for (;;) {} }")
     pulses = compiled(tmp_path, "pulses", PULSES)
     assert main(["run", str(pulses), "--cycles", "60000", "--vcd", str(first)]) == 0
     words = ["run", str(idle), "--cycles", "60000", "--stimulus", str(first), "--vcd", str(second)]

@@ -138,9 +138,7 @@ class Contexts:
         return rng.randrange(0x10000)
 
 
-def check_pairs(
-    seed: int, instructions: int, contexts: int, engine: str = "interp", chip: Chip = DSPIC30F6014A
-) -> int:
+def check_pairs(seed: int, instructions: int, contexts: int, engine: str = "interp", chip: Chip = DSPIC30F6014A) -> int:
     """Run `instructions` random instructions, each in `contexts` contexts of the same modes. Returns the pairs run.
 
     Each instruction is a generated function of its own. Rows take turns, so every row is met equally often.

@@ -30,8 +30,10 @@ def check_words(insn: Insn) -> None:
     words = codec.encode(insn.row, insn.x)
     assert codec.decode(*words) == insn
     given_words = (insn.word1, insn.word2)[: insn.words]
-    used = [mask | sum(r.mask << r.shift for f in insn.row.pattern.fields for r in f.runs if r.word == i)
-            for i, mask in enumerate(insn.row.pattern.mask)]
+    used = [
+        mask | sum(r.mask << r.shift for f in insn.row.pattern.fields for r in f.runs if r.word == i)
+        for i, mask in enumerate(insn.row.pattern.mask)
+    ]
     assert all(a & m == b & m for a, b, m in zip(words, given_words, used, strict=False))
 
 

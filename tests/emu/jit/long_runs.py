@@ -37,7 +37,7 @@ class CountedSource(Source):
 
     def emit(self, line: str) -> None:
         if self._done and line.lstrip().startswith("return"):
-            super().emit(f"{line[:len(line) - len(line.lstrip())]}executed[0] += {self._done}")
+            super().emit(f"{line[: len(line) - len(line.lstrip())]}executed[0] += {self._done}")
         super().emit(line)
 
     def commit(self) -> None:

@@ -128,8 +128,13 @@ def device_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[i
 def mode_words(generator: random.Random, chip: Chip = DSPIC30F6014A) -> list[int]:
     """A write to a register that decides which native code is valid, or to the state of a DO loop."""
     name = generator.choice(("CORCON", "MODCON", "XBREV", "DOENDL", "DOSTARTL", "DCOUNT", "PSVPAG", "SPLIM"))
-    values = {"DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2), "DOSTARTL": CODE, "DCOUNT": 2,
-             "SPLIM": chip.data["ram"].end - 0x200, "CORCON": generator.getrandbits(16) & 0x10F7}
+    values = {
+        "DOENDL": CODE + generator.randrange(0, 2 * BODY_WORDS, 2),
+        "DOSTARTL": CODE,
+        "DCOUNT": 2,
+        "SPLIM": chip.data["ram"].end - 0x200,
+        "CORCON": generator.getrandbits(16) & 0x10F7,
+    }
     value = values.get(name, generator.getrandbits(16))
     return literal(value, 7) + words_of("MOV{.W} Wns, f", s=7, f=chip.sfrs[name].address)
 
@@ -173,15 +178,27 @@ def random_firmware(seed: int, chip: Chip = DSPIC30F6014A) -> Firmware:
         firmware.put(vector.aivt, [target])
     at = 0x100
     for sfr, value in (
-        ("PR1", generator.randrange(20, 900)), ("PR2", generator.randrange(30, 400)), ("PR3", generator.randrange(300)),
+        ("PR1", generator.randrange(20, 900)),
+        ("PR2", generator.randrange(30, 400)),
+        ("PR3", generator.randrange(300)),
         *_enabled(chip, generator),
-        ("T1CON", 0x8000), ("T2CON", 0x8000 | generator.choice((0, 0x10))), ("T3CON", 0x8000),
-        ("CORCON", generator.getrandbits(16) & 0x10F7), ("PSVPAG", 0), ("TBLPAG", 0),
+        ("T1CON", 0x8000),
+        ("T2CON", 0x8000 | generator.choice((0, 0x10))),
+        ("T3CON", 0x8000),
+        ("CORCON", generator.getrandbits(16) & 0x10F7),
+        ("PSVPAG", 0),
+        ("TBLPAG", 0),
     ):
         at = firmware.put(at, to_sfr(sfr, value, chip))
     if generator.random() < 0.2:
-        for sfr, value in (("XMODSRT", 0x1000), ("XMODEND", 0x103F), ("YMODSRT", y), ("YMODEND", y + 0x1F),
-                           ("XBREV", generator.choice((0x8008, 0))), ("MODCON", generator.getrandbits(16))):
+        for sfr, value in (
+            ("XMODSRT", 0x1000),
+            ("XMODEND", 0x103F),
+            ("YMODSRT", y),
+            ("YMODEND", y + 0x1F),
+            ("XBREV", generator.choice((0x8008, 0))),
+            ("MODCON", generator.getrandbits(16)),
+        ):
             at = firmware.put(at, to_sfr(sfr, value, chip))
     if generator.random() < 0.5:
         at = firmware.put(at, to_sfr("SPLIM", whole.end - 0x200, chip))

@@ -57,10 +57,16 @@ def _start(firmware: Firmware, generator: random.Random, shape: Shape, corcon: i
     for n in range(15):
         at = firmware.put(at, literal(generator.randrange(0x900, 0x2600, 2), n))
     for sfr, value in (
-        ("PR1", generator.randrange(low, high)), ("PR2", generator.randrange(low, high)),
-        ("PR3", generator.randrange(low, high)), ("IPC0", generator.choice((0x4444, 0x5123, 0x1444))),
-        ("IPC1", generator.choice((0x4444, 0x0521, 0x0026))), ("IEC0", 0x00C8), ("T1CON", 0x8000),
-        ("T2CON", 0x8000), ("T3CON", 0x8000), ("TBLPAG", 0),
+        ("PR1", generator.randrange(low, high)),
+        ("PR2", generator.randrange(low, high)),
+        ("PR3", generator.randrange(low, high)),
+        ("IPC0", generator.choice((0x4444, 0x5123, 0x1444))),
+        ("IPC1", generator.choice((0x4444, 0x0521, 0x0026))),
+        ("IEC0", 0x00C8),
+        ("T1CON", 0x8000),
+        ("T2CON", 0x8000),
+        ("T3CON", 0x8000),
+        ("TBLPAG", 0),
     ):
         at = firmware.put(at, to_sfr(sfr, value))
     if generator.random() < 0.5:
@@ -69,10 +75,19 @@ def _start(firmware: Firmware, generator: random.Random, shape: Shape, corcon: i
     at = CODE
     modulo = generator.random() < 0.4
     for sfr, value in (
-        ("CORCON", corcon), ("PSVPAG", 0), ("XMODSRT", 0x1000), ("XMODEND", 0x103F), ("YMODSRT", 0x1900),
-        ("YMODEND", 0x191F), ("XBREV", generator.choice((0x8008, 0x8010, 8)) if modulo else 0),
-        ("MODCON", generator.getrandbits(16) if modulo else 0), ("T1CON", 0x8000), ("T2CON", 0x8000),
-        ("T3CON", 0x8000), ("IEC0", 0x00C8), ("SR", 0),
+        ("CORCON", corcon),
+        ("PSVPAG", 0),
+        ("XMODSRT", 0x1000),
+        ("XMODEND", 0x103F),
+        ("YMODSRT", 0x1900),
+        ("YMODEND", 0x191F),
+        ("XBREV", generator.choice((0x8008, 0x8010, 8)) if modulo else 0),
+        ("MODCON", generator.getrandbits(16) if modulo else 0),
+        ("T1CON", 0x8000),
+        ("T2CON", 0x8000),
+        ("T3CON", 0x8000),
+        ("IEC0", 0x00C8),
+        ("SR", 0),
     ):
         at = firmware.put(at, to_sfr(sfr, value))
     firmware.put(at, words_of("MOV{.W} f, Wnd", f=PROGRESS, d=0) + words_of("GOTO Wn", s=0))

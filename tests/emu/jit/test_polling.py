@@ -26,15 +26,18 @@ FLAG = 0x900
 
 EMPTY = {
     "wait for an interrupt flag": words_of("BTSS{.B} f, #bit4", f=IFS0, b=3) + words_of("BRA Expr", n=-2),
-    "wait for a variable": words_of("MOV{.W} f, Wnd", f=FLAG, d=4) + words_of("CP0{.B} Ws", B=0, s=4, p=0)
+    "wait for a variable": words_of("MOV{.W} f, Wnd", f=FLAG, d=4)
+    + words_of("CP0{.B} Ws", B=0, s=4, p=0)
     + words_of("BRA Z, Expr", n=-3),
     "wait for an interrupt for ever": words_of("BRA Expr", n=-1),
 }
 BUSY = {
     "a countdown": words_of("DEC{.B} Ws, Wd", B=0, s=4, p=0, d=4, q=0) + words_of("BRA NZ, Expr", n=-2),
-    "a look at the time": words_of("MOV{.W} f, Wnd", f=TMR1, d=4) + words_of("CP0{.B} Ws", B=0, s=4, p=0)
+    "a look at the time": words_of("MOV{.W} f, Wnd", f=TMR1, d=4)
+    + words_of("CP0{.B} Ws", B=0, s=4, p=0)
     + words_of("BRA NZ, Expr", n=-3),
-    "a store": words_of("MOV{.W} Wns, f", s=5, f=FLAG) + words_of("BTSS{.B} f, #bit4", f=IFS0, b=3)
+    "a store": words_of("MOV{.W} Wns, f", s=5, f=FLAG)
+    + words_of("BTSS{.B} f, #bit4", f=IFS0, b=3)
     + words_of("BRA Expr", n=-3),
 }
 START = 0x200

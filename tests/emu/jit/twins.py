@@ -75,9 +75,14 @@ class Tally:
         """Counts by name."""
         names = ("programs", "instructions", "entries", "places", "rows", "native_rows")
         return {name: dict(getattr(self, name)) for name in names} | {
-            "executed": self.executed(), "stops": self.stops, "exchanges": self.exchanges, "hooks": self.hooks,
+            "executed": self.executed(),
+            "stops": self.stops,
+            "exchanges": self.exchanges,
+            "hooks": self.hooks,
             "pairs": len(self.seen),
-            "native_pairs": len(self.native), "exact_pairs": len(self.both)}
+            "native_pairs": len(self.native),
+            "exact_pairs": len(self.both),
+        }
 
     def add(self, other: Tally) -> None:
         """Take over what another tally counted."""
@@ -272,9 +277,7 @@ class Hooks:
         other.clear()
 
 
-def twins(
-    firmware: Firmware, ipl_slip: int, block_level: int, chip: Chip = DSPIC30F6014A
-) -> tuple[Machine, Machine]:
+def twins(firmware: Firmware, ipl_slip: int, block_level: int, chip: Chip = DSPIC30F6014A) -> tuple[Machine, Machine]:
     """A plain machine, and a native one that compiles every address before it runs it."""
     plain, native = (Machine(chip, engine=engine, ipl_slip=ipl_slip) for engine in ("plain", "jit"))
     runner = native.runner

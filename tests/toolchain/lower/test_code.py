@@ -62,12 +62,21 @@ IDIOMS = [
     ("a wide near counter carries through memory", "void f(void){ T++; }", ["inc _T", "clr w0", "addc _T+2", "return"]),
     ("a widening product is one MUL", "long f(int a,int b){ return (long)a*b; }", ["mul.ss w1,w0,w0", "return"]),
     ("a tail call is a branch", "int g(int); int f(int a){ return g(a+1); }", ["inc w0,w0", "bra _g"]),
-    ("a long times a signed word is two MUL", "long f(long a,int b){ return a*b; }",
-     ["mul.ss w1,w2,w6", "mul.us w0,w2,w0", "add w1,w6,w1", "return"]),
-    ("the last look at a value may spoil it", "void f(int a){ if (a > 300) P = 1; }",
-     ["sub #300,w0", "bra le,.L1_2", "mov #1,w7", "mov w7,_P", "return"]),
-    ("an index of two arrays is scaled once", "int g(int,int); int f(int *a,int *b,int i){ return g(a[i], b[i]); }",
-     ["sl w2,w7", "mov [w0+w7],w0", "mov [w1+w7],w1", "bra _g"]),
+    (
+        "a long times a signed word is two MUL",
+        "long f(long a,int b){ return a*b; }",
+        ["mul.ss w1,w2,w6", "mul.us w0,w2,w0", "add w1,w6,w1", "return"],
+    ),
+    (
+        "the last look at a value may spoil it",
+        "void f(int a){ if (a > 300) P = 1; }",
+        ["sub #300,w0", "bra le,.L1_2", "mov #1,w7", "mov w7,_P", "return"],
+    ),
+    (
+        "an index of two arrays is scaled once",
+        "int g(int,int); int f(int *a,int *b,int i){ return g(a[i], b[i]); }",
+        ["sl w2,w7", "mov [w0+w7],w0", "mov [w1+w7],w1", "bra _g"],
+    ),
     ("a zero store is CLR", "void f(int *p){ *p = 0; }", ["clr [w0]", "return"]),
 ]
 
