@@ -1,14 +1,16 @@
 """Measures messages between robots by infra-red, on the real firmware in the arena, for docs/swarm.md.
 
-    python docs/infrared_link.py [--seconds 3] [--noise 2] [--jobs 2] [--figure docs/figures/infrared-link.png]
+    python docs/infrared_link.py [--seconds 3] [--noise 2] [--jobs 2] [--data docs/results/infrared-link.csv]
 
-Two robots that send all the time, over distance and angle. The same arguments give the same figures. Of more robots:
+Two robots, of which both or one alone sends all the time, over distance and angle. The same arguments give the same
+figures. infrared_published.py draws the data beside what SwarmCom and libIrcom have published. Of more robots:
 infrared_swarm.py.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import math
 import struct
 from concurrent.futures import ProcessPoolExecutor
@@ -21,32 +23,45 @@ from arena.firmware import image_for
 from arena.optics import amplitude
 from arena.scene import FCY, load_scene
 from arena.world import Poses
+from emu.machine import Machine
 
-DISTANCES = (12.0, 18.0, 22.0, 25.0, 28.0, 30.0, 32.0, 35.0)
+DISTANCES = (12.0, 18.0, 22.0, 25.0, 26.5, 28.0, 30.0, 32.0, 35.0)
 """cm between the middles; sensor 2 of one faces sensor 5 of the other."""
-ANGLES = tuple(range(0, 360, 30))
-"""Degrees by which one of them is turned, at 15 cm."""
+ANGLES = tuple(range(0, 360, 15))
+"""Degrees by which the listener is turned."""
+ANGLES_CM = 20.0
+FIELDS = ("senders", "cm", "turned_deg", "noise_counts", "seconds", "sent", "arrived", "damaged", "repaired_bits")
+"""Of the data file, one line per run."""
 SENDERS, ENTRY, WORDS, CODE = 30, "<5Hih", 9, 15
 """Of firmware/apps/chatter: entries, one of them; words of a frame and their bits."""
+SILENT = 15
+"""Of firmware/apps/chatter: the selector of a robot that sends hardly anything, every 1.9 to 5.6 s."""
 BEACONS = 1
 """Frames without a message that each robot sends, before it begins to talk."""
+DAMAGED = 2
+"""Place in sys_infrared_statistics."""
 WARM_S = 0.5
 """Before they begin to talk."""
 
 
 @dataclass(frozen=True)
 class Job:
-    poses: Poses
+    """Robots `distance` cm apart, the second turned by `turned` degrees, and how many of both send."""
+
+    senders: int
+    distance: float
+    turned: float
     seconds: float
     noise: float
 
 
 @dataclass(frozen=True)
 class Found:
-    """Frames sent, arrivals, bits repaired."""
+    """Messages sent, arrivals, frames that arrived damaged, bits repaired in those that arrived whole."""
 
     sent: int
     arrived: int
+    damaged: int
     repaired: int
 
     @property
@@ -60,29 +75,38 @@ class Found:
 
 
 def measure(job: Job) -> Found:
-    robots = len(job.poses.robots)
+    poses = facing(job.distance, job.turned)
+    robots = len(poses.robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": job.noise}
     scene = load_scene("clustering").with_values(**values)
     ether = Ether.of(scene)
     image = image_for("chatter")
     assert image is not None
-    brains = [EmulatedBrain(scene, 1, number, image, 0, ether) for number in range(robots)]
+    selectors = [0 if number < job.senders else SILENT for number in range(robots)]
+    brains = [EmulatedBrain(scene, 1, number, image, selectors[number], ether) for number in range(robots)]
     for tick in range(math.ceil((WARM_S + job.seconds) * FCY / scene.clock.quantum_tcy)):
         for brain in brains:
-            brain.think(tick, job.poses)
+            brain.think(tick, poses)
     machines = [brain.machine for brain in brains]
-    sent = [struct.unpack("<H", _bytes(machine, "infrared_statistics", 2))[0] - BEACONS for machine in machines]
-    numbers = [struct.unpack("<H", _bytes(machine, "infrared_number", 2))[0] for machine in machines]
-    arrived = repaired = 0
-    for machine in machines:
+    senders = machines[: job.senders]
+    sent = [_word(machine, "infrared_statistics") - BEACONS for machine in senders]
+    numbers = [_word(machine, "infrared_number") for machine in senders]
+    arrived = repaired = damaged = 0
+    for machine in machines if job.senders > 1 else machines[1:]:
+        damaged += struct.unpack("<7H", _bytes(machine, "infrared_statistics", 14))[DAMAGED]
         entries = _bytes(machine, "senders", SENDERS * struct.calcsize(ENTRY))
         for source, received, again, _, bits, _, _ in struct.iter_unpack(ENTRY, entries):
             if source in numbers:
                 arrived, repaired = arrived + received - again, repaired + bits
-    return Found(sum(sent), arrived, repaired)
+    return Found(sum(sent), arrived, damaged, repaired)
 
 
-def _bytes(machine, name: str, size: int) -> bytes:
+def _word(machine: Machine, name: str) -> int:
+    (found,) = struct.unpack("<H", _bytes(machine, name, 2))
+    return int(found)
+
+
+def _bytes(machine: Machine, name: str, size: int) -> bytes:
     at = machine.address_of(name)
     return bytes(machine.record.bytes[at : at + size])
 
@@ -100,24 +124,14 @@ def expected(distance: float, noise: float) -> tuple[float, float]:
     return wrong, word**WORDS
 
 
-def draw(path: Path, far: list[Found], around: list[Found], noise: float) -> None:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4))
-    fine = [DISTANCES[0] + (DISTANCES[-1] - DISTANCES[0]) * step / 200 for step in range(201)]
-    left.plot(fine, [expected(one, noise)[1] for one in fine], "k-", lw=1, label="frames, if only bits fail")
-    left.plot(fine, [expected(one, noise)[0] for one in fine], "k:", lw=1, label="bit errors, Q(A / 2 sigma)")
-    left.plot(DISTANCES, [one.share for one in far], "o-", color="tab:blue", label="frames that arrived")
-    left.plot(DISTANCES, [one.bit_errors for one in far], "s--", color="tab:red", label="bits repaired in them")
-    left.set(xlabel="cm between the middles", ylabel="share", title=f"facing, noise {noise:g} counts")
-    left.legend(fontsize=8)
-    right.plot(ANGLES, [one.share for one in around], "o-", color="tab:blue")
-    right.set(xlabel="one turned by, degrees", ylabel="frames that arrived", title="15 cm", ylim=(-0.05, 1.05))
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
+def keep(path: Path, jobs: list[Job], found: list[Found]) -> None:
+    """The data file: one line per run, under FIELDS."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerow(FIELDS)
+        for job, one in zip(jobs, found, strict=True):
+            about = (job.senders, f"{job.distance:g}", f"{job.turned:g}", f"{job.noise:g}", f"{job.seconds:g}")
+            lines.writerow((*about, one.sent, one.arrived, one.damaged, one.repaired))
 
 
 def main() -> None:
@@ -125,24 +139,24 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=3.0)
     parser.add_argument("--noise", type=float, default=2.0, metavar="COUNTS")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--figure", type=Path)
+    parser.add_argument("--data", type=Path, help="CSV file to write, for infrared_published.py")
     chosen = parser.parse_args()
     image_for("chatter")  # built once
-    poses = [facing(one) for one in DISTANCES] + [facing(15.0, one) for one in ANGLES]
-    jobs = [Job(one, chosen.seconds, chosen.noise) for one in poses]
-    with ProcessPoolExecutor(chosen.jobs) as pool:
-        found = list(pool.map(measure, jobs))
-    far, around = found[: len(DISTANCES)], found[len(DISTANCES) :]
-    print("cm    sent arrived  share  repaired/bit  expected: bits  frames")
-    for distance, one in zip(DISTANCES, far, strict=True):
-        wrong, frames = expected(distance, chosen.noise)
-        seen = f"{distance:4.0f} {one.sent:5} {one.arrived:7} {one.share:6.2f} {one.bit_errors:13.1e}"
-        print(f"{seen} {wrong:15.1e} {frames:7.2f}")
-    print("deg   sent arrived  share")
-    for angle, one in zip(ANGLES, around, strict=True):
-        print(f"{angle:4} {one.sent:5} {one.arrived:7} {one.share:6.2f}")
-    if chosen.figure is not None:
-        draw(chosen.figure, far, around, chosen.noise)
+    runs = [(2, one, 0.0) for one in DISTANCES] + [(1, one, 0.0) for one in DISTANCES]
+    runs += [(1, ANGLES_CM, float(one)) for one in ANGLES]
+    jobs = [Job(*one, chosen.seconds, chosen.noise) for one in runs]
+    if chosen.jobs > 1:
+        with ProcessPoolExecutor(chosen.jobs) as pool:
+            found = list(pool.map(measure, jobs))
+    else:
+        found = [measure(job) for job in jobs]
+    print("senders   cm  deg   sent arrived damaged  share  repaired/bit  expected: bits  frames")
+    for job, one in zip(jobs, found, strict=True):
+        wrong, frames = expected(job.distance, chosen.noise)
+        seen = f"{one.sent:6} {one.arrived:7} {one.damaged:7} {one.share:6.2f} {one.bit_errors:13.1e}"
+        print(f"{job.senders:7} {job.distance:4g} {job.turned:4g} {seen} {wrong:15.1e} {frames:7.2f}")
+    if chosen.data is not None:
+        keep(chosen.data, jobs, found)
 
 
 if __name__ == "__main__":

@@ -183,6 +183,26 @@ TEST(short_light_begins_nothing, "swarmcom.md 4.2: proximity of others is three 
     CHECK(Sys_Get_InfraredStatistics()->false_starts >= 2);
 }
 
+TEST(ones_in_the_middle_of_a_frame_begin_nothing,
+     "a beginning is 18 scans of light; who takes eight ones for it reads on over the beginning of the next frame")
+{
+    recording r;
+    begin_link();
+    CHECK(Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, hear, NULL));
+    say("x", 9, &r);
+    CHECK(Sys_Set_RobotNumber(5));
+    for (unsigned length = 22; length <= 36; length++) {
+        for (unsigned i = 0; i < length; i++) {
+            scan_with(3, 200);
+        }
+        scans_in_the_dark(15);
+        play(&r, 3, 200);
+        Sys_Yield();
+        CHECK_EQ(messages, length - 21);
+    }
+    CHECK_EQ(Sys_Get_InfraredStatistics()->damaged, 0);
+}
+
 TEST(light_that_stays_is_the_rooms, "swarmcom.md 8, 13: steps of the room's light, a neighbour's emitter stuck on")
 {
     recording r;

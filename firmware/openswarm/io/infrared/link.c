@@ -20,6 +20,7 @@ enum {
     LEAST_ONES = 10, /* scans of light that begin a frame: proximity lights for 3 or 4 */
     LEAST_BEHIND_FLASH = 5,
     FLASH_COUNTS = 24, /* scans: where an own flash may have hidden the first ones */
+    LONGEST_ONES = 20, /* scans of a beginning: a bit less than 7 of them; more are ones in the middle of a frame */
     MOST_ONES = 36,    /* then it is not a frame */
     CLEAR = 12,        /* dark scans: more than any usual word has in a row */
     SLOT = 6,          /* scans of back-off: faint light is seen so late */
@@ -217,7 +218,8 @@ static HAL_OUTLINE void measure_ones(scan raw)
         }
     } else if (!falling) {
         falling = true;
-    } else if (ones < ((uint16)(scans - flashed_at) < FLASH_COUNTS ? LEAST_BEHIND_FLASH : LEAST_ONES)) {
+    } else if (ones > LONGEST_ONES ||
+               ones < ((uint16)(scans - flashed_at) < FLASH_COUNTS ? LEAST_BEHIND_FLASH : LEAST_ONES)) {
         count(&infrared_statistics.false_starts);
         listen_again();
     } else {
