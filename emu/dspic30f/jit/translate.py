@@ -7,6 +7,7 @@ Whatever is not native here (see `LlvmBuilder`) leaves with nothing of the instr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from emu.dspic30f import flowrules
@@ -14,6 +15,7 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
 from emu.dspic30f.jit.builder import LlvmBuilder, NeedsInterpreter
 from emu.dspic30f.jit.counting import Count
+from emu.dspic30f.jit.course import Part, course, extra
 from emu.dspic30f.jit.pointed import requested
 from emu.dspic30f.jit.polling import empty_loops
 from emu.dspic30f.jit.reader import LlvmWays, NativeReader
@@ -35,7 +37,7 @@ declare i16 @llvm.cttz.i16(i16, i1)
 declare i64 @llvm.umin.i64(i64, i64)
 define i64 @entry(ptr noalias %rec, ptr noalias %env) {
 """
-EPILOGUE: Final = '\n}\n!0 = !{!"branch_weights", i32 2000, i32 1}\n'
+EPILOGUE: Final = '\n}\n!0 = !{!"branch_weights", i32 2000, i32 1}\n!1 = !{}\n'
 
 
 class Translator:
@@ -69,6 +71,10 @@ class Translator:
         self._polling: Final = {} if exact else empty_loops(region, around, context)
         self._heads: Final = {loop.head for loop in self._polling.values()}
         self._polled: Final = {pc for loop in self._polling.values() for pc, _ in loop.costs}
+        self._apart: Final = set(region.steps) if exact else self._heads | set(around.hooks)
+        """Instructions before which something is looked at: the deadline, that an empty loop begins, a hook."""
+        self._arm: tuple[Step, ...] = ()
+        """What the branch being translated goes round within its block."""
 
     def text(self) -> str:
         """The module."""
@@ -164,30 +170,31 @@ class Translator:
         self.jump(pc)
 
     # -- blocks -----------------------------------------------------------------------------------------------------
-    def _cost(self, pc: int) -> int:
-        """Upper bound of the cycles of the block at `pc`, without REPEATs (they make their own check)."""
+    def _cost(self, parts: Sequence[Part]) -> int:
+        """Upper bound of the cycles of a block, without REPEATs (they make their own check)."""
         total = 0
-        first = True
-        while (step := self.region.steps.get(pc)) is not None and (first or pc not in self._labels):
-            first = False
-            total += step.insn.row.cycles + (step.facts.source_pointers != 0)
-            if self._psv and step.facts.loads:
-                total += step.facts.window_cycles
-            if step.facts.flow is not None:
-                return total + 2
-            if pc == self.around.do_end:
-                break
-            pc = step.next_pc
+        for part in parts:
+            total += self._most(part.step)
+            if part.arm:
+                total += max(sum(map(self._most, part.arm)), extra(part.step))
+            elif part.step.facts.flow is not None:
+                total += 2
         return total
+
+    def _most(self, step: Step) -> int:
+        """Upper bound of an instruction's cycles, if it is no flow or one that is not taken."""
+        window = step.facts.window_cycles if self._psv and step.facts.loads else 0
+        return step.insn.row.cycles + (step.facts.source_pointers != 0) + window
 
     def _block(self, start: int) -> None:
         e, v = self.e, self.v
+        parts = course(self.region, start, self._labels, self._apart, self.around.do_end)
         e.start(self._labels[start])
         v.new_block()
         if self.exact:
             fits = e.let(f"icmp ult i64 {wide(v.get('cycle'))}, %stop", bit=True)
         else:
-            fits = self.fits(self._cost(start))
+            fits = self.fits(self._cost(parts))
         go = e.fresh("go")
         late = self.exit(start, SERVICE if self.exact else DEADLINE)
         e.end(f"br i1 {fits.text}, label %{go}, label %{late}, !prof !0")
@@ -197,22 +204,18 @@ class Translator:
         if start in self._heads:
             e.line(f"store i1 true, ptr %passed.{start:x}")
         written: Number = v.get("stall")
-        pc = start
-        while True:
-            step = self.region.steps.get(pc)
-            if step is None or (pc != start and pc in self._labels):
-                self.jump(pc)
-                return
+        for part in parts:
+            self._arm = part.arm
             try:
-                ended, written = self._instruction(step, written)
+                ended, written = self._instruction(part.step, written)
             except NeedsInterpreter:
                 self.count.settle()
-                e.end(f"br label %{self.exit(pc, INTERPRET)}")
-                self._label(step.next_pc)
+                e.end(f"br label %{self.exit(part.step.pc, INTERPRET)}")
+                self._label(part.step.next_pc)
                 return
             if ended:
                 return
-            pc = step.next_pc
+        self.jump(part.next_pc)
 
     def _stop_for_hook(self, pc: int) -> None:
         """Python is to see that `pc` is reached, unless it has just done so."""
@@ -284,6 +287,9 @@ class Translator:
                 self._leave_behind_register(step.next_pc)
                 return False, mask
             return True, mask
+        if self._arm:
+            assert isinstance(flow, (Branch, Skip))
+            return False, self._round(step, flow, cycles, mask)
         self._flow(step, flow, cycles, mask)
         return True, mask
 
@@ -325,6 +331,38 @@ class Translator:
         self.v.set("stall", mask)
         self.count.spend(self.at, cycles)
 
+    def _round(self, step: Step, flow: Branch | Skip, cycles: Number, mask: int) -> Value:
+        """A branch round `_arm`, both ways to its end; the W registers written last, on either."""
+        e, v, arm = self.e, self.v, self._arm
+        taken, through, join = e.fresh("taken"), e.fresh("through"), e.fresh("join")
+        self.advance(cycles, mask)
+        self.count.settle()
+        e.end(f"br i1 {truth(flow.cond)}, label %{taken}, label %{through}, !unpredictable !1")
+        e.start(taken)
+        v.new_block()
+        v.set("cycle", v.get("cycle") + extra(step))
+        self.count.spend(step.pc, extra(step))
+        self.count.settle()
+        e.end(f"br label %{join}")
+        e.start(through)
+        v.new_block()
+        self._arm = ()
+        written: Number = mask
+        try:
+            for one in arm:
+                ended, written = self._instruction(one, written)
+                if ended:  # it may have made an interrupt acceptable
+                    break
+            else:
+                self.count.settle()
+                e.end(f"br label %{join}")
+        except NeedsInterpreter:
+            self.count.settle()
+            e.end(f"br label %{self.exit(self.at, INTERPRET)}")
+        e.start(join)
+        v.new_block()
+        return v.get("stall")
+
     def _flow(self, step: Step, flow: Flow, cycles: Number, mask: int) -> None:
         e = self.e
         if isinstance(flow, (Branch, Skip)):
@@ -335,9 +373,8 @@ class Translator:
             assert step.target is not None
             e.start(taken)
             self.v.new_block()
-            extra = flowrules.TAKEN if isinstance(flow, Branch) else (step.target - step.next_pc) // 2
-            self.v.set("cycle", self.v.get("cycle") + extra)
-            self.count.spend(step.pc, extra)
+            self.v.set("cycle", self.v.get("cycle") + extra(step))
+            self.count.spend(step.pc, extra(step))
             self._jump_back(step.pc, step.target)
             e.start(other)
             self.jump(step.next_pc)

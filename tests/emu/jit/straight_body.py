@@ -54,6 +54,8 @@ SEPARATE = (
 ORDINARY = [row for row in table.ROWS if row.mnemonic not in FLOWS + SEPARATE]
 PLAIN = [row for row in ORDINARY if not row.mnemonic.startswith(("CPS", "BTSS", "BTSC"))]
 """Rows that always go on with the next instruction."""
+COMPUTING = [row for row in PLAIN if not set("pqghofi") & set(row.fields)]
+"""Rows that touch nothing but registers, for the most part."""
 DIVIDES = [row for row in table.ROWS if row.mnemonic.startswith("DIV")]
 BRANCHES = [row for row in table.ROWS if row.mnemonic == "BRA" and "n" in row.fields]
 BYTE_POINTERS = ("SE", "ZE")
@@ -209,6 +211,12 @@ class BodyWriter:
         for _ in range(count):
             self.one(PLAIN)
 
+    def gone_round(self, count: int) -> None:
+        """What a branch or skip goes round: often registers alone, which native code keeps in one block."""
+        rows = COMPUTING if self.generator.random() < 0.5 else PLAIN
+        for _ in range(count):
+            self.one(rows)
+
     # -- arrangements -----------------------------------------------------------------------------------------------
     def branch(self) -> None:
         """Forward over some of the instructions that follow."""
@@ -216,7 +224,7 @@ class BodyWriter:
         start = self.at
         self.put([0])
         good = self.good
-        self.plain(self.generator.randrange(1, 5))
+        self.gone_round(self.generator.randrange(1, 6))
         self.good &= good
         targets = range(start + 2, self.at + 2, 2)
         self.firmware.put(start, list(codec.encode(row, Operands(n=(self.generator.choice(targets) - start - 2) // 2))))
@@ -224,7 +232,7 @@ class BodyWriter:
     def skip(self) -> None:
         self.one([row for row in ORDINARY if row not in PLAIN])
         good = self.good
-        self.one(PLAIN) if self.generator.random() < 0.8 else self.call(2)
+        self.gone_round(1) if self.generator.random() < 0.8 else self.call(2)
         self.good &= good
 
     def call(self, kinds: int = 4) -> None:

@@ -1,0 +1,149 @@
+"""Blocks that go on past a branch round a few register instructions: which they are, and that nothing else changes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from random_firmware import Firmware, difference, literal, to_sfr, words_of
+from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
+
+from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.jit.course import ARM, ARMS, course
+from emu.dspic30f.jit.engine import JitEngine
+from emu.dspic30f.jit.region import Region, discover
+from emu.dspic30f.ledger import Ledger
+
+IFS0 = DSPIC30F6014A.sfrs["IFS0"].address
+START = 0x200
+SHIFT = words_of("LSR{.B} Ws, Wd", B=0, s=1, p=0, d=1, q=0)
+XOR = words_of("XOR{.B} Wb, Ws, Wd", w=2, B=0, s=1, p=0, d=1, q=0)
+COUNT = words_of("INC{.B} Ws, Wd", B=0, s=3, p=0, d=3, q=0)
+LOAD = words_of("MOV{.B} Ws, Wd", B=0, s=4, g=1, d=5, h=0, w=0)
+STORE = words_of("MOV{.W} Wns, f", s=3, f=0x900)
+POP = words_of("POP.S")
+WIDE = words_of("MOV{.W} #lit16, Wnd", k=7, d=6)
+
+
+def over(*arm: list[int]) -> list[int]:
+    """BRA NC over `arm`."""
+    words = [word for one in arm for word in one]
+    return words_of("BRA NC, Expr", n=len(words)) + words
+
+
+def past(words: list[int]) -> list[int]:
+    """BTSC over the next instruction, by a bit of a register that changes."""
+    return words_of("BTSC{.W} Ws, #bit4", s=3, p=0, b=0) + words
+
+
+BODIES = {
+    "a branch round one": SHIFT + over(XOR),
+    "round two": SHIFT + over(XOR, COUNT),
+    "as many as may be": SHIFT + over(*[COUNT] * ARM),
+    "one more": SHIFT + over(*[COUNT] * (ARM + 1)),
+    "round a load": SHIFT + over(LOAD),
+    "round a store": SHIFT + over(STORE),
+    "round what changes SR": SHIFT + over(POP, COUNT),
+    "a skip": SHIFT + past(XOR),
+    "one behind the other": (SHIFT + over(XOR) + past(COUNT) + SHIFT + over(COUNT) + past(WIDE) + SHIFT + over(XOR)
+                             + past(XOR)),
+    "before a pointer it has written": SHIFT + over(words_of("MOV{.W} #lit16, Wnd", k=0x902, d=4)) + LOAD,
+    "before a call": SHIFT + over(XOR) + words_of("RCALL Expr", n=0x100),
+}
+
+
+def firmware_of(body: list[int], corcon: int = 0) -> Firmware:
+    """`body` for ever; T1 matches every 97 Tcy, its handler changes what the body computes with."""
+    firmware = Firmware(0)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    firmware.put(0x1A, [0x1000])
+    at = 0x100
+    for register in range(16):
+        at = firmware.put(at, literal({15: 0xA00, 4: 0x900, 2: 0xA001}.get(register, 0xB3 + register), register))
+    for sfr, value in (("PR1", 96), ("IEC0", 8), ("T1CON", 0x8000)):
+        at = firmware.put(at, to_sfr(sfr, value))
+    at = firmware.put(at, words_of("PUSH.S"))
+    firmware.put(at, words_of("GOTO Expr", n=START))
+    at = firmware.put(START, body)
+    at = firmware.put(at, words_of("ADD{.B} #lit10, Wn", B=0, k=0x2F, d=1) + COUNT)
+    firmware.put(at, words_of("GOTO Expr", n=START))
+    call = START + 2 * (len(SHIFT + over(XOR)) + 1 + 0x100)
+    firmware.put(call, COUNT + words_of("RETURN"))
+    handler = words_of("BCLR{.B} f, #bit4", f=IFS0, b=3) + words_of("ADD{.B} #lit10, Wn", B=0, k=0x101, d=1)
+    firmware.put(0x1000, handler + words_of("RETFIE"))
+    return firmware
+
+
+def region_of(body: list[int]) -> Region:
+    """What is translated from the body's start."""
+    flash = firmware_of(body).flash
+    return discover(START, lambda pc: decode_for_execution(flash.get(pc, 0), flash.get(pc + 2, 0)))
+
+
+def arms(body: list[int], apart: set[int] | None = None, last: int = -1) -> list[int]:
+    """Lengths of what branches go round in the first block."""
+    region = region_of(body)
+    return [len(part.arm) for part in course(region, START, region.leaders, apart or set(), last) if part.arm]
+
+
+@pytest.mark.parametrize(("name", "lengths"), [
+    ("a branch round one", [1]), ("round two", [2]), ("as many as may be", [ARM]), ("one more", []), ("a skip", [1]),
+    ("round a load", []), ("round a store", []), ("one behind the other", [1] * ARMS), ("before a call", [1]),
+])  # fmt: skip
+def test_a_block_goes_past_what_only_computes(name: str, lengths: list[int]) -> None:
+    """Up to so many instructions, so many times."""
+    assert arms(BODIES[name]) == lengths
+
+
+def test_a_block_ends_where_something_is_looked_at() -> None:
+    """A hook among what is gone round, or behind it; the end of a DO loop."""
+    arm, behind = START + 4, START + 6
+    body = BODIES["a branch round one"]
+    assert arms(body) == [1]
+    assert arms(body, {arm}) == arms(body, {behind}) == arms(body, last=arm) == []
+
+
+@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
+def test_whole_records_are_equal_wherever_a_run_stops(body: list[int]) -> None:
+    """Stops in every phase of the loop and of the interrupt."""
+    plain, native = pair(firmware_of(body))
+    for length in (*range(1, 130), 997, 5003):
+        assert plain.run(length) == native.run(length)
+        assert not difference(plain, native)
+
+
+@pytest.mark.parametrize("at", range(START, START + 2 * len(BODIES["one behind the other"]), 2))
+def test_hooks_are_met_as_often(at: int) -> None:
+    """On a branch, on what it goes round, and behind."""
+    arrivals: list[list[int]] = []
+    machines = list(pair(firmware_of(BODIES["one behind the other"])))
+    for machine in machines:
+        seen: list[int] = []
+        machine.hook_pc(at, lambda m=machine, s=seen: s.append(m.cycle))  # type: ignore[misc]
+        machine.run(5_000)
+        arrivals.append(seen)
+    assert arrivals[0] == arrivals[1]
+    assert len(arrivals[0]) > 50
+    assert not difference(*machines)
+
+
+@pytest.mark.parametrize("name", ["one behind the other", "round what changes SR"])
+def test_cycles_are_counted_on_both_ways(name: str) -> None:
+    """`emu profile`: the same by address, native and interpreted."""
+    counted = []
+    for machine in pair(firmware_of(BODIES[name])):
+        ledger = Ledger(machine.core, lambda _at, _count: None)
+        if isinstance(machine.runner, JitEngine):
+            machine.runner.keep(ledger, lambda pc: pc)
+        else:
+            ledger.open()
+        machine.run(20_000)
+        counted.append(np.array(ledger.cells))
+    assert counted[0].sum() > 19_000
+    assert (counted[0] == counted[1]).all()
