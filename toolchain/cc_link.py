@@ -32,7 +32,7 @@ FORMAT_PARTS = {
         "___format_double": re.compile(_FLAGS + rb"L?[fFeEgG]"),
         "___format_wide": re.compile(_FLAGS + rb"(?:ll|j)[diouxX]"),
     },
-    re.compile(r"_v?sscanf"): {
+    re.compile(r"_v?[fs]?scanf"): {
         "___scan_double": re.compile(_WIDTH + rb"[lL]?[aAeEfFgG]"),
         "___scan_wide": re.compile(_WIDTH + rb"(?:ll|j)[diouxX]"),
     },

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* C11 7.22: conversions, division, random numbers, sorting, end of program. The heap is as large
- * as the linker is told (-Wl,--heap=BYTES); there is no environment. */
+ * as the linker is told (-Wl,--heap=BYTES); there is no environment, and multibyte characters are single bytes. */
 #ifndef STDLIB_H
 #define STDLIB_H
 
@@ -13,6 +13,7 @@ extern "C" {
 #define EXIT_SUCCESS 0
 #define EXIT_FAILURE 1
 #define RAND_MAX 32767
+#define MB_CUR_MAX 1
 
 typedef struct {
   int quot, rem;
@@ -37,7 +38,11 @@ long long atoll(const char *text);
 double atof(const char *text);
 long strtol(const char *__restrict text, char **__restrict end, int base);
 unsigned long strtoul(const char *__restrict text, char **__restrict end, int base);
+long long strtoll(const char *__restrict text, char **__restrict end, int base);
+unsigned long long strtoull(const char *__restrict text, char **__restrict end, int base);
 double strtod(const char *__restrict text, char **__restrict end);
+float strtof(const char *__restrict text, char **__restrict end);
+long double strtold(const char *__restrict text, char **__restrict end);
 
 void *malloc(size_t size);
 void *calloc(size_t count, size_t size);
@@ -55,6 +60,15 @@ void *bsearch(const void *key, const void *base, size_t count, size_t size,
 _Noreturn void exit(int status);
 _Noreturn void _Exit(int status);
 _Noreturn void abort(void);
+int atexit(void (*handler)(void)); /* at most 32; exit and the end of main call them, the last one first */
+char *getenv(const char *name);    /* NULL */
+int system(const char *command);   /* -1; 0 for NULL */
+
+int mblen(const char *text, size_t limit);
+int mbtowc(wchar_t *__restrict to, const char *__restrict text, size_t limit);
+int wctomb(char *to, wchar_t character);
+size_t mbstowcs(wchar_t *__restrict to, const char *__restrict text, size_t limit);
+size_t wcstombs(char *__restrict to, const wchar_t *__restrict text, size_t limit);
 
 #ifdef __cplusplus
 }

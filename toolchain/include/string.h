@@ -30,6 +30,8 @@ char *strtok(char *__restrict in, const char *__restrict separators);
 size_t strlen(const char *in);
 size_t strnlen(const char *in, size_t limit);
 char *strerror(int number);
+int strcoll(const char *left, const char *right);
+size_t strxfrm(char *__restrict to, const char *__restrict from, size_t limit);
 
 #ifdef __cplusplus
 }

@@ -11,7 +11,7 @@ from toolchain.elf.model import Bind, Home, ObjectFile, Section, Symbol
 from toolchain.elf.read import read_object
 from toolchain.elf.symbols import is_named
 from toolchain.errors import ToolError
-from toolchain.link.archive import Archive
+from toolchain.link.archive import Archive, Member
 from toolchain.link.smartio import plain_name
 
 MAX_REFERENCES = 4  # places shown per undefined symbol
@@ -71,14 +71,22 @@ def _rank(symbol: Symbol) -> int:
     return 1 if symbol.bind is Bind.WEAK else _STRONG
 
 
-def resolve(objects: list[ObjectFile], archives: list[Archive], roots: list[str]) -> Resolution:
-    """Enter all `objects`, then archive members as long as one defines a wanted name (one group, abi-elf.md §2.8)."""
+def resolve(
+    objects: list[ObjectFile], archives: list[Archive], roots: list[str], instead: dict[int, Member] | None = None
+) -> Resolution:
+    """Enter all `objects`, then archive members as long as one defines a wanted name (one group, abi-elf.md §2.8).
+
+    `roots` begins with the start symbol. A member that brings another start-up code along than the one that the start
+    symbol has found (the library's `atexit` does) takes its place: `instead` is such a member by the id of what it
+    replaces.
+    """
     result = Resolution()
     for obj in objects:
         result.add(obj)
     for name in roots:
         result.wanted[name] = True
     loaded: set[tuple[str, int]] = set()
+    starts: list[Member] = []
     progress = True
     while progress:
         progress = False
@@ -87,11 +95,18 @@ def resolve(objects: list[ObjectFile], archives: list[Archive], roots: list[str]
                 continue
             for archive in archives:
                 member = archive.index.get(name)
+                if member is not None and instead:
+                    member = instead.get(id(member), member)
                 if member is not None and (archive.name, member.offset) not in loaded:
                     loaded.add((archive.name, member.offset))
-                    result.add(read_object(member.data, f"{archive.name}({member.name})"))
+                    obj = read_object(member.data, f"{archive.name}({member.name})")
+                    result.add(obj)
+                    if any(s.name == roots[0] and s.home is not Home.UNDEFINED for s in obj.symbols):
+                        starts.append(member)
                     progress = True
                     break
+    if len(starts) == 2 and not instead:
+        return resolve(objects, archives, roots, {id(starts[0]): starts[1]})
     return result
 
 

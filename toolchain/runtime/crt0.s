@@ -1,5 +1,6 @@
 ; SPDX-License-Identifier: MIT
 ; C start-up, abi-elf.md §3.1: stack, PSV window, initialised data, user_init, main; then the end of the program.
+; exit_handlers.s includes it once more, for programs that register functions with atexit.
 
         .section .init,code
         .global __reset
@@ -24,6 +25,11 @@ __resetPRI:
         .global _exit
         .global __Exit
 _exit:
+.ifdef EXIT_HANDLERS
+        mov     w0,w8
+        rcall   run_handlers
+        mov     w8,w0
+.endif
 __Exit:
         mov     w0,__exit_status
         bset    _SR,#7                  ; IPL 7: nothing but a trap runs from here on (isa.md §2.3)

@@ -1,69 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* sscanf, vsscanf (C11 7.21.6.2): d i u o x X p c s [ n %, with *, width and hh h l ll j z t L; floating conversions too. */
-#include "scan.h"
-#include "scan_integer.h"
+#include "scan_parts.h"
 
 #include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <string.h>
-
-static SCAN_INTEGER(scan_long, unsigned long)
-
-/* Size of what a conversion stores into, in units that name themselves. */
-enum { INT, CHAR, SHORT, LONG, WIDE };
-
-static const char *read_length(const char *format, int *length)
-{
-    *length = INT;
-    switch (*format) {
-    case 'h':
-        *length = format[1] == 'h' ? CHAR : SHORT;
-        return format + (*length == CHAR ? 2 : 1);
-    case 'l':
-        *length = format[1] == 'l' ? WIDE : LONG;
-        return format + (*length == WIDE ? 2 : 1);
-    case 'j':
-        *length = WIDE;
-        return format + 1;
-    case 'L':
-        *length = LONG;
-        return format + 1;
-    case 'z':
-    case 't':
-        return format + 1;
-    default:
-        return format;
-    }
-}
-
-static void store(void *to, int length, unsigned long value)
-{
-    if (length == CHAR)
-        *(unsigned char *)to = (unsigned char)value;
-    else if (length == LONG)
-        *(uint32_t *)to = (uint32_t)value;
-    else
-        *(unsigned short *)to = (unsigned short)value;
-}
-
-/* Whether the set behind `%[` holds the character; *end becomes the place behind its `]`. */
-static int in_set(const char *set, char character, const char **end)
-{
-    int inverted = *set == '^', found = 0;
-    set += inverted;
-    const char *first = set;
-    for (; *set && (*set != ']' || set == first); set++) {
-        if (set[1] == '-' && set[2] && set[2] != ']') {
-            found |= (unsigned char)*set <= (unsigned char)character && (unsigned char)character <= (unsigned char)set[2];
-            set += 2;
-        } else {
-            found |= *set == character;
-        }
-    }
-    *end = *set ? set + 1 : set;
-    return character && found != inverted;
-}
 
 /* %c %s %[: the end of the field from `at`, which is at most `width` long; NULL when the field is empty or too short. */
 static const char *text_field(const char *at, char conversion, const char *set, unsigned width)
@@ -77,33 +17,6 @@ static const char *text_field(const char *at, char conversion, const char *set, 
            (conversion == 's' ? !isspace((unsigned char)*at) : in_set(set, *at, &ignored)))
         at++;
     return at == from ? NULL : at;
-}
-
-static const char *number_field(const char *at, unsigned width, char conversion, int length, void *to)
-{
-    const char *stop = at + strnlen(at, width), *after;
-    int base = conversion == 'd' || conversion == 'u' ? 10 : conversion == 'o' ? 8 : conversion == 'i' ? 0 : 16;
-    if (strchr("aefgAEFG", conversion)) {
-        double value;
-        after = __scan_double ? __scan_double(at, stop, &value) : NULL;
-        if (after && to && length == LONG)
-            *(double *)to = value;
-        else if (after && to)
-            *(float *)to = (float)value;
-        return after;
-    }
-    if (length == WIDE) {
-        unsigned long long value;
-        after = __scan_wide ? __scan_wide(at, stop, base, &value) : NULL;
-        if (after && to)
-            *(unsigned long long *)to = value;
-        return after;
-    }
-    unsigned long value;
-    after = scan_long(at, stop, base, &value);
-    if (after && to)
-        store(to, length, value);
-    return after;
 }
 
 int vsscanf(const char *restrict text, const char *restrict format, va_list arguments)
@@ -134,8 +47,7 @@ int vsscanf(const char *restrict text, const char *restrict format, va_list argu
             return stored;
         void *to = suppressed || conversion == '%' ? NULL : va_arg(arguments, void *);
         if (conversion == 'n') {
-            if (to)
-                store(to, length, (unsigned long)(at - text));
+            store_count(to, length, (unsigned)(at - text));
             continue;
         }
         if (conversion != 'c' && conversion != '[')

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One integer of a width-limited text (C11 7.22.1.4): SCAN_INTEGER(NAME, TYPE) defines a function that reads into TYPE. */
+/* One integer of a width-limited text (C11 7.21.6.2p10): SCAN_INTEGER(NAME, TYPE) defines a function that reads into TYPE.
+ * Other than for strtol, 0x without a digit is no 0: it is the beginning of a number that does not come. */
 #ifndef SCAN_INTEGER_H
 #define SCAN_INTEGER_H
 
@@ -20,8 +21,7 @@ static unsigned digit_of(char character)
         int any = 0, negative = at < stop && *at == '-';                                                          \
         if (at < stop && (*at == '-' || *at == '+'))                                                              \
             at++;                                                                                                 \
-        if ((base == 0 || base == 16) && stop - at > 2 && at[0] == '0' && (at[1] | 0x20) == 'x' &&                \
-            digit_of(at[2]) < 16) {                                                                               \
+        if ((base == 0 || base == 16) && stop - at > 1 && at[0] == '0' && (at[1] | 0x20) == 'x') {                \
             at += 2;                                                                                              \
             base = 16;                                                                                            \
         }                                                                                                         \

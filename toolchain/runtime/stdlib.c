@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Integer conversions, arithmetic, random numbers (C11 7.22). */
-#include <ctype.h>
+#include "text_integer.h"
+
 #include <errno.h>
 #include <limits.h>
 #include <stdlib.h>
@@ -40,41 +41,7 @@ lldiv_t lldiv(long long numerator, long long denominator)
     return result;
 }
 
-/* Value of a digit in any base up to 36, or 99. */
-static unsigned digit_value(char character)
-{
-    if (isdigit(character))
-        return (unsigned)(character - '0');
-    return isalpha(character) ? (unsigned)(tolower(character) - 'a' + 10) : 99;
-}
-
-/* Magnitude of the number at `text`; *negative tells the sign, *overflow that it does not fit. */
-static unsigned long magnitude(const char *text, char **end, int base, int *negative, int *overflow)
-{
-    const char *at = text;
-    unsigned long value = 0;
-    int digits = 0;
-    while (isspace(*at))
-        at++;
-    *negative = *at == '-';
-    if (*at == '-' || *at == '+')
-        at++;
-    if ((base == 0 || base == 16) && at[0] == '0' && (at[1] | 0x20) == 'x' && digit_value(at[2]) < 16) {
-        at += 2;
-        base = 16;
-    }
-    if (base == 0)
-        base = *at == '0' ? 8 : 10;
-    *overflow = 0;
-    for (unsigned digit; (digit = digit_value(*at)) < (unsigned)base; at++, digits = 1) {
-        if (value > (ULONG_MAX - digit) / (unsigned)base)
-            *overflow = 1;
-        value = value * (unsigned)base + digit;
-    }
-    if (end)
-        *end = (char *)(digits ? at : text);
-    return value;
-}
+TEXT_INTEGER(unsigned long, (ULONG_MAX - digit) / (unsigned)base)
 
 unsigned long strtoul(const char *restrict text, char **restrict end, int base)
 {

@@ -122,3 +122,16 @@ char *strerror(int number)
     (void)number;
     return (char *)"error";
 }
+
+int strcoll(const char *left, const char *right)
+{
+    return strcmp(left, right);
+}
+
+size_t strxfrm(char *restrict to, const char *restrict from, size_t limit)
+{
+    size_t length = strlen(from);
+    if (length < limit)
+        strcpy(to, from);
+    return length;
+}

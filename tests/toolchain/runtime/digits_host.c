@@ -1,4 +1,4 @@
-/* Compares __format_double and strtod, compiled for the host, with the host's printf and strtod, byte for byte.
+/* Compares __format_double, strtod and strtof, compiled for the host, with the host's printf and strtod, byte for byte.
  * argv: random numbers per function, seed. Exit status 1 on any difference, with the number that shows it. */
 #include "format.h"
 
@@ -9,6 +9,7 @@
 #include <string.h>
 
 double rt_strtod(const char *text, char **end);
+float rt_strtof(const char *text, char **end);
 
 static char *at;
 static void store(sink_t *sink, char character)
@@ -85,12 +86,20 @@ static int print_one(void)
 static void some_text(char *text)
 {
     static const char *const odd[] = {
-        "inf", "-INFINITY", "nan", "0x", "0x.p1", "1e", "1e+", "-.5", "5.", ".", "-", "  +7.25xyz", "0x1.8p3q", "infx",
+        "inf", "-INFINITY", "nan", "nan(12_a)b", "nan(1", "1e-45", "3.4028236e38", "0x1p-150", "0x1.8p-150", "0x", "0x.p1", "1e", "1e+", "-.5", "5.", ".", "-", "  +7.25xyz", "0x1.8p3q", "infx",
         "0e999999", "1e99999", "1e-99999", "0x1.fffffffffffff8p0", "0x1.fffffffffffff7ffffp0", "0x1p-1075",
         "0x1.8p-1075", "0x1.8p-1074", "0x123456789abcdef123456789p-1100", "2.2250738585072011e-308", "4.9e-324",
         "2.4703282292062327e-324", "2.4703282292062328e-324", "1.7976931348623158e308", "1.7976931348623159e308"};
     double value = number();
-    switch (below(5)) {
+    if (below(2)) /* of single precision's range */
+        value = ldexp(frexp(value, &(int){0}), (int)below(300) - 160);
+    switch (below(6)) {
+    case 5: /* the middle between two floats, and a little above or below it */
+        value = isfinite(value) ? fabs((float)value) : 1;
+        sprintf(text, "%.200g", (value + nextafterf((float)value, 0)) / 2);
+        if (strchr(text, '.') && !strchr(text, 'e') && below(2))
+            strcat(text, "00000000001");
+        break;
     case 0: sprintf(text, "%.*g", (int)below(20) + 1, value); break;
     case 1: sprintf(text, "%a", value); break;
     case 2: strcpy(text, odd[below(sizeof odd / sizeof *odd)]); break;
@@ -117,6 +126,12 @@ static int read_one(void)
 {
     char text[2000], *host_end, *our_end;
     some_text(text);
+    float host_single = strtof(text, &host_end), single = rt_strtof(text, &our_end);
+    if (host_end != our_end || (memcmp(&host_single, &single, sizeof single) != 0 && !(isnan(host_single) && isnan(single)))) {
+        printf("strtof(\"%s\"): host %a after %ld, ours %a after %ld\n", text, host_single, (long)(host_end - text), single,
+               (long)(our_end - text));
+        return 1;
+    }
     double host = strtod(text, &host_end), ours = rt_strtod(text, &our_end);
     if (host_end == our_end && (memcmp(&host, &ours, sizeof host) == 0 || (isnan(host) && isnan(ours))))
         return 0;

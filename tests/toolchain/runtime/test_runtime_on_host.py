@@ -83,7 +83,8 @@ def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
 def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -> Path:
     """The comparison of printing and reading doubles with the host's."""
     objects = []
-    for source, words in ((printing, []), (RUNTIME / "strtod.c", ["-Dstrtod=rt_strtod", "-Datof=rt_atof"])):
+    reading = ["-Dstrtod=rt_strtod", "-Datof=rt_atof", "-Dstrtold=rt_strtold", "-Dstrtof=rt_strtof"]
+    for source, words in ((printing, []), (RUNTIME / "strtod.c", reading), (RUNTIME / "strtof.c", reading)):
         objects.append(folder / f"{source.stem}.o")
         compile_host(objects[-1], "-fsanitize=address,undefined", "-I", RUNTIME, *words, "-c", source)
     program = folder / "digits"
@@ -92,7 +93,7 @@ def digits_program(folder: Path, printing: Path = RUNTIME / "format_double.c") -
 
 
 def test_doubles_are_printed_and_read_exactly(tmp_path: Path) -> None:
-    """C11 7.21.6.1, 7.22.1.3: every digit that printf gives and every double that strtod finds, as on the host."""
+    """C11 7.21.6.1, 7.22.1.3: every digit of printf, every number of strtod and strtof, as on the host."""
     words = [digits_program(tmp_path), "100000", "7216"]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/* The library's own __getchar: waits for a character of UART1, enabled on first use as by __putchar. */
+#include <dspic30f6014a.h>
+#include <stdio.h>
+
+int __getchar(void)
+{
+    if (!U1MODEbits.UARTEN) {
+        U1BRG = 0;
+        U1MODEbits.UARTEN = 1;
+        U1STAbits.UTXEN = 1;
+    }
+    while (!U1STAbits.URXDA) {
+        if (U1STAbits.OERR) /* too many came while nobody read: the receiver stands still until told to go on */
+            U1STAbits.OERR = 0;
+    }
+    return U1RXREG & 0xFF;
+}
