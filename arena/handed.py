@@ -16,7 +16,7 @@ from typing import Final
 from arena.answering import HERE
 from arena.debugged import Debugged, Recording
 from emu.dap.server import Server
-from emu.dap.wire import Message, Wire
+from emu.dap.wire import Message, Wire, wire_over
 from emu.machine import Machine
 
 LOOK_S: Final = 0.01
@@ -90,12 +90,8 @@ class Handed(Debugged):
             self._listening.close()
             connection.setblocking(True)
             self.is_met = True
-            with connection, connection.makefile("wb") as writer:
-                wire = Wire(connection.fileno(), writer)
-                try:
-                    Server(_Channel(wire, self._idle), lambda _arguments: self.machine, self.record).serve()
-                finally:
-                    wire.close()
+            with wire_over(connection) as wire:
+                Server(_Channel(wire, self._idle), lambda _arguments: self.machine, self.record).serve()
         finally:
             self.close()
         return True

@@ -17,7 +17,7 @@ from arena.debugged import AnewError, Debugged, GivenUpError
 from arena.manifest import note_host_time
 from arena.record import RecordError
 from emu.dap.server import Server
-from emu.dap.wire import Wire
+from emu.dap.wire import Wire, wire_over
 from emu.machine import Machine
 from emu.prompt.reader import Prompt
 from emu.status import DONE
@@ -99,12 +99,16 @@ def served(debugged: Debugged, port: int | None) -> bool:
     """Serve one client; true if the trial is to go on without it."""
     if port is None:
         out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
-        return _served(debugged, Wire(sys.stdin.fileno(), out))
+        wire = Wire(sys.stdin.fileno(), out)
+        try:
+            return _served(debugged, wire)
+        finally:
+            wire.close()
     with socket.create_server(("127.0.0.1", port)) as listening:
         print(f"arena debug: listening on 127.0.0.1:{listening.getsockname()[1]}", file=sys.stderr, flush=True)
         connection, _ = listening.accept()
-    with connection, connection.makefile("wb") as writer:
-        return _served(debugged, Wire(connection.fileno(), writer))
+    with wire_over(connection) as wire:
+        return _served(debugged, wire)
 
 
 def _served(debugged: Debugged, wire: Wire) -> bool:
@@ -115,8 +119,7 @@ def _served(debugged: Debugged, wire: Wire) -> bool:
         return debugged.machine
 
     server = Server(wire, machine_of, debugged.record)
-    try:
-        server.serve()
-    finally:
-        wire.close()
+    server.serve()
+    if wire.problem:
+        print(f"arena debug: the client sent what is no message: {wire.problem}", file=sys.stderr, flush=True)
     return debugged.keeps and not server.ends_all

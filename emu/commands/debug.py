@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from emu.boards import BOARDS
 from emu.command import CommandError, Parser, port
 from emu.commands.board_options import add_board_options, board_of, set_up
-from emu.status import DONE
+from emu.status import BAD_INPUT, DONE
 
 if TYPE_CHECKING:
     from emu.dap.wire import Wire
@@ -50,21 +50,24 @@ def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
     if options.tui is not None:
         return _prompted(options)
-    from emu.dap.wire import Wire
+    from emu.dap.wire import Wire, wire_over
 
     _refuse_options_of_the_prompt(options)
     if options.port is None:
         out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
-        _serve(Wire(sys.stdin.fileno(), out))
-        return DONE
+        wire = Wire(sys.stdin.fileno(), out)
+        try:
+            return _serve(wire)
+        finally:
+            wire.close()
     with socket.create_server(("127.0.0.1", options.port)) as server:
         print(f"emu debug: listening on 127.0.0.1:{server.getsockname()[1]}", file=sys.stderr, flush=True)
         while True:
             connection, _ = server.accept()
-            with connection, connection.makefile("wb") as writer:
-                _serve(Wire(connection.fileno(), writer))
+            with wire_over(connection) as wire:
+                status = _serve(wire)
             if options.once:
-                return DONE
+                return status
 
 
 def _prompted(options: argparse.Namespace) -> int:
@@ -86,13 +89,14 @@ def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
             raise CommandError(f"--{name} is for --tui; an editor's launch configuration has `{name}`")
 
 
-def _serve(wire: Wire) -> None:
+def _serve(wire: Wire) -> int:
+    """Exit status for this client."""
     from emu.dap.server import Server
 
-    try:
-        Server(wire, machine_of).serve()
-    finally:
-        wire.close()
+    Server(wire, machine_of).serve()
+    if wire.problem:
+        print(f"emu debug: the client sent what is no message: {wire.problem}", file=sys.stderr, flush=True)
+    return BAD_INPUT if wire.problem else DONE
 
 
 def machine_of(arguments: dict[str, Any]) -> Machine:

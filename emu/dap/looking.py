@@ -143,7 +143,9 @@ class Looking(ABC):
 
     def _do_writeMemory(self, arguments: Row) -> Row:
         address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
-        data = base64.b64decode(arguments["data"])
+        data = base64.b64decode(arguments["data"], validate=True)
+        if not data:
+            return {"bytesWritten": 0}
         self._change(lambda inside: inside.machine.poke(address, int.from_bytes(data, "little"), len(data)))
         return {"bytesWritten": len(data)}
 

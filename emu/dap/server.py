@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.dap.breakpoints import Breakpoint, bad_hit_condition
-from emu.dap.debuggee import Debuggee, Halt
+from emu.dap.debuggee import STACK_POINTER, Debuggee, Halt
 from emu.dap.launch import checked
 from emu.dap.looking import Looking, Refused
 from emu.dap.sights import Row, Sights, Sources
@@ -52,6 +52,8 @@ MISTAKES: Final = (
     RecursionError, OSError,
 )  # fmt: skip
 """What a request with arguments of the wrong kind, size or meaning can end in."""
+ACCESSES: Final = ("read", "write", "readWrite")
+"""What a data breakpoint may wait for."""
 
 
 class Server(Looking):
@@ -117,7 +119,7 @@ class Server(Looking):
             body, after = result if isinstance(result, tuple) else (result, None)
             self._respond(message, True, body or {})
         except MISTAKES as error:
-            text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
+            text = _told(command, error)
             self._respond(message, False, {"error": {"id": 1, "format": text}}, text)
         if after is not None:
             after()
@@ -204,7 +206,8 @@ class Server(Looking):
         return {}
 
     def _do_restart(self, _arguments: Row) -> Any:
-        return {}, lambda: self._go(self._debuggee.restart)
+        target = self._debuggee
+        return {}, lambda: self._go(target.restart)
 
     # Going
 
@@ -370,9 +373,25 @@ class Server(Looking):
             size = size or (value.type.bytes if isinstance(value, Value) else 0)
         if address is None:
             return {"dataId": None, "description": "it is not in memory"}
-        kinds = ["read", "write", "readWrite"]
+        if problem := self._not_in_memory(address, size):
+            return {"dataId": None, "description": problem}
+        entries = [one.raw.entry for one in self._debuggee.frames() if one.raw.entry is not None]
+        stays = not entries or not min(entries) <= address < self._debuggee.machine.w[STACK_POINTER]
         text = f"{arguments['name']} ({size} bytes at {address:#06x})"
-        return {"dataId": f"{address:04x}/{size}", "description": text, "accessTypes": kinds, "canPersist": True}
+        return {
+            "dataId": f"{address:04x}/{size}",
+            "description": text,
+            "accessTypes": list(ACCESSES),
+            "canPersist": stays,
+        }
+
+    def _not_in_memory(self, address: int, size: int) -> str:
+        """What is wrong with a stretch of data space, empty if nothing is."""
+        try:
+            self._debuggee.machine.peek_bytes(address, size)
+        except ValueError as error:
+            return str(error)
+        return ""
 
     def _named(self, arguments: Row) -> Any:
         reference = arguments.get("variablesReference")
@@ -385,8 +404,12 @@ class Server(Looking):
         made = []
         for one in arguments["breakpoints"]:
             address, _, size = str(one["dataId"]).partition("/")
-            access = one.get("accessType", "write")
-            made.append(self._breakpoint(one, "data", (int(address, 16),), size=int(size), access=access))
+            access = one.get("accessType") or "write"
+            problem = self._not_in_memory(int(address, 16), int(size))
+            if access not in ACCESSES:
+                problem = f"{access!r} is none of {', '.join(ACCESSES)}"
+            places = () if problem else (int(address, 16),)
+            made.append(self._breakpoint(one, "data", places, size=int(size), access=access, problem=problem))
         return self._set("data", made)
 
     def _do_breakpointLocations(self, arguments: Row) -> Row:
@@ -411,7 +434,10 @@ class Server(Looking):
         wanted = int(arguments["threadId"])
         frames = self._debuggee.frames()
         if wanted != self._thread:
-            frames = next((list(one.frames) for one in self._debuggee.threads() if one.pid + 1 == wanted), [])
+            others = [list(one.frames) for one in self._debuggee.threads() if one.pid + 1 == wanted]
+            if not others:
+                raise Refused(f"there is no thread {wanted} here")
+            frames = others[0]
         first = int(arguments.get("startFrame") or 0)
         levels = int(arguments.get("levels") or 0) or len(frames)
         return {"stackFrames": self._sights.stack(frames[first : first + levels]), "totalFrames": len(frames)}
@@ -422,3 +448,11 @@ class Server(Looking):
             raise Refused("it did not stop at a fault")
         details = {"message": stop.fault.cause, "stackTrace": stop.fault.report()}
         return {"exceptionId": "fault", "description": stop.fault.report(), "breakMode": "always", "details": details}
+
+
+def _told(command: str, error: BaseException) -> str:
+    """Why a request is refused, for the user. A name alone is that of an argument that is missing."""
+    if isinstance(error, KeyError) and error.args:
+        text = str(error.args[0])
+        return f"{command} needs `{text}`" if text.isidentifier() else text
+    return str(error)

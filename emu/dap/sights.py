@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import unquote
 
 from emu.debug.inside import Frame, Inside, Value
 from emu.debug.locate import Piece, Unavailable
@@ -43,8 +44,11 @@ class Sights:
         self._lists.clear()
 
     def frame(self, number: int | None) -> Frame | None:
-        """The frame of a reference; without one, the innermost."""
-        if number is not None and number in self._frames:
+        """The frame of a reference; without one, the innermost. Raises ValueError for one that was never handed out, or
+        before the machine went on."""
+        if number is not None:
+            if number not in self._frames:
+                raise ValueError(f"frame {number} is none of where the machine stands")
             return self._frames[number]
         frames = self.inside.frames()
         return frames[0] if frames else None
@@ -132,9 +136,7 @@ class Sights:
 
     def variables(self, reference: int, start: int = 0, count: int = 0) -> list[Row]:
         """Members of a list; `count` 0 means all."""
-        rows = self._lists.get(reference)
-        if rows is None:
-            return []
+        rows = self._list(reference)
         found = []
         for index, (name, value, path) in enumerate(rows()):
             if index < start or (count and index >= start + count):
@@ -145,8 +147,13 @@ class Sights:
 
     def find(self, reference: int, name: str) -> Value | None:
         """The member called `name` of a list."""
-        rows = self._lists.get(reference)
-        return next((value for one, value, _ in rows() if one == name), None) if rows is not None else None
+        return next((value for one, value, _ in self._list(reference)() if one == name), None)
+
+    def _list(self, reference: int) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
+        """Raises ValueError for a reference as `frame` does."""
+        if reference not in self._lists:
+            raise ValueError(f"reference {reference} is none of where the machine stands")
+        return self._lists[reference]
 
     def shown(self, value: Value, path: str) -> Row:
         """Text, type and references of a value; `path` is the expression that names it."""
@@ -210,7 +217,8 @@ class Sources:
 
     def lines(self, path: str) -> list[Line]:
         """Rows of the line table that come from the file a client calls `path`."""
-        wanted = Path(path.split("//", 1)[1].split("/", 1)[1] if "//" in path else path)
+        _, is_uri, rest = path.partition("://")
+        wanted = Path("/" + unquote(rest.partition("/")[2]) if is_uri else path)
         wanted = wanted.resolve() if wanted.exists() else wanted
         files = {row.file for row in self._inside.image.lines.rows}
         mine = {file for file in files if self.path(file) == wanted}

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import base64
+import json
+import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.emu.dap.client import Client
+from tests.emu.dap.client import ROOT, Client
 from toolchain import driver
 
 SOURCE = Path(__file__).parent / "program.c"
@@ -320,3 +324,100 @@ def test_a_breakpoint_that_is_there_has_no_problem(client: Client, program: str)
     made = client.ask("setFunctionBreakpoints", breakpoints=[{"name": "twice"}, {"name": "thrice"}])["breakpoints"]
     assert made[0] == {"id": 1, "verified": True}
     assert "thrice" in made[1]["message"]
+
+
+WRONG: list[tuple[str, dict[str, Any], str]] = [
+    ("scopes", {}, "scopes needs `frameId`"),
+    ("scopes", {"frameId": 4242}, "frame 4242 is none of where the machine stands"),
+    ("evaluate", {"expression": "total", "frameId": 4242}, "frame 4242 is none"),
+    ("variables", {"variablesReference": 4242}, "reference 4242 is none"),
+    ("stackTrace", {"threadId": 99}, "there is no thread 99 here"),
+    ("setBreakpoints", {"source": {"path": "program.c"}, "breakpoints": [{}]}, "setBreakpoints needs `line`"),
+    ("setFunctionBreakpoints", {}, "setFunctionBreakpoints needs `breakpoints`"),
+    ("writeMemory", {"memoryReference": "0x800", "data": "!!!"}, "base64"),
+    ("setVariable", {"variablesReference": 4242, "name": "a", "value": "1"}, "reference 4242 is none"),
+]
+
+
+def test_requests_that_mean_nothing_are_refused_in_words(stopped: Callable[..., Client]) -> None:
+    """An old frame was taken for the innermost one, so a watch showed another function's variables."""
+    client = stopped("total = sum;")
+    frame = client.top()["id"]
+    for command, arguments, words in WRONG:
+        reply = client.asked(command, **arguments)
+        assert not reply["success"]
+        assert words in reply["message"]
+    sources = ["http://x", "//", "file:///a/b", "\0", f"file://{SOURCE}"]
+    made = [
+        client.ask("setBreakpoints", source={"path": path}, breakpoints=[{"line": line_of("total = sum;")}])
+        for path in sources
+    ]
+    assert [one["breakpoints"][0]["verified"] for one in made] == [False] * 4 + [True]
+    for one in ({"dataId": "2800/2"}, {"dataId": "0800/-2"}, {"dataId": "0800/2", "accessType": "dance"}):
+        assert not client.ask("setDataBreakpoints", breakpoints=[one])["breakpoints"][0]["verified"]
+    assert client.ask("dataBreakpointInfo", name="0x99999", asAddress=True)["dataId"] is None
+    stays = [client.ask("dataBreakpointInfo", name=name, frameId=frame)["canPersist"] for name in ("sum", "total")]
+    assert stays == [False, True]
+    client.ask("next", threadId=1)
+    client.event("stopped")
+    assert not client.asked("evaluate", expression="sum", frameId=frame)["success"]
+
+
+def framed(command: str, **arguments: Any) -> bytes:
+    """A request as it goes over the wire."""
+    body = json.dumps({"seq": 1, "type": "request", "command": command, "arguments": arguments}).encode()
+    return b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
+
+
+@pytest.mark.parametrize(
+    ("sent", "replies", "words"),
+    [
+        (b"", 0, ""),
+        (framed("restart") + framed("terminate"), 3, ""),  # the event "terminated"
+        (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", 0, "expected `Content-Length: N` before a message, not 'GET /"),
+        (framed("initialize") + b"Content-Length: 9999999999\r\n\r\n", 1, "a message of 9999999999 bytes"),
+        (framed("initialize") + b"Content-Length: 0\r\n\r\n", 1, "a message of 0 bytes; expected 1 to 16777216"),
+        (framed("initialize")[:-5], 0, "it ends behind 66 of 71 bytes of a message"),
+        (framed("initialize") + b"Content-Length: 5\r\n\r\n{nope", 1, "a message that is no JSON: '{nope'"),
+        (b"Content-Length: 6\r\n\r\n[1, 2]", 0, "a message that is no object: '[1, 2]'"),
+        (b"Content-Length: 90000\r\n\r\n" + b"[" * 90000, 0, "no JSON: '[[[["),
+        (framed("initialize").replace(b"\r\n", b"\n"), 0, "it ends in the header of a message"),
+    ],
+)
+def test_what_is_no_message_is_told(sent: bytes, replies: int, words: str) -> None:
+    """The server left without a word, and with a traceback at a restart before there was anything to restart."""
+    done = subprocess.run([sys.executable, "-m", "emu", "debug"], input=sent, capture_output=True, timeout=60)
+    assert done.stdout.count(b"Content-Length") == replies
+    assert done.returncode == (2 if words else 0), done.stderr
+    told = done.stderr.decode()
+    assert (words in told and told.count("\n") == 1) if words else not told
+
+
+def test_a_client_that_is_gone_in_mid_run_leaves_the_port_to_the_next(program: str, tmp_path: Path) -> None:
+    source, image = tmp_path / "talk.c", tmp_path / "talk.elf"
+    source.write_text(
+        "#include <p30F6014A.h>\nint main(void) { U1BRG = 7; U1MODE = 0x8000; U1STA = 0x400;"
+        " for (;;) if (!U1STAbits.UTXBF) U1TXREG = 10; }"
+    )
+    assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
+    server = subprocess.Popen(
+        [sys.executable, "-m", "emu", "debug", "--port", "0"], stderr=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    assert server.stderr is not None
+    try:
+        port = int(server.stderr.readline().rsplit(":", 1)[1])
+        for reset in (b"\1\0\0\0\0\0\0\0", b"\0" * 8):  # with and without data that is thrown away
+            with socket.create_connection(("127.0.0.1", port), timeout=60) as gone:
+                gone.sendall(framed("launch", program=str(image)) + framed("configurationDone"))
+                seen = b""
+                while seen.count(b'"stdout"') < 5:
+                    seen += gone.recv(1 << 16)
+                gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, reset)
+        with socket.create_connection(("127.0.0.1", port), timeout=60) as last:
+            last.sendall(framed("initialize"))
+            assert b"supportsStepBack" in last.recv(1 << 16)
+        assert server.poll() is None
+    finally:
+        server.kill()
+        server.wait()
+        server.stderr.close()

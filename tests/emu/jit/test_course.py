@@ -51,8 +51,9 @@ BODIES = {
     "round a store": SHIFT + over(STORE),
     "round what changes SR": SHIFT + over(POP, COUNT),
     "a skip": SHIFT + past(XOR),
-    "one behind the other": (SHIFT + over(XOR) + past(COUNT) + SHIFT + over(COUNT) + past(WIDE) + SHIFT + over(XOR)
-                             + past(XOR)),
+    "one behind the other": (
+        SHIFT + over(XOR) + past(COUNT) + SHIFT + over(COUNT) + past(WIDE) + SHIFT + over(XOR) + past(XOR)
+    ),
     "before a pointer it has written": SHIFT + over(words_of("MOV{.W} #lit16, Wnd", k=0x902, d=4)) + LOAD,
     "before a call": SHIFT + over(XOR) + words_of("RCALL Expr", n=0x100),
 }
