@@ -43,6 +43,10 @@ TARGET_FLAGS = [
 LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas", "-Wno-section",
                   "-Wno-atomic-alignment",
                   "-fmacro-backtrace-limit=1"]  # fmt: skip
+# What GCC 4, and so XC16, warns of in every dialect of C, and clang refuses: calls of what nothing declares, `main()`,
+# pointers of another kind, `return` with or without a value. -Werror makes errors of them there, too.
+WARNINGS_OF_C = ["implicit-function-declaration", "implicit-int", "int-conversion", "incompatible-pointer-types",
+                 "incompatible-function-pointer-types", "return-mismatch"]  # fmt: skip
 # Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
 ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp2", "exp2f", "exp10", "ldexp",
                     "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
@@ -120,6 +124,8 @@ def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
         return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
     if not named:
         flags.append("-fgnu89-inline")  # XC16 takes C for gnu89, where plain `inline` defines the function
+    if not {"-Werror", "-pedantic-errors"} & set(options.clang):
+        flags += [f"-Wno-error={name}" for name in WARNINGS_OF_C]
     flags += options.clang
     return [*flags, "-isystem", str(INCLUDE_DIR), "-isystem", str(builtin_include_dir())]
 

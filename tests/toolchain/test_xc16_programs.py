@@ -404,3 +404,70 @@ def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_f
     }
     """
     assert status_of(tmp_path, source, level) == 66
+
+
+def test_a_macro_called_like_a_configuration_word(tmp_path: Path) -> None:
+    """Programs give the crystal's rate such names; the word is none of them (`#define FOSC 7372800`)."""
+    source = """
+    #include <p30F6014A.h>
+    #define FOSC 7.3728e6
+    #define FWDT
+    _FOSC(CSW_FSCM_OFF & XT_PLL8);
+    _FWDT(WDT_OFF)
+    int main(void) { return FOSC == 7.3728e6 ? 0 : 1; }
+    """
+    assert status_of(tmp_path, source) == 0
+    image = load_image(tmp_path / "main.elf")
+    words = {word.name: image.word(word.address) for word in image.chip.config.values()}
+    assert ((words["FOSC"] or 0) & 0xFFFF, (words["FWDT"] or 0) & 0xFFFF) == (0xFFE6, 0x7FFF)
+
+
+OLD_C = """
+typedef void (*handler)(void);
+static handler called;
+static int count;
+int counted(void) { count = count + 1; return count; }
+remember(what) handler what; { called = what; }
+float nothing(int wanted) { if (wanted) return; return 1.5f; }
+main()
+{
+    char *place = 0x1F00; int number = place; unsigned *words = place;
+    remember(counted);
+    called();
+    nothing(1);
+    *words = number;
+    return count + (*(unsigned *)0x1F00 == 0x1F00) * 2 + later(3, 4);
+}
+int later(int a, int b) { return a * b; }
+"""
+
+
+@pytest.mark.parametrize("options", [(), ("-std=gnu89",), ("-ansi",), ("-std=c99",), ("-std=gnu99",)])
+def test_what_gcc_4_only_warns_of(options: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Calls of what nothing declares, `main()`, pointers of another kind: in programs of 2006 as a matter of course."""
+    assert status_of(tmp_path, OLD_C, *options) == 15
+    assert "warning: incompatible function pointer types passing" in capfd.readouterr().err
+    assert driver.main(["-Werror", *options, str(tmp_path / "main.c"), "-o", str(tmp_path / "not.elf")]) == 1
+    assert "error: incompatible function pointer types passing" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_places_by_the_device_header_s_macros(level: str, tmp_path: Path) -> None:
+    """`_XBSS(64)` and its like, which DSP programs put before their buffers."""
+    source = """
+    #include <p30F6014A.h>
+    _FBS(0xFFFF) _FSS(0xFFFE);
+    int _YBSS(16) ybss[8]; int _YDATA(8) ydata[4] = {4}; int _XBSS(64) xbss[32]; int _XDATA(32) xdata[16] = {1, 2, 3};
+    int _PERSISTENT kept; int _NEAR nearby = 7; int _EEDATA(2) eedata[4] = {0x1234, 5};
+    static int _EEDATA(32) row[16] = {1};
+    int main(void)
+    {
+        if ((unsigned)ybss % 16 || (unsigned)ydata % 8 || (unsigned)xbss % 64 || (unsigned)xdata % 32) return 1;
+        if ((unsigned)ybss < 0x1800 || (unsigned)ydata < 0x1800 || (unsigned)xbss >= 0x1800) return 2;
+        if ((unsigned)xdata >= 0x1800 || xdata[1] != 2 || ydata[0] != 4 || nearby != 7) return 3;
+        TBLPAG = __builtin_tblpage(eedata);
+        if (__builtin_tblrdl(__builtin_tbloffset(eedata)) != 0x1234) return 4;
+        return kept = __builtin_tbloffset(row) % 32;
+    }
+    """
+    assert status_of(tmp_path, source, level) == 0

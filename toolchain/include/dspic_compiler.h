@@ -10,7 +10,8 @@
 #define OS_ISR(name) void __attribute__((__interrupt__, __no_auto_psv__)) name(void)
 #define OS_ISR_AUTO_PSV(name) void __attribute__((__interrupt__, __auto_psv__)) name(void)
 #define OS_ISR_SHADOW(name) void __attribute__((__interrupt__, __no_auto_psv__, __shadow__)) name(void)
-#define OS_CONFIG(word, value) int __attribute__((space(prog), section("__" #word ".sec"))) _##word = (value)
+#define DSPIC_CONFIG(section_name, variable, value) \
+  int __attribute__((space(prog), section(section_name))) variable = (value)
 #define OS_PERSISTENT __attribute__((persistent))
 /* Working registers as the clobber list of an asm statement spells them. */
 #define OS_W0 "w0"
@@ -39,8 +40,8 @@
 #define OS_ISR_SHADOW(name)                                                                     \
   __attribute__((__used__, __annotate__("interrupt"), __annotate__("no_auto_psv"), __annotate__("shadow"))) void name( \
       void)
-#define OS_CONFIG(word, value) \
-  __attribute__((__used__, __section__("__" #word ".sec"))) static const unsigned short dspic_config_##word = (value)
+#define DSPIC_CONFIG(section_name, variable, value) /* sources end it with a semicolon or without */ \
+  __attribute__((__used__, __section__(section_name))) static const unsigned short variable = (value);
 #define OS_PERSISTENT __attribute__((__section__(".pbss")))
 #define OS_W0 "r0"
 #define OS_W1 "r1"
@@ -68,18 +69,26 @@
 #define _ISRFAST __attribute__((__interrupt__, __no_auto_psv__, __shadow__))
 #endif
 
-/* Configuration words by name, as in Microchip's device headers: _FOSC(CSW_FSCM_OFF & XT_PLL8), semicolon or none;
- * field codes: dspic30f6014a.md §2. */
-#if defined(__clang__) /* sources end them with a semicolon or without */
-#define DSPIC_CONFIG(word, value) OS_CONFIG(word, value);
-#else
-#define DSPIC_CONFIG(word, value) OS_CONFIG(word, value)
+/* Where a variable lies, as in Microchip's device headers; N: alignment in bytes. */
+#ifndef _XBSS
+#define _PERSISTENT __attribute__((persistent))
+#define _NEAR __attribute__((near))
+#define _XBSS(N) __attribute__((space(xmemory), aligned(N)))
+#define _XDATA(N) __attribute__((space(xmemory), aligned(N)))
+#define _YBSS(N) __attribute__((space(ymemory), aligned(N)))
+#define _YDATA(N) __attribute__((space(ymemory), aligned(N)))
+#define _EEDATA(N) __attribute__((space(eedata), aligned(N)))
 #endif
-#define _FOSC(value) DSPIC_CONFIG(FOSC, value)
-#define _FWDT(value) DSPIC_CONFIG(FWDT, value)
-#define _FBORPOR(value) DSPIC_CONFIG(FBORPOR, value)
-#define _FGS(value) DSPIC_CONFIG(FGS, value)
-#define _FICD(value) DSPIC_CONFIG(FICD, value)
+
+/* Configuration words by name, as in Microchip's device headers: _FOSC(CSW_FSCM_OFF & XT_PLL8), semicolon or none;
+ * field codes: dspic30f6014a.md §2. The word's name is never an argument: programs have macros called FOSC. */
+#define _FOSC(value) DSPIC_CONFIG("__FOSC.sec", _FOSC, value)
+#define _FWDT(value) DSPIC_CONFIG("__FWDT.sec", _FWDT, value)
+#define _FBORPOR(value) DSPIC_CONFIG("__FBORPOR.sec", _FBORPOR, value)
+#define _FBS(value) DSPIC_CONFIG("__FBS.sec", _FBS, value)
+#define _FSS(value) DSPIC_CONFIG("__FSS.sec", _FSS, value)
+#define _FGS(value) DSPIC_CONFIG("__FGS.sec", _FGS, value)
+#define _FICD(value) DSPIC_CONFIG("__FICD.sec", _FICD, value)
 
 #define CSW_FSCM_OFF 0xFFFF
 #define CSW_ON_FSCM_OFF 0x7FFF
