@@ -15,6 +15,7 @@ from emu.status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
 COMMANDS: Final = {
     "new": "set up a project: Makefile, CMake, main.c, a test, settings for VS Code",
     "doctor": "tell what is installed, what is missing and what that disables",
+    "program": "build a program that robots take while they run",
     "flash": "write an image into a robot through its boot loader",
     "clean": "empty the cache",
     "path": "print where the kernel, CMake's toolchain file, the cache or Python are",

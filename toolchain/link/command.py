@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from emu.chips.chip import Chip, Region
 from toolchain.arguments import definition, integer
 from toolchain.device import DEFAULT, DEVICES, device
 from toolchain.elf.read import read_object
@@ -17,7 +18,7 @@ from toolchain.link.archive import MAGIC, Archive, open_archive
 from toolchain.link.hexfile import hex_text
 from toolchain.link.link import Linked, link
 from toolchain.link.mapfile import map_text, memory_summary
-from toolchain.link.options import MINIMUM_STACK, STACK_GUARD, LinkOptions
+from toolchain.link.options import MINIMUM_STACK, STACK_GUARD, LinkOptions, Part
 
 IGNORED_WORDS = (
     "--start-group", "--end-group", "-(", "-)",  # all libraries are one group anyway
@@ -53,6 +54,9 @@ def add_options(p: argparse.ArgumentParser) -> None:
     p.add_argument("--fill-upper", type=integer, default=0, metavar="BYTE", help="upper byte of data words in flash")
     p.add_argument("--debug-phantoms", action="store_true",
                    help="store debug information as XC16 does, every byte followed by a phantom octet")  # fmt: skip
+    p.add_argument("--part", metavar="FIRST-LAST,FIRST-LAST",
+                   help="link what another image calls, into these addresses of program memory and RAM alone: without"
+                        " vectors, reset and stack, constants in RAM")  # fmt: skip
     p.add_argument("--report-mem", action="store_true", help="print memory use")
     p.add_argument("--memorysummary", metavar="FILE", help="write memory use as the XML that MPLAB X shows")
     p.add_argument("-T", "--script", action="append", default=[], metavar="FILE",
@@ -91,7 +95,26 @@ def link_options(options: argparse.Namespace) -> LinkOptions:
         undefined=options.undefined,
         define=dict(map(definition, options.defsym)),
         chip=chip,
+        part=None if options.part is None else _part(options.part, chip),
     )
+
+
+def _part(text: str, chip: Chip) -> Part:
+    number = r"(0x[0-9a-fA-F]+|\d+)"
+    found = re.fullmatch(f"{number}-{number},{number}-{number}", text)
+    if found is None:
+        raise ToolError(
+            f"--part {text}: expected first and last addresses of program memory and RAM, as 0xF800-0xFFFF,0x800-0x9FF"
+        )
+    first, last, lowest, highest = (int(word, 0) for word in found.groups())
+    regions = Region("part of program", first, last + 1), Region("part of RAM", lowest, highest + 1)
+    for region, whole in zip(regions, (chip.program["program"], chip.data["ram"]), strict=True):
+        if not whole.start <= region.start < region.end <= whole.end or region.start % 2 or region.end % 2:
+            raise ToolError(
+                f"--part {text}: {region.start:#x}-{region.end - 1:#x} are no whole words of {whole.name} memory,"
+                f" {whole.start:#x}-{whole.end - 1:#x}"
+            )
+    return Part(*regions)
 
 
 class _Words(argparse.ArgumentParser):

@@ -19,7 +19,7 @@ from emu.elffacts import (
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Section, Symbol
 from toolchain.errors import ToolError
-from toolchain.link import dinit, synthesize
+from toolchain.link import dinit, part, synthesize
 from toolchain.link.archive import Archive
 from toolchain.link.gc import SECTION_LIMIT, live_sections, vector_names
 from toolchain.link.image import Output, build_executable, build_outputs
@@ -61,13 +61,16 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
     roots = [options.entry, *options.undefined]
     resolution = resolve(objects, archives, roots)
     own = ObjectFile(LINKER_OBJECT)
+    if options.part is not None:
+        part.adapt(resolution)
     resolution.objects.append(own)
-    if options.isr and "__DefaultInterrupt" not in resolution.globals:
+    if options.isr and options.part is None and "__DefaultInterrupt" not in resolution.globals:
         synthesize.default_interrupt(own)
     _adopt(resolution, own)
     live = live_sections(resolution, roots + sorted(vector_names()), options.gc_sections)
     _common_sections(resolution, own)
-    _fixed_sections(resolution, own, live, options)
+    if options.part is None:
+        _fixed_sections(resolution, own, live, options)
     handle, slots = synthesize.handle_section(resolution, live | set(own.sections))
     if not with_slots:
         handle.type, handle.flags = c.SHT_NOTE, SectionFlag(0)  # only tells tools whose address is taken
@@ -77,12 +80,15 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
         slots = {}
     _adopt(resolution, own)
     live |= set(own.sections)
-    memory = Memory(options.chip)
+    memory = Memory(options.chip, options.part)
     absolute = memory.script_symbols() | options.define
     absolute |= dict.fromkeys(_LINKER_SYMBOLS, 0)
     provided = set(absolute) | {n for n in resolution.wanted if SECTION_LIMIT.fullmatch(n)}
     check(resolution, provided, live)
-    _check_handlers(resolution, live)
+    if options.part is None:
+        _check_handlers(resolution, live)
+    else:
+        part.check(resolution, live)
     messages = _foreign_processors(objects, options.chip)
 
     order = [s for obj in resolution.objects for s in obj.sections if s in live and s.name != c.SIGNATURE_SECTION]
@@ -102,7 +108,7 @@ def _link(objects: list[ObjectFile], archives: list[Archive], options: LinkOptio
     if not with_slots and any(_beyond_pointers(layout, target) for target in slots):
         return None
 
-    stack = _stack(resolution, layout, order, options)
+    stack = (0, 0) if options.part is not None else _stack(resolution, layout, order, options)
     absolute |= _linker_symbols(resolution, layout, table if options.data_init else None, stack, options)
     absolute |= _section_limits(resolution, layout)
     relocator = Relocator(resolution, layout, absolute, slots, handle)

@@ -9,23 +9,27 @@ from functools import cached_property
 from typing import Final
 
 from emu.chips import NAMES, chip_named
-from emu.chips.chip import Chip
+from emu.chips.chip import Chip, Region
 from emu.chips.family import UNIT_ID
 from emu.elffacts import UNITS_PER_WORD
+from toolchain.link.options import Part
 
 HANDLE_LIMIT = 0x10000  # abi-elf.md §1.5: a function pointer is 16 bits
 UNIT_ID_WORDS = 4  # FUID0..3, abi-elf.md §3.3
 
 
 class Memory:
-    """One chip as a linker sees it."""
+    """One chip, or a part of it, as a linker sees it."""
 
-    def __init__(self, chip: Chip) -> None:
+    def __init__(self, chip: Chip, part: Part | None = None) -> None:
         self.chip: Final = chip
         program, data = chip.program, chip.data
         self.flash, self.program, self.eeprom = program["flash"], program["program"], program["eedata"]
         self.reset, self.ivt, self.aivt = program["reset"], program["ivt"], program["aivt"]
         self.ram, self.near, self.x_ram, self.y_ram = data["ram"], data["near"], data["xram"], data["yram"]
+        if part is not None:
+            self.program, self.ram = part.program, part.data
+            self.near, self.x_ram, self.y_ram = (_common(r, part.data) for r in (self.near, self.x_ram, self.y_ram))
 
     @cached_property
     def config_sections(self) -> Mapping[str, int]:
@@ -52,6 +56,12 @@ class Memory:
         for accumulator in ("ACCA", "ACCB"):  # three registers each; `PUSH ACCA` takes the lowest (abi-elf.md §3.3)
             symbols[accumulator] = symbols[f"_{accumulator}"] = self.chip.sfrs[f"{accumulator}L"].address
         return symbols
+
+
+def _common(region: Region, other: Region) -> Region:
+    """What lies in both."""
+    start = max(region.start, other.start)
+    return Region(region.name, start, max(start, min(region.end, other.end)))
 
 
 CONFIG_SECTIONS: Final = frozenset(name for chip in map(chip_named, NAMES) for name in Memory(chip).config_sections)

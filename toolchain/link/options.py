@@ -5,10 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from emu.chips import chip_named
-from emu.chips.chip import Chip
+from emu.chips.chip import Chip, Region
 
 STACK_GUARD = 16  # abi-elf.md §3.3: --stackguard default
 MINIMUM_STACK = 16  # --stack default
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What a program may use that another image calls: a range of program memory and one of RAM. It has no vectors, no
+    reset and no stack, and its constants lie in its RAM, since the PSV window shows those of the other image."""
+
+    program: Region
+    data: Region
 
 
 @dataclass(slots=True)
@@ -29,3 +38,4 @@ class LinkOptions:
     undefined: list[str] = field(default_factory=list)
     define: dict[str, int] = field(default_factory=dict)
     chip: Chip = field(default_factory=chip_named)
+    part: Part | None = None

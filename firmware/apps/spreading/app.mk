@@ -1,1 +1,2 @@
 DEVICES := infrared update
+PROGRAMS := lamp

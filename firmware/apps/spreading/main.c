@@ -6,12 +6,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "lamp.h" /* rows of lamp/main.c */
 #include "spread.h"
 
 enum { LOOK_MS = 20, HEARD = 8, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS = 8000, LINE = 24, STACK = 700 };
-
-/* What it spreads: BSET LATC,#2; RETURN. The body LED is on from then on. */
-static const uint8 program[] = {0xD0, 0x42, 0xA8, 0x00, 0x00, 0x06};
 
 static uint8 messages[HEARD][SYS_SPREAD_BYTES];
 static volatile uint8 first, last; /* of those that wait */
@@ -39,11 +37,16 @@ static void say(const char *what, uint16 version)
 /* The robot whose selector is not 0 has a program of that version, if it has none. */
 static void provide(uint16 version)
 {
-    uint8 row[HAL_UPDATE_ROW];
-    memset(row, 0xFF, sizeof row);
-    memcpy(row, program, sizeof program);
-    sys_update facts = {version, 1, ~Sys_Add_UpdateCrc(0xFFFFFFFFu, row, sizeof row)};
-    if (version != 0 && Sys_Begin_Update(&facts) && Sys_Put_UpdateRow(0, row)) {
+    sys_update facts = {version, sizeof lamp / sizeof *lamp, 0xFFFFFFFFu};
+    for (uint8 row = 0; row < facts.rows; row++) {
+        facts.crc = Sys_Add_UpdateCrc(facts.crc, lamp[row], sizeof *lamp);
+    }
+    facts.crc = ~facts.crc;
+    bool is_taken = version != 0 && Sys_Begin_Update(&facts);
+    for (uint8 row = 0; row < facts.rows && is_taken; row++) {
+        is_taken = Sys_Put_UpdateRow(row, lamp[row]);
+    }
+    if (is_taken) {
         Sys_End_Update();
     }
 }

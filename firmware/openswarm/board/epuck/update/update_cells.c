@@ -1,22 +1,24 @@
 /* SPDX-License-Identifier: MIT */
-/* Rows of updates at 016000 to 01787F of flash, flags in two words of the data EEPROM. */
+/* Rows of updates in flash (update_slots.h), flags in two words of the data EEPROM. */
 #include "../flash/flash_cells.h"
 #include "hal_update.h"
 #include "update_slots.h"
 
 enum {
     ALL_LEVELS = 0xE0, /* IPL in SR */
-    PAGE = UPDATE_SLOTS >> 16, /* of program memory */
-    RUN = UPDATE_SLOTS & 0xFFFF,
-    STORE = RUN + HAL_UPDATE_ROWS * FLASH_ROW_UNITS,
+    RUN_PAGE = (uint32_t)UPDATE_RUN >> 16, /* of program memory */
+    STORE_PAGE = UPDATE_STORES >> 16,
+    STORE = UPDATE_STORES & 0xFFFF,
     STORE_UNITS = (HAL_UPDATE_ROWS + 1) * FLASH_ROW_UNITS,
     EEPROM_PAGE = 0x7F,
     FLAGS = 0xFFF0
 };
 
-static uint16_t address_of(uint8_t slot, uint8_t row)
+/* Its low half; the page of program memory is set to the rest. */
+static uint16_t find_row(uint8_t slot, uint8_t row)
 {
-    uint16_t base = slot == HAL_UPDATE_RUN ? RUN : (uint16_t)(STORE + slot * (uint16_t)STORE_UNITS);
+    TBLPAG = slot == HAL_UPDATE_RUN ? RUN_PAGE : STORE_PAGE;
+    uint16_t base = slot == HAL_UPDATE_RUN ? UPDATE_RUN : (uint16_t)(STORE + slot * (uint16_t)STORE_UNITS);
     return (uint16_t)(base + row * (uint16_t)FLASH_ROW_UNITS);
 }
 
@@ -33,8 +35,7 @@ static void __attribute__((noinline)) operate(uint16_t operation)
 
 void hal_update_read(uint8_t slot, uint8_t row, uint8_t *bytes)
 {
-    uint16_t offset = address_of(slot, row);
-    TBLPAG = PAGE;
+    uint16_t offset = find_row(slot, row);
     for (uint16_t end = (uint16_t)(offset + FLASH_ROW_UNITS); offset != end; offset += 2) {
         uint16_t low = __builtin_tblrdl(offset);
         *bytes++ = (uint8_t)low;
@@ -45,15 +46,13 @@ void hal_update_read(uint8_t slot, uint8_t row, uint8_t *bytes)
 
 void hal_update_erase(uint8_t slot, uint8_t row)
 {
-    TBLPAG = PAGE;
-    __builtin_tblwtl(address_of(slot, row), 0);
+    __builtin_tblwtl(find_row(slot, row), 0);
     operate(FLASH_ERASE_ROW);
 }
 
 void hal_update_write(uint8_t slot, uint8_t row, const uint8_t *bytes)
 {
-    TBLPAG = PAGE;
-    flash_latch_row(address_of(slot, row), bytes);
+    flash_latch_row(find_row(slot, row), bytes);
     operate(FLASH_PROGRAM_ROW);
 }
 
@@ -79,5 +78,5 @@ void hal_update_renew(uint8_t store)
 
 void hal_update_run(void)
 {
-    __asm__ volatile("call %0" : : "i"(UPDATE_SLOTS) : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "memory");
+    __asm__ volatile("call %0" : : "i"((uint32_t)UPDATE_RUN) : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "memory");
 }

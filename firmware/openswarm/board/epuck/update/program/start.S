@@ -1,0 +1,41 @@
+; SPDX-License-Identifier: MIT
+; The first words of a program that comes as an update; it is called here at each start of the firmware. Linked by
+; `openswarm program`.
+#include "update_slots.h"
+
+    .macro offered name
+    .set calls, calls + 1
+    .global _\name
+    .equ _\name, UPDATE_CALLS + 4 * calls
+    .endm
+
+    .set calls, 0
+    .include "update_calls.inc"
+
+    .section .update_start, code, address(UPDATE_RUN), keep
+    .global __update_start
+__update_start:
+    clr     TBLPAG                      ; of calls and program
+    mov     #UPDATE_CALLS, w1
+    tblrdl  [w1], w0
+    mov     #(UPDATE_CALLS_MARK + calls), w1
+    sub     w0, w1, w0                  ; so many more calls are offered than this was made for
+    mov     #(0xFF - calls), w1
+    cp      w0, w1
+    bra     leu, 1f
+    reset                               ; another firmware: three tries later it goes on without this
+1:  mov     #__dinit_tbloffset, w0      ; abi-elf.md §3.2, of which --no-pack-data leaves two kinds
+2:  tblrdl  [w0++], w2                  ; where; 0 ends
+    cp0     w2
+    bra     z, 4f
+    tblrdl  [w0++], w3
+    lsr     w3, w3                      ; words
+    tblrdl  [w0++], w1                  ; 0: clear them, 1: they follow
+3:  clr     w4
+    btsc    w1, #0
+    tblrdl  [w0++], w4
+    mov     w4, [w2++]
+    dec     w3, w3
+    bra     nz, 3b
+    bra     2b
+4:  goto    _main

@@ -1,0 +1,60 @@
+"""Programs that come as updates (firmware/openswarm/io/update): what an image of one has to be, its rows, its CRC."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Final
+
+from emu.chips.chip import Region
+from emu.image import ERASED, Image
+from openswarm.flashing.loaders import ROW_UNITS
+
+SLOT: Final = Region("slot of programs", 0x00F800, 0x010000)
+"""Where they run, in PC units: board/epuck/update/update_slots.h."""
+RAM: Final = Region("RAM of programs", 0x0800, 0x0A00)
+"""In bytes: the same file."""
+ROWS: Final = SLOT.size // ROW_UNITS
+VERSION_SYMBOL: Final = "__update_version"
+"""Absolute symbol of such an image."""
+LAST_VERSION: Final = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What robots pass on to each other."""
+
+    version: int
+    rows: tuple[bytes, ...]
+    """Of 96 bytes: 32 instructions, three bytes each, the lowest first."""
+
+    @property
+    def crc(self) -> int:
+        """CRC-32 (IEEE 802.3) of all rows."""
+        return zlib.crc32(b"".join(self.rows))
+
+
+def is_program(image: Image) -> bool:
+    """Whether an image is a program for the slot: it has words there, and no firmware at the reset vector."""
+    return image.word(0) is None and image.used(SLOT) > 0
+
+
+def program_of(image: Image) -> Program:
+    """Raises ValueError for what cannot be taken as an update."""
+    version = image.symbols.find(VERSION_SYMBOL)
+    if version is None:
+        raise ValueError(f"{image.path}: has no {VERSION_SYMBOL}: expected the ELF file that `openswarm program` made")
+    if image.word(SLOT.start) is None:
+        raise ValueError(f"{image.path}: has nothing at {SLOT.start:#08x}, where programs begin")
+    outside = [block for block in image.blocks if block.base < SLOT.start or block.end > SLOT.end]
+    if outside:
+        raise ValueError(
+            f"{image.path}: {outside[0].origin} has words at {outside[0].base:#08x}, outside of the slot of programs,"
+            f" {SLOT.start:#08x} to {SLOT.end - 2:#08x}"
+        )
+    end = max(block.end for block in image.blocks)
+    words = [image.word(address) for address in range(SLOT.start, end, 2)]
+    words += [None] * (-len(words) % (ROW_UNITS // 2))
+    data = b"".join((ERASED if word is None else word).to_bytes(3, "little") for word in words)
+    size = ROW_UNITS // 2 * 3
+    return Program(version.address, tuple(data[at : at + size] for at in range(0, len(data), size)))

@@ -1,0 +1,2 @@
+DEVICES := update
+PROGRAMS := talker

@@ -1,0 +1,38 @@
+"""A program that another image calls (`--part`): what it may not have, and constants in its RAM.
+
+Before: the resolution of any program. After `adapt`: its constants are initialised data.
+"""
+
+from __future__ import annotations
+
+from emu.elffacts import SectionFlag
+from toolchain.elf.model import Section
+from toolchain.errors import ToolError
+from toolchain.link.gc import vector_names
+from toolchain.link.place import space_of
+from toolchain.link.resolve import Resolution
+
+
+def adapt(resolution: Resolution) -> None:
+    """Constants become initialised data: the only PSV window shows what the image that calls has set up."""
+    for section in resolution.owner:
+        if section.is_psv and not section.flags & SectionFlag.EEDATA:
+            kept = section.flags & ~(SectionFlag.PSV | SectionFlag.EXECINSTR)
+            section.flags = kept | SectionFlag.WRITE | SectionFlag.ALLOC
+
+
+def check(resolution: Resolution, live: set[Section]) -> None:
+    """Raise `ToolError` for what would be without effect: handlers of interrupts, configuration words, EEPROM."""
+    findings = [
+        f"{resolution.defined_in[name].name}: error: {name} is a handler of interrupts; the vectors are those of the"
+        f" image that calls this program"
+        for name in sorted(vector_names() & set(resolution.globals))
+    ]
+    for section in live:
+        space = space_of(section)
+        if section.units and space in ("config", "eeprom"):
+            what = "configuration words" if space == "config" else "contents of the data EEPROM"
+            owner = resolution.owner[section].name
+            findings.append(f"{owner}: error: {section.name}: a program that another image calls has no {what}")
+    if findings:
+        raise ToolError.of(sorted(findings))
