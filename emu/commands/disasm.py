@@ -11,6 +11,7 @@ from pathlib import Path
 from emu.command import CommandError, Parser
 from emu.commands.image_option import add_chip_option, image_of
 from emu.disassembly import Item, items
+from emu.dspic30f.state import PC_MASK
 from emu.image import Image
 from emu.status import DONE
 
@@ -49,22 +50,28 @@ def _range(image: Image, start: str | None, end: str | None) -> tuple[int, int]:
     flash = image.chip.program["flash"]
     first = flash.start if start is None else code_address(image, start)
     if end is not None:
-        return first, code_address(image, end)
+        last = code_address(image, end)
+        if last <= first:
+            raise CommandError(f"--to {last:#x} does not lie behind the first address, {first:#x}")
+        return first, last
     symbol = image.symbols.find(start) if start is not None else None
     return first, first + symbol.size if symbol is not None and symbol.size else flash.end
 
 
 def code_address(image: Image, text: str) -> int:
-    """A program address from a symbol's name or a number. Raises CommandError if it is neither."""
+    """A program address, an even number, from a symbol's name or a number. Raises CommandError if it is neither."""
     symbol = image.symbols.find(text)
     if symbol is not None:
         if symbol.space not in ("code", "absolute"):
             raise CommandError(f"{text!r} is not code but lies in {symbol.space} memory")
         return symbol.address
     try:
-        return int(text, 0)
+        address = int(text, 0)
     except ValueError:
         raise CommandError(f"{image.path} has no symbol {text!r}, and it is not an address") from None
+    if address & 1 or not 0 <= address <= PC_MASK:
+        raise CommandError(f"{text} is no program address: they are even, 0 to {PC_MASK:#x}")
+    return address
 
 
 def listing(image: Image, found: Iterator[Item], sources: _Sources) -> Iterator[str]:

@@ -69,6 +69,12 @@ def test_a_place_that_is_no_code_is_refused(firmware, capsys, name, expected):
     assert expected in output(capsys, "disasm", firmware, "--from", name, status=2).err
 
 
+@pytest.mark.parametrize(("first", "last"), [("0x102", "0x100"), ("0x102", "0x102")])
+def test_a_range_that_holds_nothing_is_refused(firmware, capsys, first, last):
+    told = output(capsys, "disasm", firmware, "--from", first, "--to", last, status=2)
+    assert told.err == f"emu disasm: --to {last} does not lie behind the first address, 0x102\n"
+
+
 def test_info_counts_memory_as_the_sections_say(firmware, capsys):
     """Flash in bytes is 3 per program word; RAM is counted from data and bss sections."""
     facts = json.loads(output(capsys, "info", firmware, "--json").out)
