@@ -86,7 +86,7 @@ class EmulatedBrain:
         self._board.camera.lamp = scene.light.brightness
         self._board.camera.sample(self._pixels)
         self._begin(scene)
-        self.machine.uart[1].on_byte = self._byte
+        self.machine.uart[1].listen(self._byte, lazy=True)
         self._ether: Final = ether or Ether.of(scene)
         self._ring = Ring(scene, seed, self._board, self._ether, robot, self._on_at)
         self._poses = self._before = Poses([], [])

@@ -331,6 +331,7 @@ class Machine(Contents, BySource):
         except DeviceReset as reset:
             return self._reset_by(reset)
         u64[self.events.now_index] = cycle
+        self.peripherals.tell()
         return None
 
     def interrupt(self) -> None:
@@ -442,9 +443,10 @@ class Machine(Contents, BySource):
         """A copy of the whole state. Whoever continues from it looks for work first: the deadline is derived data, and
         so is when a request that is held back becomes acceptable, which is known to who has looked since.
 
-        Equal machines give equal copies whatever their engines: pin changes that wait to be told are told first.
+        Equal machines give equal copies whatever their engines: what waits to be told is told first.
         """
         self.pins.flush()
+        self.peripherals.tell()
         self.core.exceptions.forget()
         self.events.kick()
         return self.record.snapshot()

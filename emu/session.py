@@ -64,7 +64,7 @@ class Session:
         self._sent: Final = {number: bytearray() for number in ports}
         self._start = 0.0
         self._first_cycle: Final = machine.cycle
-        self._removals: Final = [self._links[number].listen(self._collector(number)) for number in ports]
+        self._removals: Final = [self._links[number].listen(self._collector(number), lazy=True) for number in ports]
 
     def run(self) -> tuple[Stop, float]:
         """Run to the end; returns how it ended and the seconds of host time it took."""

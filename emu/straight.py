@@ -62,12 +62,12 @@ class Line:
     deadline: Place
 
 
-def request(m: Reader, line: Line, cycle: Number) -> None:
-    """The flag is 1 from `cycle` on, if it is not already, and the engine looks."""
+def request(m: Reader, line: Line, cycle: Number, when: Number = True) -> None:
+    """`when` that holds, the flag is 1 from `cycle` on, if it is not already, and the engine looks."""
     word = m.get(line.flags)
-    m.put(line.since, m.select((word & line.bit) == 0, cycle, m.get(line.since)))
-    m.put(line.flags, word | line.bit)
-    m.put(line.deadline, 0)
+    m.put(line.since, m.select(((word & line.bit) == 0) & when, cycle, m.get(line.since)))
+    m.put(line.flags, m.select(when, word | line.bit, word))
+    m.put(line.deadline, m.select(when, 0, m.get(line.deadline)))
 
 
 class Reader(Protocol):
@@ -135,9 +135,11 @@ class Rule:
     0x00FF or 0xFF00 is known when the rule is read, the value need not be."""
     fires: Callable[[Any, Any], None] | None = None
     """fires(reader, places): the slot is idle already; the rule may post it again."""
+    takes: Callable[[Any, Any], Number] | None = None
+    """takes(reader, places): as `reads`, and the device changes by it."""
 
     def __repr__(self) -> str:
-        names = [rule.__qualname__ for rule in (self.reads, self.writes, self.fires) if rule is not None]
+        names = [rule.__qualname__ for rule in (self.reads, self.takes, self.writes, self.fires) if rule is not None]
         return f"Rule({self.places!r}, {', '.join(names)})"
 
 
@@ -197,10 +199,11 @@ class Integers(Numbers):
 
     def read(self, rule: Rule) -> int | None:
         """The word read now, or None where the hooks answer."""
-        if rule.reads is None:
+        reads = rule.reads or rule.takes
+        if reads is None:
             return None
         try:
-            return int(rule.reads(self, rule.places))
+            return int(reads(self, rule.places))
         except Rare:
             return None
 

@@ -372,11 +372,13 @@ class History:
     def _silence(self) -> Iterator[None]:
         """Nobody hears what has been told already, nor are edges of pins that wait to be told taken for later ones."""
         self.machine.pins.flush()
+        self.machine.peripherals.tell()
         events, held = self.machine.events, self.machine.hold()
         quiet, events.quiet = events.quiet, True
         try:
             yield
         finally:
             self.machine.pins.flush()
+            self.machine.peripherals.tell()
             events.quiet = quiet
             held()

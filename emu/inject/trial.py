@@ -73,7 +73,7 @@ class Trials:
         self._said: Final = {number: bytearray() for number in self._machine.uart}
         self._trapped = ""
         for number, uart in self._machine.uart.items():
-            uart.listen(partial(self._hear, number))
+            uart.listen(partial(self._hear, number), lazy=True)
             for time, data in campaign.input.get(number, ()):
                 uart.feed(data, int(time * self._machine.hz))
         told = self._machine.core.exceptions.on_trap

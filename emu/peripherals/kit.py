@@ -69,6 +69,10 @@ class Cell:
     def value(self, number: int) -> None:
         self._view[self.index] = number
 
+    def set(self, number: int) -> None:
+        """As an assignment to `value`."""
+        self._view[self.index] = number
+
 
 @dataclass
 class Kit:

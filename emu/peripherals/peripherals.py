@@ -172,6 +172,11 @@ class Peripherals:
         """CLRWDT in `cycle`."""
         self.watchdog.clear(cycle)
 
+    def tell(self) -> None:
+        """Tell who listens to UARTs what native code has sent."""
+        for uart in self.uart.values():
+            uart.tell()
+
     def restored(self) -> None:
         """Call after the record was replaced by a snapshot."""
         for device in self.all:

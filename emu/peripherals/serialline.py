@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 from emu.record import Record
+from emu.straight import Place, place_of
 
 CAPACITY: Final = 1024
 FRAMING_ERROR: Final = 0x200
@@ -22,6 +23,7 @@ BREAK: Final = 0x800
 """The line is low for the whole frame."""
 PATIENT: Final = 0x1000
 """The frame is not sent before the receiver is enabled."""
+ERRORS: Final = FRAMING_ERROR | PARITY_ERROR | BREAK
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,18 @@ class Frame:
     earliest: int
     data: int
     bit: int
+
+
+@dataclass(frozen=True, slots=True)
+class LinePlaces:
+    """A ring of `CAPACITY` frames, and whether more of them wait outside."""
+
+    earliest: Place
+    bit: Place
+    data: Place
+    head: Place
+    count: Place
+    more: Place
 
 
 class SerialLine:
@@ -48,7 +62,12 @@ class SerialLine:
         self._data: Final = record.u16[first : first + CAPACITY]
         self._head: Final = reserve("line.head", "H")
         self._count: Final = reserve("line.count", "H")
+        self._more: Final = reserve("line.more", "B")
         self._u16: Final = record.u16
+        self._u8: Final = record.u8
+        places = (place_of(record, f"{name}.line.{one.name}") for one in fields(LinePlaces))
+        self.places: Final = LinePlaces(*places)
+        """For rules."""
         self.backlog: Final[deque[Frame]] = deque()
         """What does not fit into the record yet."""
 
@@ -79,3 +98,4 @@ class SerialLine:
             tail = (self._u16[self._head] + self._u16[self._count]) % CAPACITY
             self._earliest[tail], self._data[tail], self._bit[tail] = frame.earliest, frame.data, frame.bit
             self._u16[self._count] += 1
+        self._u8[self._more] = bool(self.backlog)

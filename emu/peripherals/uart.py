@@ -1,7 +1,8 @@
 """UART1/2 (§10): FIFOs, bit-exact line timing, error flags, interrupt modes, loopback, break, autobaud.
 
 The outside is bytes with cycles: `on_byte(byte, start_cycle)` when a frame has left the pin, `feed(bytes)` for frames
-that arrive at line rate. The level of the TX pin is a function of the cycle.
+that arrive at line rate. The level of the TX pin is a function of the cycle. What happens inside is the text of
+`uartrules.py`; here is what surrounds it.
 """
 
 from __future__ import annotations
@@ -21,14 +22,29 @@ from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports import Port
 from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR, PATIENT, Frame, SerialLine
 from emu.peripherals.txpin import TxPin
-from emu.peripherals.uartframe import FORMATS, FRAMING_MARK, PARITY_MARK, Format, sample
+from emu.peripherals.uartframe import first_stop, has_parity, length, pack, sample, stops
+from emu.peripherals.uartrules import (
+    COMING,
+    FIFO,
+    QUIET,
+    SENT,
+    UartPlaces,
+    arrive,
+    begin,
+    bit_time,
+    edge,
+    fire_line,
+    fire_receive,
+    fire_send,
+    pop,
+    push,
+    receive,
+    send_next,
+    shown,
+)
+from emu.straight import Rule, place_of, slot_of
 
-FIFO: Final = 4
-"""Depth of the transmit and receive FIFOs (§10.1, §10.2)."""
-_QUIET: Final = 0
-_COMING: Final = 1
-_SAMPLING: Final = 2
-"""Receiver states: no frame, start bit posted (loopback), inside a frame."""
+_NO_SENT: Final = memoryview(bytes(8 * SENT)).cast("Q")
 
 
 class Uart(Peripheral):
@@ -47,18 +63,17 @@ class Uart(Peripheral):
         self.idle_bit = (self.mode, "USIDL")
         self.mode.written_by(self._mode_written)
         self.sta.written_by(self._sta_written)
-        self.txreg.written_by(self._tx_written)
         self.txreg.computed(lambda: 0)
-        self.rxreg.read_by(self._rx_read)
         self.rxreg.computed(lambda: self._rx[0])
         self.brg.written_by(self._brg_written)
         self._ear: Ear | None = None
-        self._sent_to: Final[Listeners[[int, int]]] = Listeners(self.events)
+        self._at_once: Final = self.cell("at_once", "B")
+        """Whether somebody must hear of a character in the cycle in which it has left."""
+        self._sent: Final = self.array("sent", "Q", SENT)
+        """Characters that nobody has been told of: first cycle of the start bit << 16 | character."""
+        self._sent_count: Final = self.cell("sent_count", "B")
+        self._sent_to: Final[Listeners[[int, int]]] = Listeners(self.events, self._at_once.set)
         self._capture: Capture | None = None
-        fields = kit.chip.sfrs[prefix + "STA"].fields
-        self._trmt, self._utxbf, self._utxen, self._utxisel = (
-            1 << fields[name][0] for name in ("TRMT", "UTXBF", "UTXEN", "UTXISEL")
-        )
         self._uarten: Final = 1 << kit.chip.sfrs[prefix + "MODE"].fields["UARTEN"][0]
         tx_port, self._tx_pin = parse_pin(site.tx_pin)
         rx_port, self._rx_pin = parse_pin(site.rx_pin)
@@ -100,11 +115,62 @@ class Uart(Peripheral):
         self._line_free: Final = self.cell("line_free", "Q")
         """First cycle the line is free for the next frame."""
         self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
+        self._places: Final = self._registers()
+        self._ruled(self._places)
 
-    def listen(self, listener: Callable[[int, int], object], *, part: bool = False) -> Callable[[], None]:
+    def _registers(self) -> UartPlaces:
+        sfrs = self.kit.chip.sfrs
+        cells = ("clock", "tx", "tx_count", "shifting", "frame", "wave", "start", "end", "bit_began", "rx", "rx_count",
+                 "held", "receiving", "incoming", "done", "rx_wave", "rx_start", "rx_bit", "line_free", "frozen",
+                 "at_once", "sent", "sent_count")  # fmt: skip
+        fields = {**sfrs[self.mode.name].fields, **sfrs[self.sta.name].fields}
+        return UartPlaces(
+            mode=self.mode.place,
+            sta=self.sta.place,
+            brg=self.brg.place,
+            txreg=self.txreg.place,
+            bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
+            urxisel=fields["URXISEL"][0],
+            writable=sfrs[self.txreg.name].writable,
+            watched=place_of(self.record, "pins.eager", self._tx_port.index),
+            tx_pin=self._tx_pin,
+            line=self.line.places,
+            send_slot=slot_of(self.record, self._tx_event),
+            receive_slot=slot_of(self.record, self._rx_event),
+            line_slot=slot_of(self.record, self._line_event),
+            send_line=self._interrupts.line(self.site.tx_irq).line,
+            receive_line=self._interrupts.line(self.site.rx_irq).line,
+            **{name: place_of(self.record, f"{self.name}.{name}") for name in cells},
+        )
+
+    def _ruled(self, places: UartPlaces) -> None:
+        """What has rules; hooks for who has taken the rules off the bus run the same text."""
+        integers = self.bus.integers
+        self.txreg.ruled(Rule(places, writes=push))
+        self.txreg.written_by(lambda _old, new, lanes: self._push(new, lanes))
+        self.rxreg.ruled(Rule(places, takes=pop))
+        self.rxreg.read_by(lambda: pop(integers, places))
+        self.ruled(self._tx_event, Rule(places, fires=fire_send))
+        self.ruled(self._rx_event, Rule(places, fires=fire_receive))
+        self.ruled(self._line_event, Rule(places, fires=fire_line))
+
+    def listen(
+        self, listener: Callable[[int, int], object], *, part: bool = False, lazy: bool = False
+    ) -> Callable[[], None]:
         """Call listener(byte, start_cycle) for every frame that has left TX; its start bit began in start_cycle. Any
-        number may listen. Returns how to remove this one. `part`: a part of the board, whose state depends on it."""
-        return self._sent_to.add(listener, part=part)
+        number may listen. Returns how to remove this one. `part`: a part of the board, whose state depends on it.
+        `lazy`: it need not hear in that very cycle, but before the run ends; a machine runs faster if all are."""
+        return self._sent_to.add(listener, part=part, lazy=lazy)
+
+    def tell(self) -> None:
+        """Tell who listens what has been sent. The record keeps no trace of it."""
+        count = self._sent_count.value
+        if count:
+            entries = self._sent[:count].tolist()
+            self._sent_count.value = 0
+            self._sent[:count] = _NO_SENT[:count]
+            for entry in entries:
+                self._sent_to(entry & 0xFFFF, entry >> 16)
 
     @property
     def on_byte(self) -> Callable[[int, int], object] | None:
@@ -124,8 +190,12 @@ class Uart(Peripheral):
         """
         if self._ear is None:
             self._ear = Ear(self.name.upper().replace("U", "UART", 1), self.kit.wires, self.kit.fcy, lambda: self.now)
-            self.listen(self._ear.hear)
-        return self._ear.expect(pattern, within, self.drain)
+            self.listen(self._ear.hear, lazy=True)
+        no_longer = self.listen(lambda _byte, _start: None)  # what ends a run must be heard at once
+        try:
+            return self._ear.expect(pattern, within, self.drain)
+        finally:
+            no_longer()
 
     def connect_capture(self, capture: Capture) -> None:
         """The capture channel that ABAUD connects to the receive pin."""
@@ -136,7 +206,7 @@ class Uart(Peripheral):
     @property
     def bit_time(self) -> int:
         """Length of a bit in Tcy: 16 (BRG + 1)."""
-        return 16 * (self.brg.value + 1)
+        return int(bit_time(self.bus.integers, self._places))
 
     @property
     def is_enabled(self) -> bool:
@@ -148,23 +218,10 @@ class Uart(Peripheral):
         """UARTEN and UTXEN."""
         return self.is_enabled and bool(self.sta["UTXEN"])
 
-    @property
-    def _format(self) -> Format:
-        return FORMATS[self.mode.value & 7]  # PDSEL and STSEL, sfr.csv
-
     # -- transmit ----------------------------------------------------------------------------------------------------
 
-    def _tx_written(self, _old: int, new: int, lanes: int) -> None:
-        """The low byte pushes; a full FIFO drops the character (§10.1)."""
-        count = self._tx_count.value
-        if not lanes & 0xFF or not self.is_enabled or count == FIFO:
-            return
-        self._tx[count] = new & (1 << self._format.data_bits) - 1
-        self._tx_count.value = count + 1
-        status = self.sta.value & ~self._trmt
-        self.sta.value = status | self._utxbf if count + 1 == FIFO else status
-        if status & self._utxen and not self._shifting.value:
-            self.events.set(self._tx_event, self.now + 1)
+    def _push(self, value: int, lanes: int) -> None:
+        push(self.bus.integers, self._places, value, lanes)
 
     def _tx_due(self, due: int) -> None:
         """A frame has ended, or a character waits for the idle shift register."""
@@ -172,43 +229,15 @@ class Uart(Peripheral):
             return
         if self._shifting.value:
             self._shifting.value = 0
-            self._sent(self._start.value)
-        if self._tx_count.value:
-            self._load(due)
-        else:
-            self.sta["TRMT"] = 1
-            self._start.value = self._end.value = NEVER
-
-    def _load(self, cycle: int) -> None:
-        """FIFO to TSR; the start bit begins at the next edge of the free-running bit clock (§10.1)."""
-        waiting = self._tx
-        data = waiting[0]
-        waiting[0], waiting[1], waiting[2] = waiting[1], waiting[2], waiting[3]
-        count = self._tx_count.value - 1
-        self._tx_count.value = count
-        status = self.sta.value & ~self._utxbf
-        self.sta.value = status
-        if not status & self._utxisel or count == 0:
-            self._interrupts.line(self.site.tx_irq).request()
-        form = self._format
-        bits, length = form.pack(data), form.length
-        bit = self.bit_time
-        start = cycle if self._end.value == cycle else self._clock.value + -(-(cycle - self._clock.value) // bit) * bit
-        if start == self._clock.value:
-            start += bit
-        self._frame.value = data
-        self._wave.value = bits
-        self._start.value = self._bit_began.value = start
-        self._end.value = start + length * bit
-        self._shifting.value = 1
-        self.events.set(self._tx_event, self._end.value)
-        self._pin.log_frame(start, bits, length, bit)
-        if self.mode["LPBACK"]:
-            self._arrive(start, data | (BREAK if self.sta["UTXBRK"] else 0), 0)
-
-    def _sent(self, start: int) -> None:
-        """A frame has left the pin, in loopback too: that cuts off the receive pin only (§10)."""
-        self._sent_to(0 if self.sta["UTXBRK"] else self._frame.value, start)
+            self.tell()  # loopback cuts off the receive pin only: the frame has left TX (§10)
+            self._sent_to(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
+        waits = self._tx_count.value > 0
+        send_next(self.bus.integers, self._places, due)
+        if waits:
+            start, mode = self._start.value, self.mode.value
+            self._pin.log_frame(start, self._wave.value, length(mode), self.bit_time)
+            if self.mode["LPBACK"]:
+                self._arrive(start, self._frame.value | (BREAK if self.sta["UTXBRK"] else 0), 0)
 
     def _tx_level(self, cycle: int) -> int:
         """Level of TX in `cycle`, 1 = idle."""
@@ -220,6 +249,7 @@ class Uart(Peripheral):
 
     def drain(self) -> None:
         """Deliver what is still in the transmitter as a robot would: the pins outlive a stopped program."""
+        self.tell()
         while self._shifting.value or (self._tx_count.value and self.is_sending_enabled):
             self.events.cancel(self._tx_event)
             self._tx_due(self._end.value if self._shifting.value else self.now + 1)
@@ -263,86 +293,45 @@ class Uart(Peripheral):
         if frame is None:
             return
         self.line.drop()
-        length = self._format.length
-        self._line_free.value = due + (length * frame.bit + 255 >> 8 if frame.bit else length * self.bit_time)
+        bits = length(self.mode.value)
+        self._line_free.value = due + (bits * frame.bit + 255 >> 8 if frame.bit else bits * self.bit_time)
         if self.mode["WAKE"] and self.is_frozen:
             self._interrupts.line(self.site.rx_irq).request()
             self.mode["WAKE"] = 0
-        elif self.is_enabled and not self.is_frozen and not self.mode["LPBACK"] and self._receiving.value == _QUIET:
+        elif self.is_enabled and not self.is_frozen and not self.mode["LPBACK"] and self._receiving.value == QUIET:
             self._arrive(due, frame.data, frame.bit)
         self._plan_line()
 
     def _arrive(self, start: int, data: int, bit_q8: int) -> None:
         """Sample a frame whose start bit falls in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
-        form = self._format
-        wave, length, stop = form.pack(data), form.length, form.first_stop
-        if data & PARITY_ERROR and form.parity(data) is not None:
+        mode, text, places = self.mode.value, self.bus.integers, self._places
+        wave, bits, stop = pack(mode, data), length(mode), first_stop(mode)
+        if data & PARITY_ERROR and has_parity(mode):
             wave ^= 1 << stop - 1
         if data & (FRAMING_ERROR | BREAK):
             wave &= 0 if data & BREAK else (1 << stop) - 1
         tick = self.brg.value + 1
-        detected = self._clock.value + -(-(start - self._clock.value) // tick) * tick
-        sampled = wave if not bit_q8 else sample(wave, length, detected - start, tick, bit_q8)
-        self._incoming.value = form.judge(sampled)
-        self._rx_bit.value = bit_q8 or self.bit_time << 8
-        self._done.value = detected + (16 * stop + 8) * tick  # the middle of the first stop bit (§10.2)
-        self._rx_wave.value = (wave | 0xFFFF << length) & 0xFFFF  # behind the frame the line is high
-        self._rx_start.value = start
-        self._receiving.value = _COMING
+        sampled = wave if not bit_q8 else sample(wave, bits, edge(text, places, start, tick) - start, tick, bit_q8)
+        arrive(text, places, start, wave, sampled, bit_q8 or self.bit_time << 8)
+        self._receiving.value = COMING
         if start > self.now:
             self.events.set(self._rx_event, start)
         else:
             self._rx_due(start)
 
     def _rx_due(self, due: int) -> None:
-        if self._receiving.value == _COMING:
-            self._receiving.value = _SAMPLING
-            self.sta["RIDLE"] = 0
-            self.events.set(self._rx_event, self._done.value)
-            if self.mode["ABAUD"]:
-                self._edge_bit.value = 0
-                self.events.set(self._edge_event, due)
+        text = self.bus.integers
+        if self._receiving.value != COMING:
+            receive(text, self._places)
             return
-        self._receiving.value = _QUIET
-        self.sta["RIDLE"] = 1
-        self._received(self._incoming.value)
-
-    def _received(self, character: int) -> None:
-        """A character is complete: FIFO, or the shift register when the FIFO is full (§10.2)."""
-        if self._held.value or self.sta["OERR"]:
-            return
-        if self.sta["ADDEN"] and self._format.data_bits == 9 and not character & 0x100:
-            return
-        count = self._rx_count.value
-        if count == FIFO:
-            self._rx[FIFO] = character
-            self._held.value = 1
-            self.sta["OERR"] = 1
-            return
-        self._rx[count] = character
-        self._rx_count.value = count + 1
-        self._show_top()
-        wanted = {2: 3, 3: 4}.get(self.sta["URXISEL"], 0)
-        if not wanted or count + 1 == wanted:
-            self._interrupts.line(self.site.rx_irq).request()
+        begin(text, self._places)
+        if self.mode["ABAUD"]:
+            self._edge_bit.value = 0
+            self.events.set(self._edge_event, due)
 
     def _show_top(self) -> None:
         """URXDA, PERR and FERR belong to the character at the top of the FIFO (§10.2)."""
-        top = self._rx[0] if self._rx_count.value else 0
-        self.sta["URXDA"] = self._rx_count.value > 0
-        self.sta["PERR"] = bool(top & PARITY_MARK)
-        self.sta["FERR"] = bool(top & FRAMING_MARK)
-
-    def _rx_read(self) -> int:
-        """Reading pops; an empty FIFO returns the last character again."""
-        data = self._rx[0] & 0x1FF
-        count = self._rx_count.value
-        if count:
-            for index in range(count - 1):
-                self._rx[index] = self._rx[index + 1]
-            self._rx_count.value = count - 1
-            self._show_top()
-        return data
+        self.sta.value = int(shown(self._places, self.sta.value, self._rx_count.value, self._rx[0]))
 
     def _edge_due(self, due: int) -> None:
         """Autobaud: pass the edges of the RX pin to the capture module, starting with the start bit."""
@@ -413,7 +402,7 @@ class Uart(Peripheral):
 
     def _stop_receiving(self) -> None:
         """A character on its way is lost."""
-        self._receiving.value = _QUIET
+        self._receiving.value = QUIET
         for slot in (self._rx_event, self._edge_event):
             self.events.cancel(slot)
         self.sta["RIDLE"] = 1
@@ -445,8 +434,8 @@ class Uart(Peripheral):
         self.events.set(self._tx_event, self._end.value)
         if heard:  # in loopback the receiver follows
             self._rx_start.value = self._start.value
-            self._done.value = self._end.value - self._format.stops * bit + bit // 2
-            is_coming = self._receiving.value == _COMING
+            self._done.value = self._end.value - stops(self.mode.value) * bit + bit // 2
+            is_coming = self._receiving.value == COMING
             self.events.set(self._rx_event, self._start.value if is_coming else self._done.value)
 
     # -- power and reset ---------------------------------------------------------------------------------------------
@@ -479,6 +468,7 @@ class Uart(Peripheral):
             self.kit.pins.attach(self._tx_port.index, self._tx_pin, self._pin)
         else:
             self.kit.pins.detach(self._tx_port.index, self._pin)
+        self._at_once.set(self._sent_to.urgent)
         if self._capture is not None:
             self._capture.autobaud = bool(self.mode["ABAUD"])
 

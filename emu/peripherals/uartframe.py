@@ -1,73 +1,79 @@
-"""Characters as levels on a wire: start bit, data, parity, stop bits, and what a sampling receiver sees (§10)."""
+"""Characters as levels on a wire: start bit, data, parity, stop bits, and what a sampling receiver sees (§10).
+
+Text for every engine (emu/straight.py) that needs operators only; `mode` is UxMODE, whose bits 2:0 are PDSEL and STSEL.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
+
+from emu.straight import Number
 
 PARITY_MARK: Final = 0x400
 FRAMING_MARK: Final = 0x200
 """Errors of a received character, above its nine data bits."""
 
 
-@dataclass(frozen=True, slots=True)
-class Format:
-    """PDSEL and STSEL of UxMODE."""
-
-    pdsel: int
-    stops: int
-
-    @property
-    def data_bits(self) -> int:
-        """8, or 9 with PDSEL = 3."""
-        return 9 if self.pdsel == 3 else 8
-
-    @property
-    def first_stop(self) -> int:
-        """Index of the first stop bit in a frame."""
-        return 1 + self.data_bits + (self.pdsel in (1, 2))
-
-    @property
-    def length(self) -> int:
-        """Bits of a frame."""
-        return self.first_stop + self.stops
-
-    def parity(self, data: int) -> int | None:
-        """Parity bit of a character, None without parity. PDSEL 1 = even, 2 = odd."""
-        if self.pdsel in (0, 3):
-            return None
-        return (data & 0xFF).bit_count() + (self.pdsel == 2) & 1
-
-    def pack(self, data: int) -> int:
-        """Levels of a frame, start bit in bit 0."""
-        bits = (data & (1 << self.data_bits) - 1) << 1
-        parity = self.parity(data)
-        if parity:
-            bits |= 1 << self.first_stop - 1
-        return bits | ((1 << self.stops) - 1) << self.first_stop
-
-    def judge(self, sampled: int) -> int:
-        """Data and error marks of a sampled frame. UNVERIFIED: with two stop bits the first one decides."""
-        data = sampled >> 1 & (1 << self.data_bits) - 1
-        parity = self.parity(data)
-        marks = 0 if sampled >> self.first_stop & 1 else FRAMING_MARK
-        if parity is not None and sampled >> self.first_stop - 1 & 1 != parity:
-            marks |= PARITY_MARK
-        return data | marks
+def is_nine(mode: Number) -> Number:
+    """PDSEL = 3: nine data bits, no parity."""
+    return (mode & 6) == 6
 
 
-FORMATS: Final = tuple(Format(pdsel, 1 + stsel) for pdsel in range(4) for stsel in range(2))
-"""By PDSEL * 2 + STSEL."""
+def has_parity(mode: Number) -> Number:
+    """PDSEL = 1 (even) or 2 (odd)."""
+    return ((mode & 6) == 2) | ((mode & 6) == 4)
 
 
-def sample(wave: int, length: int, offset: int, tick: int, bit_q8: int) -> int:
-    """What a receiver with 16 clocks of `tick` Tcy per bit sees: the majority of clocks 7, 8 and 9 (§10.2).
+def data_of(mode: Number, word: Number) -> Number:
+    """The 8 or 9 data bits of a word."""
+    return word & (0xFF | is_nine(mode) << 8)
+
+
+def first_stop(mode: Number) -> Number:
+    """Index of the first stop bit in a frame."""
+    return ((mode & 6) != 0) + 9
+
+
+def stops(mode: Number) -> Number:
+    """1 or 2 (STSEL)."""
+    return (mode & 1) + 1
+
+
+def length(mode: Number) -> Number:
+    """Bits of a frame."""
+    return first_stop(mode) + stops(mode)
+
+
+def parity(mode: Number, data: Number) -> Number:
+    """Parity bit of a character, 0 where there is none."""
+    nibbles = (data ^ data >> 4) & 0xF
+    pairs = nibbles ^ nibbles >> 2
+    return (((mode & 6) == 4) ^ (pairs ^ pairs >> 1) & 1) & has_parity(mode)
+
+
+def pack(mode: Number, word: Number) -> Number:
+    """Levels of a frame, start bit in bit 0."""
+    data = data_of(mode, word)
+    return data << 1 | parity(mode, data) << 9 | (1 | (mode & 1) << 1) << first_stop(mode)
+
+
+def judge(mode: Number, sampled: Number) -> Number:
+    """Data and error marks of a sampled frame. UNVERIFIED: with two stop bits the first one decides."""
+    data = data_of(mode, sampled >> 1)
+    broken = (sampled >> first_stop(mode) & 1) ^ 1
+    wrong = (parity(mode, data) ^ sampled >> 9 & 1) & has_parity(mode)
+    return data | broken * FRAMING_MARK | wrong * PARITY_MARK
+
+
+def sample(wave: int, bits: int, offset: int, tick: int, bit_q8: int) -> int:
+    """What a receiver with 16 clocks of `tick` Tcy per bit sees of a frame of `bits`: the majority of clocks 7, 8 and 9
+    (§10.2).
 
     `offset`: Tcy from the start edge to the clock that detects it; `bit_q8`: the sender's bit time in Tcy/256.
     """
     sampled = 0
-    for index in range(length):
+    for index in range(bits):
         times = (offset + (16 * index + clock) * tick for clock in (7, 8, 9))
-        votes = sum(wave >> min(time * 256 // bit_q8, length - 1) & 1 for time in times)
+        votes = sum(wave >> min(time * 256 // bit_q8, bits - 1) & 1 for time in times)
         sampled |= (votes >= 2) << index
     return sampled

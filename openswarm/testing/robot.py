@@ -38,7 +38,7 @@ class Line:
         self._uart: Final = uart
         self.said: Final = bytearray()
         """All it has said."""
-        uart.listen(lambda byte, _cycle: self.said.append(byte & 0xFF))
+        uart.listen(lambda byte, _cycle: self.said.append(byte & 0xFF), lazy=True)
         uart.expect(b"", within=0)  # hears from now on
 
     def expect(self, pattern: Pattern, *, within_ms: float) -> Match[bytes]:

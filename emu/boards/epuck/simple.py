@@ -174,12 +174,14 @@ class Bluetooth(Part):
     def __init__(self, chip: Peripherals, loss: float = 0.0, seed: int = 0) -> None:
         super().__init__("bluetooth", chip)
         self._uart: Final = chip.uart[1]
-        self._uart.listen(self._from_robot, part=True)
+        self._uart.listen(self._from_robot, part=True, lazy=True)
+        self._no_longer: Callable[[], None] | None = None
+        """How to tell the UART that nobody beyond the link must hear at once."""
         self.loss = loss
         """Probability that a byte is lost, each way, 0..1."""
         self.dropouts: Final[list[tuple[int, int]]] = []
         """Half-open windows of cycles in which nothing passes."""
-        self._reached: Final[Listeners[[int, int]]] = Listeners(self.events)
+        self._reached: Final[Listeners[[int, int]]] = Listeners(self.events, self._hurry)
         self._down: Final = self.cell("down", "B")
         self._random: Final = self.cell("random", "Q", seed * 2 + 1 & _ONES)
         self._lost: Final = self.cell("lost")
@@ -191,6 +193,7 @@ class Bluetooth(Part):
 
     @connected.setter
     def connected(self, up: bool) -> None:
+        self._uart.tell()
         self._down.value = not up
 
     @property
@@ -198,9 +201,15 @@ class Bluetooth(Part):
         """Bytes that did not get through, both directions."""
         return self._lost.value
 
-    def listen(self, listener: Callable[[int, int], object]) -> Callable[[], None]:
-        """Call listener(byte, start_cycle) for what reaches the computer. Returns how to remove it."""
-        return self._reached.add(listener)
+    def listen(self, listener: Callable[[int, int], object], *, lazy: bool = False) -> Callable[[], None]:
+        """Call listener(byte, start_cycle) for what reaches the computer. Returns how to remove it. `lazy`: see
+        `Uart.listen`."""
+        return self._reached.add(listener, lazy=lazy)
+
+    def _hurry(self, urgent: bool) -> None:
+        if self._no_longer is not None:
+            self._no_longer()
+        self._no_longer = self._uart.listen(lambda _byte, _start: None) if urgent else None
 
     @property
     def on_byte(self) -> Callable[[int, int], object] | None:
@@ -214,6 +223,7 @@ class Bluetooth(Part):
     def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0) -> None:
         """The computer sends; see `Uart.feed` for `cycle` and `errors`."""
         at = self.now if cycle is None else cycle
+        self._uart.tell()
         self._uart.feed([byte for byte in data if not self._drops(at)], cycle, errors=errors)
 
     def _drops(self, cycle: int) -> bool:

@@ -270,6 +270,10 @@ class LlvmBuilder:
         if rule is not None and rule.reads is not None and self.repeating is None:
             shown: Number = rule.reads(NativeReader(self), rule.places)
             return shown if size == 2 else (shown >> 8 if ea & 1 else shown & 0xFF)
+        if rule is not None and rule.takes is not None and self.repeating is None:
+            self.pending.taken = True
+            taken: Number = rule.takes(NativeReader(self), rule.places)
+            return taken if size == 2 else (taken >> 8 if ea & 1 else taken & 0xFF)
         if word_address == self.around.offset["RCOUNT"] and self.repeating is not None and size == 2:
             return self.repeating
         place = self.around.accumulator_at(word_address)
@@ -328,6 +332,8 @@ class LlvmBuilder:
         rule = self.around.rules.get(word_address)
         lanes = 0xFFFF if size == 2 else (0xFF00 if ea & 1 else 0x00FF)
         placed = v << 8 if lanes == 0xFF00 else v
+        if rule is not None and self.pending.taken:  # it would see the device as it was before the read
+            raise NeedsInterpreter
         if rule is not None and rule.writes is not None and self.repeating is None:
             if not rule.writes(NativeReader(self), rule.places, placed, lanes):
                 raise NeedsInterpreter

@@ -37,6 +37,8 @@ class Pending:
     """The deadline may have come nearer: the function must be left."""
     touches_sfr: bool = False
     """An SFR that events may change, or that devices hear of, is accessed."""
+    taken: bool = False
+    """A device changes because it is read."""
     sr: Number | None = None
     pointed: Store | None = None
     """A store of which only the address that it has when it is made says whether it is to RAM or to a register."""

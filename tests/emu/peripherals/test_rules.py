@@ -11,7 +11,7 @@ from emu.straight import Integers, Place, Rule
 from .conftest import Rig
 from .test_fuzz import WORDS, act
 
-RULED = ("TMR", "PR", "LAT", "PORT", "ADC")
+RULED = ("TMR", "PR", "LAT", "PORT", "ADC", "U1", "U2")
 
 
 def test_every_device_with_rules_has_them_on_the_bus(rig: Rig) -> None:
@@ -38,6 +38,7 @@ def test_hooks_alone_give_the_same_record_as_rules(seed: int) -> None:
             else:
                 act(rig, draw)
             rig.dev.pins.flush()
+            rig.dev.tell()
             rig.record.u64[rig.events.deadline_index] = 0  # derived
         one, other = (rig.record.snapshot() for rig in rigs)
         assert one == other, (step, _places(rigs[0], one, other))

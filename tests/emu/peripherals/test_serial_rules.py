@@ -1,0 +1,103 @@
+"""UART and SPI under programs that never leave them alone: the same state, and the same told, in every engine."""
+
+from __future__ import annotations
+
+import random
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "cpu"))
+
+from cpu_rig import Rig
+
+from emu.chips.dspic30f6014a import SFRS
+
+A = {name: f"{sfr.address:#x}" for name, sfr in SFRS.items()}
+UART = """
+    mov #{brg}, w0
+    mov w0, {U1BRG}
+    mov #{mode}, w0
+    mov w0, {U1MODE}
+    mov #{status}, w0
+    mov w0, {U1STA}
+    mov #{RX}, w8
+    mov #3, w3
+    loop: btss {U1STA}, #0
+    bra silent
+    mov {U1RXREG}, w1
+    add w1, w2, w2
+    btsc w1, #0
+    mov.b [w8], w4
+    add w4, w2, w2
+    btsc {U1STA}, #1
+    bclr {U1STA}, #1
+    silent: dec w3, w3
+    bra nz, loop
+    mov #{pause}, w3
+    mov w2, {U1TXREG}
+    inc w2, w2
+    bra loop
+"""
+"""What comes is added up; the sum is sent, whether there is room or not. Some characters are taken by pointer."""
+
+
+def machine(engine: str, text: str, **settings: object) -> Rig:
+    rig = Rig(text.format(**A, **settings), engine)
+    if engine == "jit":
+        rig.machine.runner.threshold, rig.machine.runner.wait = 1, True
+    return rig
+
+
+def history(rig: Rig, seed: int, lazy: bool) -> list[object]:
+    """Snapshots at drawn stops, with input at drawn times, and at the end what was heard of UART1."""
+    draw = random.Random(seed)
+    made, heard = rig.machine, []
+    no_longer = made.uart[1].listen(lambda byte, start: heard.append((byte, start)), lazy=lazy)
+    states: list[object] = []
+    for _ in range(12):
+        if draw.random() < 0.7:
+            some = [draw.randrange(0x200) for _ in range(draw.choice((1, 2, 7)))]
+            made.uart[1].feed(some, made.cycle + draw.randrange(2000), errors=draw.choice((0, 0, 0, 0x200, 0x400)))
+        made.run(cycles=draw.randrange(1, 3000))
+        states.append(made.snapshot())
+    no_longer()
+    return [*states, heard]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_engines_agree_on_a_uart_that_sends_and_receives(seed: int) -> None:
+    """8 and 9 bits, parity, one or two stop bits, all interrupt modes, overruns on both sides, wrong frames."""
+    draw = random.Random(f"uart {seed}")
+    settings = {
+        "brg": draw.choice((0, 1, 7)),
+        "mode": 0x8000 | draw.randrange(8),
+        "status": 0x0400 | draw.choice((0, 0x8000)) | draw.randrange(4) << 6 | draw.choice((0, 0, 0x20)),
+        "pause": draw.choice((2, 5, 30)),
+        "RX": int(A["U1RXREG"], 16),
+    }
+    told = [history(machine(engine, UART, **settings), seed, True) for engine in ("plain", "interp", "jit")]
+    assert len(told[0][-1]) > 5
+    assert told[1] == told[0]
+    assert told[2] == told[0]
+
+
+def test_who_is_lazy_hears_what_the_others_hear() -> None:
+    """In the same order, before the run ends; who is not hears in the cycle in which the stop bit has ended."""
+    settings = {"brg": 1, "mode": 0x8000, "status": 0x0400, "pause": 2, "RX": int(A["U1RXREG"], 16)}
+    rig = machine("jit", UART, **settings)
+    lazy, prompt = [], []
+    uart = rig.machine.uart[1]
+    uart.listen(lambda byte, start: lazy.append((byte, start)), lazy=True)
+    rig.machine.run(cycles=20_000)
+    no_longer = uart.listen(lambda byte, start: prompt.append((byte, start, rig.machine.events.now)))
+    first = len(lazy)
+    rig.machine.run(cycles=20_000)
+    no_longer()
+    assert first > 40
+    assert prompt == [(byte, start, start + 320) for byte, start in lazy[first:]]
+    rig.machine.run(cycles=20_000)
+    assert len(lazy) > first + len(prompt) + 40
+    assert all(later[1] - earlier[1] == 320 for earlier, later in pairwise(lazy))
