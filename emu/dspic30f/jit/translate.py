@@ -67,7 +67,8 @@ class Translator:
         self._labels: dict[int, str] = {}
         self._todo: list[int] = []
         self._exits: dict[tuple[object, ...], str] = {}
-        self._requested: Value
+        self._unsure: Value | None = None
+        """Whether an interrupt may be accepted in front of the third cycle of the return being translated."""
         self._polling: Final = {} if exact else empty_loops(region, around, context)
         self._heads: Final = {loop.head for loop in self._polling.values()}
         self._polled: Final = {pc for loop in self._polling.values() for pc, _ in loop.costs}
@@ -259,14 +260,13 @@ class Translator:
             b.pending.touches_sfr = True
         elif not isinstance(flow, (type(None), Goto, Branch, Call, Return, Skip, Disi)):
             raise NeedsInterpreter
+        self._unsure = None
         if isinstance(flow, Return) and flow.kind == "retfie":
             self._check_retfie(flow)
         if isinstance(flow, Skip) and step.target is None:
             raise NeedsInterpreter
         if self.exact and b.pending.touches_sfr:  # an event up to the access would matter
             b.guard(self.fits(row.cycles + stall))
-        elif self.exact and isinstance(flow, Return):  # one up to the second cycle would end it there
-            b.guard(self.fits(2 + stall))
         b.commit()
         cycles: Number = row.cycles + stall
         if b.pending.psv:
@@ -274,6 +274,9 @@ class Translator:
             for other in b.pending.psv[1:]:
                 any_window = any_window | other
             cycles = cycles + b.select(any_window, step.facts.window_cycles, 0)
+        if self.exact and isinstance(flow, Return):  # an event up to the second cycle may end it there
+            due = self.e.let(f"icmp uge i64 {wide(start + cycles - 2)}, %before", bit=True)
+            self._unsure = due if self._unsure is None else due | self._unsure
         mask = step.facts.writes | b.pending.mapped
         if flow is None:
             self.advance(cycles, mask)
@@ -398,19 +401,21 @@ class Translator:
         if isinstance(flow.target, int):
             self._jump_back(step.pc, flow.target)
             return
-        if isinstance(flow, Return) and flow.kind == "retfie":
-            self._leave_if_requested(step, flow)
         if isinstance(flow, Return):
+            self._leave_if_unsure(step, flow)
             self.count.returned(step.pc, flow.target & PC_MASK, self.v.get("W15"), self.v.get("cycle"))
         self.v.leave(flow.target & PC_MASK, NEXT)
 
-    def _leave_if_requested(self, step: Step, flow: Return) -> None:
-        """RETFIE with something requested ends after two cycles if that is accepted: the boundary decides."""
+    def _leave_if_unsure(self, step: Step, flow: Return) -> None:
+        """A return ends after two cycles if an interrupt is accepted then: the boundary decides."""
         e = self.e
+        if self._unsure is None:
+            return
         some, none = e.fresh("some"), e.fresh("none")
-        e.end(f"br i1 {self._requested.text}, label %{some}, label %{none}")
+        e.end(f"br i1 {self._unsure.text}, label %{some}, label %{none}")
         e.start(some)
-        e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
+        if flow.kind == "retfie":
+            e.store(pointer(e, self.around.offset["events.deadline"]), 0, 64)
         cycle = self.v.get("cycle")
         self.v.set("cycle", cycle - 1)
         self.count.shortened(step.pc)
@@ -452,5 +457,5 @@ class Translator:
         traps = e.load(pointer(e, self.around.offset["INTCON1"]), 16) & self.around.trap_flags
         plain = (flow.ipl3 == 0) & (((corcon & IPL3) | traps) == 0)
         b.guard(plain)
-        self._requested = requested(self.e, self.around)
+        self._unsure = requested(self.e, self.around)
         flowrules.resume(NativeReader(b), self.around.flow, flow.srl & 0xFF, 0)

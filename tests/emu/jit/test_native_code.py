@@ -95,6 +95,20 @@ def test_interrupts_are_entered_and_left_without_python() -> None:
     assert native.runner.counts.interpreted < 40
 
 
+def test_returns_in_which_an_event_is_due_are_native() -> None:
+    """RETURN and RETFIE end after two cycles if an interrupt is accepted then (isa.md §7.4): the boundary decides."""
+    firmware = counting_firmware()
+    at = next(a for a in range(0x100, 0x400, 2) if firmware.flash.get(a) == words_of("BRA Expr", n=-2)[0])
+    firmware.put(at, words_of("RCALL Expr", n=1) + words_of("BRA Expr", n=-2) + words_of("RETURN"))
+    plain, native = pair(firmware)
+    for _ in range(50):
+        assert plain.run(1_009) == native.run(1_009)
+        assert not difference(plain, native)
+    assert isinstance(native.runner, JitEngine)
+    assert native.runner.interrupts > 450
+    assert native.runner.counts.interpreted < 20
+
+
 @pytest.mark.parametrize("watchdog", [False, True])
 def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bool) -> None:
     """A boot loader's loop stays in native code while the watchdog is off; latches and NVMADR come out right."""
