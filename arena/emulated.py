@@ -37,6 +37,9 @@ LINE_LIMIT: Final = 200
 """Bytes after which a line without an end is taken as one."""
 LIGHTS_LIMIT: Final = 100
 """Changes of the LEDs kept per sample: a firmware may dim them by switching fast."""
+CUTS_KEPT: Final = 64
+"""Ends of quanta after which the wheels' speeds are told though the world does not wait for them: the motors remember
+4096 steps."""
 STUCK_TCY: Final = FCY // 10
 """A trap's handler that is at work longer does not come back."""
 _ENABLES: Final = ("IEC0", "IEC1", "IEC2")
@@ -96,7 +99,7 @@ class EmulatedBrain:
         self.lived = 0
         """Quanta that are over for this robot."""
         self._cuts: list[int] = []
-        self._told_cuts = 0
+        self._first_cut = self._told_cuts = 0
         self.wheels: Final = Wheels(self._quantum)
         self._board.motors.remember()
         self._lights: list[Lights] = []
@@ -166,10 +169,12 @@ class EmulatedBrain:
                 self.wheels.rested(self.lived)
                 self.lived += 1
             elif self._look_at is not None and self._ring.is_read:
+                self._settle()
                 self._see(self.lived, *self._look_at(self.lived))
                 self._run(self.lived + 1)
             else:
                 self._run(min(ticks, self._off_tick))
+        self._settle()
 
     def _go_dark(self) -> None:
         """The battery has been taken out: emitters and LEDs go off."""
@@ -187,10 +192,12 @@ class EmulatedBrain:
     def _run(self, ticks: int) -> None:
         """Run until so many quanta are over, or to the next probe."""
         machine = self.machine
-        self._cuts, self._told_cuts = [], 0
+        if len(self._cuts) == self._told_cuts or len(self._cuts) >= CUTS_KEPT:
+            self._settle()
+            self._cuts, self._first_cut, self._told_cuts = [], self.lived, 0
         last = min(self._probe_at, self._end_of(ticks - 1))
         stop = machine.run_past(self._end_of(self.lived), self._quantum, last, self._cuts)
-        self._settle()
+        self.lived = self._first_cut + len(self._cuts)
         if stop is not None:
             place = f"{stop.reason} at {stop.pc:#08x} in cycle {stop.cycle}"
             said = f"stopped: {place}: {stop.fault.cause if stop.fault else stop.detail}".rstrip(":, ")
@@ -204,12 +211,12 @@ class EmulatedBrain:
             self._probe_at = reached + 1 + int(self._rng.integers(2 * PROBE_TCY))
 
     def _settle(self) -> None:
-        """Speeds of the quanta that have ended in this run, by the steps made when they did."""
-        new = self._cuts[self._told_cuts :]
+        """Tell the speeds of the wheels in quanta that are over, before the world goes on: by the steps made then."""
+        told = self._told_cuts
+        new = self._cuts[told:] if told else self._cuts
         if new:
             self._told_cuts += len(new)
-            self.wheels.turned(self.lived, self._board.motors.steps_by(new))
-            self.lived += len(new)
+            self.wheels.turned(self._first_cut + told, self._board.motors.steps_by(new))
 
     def _see(self, tick: int, poses: Poses, before: Poses) -> None:
         """A quantum begins with `poses`; `before` are those a quantum ago."""
@@ -225,8 +232,7 @@ class EmulatedBrain:
     def _look_now(self) -> Poses:
         """Poses of the quantum in which the firmware looks at something, in the middle of a run."""
         if self._look_at is not None:
-            self.machine.cuts_so_far()
-            tick = self.lived - self._told_cuts + len(self._cuts)
+            tick = self._first_cut + len(self.machine.cuts_so_far())
             if tick != self._looked:
                 self._settle()
                 poses, before = self._look_at(tick)

@@ -120,6 +120,12 @@ class Pins:
         self._readers: Final[list[RingReader]] = []
         self._clean: Final = memoryview(bytes(8 * RING)).cast("Q")
         self._ring_address: Final = record.address + 8 * ring
+        self.ring_places: Final = tuple(
+            record.address + record.fields[f"pins.{name}"].offset for name in ("ring", "ring_count", "told")
+        )
+        """Addresses of the host, for a reader that is compiled code: `ring`, how many changes are in it, and the levels
+        of each port that have been told; whoever reads leaves the ring clean as `flush` does."""
+        self._heard = 0
         self._waveforms: Final[list[list[tuple[int, Waveform]]]] = [[] for _ in PORTS]
         self._on_waveform: Final[list[tuple[Callable[[int], None], Callable[[], None]]]] = []
 
@@ -163,11 +169,17 @@ class Pins:
         (self._lazy_watchers if lazy else self._watchers)[port].append((mask, watcher))
         if lazy:
             self._told[port] = self.level[port]
-            self._ring_watchers[port] += [(mask, watcher)] if reader is None else []
             if reader is not None:
                 self._readers.append(reader)
+            else:
+                self._ring_watchers[port].append((mask, watcher))
+                self._heard |= 1 << port
         table = self.lazy if lazy else self.eager
         table[port] |= 0 if inputs_only else mask
+
+    def heard_of(self, readers: int) -> int:
+        """Bit n: what the ring has of port n is to be told to somebody else than so many readers, who ask."""
+        return self._heard if len(self._readers) == readers else -1
 
     def flush(self) -> None:
         """Tell the lazy watchers what native code has done to the pins. The ring is left clean, as if never used."""

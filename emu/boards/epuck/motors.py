@@ -39,13 +39,17 @@ class _Motor(Structure):
     _fields_ = [("state", c_void_p), ("shift", c_int64), ("forward", c_int64), ("history", POINTER(_History))]
 
 
+class _Ring(Structure):
+    _fields_ = [*((name, c_void_p) for name in ("changes", "count", "told")), ("heard", c_int64)]
+
+
 @cache
-def _code() -> dict[str, Callable[..., None]]:
+def _code() -> dict[str, Callable[..., int]]:
     return functions(Path(__file__).with_name("motors.c"), {
         "settle_by": (None, (ADDRESS, INT)),
         "change": (None, (ADDRESS, INT, INT)),
         "decode": (None, (ADDRESS, ADDRESS, INT, INT)),
-        "both_by": (None, (ADDRESS, ADDRESS, ADDRESS, INT, ADDRESS)),
+        "both_by": (INT, (ADDRESS, ADDRESS, ADDRESS, INT, INT, ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 
 
@@ -141,7 +145,12 @@ class Stepper(Part):
         """A new pattern: what the last one was is known now."""
         self._telling(self._change, cycle, levels)
 
-    def _telling(self, work: Callable[..., None], *arguments: int) -> None:
+    @property
+    def tells(self) -> bool:
+        """Whether somebody hears of each step."""
+        return self._on_step is not None
+
+    def _telling(self, work: Callable[..., int], *arguments: int) -> None:
         """Do what may find that a step was made, and tell."""
         state = self._state
         before, since = state[_STEPS], state[_SINCE]
@@ -161,6 +170,9 @@ class Motors:
         self.left: Final = Stepper("motor.left", chip, 0, -1)
         self.right: Final = Stepper("motor.right", chip, 4, 1)
         self._both_by: Final = _code()["both_by"]
+        self._pins: Final = chip.pins
+        self._ring: Final = _Ring(*chip.pins.ring_places, 0)
+        self._ring_at: Final = addressof(self._ring)
 
     def steps(self) -> tuple[int, int]:
         """Steps of both made so far (left, right): what `Stepper.steps` of each says, in one look."""
@@ -183,8 +195,15 @@ class Motors:
     def steps_by(self, cycles: Sequence[int]) -> array[int]:
         """Steps of both (left, right, left and so on) as they were in some cycles, which rise from call to call; see
         `remember`."""
-        self.steps()
+        left, right, pins = self.left, self.right, self._pins
+        if left.tells or right.tells:
+            self.steps()
         count = len(cycles)
         asked, made = array("q", cycles), array("q", bytes(16 * count))
-        self._both_by(self.left.at, self.right.at, asked.buffer_info()[0], count, made.buffer_info()[0])
+        self._ring.heard = pins.heard_of(2)
+        arguments = (left.at, right.at, self._ring_at, PORT, left.events.now, asked.buffer_info()[0], count,
+                     made.buffer_info()[0])  # fmt: skip
+        if not self._both_by(*arguments):
+            pins.flush()
+            self._both_by(*arguments)
         return made

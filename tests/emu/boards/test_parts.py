@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import statistics
 from itertools import pairwise
 
@@ -66,6 +67,45 @@ def test_right_motor_goes_forward_with_rising_and_left_with_falling_phases(robot
     motors = robot.board.motors
     assert (motors.left.steps, motors.right.steps) == (5000, 5000)
     assert (motors.left.lost, motors.left.illegal, motors.right.lost, motors.right.illegal) == (0, 0, 0, 0)
+
+
+@pytest.mark.parametrize("blinks", [False, True])
+def test_steps_by_the_ends_of_quanta_are_those_of_who_looks_at_each(blinks):
+    """Native code leaves changes in the ring, of the LEDs' port too; nobody else misses one of them."""
+    quick, plain = Robot(), Robot()
+    draw = random.Random(7)
+    index, cycle, lit, entries, ends = 0, 100, [], [], list(range(1_000, 41_000, 1_000))
+    while cycle < 40_000:
+        index += draw.choice([1, 1, 1, -1, 0])
+        entries.append(cycle << 24 | 3 << 16 | PHASES[index % 4] << 4 | PHASES[-index // 2 % 4])
+        if blinks and draw.random() < 0.2:
+            entries.append(cycle + 1 << 24 | draw.choice([0, 0x40, 0x80]))
+        cycle += draw.choice([5, 300, 700])
+
+    def leave(robot: Robot, changes: list[int]) -> None:
+        pins = robot.machine.pins
+        pins.ring[: len(changes)] = memoryview(b"".join(one.to_bytes(8, "little") for one in changes)).cast("Q")
+        robot.machine.record.u64[robot.machine.record.fields["pins.ring_count"].index] = len(changes)
+
+    quick.machine.pins.watch("RA6", lambda *edge: lit.append(edge), lazy=True)
+    made, looked = [], []
+    for robot in (quick, plain):
+        robot.board.motors.remember()
+    for first in range(0, len(ends), 4):
+        until = ends[first + 3]
+        due = [one for one in entries if (until - 4_000) <= one >> 24 < until]
+        leave(quick, due)
+        quick.at(until)
+        made += quick.board.motors.steps_by(ends[first : first + 4])
+        assert not any(quick.machine.pins.ring)
+        for end in ends[first : first + 4]:
+            leave(plain, [one for one in due if end - 1_000 <= one >> 24 < end])
+            plain.at(end)
+            looked += plain.board.motors.steps()
+    assert made == looked
+    assert max(looked) > 5
+    assert quick.machine.pins._told.tolist() == plain.machine.pins._told.tolist()
+    assert bool(lit) == blinks
 
 
 def test_reversing_counts_backward(robot):
