@@ -108,7 +108,9 @@ class _Chipmunk(Structure):
     """The physics library's functions that `world.c` calls, by their names there."""
 
     NAMES: Final = ("cpSpaceStep", "cpBodySetVelocity", "cpBodySetAngularVelocity", "cpBodyGetPosition",
-                    "cpBodyGetAngle", "cpConstraintSetMaxForce")  # fmt: skip
+                    "cpBodyGetAngle", "cpConstraintSetMaxForce", "cpBodyGetVelocity", "cpBodyGetAngularVelocity",
+                    "cpConstraintGetImpulse", "cpSpaceAddConstraint", "cpSpaceRemoveConstraint", "cpBodyEachArbiter",
+                    "cpArbiterTotalImpulse")  # fmt: skip
     _fields_ = [(name, c_void_p) for name in NAMES]
 
 
@@ -119,12 +121,19 @@ class _Robot(Structure):
     ]  # fmt: skip
 
 
+class _Disc(Structure):
+    _fields_ = [
+        *((name, c_void_p) for name in ("body", "grip", "hold")), ("radius", c_double), ("seen", c_double * 2),
+        *((name, c_int64) for name in ("is_known", "rests", "may_rest")),
+    ]  # fmt: skip
+
+
 class _World(Structure):
     _fields_ = [
         ("chipmunk", _Chipmunk), ("space", c_void_p),
         *((name, c_double) for name in ("dt", "axle", "thrust", "thrust_turning", "brake", "brake_turning")),
         ("robot_count", c_int64), ("object_count", c_int64),
-        ("robots", POINTER(_Robot)), ("objects", POINTER(c_void_p)),
+        ("robots", POINTER(_Robot)), ("discs", POINTER(_Disc)), ("steps", c_int64),
     ]  # fmt: skip
 
 
@@ -180,6 +189,7 @@ class World:
         self.robots = [self._add_robot(*pose) for pose in robots]
         self._joints: list[tuple[pymunk.PivotJoint, pymunk.GearJoint] | None] = []
         drives = [self._add_drive(body) for body in self.robots]
+        self._floor: list[tuple[pymunk.PivotJoint, pymunk.GearJoint]] = []
         self.objects = [self._add_object(scene.kind_of(number), x, y) for number, (x, y) in enumerate(objects)]
         self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
         self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
@@ -200,10 +210,14 @@ class World:
             robot.noise[:] = 1.0, 1.0
         setting = self.scene.robots
         forces = [force for newtons in (setting.thrust_n, setting.brake_n) for force in self._grip(newtons)]
-        self._objects = (c_void_p * len(self.objects))(*(_address(body._body) for body in self.objects))
+        discs = [_Disc(robot.body, None, None, bodies.ROBOT_RADIUS) for robot in self._robots]
+        for number, (body, joints) in enumerate(zip(self.objects, self._floor, strict=True)):
+            held = (_address(joint._constraint) for joint in joints)
+            discs.append(_Disc(_address(body._body), *held, self.scene.kind_of(number).radius_cm))
+        self._discs = (_Disc * len(discs))(*discs)
         self._world = _World(
             _Chipmunk(*(_address(ffi.addressof(lib, name)) for name in _Chipmunk.NAMES)), _address(self.space._space),
-            self.dt, setting.axle_cm, *forces, len(self._robots), len(self._objects), self._robots, self._objects,
+            self.dt, setting.axle_cm, *forces, len(self._robots), len(self.objects), self._robots, self._discs,
         )  # fmt: skip
         self._at = addressof(self._world)
         self._wheels = np.zeros((len(self.robots), 2))
@@ -277,6 +291,7 @@ class World:
         for joint in (grip, hold):
             joint.max_bias = 0.0
             self.space.add(joint)
+        self._floor.append((grip, hold))
         return body
 
     # -- one quantum -------------------------------------------------------------------------------------------------

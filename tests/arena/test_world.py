@@ -104,6 +104,41 @@ def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
     assert reached[0] < 1 < 10 < reached[1]
 
 
+@pytest.mark.parametrize(("quantum_ms", "thrust_n"), [(1.0, 1.0), (10.0, 1.0), (10.0, math.inf)])
+def test_objects_whose_joints_are_out_of_the_solver_are_where_they_were_to_the_bit(
+    quantum_ms: float, thrust_n: float
+) -> None:
+    """Robots that push crowded objects about; a hand that puts one thing among others now and then."""
+    scene = load_scene("clustering").with_values(
+        arena__width_cm=100.0, arena__height_cm=80.0, robots__count=4, robots__thrust_n=thrust_n, objects__count=14,
+        clock__quantum_ms=quantum_ms,
+    )  # fmt: skip
+    draw = random.Random(quantum_ms)
+    robots = [(10.0, 10.0, 0.3), (90.0, 10.0, 2.0), (90.0, 70.0, 4.0), (10.0, 70.0, 5.5)]
+    objects = [(20.0 + 11.0 * (n % 6), 25.0 + 12.0 * (n // 6)) for n in range(14)]
+    quick, plain = (World.of(scene, 1, robots, objects) for _ in range(2))
+    resting, roused, before = [], 0, [0] * 18
+    for turn in range(60):
+        wheels = [(draw.uniform(-6, 12), draw.uniform(-6, 12)) for _ in robots]
+        if turn % 20 == 19:
+            body, to = draw.choice("ro") + str(draw.randrange(4)), (draw.uniform(10, 90), draw.uniform(10, 70))
+            for world in (quick, plain):
+                world.move((world.robots if body[0] == "r" else world.objects)[int(body[1])], *to)
+        for _ in range(round(0.4 / quick.dt)):
+            quick.step(wheels)
+            plain._world.steps = 0  # it never looks for what may rest
+            plain.step(wheels)
+            assert quick.poses.values.tobytes() == plain.poses.values.tobytes()
+            now = [disc.rests for disc in quick._discs]
+            roused += sum(one and not other for one, other in zip(before, now, strict=True))
+            before = now
+        resting.append(sum(before))
+    assert not any(disc.rests for disc in plain._discs)
+    assert max(resting) > 7
+    assert roused > 10
+    assert max(abs(x - a) for (x, _), (a, _) in zip(quick.poses.objects, objects, strict=True)) > 5
+
+
 def test_wheel_noise_stays_within_its_share() -> None:
     """epuck.md §4: uniform 5 %, a new draw per 0.1 s."""
     scene = load_scene("clustering").with_values(
