@@ -16,7 +16,7 @@ from greenlet import getcurrent, greenlet
 
 from arena.ether import Ether
 from arena.wheels import ROOM, Wheels
-from arena.world import Poses, World
+from arena.world import Poses, Stretch, World
 
 
 @runtime_checkable
@@ -46,6 +46,7 @@ class LockStep:
         self._ether: Final = ether or Ether.of(world.scene)
         self._ether.slowest = 0
         self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
+        self._stretches: list[Stretch] = []
         self._hub: greenlet = getcurrent()
         self._speeds: Final = (c_void_p * len(robots))(*(robot.wheels.address for robot in robots))
         self._speeds_at: Final = addressof(self._speeds)
@@ -73,14 +74,26 @@ class LockStep:
             ready = [life for life, tick in waiting.items() if tick == until]
         for tick in [tick for tick in self._past if tick < ticks - 1]:
             del self._past[tick]
+        self._stretches = [stretch for stretch in self._stretches if stretch.last >= ticks - 1]
         return [robot.wheels.speed(ticks - 1) for robot in self._robots]
 
     def look_at(self, tick: int) -> tuple[Poses, Poses]:
         """Poses at the beginning of a quantum, and a quantum before."""
         if tick > self._world.ticks:
             self._hub.switch(tick)
-        poses = self._past[tick]
-        return poses, self._past.get(tick - 1, poses)
+        return self._poses(tick), self._poses(tick - 1)
+
+    def _poses(self, tick: int) -> Poses:
+        """Poses at the beginning of a quantum; the oldest that are kept if they are older."""
+        poses = self._past.get(tick)
+        if poses is None:
+            for stretch in reversed(self._stretches):
+                if stretch.first <= tick <= stretch.last:
+                    poses = self._past[tick] = self._world.at(stretch, tick)
+                    break
+            else:
+                return self._past[tick + 1]
+        return poses
 
     def moved(self) -> None:
         """Something was put somewhere else between two quanta."""
@@ -89,6 +102,5 @@ class LockStep:
     def _step_to(self, ticks: int) -> None:
         """Let the world make the quanta that all robots have lived."""
         world = self._world
-        first = world.ticks + 1
-        self._past.update(enumerate(world.go(self._speeds_at, ROOM, ticks - world.ticks), first))
+        self._stretches += world.go(self._speeds_at, ROOM, ticks - world.ticks)
         self._ether.slowest = world.ticks * self._ether.quantum

@@ -7,7 +7,7 @@ steps is only the wheel speeds given to it. The same calls give the same numbers
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
@@ -102,6 +102,18 @@ class Poses:
             numbers = self.values[3 * self.counts[0] :].tolist()
             self._objects = list(zip(numbers[::2], numbers[1::2], strict=True))
         return self._objects
+
+
+class Stretch(NamedTuple):
+    """Quanta in a row whose poses are in memory one after the other."""
+
+    first: int
+    last: int
+    """How many quanta were over at the end of the first and last of them."""
+    sheet: NDArray[np.float64]
+    row: int
+    """Where in the sheet those of the first are."""
+    address: int
 
 
 class _Chipmunk(Structure):
@@ -224,6 +236,7 @@ class World:
         self._wheels_at = self._wheels.ctypes.data
         self._numbers = 3 * len(self.robots) + 2 * len(self.objects)
         self._sheet, self._sheet_at, self._row = np.empty((0, self._numbers)), 0, 0
+        self._row_bytes = self._sheet.itemsize * self._numbers
 
     # -- building ----------------------------------------------------------------------------------------------------
 
@@ -304,22 +317,28 @@ class World:
         self.ticks += 1
         self.poses = self._read()
 
-    def go(self, speeds: int, room: int, count: int) -> Iterator[Poses]:
+    def go(self, speeds: int, room: int, count: int) -> list[Stretch]:
         """So many quanta at wheel speeds that lie where `Wheels` keeps them, `room` per robot: `speeds` is the address
-        of a table of addresses. Poses at the end of each; they are computed in rows, none before it is asked for."""
+        of a table of addresses. Where poses at the end of each are."""
+        made = []
         while count:
             self._draw_noise()
             row = self._room()
             more = min(count, self._noise_ticks - self.ticks % self._noise_ticks, ROWS - row)
-            size = self._sheet.itemsize * self._numbers
-            at = self._sheet_at + row * size
+            at = self._sheet_at + row * self._row_bytes
             self._quanta(self._at, speeds, room, self.ticks, more, self._wheels_at, at, self._numbers)
+            made.append(Stretch(self.ticks + 1, self.ticks + more, self._sheet, row, at))
             self._row += more
+            self.ticks += more
             count -= more
-            for number in range(more):
-                self.ticks += 1
-                self.poses = Poses.of(self._sheet[row + number], len(self.robots), at + number * size)
-                yield self.poses
+        if made:
+            self.poses = self.at(made[-1], self.ticks)
+        return made
+
+    def at(self, stretch: Stretch, tick: int) -> Poses:
+        """Poses at the end of so many quanta, which are in that stretch."""
+        row = tick - stretch.first
+        return Poses.of(stretch.sheet[stretch.row + row], len(self.robots), stretch.address + row * self._row_bytes)
 
     def _room(self) -> int:
         """A free row for poses. Sheets are never written twice: poses stay what they were."""
@@ -346,7 +365,7 @@ class World:
     def _read(self) -> Poses:
         row = self._room()
         self._row += 1
-        at = self._sheet_at + row * self._sheet.itemsize * self._numbers
+        at = self._sheet_at + row * self._row_bytes
         self._tell_poses(self._at, at)
         return Poses.of(self._sheet[row], len(self.robots), at)
 

@@ -50,13 +50,12 @@ def measure(scene: Scene, brains: list[Brain], seconds: float, warm_up: float) -
     """CPU seconds per simulated second: all, physics, rendering."""
     world = World(scene, 1)
     physics, rendering = Clock(), Clock()
-    step, go = physics.around(world.step), world.go
     for brain in brains:
         if isinstance(brain, EmulatedBrain):
             sight = brain._sight  # not `_pixels`: other robots are run inside it
             sight.line = rendering.around(sight.line)  # type: ignore[method-assign]
-    world.step = step  # type: ignore[method-assign]
-    world.go = physics.around(lambda *how: list(go(*how)))  # type: ignore[method-assign]
+    world.step = physics.around(world.step)  # type: ignore[method-assign]
+    world.go = physics.around(world.go)  # type: ignore[method-assign]
     robots = [brain for brain in brains if isinstance(brain, EmulatedBrain)]
     lockstep = LockStep(world, robots) if robots else None
     sample = round(scene.clock.sample_s / world.dt)

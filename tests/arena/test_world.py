@@ -263,8 +263,11 @@ def test_quanta_in_a_row_are_quanta_one_by_one() -> None:
         speeds.turned(0, array("q", [count for tick in range(900) for count in (tick // 3, tick // (2 + robot))]))
     addresses = (c_void_p * 2)(*(speeds.address for speeds in wheels))
     for count in (1, 7, 300, 592):
-        for poses in rows.go(addressof(addresses), ROOM, count):
-            one.step([speeds.speed(one.ticks) for speeds in wheels])
-            assert poses.values.tolist() == one.poses.values.tolist()
+        for stretch in rows.go(addressof(addresses), ROOM, count):
+            for tick in range(stretch.first, stretch.last + 1):
+                one.step([speeds.speed(one.ticks) for speeds in wheels])
+                poses = rows.at(stretch, tick)
+                assert poses.values.tolist() == one.poses.values.tolist()
+                assert poses.address == poses.values.ctypes.data
     assert (rows.ticks, rows.poses.counts) == (900, (2, 5))
     assert rows.poses.robots != World(scene, 3).poses.robots
