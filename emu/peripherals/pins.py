@@ -294,8 +294,13 @@ class Pins:
             return level
         if cycle < self.stands_until[port]:
             return level & ~waving | self.standing[port]
-        waved = self._with_waveforms(port, cycle, 0)
-        until = min(wave.stands_until(cycle) for _, wave in self._waveforms[port])
+        waveforms = self._waveforms[port]
+        if len(waveforms) == 1:
+            ((mask, wave),) = waveforms
+            waved, until = wave.bits(cycle) & mask, wave.stands_until(cycle)
+        else:
+            waved = self._with_waveforms(port, cycle, 0)
+            until = min(wave.stands_until(cycle) for _, wave in waveforms)
         if until > cycle:
             self.standing[port], self.stands_until[port] = waved, until
         return level & ~waving | waved

@@ -57,6 +57,7 @@ class Camera(Part, I2cDevice):
         self.pins.describe(SYNC_PORT, HREF | VSYNC | PCLK, self.scan, self._plugged.place)
         self._line: Final = self.array("line", "B", 2 * LINE_PIXELS)
         self._line_at: Final = self.record.address + self.record.fields["camera.line"].offset
+        self._u64: Final = self.record.u64
         self._line_from: Final = self.cell("line_from", "Q")
         self._line_to: Final = self.cell("line_to", "Q")
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
@@ -189,13 +190,16 @@ class Camera(Part, I2cDevice):
 
     def bits(self, cycle: int) -> int:
         """The byte on RD8..RD15 in `cycle`, 0 between lines."""
-        if not self._line_from.value <= cycle < self._line_to.value and not self._render(cycle):
+        u64, first = self._u64, self._line_from.index
+        if not u64[first] <= cycle < u64[self._line_to.index] and not self._render(cycle):
             return 0
-        return self._line[(cycle - self._line_from.value) // self._byte.value] << 8
+        return self._line[(cycle - u64[first]) // u64[self._byte.index]] << 8
 
     def stands_until(self, cycle: int) -> int:
         """Between lines the next one; the bytes of a line are in the record."""
-        return cycle if self._line_from.value <= cycle < self._line_to.value else self.scan.next_line(cycle)
+        u64 = self._u64
+        is_on = u64[self._line_from.index] <= cycle < u64[self._line_to.index]
+        return cycle if is_on else self.scan.next_line(cycle)
 
     def rises(self, mask: int, after: int, until: int) -> int:
         """The data lines clock nothing inside the chip."""

@@ -140,6 +140,9 @@ class JitEngine:
         self._u64: Final = core.record.u64
         self._now: Final = core.state.at["cpu.cycle"]
         self._edt: Final = core.state.at["cpu.edt"]
+        self._u32: Final = core.record.u32
+        self._pc: Final = core.state.at["cpu.pc"]
+        self._mode: Final = core.state.at["cpu.mode"]
         self._modes: Final = Modes(core.state)
         self._offset: Final = offsets(core)
         self.counts: Final = Counts()
@@ -184,9 +187,9 @@ class JitEngine:
 
     def natively(self, limit: int) -> bool:
         """As `Engine.natively`. Many runs are short: what is looked at is read from the record directly."""
-        u64, now = self._u64, self._now
+        u16, u64, now = self._u16, self._u64, self._now
         start = before = u64[now]
-        if self._dispatch is None or not start or self._u16[self._edt]:  # native boundaries count with the cycle before
+        if self._dispatch is None or not start or u16[self._edt]:  # native boundaries count with the cycle before
             return False
         if self.compiler.busy:
             self._collect()
@@ -200,10 +203,10 @@ class JitEngine:
         while before != (cycle := u64[now]) < limit:
             before = cycle
             if why == SERVICE:  # most often some device's event is due
-                self._core.events.fire_until(cycle if self._state.mode != RUN else cycle - 1)
+                self._core.events.fire_until(cycle if u16[self._mode] != RUN else cycle - 1)
                 if interrupted():
                     break
-            elif why == INTERPRET and self._refresh(self._state.pc, cycle):
+            elif why == INTERPRET and self._refresh(self._u32[self._pc], cycle):
                 env[BOUNDARY] = 0  # that of this instruction has been done
             else:
                 break
@@ -213,7 +216,7 @@ class JitEngine:
             self.counts.runs += 1
         env[BOUNDARY] = 0
         self.counts.runs += 1
-        if why == INTERPRET and self._state.pc not in self._hooks:
+        if why == INTERPRET and self._u32[self._pc] not in self._hooks:
             self.counts.interpreted += 1
             self._interpret()
             return True
