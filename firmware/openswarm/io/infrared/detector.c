@@ -4,7 +4,6 @@
 #include "infrared_parts.h"
 
 #include "hal_cpu.h"
-#include "kernel.h"
 
 enum {
     COUNT = 16,
@@ -134,10 +133,10 @@ uint16 detector_level(uint8 sensor)
     return filters[sensor].level;
 }
 
-bool Sys_Set_InfraredThreshold(uint8 counts)
+bool detector_set_threshold(uint8 counts)
 {
     if (counts == 0 || counts > 100) {
-        return os_fail(SYS_ERROR_ARGUMENT);
+        return false;
     }
     HAL_STORE(least, (uint16)(COUNT * counts));
     return true;

@@ -8,10 +8,9 @@
 
 static uint16 lit_readings[HAL_INFRARED_SENSORS];
 
-bool reflections_init(void)
+void reflections_init(void)
 {
     proximity_init();
-    return Sys_Register_Event(SYS_IO_PROXIMITY);
 }
 
 void reflections_lit(scan raw)
