@@ -278,7 +278,9 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
     tick = not -TICK_MARGIN < at - base.timer_at < TICK_MARGIN
     step = not stage.in_stepper() and not machine.peek("IFS0") & T3IF
     machine.poke("isr_wanted", calls)
-    machine.uart[1]._received(ord("x"))  # a byte is complete in this very cycle
+    uart = machine.uart[1]
+    uart._incoming.value = ord("x")
+    uart._rx_due(machine.cycle)  # a byte is complete in this very cycle
     machine.write("IFS0", machine.peek("IFS0") | T2IF | T3IF * step | T1IF * tick)
     machine.write("IFS1", machine.peek("IFS1") | INT1IF | INT2IF)
     saved = _registers(machine)

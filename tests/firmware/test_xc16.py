@@ -35,8 +35,9 @@ kept = [w for w in words if not re.match("-mcpu|-omf|-std|-fno-short-double|-W[l
 sys.exit(subprocess.run([sys.executable, "-m", "toolchain", "cc", *kept]).returncode)
 '''
 DIRECTIVES = {".equ", ".global", ".text", ".bss", ".space", ".macro", ".endm", ".ifndef", ".endif", ".irp", ".endr"}
+DIRECTIVES |= {".set", ".pword", ".include"}
 """pic30-as knows them all (DS50002106)."""
-SECTION = r"\.section \.\w+(, (code|noload|keep|address\(\w+\)))+"
+SECTION = r"\.section \.\w+(, (code|noload|keep|persist|address\(\w+\)))+"
 """The attributes it knows, too (DS50002106); the number is a macro here, which the preprocessor replaces."""
 OTHER_ROBOTS = {"posix", "template", "host", "avr", "kilobot", "cortex_m", "epuck2"}
 """Ports and boards that are not built for the dsPIC30F."""
@@ -113,17 +114,22 @@ def test_the_kernel_is_gnu99(source: Path) -> None:
 
 
 @pytest.mark.parametrize("app", sorted(path.name for path in FIRMWARE.glob("apps/*") if path.is_dir()))
-def test_the_applications_are_gnu99(app: str) -> None:
-    """The same for firmware/apps."""
+def test_the_applications_are_gnu99(app: str, tmp_path: Path) -> None:
+    """The same for firmware/apps, with the programs they bring along."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed (Debian package gcc)")
+    for program in sorted((FIRMWARE / "apps" / app).glob("*/main.c")):
+        rows = tmp_path / program.parent.name
+        command = [sys.executable, "-m", "openswarm", "program", str(program), "--version", "1"]
+        subprocess.run([*command, "-o", f"{rows}.elf", "--header", f"{rows}.h"], check=True, cwd=ROOT)
+        check_gnu99(program)
     for source in sorted((FIRMWARE / "apps" / app).glob("*.c")):
-        check_gnu99(source)
+        check_gnu99(source, tmp_path)
 
 
-def check_gnu99(source: Path) -> None:
+def check_gnu99(source: Path, *folders: Path) -> None:
     shared = [FIRMWARE / "apps" / app for app in ("clustering", "clocks")]
-    includes = [f"-I{folder}" for folder in [*HEADERS, *shared]] + [
+    includes = [f"-I{folder}" for folder in [*HEADERS, *shared, *folders]] + [
         "-isystem",
         str(ROOT / "toolchain" / "include"),
     ]

@@ -40,8 +40,13 @@
 #define OS_ISR_SHADOW(name)                                                                     \
   __attribute__((__used__, __annotate__("interrupt"), __annotate__("no_auto_psv"), __annotate__("shadow"))) void name( \
       void)
-#define DSPIC_CONFIG(section_name, variable, value) /* sources end it with a semicolon or without */ \
-  __attribute__((__used__, __section__(section_name))) static const unsigned short variable = (value);
+#ifdef __clang__ /* sources end it with a semicolon or without */
+#define DSPIC_CONFIG_END ;
+#else
+#define DSPIC_CONFIG_END
+#endif
+#define DSPIC_CONFIG(section_name, variable, value) \
+  __attribute__((__used__, __section__(section_name))) static const unsigned short variable = (value) DSPIC_CONFIG_END
 #define OS_PERSISTENT __attribute__((__section__(".pbss")))
 #define OS_W0 "r0"
 #define OS_W1 "r1"
