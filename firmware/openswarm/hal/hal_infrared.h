@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Lower layer of the infra-red link: contract here, code in board/<robot>/infrared. Eight receivers are sampled one after the
- * other in scans of equal length, for ever; the scan is the only clock of the link. Three scans are a bit. */
+ * other in scans of equal length, for ever; the scan is the only clock of the link. Three scans are a bit. A robot whose
+ * hardware is another has a link of its own (io/infrared/README.md), of which start and number are all that others call. */
 #ifndef HAL_INFRARED_H
 #define HAL_INFRARED_H
 

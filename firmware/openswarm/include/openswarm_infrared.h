@@ -9,6 +9,10 @@
  * Everybody in sight hears a message: there are no addresses, no acknowledgement and no promise that it arrives. What does
  * arrive has passed a CRC of 16 bits. Proximity goes on meanwhile, as with analog.h, which is not linked beside this one: they
  * share the converter. Microphones and accelerometer are not sampled.
+ *
+ * That is the e-puck. A Kilobot has one receiver, which sees pulses: there is no bearing (sensor is 0), no repair (corrected is
+ * 0), no proximity (SYS_IO_PROXIMITY is not registered) and no threshold (Sys_Set_InfraredThreshold is not linked). All else
+ * holds; cycles and stack of the contract lines are the e-puck's. Kilobots and e-pucks do not understand each other.
  */
 #ifndef OPENSWARM_INFRARED_H
 #define OPENSWARM_INFRARED_H
@@ -40,7 +44,8 @@ enum {
 
 typedef struct {
     uint16 source;   /* the sender's number, 1 to 2047; also data->value */
-    uint16 strength; /* counts by which its light lowered the sensor; larger is nearer */
+    uint16 strength; /* counts by which its light lowered the sensor; larger is nearer. Kilobot: 0-899 counts of high gain,
+                      * nearer 1024 and more: 1024 and the counts of low gain */
     uint8 sensor;    /* 0-7, clockwise from the front: where it came from */
     uint8 corrected; /* bits that were repaired */
     uint8 size;      /* of payload */
@@ -71,14 +76,14 @@ sys_leaving_processor Sys_Set_LeavingProcessor(sys_leaving_processor processor);
 /* M | no | - | 38 | MEMORY.  Between Sys_Init_Kernel and Sys_Start_Kernel. */
 bool Sys_Start_Infrared(void);
 
-/* MTHI | no | 128 | 30 | ARGUMENT, BUSY.  Queues a message of 1 to SYS_MESSAGE_BYTES bytes. BUSY: SYS_INFRARED_QUEUE wait. */
+/* MTHI | no | 126 | 30 | ARGUMENT, BUSY.  Queues a message of 1 to SYS_MESSAGE_BYTES bytes. BUSY: SYS_INFRARED_QUEUE wait. */
 bool Sys_Send_Neighbours(const void *payload, uint16 size);
 
 /* MTHI | no | 321 | 12 | none.  Copies up to most neighbours, in no order; how many. */
 uint8 Sys_Get_Neighbours(sys_neighbour *neighbours, uint8 most);
 
-/* MTHI | no | 4 | 4 | none.  The own number: of the data EEPROM's last word if that holds 1 to 2047; otherwise drawn at random
- * a quarter of a second after the start, and again when somebody else is heard with it. 0: not drawn yet. */
+/* MTHI | no | 4 | 4 | none.  The own number: of the data EEPROM's last word (Kilobot: its UID) if that holds 1 to 2047; otherwise
+ * drawn at random a quarter of a second after the start, and again when somebody else is heard with it. 0: not drawn yet. */
 uint16 Sys_Get_RobotNumber(void);
 /* MTHI | no | 32 | 14 | ARGUMENT.  1 to 2047; kept whoever else has it, and
  * before Sys_Start_Infrared whatever the EEPROM holds. */
@@ -88,7 +93,8 @@ bool Sys_Set_RobotNumber(uint16 number);
 bool Sys_Set_InfraredThreshold(uint8 counts);
 
 /* MTHI | no | 120 | 4 | none.  Millimetres between two robots' middles that face each other, 70 to 600, for a strength: the
- * amplitudes that libIrcom's authors measured (swarmcom.md 3.1). Askew sensors seem farther. */
+ * amplitudes that libIrcom's authors measured (swarmcom.md 3.1). Askew sensors seem farther. Kilobot: 33 to 98 by the tables
+ * of its calibration, 0 if the EEPROM has none; slow, it reads them there. */
 uint16 Sys_Estimate_Range(uint16 strength);
 
 typedef struct {
@@ -96,7 +102,7 @@ typedef struct {
     uint16 received;    /* frames that were whole */
     uint16 damaged;     /* begun and not whole at the end */
     uint16 false_starts; /* light too short for a frame, such as others' proximity */
-    uint16 adaptations; /* light that stayed, now taken for the room's */
+    uint16 adaptations; /* light that stayed, now taken for the room's; 0 on a Kilobot */
     uint16 refused;     /* messages that found the queue full */
     uint16 conflicts;   /* frames of somebody with the own number */
 } sys_infrared_statistics; /* they saturate */

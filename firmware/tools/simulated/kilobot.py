@@ -12,6 +12,7 @@ from pathlib import Path
 from firmware.tools.simulated.machine import NotInstalled, Stopped, Symbols
 
 HERE = Path(__file__).parent
+SOURCES = (HERE / "simavr.c", HERE / "air.c")
 HZ = 8_000_000
 PATIENCE = 80_000_000
 """Cycles: 10 s."""
@@ -21,8 +22,8 @@ _DONE, _CRASHED, _AT_PLACE = 1, 2, 3
 
 
 @functools.cache
-def _library() -> ctypes.CDLL:
-    """simavr.c, compiled once per run of Python. Raises NotInstalled."""
+def library() -> ctypes.CDLL:
+    """simavr.c and air.c, compiled once per run of Python. Raises NotInstalled."""
     for program, package in (("gcc", "gcc"), ("pkg-config", "pkg-config")):
         if shutil.which(program) is None:
             raise NotInstalled(f"{program} is not installed; Debian package: {package}")
@@ -33,55 +34,64 @@ def _library() -> ctypes.CDLL:
         raise NotInstalled("simavr's library is not installed; Debian package: libsimavr-dev")
     flags = [f"-I{found.stdout.strip()}/simavr", "-lsimavr"]
     folder = Path(tempfile.mkdtemp(prefix="openswarm-simavr-"))
-    made = folder / "simavr.so"
-    command = ["gcc", "-O2", "-shared", "-fPIC", str(HERE / "simavr.c"), *flags, "-o", str(made)]
+    object_ = folder / "simavr.so"
+    command = ["gcc", "-O2", "-shared", "-fPIC", *map(str, SOURCES), *flags, "-o", str(object_)]
     try:
         subprocess.run(command, check=True)
-        library = ctypes.CDLL(str(made))
+        made = ctypes.CDLL(str(object_))
     finally:
         shutil.rmtree(folder, ignore_errors=True)  # what is loaded stays
     handle = ctypes.c_void_p
     for name, result, arguments in (
-        ("open", handle, [ctypes.c_char_p, ctypes.c_uint32]),
-        ("close", None, [handle]),
-        ("step", ctypes.c_int, [handle]),
-        ("steps", ctypes.c_int, [handle, ctypes.c_uint32]),
-        ("instructions", ctypes.c_uint64, [handle]),
-        ("run", ctypes.c_int, [handle, ctypes.POINTER(ctypes.c_uint32), ctypes.c_int, ctypes.c_uint64]),
-        ("pc", ctypes.c_uint32, [handle]),
-        ("cycle", ctypes.c_uint64, [handle]),
-        ("data", ctypes.POINTER(ctypes.c_uint8), [handle]),
-        ("interrupt", ctypes.c_int, [handle, ctypes.c_uint8]),
-        ("receive", None, [handle, ctypes.c_uint8]),
-        ("uart", ctypes.c_uint32, [handle, ctypes.c_char_p, ctypes.c_uint32]),
-        ("watch", None, [handle, ctypes.c_uint16, ctypes.c_uint16]),
-        ("lowest", ctypes.c_uint16, [handle]),
+        ("machine_open", handle, [ctypes.c_char_p, ctypes.c_uint32]),
+        ("machine_close", None, [handle]),
+        ("machine_step", ctypes.c_int, [handle]),
+        ("machine_steps", ctypes.c_int, [handle, ctypes.c_uint32]),
+        ("machine_instructions", ctypes.c_uint64, [handle]),
+        ("machine_run", ctypes.c_int, [handle, ctypes.POINTER(ctypes.c_uint32), ctypes.c_int, ctypes.c_uint64]),
+        ("machine_pc", ctypes.c_uint32, [handle]),
+        ("machine_cycle", ctypes.c_uint64, [handle]),
+        ("machine_data", ctypes.POINTER(ctypes.c_uint8), [handle]),
+        ("machine_interrupt", ctypes.c_int, [handle, ctypes.c_uint8]),
+        ("machine_receive", None, [handle, ctypes.c_uint8]),
+        ("machine_eeprom", ctypes.c_int, [handle, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_uint32]),
+        ("machine_uart", ctypes.c_uint32, [handle, ctypes.c_char_p, ctypes.c_uint32]),
+        ("machine_watch", None, [handle, ctypes.c_uint16, ctypes.c_uint16]),
+        ("machine_lowest", ctypes.c_uint16, [handle]),
+        ("air_open", handle, [ctypes.c_uint32]),
+        ("air_close", None, [handle]),
+        ("air_join", ctypes.c_int, [handle, handle, ctypes.c_uint64]),
+        ("air_link", None, [handle, *[ctypes.c_int] * 2, *[ctypes.c_uint16] * 3]),
+        ("air_flash", None, [handle, ctypes.c_int, ctypes.c_uint32, *[ctypes.c_uint16] * 2]),
+        ("air_run", ctypes.c_int, [handle, ctypes.c_uint64]),
     ):
-        function = getattr(library, f"machine_{name}")
+        function = getattr(made, name)
         function.restype, function.argtypes = result, arguments
-    return library
+    return made
 
 
 class Kilobot:
     """A Kilobot's CPU that stands at its reset vector. Raises NotInstalled."""
 
     pointer = 2
+    handle: int | None
+    """simavr.c's name for it; None: closed."""
 
     def __init__(self, image: Path) -> None:
-        self._library = _library()
+        self._library = library()
         self.symbols = Symbols(image)
-        self._machine = self._library.machine_open(str(image).encode(), HZ)
-        if not self._machine:
+        self.handle = self._library.machine_open(str(image).encode(), HZ)
+        if not self.handle:
             raise Stopped(f"simavr does not load {image}")
-        self._data = self._library.machine_data(self._machine)
+        self._data = self._library.machine_data(self.handle)
 
     @property
     def pc(self) -> int:
-        return int(self._library.machine_pc(self._machine))
+        return int(self._library.machine_pc(self.handle))
 
     @property
     def now(self) -> int:
-        return int(self._library.machine_cycle(self._machine))
+        return int(self._library.machine_cycle(self.handle))
 
     def _check(self, how: int) -> None:
         if how in (_DONE, _CRASHED):
@@ -89,25 +99,25 @@ class Kilobot:
             raise Stopped(f"the firmware {what} at {self.pc:#x}, cycle {self.now}")
 
     def step(self) -> None:
-        self._check(self._library.machine_step(self._machine))
+        self._check(self._library.machine_step(self.handle))
 
     def steps(self, count: int) -> None:
         """That many instructions."""
-        self._check(self._library.machine_steps(self._machine, count))
+        self._check(self._library.machine_steps(self.handle, count))
 
     @property
     def instructions(self) -> int:
         """Instructions so far, each stretch of sleep counted as one."""
-        return int(self._library.machine_instructions(self._machine))
+        return int(self._library.machine_instructions(self.handle))
 
     def run(self, cycles: int) -> None:
         """At least that many cycles."""
-        self._check(self._library.machine_run(self._machine, None, 0, self.now + cycles))
+        self._check(self._library.machine_run(self.handle, None, 0, self.now + cycles))
 
     def run_to(self, *places: str | int, patience: int = PATIENCE) -> int:
         addresses = [self.symbols[place] if isinstance(place, str) else place for place in places]
         listed = (ctypes.c_uint32 * len(addresses))(*addresses)
-        how = self._library.machine_run(self._machine, listed, len(addresses), self.now + patience)
+        how = self._library.machine_run(self.handle, listed, len(addresses), self.now + patience)
         self._check(how)
         if how != _AT_PLACE:
             raise Stopped(f"not at {', '.join(map(str, places))} after {patience} cycles")
@@ -131,27 +141,32 @@ class Kilobot:
 
     def interrupt(self, vector: int) -> None:
         """Set an enabled interrupt's flag."""
-        self._library.machine_interrupt(self._machine, vector)
+        self._library.machine_interrupt(self.handle, vector)
 
     def receive(self, byte: int) -> None:
         """A byte arrives at the UART."""
-        self._library.machine_receive(self._machine, byte)
+        self._library.machine_receive(self.handle, byte)
+
+    def write_eeprom(self, offset: int, data: bytes) -> None:
+        """Data EEPROM, 1,024 bytes, erased to begin with. Raises ValueError."""
+        if self._library.machine_eeprom(self.handle, data, offset, len(data)) != 0:
+            raise ValueError(f"{len(data)} bytes at {offset:#x} are not in the EEPROM")
 
     def uart(self) -> bytes:
         """What the UART sent since the last call."""
         room = ctypes.create_string_buffer(1 << 16)
-        count = self._library.machine_uart(self._machine, room, len(room))
+        count = self._library.machine_uart(self.handle, room, len(room))
         return room.raw[:count]
 
     def watch_stack(self, lowest: int, highest: int) -> None:
         """From now on note the lowest stack pointer between the two addresses."""
-        self._library.machine_watch(self._machine, lowest, highest)
+        self._library.machine_watch(self.handle, lowest, highest)
 
     def lowest_sp(self) -> int:
         """The lowest stack pointer noted."""
-        return int(self._library.machine_lowest(self._machine))
+        return int(self._library.machine_lowest(self.handle))
 
     def close(self) -> None:
-        if self._machine:
-            self._library.machine_close(self._machine)
-            self._machine = None
+        if self.handle:
+            self._library.machine_close(self.handle)
+            self.handle = None

@@ -1,24 +1,15 @@
 /* An ATmega328P for Python (kilobot.py): simavr's library behind a few functions, one instruction at a time.
  *
- *     gcc -O2 -shared -fPIC simavr.c -I/usr/include/simavr -lsimavr -o simavr.so */
+ *     gcc -O2 -shared -fPIC simavr.c air.c -I/usr/include/simavr -lsimavr -o simavr.so */
+#include "simavr.h"
+
+#include <avr_eeprom.h>
 #include <avr_extint.h>
 #include <avr_uart.h>
-#include <sim_avr.h>
 #include <sim_elf.h>
 #include <sim_interrupts.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { UART_ROOM = 1 << 20 };
-
-typedef struct {
-    avr_t *avr;
-    uint64_t instructions;
-    uint32_t written;
-    uint16_t lowest_sp, watch_from, watch_to;
-    uint8_t uart[UART_ROOM];
-} machine;
 
 static void quiet(avr_t *avr, const int level, const char *format, va_list arguments)
 {
@@ -74,7 +65,7 @@ void machine_close(machine *m)
     free(m);
 }
 
-/* One instruction, or a stretch of sleep. 0: runs on; 1: done, sleeping with interrupts off; 2: crashed. */
+/* DONE: sleeping with interrupts off. */
 int machine_step(machine *m)
 {
     int state = avr_run(m->avr);
@@ -84,34 +75,34 @@ int machine_step(machine *m)
     if (sp >= m->watch_from && sp <= m->watch_to && sp < m->lowest_sp) {
         m->lowest_sp = sp;
     }
-    return state == cpu_Done ? 1 : state == cpu_Crashed ? 2 : 0;
+    return state == cpu_Done ? DONE : state == cpu_Crashed ? CRASHED : RUNS_ON;
 }
 
 /* That many instructions, or less: as machine_step. */
 int machine_steps(machine *m, uint32_t count)
 {
-    int stopped = 0;
-    while (count-- != 0 && stopped == 0) {
+    int stopped = RUNS_ON;
+    while (count-- != 0 && stopped == RUNS_ON) {
         stopped = machine_step(m);
     }
     return stopped;
 }
 
-/* Until the program counter is one of `places` (at least one step), or cycle `end`. As machine_step; 3: at a place. */
+/* Until the program counter is one of `places` (at least one step), or cycle `end`. As machine_step, or AT_PLACE. */
 int machine_run(machine *m, const uint32_t *places, int count, uint64_t end)
 {
     while (m->avr->cycle < end) {
         int stopped = machine_step(m);
-        if (stopped != 0) {
+        if (stopped != RUNS_ON) {
             return stopped;
         }
         for (int i = 0; i < count; i++) {
             if (m->avr->pc == places[i]) {
-                return 3;
+                return AT_PLACE;
             }
         }
     }
-    return 0;
+    return RUNS_ON;
 }
 
 /* Instructions so far. */
@@ -150,6 +141,13 @@ int machine_interrupt(machine *m, uint8_t vector)
 void machine_receive(machine *m, uint8_t byte)
 {
     avr_raise_irq(avr_io_getirq(m->avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
+}
+
+/* 0 unless the bytes do not fit. */
+int machine_eeprom(machine *m, const uint8_t *bytes, uint32_t offset, uint32_t count)
+{
+    avr_eeprom_desc_t d = {(uint8_t *)bytes, (uint16_t)offset, count};
+    return avr_ioctl(m->avr, AVR_IOCTL_EEPROM_SET, &d) == -2; /* -1 is how simavr says that it is done */
 }
 
 /* Copies what the UART sent since the last call. */

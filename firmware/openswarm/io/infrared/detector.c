@@ -4,6 +4,7 @@
 #include "infrared_parts.h"
 
 #include "hal_cpu.h"
+#include "kernel.h"
 
 enum {
     COUNT = 16,
@@ -133,10 +134,10 @@ uint16 detector_level(uint8 sensor)
     return filters[sensor].level;
 }
 
-bool detector_set_threshold(uint8 counts)
+bool Sys_Set_InfraredThreshold(uint8 counts)
 {
     if (counts == 0 || counts > 100) {
-        return false;
+        return os_fail(SYS_ERROR_ARGUMENT);
     }
     HAL_STORE(least, (uint16)(COUNT * counts));
     return true;

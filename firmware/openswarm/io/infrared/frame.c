@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A frame is a header (number of the sender 11 bits, kind 1, size 4), the payload and a CRC of both, low bytes first.
- * On the air it is words of 15 bits, each for eleven bits of it. */
+ * On the air it is words of 15 bits, each for eleven bits of it, or the bytes as they are: what the link can carry. */
 #include "infrared_parts.h"
 
 #include <string.h>
@@ -43,6 +43,17 @@ void frame_begin(frame_buffer *b)
     memset(b, 0, sizeof *b);
 }
 
+/* What has come so far, behind another part of it. */
+static frame_state judge(const frame_buffer *b)
+{
+    if (b->bits < 8 * FRAME_HEADER || b->bits < total_bits(b)) {
+        return FRAME_MORE;
+    }
+    uint8 covered = (uint8)(FRAME_HEADER + (b->bytes[1] >> 4));
+    uint16 crc = (uint16)(b->bytes[covered] | (uint16)b->bytes[covered + 1u] << 8);
+    return crc == coder_crc(b->bytes, covered) ? FRAME_WHOLE : FRAME_DAMAGED;
+}
+
 frame_state frame_word(frame_buffer *b, uint16 word)
 {
     if (word == 0) {
@@ -54,12 +65,24 @@ frame_state frame_word(frame_buffer *b, uint16 word)
     to[1] = (uint8)(bits >> 8);
     to[2] = (uint8)(bits >> 16);
     b->bits = (uint8)(b->bits + DATA_BITS);
-    if (b->bits < 2 * DATA_BITS || b->bits < total_bits(b)) {
-        return FRAME_MORE;
+    return judge(b);
+}
+
+bool frame_next_byte(frame_buffer *b, uint8 *byte)
+{
+    if (b->bits >= total_bits(b)) {
+        return false;
     }
-    uint8 covered = (uint8)(FRAME_HEADER + (b->bytes[1] >> 4));
-    uint16 crc = (uint16)(b->bytes[covered] | (uint16)b->bytes[covered + 1u] << 8);
-    return crc == coder_crc(b->bytes, covered) ? FRAME_WHOLE : FRAME_DAMAGED;
+    *byte = b->bytes[b->bits >> 3];
+    b->bits = (uint8)(b->bits + 8u);
+    return true;
+}
+
+frame_state frame_byte(frame_buffer *b, uint8 byte)
+{
+    b->bytes[b->bits >> 3] = byte;
+    b->bits = (uint8)(b->bits + 8u);
+    return judge(b);
 }
 
 void frame_unpack(const frame_buffer *b, frame *f)

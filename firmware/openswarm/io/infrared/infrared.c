@@ -64,11 +64,11 @@ void infrared_leaving(uint8 *payload, uint8 size)
 static void keep_alive(void)
 {
     uint16 now = clock_now();
-    if (link_has_sent()) {
+    if (queue_has_sent()) {
         beacon_at = (uint16)(now + SYS_BEACON_PERIOD + (link_random() & (SYS_BEACON_PERIOD / 4 - 1)));
     } else if ((sint16)(now - beacon_at) >= 0) {
         beacon_at = (uint16)(now + SYS_BEACON_PERIOD);
-        (void)link_queue(FRAME_MESSAGE, &housekeepings, 0);
+        (void)queue_frame(FRAME_MESSAGE, &housekeepings, 0);
     }
 }
 
@@ -94,7 +94,7 @@ bool Sys_Send_Neighbours(const void *payload, uint16 size)
     if (processor != NULL && (!processor(changed, &bytes) || bytes == 0 || bytes > SYS_MESSAGE_BYTES)) {
         return os_fail(SYS_ERROR_ARGUMENT);
     }
-    return link_queue(FRAME_MESSAGE, changed, bytes) || os_fail(SYS_ERROR_BUSY);
+    return queue_frame(FRAME_MESSAGE, changed, bytes) || os_fail(SYS_ERROR_BUSY);
 }
 
 static bool on_request(uint16 pid, uint16 event, sys_event_data *data)
@@ -147,11 +147,6 @@ bool Sys_Set_RobotNumber(uint16 number)
     return keep_number(number) || os_fail(SYS_ERROR_ARGUMENT);
 }
 
-bool Sys_Set_InfraredThreshold(uint8 counts)
-{
-    return detector_set_threshold(counts) || os_fail(SYS_ERROR_ARGUMENT);
-}
-
 const sys_infrared_statistics *Sys_Get_InfraredStatistics(void)
 {
     return &infrared_statistics;
@@ -159,13 +154,12 @@ const sys_infrared_statistics *Sys_Get_InfraredStatistics(void)
 
 bool Sys_Start_Infrared(void)
 {
-    reflections_init();
-    link_init();
+    bool is_ready = link_init();
     if (!number_is_kept) {
         (void)keep_number(hal_infrared_number());
     }
     hal_infrared_start();
-    return Sys_Register_Event(SYS_IO_PROXIMITY) && Sys_Register_Event(SYS_NEIGHBOUR_MESSAGE) &&
+    return is_ready && Sys_Register_Event(SYS_NEIGHBOUR_MESSAGE) &&
            Sys_Register_Event(SYS_NEIGHBOUR_SEEN) && Sys_Register_Event(SYS_NEIGHBOUR_LOST) &&
            Sys_Register_Event(SYS_SEND_NEIGHBOURS) && Sys_Subscribe_to_Event(SYS_SEND_NEIGHBOURS, 0, on_request, NULL);
 }

@@ -38,9 +38,11 @@ typedef struct {
 
 void frame_pack(frame_buffer *b, const frame *f);
 bool frame_next_word(frame_buffer *b, uint16 *word); /* to be sent; false: that was all */
+bool frame_next_byte(frame_buffer *b, uint8 *byte);  /* or so */
 typedef enum { FRAME_MORE, FRAME_WHOLE, FRAME_DAMAGED } frame_state;
 void frame_begin(frame_buffer *b);
 frame_state frame_word(frame_buffer *b, uint16 word); /* as received */
+frame_state frame_byte(frame_buffer *b, uint8 byte);  /* or so */
 void frame_unpack(const frame_buffer *b, frame *f);   /* of a whole one; payload points into b */
 
 /* ---- detector.c: light that comes and goes, sensor by sensor. Levels are sixteenths of a count ---- */
@@ -52,14 +54,25 @@ void detector_adapt(scan raw);         /* what is there now is the background */
 bool detector_is_dark(scan raw);       /* no sensor is lit by more than its threshold */
 uint16 detector_background(uint8 sensor);
 uint16 detector_level(uint8 sensor);   /* mean of about four scans */
-bool detector_set_threshold(uint8 counts); /* any context */
 
-/* ---- link.c: who may light up when ---- */
-void link_init(void);
-bool link_queue(frame_kind kind, const uint8 *payload, uint8 size); /* any context */
-uint16 link_random(void);
-bool link_has_sent(void);              /* since the last call */
+/* ---- queue.c: frames that wait for their turn ---- */
+typedef struct {
+    bool is_filled; /* its sender may have been interrupted */
+    uint8 kind, size;
+    uint8 payload[FRAME_PAYLOAD];
+} waiting_frame;
+
+bool queue_frame(frame_kind kind, const uint8 *payload, uint8 size); /* any context */
+extern waiting_frame queue[SYS_INFRARED_QUEUE]; /* the link's, to see whether the first is filled; and how many there are */
+extern volatile uint8 queue_first, queue_length;
+void queue_pack(frame_buffer *b);      /* takes the first out */
+void queue_sent(void);                 /* the last light of a frame is out */
+bool queue_has_sent(void);             /* since the last call */
 extern sys_infrared_statistics infrared_statistics;
+
+/* ---- link.c, or the board's own: who may light up when ---- */
+bool link_init(void);                  /* false: no memory */
+uint16 link_random(void);
 
 /* ---- infrared.c ---- */
 extern uint16 infrared_number;
@@ -75,7 +88,7 @@ void neighbours_age(void);             /* one of the table */
 uint8 neighbours_count(void);
 
 /* ---- reflections.c: proximity between frames ---- */
-void reflections_init(void);
+bool reflections_init(void);           /* false: no memory */
 void reflections_lit(scan raw);        /* the own emitters have been on for two scans */
 void reflections_use(void);            /* nobody else lit anything meanwhile */
 

@@ -8,8 +8,6 @@
 #include "infrared_parts.h"
 #include "hal_cpu.h"
 
-#include <string.h>
-
 enum {
     SCANS_PER_BIT = 3,
     PREAMBLE = 0x3F,
@@ -37,15 +35,6 @@ enum {
     INCREMENT = 13849 /* of a full period of 2^16 */
 };
 
-typedef struct {
-    bool is_filled; /* its sender may have been interrupted */
-    uint8 kind, size;
-    uint8 payload[FRAME_PAYLOAD];
-} waiting_frame;
-
-static waiting_frame queue[SYS_INFRARED_QUEUE];
-static volatile uint8 queue_first, queue_length;
-
 static enum { LISTEN, ONES, BITS, SEND, FLASHING, SETTLING, RESTING } state;
 static uint8 phase;      /* scans until something is due, or of a bit */
 static uint8 lit, quiet; /* scans with light, without; in LISTEN */
@@ -61,11 +50,7 @@ static uint16 word;
 static uint8 word_bits;
 static frame_buffer buffer;
 static uint16 scans, flashed_at, random_state;
-static bool has_sent;
 
-sys_infrared_statistics infrared_statistics;
-
-/* ISRs alone, or with devices locked. */
 static void count(uint16 *counter)
 {
     if (++*counter == 0) {
@@ -85,55 +70,11 @@ static void draw_backoff(void)
     backoff = (uint16)((uint16)(link_random() % slots) * SLOT);
 }
 
-static waiting_frame *reserve(void)
-{
-    waiting_frame *w = NULL;
-    hal_lock_state lock = hal_lock_devices();
-    if (queue_length < SYS_INFRARED_QUEUE) {
-        w = queue + (uint8)(queue_first + queue_length) % SYS_INFRARED_QUEUE;
-        queue_length++;
-    } else {
-        count(&infrared_statistics.refused);
-    }
-    hal_unlock(lock);
-    return w;
-}
-
-bool link_has_sent(void)
-{
-    bool answer = has_sent;
-    has_sent = false;
-    return answer;
-}
-
-bool link_queue(frame_kind kind, const uint8 *payload, uint8 size)
-{
-    hal_lock_state lock = hal_lock_slice(); /* nobody is killed between reserving and filling */
-    waiting_frame *w = reserve();
-    if (w != NULL) {
-        w->kind = (uint8)kind;
-        w->size = size;
-        memcpy(w->payload, payload, size);
-        hal_barrier();
-        w->is_filled = true;
-    }
-    hal_unlock(lock);
-    return w != NULL;
-}
-
 /* -- sending ------------------------------------------------------------------------------------------------------- */
 
 static HAL_OUTLINE void begin_sending(void)
 {
-    waiting_frame *w = queue + queue_first;
-    if (w->kind == FRAME_MESSAGE && w->size != 0) {
-        infrared_leaving(w->payload, w->size);
-    }
-    frame f = {infrared_number, w->kind, w->size, w->payload};
-    frame_pack(&buffer, &f);
-    w->is_filled = false;
-    queue_first = (uint8)((queue_first + 1u) % SYS_INFRARED_QUEUE);
-    queue_length--;
+    queue_pack(&buffer);
     word = PREAMBLE;
     word_bits = PREAMBLE_BITS;
     phase = 1;
@@ -155,8 +96,7 @@ static HAL_OUTLINE void send(void)
     phase = SCANS_PER_BIT;
     if (word_bits == 0) {
         if (!frame_next_word(&buffer, &word)) {
-            count(&infrared_statistics.sent);
-            has_sent = true;
+            queue_sent();
             draw_backoff();
             rest_for(SCANS_PER_BIT);
             return;
@@ -375,7 +315,8 @@ void infrared_scanned(scan raw)
     }
 }
 
-void link_init(void)
+bool link_init(void)
 {
     draw_backoff();
+    return reflections_init();
 }

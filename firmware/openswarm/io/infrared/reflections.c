@@ -8,9 +8,10 @@
 
 static uint16 lit_readings[HAL_INFRARED_SENSORS];
 
-void reflections_init(void)
+bool reflections_init(void)
 {
     proximity_init();
+    return Sys_Register_Event(SYS_IO_PROXIMITY);
 }
 
 void reflections_lit(scan raw)

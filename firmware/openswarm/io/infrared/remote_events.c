@@ -87,7 +87,7 @@ static bool transmit(uint16 event, uint8 hops, uint16 origin, const void *data, 
     payload[2] = (uint8)origin;
     payload[3] = (uint8)(origin >> 8);
     memcpy(payload + HEADER, data, size);
-    return link_queue(FRAME_EVENT, payload, (uint8)(HEADER + size));
+    return queue_frame(FRAME_EVENT, payload, (uint8)(HEADER + size));
 }
 
 static bool on_event(uint16 pid, uint16 event, sys_event_data *data)

@@ -1,0 +1,130 @@
+"""Several Kilobots within sight of each other: ATmega328Ps in simavr, in lock step, that see each other's infrared.
+
+    with Kilobots([Robot(image, x=0, number=1), Robot(image, x=50, number=2)]) as swarm:
+        swarm.run(2.0)
+        swarm.robots[0].uart()
+
+The same robots, seeds and calls give the same run, cycle by cycle.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from firmware.tools.simulated.kilobot import HZ, Kilobot, library
+from firmware.tools.simulated.machine import Stopped
+
+REACH_MM = 70.0
+"""Between two robots' middles; farther away nobody hears anything. Public descriptions of the robot say 7 cm."""
+FULL_SCALE = 1023
+HIGH_GAIN_MM, LOW_GAIN_MM = 40.0, 20.0
+"""Where the two gains saturate; beyond, counts fall with the square of the distance. UNVERIFIED, docs/accuracy.md."""
+CALIBRATED_MM = tuple(range(33, 99, 5))
+"""Distances of the tables in the EEPROM (kilolib)."""
+NUMBER_AT, LOW_GAIN_AT, HIGH_GAIN_AT = 0xB0, 0x20, 0x50
+"""EEPROM addresses (kilolib): UID, and 14 counts of each gain, high bytes first."""
+PULSE_LOSS = 1 << 16
+
+
+def counts(gain_mm: float, distance_mm: float) -> int:
+    """What the converter makes of a neighbour's pulse."""
+    return FULL_SCALE if distance_mm <= gain_mm else round(FULL_SCALE * (gain_mm / distance_mm) ** 2)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One robot of a swarm as it is switched on."""
+
+    image: Path
+    x: float = 0.0
+    """mm, of its middle."""
+    y: float = 0.0
+    number: int | None = None
+    """Its UID; None: an erased EEPROM, so that it draws one."""
+    on_at: float = 0.0
+    """Seconds."""
+    calibrated: bool = True
+    """Whether the tables of strength by distance are in its EEPROM."""
+
+
+class Kilobots:
+    """A swarm that stands still until it is told to run. Raises NotInstalled, Stopped, ValueError.
+
+    `loss` is the part of pulses, 0 to 1, that a receiver misses. Each robot sees its own light, too."""
+
+    def __init__(self, robots: Sequence[Robot], *, seed: int = 1, loss: float = 0.0) -> None:
+        if not 0 <= loss < 1:
+            raise ValueError(f"a loss of {loss} is not within 0 and 1")
+        self._library = library()
+        self._air = self._library.air_open(seed)
+        self._loss = int(loss * PULSE_LOSS)
+        self.robots: list[Kilobot] = []
+        self.places = [(robot.x, robot.y) for robot in robots]
+        self.now = 0
+        """Cycles since time 0."""
+        try:
+            for robot in robots:
+                self._add(robot)
+        except BaseException:
+            self.close()
+            raise
+        for index in range(len(robots)):
+            self._look_at(index)
+
+    def _add(self, robot: Robot) -> None:
+        machine = Kilobot(robot.image)
+        self.robots.append(machine)
+        if robot.number is not None:
+            machine.write_eeprom(NUMBER_AT, struct.pack("<H", robot.number))
+        if robot.calibrated:
+            for address, gain in ((LOW_GAIN_AT, LOW_GAIN_MM), (HIGH_GAIN_AT, HIGH_GAIN_MM)):
+                table = [counts(gain, distance) for distance in CALIBRATED_MM]
+                machine.write_eeprom(address, struct.pack(f">{len(table)}H", *table))
+        if self._library.air_join(self._air, machine.handle, int(robot.on_at * HZ)) < 0:
+            raise ValueError(f"{len(self.robots)} robots are too many")
+
+    def _look_at(self, moved: int) -> None:
+        for other in range(len(self.robots)):
+            distance = math.dist(self.places[moved], self.places[other])
+            heard = distance <= REACH_MM
+            seen = [counts(gain, distance) if heard else 0 for gain in (HIGH_GAIN_MM, LOW_GAIN_MM)]
+            for way in ((moved, other), (other, moved)):
+                self._library.air_link(self._air, *way, *seen, self._loss)
+
+    def move(self, robot: int, x: float, y: float) -> None:
+        """At once, to a place in mm."""
+        self.places[robot] = (x, y)
+        self._look_at(robot)
+
+    def flash(self, robot: int, after_us: float) -> None:
+        """One robot sees a pulse that nobody sent, so many us from now."""
+        self._library.air_flash(self._air, robot, int(after_us * HZ / 1e6), FULL_SCALE, FULL_SCALE)
+
+    def run(self, seconds: float) -> None:
+        """All of them, that long. Raises Stopped."""
+        self.now += int(seconds * HZ)
+        stopped = self._library.air_run(self._air, self.now)
+        if stopped >= 0:
+            machine = self.robots[stopped]
+            raise Stopped(f"robot {stopped} stopped at {machine.pc:#x}, its cycle {machine.now}")
+
+    def close(self) -> None:
+        """End the simulators."""
+        for machine in self.robots:
+            machine.close()
+        if self._air:
+            self._library.air_close(self._air)
+            self._air = None
+
+    def __enter__(self) -> Kilobots:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

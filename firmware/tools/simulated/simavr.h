@@ -1,0 +1,20 @@
+/* An ATmega328P that stands still until it is told to run: what simavr.c and air.c share. */
+#ifndef SIMAVR_H
+#define SIMAVR_H
+
+#include <sim_avr.h>
+#include <stdint.h>
+
+enum { UART_ROOM = 1 << 20, RUNS_ON = 0, DONE = 1, CRASHED = 2, AT_PLACE = 3 };
+
+typedef struct {
+    avr_t *avr;
+    uint64_t instructions;
+    uint32_t written;
+    uint16_t lowest_sp, watch_from, watch_to;
+    uint8_t uart[UART_ROOM];
+} machine;
+
+int machine_step(machine *m); /* one instruction, or a stretch of sleep; RUNS_ON, DONE or CRASHED */
+
+#endif
