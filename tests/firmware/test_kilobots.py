@@ -228,9 +228,11 @@ def test_a_foreign_pulse_damages_a_frame(image: Path, swarm: Open, after_us: flo
     left, right = both.robots
     say(left, MESSAGE, bytes(8))  # zeros: whatever light is added changes something
     frame_begins(both, right)
-    for _ in range(12):  # every 29 us, so that the byte it falls upon does not matter
+    if after_us:
+        both.run(after_us * 1e-6)
+    for _ in range(12):  # every 29 us, so that some fall upon a byte and not all between two
         both.run(29e-6)
-        both.flash(1, after_us)
+        both.flash(1, 0)
     both.run(0.1)
     assert (peek(right, "messages"), statistics(right)["damaged"]) == (0, 1)
     say(left, MESSAGE, b"again")
