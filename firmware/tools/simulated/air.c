@@ -2,11 +2,11 @@
  * converters, and all of them run in lock step.
  *
  * Time is counted from when the first was switched on. A robot runs only as far as nobody else can have lit anything
- * before: so a pulse is never late, and every run is the same. Light takes DELAY from pin to comparator; it also keeps a
- * pulse in the future of a receiver that is an instruction ahead.
+ * before: so a pulse is never late, and every run is the same. Light takes DELAY from pin to comparator; it also keeps
+ * a pulse in the future of a receiver that is an instruction ahead.
  *
- * simavr knows no conversion that the comparator starts; it is started here. It reads a channel's voltage when the program
- * reads the result, so a voltage stays until the next pulse. */
+ * simavr knows no conversion that the comparator starts; it is started here. It reads a channel's voltage when the
+ * program reads the result, so a voltage stays until the next pulse. */
 #include "simavr.h"
 
 #include <avr_acomp.h>
@@ -17,8 +17,8 @@
 
 enum {
     ROBOTS = 32,
-    DELAY = 8, /* cycles */
-    STRAY = 9, /* cycles of a foreign light: as long as a pulse */
+    DELAY = 8,       /* cycles */
+    STRAY = 9,       /* cycles of a foreign light: as long as a pulse */
     EMITTERS = 0xC7, /* of port B */
     DARK_MV = 0,
     REFERENCE_MV = 500, /* of the comparator */
@@ -48,7 +48,7 @@ typedef struct place {
     machine *machine;
     uint64_t since; /* its cycle 0 */
     uint32_t noise;
-    uint8_t lit; /* lights it sees */
+    uint8_t lit;  /* lights it sees */
     uint8_t pins; /* of its emitter that are on */
     path to[ROBOTS];
     path stray;
@@ -241,7 +241,8 @@ static int advance(place *p, uint64_t others)
     uint64_t here = now(p);
     bool falls_asleep = avr->flash[avr->pc] == (SLEEP & 0xFF) && avr->flash[avr->pc + 1] == SLEEP >> 8;
     if (avr->state == cpu_Sleeping || falls_asleep) { /* in this step, and not beyond what the others may do */
-        avr_cycle_timer_register(avr, others > here + 2 ? others - here : 2, wake, p); /* behind the sleep instruction */
+        avr_cycle_timer_register(avr, others > here + 2 ? others - here : 2, wake,
+                                 p); /* behind the sleep instruction */
     }
     return machine_step(p->machine);
 }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Who may light up when, and what pulses mean. A byte is a pulse, a pause, eight bits of which the ones are pulses, and
- * another pulse. A frame begins with a byte 0 whose last pulse waits for others that begin as well, as kilolib's does; then
- * come the bytes of frame.c.
+ * another pulse. A frame begins with a byte 0 whose last pulse waits for others that begin as well, as kilolib's does;
+ * then come the bytes of frame.c.
  *
- * Within a byte pulses may follow each other in 34 us, and the kernel's clock alone takes longer than that. So both sides do
- * a byte in one interrupt, and the pause behind its first pulse is for whatever delays the receiver's. */
+ * Within a byte pulses may follow each other in 34 us, and the kernel's clock alone takes longer than that. So both
+ * sides do a byte in one interrupt, and the pause behind its first pulse is for whatever delays the receiver's. */
 #include "infrared_parts.h"
 #include "kernel.h"
 #include "pulses.h"
@@ -17,17 +17,17 @@ enum {
     HALF_SLOT = 17, /* counts */
     FIRST_SLOT = 3, /* of the bits: 807 cycles for other interrupts */
     STOP_SLOT = FIRST_SLOT + 8,
-    LONGEST = 505,  /* counts from the first pulse to the last; four slots late, if another interrupt delayed it */
-    WINDOW = 370,   /* counts: STOP_SLOT of the first byte */
-    PAUSE = 100,    /* counts between bytes: for everybody else on this CPU */
-    ECHO = 8,       /* counts behind the own light in which a pulse may be its reflection: UNVERIFIED, docs/accuracy.md */
-    TICK = 977,     /* counts */
-    SILENCE = 2,    /* ticks without a pulse: no byte of a frame is so far from the next */
-    CLEAR = 3,      /* ticks without a pulse before an own frame */
+    LONGEST = 505, /* counts from the first pulse to the last; four slots late, if another interrupt delayed it */
+    WINDOW = 370,  /* counts: STOP_SLOT of the first byte */
+    PAUSE = 100,   /* counts between bytes: for everybody else on this CPU */
+    ECHO = 8,    /* counts behind the own light in which a pulse may be its reflection: UNVERIFIED, docs/accuracy.md */
+    TICK = 977,  /* counts */
+    SILENCE = 2, /* ticks without a pulse: no byte of a frame is so far from the next */
+    CLEAR = 3,   /* ticks without a pulse before an own frame */
     FIRST_SLOTS = 12,
     SLOTS_PER_NEIGHBOUR = 4, /* ticks of back-off */
-    SKEW = 511,     /* counts: most by which robots' ticks part whenever they draw */
-    HOUSEKEEPING = 16, /* ticks */
+    SKEW = 511,              /* counts: most by which robots' ticks part whenever they draw */
+    HOUSEKEEPING = 16,       /* ticks */
     NO_BYTE = -1
 };
 
@@ -35,7 +35,7 @@ static enum { STARTING, LISTEN, RECEIVE, LEADING, SENDING } state;
 static uint8 quiet = SILENCE; /* ticks without a pulse */
 static uint8 backoff, due;    /* ticks of silence on top before an own frame; since the last housekeeping */
 static uint16 skew;
-static uint16 seen;           /* the last pulse that was looked at */
+static uint16 seen; /* the last pulse that was looked at */
 static uint16 lit_at;
 static bool collided;
 static uint16 strength;

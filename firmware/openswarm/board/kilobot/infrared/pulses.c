@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* The Kilobot's infrared hardware, with the pins and channels of kilolib (board/kilobot/README.md): emitters on port B, the
- * receiver at the analog comparator, its strength at ADC0 (high gain) and ADC1 (low gain).
+/* The Kilobot's infrared hardware, with the pins and channels of kilolib (board/kilobot/README.md): emitters on port B,
+ * the receiver at the analog comparator, its strength at ADC0 (high gain) and ADC1 (low gain).
  *
- * The comparator also drives T1's input capture, which kilolib does not use: it dates each pulse however busy the CPU is. */
+ * The comparator also drives T1's input capture, which kilolib does not use: it dates each pulse however busy the CPU
+ * is. */
 #include "pulses.h"
 #include "infrared_parts.h"
 
@@ -13,15 +14,15 @@ enum {
     EMITTERS_ALLOWED = 0xC7,
     EMITTER_DEFAULT = 1 << PB0,
     SENSOR_SUPPLY_D = 1 << PD2,
-    RECEIVER_D = 3, /* digital inputs of PD6 and PD7 off */
+    RECEIVER_D = 3,                         /* digital inputs of PD6 and PD7 off */
     CLOCK_OF_ADC = 1 << ADPS1 | 1 << ADPS0, /* 1 MHz */
     CHANNEL_HIGH_GAIN = 0,
     CHANNEL_LOW_GAIN = 1,
     CHANNEL_BATTERY = 6,
     NOISY_CONVERSIONS = 32
 };
-#define EMITTERS ((const uint8 *)0x90)       /* EEPROM: kilolib's TX mask */
-#define NUMBER ((const uint16 *)0xB0)        /* its UID */
+#define EMITTERS ((const uint8 *)0x90) /* EEPROM: kilolib's TX mask */
+#define NUMBER ((const uint16 *)0xB0)  /* its UID */
 
 static uint8 emitters;
 static uint16 noise;
