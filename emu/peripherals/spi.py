@@ -1,7 +1,8 @@
 """SPI1/2 (§12): master and slave, 8 and 16 bits, double-buffered.
 
 The outside is words: as master, `exchange(word, bits)` is asked for the answer at the end of each transfer; as slave,
-the outside calls `clock_word(word, bit_tcy)`. SCK and SDO levels are functions of the cycle.
+the outside calls `clock_word(word, bit_tcy)`. SCK and SDO levels are functions of the cycle. What happens inside is
+the text of `spirules.py`.
 """
 
 from __future__ import annotations
@@ -15,9 +16,19 @@ from emu.peripherals.interrupts import Interrupts
 from emu.peripherals.kit import Kit, Peripheral
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports import Port
-
-_PRIMARY: Final = (64, 16, 4, 1)
-"""Primary prescale for PPRE = 0..3; the secondary is 8 - SPRE (§12)."""
+from emu.peripherals.spirules import (
+    SpiPlaces,
+    begin,
+    bit_time,
+    finish,
+    fire,
+    open_end,
+    push,
+    take,
+    waits_to_begin,
+    word_bits,
+)
+from emu.straight import Rule, place_of, slot_of
 
 
 class Spi(Peripheral):
@@ -33,11 +44,9 @@ class Spi(Peripheral):
         self.idle_bit = (self.stat, "SPISIDL")
         self.stat.written_by(self._stat_written)
         self.con.written_by(self._con_written)
-        self.buf.written_by(self._buf_written)
-        self.buf.read_by(self._buf_read)
         self.buf.computed(lambda: self._received.value)
-        self.exchange: Callable[[int, int], int] | None = None
-        """exchange(word, bits) -> word: the device at the other end, when this module is master."""
+        self._exchange: Callable[[int, int], int] | None = None
+        self._answered: Final = self.cell("answered", "B")
         self.on_slave_word: Callable[[int, int], None] | None = None
         """on_slave_word(word, cycle): what an outside master has clocked out of this module."""
         self._pins: Final = {role: parse_pin(getattr(site, f"{role}_pin")) for role in ("sck", "sdi", "sdo", "ss")}
@@ -50,70 +59,71 @@ class Spi(Peripheral):
         self._start: Final = self.moment("start", NEVER)
         self._bit: Final = self.cell("bit", "I")
         self._step: Final = self.slot("step", self._due)
+        self._places: Final = self._registers()
+        integers, places = self.bus.integers, self._places
+        self.buf.ruled(Rule(places, writes=push, takes=take))
+        self.buf.read_by(lambda: take(integers, places))
+        self.buf.written_by(self._push)
+        self.ruled(self._step, Rule(places, fires=fire))
+
+    def _registers(self) -> SpiPlaces:
+        sfrs, (port, pin) = self.kit.chip.sfrs, self._pins["sdi"]
+        fields = {**sfrs[self.stat.name].fields, **sfrs[self.con.name].fields}
+        cells = {name: name for name in ("waiting", "shift", "received", "busy", "start", "answered")}
+        return SpiPlaces(
+            stat=self.stat.place,
+            con=self.con.place,
+            buf=self.buf.place,
+            bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
+            spre=fields["SPRE"][0],
+            level=place_of(self.record, "pins.level", port),
+            sdi=pin,
+            step=slot_of(self.record, self._step),
+            line=self._line.line,
+            **{
+                cell: place_of(self.record, f"{self.name}.{name}")
+                for cell, name in (cells | {"bit_tcy": "bit"}).items()
+            },
+        )
+
+    @property
+    def exchange(self) -> Callable[[int, int], int] | None:
+        """exchange(word, bits) -> word: the device at the other end, when this module is master."""
+        return self._exchange
+
+    @exchange.setter
+    def exchange(self, device: Callable[[int, int], int] | None) -> None:
+        self._exchange = device
+        self._answered.value = device is not None
 
     @property
     def word_bits(self) -> int:
         """8 or 16 (MODE16)."""
-        return 16 if self.con["MODE16"] else 8
+        return int(word_bits(self.bus.integers, self._places))
 
     @property
     def bit_time(self) -> int:
-        """Length of a bit as master in Tcy: primary x secondary prescale (§12)."""
-        return _PRIMARY[self.con["PPRE"]] * (8 - self.con["SPRE"])
+        """Length of a bit as master in Tcy."""
+        return int(bit_time(self.bus.integers, self._places))
 
     # -- transfers ---------------------------------------------------------------------------------------------------
 
-    def _buf_written(self, _old: int, new: int, _lanes: int) -> None:
-        if not self.stat["SPIEN"] or self.stat["SPITBF"]:
-            return  # a word written while TXB is full is lost (§12)
-        self._waiting.value = new
-        self.stat["SPITBF"] = 1
-        if self.con["MSTEN"] and not self._busy.value:
-            self.events.set(self._step, self.now + 1)
+    def _push(self, _old: int, new: int, lanes: int) -> None:
+        push(self.bus.integers, self._places, new, lanes)
 
     def _due(self, due: int) -> None:
+        text, places = self.bus.integers, self._places
         if self._busy.value:
-            self._finish(due)
-        if self.con["MSTEN"] and self.stat["SPITBF"] and not self._busy.value:
-            self._begin(due, self.bit_time)
-
-    def _begin(self, cycle: int, bit_time: int) -> None:
-        """TXB moves to the shift register, which is clocked from `cycle` on."""
-        if self.stat["SPITBF"]:
-            self._shift.value = self._waiting.value & (1 << self.word_bits) - 1
-            self.stat["SPITBF"] = 0
-        self._busy.value = 1
-        self._start.value = cycle
-        self._bit.value = bit_time
-        self.events.set(self._step, cycle + self.word_bits * bit_time)
-
-    def _finish(self, due: int) -> None:
-        bits = self.word_bits
-        out = self._shift.value
-        if not self.con["MSTEN"]:
-            word = self._reply.value
-            if self.on_slave_word is not None:
-                self.on_slave_word(out, due)
-        elif self.exchange is not None:
-            word = self.exchange(out, bits)
-        else:  # nobody there: the level of SDI in every bit
-            port, pin = self._pins["sdi"]
-            word = 0xFFFF if self.kit.pins.level[port] & pin else 0
-        word &= (1 << bits) - 1
-        self._shift.value = word
-        self._busy.value = 0
-        if self.stat["SPIROV"]:
-            return
-        if self.stat["SPIRBF"]:
-            self.stat["SPIROV"] = 1
-        else:
-            self._received.value = word
-            self.stat["SPIRBF"] = 1
-        self._line.request()
-
-    def _buf_read(self) -> int:
-        self.stat["SPIRBF"] = 0
-        return self._received.value
+            out = self._shift.value
+            if not self.con["MSTEN"]:
+                word = self._reply.value
+                if self.on_slave_word is not None:
+                    self.on_slave_word(out, due)
+            else:
+                word = int(open_end(text, places)) if self.exchange is None else self.exchange(out, self.word_bits)
+            finish(text, places, word)
+        if waits_to_begin(text, places):
+            begin(text, places, due, self.bit_time)
 
     def clock_word(self, word: int, bit_tcy: int = 16) -> bool:
         """An outside master clocks one word through this module, starting now. False if it is not listening."""
@@ -122,7 +132,7 @@ class Spi(Peripheral):
         if not self.stat["SPIEN"] or self.con["MSTEN"] or self._busy.value or self.is_frozen or not selected:
             return False
         self._reply.value = word
-        self._begin(self.now + 1, bit_tcy)
+        begin(self.bus.integers, self._places, self.now + 1, bit_tcy)
         return True
 
     # -- pins --------------------------------------------------------------------------------------------------------
@@ -167,6 +177,7 @@ class Spi(Peripheral):
 
     def restored(self) -> None:
         """SCK (as master) and SDO carry the waveform while the module is on."""
+        self._answered.value = self._exchange is not None
         port = self._pins["sck"][0]
         self.kit.pins.detach(port, self)
         mask = self._pins["sck"][1] if self.con["MSTEN"] else 0

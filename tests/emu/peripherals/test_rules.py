@@ -11,7 +11,7 @@ from emu.straight import Integers, Place, Rule
 from .conftest import Rig
 from .test_fuzz import WORDS, act
 
-RULED = ("TMR", "PR", "LAT", "PORT", "ADC", "U1", "U2")
+RULED = ("TMR", "PR", "LAT", "PORT", "ADC", "U1", "U2", "SPI")
 
 
 def test_every_device_with_rules_has_them_on_the_bus(rig: Rig) -> None:

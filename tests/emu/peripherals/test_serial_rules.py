@@ -43,6 +43,32 @@ UART = """
 """
 """What comes is added up; the sum is sent, whether there is room or not. Some characters are taken by pointer."""
 
+SPI = """
+    mov #{con}, w0
+    mov w0, {SPI1CON}
+    bset {SPI1STAT}, #15
+    mov #{BUF}, w8
+    mov #3, w3
+    loop: mov w2, {SPI1BUF}
+    inc w2, w2
+    wait: btsc w2, #0
+    bra read
+    btss {SPI1STAT}, #0
+    bra wait
+    read: mov {SPI1BUF}, w1
+    xor w1, w2, w2
+    dec w3, w3
+    bra nz, loop
+    mov #{pause}, w3
+    inc {SPI1BUF}
+    mov [w8], w4
+    mov.b w4, [w8]
+    btsc {SPI1STAT}, #6
+    bclr {SPI1STAT}, #6
+    bra loop
+"""
+"""Words are sent, every second one without waiting for the one before; one instruction reads and writes the buffer."""
+
 
 def machine(engine: str, text: str, **settings: object) -> Rig:
     rig = Rig(text.format(**A, **settings), engine)
@@ -80,6 +106,28 @@ def test_engines_agree_on_a_uart_that_sends_and_receives(seed: int) -> None:
     }
     told = [history(machine(engine, UART, **settings), seed, True) for engine in ("plain", "interp", "jit")]
     assert len(told[0][-1]) > 5
+    assert told[1] == told[0]
+    assert told[2] == told[0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_engines_agree_on_an_spi_master(seed: int) -> None:
+    """Every clock, 8 and 16 bits, both buffers full; SDI moves, and for a while a device is asked for its words."""
+    draw = random.Random(f"spi {seed}")
+    settings = {
+        "con": 0x20 | draw.randrange(0x20) | draw.choice((1, 2, 3)) | draw.choice((0, 0x400, 0x400)),
+        "pause": draw.choice((2, 5, 30)),
+        "BUF": int(A["SPI1BUF"], 16),
+    }
+    told = []
+    for engine in ("plain", "interp", "jit"):
+        rig, states, outside = machine(engine, SPI, **settings), [], random.Random(seed)
+        for turn in range(12):
+            rig.machine.pins.set("RF7", outside.randrange(2))
+            rig.machine.peripherals.spi[1].exchange = (lambda word, _bits: word * 3) if turn in (4, 5) else None
+            rig.machine.run(cycles=outside.randrange(1, 3000))
+            states.append(rig.machine.snapshot())
+        told.append(states)
     assert told[1] == told[0]
     assert told[2] == told[0]
 
