@@ -127,13 +127,15 @@ class LlvmWays(Ways):
 class BoundaryReader(LlvmReader):
     """What happens between two instructions, in the function of `service.py`; it is done as it is read."""
 
-    def __init__(self, core: Core, e: Emitter, now: Number, otherwise: str) -> None:
-        """`otherwise`: label of the block that hands over to Python."""
+    def __init__(
+        self, core: Core, e: Emitter, now: Number, otherwise: str, tables: dict[tuple[int, ...], str] | None = None
+    ) -> None:
+        """`otherwise`: label of the block that hands over to Python; `tables`: of a reader of the same module."""
         super().__init__(e)
         self.now: Final = now
         self._core: Final = core
         self._otherwise: Final = otherwise
-        self._tables: Final[dict[tuple[int, ...], str]] = {}
+        self.tables: Final[dict[tuple[int, ...], str]] = tables if tables is not None else {}
         self.posted: Final[set[Slot]] = set()
         """Slots that were posted."""
 
@@ -170,7 +172,7 @@ class BoundaryReader(LlvmReader):
 
     def table(self, values: tuple[int, ...], index: Number) -> Value:
         """Load from a constant."""
-        name = self._tables.setdefault(values, f"@table{len(self._tables)}")
+        name = self.tables.setdefault(values, f"@table{len(self.tables)}")
         place = self.e.name()
         self.e.line(f"{place} = getelementptr [{len(values)} x i64], ptr {name}, i64 0, i64 {wide(index)}")
         return self.e.let(f"load i64, ptr {place}")
@@ -190,7 +192,7 @@ class BoundaryReader(LlvmReader):
         """IR of the tables used so far."""
         return "\n".join(
             f"{name} = private unnamed_addr constant [{len(values)} x i64] [{', '.join(f'i64 {v}' for v in values)}]"
-            for values, name in self._tables.items())  # fmt: skip
+            for values, name in self.tables.items())  # fmt: skip
 
     def either(
         self, condition: Number, costly: Callable[[], tuple[Number, ...]], *others: Number

@@ -11,7 +11,9 @@ from emu.dspic30f.core import Core
 from emu.dspic30f.jit.counting import BoundaryCount
 from emu.dspic30f.jit.pointed import POINTED
 from emu.dspic30f.jit.service import DONE, service_text
-from emu.dspic30f.jit.surroundings import DEADLINE, MISS, NEXT, RETFIE, SERVICE
+from emu.dspic30f.jit.surroundings import ARRIVE, DEADLINE, INTERPRET, MISS, NEXT, RETFIE, SERVICE
+from emu.dspic30f.jit.translate import ARRIVED
+from emu.events import NEVER
 
 LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
@@ -32,6 +34,8 @@ first:
   %repeat_place = getelementptr i8, ptr %rec, i64 {repeat}
   %blocks_place = getelementptr i64, ptr %env, i64 {blocks}
   %steps_place = getelementptr i64, ptr %env, i64 {steps}
+  %arrived_place = getelementptr i64, ptr %env, i64 {arrived}
+  store i64 {never}, ptr %arrived_place
   %blocks = load ptr, ptr %blocks_place
   %steps = load ptr, ptr %steps_place
   %begin_place = getelementptr i64, ptr %env, i64 {begin}
@@ -74,7 +78,25 @@ step:
   %why2 = call i64 %code2(ptr %rec, ptr %env)
   switch i64 %why2, label %back2 [ i64 {next}, label %loop
                                    i64 {service}, label %serve
+                                   i64 {arrive}, label %arrive
                                    i64 {retfie}, label %returned ]
+arrive:
+  %upto = load i64, ptr %arrived_place
+  %due6 = call i64 @fire(ptr %rec, i64 %upto)
+  %refused6 = icmp eq i64 %due6, 0
+  br i1 %refused6, label %unarrived, label %arrived
+unarrived:
+  ret i64 {interpret}
+arrived:
+  %deadline_place = getelementptr i8, ptr %rec, i64 {deadline_at}
+  %deadline6 = load i64, ptr %deadline_place
+  %kicked = icmp eq i64 %deadline6, 0
+  %settled6 = select i1 %kicked, i64 0, i64 %due6
+  store i64 %settled6, ptr %deadline_place
+  %cycle_place6 = getelementptr i8, ptr %rec, i64 {cycle}
+  %cycle6 = load i64, ptr %cycle_place6
+  store i64 %cycle6, ptr %arrived_place
+  br label %again
 returned:
   %limit3 = load i64, ptr %env
   %entered3 = getelementptr i64, ptr %env, i64 {entered}
@@ -154,6 +176,11 @@ def dispatch_text(core: Core, flash_end: int, counts: BoundaryCount | None = Non
         steps=STEPS,
         entered=ENTERED,
         begin=BOUNDARY,
+        arrived=ARRIVED,
+        never=NEVER,
+        arrive=ARRIVE,
+        interpret=INTERPRET,
+        deadline_at=core.record.fields["events.deadline"].offset,
         next=NEXT,
         retfie=RETFIE,
         deadline=DEADLINE,

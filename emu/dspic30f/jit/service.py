@@ -38,11 +38,24 @@ PLACES: Final = {"cycle": "cpu.cycle", "deadline": "events.deadline", "hold": "c
 
 def service_text(core: Core, counts: BoundaryCount) -> str:
     """IR of `i64 @service(ptr %rec, i64 %limit, ptr %entered)`."""
-    e = Emitter()
-    m = BoundaryReader(core, e, Value(e, "%least1", False), "python")
-    _fire(core, m)
-    _accept(core, m, counts)
-    return "\n".join([DECLARED, m.constants(), _head(core, counts), _events(core), e.text(), "}"])
+    fired, accepted = Emitter(), Emitter()
+    events = BoundaryReader(core, fired, Value(fired, "%least1", False), "python")
+    _fire(core, events)
+    entering = BoundaryReader(core, accepted, Value(accepted, "%first.due", False), "python", events.tables)
+    _accept(core, entering, counts)
+    fire = "\n".join([_events(core), fired.text(), "}"])
+    service = "\n".join([_head(core, counts), _SETTLE, accepted.text(), "}"])
+    return "\n".join([DECLARED, events.constants(), fire, service])
+
+
+_SETTLE: Final = """fire:
+  %first.due = call i64 @fire(ptr %rec, i64 %last)
+  %refused.one = icmp eq i64 %first.due, 0
+  br i1 %refused.one, label %python, label %settled
+settled:
+  store i64 %first.due, ptr %p.deadline
+  br label %accept"""
+"""What is due at the boundary, before somebody is accepted."""
 
 
 def _head(core: Core, counts: BoundaryCount) -> str:
@@ -109,7 +122,9 @@ jump:
 
 
 def _events(core: Core) -> str:
-    """The earliest due cycle: behind `%last` the events are `settled`, else its first slot fires."""
+    """IR of `i64 @fire(ptr %rec, i64 %last)`: the events due up to cycle `%last`, in order of (due, slot). The earliest
+    due cycle behind it, or 0 if Python must go on; the deadline is the caller's."""
+    due = core.record.fields[PLACES["due"]].offset
     lanes, groups = f"<{LANES} x i64>", range(-(-len(core.events.names) // LANES))
     looked, hits, least = [], [], "%dues0"
     for g in groups:  # slots behind the last one are never due
@@ -128,14 +143,19 @@ def _events(core: Core) -> str:
             f"  %hits{g} = or i128 %placed{g}, {f'%hits{g - 1}' if g else 0}",
         ]
     newline = "\n"
-    return f"""fire:
+    return f"""define internal i64 @fire(ptr noalias %rec, i64 %last) {{
+first:
+  %p.due = getelementptr i8, ptr %rec, i64 {due}
+  br label %fire
+python:
+  ret i64 0
+fire:
 {newline.join(looked)}
   %least1 = call i64 @llvm.vector.reduce.umin.v{LANES}i64({lanes} {least})
   %later = icmp ugt i64 %least1, %last
   br i1 %later, label %settled, label %choose
 settled:
-  store i64 %least1, ptr %p.deadline
-  br label %accept
+  ret i64 %least1
 choose:
   %least.0 = insertelement {lanes} poison, i64 %least1, i64 0
   %least.all = shufflevector {lanes} %least.0, {lanes} poison, <{LANES} x i32> zeroinitializer

@@ -14,10 +14,10 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.modes import REGISTERS, Key
 from emu.straight import Rule
 
-NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK, MODES = range(8)
+NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK, MODES, ARRIVE = range(9)
 """Why native code came back: go on at PC; interpret the instruction at PC; the block at PC reaches the deadline;
 look at events and interrupts before PC; no native code at PC; a RETFIE has run for two cycles;
-PC is hooked; the processor modes are others at PC."""
+PC is hooked; the processor modes are others at PC; events are due before the access of the instruction at PC."""
 
 Access = Literal["plain", "slow", "irq", "flags", "sr"]
 """How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from emu.dspic30f import flowrules
+from emu.dspic30f.data import W_END
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Flow, Goto, Repeat, Return, Skip, Sleep
 from emu.dspic30f.jit.builder import LlvmBuilder, NeedsInterpreter
@@ -21,7 +22,18 @@ from emu.dspic30f.jit.polling import empty_loops
 from emu.dspic30f.jit.reader import LlvmWays, NativeReader
 from emu.dspic30f.jit.region import Region, Step
 from emu.dspic30f.jit.repeat import Repeats
-from emu.dspic30f.jit.surroundings import DEADLINE, HOOK, INTERPRET, MISS, MODES, NEXT, RETFIE, SERVICE, Surroundings
+from emu.dspic30f.jit.surroundings import (
+    ARRIVE,
+    DEADLINE,
+    HOOK,
+    INTERPRET,
+    MISS,
+    MODES,
+    NEXT,
+    RETFIE,
+    SERVICE,
+    Surroundings,
+)
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.jit.variables import MemoryVariables, Variables, pointer
 from emu.dspic30f.state import IDLE, IPL3, NOT_REPEATING, PC_MASK
@@ -31,6 +43,9 @@ from emu.straight import Rule
 RESUME: Final = 5
 """Word of the environment: the hooked address Python has just seen, or"""
 NOWHERE: Final = -1
+ARRIVED: Final = 10
+"""Word of the environment: cycle in which an instruction begins before whose access all events have happened; on the
+way there (`ARRIVE`) the cycle of the access."""
 PROLOGUE: Final = """declare i16 @llvm.fshl.i16(i16, i16, i16)
 declare i16 @llvm.ctlz.i16(i16, i1)
 declare i16 @llvm.cttz.i16(i16, i1)
@@ -194,6 +209,8 @@ class Translator:
         v.new_block()
         if self.exact:
             fits = e.let(f"icmp ult i64 {wide(v.get('cycle'))}, %stop", bit=True)
+            arrived = self._arrived(parts[0].step)
+            fits = fits | arrived if isinstance(arrived, Value) else fits
         else:
             fits = self.fits(self._cost(parts))
         go = e.fresh("go")
@@ -217,6 +234,31 @@ class Translator:
             if ended:
                 return
         self.jump(part.next_pc)
+
+    def _arrived(self, step: Step) -> Number:
+        """Truth of "what is due before the access of this instruction has happened". It is asked for those that read a
+        register by address, in one cycle: waiting for a flag hits the cycle of its event often."""
+        if step.insn.row.cycles != 1 or step.facts.flow not in (None, Skip) or step.pc in self.around.hooks:
+            return 0
+        if not any(W_END <= address < self.around.ram[0] for address in step.facts.reads):
+            return 0
+        return self.e.load(self._arrival(), 64) == self.v.get("cycle")
+
+    def _arrival(self) -> str:
+        place = self.e.name()
+        self.e.line(f"{place} = getelementptr i64, ptr %env, i64 {ARRIVED}")
+        return place
+
+    def _arrive(self, step: Step, in_time: Value) -> None:
+        """Leave unless `in_time`, to have happen what is due before the access."""
+        e, b = self.e, self.b
+        ready, late = e.fresh("ready"), e.fresh("late")
+        e.end(f"br i1 {in_time.text}, label %{ready}, label %{late}, !prof !0")
+        e.start(late)
+        b.before_slow()
+        e.store(self._arrival(), b.now, 64)
+        self.v.leave(step.pc, ARRIVE)
+        e.start(ready)
 
     def _stop_for_hook(self, pc: int) -> None:
         """Python is to see that `pc` is reached, unless it has just done so."""
@@ -266,7 +308,11 @@ class Translator:
         if isinstance(flow, Skip) and step.target is None:
             raise NeedsInterpreter
         if self.exact and b.pending.touches_sfr:  # an event up to the access would matter
-            b.guard(self.fits(row.cycles + stall))
+            fits, arrived = self.fits(row.cycles + stall), self._arrived(step)
+            if isinstance(arrived, Value):
+                self._arrive(step, fits | arrived)
+            else:
+                b.guard(fits)
         b.commit()
         cycles: Number = row.cycles + stall
         if b.pending.psv:

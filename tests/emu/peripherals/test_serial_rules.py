@@ -149,3 +149,26 @@ def test_who_is_lazy_hears_what_the_others_hear() -> None:
     rig.machine.run(cycles=20_000)
     assert len(lazy) > first + len(prompt) + 40
     assert all(later[1] - earlier[1] == 320 for earlier, later in pairwise(lazy))
+
+
+POLL = """
+    mov #0x53E, w0
+    mov w0, {SPI1CON}
+    bset {SPI1STAT}, #15
+    loop: mov w2, {SPI1BUF}
+    wait: btss {SPI1STAT}, #0
+    bra wait
+    mov {SPI1BUF}, w1
+    inc w2, w2
+    bra loop
+"""
+
+
+def test_a_poll_that_hits_the_cycle_of_its_event_stays_native() -> None:
+    """Words of 64 Tcy end in cycles in which SPIRBF is read."""
+    rig = machine("jit", POLL)
+    rig.machine.run(cycles=100_000)
+    before = rig.machine.runner.counts.interpreted
+    rig.machine.run(cycles=100_000)
+    assert rig.machine.w[2] > 2_000
+    assert rig.machine.runner.counts.interpreted == before
