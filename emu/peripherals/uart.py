@@ -24,6 +24,7 @@ from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR, PATIE
 from emu.peripherals.txpin import TxPin
 from emu.peripherals.uartframe import first_stop, has_parity, length, pack, sample, stops
 from emu.peripherals.uartrules import (
+    CHARACTER,
     COMING,
     FIFO,
     QUIET,
@@ -64,7 +65,7 @@ class Uart(Peripheral):
         self.mode.written_by(self._mode_written)
         self.sta.written_by(self._sta_written)
         self.txreg.computed(lambda: 0)
-        self.rxreg.computed(lambda: self._rx[0])
+        self.rxreg.computed(lambda: self._rx[0] & CHARACTER)
         self.brg.written_by(self._brg_written)
         self._ear: Ear | None = None
         self._at_once: Final = self.cell("at_once", "B")

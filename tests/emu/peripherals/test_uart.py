@@ -376,3 +376,13 @@ def test_snapshot_in_the_middle_of_a_frame_continues_identically(rig):
     rig.dev.restored()
     rig.at(9000)
     assert (sent, rig.record.snapshot()) == first
+
+
+def test_whoever_looks_at_a_character_with_errors_sees_its_data(rig: Rig) -> None:
+    """FERR is in UxSTA, not in UxRXREG; looking takes nothing out of the FIFO."""
+    enable(rig)
+    rig.dev.uart[1].feed(b"A", 100, errors=FRAMING_ERROR)
+    rig.at(3000)
+    assert rig.peek("U1RXREG") == 0x41
+    assert rig.field("U1STA", "FERR") == 1
+    assert rig.read("U1RXREG") == 0x41
