@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 
 from . import layout
-from .liveness import bits, live_out
+from .liveness import bits, live_out, summary
 from .mir import CC_INVERSE, MI, File, Imm, MBlock, Mem, MFunction, covered
 from .peephole import ALL, AT_RETURN
 
@@ -126,9 +126,8 @@ def _is_neutral(mi: MI) -> bool:
 def live_in(block: MBlock, live: int) -> int:
     """Registers live at the start of a block, from those live at its end. Moving copies up an edge leaves them as they
     are for every block but the emptied one, so one analysis serves the whole pass."""
-    for mi in reversed(block.insts):
-        live = live & ~bits(mi.defs()) | bits(mi.uses())
-    return live
+    reads, kill = summary(block)
+    return reads | live & ~kill
 
 
 def thread_constants(m: MFunction) -> None:

@@ -50,16 +50,19 @@ def _follow(mi: MI, facts: Facts) -> None:
     value: int | Known | None = _constant(mi)
     if isinstance(copied, int) and copied < SP:
         value = facts.get(copied, copied)
-    for d in mi.defs():
-        _forget(d, facts)
+    if facts:
+        _forget(mi.register_sets()[1], facts)
     dest = mi.args[-1] if mi.args else None
     if value is not None and isinstance(dest, int) and dest < SP and value != dest:
         facts[dest] = value
 
 
-def _forget(d: int, facts: Facts) -> None:
-    facts.pop(d, None)
-    gone = [r for r, v in facts.items() if v == d or (d == SP and isinstance(v, tuple) and v[0] != "k")]
+def _forget(written: int, facts: Facts) -> None:
+    moved = written >> SP & 1  # addresses in the frame are relative to it
+    gone = [
+        r for r, v in facts.items()
+        if written >> r & 1 or (written >> v & 1 if isinstance(v, int) else moved and v[0] != "k")
+    ]  # fmt: skip
     for r in gone:
         del facts[r]
 

@@ -30,12 +30,22 @@ def live_out(m: MFunction, at_return: int = 0) -> dict[str, int]:
     gen: dict[str, int] = {}
     kill: dict[str, int] = {}
     for b in m.blocks:
-        g = k = 0
-        for mi in reversed(b.insts):
-            d, u = bits(mi.defs()), bits(mi.uses())
-            g = g & ~d | u
-            k |= d
-        gen[b.name], kill[b.name] = g, k
+        gen[b.name], kill[b.name] = summary(b)
+    return solve(m, gen, kill, at_return)
+
+
+def summary(b: MBlock) -> tuple[int, int]:
+    """Registers a block reads before it writes them, and registers it writes."""
+    g = k = 0
+    for mi in reversed(b.insts):
+        u, d = mi.register_sets()
+        g = g & ~d | u
+        k |= d
+    return g, k
+
+
+def solve(m: MFunction, gen: dict[str, int], kill: dict[str, int], at_return: int = 0) -> dict[str, int]:
+    """`live_out` from the summaries of all blocks."""
     live_in: dict[str, int] = dict.fromkeys(gen, 0)
     out: dict[str, int] = dict.fromkeys(gen, 0)
     preds: dict[str, list[str]] = {b.name: [] for b in m.blocks}
@@ -77,15 +87,16 @@ def drop_dead(b: MBlock, live: int) -> bool:
     kept: list[MI] = []
     flags: set[str] = set()
     for mi in reversed(b.insts):
-        d, writes = bits(mi.defs()), set(mi.flags_written())
+        u, d = mi.register_sets()
+        writes = mi.flags_written_set()
         if (d or writes) and not d & (live | SP_BIT) and not flags & writes and not mi.effect():
             continue
         if mi.op == "skip" and not (kept and kept[-1].pred):
             continue
         if not mi.pred:
             flags -= writes
-        flags |= set(mi.flags_read())
-        live = live & ~d | bits(mi.uses())
+        flags.update(mi.flags_read())
+        live = live & ~d | u
         kept.append(mi)
     kept.reverse()
     changed = len(kept) != len(b.insts)

@@ -63,7 +63,7 @@ class File:
 
 
 Operand = int | Imm | Mem | Slot | File | str
-MEMORY = Mem | Slot | File
+MEMORY = (Mem, Slot, File)
 STEPPING = ("++", "--", "+", "-")
 
 
@@ -72,7 +72,7 @@ class OpInfo:
     register stands for both once registers are real); flags written and read; words; memory read ("r") and written
     ("w") other than by operands; `fixed`: does more than write registers, flags and memory, so it stays where it is."""
 
-    __slots__ = ("fixed", "memory", "reads", "roles", "words", "writes")
+    __slots__ = ("fixed", "flags", "memory", "reads", "roles", "ways", "words", "writes")
 
     def __init__(
         self, roles: str, writes: str = "", reads: str = "", words: int = 1, memory: str = "", fixed: bool = False
@@ -83,6 +83,20 @@ class OpInfo:
         self.words = words
         self.memory = memory
         self.fixed = fixed
+        self.flags = frozenset(writes)
+        self.ways = tuple(WAYS[role] for role in roles)
+
+
+# Role -> whether a register operand is read, written, whether a conditional write also reads, and real registers of it.
+WAYS = {
+    "n": (False, False, False, 1),
+    "s": (True, False, False, 1),
+    "d": (False, True, True, 1),
+    "b": (True, True, False, 1),
+    "S": (True, False, False, 3),
+    "D": (False, True, False, 3),
+    "B": (True, True, False, 3),
+}
 
 
 def opaque(roles: str, writes: str = "", words: int = 1) -> OpInfo:
@@ -175,6 +189,7 @@ OPS: dict[str, OpInfo] = {
 
 SKIPS = {"skip", "cpseq", "cpsne", "cpslt", "cpsgt", "btsc", "btss", "btscf", "btssf"}
 READS_FLAGS = {"bra", "skip"}
+NZ = frozenset("zn")
 CC_FLAGS = {
     "z": "z", "nz": "z", "c": "c", "nc": "c", "n": "n", "nn": "n", "lt": "nv", "ge": "nv", "gt": "znv", "le": "znv",
     "gtu": "cz", "leu": "cz", "ov": "v", "nov": "v",
@@ -260,6 +275,31 @@ class MI:
                 out.append(a.base)
         return out
 
+    def register_sets(self) -> tuple[int, int]:
+        """Registers read and registers written, each a set as `liveness` has them (bit n for register n)."""
+        used = defined = 0
+        if self.also_uses:
+            for r in self.also_uses:
+                used |= 1 << r
+        if self.also_defs:
+            for r in self.also_defs:
+                defined |= 1 << r
+        for a, (reads, writes, partly, real) in zip(self.args, self.info.ways, strict=False):
+            if isinstance(a, int):
+                if reads or writes:
+                    bit = (real if a < FIRST_VIRTUAL else 1) << a
+                    if reads or (partly and self.pred):
+                        used |= bit
+                    if writes:
+                        defined |= bit
+            elif isinstance(a, Mem):
+                used |= 1 << a.base
+                if a.mode == "idx":
+                    used |= 1 << a.off
+                elif a.mode in STEPPING:
+                    defined |= 1 << a.base
+        return used, defined
+
     def map_registers(self, rename: dict[int, int]) -> None:
         """Replace registers, in place."""
         for k, a in enumerate(self.args):
@@ -328,6 +368,10 @@ class MI:
         if self.op == "mov" and self.byte and isinstance(self.args[0], File):
             return "zn"
         return self.info.writes
+
+    def flags_written_set(self) -> frozenset[str]:
+        """The same as a set."""
+        return NZ if self.op == "mov" and self.byte and isinstance(self.args[0], File) else self.info.flags
 
     def __repr__(self) -> str:
         cc = f".{self.cc}" if self.cc else ""

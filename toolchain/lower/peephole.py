@@ -149,7 +149,8 @@ def compare_in_place(b: MBlock, live: int) -> bool:
                     b.insts[k - 1 : k + 1] = [new]
                     changed = True
                     return changed
-        live = live & ~bits(mi.defs()) | bits(mi.uses())
+        used, written = mi.register_sets()
+        live = live & ~written | used
     return changed
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .bindings import Position
-from .liveness import bits, live_out
+from .liveness import live_out
 from .mir import GONE, MI, Located, MFunction
 
 Values = dict[int, int]
@@ -32,7 +32,8 @@ def claim(m: MFunction, rename: Mapping[int, int], group: Mapping[int, int]) -> 
         live = out[b.name]
         for mi in reversed(b.insts):
             mi.holds = {rename[r]: group[r] for r in mi.defs() if r in rename and r not in m.pairs}
-            live = live & ~bits(mi.defs()) | bits(mi.uses())
+            used, written = mi.register_sets()
+            live = live & ~written | used
             if isinstance(mi.line, Position):
                 here = [known[k] for k in mi.line.records if k in known]
                 claims = [(v, tuple(r if w < 0 or w >= GONE or live >> w & 1 else GONE

@@ -11,6 +11,7 @@ from tests.toolchain.lower.compiled import llvm
 from toolchain import pipeline
 from toolchain.ir.read import read_module
 from toolchain.lower import regalloc
+from toolchain.lower.liveness import summary
 from toolchain.lower.mir import MI, File, Imm, MBlock, Mem, MFunction
 from toolchain.lower.verify import MachineError
 from toolchain.lower.verify.registers import undefined_at_entry
@@ -117,7 +118,9 @@ def _lost_flags(m: MFunction) -> bool:
 
 
 def _undefined(m: MFunction) -> bool:
-    free = next(r for r in range(7, 0, -1) if not undefined_at_entry(m) >> r & 1)
+    reads, kill = ({b.name: summary(b)[k] for b in m.blocks} for k in (0, 1))
+    undefined = undefined_at_entry(m, reads, kill)
+    free = next(r for r in range(7, 0, -1) if not undefined >> r & 1)
     m.blocks[0].insts.insert(0, MI("mov", free, Mem("off", 15, -60)))
     return True
 

@@ -6,15 +6,42 @@ for one value. What was never written may be anywhere. Sets are bit masks over v
 
 from __future__ import annotations
 
-from ..mir import FIRST_VIRTUAL, MBlock, MFunction
+from ..mir import FIRST_VIRTUAL, MI, MFunction
 from .error import fail
 
 State = tuple[list[int], int]  # contents of W0-W15, registers possibly written
 
 
+class Step:
+    """One instruction as it moves values between registers."""
+
+    __slots__ = ("mi", "names", "source", "uses", "wiped", "written")
+
+    def __init__(self, m: MFunction, mi: MI, colour: dict[int, int]) -> None:
+        self.mi = mi
+        self.uses = [(r, colour[r]) for r in mi.uses() if r >= FIRST_VIRTUAL]
+        source = mi.args[0] if mi.is_copy() else None
+        self.source = -1  # the real register it copies
+        if isinstance(source, int):
+            self.source = colour[source] if source >= FIRST_VIRTUAL else source
+        self.wiped: list[int] = []
+        self.written: list[tuple[int, int]] = []  # real register, and the name it gets
+        self.names = 0  # virtual registers whose old values are no longer meant
+        for r in mi.defs():
+            if r < FIRST_VIRTUAL:
+                self.wiped.append(r)
+                self.written.append((r, 0))
+                continue
+            self.names |= 1 << r
+            places = [colour[r], colour[r] + 1] if r in m.pairs else [colour[r]]
+            self.wiped += places
+            self.written += [(k, 1 << r) for k in places]
+
+
 def check(m: MFunction, colour: dict[int, int]) -> None:
     """`m` still has virtual registers; `colour` is the real register of each (of a pair, the lower one)."""
-    blocks = m.block_map()
+    steps = {b.name: [Step(m, mi, colour) for mi in b.insts] for b in m.blocks}
+    succs = {b.name: b.succs for b in m.blocks}
     starts: dict[str, State] = {m.blocks[0].name: ([0] * 16, 0)}
     for b in m.blocks:
         if b.address_taken:
@@ -22,15 +49,15 @@ def check(m: MFunction, colour: dict[int, int]) -> None:
     work = list(starts)
     while work:
         name = work.pop()
-        state = _through(m, blocks[name], starts[name], colour, False)
-        for s in blocks[name].succs:
+        state = _through(steps[name], starts[name], "")
+        for s in succs[name]:
             old = starts.get(s)
             new = state if old is None else _meet(old, state)
             if new != old:
                 starts[s] = new
                 work.append(s)
     for name, state in starts.items():
-        _through(m, blocks[name], state, colour, True)
+        _through(steps[name], state, name)
 
 
 def _meet(a: State, b: State) -> State:
@@ -38,42 +65,20 @@ def _meet(a: State, b: State) -> State:
     return held, a[1] | b[1]
 
 
-def _through(m: MFunction, b: MBlock, state: State, colour: dict[int, int], checking: bool) -> State:
+def _through(steps: list[Step], state: State, checked: str) -> State:
+    """The state behind a block; `checked` is its name when its uses are checked."""
     held, written = list(state[0]), state[1]
-    for mi in b.insts:
-        if checking:
-            for r in mi.uses():
-                if r >= FIRST_VIRTUAL and written >> r & 1 and not held[colour[r]] >> r & 1:
-                    fail(f"W{colour[r]} does not hold v{r}", b.name, mi)
-        source = mi.args[0] if mi.is_copy() else None
-        value = 0
-        if isinstance(source, int):
-            value = held[colour[source] if source >= FIRST_VIRTUAL else source]
-        defs = mi.defs()
-        _clear(m, defs, held, colour)
-        for r in defs:
-            if r >= FIRST_VIRTUAL:
-                written |= 1 << r
-                for k in _places(m, r, colour):
-                    held[k] = value | 1 << r if k == colour[r] or r in m.pairs else 0
-            else:
-                held[r] = value
-    return held, written
-
-
-def _clear(m: MFunction, defs: list[int], held: list[int], colour: dict[int, int]) -> None:
-    """Forget what is overwritten, and the old values of the names that get new ones."""
-    names = 0
-    for r in defs:
-        if r >= FIRST_VIRTUAL:
-            names |= 1 << r
-        for k in _places(m, r, colour):
+    for step in steps:
+        if checked:
+            for r, k in step.uses:
+                if written >> r & 1 and not held[k] >> r & 1:
+                    fail(f"W{k} does not hold v{r}", checked, step.mi)
+        value = held[step.source] if step.source >= 0 else 0
+        for k in step.wiped:
             held[k] = 0
-    for k in range(16):
-        held[k] &= ~names
-
-
-def _places(m: MFunction, r: int, colour: dict[int, int]) -> list[int]:
-    if r < FIRST_VIRTUAL:
-        return [r]
-    return [colour[r], colour[r] + 1] if r in m.pairs else [colour[r]]
+        if step.names:
+            held = [x & ~step.names for x in held]
+            written |= step.names
+        for k, name in step.written:
+            held[k] = value | name
+    return held, written

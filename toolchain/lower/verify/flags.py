@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from ..mir import CC_INVERSE, READS_FLAGS, MBlock, MFunction
+from ..mir import CC_INVERSE, READS_FLAGS, MBlock
 from .error import MachineError, fail
 
 Source = tuple[str, str, str]  # reader, flag, writer
 LIKE_A_TEST = {"cp", "cp0", "btst"}  # comparisons that another instruction's result may stand for
 
 
-def check(m: MFunction) -> None:
-    """Every flag that is read was written in the same block."""
-    for b in m.blocks:
-        _walk(b)
-
-
-def sources(m: MFunction) -> set[Source]:
-    """Who reads which flag from whom."""
-    return {s for b in m.blocks for s in _walk(b)}
-
-
-def _walk(b: MBlock) -> list[Source]:
+def walk(b: MBlock) -> list[Source]:
+    """Who reads which flag from whom. Raises MachineError for one that was not written in the same block."""
     writer: dict[str, str] = {}
     out: list[Source] = []
     for mi in b.insts:

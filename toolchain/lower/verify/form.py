@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Collection
 
-from ..mir import FIRST_VIRTUAL, MI, SKIPS, File, MBlock, Mem, MFunction, Slot, covered
+from ..mir import FIRST_VIRTUAL, MI, SKIPS, File, MBlock, Mem, MFunction, covered
 from .error import fail
 
 LEAVE = {"bra", "jump", "jumpr", "brtable", "ret", "tailcall"}
@@ -13,14 +14,19 @@ LONG = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s", "di
         "text", "shiftloop", "brtable", "lea", "hold"}  # fmt: skip
 
 
-def check(m: MFunction, allocated: bool) -> None:
-    """All rules of form. `allocated`: registers are real."""
+def check(m: MFunction, allocated: bool, known: Collection[str] = (), same_layout: bool = False) -> None:
+    """All rules of form. `allocated`: registers are real. The instructions of the blocks `known` were checked before,
+    and with `same_layout` stood among the same neighbours and tables."""
     names = [b.name for b in m.blocks]
     if len(set(names)) != len(names):
         fail("two blocks of one name", names[0])
     following = dict(itertools.pairwise(names))
+    present = set(names)
     for b in m.blocks:
-        _ends(b, set(names), following.get(b.name, ""), m)
+        if not (same_layout and b.name in known):
+            _ends(b, present, following.get(b.name, ""), m)
+        if b.name in known:
+            continue
         for k, mi in enumerate(b.insts):
             if mi.op in SKIPS:
                 _skip(b, k)
@@ -60,11 +66,9 @@ def _skip(b: MBlock, k: int) -> None:
 
 def _registers(m: MFunction, b: MBlock, mi: MI, allocated: bool) -> None:
     for role, a in zip(mi.info.roles, mi.args, strict=False):
-        if isinstance(a, Slot | File | Mem):
+        if not isinstance(a, int):
             if isinstance(a, Mem) and allocated and not 0 <= a.base < FIRST_VIRTUAL:
                 fail("a virtual register is left", b.name, mi)
-            continue
-        if not isinstance(a, int):
             continue
         if allocated and a >= FIRST_VIRTUAL:
             fail("a virtual register is left", b.name, mi)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from ...target import CALLEE_SAVED, SP
-from ..liveness import bits, live_out, members
-from ..mir import MI, Mem, MFunction
+from ..liveness import bits, members, solve
+from ..mir import MI, MBlock, Mem, MFunction
 from .error import MachineError
 
 KEPT = bits(list(CALLEE_SAVED))
 
 
-def undefined_at_entry(m: MFunction) -> int:
-    """Registers somebody may read before the function has written them: arguments, and values C leaves undefined."""
-    live = live_out(m)[m.blocks[0].name]
-    for mi in reversed(m.blocks[0].insts):
-        live = live & ~bits(mi.defs()) | bits(mi.uses())
-    return live & ~(1 << SP)
+def undefined_at_entry(m: MFunction, reads: dict[str, int], kill: dict[str, int]) -> int:
+    """Registers somebody may read before the function has written them: arguments, and values C leaves undefined.
+
+    `reads` and `kill` are the blocks' summaries (`liveness.summary`).
+    """
+    first = m.blocks[0].name
+    return (reads[first] | solve(m, reads, kill)[first] & ~kill[first]) & ~(1 << SP)
 
 
 def compare(before: int, after: int) -> None:
@@ -25,15 +26,22 @@ def compare(before: int, after: int) -> None:
         raise MachineError(f"{names} is read before it is written")
 
 
-def check_saved(m: MFunction) -> None:
-    """Registers that must survive are pushed before they are written. Interrupt functions save what they write."""
-    shadow = bits([0, 1, 2, 3]) if "shadow" in m.interrupt else 0
-    saved, written = shadow, 0
-    for b in m.blocks:
-        for mi in b.insts:
-            saved |= _pushed(mi)
-            if not mi.epilogue:
-                written |= bits(mi.defs())
+def saves(b: MBlock) -> tuple[int, int]:
+    """Registers a block pushes, and those it writes outside of an epilogue."""
+    pushed = written = 0
+    for mi in b.insts:
+        pushed |= _pushed(mi)
+        if not mi.epilogue:
+            written |= mi.register_sets()[1]
+    return pushed, written
+
+
+def check_saved(m: MFunction, pushed: int, written: int) -> None:
+    """Registers that must survive are pushed before they are written. Interrupt functions save what they write.
+
+    `pushed` and `written` are of all blocks together (`saves`).
+    """
+    saved = pushed | (bits([0, 1, 2, 3]) if "shadow" in m.interrupt else 0)
     if m.uses_fp:
         saved |= 1 << 14
     lost = written & ~saved & ~(1 << SP) & (KEPT if not m.interrupt else 0xFFFF)

@@ -9,15 +9,22 @@ from .error import fail
 LINK = 1 << 20  # depth counted from the frame pointer, whatever the dynamic part of the stack does
 
 
-def check(m: MFunction, framed: bool) -> None:
-    """Follow every path. Before frames are built, what a block pushes it takes off again."""
+def check(m: MFunction, framed: bool, changes: dict[str, int | None]) -> None:
+    """Follow every path. Before frames are built, what a block pushes it takes off again.
+
+    `changes` is `plain_change` of every block.
+    """
     first = m.blocks[0].name
     depth = {first: 0} | {b.name: 0 for b in m.blocks if not framed}
     blocks = m.block_map()
     work = [first] if framed else [b.name for b in m.blocks]
     while work:
         name = work.pop()
-        end = _through(blocks[name], depth[name], m)
+        change, end = changes[name], depth[name]
+        if change is None:
+            end = _through(blocks[name], end, m)
+        elif end < LINK:
+            end += change
         if not framed:
             if end:
                 fail(f"{end} bytes stay on the stack", name)
@@ -28,6 +35,17 @@ def check(m: MFunction, framed: bool) -> None:
                 work.append(s)
             elif depth[s] != end and not m.dynamic_stack:
                 fail(f"the stack is {depth[s]} or {end} bytes deep", s)
+
+
+def plain_change(b: MBlock) -> int | None:
+    """Bytes the block adds, None when that depends on the frame pointer or it ends the function."""
+    if any(mi.op in ("ret", "tailcall") or (mi.op == "text" and _is_link(str(mi.args[0]))) for mi in b.insts):
+        return None
+    return sum(map(stack_change, b.insts))
+
+
+def _is_link(text: str) -> bool:
+    return text == "ulnk" or text.startswith("lnk ")
 
 
 def _through(b: MBlock, at: int, m: MFunction) -> int:
@@ -59,8 +77,11 @@ def stack_change(mi: MI) -> int:
         word = str(mi.args[0]).split()[0]
         return {"push": 2, "pop": -2}.get(word, 0)
     size = 4 if mi.op == "movd" else 2
-    steps = {"++": size, "-": -size}
-    return sum(steps.get(a.mode, 0) for a in mi.args if isinstance(a, Mem) and a.base == SP)
+    total = 0
+    for a in mi.args:
+        if isinstance(a, Mem) and a.base == SP:
+            total += size if a.mode == "++" else -size if a.mode == "-" else 0
+    return total
 
 
 def _number(a: object) -> int:

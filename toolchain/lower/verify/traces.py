@@ -6,11 +6,14 @@ Passes that keep the blocks also keep the accesses of each block one by one.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from ...ir.model import Function, Instr
 from ..mir import MEMORY, MI, File, MBlock, MFunction
 from .error import MachineError
 
 Letter = tuple[str, int, str]  # "r", "w" or what else happens; bytes; where, as far as the code says it
+Seen = tuple[list[tuple[Letter, bool]], list[int]]
 State = tuple[str, int]  # block, letters of it already read
 END: Letter = ("return", 0, "")
 MAX_PAIRS = 20_000  # larger products are left alone
@@ -20,6 +23,8 @@ def letters(mi: MI) -> list[Letter]:
     """What one instruction does that can be seen from outside, in order."""
     if mi.op in ("call", "tailcall", "callr", "asm"):
         return [("call" if mi.op != "asm" else "asm", 0, "")]
+    if not any(isinstance(a, MEMORY) and a.volatile for a in mi.args):
+        return []
     out: list[Letter] = []
     for directions, roles in (("r", "sSbB"), ("w", "dDbB")):
         for role, a in zip(mi.info.roles, mi.args, strict=False):
@@ -38,6 +43,17 @@ def accesses(i: Instr) -> list[Letter]:
     return [("w" if stores else "r", 1 if t.bits <= 8 else 2, "")] * max(1, t.bits // 16)
 
 
+def seen_outside(b: MBlock) -> Seen:
+    """Letters of a block, each with whether it is conditional, and the numbers of its volatile accesses."""
+    word: list[tuple[Letter, bool]] = []
+    numbers: list[int] = []
+    for mi in b.insts:
+        made = letters(mi)
+        word += [(letter, mi.pred) for letter in made]
+        numbers += [mi.volatile for letter in made if letter[1]]
+    return word, numbers
+
+
 class Traces:
     """The automaton of one function."""
 
@@ -49,11 +65,14 @@ class Traces:
         self.ends: set[str] = set()
 
     @classmethod
-    def of(cls, m: MFunction) -> Traces:
-        """Of a function in machine form."""
+    def of(cls, m: MFunction, seen: Mapping[str, Seen]) -> Traces:
+        """Of a function in machine form, from `seen_outside` of its blocks."""
         made = cls(m.blocks[0].name)
         for b in m.blocks:
-            made._block(b)
+            made.word[b.name], made.numbers[b.name] = seen[b.name]
+            made.succs[b.name] = list(b.succs)
+            if b.insts and b.insts[-1].op in ("ret", "tailcall"):
+                made.ends.add(b.name)
         return made
 
     @classmethod
@@ -74,13 +93,6 @@ class Traces:
         for name, word in self.word.items():
             made.word[name] = [((kind, size, ""), pred) for (kind, size, _), pred in word if size]
         return made
-
-    def _block(self, b: MBlock) -> None:
-        self.word[b.name] = [(letter, mi.pred) for mi in b.insts for letter in letters(mi)]
-        self.numbers[b.name] = [mi.volatile for mi in b.insts for letter in letters(mi) if letter[1]]
-        self.succs[b.name] = list(b.succs)
-        if b.insts and b.insts[-1].op in ("ret", "tailcall"):
-            self.ends.add(b.name)
 
     def steps(self, states: frozenset[State]) -> dict[Letter, frozenset[State]]:
         """Letter -> states behind it."""
@@ -104,14 +116,14 @@ class Traces:
                     work.append(state)
         return {letter: frozenset(after) for letter, after in out.items()}
 
-    def check(self, m: MFunction, same_blocks: bool) -> None:
-        """Raise MachineError when `m` can do what this automaton cannot."""
-        after = Traces.of(m)
+    def check(self, after: Traces, same_blocks: bool) -> None:
+        """Raise MachineError when `after` can do what this automaton cannot."""
         if same_blocks and {n: sorted(k) for n, k in after.numbers.items()} != {
             n: sorted(k) for n, k in self.numbers.items()
         }:
             raise MachineError("volatile accesses were lost or made")
-        self.includes(after)
+        if (after.first, after.word, after.succs, after.ends) != (self.first, self.word, self.succs, self.ends):
+            self.includes(after)
 
     def includes(self, after: Traces) -> None:
         """Raise MachineError when `after` has a trace that this automaton has not."""
