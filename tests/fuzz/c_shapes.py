@@ -1,5 +1,5 @@
 """Random C programs of the shapes firmware has: large frames, addresses chosen by conditions, locals that escape,
-volatile registers, bit-fields, interrupts, structs by value, near bytes, several files.
+volatile registers, bit-fields, interrupts, structs by value, near bytes, several files, and what `c_features.py` has.
 
 Every program has one meaning on any machine: all arithmetic is cut to named widths, distances and divisors are in
 range, nothing is read before it is written. The same files compile for the host, where `shapes.h` replaces registers
@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import random
 from dataclasses import dataclass, field
+
+from tests.fuzz import c_features
 
 UNSIGNED = ("u8", "u16", "u32")
 SIGNED = ("i8", "i16", "i32")
@@ -58,7 +60,7 @@ typedef int port_pointer;
 #define SET_WIDE_AT(p, v) wide_write(p, v)
 void handler(void);
 #define INTERRUPT() handler()
-#define HANDLER void handler(void)
+#define HANDLER(...) void handler(void)
 #define HANDLED() (void)0
 #else
 typedef unsigned char u8; typedef signed char i8; typedef unsigned u16; typedef int i16; typedef unsigned long u32;
@@ -84,7 +86,7 @@ typedef volatile u16 *port_pointer;
         IFS0bits.T1IF = 1; \\
         __asm__ volatile("nop\\n nop\\n nop\\n nop" ::: "memory"); \\
     } while (0)
-#define HANDLER void __attribute__((interrupt, auto_psv)) _T1Interrupt(void)
+#define HANDLER(...) void __attribute__((__VA_ARGS__)) _T1Interrupt(void)
 #define HANDLED() (IFS0bits.T1IF = 0)
 #endif
 #define APART __attribute__((noinline))
@@ -127,6 +129,8 @@ class Scope:
     structs: list[tuple[str, str]] = field(default_factory=list)
     port: str = ""
     counters: list[str] = field(default_factory=list)
+    quiet: bool = False
+    """In an interrupt function."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +151,7 @@ class Program:
         self.globals: Scope = Scope()
         self.functions: list[Signature] = []
         self.calls_left = 0
+        self.features = c_features.Features(self.rng, self.fresh)
         self.files = self._make()
 
     # -- pieces -------------------------------------------------------------------------------------------------------
@@ -249,8 +254,8 @@ class Program:
         """One statement, perhaps of several lines."""
         kind = self.rng.choices(
             ("scalar", "array", "pointer", "select", "escape", "struct", "field", "port", "interrupt", "if", "loop",
-             "switch", "call", "memory", "mix", "sized"),
-            (14, 12, 8, 8, 6, 8, 10, 14, 4, 8, 6, 3, 8, 4, 6, 2))[0]  # fmt: skip
+             "switch", "call", "memory", "mix", "sized", "feature"),
+            (14, 12, 8, 8, 6, 8, 10, 14, 4, 8, 6, 3, 8, 4, 6, 2, 24))[0]  # fmt: skip
         if kind in ("if", "loop", "switch", "sized") and depth == 0:
             kind = "scalar"
         made: list[str] = getattr(self, f"_{kind}")(s, depth, calls)
@@ -359,7 +364,7 @@ class Program:
 
     def _loop(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
         k = self.fresh("k")
-        inner = Scope(s.scalars, s.arrays, s.pointers, s.structs, s.port, [*s.counters, k])
+        inner = Scope(s.scalars, s.arrays, s.pointers, s.structs, s.port, [*s.counters, k], s.quiet)
         step = self.rng.randrange(2)
         head = f"for (u16 {k} = 0; {k} < {self.rng.randrange(2, 8)}; {k}++) {{"
         if step:
@@ -412,13 +417,21 @@ class Program:
     def _mix(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
         return [f"mix({self.expression('u32', s, 2)});"]
 
+    def _feature(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
+        """Of `c_features.py`; interrupt functions keep away from what is not made to be interrupted by itself."""
+        if s.quiet:
+            return []
+        name = self.fresh("r")
+        lines = self.features.use(lambda t: self.expression(t, s, 1), name)
+        return [f"{{   u32 {name} = 1;", *(f"    {line}" for line in lines), f"    mix({name});", "}"]
+
     def _sized(self, s: Scope, depth: int, calls: list[Signature]) -> list[str]:
         """An array whose length is computed, or room from alloca: W14 holds the frame."""
         if not s.port and not s.pointers:
             return []  # the frames of interrupt functions and of start() stay small
         name, n, k, t = self.fresh("q"), self.fresh("n"), self.fresh("k"), self.pick(("u8", "u16", "i32"))
         room = f"{t} {name}[{n}];" if self.rng.random() < 0.5 else f"{t} *{name} = __builtin_alloca({n} * sizeof({t}));"
-        inner = Scope(s.scalars, s.arrays, s.pointers, s.structs, s.port, s.counters)
+        inner = Scope(s.scalars, s.arrays, s.pointers, s.structs, s.port, s.counters, s.quiet)
         return [
             f"{{   u16 {n} = ({self.expression('u16', s, 1)} & 7) + 1;", f"    {room}",
             f"    for (u16 {k} = 0; {k} < {n}; {k}++) {name}[{k}] = ({t})({k} * 3u);",
@@ -522,13 +535,13 @@ class Program:
         bodies = [self.function(f, self.functions[k + 1 :]) for k, f in enumerate(self.functions)]
         declared += ["void start(void);", "void forget(void);"]
         declared += [f"void keep_{t}({t} *p, u16 n);\nvoid touch_{t}(u16 v);" for t in ("u8", "u16", "i32")]
-        header = "\n".join([HEADER, *structs, *declared, "#endif\n"])
+        header = "\n".join([HEADER, c_features.HEADER, *structs, *self.features.declared, *declared, "#endif\n"])
         include = '#include "shapes.h"\n'
         return {
             "shapes.h": header,
             "one.c": include + "\n".join(bodies[::2]),
             "two.c": include + "\n".join(bodies[1::2]) + self._keepers(),
-            "three.c": MAIN + "\n".join(defined) + "\n" + self._handler() + self._start(),
+            "three.c": MAIN + "\n".join([*defined, *self.features.defined]) + "\n" + self._handler() + self._start(),
         }
 
     def _keepers(self) -> str:
@@ -545,10 +558,12 @@ class Program:
 
     def _handler(self) -> str:
         """The interrupt function: globals and ports."""
-        s = Scope(self.globals.scalars, self.globals.arrays, [], self.globals.structs)
+        s = Scope(self.globals.scalars, self.globals.arrays, [], self.globals.structs, quiet=True)
         body = self.block(s, self.rng.randrange(2, 6), 1, [], "    ")
         body = [line for line in body if "INTERRUPT" not in line]
-        return "HANDLER\n{\n    HANDLED();\n" + "\n".join(body) + "\n}\n"
+        kind = self.pick(("interrupt, auto_psv", "interrupt, no_auto_psv", "interrupt, shadow, auto_psv",
+                          "interrupt(save(spared)), auto_psv"))  # fmt: skip
+        return f"HANDLER({kind})\n{{\n    HANDLED();\n" + "\n".join(body) + "\n}\n"
 
     def _start(self) -> str:
         s = Scope(self.globals.scalars, self.globals.arrays, [], self.globals.structs)

@@ -41,6 +41,8 @@ Shape = tuple[str, str]
 LEVELS = ("-O0", "-O1", "-Os", "-O2")
 SHAPES: tuple[Shape, ...] = tuple((level, alone) for level in LEVELS for alone in ("", "-fno-lto"))
 CYCLES = 15_000_000
+SHORT = 500_000
+"""Tcy for which starting native code does not pay."""
 PLATFORM = "integer size = 2\npointer size = 2\n"
 GENERATOR = [
     *("--max-funcs", "5", "--max-block-depth", "3", "--max-block-size", "3", "--max-expr-complexity", "6"),
@@ -110,7 +112,7 @@ def ours(source: Path, level: str, alone: str, folder: Path) -> tuple[str, str]:
     built = build([source], image, level, *alone.split(), "-w", *flags())
     if built.status != 0:
         return "", f"memory: {built.first_error}" if MEMORY.search(built.messages) else f"build: {built.first_error}"
-    ran = run(image, CYCLES, engine="interp")
+    ran = run(image, CYCLES, engine="interp", native_after=SHORT)
     if ran.status is None:
         return "", ran.why
     return ran.uart.decode("latin-1").strip(), ""

@@ -49,12 +49,18 @@ def build(sources: list[Path], output: Path, *options: str) -> Built:
     return Built(status, said.getvalue())
 
 
-def run(image: Path, cycles: int = 30_000_000, engine: str = "auto") -> Ran:
-    """Run an image for at most `cycles` Tcy."""
+def run(image: Path, cycles: int = 30_000_000, engine: str = "auto", native_after: int | None = None) -> Ran:
+    """Run an image for at most `cycles` Tcy; what is not over after `native_after` of them goes on in native code."""
     machine = emu.load(image, engine=engine)
     said = bytearray()
     machine.uart[1].on_byte = lambda byte, cycle: said.append(byte)
-    stop = machine.run(cycles=cycles)
+    stop = machine.run(cycles=cycles if native_after is None else min(cycles, native_after))
+    if native_after is not None and stop.reason == "limit" and native_after < cycles:
+        state = machine.snapshot()
+        machine = emu.load(image)
+        machine.uart[1].on_byte = lambda byte, cycle: said.append(byte)
+        machine.restore(state)
+        stop = machine.run(cycles=cycles - native_after)
     if stop.reason == "halt":
         return Ran(machine.w[0], "", bytes(said), stop.cycle)
     why = stop.fault.cause if stop.fault is not None else f"{stop.reason} at {stop.pc:#x} {stop.detail}".strip()
