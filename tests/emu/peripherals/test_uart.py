@@ -378,7 +378,7 @@ def test_snapshot_in_the_middle_of_a_frame_continues_identically(rig):
     assert (sent, rig.record.snapshot()) == first
 
 
-def test_whoever_looks_at_a_character_with_errors_sees_its_data(rig: Rig) -> None:
+def test_whoever_looks_at_a_character_with_errors_sees_its_data(rig):
     """FERR is in UxSTA, not in UxRXREG; looking takes nothing out of the FIFO."""
     enable(rig)
     rig.dev.uart[1].feed(b"A", 100, errors=FRAMING_ERROR)
