@@ -145,13 +145,15 @@ class Signature:
 class Program:
     """One program; `files` are its sources by name."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, *, featured: bool = True) -> None:
+        """`featured`: with what `c_features.py` has."""
         self.rng = random.Random(seed)
         self.serial = 0
         self.globals: Scope = Scope()
         self.functions: list[Signature] = []
         self.calls_left = 0
         self.features = c_features.Features(self.rng, self.fresh)
+        self.feature_weight = 24 if featured else 0
         self.files = self._make()
 
     # -- pieces -------------------------------------------------------------------------------------------------------
@@ -255,7 +257,7 @@ class Program:
         kind = self.rng.choices(
             ("scalar", "array", "pointer", "select", "escape", "struct", "field", "port", "interrupt", "if", "loop",
              "switch", "call", "memory", "mix", "sized", "feature"),
-            (14, 12, 8, 8, 6, 8, 10, 14, 4, 8, 6, 3, 8, 4, 6, 2, 24))[0]  # fmt: skip
+            (14, 12, 8, 8, 6, 8, 10, 14, 4, 8, 6, 3, 8, 4, 6, 2, self.feature_weight))[0]  # fmt: skip
         if kind in ("if", "loop", "switch", "sized") and depth == 0:
             kind = "scalar"
         made: list[str] = getattr(self, f"_{kind}")(s, depth, calls)

@@ -1,7 +1,8 @@
 """Random C at every level: nothing runs longer, uses more stack or masks longer than `toolchain.bounds` says.
 
 `python tests/fuzz/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
-a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts.
+a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts; every
+second one has what `c_features.py` has, which often leaves no bound.
 Prints how tight the bounds of `main` are.
 """
 
@@ -89,7 +90,7 @@ def _follow(machine: emu.Machine, main: int, handler: int | None) -> dict[str, S
 def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]]:
     """One program at one level: what became of it, and what was seen beside what was said."""
     level = LEVELS[seed % len(LEVELS)]
-    files = c_shapes.Program(seed).files
+    files = c_shapes.Program(seed, featured=seed % 2 == 1).files
     for name, text in files.items():
         (folder / name).write_text(text)
     image = folder / "program.elf"
