@@ -23,7 +23,7 @@ union view { u32 w; u16 h[2]; u8 b[4]; struct { u16 a : 3, b : 7, c : 6; u16 d :
              struct { i16 s : 5, t : 9; } g; };
 typedef u32 (*work)(u16, u32);
 #ifdef HOST
-typedef float f32; typedef double f64;
+typedef float real32; typedef double real64;
 #define ARG_WORD(list) ((u16)va_arg(list, int))
 #define NEAR
 #define FAR
@@ -38,7 +38,7 @@ static inline u16 asm_busy(u16 a, u16 b) { return (u16)(a ^ b); }
 static inline void asm_store(u16 *p, u16 a) { *p = a; }
 static inline u32 asm_add32(u32 a, u32 b) { return a + b; }
 #else
-typedef float f32; typedef long double f64;
+typedef float real32; typedef long double real64;
 #define ARG_WORD(list) va_arg(list, u16)
 #define NEAR __attribute__((near))
 #define FAR __attribute__((far))
@@ -63,17 +63,17 @@ static inline u32 asm_add32(u32 a, u32 b)
 }
 #endif
 /* A float as a number, every not-a-number as one, and conversions where they are defined. */
-static inline u32 bits32(f32 x) { u32 w; __builtin_memcpy(&w, &x, 4); return x != x ? 0x7FC00000ul : w; }
-static inline u32 bits64(f64 x)
+static inline u32 bits32(real32 x) { u32 w; __builtin_memcpy(&w, &x, 4); return x != x ? 0x7FC00000ul : w; }
+static inline u32 bits64(real64 x)
 {
     u64 w;
     __builtin_memcpy(&w, &x, 8);
     return x != x ? 0x7FF80000ul : (u32)(w >> 32) ^ (u32)w;
 }
-static inline i32 whole32(f32 x) { return x > -2e9f && x < 2e9f ? (i32)x : 77; }
-static inline u16 whole16(f32 x) { return x > -0.5f && x < 65000.0f ? (u16)x : 78; }
-static inline i64 whole64(f64 x) { return x > -9e18L && x < 9e18L ? (i64)x : 79; }
-static inline u64 natural64(f64 x) { return x > -0.5L && x < 1.8e19L ? (u64)x : 80; }
+static inline i32 whole32(real32 x) { return x > -2e9f && x < 2e9f ? (i32)x : 77; }
+static inline u16 whole16(real32 x) { return x > -0.5f && x < 65000.0f ? (u16)x : 78; }
+static inline i64 whole64(real64 x) { return x > -9e18L && x < 9e18L ? (i64)x : 79; }
+static inline u64 natural64(real64 x) { return x > -0.5L && x < 1.8e19L ? (u64)x : 80; }
 u32 gather(const char *what, ...);
 """
 
@@ -208,7 +208,7 @@ class Features:
         return [f'{assign} = gather("{"".join(kinds)}", {", ".join(arguments)});']
 
     def _union(self, value: Value, assign: str) -> list[str]:
-        name = self.fresh("u")
+        name = self.fresh("un")
         fields = {"a": 7, "b": 127, "c": 63, "d": 2047, "e": 31}
         changes = [f"{name}.f.{(m := self.rng.choice(list(fields)))} = {value('u16')} & {fields[m]}u;",
                    f"{name}.b[{self.rng.randrange(4)}] = {value('u8')};", f"{name}.h[1] ^= {value('u16')};",
@@ -242,20 +242,20 @@ class Features:
                 f"if ({x} {self.rng.choice(('<', '>', '<=', '>=', '==', '!='))} {y}) {x} = -{y};"]  # fmt: skip
 
     def _float(self, value: Value, assign: str) -> list[str]:
-        body = self._floating(value, "f32", "f")
+        body = self._floating(value, "real32", "f")
         x = body[0].split()[1]
-        result = self.rng.choice((f"bits32({x})", f"(u32)whole32({x})", f"whole16({x})", f"bits64((f64){x})"))
+        result = self.rng.choice((f"bits32({x})", f"(u32)whole32({x})", f"whole16({x})", f"bits64((real64){x})"))
         return ["{", *(f"    {line}" for line in body), f"    {assign} = {result};", "}"]
 
     def _double(self, value: Value, assign: str) -> list[str]:
-        body = self._floating(value, "f64", "L")
+        body = self._floating(value, "real64", "L")
         x = body[0].split()[1]
-        result = self.rng.choice((f"bits64({x})", f"(u32)whole64({x})", f"(u32)natural64({x})", f"bits32((f32){x})"))
+        result = self.rng.choice((f"bits64({x})", f"(u32)whole64({x})", f"(u32)natural64({x})", f"bits32((real32){x})"))
         return ["{", *(f"    {line}" for line in body), f"    {assign} = {result};", "}"]
 
     def _convert(self, value: Value, assign: str) -> list[str]:
         whole = self.rng.choice(("u8", "i8", "i16", "u16", "i32", "u32", "i64", "u64"))
-        to = self.rng.choice(("bits32((f32){})", "bits64((f64){})", "(u32)whole32((f32){} * 0.25f)"))
+        to = self.rng.choice(("bits32((real32){})", "bits64((real64){})", "(u32)whole32((real32){} * 0.25f)"))
         return [f"{assign} = {to.format(value(whole))};"]
 
     def _wide_switch(self, value: Value, assign: str) -> list[str]:

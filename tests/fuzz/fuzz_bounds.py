@@ -1,9 +1,8 @@
 """Random C at every level: nothing runs longer, uses more stack or masks longer than `toolchain.bounds` says.
 
 `python tests/fuzz/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
-a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts; every
-second one has what `c_features.py` has, which often leaves no bound.
-Prints how tight the bounds of `main` are.
+a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts;
+every second one has what `c_features.py` has, which often leaves no bound. Prints how tight the bounds of `main` are.
 """
 
 from __future__ import annotations
