@@ -12,6 +12,8 @@
 
 static sys_mutex mutex = SYS_MUTEX(3), second = SYS_MUTEX(5);
 static volatile uint16 spins;
+static volatile bool held;
+static volatile uint8 others;
 static uint16 own_pid;
 
 static void spin(void *unused)
@@ -110,19 +112,35 @@ static void owners_and_waiters_die(void)
     CHECK(noted("hbb") && Sys_Lock_MutexTimeout(&mutex, 1) && Sys_Unlock_Mutex(&mutex) && heap_now() == heap);
 }
 
+/* It locks when both others are there, and they wait until it has: on a busy host each may take any time. */
 static void low(void *unused)
 {
     (void)unused;
-    note(Sys_Lock_Mutex(&mutex) ? '(' : '?');
+    while (others < 2) {
+        Sys_Sleep(1);
+    }
+    bool mine = Sys_Lock_Mutex(&mutex);
+    note(mine ? '(' : '?');
+    held = true;
     spend(8);
     note(')');
     (void)Sys_Unlock_Mutex(&mutex);
 }
 
+static void until_held(void)
+{
+    Sys_Start_CriticalSection();
+    others++;
+    Sys_End_CriticalSection();
+    while (!held) {
+        Sys_Sleep(1);
+    }
+}
+
 static void middle(void *unused)
 {
     (void)unused;
-    Sys_Sleep(3);
+    until_held();
     spend(60);
     note('m');
 }
@@ -130,7 +148,7 @@ static void middle(void *unused)
 static void high(void *unused)
 {
     (void)unused;
-    Sys_Sleep(3);
+    until_held();
     note(Sys_Lock_Mutex(&mutex) ? 'H' : '?');
     (void)Sys_Unlock_Mutex(&mutex);
 }
@@ -139,8 +157,11 @@ static void a_ceiling_bounds_inversion(void)
 {
     forget();
     Sys_Set_Scheduler(&sys_fixed_priority);
+    others = 0, held = false;
     CHECK(start(low, NULL, 1) != 0 && start(middle, NULL, 2) != 0 && start(high, NULL, 3) != 0);
-    Sys_Sleep(150);
+    for (uint16 i = 0; i < 2000 && !noted("()Hm"); i++) {
+        Sys_Sleep(1);
+    }
     CHECK(noted("()Hm"));
     sys_process_config above = {lock_and_tell, NULL, 0, 4, 0, 0, 0};
     above.arg = &above;
