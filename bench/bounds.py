@@ -3,8 +3,9 @@
 `python -m bench.bounds [--image NAME] [--times X] [--json]`. Each call is bounded in the image it is measured in, with
 as many events, subscriptions, messages and holes as there were at most before or behind any call of the run. Measured
 is from the first instruction to behind the return, as bounds are; a call that was interrupted, or in which threads were
-switched, is not counted. "Plain" leaves out the ways on which memory is short or the call is refused; they count in the
-other column.
+switched, is not counted; a thread that ends itself goes on into the scheduler, so of its end `bury` has a row and
+`Sys_Kill_Process` is that of others. "Plain" leaves out the ways on which memory is short, the reserve is exchanged, a
+handler has left something to join, or the call is refused; they count in the other column.
 """
 
 from __future__ import annotations
@@ -29,8 +30,18 @@ from toolchain.bounds.report import Analyst  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.stack.annotations import Annotations, add_symbols  # noqa: E402
 
-APART = ("renew_reserve", "refuse_message", "os_fail", "os_refuse", "heap_give")
+APART = ("refuse_message", "os_fail", "os_refuse")
 """Functions of the ways that are not plain."""
+PLAIN = {"x": 0, "j": 0}
+"""Limits of plain ways beside those seen: no hole outgrows the reserve, nothing given back waits to be joined."""
+ITSELF = "os_thread_returned"
+"""Where a thread ends itself: on into the scheduler, a row of its own."""
+TREE = ("find_hole", "pull_hole", "put_hole")
+"""What works on the heap's tree: in front of each it is whole."""
+EXCHANGE = "renew_reserve"
+"""Pulls a hole only where it is larger than the reserve."""
+ALSO = ("_bury",)
+"""Timed beside the calls."""
 SWITCHES = ("hal_yield", "hal_block", "hal_abandon")
 TARGET = "../tests/firmware/target"
 IMAGES = {
@@ -102,6 +113,18 @@ class Meter:
                 self.worst[key] = max(self.worst.get(key, 0), self.machine.cycle - one.start)
         return False
 
+    def tree(self, exchange: range) -> Callable[[], bool]:
+        """What happens in front of a step on the tree, and where it was called from one that is not plain."""
+
+        def hook() -> bool:
+            top = self.machine.w[15]
+            self.structures.look()
+            if (self.machine.peek(top - 4) & ~1) in exchange:
+                self.apart()
+            return False
+
+        return hook
+
     def disturb(self) -> bool:
         """An interrupt, or a switch."""
         for one in self.under_way:
@@ -133,6 +156,11 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> M
             address = program.address(name)
             if address in program.calls.entries:
                 machine.hook_pc(address, hook)
+    exchange = _extent(program, EXCHANGE)
+    for name in TREE:
+        address = program.address(name)
+        if address in program.calls.entries:
+            machine.hook_pc(address, meter.tree(exchange if name == "pull_hole" else range(0)))
     for name in names:
         address = program.address(name)
         assert address is not None
@@ -141,20 +169,28 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> M
     return meter
 
 
+def _extent(program: Program, name: str) -> range:
+    """Addresses of a function, up to the next."""
+    start = program.address(name)
+    if start not in program.calls.entries or start is None:
+        return range(0)
+    return range(start, min(entry for entry in program.calls.entries if entry > start))
+
+
 def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> list[Row]:
     """All calls of the kernel in one image."""
     image = read_executable(path.read_bytes(), str(path))
     annotations = Annotations()
     add_symbols(annotations, image.symbols)
     bare = Program(image, annotations, read_notes(image, values))
-    names = bare.interesting("_Sys_")
+    names = [*bare.interesting("_Sys_"), *(name for name in ALSO if bare.address(name) in bare.calls.entries)]
     meter = measure(path, bare, names, seconds)
     values = values | meter.structures.most
     print(f"{app}: " + ", ".join(f"{name}={value}" for name, value in sorted(values.items())), file=sys.stderr)
-    seen, notes = meter.worst, read_notes(image, values)
-    whole = Program(image, annotations, notes)
-    apart = [name for name in APART if whole.address(name) in whole.calls.entries]
-    plain = Program(image, annotations, notes, apart)
+    seen = meter.worst
+    there = [name for name in (ITSELF, *APART) if bare.address(name) in bare.calls.entries]
+    whole = Program(image, annotations, read_notes(image, values), [name for name in there if name == ITSELF])
+    plain = Program(image, annotations, read_notes(image, values | PLAIN), there)
     rows = []
     for name in names:
         at = whole.address(name)

@@ -17,7 +17,7 @@ from emu.dspic30f.isa.flow import Branch, Call, Disi, Do, Flow, Goto, Repeat, Re
 from toolchain.bounds.builder import Abstract, World, exact
 from toolchain.bounds.compare import Result, refined, tested
 from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step, joined
-from toolchain.bounds.outcome import Outcome
+from toolchain.bounds.outcome import Outcome, Scope
 from toolchain.bounds.state import INHERITED, LEVELS, NOWHERE, State, widened
 from toolchain.bounds.values import WORD, Value, ends, span
 
@@ -45,6 +45,7 @@ CHOICE: Final = 6
 EPILOGUE: Final = 12
 """Most instructions of a block that returns and is run for every way there."""
 MOVED: Final = "room of a length that is not known is taken from the stack (alloca, array of variable length)"
+ELSEWHERE: Final = "returns where nobody called it from (longjmp, a change of stacks)"
 LOOP: Final = "no bound of this loop is known"
 """The one reason that leaves the stack bounded: its rounds have been followed until nothing new came of them."""
 
@@ -61,16 +62,26 @@ class Rules:
     """Most rounds of a loop beyond its first, per entry."""
     total: Callable[[Code, Loop], int | None] = lambda _code, _loop: None
     """The same of all its entries together."""
+    together: Callable[[Code, Loop], dict[int, tuple[str, int]]] = lambda _code, _loop: {}
+    """By function: what all loops say that share rounds in one call of it, and how many rounds."""
+    scopes: frozenset[int] = frozenset()
+    """Functions of whose calls some loop says so."""
     same: Callable[[Code], set[int]] = lambda _code: set()
     """Heads of loops that are one with the loop around them."""
     calls: Callable[[int, State], list[int] | None] = lambda _pc, _state: None
     """Targets of a call through a pointer whose value is not known."""
+    times: Callable[[int], dict[int, int]] = lambda _pc: {}
+    """By function: how often the call at an address is made in one call of it."""
+    never: Callable[[int], bool] = lambda _pc: False
+    """Whether the call at an address is not made."""
     without: frozenset[int] = frozenset()
     """Functions that are not called: paths that lead into them are left out."""
     recursion: Callable[[int], int | None] = lambda _entry: None
     """Activations of a function that exist at once."""
     resumed: Callable[[], list[int]] = list
     """Where code goes on that has moved to a stack of somebody else."""
+    switches: Callable[[int], bool] = lambda _entry: False
+    """Whether a function that returns on a stack that is not known has changed stacks."""
     back: Callable[[int], int | None] = lambda _entry: None
     """Level at which a function that changes stacks comes back, None: it is none."""
 
@@ -107,7 +118,7 @@ class Explorer:
         """Run from the first instruction of `entry`; the outcome's times count from there."""
         state.shift(-state.time)
         state.since = [None if s is None else INHERITED for s in state.since]
-        key = entry, state.key()
+        key = self._key(entry, state)
         found = self.known.get(key)
         if found is None:
             self.variants[entry] += 1
@@ -118,13 +129,34 @@ class Explorer:
             self.closed[entry] += not found.open
         return found
 
+    def _key(self, entry: int, state: State) -> object:
+        """Equal for runs that find the same: where rounds are shared, also within the same calls."""
+        around = [one for one in self.active if one in self.rules.scopes] if self.sharing else []
+        return entry, tuple(dict.fromkeys(around)), state.key()
+
+    def shares(self, code: Code, loop: Loop, total: int | None) -> tuple[Scope, int] | None:
+        """Among which rounds those of a loop count, of the outermost call under way or of all, and how many."""
+        if not self.sharing or len(loop.heads) != 1:
+            return None
+        together = self.rules.together(code, loop)
+        for entry in self.active:
+            if entry in together:
+                text, rounds = together[entry]
+                return (entry, text), rounds
+        return None if total is None else ((None, str(loop.head)), total)
+
+    def rare(self, pc: int) -> tuple[Scope, int] | None:
+        """In which of the calls under way the call at `pc` is made so often at most."""
+        times = self.rules.times(pc) if self.sharing else {}
+        return next((((entry, str(pc)), times[entry]) for entry in self.active if entry in times), None)
+
     def call(self, entry: int, state: State, one_of_many: bool) -> tuple[Outcome, bool]:
         """Run a called function; True: from a state that stands for all its calls, because there are many, or because a
         pointer may lead to many functions.
 
         That is done only where it leaves nothing open, or all of them do.
         """
-        key = entry, state.key()
+        key = self._key(entry, state)
         if entry in self.active:
             return self.run(entry, state), False  # recursion ends by its arguments
         exposed = state.leaked < NOWHERE or any(map(self.sees, state.w[:8]))
@@ -172,7 +204,18 @@ class _Run:
         if self.code.entry in self.code.blocks:
             self.pending[self.code.entry] = state.copy()
             self._visit(self.code.order)
+            self._settle()
         return self.outcome
+
+    def _settle(self) -> None:
+        """Add the rounds that loops have together in this call: as many as there may be of the longest."""
+        outcome = self.outcome
+        more = outcome.rounds_of(self.code.entry)
+        outcome.shared = {scope: most for scope, most in outcome.shared.items() if scope[0] != self.code.entry}
+        for end in outcome.ends.values():
+            end.shift(more)
+        if outcome.left is not None:
+            outcome.left += more
 
     def _visit(self, order: list[Order]) -> None:
         for part in order:
@@ -200,7 +243,7 @@ class _Run:
             return
         bound, total = explorer.rules.loop(self.code, loop), explorer.rules.total(self.code, loop)
         bound = min((most for most in (bound, total) if most is not None), default=None)
-        shared = total is not None and explorer.sharing and len(loop.heads) == 1
+        shared = explorer.shares(self.code, loop, total)
         limit = HOPELESS_TURNS if loop.head in explorer.hopeless else MAX_TURNS
         before: dict[int, State] = {}
         turns = 0
@@ -212,9 +255,9 @@ class _Run:
                 if turns > limit:
                     explorer.hopeless.add(loop.head)
                     self._widen(before, now)
-                if shared and total is not None:
+                if shared is not None:
                     cycles = now[loop.head].time - before[loop.head].time
-                    Outcome.longer(self.outcome.shared, loop.head, cycles, total)
+                    self.outcome.share(*shared, cycles)
                     now[loop.head].shift(-cycles)
                 if {h: s.key() for h, s in now.items()} == {h: s.key() for h, s in before.items()}:
                     if bound is None:
@@ -442,7 +485,7 @@ class _Run:
     def _enter(self, last: Step, target: int, state: State, tail: bool, many: bool = False) -> None:
         """Call a function, or jump to it, and go on behind it."""
         explorer = self.explorer
-        if target in explorer.rules.without:
+        if target in explorer.rules.without or explorer.rules.never(last.pc):
             return
         if target == 0:  # a weak function that is not linked
             if not tail:
@@ -470,6 +513,12 @@ class _Run:
             ends = [back]
         else:
             ends = [self._behind(before, end, found.wild) if general else end.copy() for end in found.ends.values()]
+        rare = explorer.rare(last.pc)
+        if rare is not None and ends:
+            cycles = min(end.time for end in ends)
+            self.outcome.share(*rare, cycles)
+            for end in ends:
+                end.shift(-cycles)
         for end in ends:  # W8-W14 are preserved (abi-elf.md §2.1)
             if not tail and level is None:
                 end.w[8:15] = before.w[8:15]
@@ -510,6 +559,8 @@ class _Run:
 
     def _return(self, target: Value, state: State) -> None:
         if not exact(state.w[15]):
+            if not self.explorer.rules.switches(self.code.entry):
+                self.outcome.open[self.code.entry] = ELSEWHERE
             self.outcome.left = max(self.outcome.left or 0, state.time)
             state.ipl, state.disi = (0, 0), 0  # whatever level it is, this stack is done with it
             self._levels(state, self.code.entry)

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field, replace
 
 from toolchain.bounds.state import INHERITED, State
 
+Scope = tuple[int | None, str]
+"""Rounds that are counted together: those in one call of the function at an address (None: in all), and which."""
+
 
 @dataclass(slots=True)
 class Outcome:
@@ -29,8 +32,17 @@ class Outcome:
     """It stores where the address says nothing."""
     visited: set[int] = field(default_factory=set)
     """Functions run."""
-    shared: dict[int, tuple[int, int]] = field(default_factory=dict)
-    """Loops whose rounds its times leave out (`Explorer.sharing`): head -> the longest round, and how many in all."""
+    shared: dict[Scope, tuple[int, int]] = field(default_factory=dict)
+    """Rounds of loops that its times leave out (`Explorer.sharing`): the longest of them, and how many in all."""
+
+    def share(self, scope: Scope, total: int, cycles: int) -> None:
+        """Leave out a round of a loop, of so many in all."""
+        most = self.shared.get(scope, (0, 0))
+        self.shared[scope] = max(most[0], cycles), max(most[1], total)
+
+    def rounds_of(self, entry: int | None) -> int:
+        """Cycles of the rounds left out that belong to the calls of a function, or to no call."""
+        return sum(cycles * total for (of, _), (cycles, total) in self.shared.items() if of == entry)
 
     def take(self, other: Outcome, start: int, since: list[int | None], caller: tuple[int, ...]) -> None:
         """Add what a call, made at time `start`, found."""
@@ -49,8 +61,8 @@ class Outcome:
         self.forever |= other.forever
         self.visited |= other.visited
         self.wild |= other.wild
-        for head, (cycles, total) in other.shared.items():
-            self.longer(self.shared, head, cycles, total)
+        for scope, (cycles, total) in other.shared.items():
+            self.share(scope, total, cycles)
         if other.left is not None:
             self.left = max(self.left or 0, start + other.left)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from emu.chips import chip_named, chip_of
@@ -77,7 +77,8 @@ class Program:
         found: dict[int, int] = {}
         for section in sections:
             base = WINDOW | section.address & PAGE - 1
-            found.update((base + i, octet) for i, octet in enumerate(section.data[::2]))
+            low = (octet for i, octet in enumerate(section.data) if not i & 2)  # of each word; above is what PSV hides
+            found.update(enumerate(low, base))
         return found
 
     def place(self, pc: int) -> str:
@@ -123,6 +124,34 @@ class Program:
         """Rounds of a loop in all, by its LOOP_TOTAL."""
         numbers = self._numbers(code, loop, "total")
         return None if None in numbers else max((n for n in numbers if n is not None), default=None)
+
+    def together(self, code: Code, loop: Loop) -> dict[int, tuple[str, int]]:
+        """Rounds of a loop and all others of one LOOP_SHARE in one call of a function: what it says, the number."""
+        notes = [note for head in loop.heads for note in self._bound(code, "share", head)]
+        return {address: (text, number) for address, text, number in self._of_functions(notes)}
+
+    def times(self, pc: int) -> dict[int, int]:
+        """By function, how often the call there is made in one call of it, by CALL_SHARE."""
+        notes = self._at["often"].get(self.line(pc), ()) if "often" in self._at else ()
+        return {address: number for address, _, number in self._of_functions(notes)}
+
+    def _of_functions(self, notes: Iterable[Note]) -> Iterator[tuple[int, str, int]]:
+        """Function, rest and value of notes that begin with a function."""
+        for note in notes:
+            name, _, text = note.text.partition(" ")
+            address, number = self.address(name), self.notes.number(text, note)
+            if address is not None and number is not None:
+                yield address, text, number
+
+    def never(self, pc: int) -> bool:
+        """Whether the call there is not made, by CALL_IF."""
+        notes = self._at["if"].get(self.line(pc), ()) if "if" in self._at else ()
+        return any(self.notes.number(note.text, note) == 0 for note in notes)
+
+    def scopes(self) -> frozenset[int]:
+        """Functions that LOOP_SHARE and CALL_SHARE name."""
+        names = {note.text.partition(" ")[0] for kind in ("share", "often") for note in self.notes.of(kind)}
+        return frozenset(a for name in names if (a := self.address(name)) in self.calls.entries and a is not None)
 
     def _numbers(self, code: Code, loop: Loop, kind: str) -> list[int | None]:
         return [self.notes.number(note.text, note) for head in loop.heads for note in self._bound(code, kind, head)]
@@ -226,6 +255,11 @@ class Program:
             if self.address(name) == entry:
                 return self.notes.number(level, note)
         return None
+
+    def switches(self, entry: int) -> bool:
+        """Whether code moves to stacks of others, by STACK_AREA, COMES_BACK or RESUMED_BY; longjmp does not."""
+        told = any(self.notes.of(kind) for kind in ("stack", "back", "resumed"))
+        return told and entry != self.address("_longjmp")
 
     def resumed(self) -> list[int]:
         """Functions of RESUMED_BY."""

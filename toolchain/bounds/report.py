@@ -74,11 +74,16 @@ class Analyst:
         self.rules = Rules(
             loop=program.rounds,
             total=program.total,
+            together=program.together,
+            scopes=program.scopes(),
             same=program.same,
+            times=program.times,
+            never=program.never,
             without=program.without(),
             calls=program.targets,
             recursion=program.recursion,
             resumed=program.resumed,
+            switches=program.switches,
             back=program.comes_back,
         )
 
@@ -130,7 +135,7 @@ class Analyst:
             contexts = [outside, False] if kind == "call" and self.private else [outside]
             found, *others = (self.explore(entry, level, on_other, thread) for thread in contexts)
             shared = []
-            if self.program.notes.of("total"):
+            if any(self.program.notes.of(kind) for kind in ("total", "share", "often")):
                 shared = [self.explore(entry, level, on_other, thread, sharing=True) for thread in contexts]
         except TooMuch:
             result.open[self.program.place(entry)] = "too many paths; bound its loops"
@@ -180,7 +185,7 @@ def _times(contexts: list[Outcome]) -> list[int]:
     """Cycles of every way through."""
     found = []
     for one in contexts:
-        rounds = sum(cycles * total for cycles, total in one.shared.values())
+        rounds = one.rounds_of(None)
         found += [end.time + rounds for end in one.ends.values()]
         found += [one.left + rounds] if one.left is not None else []
     return found

@@ -16,11 +16,18 @@
 /* On the line of a LOOP_BOUND, or alone: in one call of whatever is looked at, all rounds of the loop together, however often
  * it is entered, are at most `rounds`. Of the two ways to count, the one that gives less is taken. */
 #define LOOP_TOTAL(rounds) _BOUNDS_NOTE("total", rounds)
+/* On the line of a LOOP_BOUND, once for each function: in one call of that function, this loop and all others that say the
+ * same go round at most `rounds` times together. Of functions that are under way at once the outermost counts. */
+#define LOOP_SHARE(function, rounds) _BOUNDS_NOTE("share", function rounds)
 /* Anywhere: the loops of this function, which may be assembly, go round at most `rounds` times. */
 #define LOOPS_OF(function, rounds) _BOUNDS_NOTE("loops", function rounds)
 /* In front of a call through a pointer: its targets are the functions named, of a type named all whose address is taken,
  * without those behind a minus. */
 #define CALL_TARGETS(...) _BOUNDS_NOTE("calls", __VA_ARGS__)
+/* In front of a call: in one call of that function it is made at most so often. */
+#define CALL_SHARE(function, times) _BOUNDS_NOTE("often", function times)
+/* In front of a call: it is made only where this is not 0. */
+#define CALL_IF(expression) _BOUNDS_NOTE("if", expression)
 /* Anywhere: looked at by itself, the function finds in register Wn at most `most`. */
 #define ARGUMENT_BOUND(function, n, most) _BOUNDS_NOTE("argument", function n most)
 /* Anywhere: the function leaves its stack to another, and comes back to its caller at this interrupt level. */

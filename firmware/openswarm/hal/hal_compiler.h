@@ -12,15 +12,19 @@
 
 /* What bounds of time and stack take from the source (toolchain/include/bounds.h); nothing to other compilers. n threads,
  * m events, b newer events in the same bucket, s subscriptions of one event, q queued messages, i times idle, u bytes of a
- * stack never used; where they are told, t subscriptions of all events together, h holes on a path of the heap's tree. */
+ * stack never used; where they are told, t subscriptions of all events together, h holes on a path of the heap's tree, j runs
+ * of pieces given back that wait to be joined (0 outside of handlers), x holes that become larger than the reserve. */
 #if defined(__clang__) && defined(__dsPIC30F__)
 #include <bounds.h>
 #else
 #define LOOP_BOUND(rounds)
 #define LOOP_TOTAL(rounds)
+#define LOOP_SHARE(function, rounds)
 #define SAME_LOOP()
 #define LOOPS_OF(function, rounds) struct no_note
 #define CALL_TARGETS(...)
+#define CALL_SHARE(function, times)
+#define CALL_IF(expression)
 #define PRIVATE_VALUE(variable, value) struct no_note
 #define KNOWN_VALUE(variable, value) struct no_note
 #define ARGUMENT_BOUND(function, n, most) struct no_note

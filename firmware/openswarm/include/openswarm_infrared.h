@@ -92,7 +92,7 @@ bool Sys_Set_RobotNumber(uint16 number);
 /* MTHI | no | 45 | 14 | ARGUMENT.  Counts (1 to 100, 4 to begin with) that light must take from a sensor, whatever its noise. */
 bool Sys_Set_InfraredThreshold(uint8 counts);
 
-/* MTHI | no | 120 | 4 | none.  Millimetres between two robots' middles that face each other, 70 to 600, for a strength: the
+/* MTHI | no | 141 | 4 | none.  Millimetres between two robots' middles that face each other, 70 to 600, for a strength: the
  * amplitudes that libIrcom's authors measured (swarmcom.md 3.1). Askew sensors seem farther. Kilobot: 33 to 98 by the tables
  * of its calibration, 0 if the EEPROM has none; slow, it reads them there. */
 uint16 Sys_Estimate_Range(uint16 strength);

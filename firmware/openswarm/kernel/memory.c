@@ -62,6 +62,12 @@ HAL_OUTLINE void heap_note_use(void)
     }
 }
 
+/* For bounds: nodes of a path (README.md); runs joined when a piece is given back, itself and perhaps what came before;
+ * paths searched and pulled meanwhile, one more where the reserve is exchanged. */
+#define PATH min(10, h)
+#define RUNS min(2, 1 + j)
+#define PATHS (2 * RUNS + min(1, x)) * PATH
+
 /* ---- The tree: slice locked ----------------------------------------------------------------------------------- */
 
 static HAL_INLINE uint16 offset_of(const void *at)
@@ -79,7 +85,7 @@ static HAL_OUTLINE hole **find_hole(uintptr_t at)
 {
     hole **link = &holes;
     uint16 offset = (uint16)(at - (uintptr_t)os_memory.bytes);
-    LOOP_BOUND(min(10, h)); /* a path has at most 10 nodes (README.md) */
+    LOOP_BOUND(PATH); LOOP_SHARE(join_run, 2 * PATH); LOOP_SHARE(heap_give, PATHS);
     for (uint16 bit = TOP_BIT; *link != &no_hole && (uintptr_t)*link != at; bit >>= 1) {
         link = offset & bit ? &(*link)->side[1] : &(*link)->side[0];
     }
@@ -104,7 +110,7 @@ static HAL_OUTLINE void put_hole(void *at, uint16 size)
         }
         link = offset_of(h) & bit ? &stays->side[1] : &stays->side[0];
         bit >>= 1;
-        LOOP_BOUND(min(9, h));
+        LOOP_BOUND(PATH - 1);
     } while (h != &no_hole);
 }
 
@@ -112,7 +118,8 @@ static HAL_OUTLINE void put_hole(void *at, uint16 size)
 static HAL_OUTLINE hole *pull_hole(hole **link)
 {
     hole *gone = *link, *left = gone->side[0], *right = gone->side[1];
-    LOOP_BOUND(min(9, h));
+    /* What was searched lies above what is pulled, on one path. */
+    LOOP_BOUND(PATH - 1); LOOP_SHARE(heap_keep, PATH); LOOP_SHARE(join_run, 2 * PATH); LOOP_SHARE(heap_give, PATHS);
     while (left != right) { /* not both nothing */
         hole *next;
         if (left->size >= right->size) {
@@ -152,10 +159,13 @@ static HAL_OUTLINE void join_run(void)
     }
     run = run_end;
     /* The size of a hole, if one ends here; if not, no hole begins so far below that ends here. */
+    CALL_SHARE(heap_give, RUNS);
     hole **link = find_hole((uintptr_t)begin - *last_step(begin));
     if ((uint8 *)*link + (*link)->size == begin) {
+        CALL_SHARE(heap_give, RUNS);
         begin = (uint8 *)pull_hole(link);
     }
+    CALL_SHARE(heap_give, RUNS);
     end += pull_hole(find_hole((uintptr_t)end))->size; /* of nothing: 0 */
     hal_lock_state lock = hal_lock_devices();
     if (end == low) {
@@ -167,6 +177,7 @@ static HAL_OUTLINE void join_run(void)
     }
     hal_unlock(lock);
     if (apart) {
+        CALL_SHARE(heap_give, RUNS);
         put_hole(begin, (uint16)(end - begin));
     }
 }
@@ -177,6 +188,7 @@ static HAL_OUTLINE uint16 renew_reserve(void)
     if (holes->size <= reserve()) {
         return 0;
     }
+    CALL_IF(min(1, x));
     hole *h = pull_hole(&holes);
     hal_lock_state lock = hal_lock_devices();
     uint8 *from = low, *to = high;
@@ -223,7 +235,7 @@ void *heap_take(uint16 size)
 void *heap_keep(uint16 size)
 {
     hole **link = NULL, **next = &holes;
-    LOOP_BOUND(min(10, h));
+    LOOP_BOUND(PATH); LOOP_SHARE(heap_keep, PATH);
     while ((*next)->size >= size + sizeof(hole)) {
         link = next;
         next = &(*link)->side[0];

@@ -1,0 +1,101 @@
+"""Rounds and calls that are counted together, constants behind the PSV window, returns from elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.fuzz_bounds import measure
+from tests.toolchain.bounds.test_bounds import built, report
+
+SHARED = """
+#include <bounds.h>
+struct item { struct item *next; } items[9], *volatile first, *volatile second;
+__attribute__((noinline)) void visit(void) { __asm__ volatile("repeat #99\\n nop"); }
+__attribute__((noinline)) struct item *down(struct item *p, int most)
+{
+    LOOP_BOUND(8); NOTE
+    while (p->next && most--) { visit(); p = p->next; }
+    return p;
+}
+__attribute__((noinline)) void walk(void)
+{
+    down(down(first, 3), 9);
+}
+int main(void)
+{
+    for (int i = 0; i < 8; i++) items[i].next = &items[i + 1];
+    first = items;
+    walk();
+    walk();
+    return 0;
+}
+"""
+RARE = """
+#include <bounds.h>
+volatile int wanted = 2;
+__attribute__((noinline)) void mend(void) { __asm__ volatile("repeat #999\\n nop"); }
+__attribute__((noinline)) void work(void)
+{
+    for (int i = 0; i < 10; i++) {
+        NOTE
+        if (wanted == i) mend();
+    }
+}
+int main(void) { work(); return 0; }
+"""
+CONSTANTS = """
+static const int counts[4] __attribute__((space(auto_psv))) = {0x0102, 0x0101, 0x0203, 0x0180};
+volatile unsigned which = 2;
+__attribute__((noinline)) int main(void)
+{
+    int n = counts[which & 3], sum = 0;
+    for (int i = 0; i < n; i++) { sum += i; __asm__ volatile("" : "+r"(sum)); }
+    return sum;
+}
+"""
+LONG_JUMP = """
+#include <setjmp.h>
+static jmp_buf back;
+volatile int never;
+__attribute__((noinline)) void leave(void) { longjmp(back, 1); }
+int main(void) { if (setjmp(back) == 0) leave(); return never; }
+"""
+
+
+def measured(image: Path) -> int:
+    seen = measure(image)
+    assert isinstance(seen, dict)
+    return seen["_main"].cycles
+
+
+def test_rounds_of_two_calls_are_shared_in_the_function_that_makes_them(tmp_path: Path, capsys) -> None:
+    """Eight rounds in each of two calls of walk(), three of them in the first call of down(); without the note the
+    second may go round eight times."""
+    image = built(tmp_path, SHARED.replace("NOTE", "LOOP_SHARE(walk, 8);"))
+    assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
+    apart = built(tmp_path, SHARED.replace("NOTE", ""))
+    assert report(capsys, apart)["cycles"] > 1.3 * measured(apart)
+
+
+def test_a_call_is_made_only_so_often(tmp_path: Path, capsys) -> None:
+    """Once in ten rounds, or never."""
+    image = built(tmp_path, RARE.replace("NOTE", "CALL_SHARE(work, 1);"))
+    assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
+    image = built(tmp_path, RARE.replace("NOTE", "CALL_IF(x);"))
+    assert report(capsys, image, "--let", "x=0")["cycles"] < 1000 < report(capsys, image, "--let", "x=1")["cycles"]
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
+def test_constants_behind_the_window_have_both_their_bytes(tmp_path: Path, capsys, level: str) -> None:
+    """A loop that goes round as often as one of them says."""
+    image = built(tmp_path, CONSTANTS, level)
+    assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
+
+
+def test_a_long_jump_leaves_no_bound(tmp_path: Path, capsys) -> None:
+    """And is named as the reason."""
+    row = report(capsys, built(tmp_path, LONG_JUMP))
+    assert row["cycles"] is None
+    assert any("longjmp" in reason for reason in row["open"].values())
