@@ -53,7 +53,7 @@
 #define _BOUNDS_NOTE(kind, ...) _BOUNDS_LINE(__COUNTER__, __LINE__, kind, __VA_ARGS__)
 #define _BOUNDS_LINE(number, line, kind, ...) _BOUNDS_TEXT(number, line, kind, __VA_ARGS__)
 #define _BOUNDS_TEXT(number, line, kind, ...)                                                                       \
-    static const char _bounds_##number[] __attribute__((used, section(".note.bounds"))) =                           \
+    static const char _bounds_##number[] __attribute__((used, nodebug, section(".note.bounds"))) =                           \
         kind " " #__VA_ARGS__ "@" __FILE__ ":" #line "\n"
 
 #endif

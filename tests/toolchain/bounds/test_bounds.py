@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from emu.loader import load_image
 from tests.fuzz.fuzz_bounds import examine, measure
 from tests.toolchain.c_programs import build
 from toolchain.bounds.notes import read_notes
@@ -323,3 +324,13 @@ def test_room_of_unknown_length_is_no_other_stack(level: str, called: str, tmp_p
     assert bound.cycles is None or bound.cycles >= seen["_main"].cycles
     assert not bound.stack_is_known or bound.bytes >= seen["_main"].stack
     assert any("room of a length" in why for why in bound.open.values()) or bound.cycles is not None
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os"])
+def test_notes_are_no_variables_of_the_program(tmp_path: Path, level: str) -> None:
+    """What DWARF knows stands in data memory: a note's place in its section is no address there."""
+    image = load_image(str(built(tmp_path, LIST.replace("NOTE", "LOOP_BOUND(8);"), level)))
+    assert set(image.lines.files) <= {symbol.address for symbol in image.symbols.all if symbol.space == "data"}
+    head = image.symbols.find("_head")
+    assert head is not None
+    assert image.lines.files[head.address].endswith("program.c")
