@@ -1,5 +1,5 @@
-/* Robots that reprogram each other by infra-red (README.md): one thread keeps the stores and talks, a handler keeps what is
- * heard for it. */
+/* Robots that reprogram each other by infra-red, and take programs from a host by UART1 (README.md): one thread keeps the
+ * stores and talks, handlers keep what is heard for it. */
 #include <openswarm.h>
 #include <openswarm_infrared.h>
 #include <openswarm_io.h>
@@ -9,20 +9,38 @@
 #include "lamp.h" /* rows of lamp/main.c */
 #include "spread.h"
 
-enum { LOOK_MS = 20, HEARD = 8, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS = 8000, LINE = 24, STACK = 700 };
+enum { LOOK_MS = 20, HEARD = 16, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS = 8000, LINE = 24, STACK = 700 };
 
 static uint8 messages[HEARD][SYS_SPREAD_BYTES];
 static volatile uint8 first, last; /* of those that wait */
+static volatile bool has_host;
+
+static bool keep(const uint8 *message, uint16 size)
+{
+    uint8 next = (uint8)((last + 1u) % HEARD);
+    bool is_one = size == SYS_SPREAD_BYTES && (message[0] & SYS_SPREAD_KIND) != 0;
+    if (is_one && next != first) {
+        memcpy(messages[last], message, SYS_SPREAD_BYTES);
+        last = next;
+    }
+    return is_one;
+}
 
 static bool on_message(uint16 pid, uint16 event, sys_event_data *data)
 {
     const sys_neighbour_message *m = data->payload;
-    uint8 next = (uint8)((last + 1u) % HEARD);
     (void)pid;
     (void)event;
-    if (m->size == SYS_SPREAD_BYTES && (m->payload[0] & SYS_SPREAD_KIND) != 0 && next != first) {
-        memcpy(messages[last], m->payload, SYS_SPREAD_BYTES);
-        last = next;
+    keep(m->payload, m->size);
+    return true;
+}
+
+static bool on_host(uint16 pid, uint16 event, sys_event_data *data)
+{
+    (void)pid;
+    (void)event;
+    if (keep(data->payload, data->size)) {
+        has_host = true; /* from now on it hears what neighbours do */
     }
     return true;
 }
@@ -75,6 +93,9 @@ static void spread(void *unused)
         }
         if (now >= next && Sys_Spread(now, message)) {
             Sys_Send_Neighbours(message, sizeof message);
+            if (has_host) {
+                Sys_Write_UART1(message, sizeof message);
+            }
             next = now + SYS_SPREAD_TICK;
         }
         uint16 version = Sys_Get_StoredVersion(&is_active);
@@ -99,6 +120,9 @@ int main(void)
     Sys_Init_Kernel();
     SYS_ASSERT(Sys_Start_Infrared());
     Sys_Subscribe_to_Event(SYS_NEIGHBOUR_MESSAGE, 0, on_message, NULL);
+    Sys_Subscribe_to_Event(SYS_UART1_RECEIVED, 0, on_host, NULL);
+    Sys_Set_RxProcessor(SYS_UART1, Sys_Frame_Rx);
+    Sys_Set_TxProcessor(SYS_UART1, Sys_Spread_Tx);
     const sys_process_config thread = {.entry = spread, .stack = STACK};
     SYS_ASSERT(Sys_Start_ProcessWith(&thread) != 0);
     Sys_Start_Kernel();

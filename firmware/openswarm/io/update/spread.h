@@ -7,10 +7,14 @@
  *     Sys_Spread(now, message)                      every SYS_SPREAD_TICK ms; true: send these eight bytes
  *     Sys_Hear_Update(message)                      with each message of this kind (SYS_SPREAD_KIND set in its first byte)
  *     Sys_Offer_Activation(version)                 on one robot, when it is to be: all that have the version whole follow
+ *
+ * A host that brings a program (`openswarm flash`) is a neighbour at the end of a UART: Sys_Frame_Rx and Sys_Spread_Tx are its
+ * processors, what it receives goes to Sys_Hear_Update, and what Sys_Spread gives to the UART as well.
  */
 #ifndef OPENSWARM_SPREAD_H
 #define OPENSWARM_SPREAD_H
 
+#include "openswarm_io.h"
 #include "update.h"
 
 #ifdef __cplusplus
@@ -27,6 +31,8 @@ void Sys_Hear_Update(const uint8 *message);
 bool Sys_Offer_Activation(uint16 version);
 /* The newest program that is whole here, or 0, and whether it is activated. */
 uint16 Sys_Get_StoredVersion(bool *is_active);
+/* Tx-processor: messages of this kind are frames (Sys_Frame_Tx) behind a 0, all else is sent as it is, such as text. */
+bool Sys_Spread_Tx(const uint8 *message, uint16 size, sys_put put);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,150 @@
+"""`openswarm flash` brings a program into a robot that runs `apps/spreading`, over its Bluetooth."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import threading
+import tty
+from pathlib import Path
+
+import pytest
+
+import emu
+from emu.loader import load_image
+from emu.machine import Machine
+from openswarm.cli import main
+from openswarm.flashing.program import SLOT, Program, program_of
+from openswarm.flashing.spreading import Neighbour, framed, unframed
+from openswarm.flashing.talk import RobotError
+from tests.firmware.radio import SLICE, Line
+
+ROWS = 3
+
+
+def built(folder: Path, version: int, filling: int = 1) -> Path:
+    """A program of three rows that switches the body LED on."""
+    source = folder / f"{version}-{filling}.c"
+    words = ", ".join(str(filling * n) for n in range(1, 41))
+    source.write_text(f"""
+#include <openswarm_io.h>
+static const uint16 filling[] = {{{words}}};
+int main(void)
+{{
+    uint16 sum = 0;
+    for (volatile uint16 n = 0; n < 40; n++) {{
+        sum += filling[n];
+    }}
+    return Sys_Set_LED(SYS_LED_BODY, sum == {820 * filling});
+}}
+""")
+    out = source.with_suffix(".elf")
+    assert main(["program", str(source), "--version", str(version), "-o", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    folder = tmp_path_factory.mktemp("programs")
+    return {version: built(folder, version) for version in (4, 5)}
+
+
+@pytest.fixture
+def robot(image) -> Machine:
+    """One that has no program, and sees nobody."""
+    return emu.load(image("spreading"))
+
+
+def of(path: Path) -> Program:
+    return program_of(load_image(str(path)))
+
+
+def slot(machine: Machine, rows: int) -> bytes:
+    words = [machine.program.word(address) for address in range(SLOT.start, SLOT.start + 64 * rows, 2)]
+    return b"".join(word.to_bytes(3, "little") for word in words)
+
+
+def test_a_robot_takes_checks_and_runs_what_the_host_has(robot, programs):
+    """With parts damaged on the way; then a newer one; what is old or another of the same version is refused."""
+    line, program = Line(robot), of(programs[4])
+    assert len(program.rows) == ROWS
+    write, sent = line.write, 0
+
+    def damage(data: bytes) -> None:
+        nonlocal sent
+        sent += 1
+        write(data if sent % 7 else data[:4] + bytes([data[4] ^ 0x40]) + data[5:])
+
+    line.write = damage  # type: ignore[method-assign]
+    host = Neighbour(line, program, 20.0)
+    rows: list[int] = []
+    assert host.give(lambda done, total: rows.append(done)) is False
+    assert rows == sorted(rows)
+    assert {0, 1, 2, 3} == set(rows)
+    assert host.counts.requests > ROWS
+    host.activate()
+    robot.run(seconds=4.0)
+    assert slot(robot, ROWS) == b"".join(program.rows)
+    line.drop()
+    assert Neighbour(line, program, 20.0).give(lambda done, total: None) is True  # it has it already
+    newer = Neighbour(line, of(programs[5]), 20.0)
+    assert newer.give(lambda done, total: None) is False
+    with pytest.raises(RobotError, match=r"the robot has version 5, and takes only what is above it: .* --version 6"):
+        Neighbour(line, program, 20.0).give(lambda done, total: None)
+    other = Program(5, program.rows[:2])
+    with pytest.raises(RobotError, match="the robot has another program of version 5"):
+        Neighbour(line, other, 20.0).give(lambda done, total: None)
+
+
+def test_a_robot_that_falls_silent_is_told(robot, programs):
+    """Nothing of the host arrives; then only what it advertises does, until a robot that asks is off."""
+    line, program = Line(robot), of(programs[4])
+    write = line.write
+    line.write = lambda data: None  # type: ignore[method-assign]
+    with pytest.raises(RobotError, match=r"no robot answered within 3 s|the robot has version 0 and does not ask"):
+        Neighbour(line, program, 3.0).give(lambda done, total: None)
+    line.write = lambda data: write(data)  # type: ignore[method-assign]
+
+    def cut(done: int, total: int) -> None:
+        robot.board.bluetooth.on_byte = lambda byte, _cycle: None
+
+    with pytest.raises(RobotError, match=r"the robot fell silent at row 0: what it has stays there"):
+        Neighbour(line, program, 5.0).give(cut)
+
+
+def test_damaged_frames_are_none():
+    """Every byte of a frame changed, and left out."""
+    frame = framed(bytes([0x80, 0, 0, 3, 0, 9, 0, 0]))[1:-1]
+    assert unframed(frame) == bytes([0x80, 0, 0, 3, 0, 9, 0, 0])
+    for at in range(len(frame)):
+        assert unframed(frame[:at] + bytes([frame[at] ^ 0x10]) + frame[at + 1 :]) == b""
+        assert unframed(frame[:at] + frame[at + 1 :]) == b""
+    assert unframed(b"runs 2\n") == unframed(b"") == b""
+
+
+def test_the_command_reaches_a_running_robot_behind_a_pseudo_terminal(robot, programs, capsys):
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    robot.board.bluetooth.on_byte = lambda byte, _cycle: os.write(master, bytes([byte]))
+    words = ["flash", str(programs[4]), "--port", os.ttyname(slave), "--wait", "100", "--json"]
+    status: list[int] = []
+    host = threading.Thread(target=lambda: status.append(main(words)))
+    host.start()
+    try:
+        while host.is_alive():
+            if select.select([master], [], [], 0)[0]:
+                robot.board.bluetooth.feed(os.read(master, 4096))
+            robot.run(cycles=SLICE)
+    finally:
+        host.join()
+        robot.board.bluetooth.on_byte = None
+        os.close(master)
+        os.close(slave)
+    assert status == [0]
+    facts = json.loads(capsys.readouterr().out)
+    program = of(programs[4])
+    assert (facts["version"], facts["rows"], facts["crc"], facts["active"]) == (4, ROWS, program.crc, True)
+    robot.run(seconds=4.0)
+    assert slot(robot, ROWS) == b"".join(program.rows)
