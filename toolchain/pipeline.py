@@ -143,7 +143,7 @@ def _by_value(c: Context) -> None:
 
 def _combine(c: Context) -> None:
     if c.options.level != "0":
-        combine.combine(c.function, c.for_size)
+        combine.combine(c.function, c.for_size, c.options.level == "2")
 
 
 def _returns(c: Context) -> None:

@@ -30,13 +30,13 @@ def users_of(f: Function) -> dict[int, list[Instr]]:
     return out
 
 
-def combine(f: Function, for_size: bool) -> None:
+def combine(f: Function, for_size: bool, for_speed: bool = False) -> None:
     """Needs: legal IR. Ensures: the rewrites above, where they apply."""
     quotients(f)
     conditional(f)
     selects(f)
     remainders(f)
-    magic.run(f, for_size)
+    magic.run(f, for_size, for_speed)
     pair_divisions(f)
     induction.run(f)
     increments(f)

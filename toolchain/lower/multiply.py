@@ -208,6 +208,34 @@ def _accumulate(s: Selector, total: list[int | None], k: int, low: int, high: in
         at += 1
 
 
+def select_mulhigh(s: Selector, i: Instr) -> None:
+    """Upper two words of a product of two words by a constant of two words without sign.
+
+    x * y + z fits into two words for words x, y, z, so the first carry ends one word up. MUL leaves the flags alone."""
+    (low, high), d = s.regs(i.args[0]), s.value_regs(i)
+    m, kind = i.args[1], "su" if i.extra["signed"] else "uu"
+    assert isinstance(m, ConstInt)
+    m_low, m_high = s.temp(), s.temp()
+    s.load_imm(m.value & 0xFFFF, m_low)
+    s.load_imm(m.value >> 16, m_high)
+    _, outer = _pair(s, "uu", low, m_low)
+    one_low, one_high = _pair(s, "uu", low, m_high)
+    sums = [s.temp() for _ in range(5)]
+    s.emit("add", one_low, outer, sums[0])
+    s.emit("addc", one_high, Imm(0), sums[1])
+    other_low, other_high = _pair(s, kind, high, m_low)
+    sign: int | Imm = Imm(0)
+    if i.extra["signed"]:
+        sign = s.temp()
+        s.emit("asr", other_high, Imm(15), sign)
+    s.emit("add", other_low, sums[0], sums[2])
+    s.emit("addc", other_high, sums[1], sums[3])
+    top_low, top_high = _pair(s, kind, high, m_high)
+    s.emit("addc", top_high, sign, sums[4])
+    s.emit("add", top_low, sums[3], d[0])
+    s.emit("addc", sums[4], Imm(0), d[1])
+
+
 def select_divide(s: Selector, i: Instr) -> None:
     """16-bit DIV under REPEAT #17: quotient in W0, remainder in W1 (isa.md §6.7). The divisor must survive them."""
     signed = i.op in ("sdiv", "srem")
@@ -231,6 +259,7 @@ def select_divother(s: Selector, i: Instr) -> None:
 
 SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "mul": select_mul,
+    "mulhigh": select_mulhigh,
     **dict.fromkeys(("udiv", "sdiv", "urem", "srem"), select_divide),
     "divother": select_divother,
 }

@@ -36,3 +36,46 @@ TEST(increment_through_pointer_64, "C11 6.5.2.4") { long long v = LL(0xFFFFFFFFF
 TEST(array_of_64, "C11 6.5.2.1") { long long a[4]; for (int i = 0; i < 4; i++) a[i] = (long long)i << 40; CHECK(a[I(3)] == 3ll << 40 && a[I(1)] + a[2] == a[3]); }
 TEST(fnv_hash, "C11 6.2.5p9") { unsigned long long h = 0xCBF29CE484222325ull; for (const char *p = "foobar"; *p; p++) { h ^= (unsigned char)*p; h *= 0x100000001B3ull; } CHECK(h == 0x85944171F73967E8ull); }
 TEST(xorshift_sequence, "C11 6.5.7") { unsigned long long x = ULL(88172645463325252ull); for (int i = 0; i < 3; i++) { x ^= x << 13; x ^= x >> 7; x ^= x << 17; } CHECK(x == 0x2FEF107A27529AD0ull); }
+
+/* Where a function has its divisor as a constant, products may stand for DIV. */
+#define DIVIDED_BY(name, d) \
+    NOINLINE unsigned long u_##name(unsigned long x, unsigned long *r) { *r = x % (d); return x / (d); } \
+    NOINLINE long s_##name(long x, long *r) { *r = x % (long)(d); return x / (long)(d); }
+DIVIDED_BY(2, 2ul)
+DIVIDED_BY(3, 3ul)
+DIVIDED_BY(7, 7ul)
+DIVIDED_BY(8, 8ul)
+DIVIDED_BY(10, 10ul)
+DIVIDED_BY(1000, 1000ul)
+DIVIDED_BY(4096, 4096ul)
+DIVIDED_BY(65537, 65537ul)
+DIVIDED_BY(131072, 131072ul)
+DIVIDED_BY(billion, 1000000007ul)
+DIVIDED_BY(largest, 0x7FFFFFFFul)
+DIVIDED_BY(minus_10, -10L)
+DIVIDED_BY(minus_64, -64L)
+
+TEST(divide_32_by_constants, "C11 6.5.5p6")
+{
+    static const struct {
+        unsigned long d;
+        unsigned long (*u)(unsigned long, unsigned long *);
+        long (*s)(long, long *);
+    } forms[] = {
+        {2, u_2, s_2}, {3, u_3, s_3}, {7, u_7, s_7}, {8, u_8, s_8}, {10, u_10, s_10}, {1000, u_1000, s_1000},
+        {4096, u_4096, s_4096}, {65537, u_65537, s_65537}, {131072, u_131072, s_131072},
+        {1000000007, u_billion, s_billion}, {0x7FFFFFFF, u_largest, s_largest}, {-10, u_minus_10, s_minus_10},
+        {-64, u_minus_64, s_minus_64}};
+    static const unsigned long edges[] = {0, 1, 0x7FFF, 0x8000, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000, 0x80000001, 0xFFFFFFFF};
+    for (unsigned k = 0; k < sizeof forms / sizeof *forms; k++) {
+        volatile unsigned long d = forms[k].d;
+        unsigned long x = 0x12345678;
+        for (int n = 0; n < 60; n++) {
+            x = n < 10 ? edges[n] : n < 20 ? d * (unsigned)n - 1 : n < 30 ? d * (unsigned)n : x * 1664525ul + 1013904223ul;
+            unsigned long ur;
+            long sr;
+            CHECK(forms[k].u(x, &ur) == x / d && ur == x % d);
+            CHECK(forms[k].s((long)x, &sr) == (long)x / (long)d && sr == (long)x % (long)d);
+        }
+    }
+}

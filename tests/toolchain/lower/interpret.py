@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from toolchain.ir.model import Arg, ConstInt, Function, GlobalRef, Instr, Undef, Value
 from toolchain.lower.build import compare, const, evaluate
+from toolchain.lower.magic import CALLS
 
 MEMORY_TOP = 0x8000
 FUEL = 200_000
@@ -65,9 +66,20 @@ class Interpreter:
         chosen = self.value(i.args[0])
         return i.blocks[cases.index(chosen) + 1] if chosen in cases else i.blocks[0]
 
+    def divided(self, call: Instr, a: ConstInt, b: ConstInt) -> int:
+        """A function of the run-time library that divides."""
+        function = call.args[-1]
+        assert isinstance(function, GlobalRef)
+        op = CALLS[function.name]
+        x, d = (a.signed, b.signed) if op[0] == "s" else (a.value, b.value)
+        quotient = abs(x) // abs(d) * (1 if (x < 0) == (d < 0) else -1)
+        return quotient if op.endswith("div") else x - quotient * d
+
     def step(self, i: Instr) -> int | None:
         args = [const(a.type, self.value(a)) for a in i.args if a.type.bits]
         match i.op:
+            case "call":
+                return self.divided(i, args[0], args[1])
             case "icmp":
                 return int(compare(i.pred, args[0], args[1]))
             case "select":
@@ -76,6 +88,9 @@ class Interpreter:
                 return args[0].value
             case "sext":
                 return args[0].signed
+            case "mulhigh":
+                x = args[0].signed if i.extra["signed"] else args[0].value
+                return x * args[1].value >> i.type.bits
             case "load":
                 size = max(1, i.type.bits // 8)
                 return sum(self.byte(args[0].value + k) << 8 * k for k in range(size))

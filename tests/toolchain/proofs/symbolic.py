@@ -7,6 +7,7 @@ Memory is one z3 array of bytes. Nothing of an instruction's meaning is written 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,37 @@ from emu.dspic30f.isa.builder import Context
 BITS = 48
 """Width of the integers the table computes with; products of two words need 33."""
 MOST_STEPS = 4000
+
+
+bounds: dict[str, tuple[Any, Any]] | None = None
+"""None: products are computed in bits. Else by their factors: the unknown that stands for one, what is known of it."""
+
+
+@contextmanager
+def unknown_products() -> Iterator[dict[str, tuple[Any, Any]]]:
+    """Inside, a product is any number within the bounds of its factors: what holds for those holds for products, and
+    the solver need not look into multipliers."""
+    global bounds
+    bounds = {}
+    try:
+        yield bounds
+    finally:
+        bounds = None
+
+
+def times(a: Any, b: Any) -> Any:
+    """a * b as the table has it."""
+    if bounds is None:
+        return a * b
+    a, b = sorted((z3.simplify(a), z3.simplify(b)), key=z3.is_bv_value)
+    key = f"{a} * {b}"
+    if key not in bounds:
+        p, word = z3.BitVec(key, BITS), (1 << 16) - 1
+        words = z3.Implies(z3.And(z3.ULE(a, word), z3.ULE(b, word)), z3.ULE(p, word * word))
+        signed = z3.And(a >= -(1 << 15), a < 1 << 15, z3.ULE(b, word))
+        within = z3.And(p >= -(1 << 15) * word, p <= ((1 << 15) - 1) * word)
+        bounds[key] = p, z3.And(words, z3.Implies(signed, within))
+    return bounds[key][0]
 
 
 def number(v: Any) -> Any:
@@ -52,7 +84,7 @@ class Int:
         return self._with(lambda a, b: a - b, o, swapped=True)
 
     def __mul__(self, o: Any) -> Int:
-        return self._with(lambda a, b: a * b, o)
+        return self._with(times, o)
 
     __rmul__ = __mul__
 
