@@ -3,7 +3,7 @@
     python docs/infrared_update.py [--robots 10] [--rows 1] [--lost 0] [--most 120] [--noise 2]
 
 Robots of apps/spreading stand on the grid of infrared_swarm.py; the first has a program of so many rows. Printed is
-when each has it whole, and when it has restarted and calls it. Exit status 1 if one does not within the `--most` seconds.
+when each has it whole, and when it has restarted and calls it. Exit status 1 if one does not within `--most` seconds.
 """
 
 from __future__ import annotations
