@@ -6,6 +6,7 @@ STAMP  := $(VENV)/.installed
 APP    ?= listing1
 SECONDS ?= 5
 EXTRAS ?= arena,film,test
+TYPED  := emu toolchain arena openswarm
 
 firmware.elf: $(STAMP) FORCE
 	$(MAKE) -C firmware APP=$(APP) PYTHON=$(abspath $(PY))
@@ -14,10 +15,11 @@ firmware.elf: $(STAMP) FORCE
 run: firmware.elf
 	$(PY) -m emu run firmware.elf --seconds $(SECONDS)
 
+# types take a core for a minute: they are looked at beside the tests, and told, from mypy's cache, behind them
 test: $(STAMP)
 	$(PY) -m ruff check emu toolchain arena openswarm tests bench setup.py
-	$(PY) -m mypy emu toolchain arena openswarm
-	$(PY) -m pytest -n auto --dist worksteal tests $(PYTEST)
+	$(PY) -m mypy $(TYPED) >/dev/null & $(PY) -m pytest -n auto --dist worksteal tests $(PYTEST); status=$$?; wait; exit $$status
+	$(PY) -m mypy $(TYPED)
 
 bench: $(STAMP)
 	$(PY) -m bench

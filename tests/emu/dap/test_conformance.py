@@ -30,7 +30,7 @@ def node_modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("there is no node with npm (Debian packages nodejs, npm)")
     folder = tmp_path_factory.mktemp("npm")
     done = subprocess.run(
-        [npm, "install", "--no-audit", "--no-fund", "--prefix", str(folder), *PACKAGES],
+        [npm, "install", "--fetch-retries=0", "--no-audit", "--no-fund", "--prefix", str(folder), *PACKAGES],
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     if done.returncode:
