@@ -17,6 +17,7 @@ enum {
     SHORTEST = 1000, /* ms between advertisements, doubled while nothing is new */
     LONGEST = 60000,
     PATIENCE = 3 * SYS_SPREAD_TICK, /* without data before a request is made again, and up to twice that more */
+    BEHIND = 2000,                  /* the same, when somebody asked for or was sent a row that is here already */
     ENOUGH = 1,                     /* equal advertisements heard that make the own one needless */
     MOST_ASKED = 30,                /* requests without data after which another program may take the place */
     MOST_FAILED = 3                 /* times that all rows of a program came and its CRC was wrong */
@@ -58,9 +59,18 @@ static void something_is_new(void)
     }
 }
 
-static void ask_later(void)
+static void ask_later(uint16 wait)
 {
-    ask_at = clock + PATIENCE + draw(2 * PATIENCE);
+    ask_at = clock + wait + draw(2 * wait);
+}
+
+/* A row of the program that is coming is asked for, or here it is. Who is behind comes first, so that all go on together: a
+ * row is sent once to all, and a robot can use only the one that it is at. What is for those ahead is no answer. */
+static void put_off(uint8 their_row)
+{
+    if (their_row <= row) {
+        ask_later(their_row < row ? BEHIND : PATIENCE);
+    }
 }
 
 static void next_row(void)
@@ -133,7 +143,7 @@ static void on_advertisement(const uint8 *m)
             asked = 0;
             refresh(); /* the store may be that of a program that is not activated */
             next_row();
-            ask_later();
+            ask_later(PATIENCE);
             something_is_new();
         }
     } else if (their.version < have.version || (is_ours && is_active && !theirs_is_active)) {
@@ -158,8 +168,8 @@ static void on_request(const uint8 *m)
         } else if (their_row == wanted_row) {
             wanted_parts |= parts;
         }
-    } else if (version == want.version && version != 0 && program == identity(&want) && their_row <= row) {
-        ask_later(); /* the answer is for us too, or comes first */
+    } else if (version == want.version && version != 0 && program == identity(&want)) {
+        put_off(their_row);
     }
 }
 
@@ -175,7 +185,7 @@ static void on_data(const uint8 *m)
         return;
     }
     asked = 0;
-    ask_later();
+    put_off(their_row);
     if (their_row != row || (lacking & bit) == 0) {
         return;
     }
@@ -242,7 +252,7 @@ static bool ask(uint8 *m)
     m[6] = (uint8)identity(&want);
     m[7] = (uint8)(identity(&want) >> 8);
     asked += asked != MOST_ASKED;
-    ask_later();
+    ask_later(PATIENCE);
     return true;
 }
 
@@ -268,7 +278,7 @@ bool Sys_Spread(uint32 now, uint8 *message)
     if (wanted_parts != 0) {
         return send_part(message);
     }
-    if (want.version != 0 && ask_at - now - 1u >= 3u * PATIENCE) { /* now or before: later than that it never is */
+    if (want.version != 0 && ask_at - now - 1u >= 3u * BEHIND) { /* now or before: later than that it never is */
         return ask(message);
     }
     if (advertise_at != begun && (sint32)(now - advertise_at) >= 0) {
