@@ -15,11 +15,13 @@ firmware.elf: $(STAMP) FORCE
 run: firmware.elf
 	$(PY) -m emu run firmware.elf --seconds $(SECONDS)
 
-# types take a core for a minute: they are looked at beside the tests, and told, from mypy's cache, behind them
+# types take a core for a minute: they are looked at beside the tests, and told behind them whatever the tests say
 test: $(STAMP)
 	$(PY) -m ruff check emu toolchain arena openswarm tests bench setup.py
-	$(PY) -m mypy $(TYPED) >/dev/null & $(PY) -m pytest -n auto --dist worksteal tests $(PYTEST); status=$$?; wait; exit $$status
-	$(PY) -m mypy $(TYPED)
+	@mkdir -p build
+	@$(PY) -m mypy $(TYPED) >build/types 2>&1 & types=$$!; \
+	$(PY) -m pytest -n auto --dist worksteal tests $(PYTEST); tests=$$?; \
+	wait $$types; types=$$?; cat build/types; exit $$((tests != 0 || types != 0))
 
 bench: $(STAMP)
 	$(PY) -m bench

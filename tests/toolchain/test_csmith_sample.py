@@ -1,4 +1,4 @@
-"""Some thirty programs of the csmith campaign (`tests/fuzz/csmith_campaign.py`; `make campaigns` runs it at length)."""
+"""A few programs of the csmith campaign (`tests/fuzz/csmith_campaign.py`); each commit tries new ones there."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import pytest
 
 from tests.fuzz.csmith_campaign import SHAPES, available, examine
 
-SEEDS = [seed for seed in range(9000, 9032) if seed not in (9001, 9012, 9030)]
-"""Without three whose programs run on for more than 15,000,000 cycles at -O0."""
+SEEDS = [seed for seed in range(9000, 9014) if seed not in (9001, 9012)]
+"""Without two whose programs run on for more than 15,000,000 cycles at -O0."""
 
 
 @pytest.mark.skipif(not available(), reason="csmith is not installed (Debian package csmith)")
