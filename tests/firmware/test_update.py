@@ -40,20 +40,22 @@ def test_every_operation_may_be_the_last_and_damage_is_refused(tmp_path):
 
 def test_a_program_reaches_every_robot(tmp_path):
     """Two robots, three and thirty, ten hops from end to end, with 30 % of the messages lost: all have it, activate it
-    and run it; then they are quiet. Random messages do no harm."""
+    and run it; then they are quiet. So have all of ten among which a deaf one and a greedy one ask for rows without
+    end (nine within 10 min, or the program fails). Random messages do no harm."""
     said = on_host("swarm", tmp_path)
-    trials = re.findall(r"(\d+) robots, .* active ([\d.]+) s, .* then (\d+) in 300 s", said)
-    assert [int(robots) for robots, _, _ in trials] == [2, 3, 30] * 2
-    for robots, seconds, frames in trials:
+    trials = re.findall(r"(\d+) robots, .* (\d) nag: .* active ([\d.]+) s, .* then (\d+) in 300 s", said)
+    assert [(int(robots), int(nag)) for robots, nag, _, _ in trials] == [(2, 0), (3, 0), (30, 0), (12, 2)] * 2
+    for robots, nag, seconds, frames in trials:
         assert 0 < float(seconds) < 600
-        assert int(frames) < 9 * int(robots)  # one of 1, 2, 4 s and so on each, or none where others say the same
+        # One of 1, 2, 4 s and so on each, or none where others say the same.
+        assert nag != "0" or int(frames) < 9 * int(robots)
     assert said.endswith("whatever was said\n")
 
 
 def test_neighbours_may_say_anything(tmp_path):
     """150 histories under sanitizers: false facts, two programs of one version, requests for what is gone, power that
-    fails, flash that sticks, a clock that wraps. Programs and their parts stay whole, and a promise that nobody keeps
-    is given up."""
+    fails, flash that sticks, a clock that wraps. Programs and their parts stay whole, a promise that nobody keeps is
+    given up, and nothing makes a robot send without end once it hears no more."""
     said = on_host("hostile", tmp_path)
     assert int(re.search(r"(\d+) messages", said)[1]) > 100_000
 

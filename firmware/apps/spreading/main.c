@@ -14,6 +14,7 @@ enum { LOOK_MS = 20, HEARD = 16, CONFIRM_MS = 1000, RESTART_MS = 3000, OFFER_MS 
 static uint8 messages[HEARD][SYS_SPREAD_BYTES];
 static volatile uint8 first, last; /* of those that wait */
 static volatile bool has_host;
+static volatile bool is_waiting; /* a message for the neighbours: another would be old when its turn came */
 
 static bool keep(const uint8 *message, uint16 size)
 {
@@ -45,6 +46,24 @@ static bool on_host(uint16 pid, uint16 event, sys_event_data *data)
     return true;
 }
 
+static void on_leaving(uint8 *payload, uint8 size)
+{
+    (void)payload;
+    (void)size;
+    is_waiting = false;
+}
+
+static void send(const uint8 *message)
+{
+    is_waiting = true;
+    if (!Sys_Send_Neighbours(message, SYS_SPREAD_BYTES)) {
+        is_waiting = false;
+    }
+    if (has_host) {
+        Sys_Write_UART1(message, SYS_SPREAD_BYTES);
+    }
+}
+
 static void say(const char *what, uint16 version)
 {
     char line[LINE];
@@ -72,7 +91,7 @@ static void provide(uint16 version)
 static void spread(void *unused)
 {
     (void)unused;
-    uint16 running = Sys_Start_Update(), stored = 0;
+    uint16 running = Sys_Start_Update(), stored = 0, in_vain = 0;
     uint32 next = 0, restart_at = 0;
     bool is_active = false;
     say("runs", running);
@@ -85,17 +104,14 @@ static void spread(void *unused)
         uint8 message[SYS_SPREAD_BYTES];
         Sys_Sleep(LOOK_MS);
         for (; first != last; first = (uint8)((first + 1u) % HEARD)) {
-            Sys_Hear_Update(messages[first]);
+            Sys_Hear_Update(Sys_Get_SystemTime(), messages[first]);
         }
         uint32 now = Sys_Get_SystemTime();
         if (now >= CONFIRM_MS && running != 0) {
             Sys_Confirm_Update();
         }
-        if (now >= next && Sys_Spread(now, message)) {
-            Sys_Send_Neighbours(message, sizeof message);
-            if (has_host) {
-                Sys_Write_UART1(message, sizeof message);
-            }
+        if (now >= next && !is_waiting && Sys_Spread(now, message)) {
+            send(message);
             next = now + SYS_SPREAD_TICK;
         }
         uint16 version = Sys_Get_StoredVersion(&is_active);
@@ -106,10 +122,14 @@ static void spread(void *unused)
         if (Sys_Get_Selector() != 0 && version != 0 && !is_active && now >= OFFER_MS) {
             Sys_Offer_Activation(version);
         }
-        if (version != running && is_active) {
+        if (version != running && is_active && version != in_vain) {
             restart_at = restart_at != 0 ? restart_at : now + RESTART_MS; /* while the word goes round */
-            if (now >= restart_at && Sys_Get_NextVersion() != running) { /* else it has been tried, in vain */
-                __asm__ volatile("reset");
+            if (now >= restart_at) {
+                if (Sys_Get_NextVersion() != running) {
+                    __asm__ volatile("reset");
+                }
+                in_vain = version; /* it has been tried, or its flag sticks */
+                restart_at = 0;
             }
         }
     }
@@ -123,6 +143,7 @@ int main(void)
     Sys_Subscribe_to_Event(SYS_UART1_RECEIVED, 0, on_host, NULL);
     Sys_Set_RxProcessor(SYS_UART1, Sys_Frame_Rx);
     Sys_Set_TxProcessor(SYS_UART1, Sys_Spread_Tx);
+    Sys_Set_LeavingProcessor(on_leaving);
     const sys_process_config thread = {.entry = spread, .stack = STACK};
     SYS_ASSERT(Sys_Start_ProcessWith(&thread) != 0);
     Sys_Start_Kernel();

@@ -1,6 +1,6 @@
-/* One robot among neighbours that say anything: true and false advertisements, requests, data of every program in any order,
- * half of them of two programs with one version; power fails in the middle of operations, clocks wrap, bytes of flash stick.
- * Whatever has happened, only whole programs are called, and only parts of whole programs are sent. */
+/* One robot among neighbours that say anything: true and false advertisements, requests, data of every program in any
+ * order, half of them of two programs with one version; power fails in the middle of operations, clocks wrap, bytes of
+ * flash stick. Whatever has happened, only whole programs are called, and only parts of whole programs are sent. */
 #include "update.c"
 
 #include "spread.c"
@@ -22,11 +22,11 @@ static jmp_buf power_off;
 static int cut_in, history;
 static const uint8 *stuck; /* a row of which a byte does not change */
 static bool sticks;
-static uint8 worn_stores; /* bit n: nothing in store n changes any more */
+static uint8 worn_stores;  /* bit n: nothing in store n changes any more */
 static uint16 stuck_flags; /* bits of all flags that stay as they are */
 static long changes;
 static uint32 seed, now;
-static long sent, calls, reads;
+static long sent, calls, reads, kinds[4]; /* kinds: what it has sent, by the upper three bits */
 
 static uint32 chance(uint32 below)
 {
@@ -100,7 +100,7 @@ uint16_t hal_update_flags(uint8_t store)
 
 void hal_update_clear(uint8_t store, uint16_t bits)
 {
-    flags[store] &= (uint16)~(bits & ~stuck_flags);
+    flags[store] &= (uint16) ~(bits & ~stuck_flags);
     changes++;
     operated();
 }
@@ -153,7 +153,10 @@ static void tick(void)
     uint8 m[SYS_SPREAD_BYTES];
     long before = reads;
     now += SYS_SPREAD_TICK;
-    bool is_known = !Sys_Spread(now, m) || (m[0] & KINDS) != DATA;
+    bool speaks = Sys_Spread(now, m), is_known = !speaks || (m[0] & KINDS) != DATA;
+    if (speaks) {
+        kinds[m[0] >> 5 & 3]++;
+    }
     for (int n = 0; n < PROGRAMS && !is_known; n++) {
         uint8 r = m[0] & ROW;
         int at = (m[1] >> 3) * PART, size = at + PART <= HAL_UPDATE_ROW ? PART : HAL_UPDATE_ROW - at;
@@ -175,7 +178,7 @@ static void hear_advertisement(sys_update facts, bool active)
     advertise(m);
     have = own;
     is_active = own_active;
-    Sys_Hear_Update(m);
+    Sys_Hear_Update(now, m);
 }
 
 static void hear_part(int n, uint8 r, uint8 part)
@@ -185,7 +188,7 @@ static void hear_part(int n, uint8 r, uint8 part)
     uint8 whole[PARTS * PART] = {0};
     memcpy(whole, programs[n].rows[r], HAL_UPDATE_ROW);
     memcpy(m + DATA_HEADER, whole + part * PART, PART);
-    Sys_Hear_Update(m);
+    Sys_Hear_Update(now, m);
 }
 
 /* What it asks for, as a neighbour that has it would send it. */
@@ -226,7 +229,7 @@ static void something(void)
         m[2] = (uint8)(have.version >> 8);
         m[6] = (uint8)identity(&have);
         m[7] = (uint8)(identity(&have) >> 8);
-        Sys_Hear_Update(m);
+        Sys_Hear_Update(now, m);
         break;
     case 4:
         hear_part(n, (uint8)chance(facts.rows), (uint8)chance(PARTS));
@@ -254,7 +257,7 @@ static void something(void)
         }
         break;
     case 13:
-        Sys_Hear_Update(m);
+        Sys_Hear_Update(now, m);
         break;
     default:
         for (uint32 ticks = chance(6); ticks-- != 0;) {
@@ -274,25 +277,79 @@ static void begin_history(bool with_stuck_bytes)
     draw_programs();
 }
 
-/* A promise that nobody keeps does not shut out the program that is really there. */
-static void promise(void)
+enum {
+    ADVERTISED = ADVERTISEMENT >> 5 & 3,
+    REQUESTED = REQUEST >> 5 & 3,
+    SENT = DATA >> 5 & 3,
+    MINUTE = 60000 / SYS_SPREAD_TICK
+};
+
+static void forget_kinds(void)
+{
+    memset(kinds, 0, sizeof kinds);
+}
+
+/* Whatever it has heard: when nobody says anything any more it says little, and after some minutes that it is there. */
+static void silence(void)
+{
+    forget_kinds();
+    for (int n = 0; n < 10 * MINUTE; n++) {
+        tick();
+    }
+    check(kinds[REQUESTED] <= MOST_ASKED && kinds[SENT] <= PARTS && kinds[ADVERTISED] <= 20,
+          "in silence it falls silent");
+    forget_kinds();
+    for (int n = 0; n < 10 * MINUTE; n++) {
+        tick();
+    }
+    check(kinds[REQUESTED] == 0 && kinds[SENT] == 0 && kinds[ADVERTISED] <= 11, "and stays so");
+}
+
+static void hear_request(int n, uint8 their_row, uint32 parts)
+{
+    sys_update facts = programs[n].facts;
+    uint16 program = identity(&facts);
+    uint8 m[SYS_SPREAD_BYTES] = {(uint8)(REQUEST | their_row),
+                                 (uint8)facts.version,
+                                 (uint8)(facts.version >> 8),
+                                 (uint8)parts,
+                                 (uint8)(parts >> 8),
+                                 (uint8)(parts >> 16),
+                                 (uint8)program,
+                                 (uint8)(program >> 8)};
+    Sys_Hear_Update(now, m);
+}
+
+/* A promise that nobody keeps does not shut out the program that is really there, however often it is made. */
+static void promise(bool is_repeated)
 {
     sys_update false_one = {65535, HAL_UPDATE_ROWS, 1};
     hear_advertisement(false_one, false);
     check(want.version == 65535, "it is believed at first");
-    for (int n = 0; n < 1000 && have.version != programs[PROGRAMS - 1].facts.version; n++) {
+    for (int n = 0; n < 4 * MINUTE && have.version != programs[PROGRAMS - 1].facts.version; n++) {
         tick();
+        if (is_repeated) {
+            hear_advertisement(false_one, false);
+        }
         hear_advertisement(programs[PROGRAMS - 1].facts, false);
         hear_what_is_wanted(8);
     }
-    check(have.version == programs[PROGRAMS - 1].facts.version, "the true one comes in two minutes");
+    check(have.version == programs[PROGRAMS - 1].facts.version, "the true one comes in four minutes");
+    forget_kinds();
+    for (int n = 0; n < 60 * MINUTE; n++) {
+        tick();
+        hear_advertisement(false_one, false);
+    }
+    check(want.version == 65535 && kinds[REQUESTED] <= 60 * 60 * 1000 / (PATIENCE << DOUBLINGS),
+          "it is asked for seldom");
 }
 
 /* Of two programs of one version the one that was begun comes whole, whatever is heard of the other before. */
 static void namesakes(int wanted, int other)
 {
     sys_update facts = programs[other].facts;
-    check(facts.version == programs[wanted].facts.version && facts.crc != programs[wanted].facts.crc, "two of one version");
+    check(facts.version == programs[wanted].facts.version && facts.crc != programs[wanted].facts.crc,
+          "two of one version");
     hear_advertisement(programs[wanted].facts, false);
     for (int n = 0; n < 100 && have.version != facts.version; n++) {
         for (uint8 part = 0; part < PARTS && row < facts.rows; part++) {
@@ -313,7 +370,7 @@ static void namesakes(int wanted, int other)
         want = facts, row = r, lacking = ALL_PARTS;
         ask(m);
         want = own;
-        Sys_Hear_Update(m);
+        Sys_Hear_Update(now, m);
         check(wanted_parts == 0, "requests are for one program");
     }
 }
@@ -335,12 +392,86 @@ static int serve(int n, int ticks)
     return requests;
 }
 
+static void take(int n)
+{
+    serve(n, 4000);
+    check(have.version == programs[n].facts.version && want.version == 0, "it comes");
+}
+
+/* Who asks for a row for ever, of which it has none or all, gets little, and what others ask for and what is due goes
+ * on. */
+static void nagged(bool for_all_rows)
+{
+    int n = PROGRAMS - 1, rows = programs[n].facts.rows, last = rows - 1, requests = 0;
+    uint32 got = 0;
+    take(n);
+    forget_kinds();
+    for (int t = 0; t < 60 * MINUTE; t++) {
+        if (t % 6 == 0) {
+            hear_request(n, (uint8)(for_all_rows ? requests % rows : 0), ALL_PARTS);
+            requests++;
+        }
+        tick();
+    }
+    check(kinds[SENT] <= requests + (MOST_SERVED + PARTS + 3600000 / FORGIVEN) * (for_all_rows ? rows : 1),
+          "one part for a request");
+    check(kinds[ADVERTISED] >= 30, "it advertises all the same");
+    for (int t = 0; t < 60 * MINUTE && got != ALL_PARTS; t++) {
+        uint8 m[SYS_SPREAD_BYTES];
+        if (t % 6 == 0) {
+            hear_request(n, 0, ALL_PARTS);
+        }
+        if (t % 12 == 3) {
+            hear_request(n, (uint8)last, ALL_PARTS & ~got);
+        }
+        now += SYS_SPREAD_TICK;
+        if (Sys_Spread(now, m) && (m[0] & KINDS) == DATA && (m[0] & ROW) == last) {
+            got |= (uint32)1 << (m[1] >> 3);
+        }
+    }
+    check(got == ALL_PARTS, "who lacks the last row has it in an hour");
+    wanted_parts = 0;
+    hear_request(n, 0, 0);
+    check(wanted_parts == 0, "who asks for no parts gets none");
+}
+
+/* Who is behind comes first, but not for ever. */
+static void pushed(void)
+{
+    int n = PROGRAMS - 1;
+    hear_advertisement(programs[n].facts, false);
+    for (int t = 0; t < MINUTE && row == 0; t++) {
+        tick();
+        hear_what_is_wanted(1000);
+    }
+    check(row == 1, "it is at the second row");
+    forget_kinds();
+    for (int t = 0; t < POLITENESS / SYS_SPREAD_TICK; t++) {
+        hear_part(n, 0, (uint8)chance(PARTS));
+        tick();
+    }
+    check(kinds[REQUESTED] == 0, "it lets others go first");
+    for (int t = 0; t < POLITENESS / SYS_SPREAD_TICK; t++) {
+        hear_part(n, 0, (uint8)chance(PARTS));
+        hear_request(n, 1, ALL_PARTS);
+        tick();
+    }
+    check(kinds[REQUESTED] > 1, "then it asks, whoever else is served or asks");
+    forget_kinds();
+    for (int t = 0; t < 10 * MINUTE; t++) {
+        hear_request(n, 0, ALL_PARTS);
+        tick();
+    }
+    check(kinds[REQUESTED] <= MOST_ASKED, "requests that nobody answers are no reason to go on, nor to wait");
+}
+
 /* Flash that holds nothing any more is not asked for, nor written, without end; the store that does is used. */
 static void worn_out(void)
 {
     worn_stores = 1;
     serve(PROGRAMS - 1, 4000);
-    check(have.version == programs[PROGRAMS - 1].facts.version, "where one store does not change the other one is used");
+    check(have.version == programs[PROGRAMS - 1].facts.version,
+          "where one store does not change the other one is used");
     begin_history(false);
     boot();
     worn_stores = 3;
@@ -363,12 +494,6 @@ static void false_sum(void)
     programs[PROGRAMS - 1].facts.crc ^= 1;
     serve(PROGRAMS - 1, 4000);
     check(have.version == programs[PROGRAMS - 1].facts.version, "but the true one is");
-}
-
-static void take(int n)
-{
-    serve(n, 4000);
-    check(have.version == programs[n].facts.version, "it comes");
 }
 
 /* Flags that do not change: what cannot be tried is not in the way of the one that works, nor of the next. */
@@ -394,15 +519,55 @@ static void stuck_bits(void)
     hear_advertisement(programs[THIRD].facts, true);
     changes = 0;
     hear_advertisement(programs[THIRD].facts, true);
-    check(changes == 0, "nor is it tried each time that somebody says so");
+    check(!Sys_Activate_Update(3) && !Sys_Offer_Activation(3) && changes == 0,
+          "nor is it tried each time that somebody says so");
     stuck_flags = 0;
-    check(Sys_Activate_Update(3) && Sys_Start_Update() == 3, "it runs");
+    check(!Sys_Activate_Update(3) && Sys_Start_Update() == 1 && Sys_Activate_Update(3), "but at the next start");
+    changes = 0;
+    check(Sys_Activate_Update(3) && changes == 0, "what is done is not done again");
+    check(Sys_Start_Update() == 3, "it runs");
     stuck_flags = NOT_CONFIRMED;
     check(!Sys_Confirm_Update(), "what is not confirmed is not said to be");
+    changes = 0;
+    check(!Sys_Confirm_Update() && changes == 0, "nor is that tried each time");
     stuck_flags = 0;
 }
 
-int main(void)
+/* Who is on trial begins nothing, however long that is and whatever it hears; then it does. */
+static void long_trial(void)
+{
+    take(0);
+    check(Sys_Offer_Activation(1), "activated");
+    boot();
+    check(running != NONE, "on trial");
+    changes = 0;
+    check(serve(PROGRAMS - 1, 60 * MINUTE) == 0 && changes == 0, "an hour of it");
+    check(Sys_Confirm_Update(), "confirmed");
+    take(PROGRAMS - 1);
+}
+
+/* There is nothing above the last version, and nothing below it comes back. */
+static void last_versions(void)
+{
+    for (int n = 0; n < 4; n++) {
+        programs[n].facts.version = (uint16)(n == 3 ? 1 : 65533 + n);
+    }
+    for (int n = 0; n < 3; n++) {
+        take(n);
+        check(Sys_Offer_Activation(programs[n].facts.version), "activated");
+        boot();
+        check(Sys_Confirm_Update() && have.version == programs[n].facts.version, "it runs");
+    }
+    changes = 0;
+    for (int n = 0; n < 4; n++) {
+        check(serve(n, 4000) == 0, "nothing is newer than the last");
+    }
+    sys_update nothing = {0, 0, 0xFFFFFFFF};
+    hear_advertisement(nothing, false);
+    check(changes == 0 && have.version == 65535, "nor is nothing");
+}
+
+static void histories(void)
 {
     while (history < HISTORIES) {
         static int steps;
@@ -413,22 +578,53 @@ int main(void)
         for (boot(); steps < STEPS; steps++) {
             something();
         }
+        cut_in = NEVER;
+        silence();
     }
-    begin_history(false);
+}
+
+int main(void)
+{
+    histories();
+    for (int n = 0; n < 10; n++) {
+        begin_history(false);
+        boot();
+        switch (n) {
+        case 0:
+        case 1:
+            promise(n != 0);
+            break;
+        case 2:
+            namesakes(6, 7);
+            break;
+        case 3:
+            worn_out();
+            break;
+        case 4:
+            false_sum();
+            break;
+        case 5:
+            stuck_bits();
+            break;
+        case 6:
+        case 7:
+            while (programs[PROGRAMS - 1].facts.rows < 3) {
+                draw_programs();
+            }
+            nagged(n == 7);
+            break;
+        case 8:
+            long_trial();
+            break;
+        default:
+            last_versions();
+        }
+    }
+    do {
+        begin_history(false);
+    } while (programs[PROGRAMS - 1].facts.rows < 3);
     boot();
-    promise();
-    begin_history(false);
-    boot();
-    namesakes(6, 7);
-    begin_history(false);
-    boot();
-    worn_out();
-    begin_history(false);
-    boot();
-    false_sum();
-    begin_history(false);
-    boot();
-    stuck_bits();
+    pushed();
     printf("%ld messages, %ld calls\n", sent, calls);
     return 0;
 }

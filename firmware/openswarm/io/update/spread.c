@@ -17,24 +17,34 @@ enum {
     SHORTEST = 1000, /* ms between advertisements, doubled while nothing is new */
     LONGEST = 60000,
     PATIENCE = 3 * SYS_SPREAD_TICK, /* without data before a request is made again, and up to twice that more */
-    BEHIND = 2000,                  /* the same, when somebody asked for or was sent a row that is here already */
-    ENOUGH = 1,                     /* equal advertisements heard that make the own one needless */
-    MOST_ASKED = 30,                /* requests without data after which another program may take the place */
-    MOST_FAILED = 3                 /* times that all rows of a program came and its CRC was wrong */
+    BEHIND = 2000,                  /* the same, when somebody was sent a row that is here already */
+    POLITENESS = 20000, /* ms without a part of use after which a robot asks for its row whoever else is served */
+    DOUBLINGS = 3,      /* of PATIENCE, while no data come */
+    MOST_ASKED = 16,    /* requests in vain: then another program may take the place, and there are no more of them */
+    MOST_SERVED = 180,  /* parts of a row; then a request for it is answered by one part */
+    FORGIVEN = 16000,   /* ms after which a part counts no more, of each row */
+    ENOUGH = 1,         /* equal advertisements heard that make the own one needless */
+    MOST_FAILED = 3     /* times that all rows of a program came and its CRC was wrong */
 };
 
+/* Neighbours are not trusted to stop, or to get on: no wait for them is without end, and no answer takes what others
+ * need. */
 static const uint32 ALL_PARTS = 0xFFFFFFFFu >> (32 - PARTS);
 
 static sys_update have; /* version 0: nothing */
 static bool is_active;
-static sys_update want; /* version 0: nothing */
+static sys_update want;   /* version 0: nothing */
+static sys_update vain;   /* what gave way to `want`, since nobody sent it */
 static sys_update failed; /* what failed last, */
 static uint8 failures;    /* and how often */
-static uint8 row, asked, buffer[PARTS * PART];
+static uint8 row, asked, doublings, buffer[PARTS * PART];
+static bool is_asking, is_polite;
 static uint32 lacking; /* parts of `row`; bit n: part n */
-static uint8 wanted_row;
-static uint32 wanted_parts; /* of `wanted_row`, by others */
-static uint32 clock, interval, begun, advertise_at, ask_at;
+static uint8 wanted_row, part_sent;
+static uint32 wanted_parts;           /* of `wanted_row`, by others */
+static uint8 served[HAL_UPDATE_ROWS]; /* parts of each row, by whomever, less what has been forgiven */
+static uint32 forgiven_at;
+static uint32 clock, interval, begun, advertise_at, ask_at, useful_at;
 static uint8 heard;
 static uint32 noise;
 
@@ -59,18 +69,33 @@ static void something_is_new(void)
     }
 }
 
-static void ask_later(uint16 wait)
+static bool is_due(uint32 moment)
 {
-    ask_at = clock + wait + draw(2 * wait);
+    return (sint32)(clock - moment) >= 0;
 }
 
-/* A row of the program that is coming is asked for, or here it is. Who is behind comes first, so that all go on together: a
- * row is sent once to all, and a robot can use only the one that it is at. What is for those ahead is no answer. */
-static void put_off(uint8 their_row)
+static void ask_in(uint16 wait)
 {
-    if (their_row <= row) {
-        ask_later(their_row < row ? BEHIND : PATIENCE);
+    ask_at = clock + wait + draw(2 * wait);
+    is_asking = true;
+}
+
+/* Others are served: the own request is not made sooner than it would be, nor put off for ever. */
+static void put_off(uint16 wait)
+{
+    is_polite = is_polite && clock - useful_at < POLITENESS;
+    if (is_asking && is_polite) {
+        uint32 before = ask_at;
+        ask_in(wait);
+        ask_at = (sint32)(ask_at - before) < 0 ? before : ask_at;
     }
+}
+
+static void go_on(void)
+{
+    asked = doublings = 0;
+    useful_at = clock;
+    ask_in(PATIENCE);
 }
 
 static void next_row(void)
@@ -80,11 +105,14 @@ static void next_row(void)
         missing >>= 1;
     }
     lacking = ALL_PARTS;
+    is_polite = true; /* until it has waited for too long: then for this row no more */
+    go_on();
 }
 
 static void refresh(void)
 {
     wanted_parts = 0; /* of what was here before */
+    memset(served, 0, sizeof served);
     if (!Sys_Get_StoredUpdate(&have, &is_active)) {
         have = (sys_update){0, 0, 0};
     }
@@ -93,7 +121,7 @@ static void refresh(void)
 void Sys_Start_Spreading(uint16 number)
 {
     noise = number * 2654435761u;
-    want.version = 0;
+    want.version = vain.version = 0;
     failures = 0;
     refresh();
     begin_interval(SHORTEST);
@@ -107,12 +135,14 @@ uint16 Sys_Get_StoredVersion(bool *is_activated)
 
 bool Sys_Offer_Activation(uint16 version)
 {
-    if (have.version != version || version == 0 || !Sys_Activate_Update(version)) {
+    if (have.version != version || version == 0) {
         return false;
     }
-    is_active = true;
-    something_is_new();
-    return true;
+    if (!is_active) {
+        something_is_new();
+    }
+    is_active = true; /* the word goes round, even if the flag sticks here */
+    return Sys_Activate_Update(version);
 }
 
 static bool is_same(const sys_update *one, const sys_update *other)
@@ -128,7 +158,8 @@ static uint16 identity(const sys_update *facts)
 static bool is_newer(const sys_update *their)
 {
     return their->version > have.version && (failures < MOST_FAILED || !is_same(their, &failed)) &&
-           (their->version > want.version || (asked == MOST_ASKED && !is_same(their, &want)));
+           ((their->version > want.version && !is_same(their, &vain)) ||
+            (asked == MOST_ASKED && !is_same(their, &want)));
 }
 
 static void on_advertisement(const uint8 *m)
@@ -138,22 +169,37 @@ static void on_advertisement(const uint8 *m)
     bool theirs_is_active = (m[0] & 1u) != 0;
     bool is_ours = is_same(&their, &have);
     if (is_newer(&their)) {
+        sys_update before = want;
         if (Sys_Begin_Update(&their)) {
+            vain =
+                asked == MOST_ASKED ? before : vain; /* not again before this one has ended, or been in vain as well */
             want = their;
-            asked = 0;
             refresh(); /* the store may be that of a program that is not activated */
             next_row();
-            ask_later(PATIENCE);
             something_is_new();
+        }
+    } else if (want.version != 0 && is_same(&their, &want)) {
+        if (!is_asking) { /* once more: who has it is there, perhaps */
+            ask_in(PATIENCE << DOUBLINGS);
         }
     } else if (their.version < have.version || (is_ours && is_active && !theirs_is_active)) {
         something_is_new(); /* for them */
     } else if (is_ours && theirs_is_active && !is_active) {
         (void)Sys_Offer_Activation(have.version);
-        is_active = true; /* a flag that sticks is not tried at each word of it */
     } else if (is_ours) {
         heard += heard != 0xFF;
     }
+}
+
+/* Somebody who does not get on, or has the row, may ask for it for ever. A part for a request leaves the others theirs,
+ * and who really lacks it has it some time. */
+static uint32 allowed(uint8 their_row, uint32 parts)
+{
+    uint8 part = (uint8)draw(PARTS);
+    while ((parts >> part & 1u) == 0) {
+        part = part + 1u < PARTS ? (uint8)(part + 1u) : 0;
+    }
+    return served[their_row] < MOST_SERVED ? parts : (uint32)1 << part;
 }
 
 static void on_request(const uint8 *m)
@@ -161,16 +207,26 @@ static void on_request(const uint8 *m)
     uint16 version = (uint16)(m[1] | (uint16)m[2] << 8), program = (uint16)(m[6] | (uint16)m[7] << 8);
     uint32 parts = (m[3] | (uint32)m[4] << 8 | (uint32)m[5] << 16) & ALL_PARTS;
     uint8 their_row = m[0] & ROW;
-    if (version == have.version && version != 0 && program == identity(&have) && their_row < have.rows) {
+    if (parts == 0 || version == 0) {
+        return;
+    }
+    if (version == have.version && program == identity(&have) && their_row < have.rows) {
+        parts = allowed(their_row, parts);
         if (wanted_parts == 0 || their_row < wanted_row) { /* who is behind first: the others fill their gaps as well */
             wanted_row = their_row;
             wanted_parts = parts;
+            part_sent = (uint8)draw(PARTS); /* so that two who have the row begin with different parts */
         } else if (their_row == wanted_row) {
             wanted_parts |= parts;
         }
-    } else if (version == want.version && version != 0 && program == identity(&want)) {
-        put_off(their_row);
+    } else if (version == want.version && program == identity(&want) && their_row == row && (lacking & ~parts) == 0) {
+        put_off(PATIENCE); /* the answer will do here as well */
     }
+}
+
+static void count_served(uint8 their_row)
+{
+    served[their_row] += served[their_row] != 0xFF;
 }
 
 static void on_data(const uint8 *m)
@@ -178,17 +234,23 @@ static void on_data(const uint8 *m)
     uint8 their_row = m[0] & ROW, part = m[1] >> 3;
     uint16 program = (uint16)((uint16)(m[1] & 7u) << 8 | m[2]);
     uint32 bit = (uint32)1 << part;
-    if (program == identity(&have) && their_row == wanted_row) {
-        wanted_parts &= ~bit; /* somebody else has sent it */
+    if (have.version != 0 && program == identity(&have)) { /* somebody else has sent it */
+        count_served(their_row);
+        if (their_row == wanted_row) {
+            wanted_parts = served[their_row] < MOST_SERVED ? wanted_parts & ~bit : 0;
+        }
     }
     if (want.version == 0 || program != identity(&want)) {
         return;
     }
-    asked = 0;
-    put_off(their_row);
+    doublings = 0;
     if (their_row != row || (lacking & bit) == 0) {
+        if (their_row <= row) { /* who is behind comes first, so that all go on together: a row is sent once to all */
+            put_off(their_row < row ? BEHIND : PATIENCE);
+        }
         return;
     }
+    go_on();
     memcpy(buffer + part * PART, m + DATA_HEADER, PART);
     lacking &= ~bit;
     if (lacking != 0) {
@@ -205,12 +267,13 @@ static void on_data(const uint8 *m)
         failures = (uint8)(is_same(&want, &failed) ? failures + (failures != MOST_FAILED) : 1);
         failed = want;
     }
-    want.version = 0;
+    want.version = vain.version = 0;
     begin_interval(SHORTEST);
 }
 
-void Sys_Hear_Update(const uint8 *message)
+void Sys_Hear_Update(uint32 now, const uint8 *message)
 {
+    clock = now;
     switch (message[0] & KINDS) {
     case ADVERTISEMENT:
         on_advertisement(message);
@@ -228,11 +291,13 @@ void Sys_Hear_Update(const uint8 *message)
 
 static bool send_part(uint8 *m)
 {
-    uint8 whole[PARTS * PART] = {0}, part = 0;
-    while ((wanted_parts >> part & 1u) == 0) {
-        part++;
-    }
+    uint8 whole[PARTS * PART] = {0}, part = part_sent;
+    do { /* in turn: none is left out because others are asked for again */
+        part = part + 1u < PARTS ? (uint8)(part + 1u) : 0;
+    } while ((wanted_parts >> part & 1u) == 0);
+    part_sent = part;
     wanted_parts &= ~((uint32)1 << part);
+    count_served(wanted_row);
     Sys_Get_UpdateRow(wanted_row, whole);
     m[0] = (uint8)(DATA | wanted_row);
     m[1] = (uint8)(part << 3 | identity(&have) >> 8);
@@ -252,7 +317,9 @@ static bool ask(uint8 *m)
     m[6] = (uint8)identity(&want);
     m[7] = (uint8)(identity(&want) >> 8);
     asked += asked != MOST_ASKED;
-    ask_later(PATIENCE);
+    ask_in((uint16)(PATIENCE << doublings));
+    doublings += doublings != DOUBLINGS;
+    is_asking = asked != MOST_ASKED; /* then only when somebody says that it has the program */
     return true;
 }
 
@@ -268,6 +335,14 @@ static bool advertise(uint8 *m)
     return true;
 }
 
+static void forgive(void)
+{
+    forgiven_at = clock;
+    for (uint8 r = 0; r < HAL_UPDATE_ROWS; r++) {
+        served[r] -= served[r] != 0;
+    }
+}
+
 bool Sys_Spread(uint32 now, uint8 *message)
 {
     clock = now;
@@ -275,15 +350,18 @@ bool Sys_Spread(uint32 now, uint8 *message)
     if (now - begun >= interval) {
         begin_interval(interval * 2 < LONGEST ? interval * 2 : LONGEST);
     }
-    if (wanted_parts != 0) {
-        return send_part(message);
+    if (now - forgiven_at >= FORGIVEN) {
+        forgive();
     }
-    if (want.version != 0 && ask_at - now - 1u >= 3u * BEHIND) { /* now or before: later than that it never is */
+    /* What is seldom goes first: parts may be asked for without end. */
+    if (advertise_at != begun && is_due(advertise_at)) {
+        advertise_at = begun; /* once an interval */
+        if (heard < ENOUGH) {
+            return advertise(message);
+        }
+    }
+    if (want.version != 0 && is_asking && is_due(ask_at)) {
         return ask(message);
     }
-    if (advertise_at != begun && (sint32)(now - advertise_at) >= 0) {
-        advertise_at = begun; /* once an interval */
-        return heard < ENOUGH && advertise(message);
-    }
-    return false;
+    return wanted_parts != 0 && send_part(message);
 }

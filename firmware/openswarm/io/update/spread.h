@@ -5,7 +5,7 @@
  *
  *     Sys_Start_Spreading(number);                  after Sys_Start_Update; number: any, but not all alike
  *     Sys_Spread(now, message)                      every SYS_SPREAD_TICK ms; true: send these eight bytes
- *     Sys_Hear_Update(message)                      with each message of this kind (SYS_SPREAD_KIND set in its first byte)
+ *     Sys_Hear_Update(now, message)                 with each message of this kind (SYS_SPREAD_KIND set in its first byte)
  *     Sys_Offer_Activation(version)                 on one robot, when it is to be: all that have the version whole follow
  *
  * A host that brings a program (`openswarm flash`) is a neighbour at the end of a UART: Sys_Frame_Rx and Sys_Spread_Tx are its
@@ -24,10 +24,10 @@ extern "C" {
 enum { SYS_SPREAD_BYTES = 8, SYS_SPREAD_KIND = 0x80, SYS_SPREAD_TICK = 120 /* ms: a frame of eight bytes by infra-red is 105 */ };
 
 void Sys_Start_Spreading(uint16 number);
-/* ms of any clock that does not jump. One message at a time: the caller sends it before it asks again. */
+/* now: ms of any clock that does not jump, one for both. One message at a time: the caller sends it before it asks again. */
 bool Sys_Spread(uint32 now, uint8 *message);
-void Sys_Hear_Update(const uint8 *message);
-/* false: there is no such program here that is whole. */
+void Sys_Hear_Update(uint32 now, const uint8 *message);
+/* false: there is no such program here that is whole; or its flag sticks, and only the others are told. */
 bool Sys_Offer_Activation(uint16 version);
 /* The newest program that is whole here, or 0, and whether it is activated. */
 uint16 Sys_Get_StoredVersion(bool *is_active);

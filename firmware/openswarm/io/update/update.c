@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Two stores, one of which always keeps the program that works (README.md has the order of writes and why it is safe). */
+/* Two stores, one of which always keeps the program that works (README.md: the order of writes and why it is safe). */
 #include "update.h"
 
 #include <string.h>
@@ -12,8 +12,10 @@ enum { FACTS = 8, MARK = 0xA7, NONE = 0xFF, WRITES = 3 /* before a row counts as
 static uint8 target = NONE; /* store that is being filled */
 static uint8 running = NONE;
 static uint8 stored = NONE; /* store that Sys_Get_StoredUpdate found last */
-static uint8 worn;    /* bit n: store n has not held what was written since the last start: nothing more is */
-static uint8 refused; /* bit n: the program of store n could not be tried at the last start */
+/* Since the last start: */
+static uint8 worn;                       /* bit n: store n has not held what was written, so nothing more is */
+static uint8 refused;                    /* bit n: the program of store n could not be tried */
+static uint16 frozen[HAL_UPDATE_STORES]; /* flags that did not change when they should have, and are not tried again */
 static sys_update coming;
 static uint32 missing;
 
@@ -93,7 +95,8 @@ static uint8 choose(sys_update *best)
     for (uint8 store = 0; store < HAL_UPDATE_STORES; store++) {
         sys_update facts;
         uint16 flags = hal_update_flags(store);
-        bool may_start = (refused >> store & 1u) == 0 && (flags & NOT_ACTIVE) == 0 && ((flags & NOT_CONFIRMED) == 0 || (flags & TRIES) != 0);
+        bool may_start = (refused >> store & 1u) == 0 && (flags & NOT_ACTIVE) == 0 &&
+                         ((flags & NOT_CONFIRMED) == 0 || (flags & TRIES) != 0);
         if (may_start && is_whole(store, &facts) && (chosen == NONE || facts.version > best->version)) {
             chosen = store;
             *best = facts;
@@ -125,10 +128,13 @@ static bool write_store(uint8 store, uint8 row, const uint8 *bytes)
     return false;
 }
 
-/* The flags of a store; whether they are now. */
+/* Whether these flags are 0, now. */
 static bool clear(uint8 store, uint16 bits)
 {
-    hal_update_clear(store, bits);
+    if ((hal_update_flags(store) & bits & (uint16)~frozen[store]) != 0) {
+        hal_update_clear(store, bits);
+        frozen[store] |= hal_update_flags(store) & bits;
+    }
     return (hal_update_flags(store) & bits) == 0;
 }
 
@@ -153,6 +159,7 @@ bool Sys_Begin_Update(const sys_update *facts)
     stored = stored == store ? NONE : stored;
     hal_update_erase(store, 0); /* first: from here on the store holds nothing, whatever its flags say */
     hal_update_renew(store);
+    frozen[store] = 0;
     if (hal_update_flags(store) != ALL) {
         worn |= (uint8)(1u << store);
         return false;
@@ -243,7 +250,8 @@ uint16 Sys_Get_NextVersion(void)
     return choose(&facts) == NONE ? 0 : facts.version;
 }
 
-/* Before the program can do any harm: tries that are not counted would go on for ever. A bit that sticks leaves the others. */
+/* Before the program can do any harm: tries that are not counted would go on for ever. A bit that sticks leaves the
+ * others. */
 static bool count_try(uint8 store)
 {
     uint16 tries = hal_update_flags(store) & TRIES;
@@ -272,6 +280,7 @@ uint16 Sys_Start_Update(void)
 {
     sys_update facts;
     worn = refused = 0;
+    memset(frozen, 0, sizeof frozen);
     while ((running = choose(&facts)) != NONE) {
         if ((is_confirmed(running) || count_try(running)) && install(running, facts.rows)) {
             hal_update_run();

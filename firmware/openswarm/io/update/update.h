@@ -46,14 +46,14 @@ bool Sys_Get_StoredUpdate(sys_update *facts, bool *is_active);
 /* Copies a row of the program that the last call before has told. */
 void Sys_Get_UpdateRow(uint8 row, uint8 *bytes);
 /* The program with this version is to run from the next start on. false: there is none that is whole, or its
- * flag sticks. */
+ * flag sticks, which is not tried again until the next start. */
 bool Sys_Activate_Update(uint16 version);
 /* The version that the next start calls, or 0. One that did not start well is stored and activated, and not it. */
 uint16 Sys_Get_NextVersion(void);
 /* Puts the program that is to run where it belongs and calls it; where its tries cannot be counted, or its rows not written,
  * the one before. Its version, or 0: none was called. */
 uint16 Sys_Start_Update(void);
-/* The program that was called last works. false: none was, or its flag sticks. */
+/* The program that was called last works. false: none was, or its flag sticks, as above. */
 bool Sys_Confirm_Update(void);
 
 #ifdef __cplusplus
