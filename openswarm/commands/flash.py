@@ -8,8 +8,9 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Final
+from typing import Final, Protocol
 
+from emu.image import Image
 from emu.loader import load_image
 from emu.status import DONE, FAULT
 from openswarm.commands import made_parser
@@ -63,75 +64,140 @@ def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says. Raises ValueError or OSError for a bad image or port."""
     image = load_image(options.image)
     if is_program(image):
-        return _spread(options, program_of(image))
+        return _with_robot(options, _Spreading(options, program_of(image)))
     if options.store:
         raise ValueError(f"{image.path}: --store is for programs that `openswarm program` has built")
     checked(image)
     for what in left_out(image):
         print(f"openswarm flash: note: {what} of the image are not written; a programmer does that", file=sys.stderr)
+    return _with_robot(options, _Loading(options, image))
+
+
+class _Job(Protocol):
+    """A way for an image into a robot."""
+
+    wanted: str
+    """What is looked for at the port."""
+    hint: str
+    """And what the user may do that it is found."""
+    keeps: str
+    """What becomes of rows when the rest does not come."""
+
+    def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
+        """Until the robot has it. Raises RobotError, or OSError of the port."""
+
+    def facts(self) -> dict[str, object]:
+        """What was done, for scripts."""
+
+    def told(self, seconds: float) -> str:
+        """The same in words."""
+
+
+class _Loading:
+    """Firmware, through a boot loader."""
+
+    wanted = "a boot loader"
+    hint = ": press reset"
+    keeps = "the robot waits in its boot loader"
+
+    def __init__(self, options: argparse.Namespace, image: Image) -> None:
+        self._options: Final = options
+        self._image: Final = image
+
+    def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
+        self._talk = Talk(line, self._options.wait)
+        self._rows = rows(self._image, self._talk.loader)
+        self._talk.write(self._rows, progress)
+        self._talk.start()
+
+    def facts(self) -> dict[str, object]:
+        loader = asdict(self._talk.loader)
+        return {"image": self._image.path, "loader": loader, "rows": len(self._rows), **asdict(self._talk.counts)}
+
+    def told(self, seconds: float) -> str:
+        again = self._talk.counts.blocks - len(self._rows)
+        return (f"{self._image.path} is in the robot: {len(self._rows)} rows, {again} sent again, {seconds:.1f} s;"
+                f" boot loader {self._talk.loader.name}")  # fmt: skip
+
+
+class _Spreading:
+    """A program, to firmware that runs."""
+
+    wanted = "a robot that takes programs"
+    hint = ""
+    keeps = "the robot keeps them until a reset"
+
+    def __init__(self, options: argparse.Namespace, program: Program) -> None:
+        self._options: Final = options
+        self._program: Final = program
+        self._is_active = False
+
+    def converse(self, line: SerialPort, progress: Callable[[int, int], None]) -> None:
+        self._neighbour = Neighbour(line, self._program, self._options.wait)
+        self._is_active = self._neighbour.give(progress)
+        if not self._is_active and not self._options.store:
+            self._neighbour.activate()
+            self._is_active = True
+
+    def facts(self) -> dict[str, object]:
+        made = self._program
+        facts = {"program": self._options.image, "version": made.version, "rows": len(made.rows), "crc": made.crc}
+        return {**facts, "active": self._is_active, **asdict(self._neighbour.counts)}
+
+    def told(self, seconds: float) -> str:
+        made = self._program
+        what = "in the robot and activated" if self._is_active else "in the robot"
+        return (f"{self._options.image} is {what}: version {made.version}, {len(made.rows)} rows, CRC {made.crc:08X} as"
+                f" the robot says, {seconds:.1f} s")  # fmt: skip
+
+
+def _with_robot(options: argparse.Namespace, job: _Job) -> int:
+    progress = _Progress()
     with SerialPort(options.port, BAUD) as line:
         began = line.now()
-        print(f"openswarm flash: looking for a boot loader at {options.port}: press reset", file=sys.stderr, flush=True)
+        print(f"openswarm flash: looking for {job.wanted} at {options.port}{job.hint}", file=sys.stderr, flush=True)
         try:
-            talk = Talk(line, options.wait)
-            wanted = rows(image, talk.loader)
-            talk.write(wanted, _progress())
-            talk.start()
-        except (RobotError, OSError, KeyboardInterrupt) as error:
-            print(end="\n" * sys.stderr.isatty(), file=sys.stderr)  # behind the progress
-            if not isinstance(error, RobotError):
-                raise
+            job.converse(line, progress)
+        except RobotError as error:
+            progress.end()
             print(f"openswarm flash: {error}", file=sys.stderr)
             return FAULT
+        except OSError as error:
+            progress.end()
+            raise OSError(f"{error}; {progress.reached(job.keeps)}") from None
+        except KeyboardInterrupt:
+            progress.end()
+            print(f"openswarm flash: interrupted; {progress.reached(job.keeps)}", file=sys.stderr)
+            raise
         seconds = line.now() - began
-    loader = talk.loader
     if options.json:
-        facts = {"image": image.path, "port": options.port, "loader": asdict(loader), "rows": len(wanted)}
-        print(json.dumps(facts | asdict(talk.counts) | {"seconds": round(seconds, 3)}))
+        print(json.dumps({**job.facts(), "port": options.port, "seconds": round(seconds, 3)}))
     else:
-        again = talk.counts.blocks - len(wanted)
-        print(f"{image.path} is in the robot: {len(wanted)} rows, {again} sent again, {seconds:.1f} s;"
-              f" boot loader {loader.name}")  # fmt: skip
+        print(job.told(seconds))
     return DONE
 
 
-def _spread(options: argparse.Namespace, program: Program) -> int:
-    """A program into a robot that runs."""
-    with SerialPort(options.port, BAUD) as line:
-        began = line.now()
-        print(
-            f"openswarm flash: looking for a robot that takes programs at {options.port}", file=sys.stderr, flush=True
-        )
-        neighbour = Neighbour(line, program, options.wait)
-        try:
-            is_active = neighbour.give(_progress())
-            if not is_active and not options.store:
-                neighbour.activate()
-                is_active = True
-        except (RobotError, OSError, KeyboardInterrupt) as error:
-            print(end="\n" * sys.stderr.isatty(), file=sys.stderr)  # behind the progress
-            if not isinstance(error, RobotError):
-                raise
-            print(f"openswarm flash: {error}", file=sys.stderr)
-            return FAULT
-        seconds = line.now() - began
-    if options.json:
-        facts = {"program": options.image, "port": options.port, "version": program.version, "rows": len(program.rows)}
-        counts = asdict(neighbour.counts)
-        print(json.dumps(facts | {"crc": program.crc, "active": is_active} | counts | {"seconds": round(seconds, 3)}))
-    else:
-        print(f"{options.image} is in the robot{' and activated' if is_active else ''}: version {program.version},"
-              f" {len(program.rows)} rows, CRC {program.crc:08X} as the robot says, {seconds:.1f} s")  # fmt: skip
-    return DONE
+class _Progress:
+    """Hears how many rows of how many are done: one line that is written over on a terminal, nothing elsewhere."""
 
+    def __init__(self) -> None:
+        self._done = self._total = 0
+        self._shows: Final = sys.stderr.isatty()
 
-def _progress() -> Callable[[int, int], None]:
-    """One line that is written over on a terminal, nothing elsewhere."""
-    if not sys.stderr.isatty():
-        return lambda done, total: None
+    def __call__(self, done: int, total: int) -> None:
+        self._done, self._total = done, total
+        if self._shows:
+            print(f"\r{done} of {total} rows", end="\n" if done == total else "", file=sys.stderr, flush=True)
 
-    def show(done: int, total: int) -> None:
-        end = "\n" if done == total else ""
-        print(f"\r{done} of {total} rows", end=end, file=sys.stderr, flush=True)
+    def end(self) -> None:
+        """What follows has a line of its own."""
+        if self._shows and self._done != self._total:
+            print(file=sys.stderr)
 
-    return show
+    def reached(self, keeps: str) -> str:
+        """What the robot has when the rest does not come."""
+        if not self._done:
+            return "no row is written"
+        if self._done == self._total:
+            return f"all {self._total} rows are written"
+        return f"{self._done} of {self._total} rows are written, {keeps}: run the command again"

@@ -14,6 +14,7 @@ from emu.image import Image
 from emu.loader import load_image
 from emu.status import DONE
 from openswarm.commands import made_parser
+from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.program import LAST_VERSION, RAM, ROWS, SLOT, VERSION_SYMBOL, Program, program_of
 
 DESCRIPTION: Final = f"""\
@@ -97,4 +98,5 @@ def header(name: str, source: str, made: Program) -> str:
     """C that an application includes which brings the program along."""
     array = re.sub(r"\W", "_", name)
     rows = ",\n".join(f"    {{{', '.join(f'0x{byte:02X}' for byte in row)}}}" for row in made.rows)
-    return f"/* Rows of {source}, by `openswarm program`. */\nstatic const uint8 {array}[][96] = {{\n{rows}\n}};\n"
+    declared = f"static const uint8 {array}[][{ROW_BYTES}]"
+    return f"/* Rows of {source}, by `openswarm program`. */\n{declared} = {{\n{rows}\n}};\n"

@@ -16,6 +16,8 @@ AGAIN: Final = b"N"
 ROW_WORDS: Final = 32
 ROW_UNITS: Final = 2 * ROW_WORDS
 """PC units of a row."""
+ROW_BYTES: Final = 3 * ROW_WORDS
+"""Of a row on its way: three for each word, the lowest first."""
 BAUD: Final = 115_200
 PATIENCE_SECONDS: Final = 1.4
 """A loader that hears nothing for so long gives up and starts the program: 1 s by its comments, up to 1.4 s by the
@@ -25,7 +27,7 @@ ADDRESS_ORDER: Final = "little"
 """UNVERIFIED on a robot: lowest byte first, as tinybld's source says (its block is L, H, U, count). To a loader that
 read the other way the lowest byte, a multiple of 0x40, would be the page: never page 1, where loaders lie. It could
 not be harmed, and the program would not start."""
-_DATA_COMMAND: Final = 96
+_DATA_COMMAND: Final = ROW_BYTES
 """Fourth byte of a block with data. tinybld wants the number of bytes there, the e-puck's variant only looks for
 `_END_COMMAND`."""
 _END_COMMAND: Final = 0xFF

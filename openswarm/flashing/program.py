@@ -8,7 +8,7 @@ from typing import Final
 
 from emu.chips.chip import Region
 from emu.image import ERASED, Image
-from openswarm.flashing.loaders import ROW_UNITS
+from openswarm.flashing.loaders import ROW_BYTES, ROW_UNITS, ROW_WORDS
 
 SLOT: Final = Region("slot of programs", 0x00F800, 0x010000)
 """Where they run, in PC units: board/epuck/update/update_slots.h."""
@@ -26,7 +26,7 @@ class Program:
 
     version: int
     rows: tuple[bytes, ...]
-    """Of 96 bytes: 32 instructions, three bytes each, the lowest first."""
+    """Of ROW_BYTES each."""
 
     @property
     def crc(self) -> int:
@@ -44,6 +44,8 @@ def program_of(image: Image) -> Program:
     version = image.symbols.find(VERSION_SYMBOL)
     if version is None:
         raise ValueError(f"{image.path}: has no {VERSION_SYMBOL}: expected the ELF file that `openswarm program` made")
+    if not 1 <= version.address <= LAST_VERSION:
+        raise ValueError(f"{image.path}: is of version {version.address}; expected 1 to {LAST_VERSION}")
     if image.word(SLOT.start) is None:
         raise ValueError(f"{image.path}: has nothing at {SLOT.start:#08x}, where programs begin")
     outside = [block for block in image.blocks if block.base < SLOT.start or block.end > SLOT.end]
@@ -54,7 +56,6 @@ def program_of(image: Image) -> Program:
         )
     end = max(block.end for block in image.blocks)
     words = [image.word(address) for address in range(SLOT.start, end, 2)]
-    words += [None] * (-len(words) % (ROW_UNITS // 2))
+    words += [None] * (-len(words) % ROW_WORDS)
     data = b"".join((ERASED if word is None else word).to_bytes(3, "little") for word in words)
-    size = ROW_UNITS // 2 * 3
-    return Program(version.address, tuple(data[at : at + size] for at in range(0, len(data), size)))
+    return Program(version.address, tuple(data[at : at + ROW_BYTES] for at in range(0, len(data), ROW_BYTES)))

@@ -31,8 +31,11 @@ TRIES: Final = 5
 """Of a row."""
 
 
+ECHO: Final = "the line sends back what is written to it: switch its echo off, or take the loop-back away"
+
+
 class RobotError(Exception):
-    """The robot does not do what a boot loader does."""
+    """The robot does not do what a boot loader does, or firmware that takes programs."""
 
 
 @dataclass(slots=True)
@@ -68,7 +71,7 @@ class Talk:
             if heard[-1:] == DONE and heard[-2:-1]:
                 loader = LOADERS.get(heard[-2])
                 if loader is not None and HELLO in heard:  # a 'K' in a row would be taken for its answer
-                    raise RobotError("the line sends back what is written to it: switch its echo off")
+                    raise RobotError(ECHO)
                 if loader is not None:
                     return loader
                 if len(heard) == 2:

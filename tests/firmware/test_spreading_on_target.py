@@ -16,8 +16,9 @@ import emu
 from emu.loader import load_image
 from emu.machine import Machine
 from openswarm.cli import main
+from openswarm.flashing.messages import framed, unframed
 from openswarm.flashing.program import SLOT, Program, program_of
-from openswarm.flashing.spreading import Neighbour, framed, unframed
+from openswarm.flashing.spreading import Neighbour
 from openswarm.flashing.talk import RobotError
 from tests.firmware.radio import SLICE, Line
 

@@ -15,12 +15,17 @@ import pytest
 import emu
 from emu.dspic30f.isa.text import parse
 from emu.machine import Machine
+from openswarm.flashing.loaders import ROW_BYTES
+from openswarm.flashing.messages import MESSAGE, PARTS, Advertisement, Request, framed, identity, read, unframed
+from openswarm.flashing.messages import data as part_of
+from openswarm.flashing.program import ROWS as SLOT_ROWS
+from openswarm.flashing.program import Program
 
 HERE = Path(__file__).parent
 OPENSWARM = HERE.parents[1] / "firmware" / "openswarm"
 TARGET_APPS = HERE / "target"
 RECEIVE, ACTIVATE, CONFIRM = 1, 2, 3
-ROWS, ROW_BYTES = 1, 96
+ROWS = 1
 MARK = 0x1F00
 """Where the programs of this test leave their version, in RAM."""
 RUN, STORES = 0x00F800, 0x016800
@@ -58,6 +63,24 @@ def test_neighbours_may_say_anything(tmp_path):
     given up, and nothing makes a robot send without end once it hears no more."""
     said = on_host("hostile", tmp_path)
     assert int(re.search(r"(\d+) messages", said)[1]) > 100_000
+
+
+def test_host_and_robot_have_one_format(tmp_path):
+    """Sizes, every kind of message, and frames: of the firmware's own code and of the host's."""
+    lines = [line.split() for line in on_host("format", tmp_path).splitlines()]
+    sizes = {name: int(number) for name, number, *frame in lines if not frame}
+    assert sizes == {"row": ROW_BYTES, "rows": SLOT_ROWS, "parts": PARTS, "message": MESSAGE}
+    said = [(name, bytes.fromhex(message), bytes.fromhex(frame)) for name, message, *rest in lines for frame in rest]
+    for _, message, frame in said:
+        assert framed(message) == frame
+        assert unframed(frame[1:-1]) == message
+    rows = tuple(bytes((row * 7 + at * 3) & 0xFF for at in range(ROW_BYTES)) for row in range(1, 4))
+    program = Program(0xA123, rows)
+    stored, active = (Advertisement(program.version, 3, program.crc, is_active) for is_active in (False, True))
+    assert [message for _, message, _ in said[:2]] == [stored.packed(), active.packed()]
+    asked = Request(program.version, 2, 0x80001, identity(program.crc))
+    assert [read(message) for _, message, _ in said[:3]] == [stored, active, asked]
+    assert [message for _, message, _ in said[3:]] == [part_of(program, 2, part) for part in range(PARTS)]
 
 
 def on_host(program: str, folder: Path) -> str:

@@ -302,7 +302,10 @@ def test_what_ends_the_progress_has_a_line_of_its_own(monkeypatch, capsys):
     assert main(["flash", str(HELLO_HEX), "--port", os.ttyname(slave)]) == BAD_INPUT
     os.close(master)
     os.close(slave)
-    assert capsys.readouterr().err.endswith("3 of 5 rows\nopenswarm flash: /dev/x is gone\n")
+    assert capsys.readouterr().err.endswith(
+        "3 of 5 rows\nopenswarm flash: /dev/x is gone; 3 of 5 rows are written, the robot waits in its boot loader:"
+        " run the command again\n"
+    )
 
 
 def test_the_terminal_of_the_command_is_no_port():

@@ -1,0 +1,98 @@
+"""What robots and host say to each other about programs: messages of eight bytes, and their frames on a serial line.
+
+What enters: facts, parts of a program, bytes. What leaves: the same in the other form; nothing for what is damaged. The
+other end is firmware/openswarm/io/update/spread.c, and io/framing.c for frames: COBS with a CRC-16/CCITT-FALSE, here
+between zeros. tests/firmware/test_update.py compares both.
+"""
+
+from __future__ import annotations
+
+import binascii
+from dataclasses import dataclass
+from typing import Final
+
+from openswarm.flashing.loaders import ROW_BYTES
+from openswarm.flashing.program import Program
+
+MESSAGE: Final = 8
+_KINDS, _ROW = 0xE0, 0x1F
+_ADVERTISEMENT, _REQUEST, _DATA = 0x80, 0xA0, 0xC0
+_IDENTITY: Final = 0x07FF
+_PART: Final = 5
+PARTS: Final = -(-ROW_BYTES // _PART)
+"""Of a row; the last one is a byte."""
+LONGEST_FRAME: Final = 255
+"""Of what may be a frame; a line of text without an end is not kept."""
+_CRC_START: Final = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Advertisement:
+    """What a robot says it has; version 0: nothing."""
+
+    version: int
+    rows: int
+    crc: int
+    is_active: bool
+
+    def packed(self) -> bytes:
+        """As a message."""
+        head = bytes([_ADVERTISEMENT | self.is_active]) + self.version.to_bytes(2, "little") + bytes([self.rows])
+        return head + self.crc.to_bytes(4, "little")
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """The parts of a row that a robot lacks: bit n is part n."""
+
+    version: int
+    row: int
+    parts: int
+    identity: int
+
+
+def read(message: bytes) -> Advertisement | Request | None:
+    """What a message says; None for those that a host has no use for."""
+    kind, row = message[0] & _KINDS, message[0] & _ROW
+    version = int.from_bytes(message[1:3], "little")
+    if kind == _ADVERTISEMENT:
+        return Advertisement(version, message[3], int.from_bytes(message[4:], "little"), bool(row & 1))
+    if kind == _REQUEST:
+        parts = int.from_bytes(message[3:6], "little") & (1 << PARTS) - 1
+        return Request(version, row, parts, int.from_bytes(message[6:], "little"))
+    return None
+
+
+NOTHING: Final = Advertisement(0, 0, 0xFFFFFFFF, False)
+"""Older than what any robot has, so each says what that is, and not the same as having nothing."""
+
+
+def identity(crc: int) -> int:
+    """By which requests and data tell programs of one version from each other."""
+    return crc & _IDENTITY
+
+
+def data(program: Program, row: int, part: int) -> bytes:
+    """A part of a row as a message."""
+    own = identity(program.crc)
+    head = bytes([_DATA | row, part << 3 | own >> 8, own & 0xFF])
+    return head + program.rows[row][part * _PART : (part + 1) * _PART].ljust(_PART, b"\0")
+
+
+def framed(message: bytes) -> bytes:
+    """A message between zeros."""
+    rest = message + binascii.crc_hqx(message, _CRC_START).to_bytes(2, "big")
+    return b"\0" + b"".join(bytes([len(run) + 1]) + run for run in rest.split(b"\0")) + b"\0"
+
+
+def unframed(frame: bytes) -> bytes:
+    """The message of a frame without its zeros; empty for what is none, or damaged."""
+    out, at = b"", 0
+    while at < len(frame):
+        run = frame[at + 1 : at + frame[at]]
+        if len(run) != frame[at] - 1:
+            return b""
+        out += run + b"\0"
+        at += frame[at]
+    message = out[:-3]
+    return message if len(message) == MESSAGE and not binascii.crc_hqx(out[:-1], _CRC_START) else b""
