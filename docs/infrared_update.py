@@ -11,60 +11,74 @@ from __future__ import annotations
 import argparse
 import itertools
 import math
-import random
+import shutil
 import statistics
+import subprocess
 import sys
-import zlib
+import tempfile
+from pathlib import Path
 
 from infrared_swarm import grid, word
 
 from arena.emulated import EmulatedBrain
 from arena.ether import Ether
-from arena.firmware import image_for
 from arena.scene import FCY, load_scene
+from emu import places
+from emu.image import ERASED
 from emu.loader import load_image
 from emu.machine import Machine
-from openswarm.flashing.program import ROWS, program_of
+from openswarm.flashing.loaders import ROW_WORDS
+from openswarm.flashing.program import ROWS, SLOT, program_of
 
+APP = "spreading"
 VERSION = 2
 """The selector of the first robot, which is the version of its program."""
-NO_STORE = 0xFF
-"""Of `running` in io/update/update.c."""
 LOOK_TICKS = 100
-STORE, ROW_UNITS, ROW_BYTES = 0x016800, 64, 96
-"""The first store of a robot (board/epuck/update/update_slots.h), and its rows."""
-MARK, FACTS = 0xA7, 8
-"""Of its head (io/update/update.c)."""
+FILLING = """\
+    .section .filling, code, keep       ; words of which none is like another
+    .set n, 0
+    .rept {words}
+    mov     #n, w0
+    .set n, n + 1
+    .endr
+"""
+
+
+def built(folder: Path, rows: int) -> Path:
+    """The application's image, whose lamp has so many rows."""
+    app, out = folder / APP, folder / "build"
+    shutil.copytree(places.firmware() / "apps" / APP, app)
+    if rows > 1:
+        (app / "lamp" / "filling.S").write_text(FILLING.format(words=(rows - 1) * ROW_WORDS))
+    command = [
+        "make",
+        "-C",
+        places.firmware(),
+        f"APPS={folder}",
+        f"APP={APP}",
+        f"OUT={out}",
+        f"PYTHON={sys.executable}",
+    ]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    made = program_of(load_image(str(out / "lamp.elf")))
+    if len(made.rows) != rows:
+        raise ValueError(f"the program has {len(made.rows)} rows, not {rows}")
+    return out / "firmware.elf"
 
 
 def calls_it(machine: Machine) -> bool:
-    """Whether the program was called at the last start."""
-    return bool(machine.record.bytes[machine.address_of("running")] != NO_STORE)
+    """Whether the program was put where it is called."""
+    return machine.program.word(SLOT.start) != ERASED
 
 
-def store(machine: Machine, rows: list[bytes]) -> None:
-    """Put a program into a robot, as if it had received it."""
-    crc = zlib.crc32(b"".join(rows))
-    facts = bytes([MARK]) + VERSION.to_bytes(2, "little") + bytes([len(rows)]) + crc.to_bytes(4, "little")
-    head = facts + bytes(~byte & 0xFF for byte in facts)
-    for number, row in enumerate([head.ljust(ROW_BYTES, b"\xff"), *rows]):
-        words = [int.from_bytes(row[at : at + 3], "little") for at in range(0, ROW_BYTES, 3)]
-        machine.program.put_flash(STORE + number * ROW_UNITS, words)
-
-
-def measure(robots: int, rows: int, lost: float, most: float, noise: float) -> tuple[list[float], list[float]]:
+def measure(image: Path, robots: int, lost: float, most: float, noise: float) -> tuple[list[float], list[float]]:
     """Seconds after which each robot has the program, and calls it; in no order, less than all if some do not."""
     poses = grid(robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise,
               "infrared__lost_share": lost}  # fmt: skip
     scene = load_scene("clustering").with_values(**values)
     ether = Ether.of(scene)
-    image = image_for("spreading")
-    assert image is not None
     brains = [EmulatedBrain(scene, 1, one, image, 0 if one else VERSION, ether) for one in range(robots)]
-    lamp = program_of(load_image(str(image.with_name("lamp.elf")))).rows
-    filling = [random.Random(number).randbytes(ROW_BYTES) for number in range(len(lamp), rows)]
-    store(brains[0].machine, [*lamp, *filling])
     has, calls = dict[int, float](), dict[int, float]()
     for tick in itertools.count(1):
         for brain in brains:
@@ -90,7 +104,9 @@ def main() -> int:
     parser.add_argument("--most", type=float, default=120.0, metavar="SECONDS")
     parser.add_argument("--noise", type=float, default=2.0, metavar="COUNTS")
     chosen = parser.parse_args()
-    has, calls = measure(chosen.robots, chosen.rows, chosen.lost, chosen.most, chosen.noise)
+    with tempfile.TemporaryDirectory() as folder:
+        image = built(Path(folder), chosen.rows)
+        has, calls = measure(image, chosen.robots, chosen.lost, chosen.most, chosen.noise)
     for what, seconds in (("have it whole", has), ("restarted and call it", calls)):
         known = seconds or [math.nan]
         times = f"median {statistics.median(known):.1f} s, last {max(known):.1f} s"
