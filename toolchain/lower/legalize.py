@@ -159,6 +159,7 @@ class Legalizer(MemoryLegalizer):
         if width == 128:
             raise UnsupportedError(f"{bits}-bit division")
         wide = self.b.call(name, t, [self.b.cast(ext, a, t), self.b.cast(ext, b, t)])
+        wide.extra["divides"] = op
         return self.b.cast("trunc", wide, a.type)
 
     def fneg(self, i: Instr) -> Value:

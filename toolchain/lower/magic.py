@@ -7,10 +7,10 @@ otherwise call the run-time library, only for speed: 17 words and cycles where t
 
 from __future__ import annotations
 
-from ..ir.model import I16, I32, Block, ConstInt, Function, GlobalRef, Instr, Value
+from ..ir.model import I16, I32, Block, ConstInt, Function, Instr, Value
 from .build import Builder, const
 
-CALLS = {"__udivsi3": "udiv", "__divsi3": "sdiv", "__umodsi3": "urem", "__modsi3": "srem"}
+OPERATIONS = frozenset(("udiv", "sdiv", "urem", "srem"))
 
 
 def run(f: Function, for_size: bool, for_speed: bool = False) -> None:
@@ -32,16 +32,14 @@ def run(f: Function, for_size: bool, for_speed: bool = False) -> None:
 
 
 def _inline(i: Instr) -> None:
-    """A call that divides by a constant becomes the operation itself, for `_rewrite`."""
-    if i.op != "call" or i.type is not I32 or len(i.args) != 3 or not isinstance(i.args[2], GlobalRef):
-        return
-    op = CALLS.get(i.args[2].name)
-    if op is not None and _divides(op, i.args[0], i.args[1]):
+    """A call that legalisation made of a division by a constant becomes the operation itself, for `_rewrite`."""
+    op = i.extra.get("divides")
+    if isinstance(op, str) and i.type is I32 and _divides(op, i.args[0], i.args[1]):
         i.op, i.args, i.extra = op, i.args[:2], {}
 
 
 def _wanted(i: Instr) -> bool:
-    if i.op not in CALLS.values() or (i.type is not I16 and i.type is not I32) or "other" in i.extra:
+    if i.op not in OPERATIONS or (i.type is not I16 and i.type is not I32) or "other" in i.extra:
         return False
     return _divides(i.op, i.args[0], i.args[1])
 

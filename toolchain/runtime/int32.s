@@ -11,7 +11,8 @@ ___mulsi3:
         add     w1,w6,w1
         return
 
-; Unsigned quotient in W1:W0, remainder in W5:W4. Division by zero takes the math error trap, like DIV itself.
+; Unsigned quotient in W1:W0, remainder in W5:W4. Division by zero takes the math error trap, like DIV itself. The others
+; call it by the name for both results: a ___udivsi3 of the program leaves no remainder.
         .section .text.___udivsi3,code
         .global ___udivsi3
         .global ___udivmodsi4
@@ -67,7 +68,7 @@ divisor_32:
         .section .text.___umodsi3,code
         .global ___umodsi3
 ___umodsi3:
-        rcall   ___udivsi3
+        rcall   ___udivmodsi4
         mov.d   w4,w0
         return
 
@@ -76,7 +77,7 @@ ___umodsi3:
 ___divsi3:
         xor     w1,w3,[w15++]           ; its sign is the quotient's
         rcall   ___absolutesi2
-        rcall   ___udivsi3
+        rcall   ___udivmodsi4
         btsc    [--w15],#15
         bra     ___negsi2
         return
@@ -86,7 +87,7 @@ ___divsi3:
 ___modsi3:
         mov     w1,[w15++]              ; the remainder has the sign of the dividend (C11 6.5.5p6)
         rcall   ___absolutesi2
-        rcall   ___udivsi3
+        rcall   ___udivmodsi4
         mov.d   w4,w0
         btsc    [--w15],#15
         bra     ___negsi2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from toolchain.ir.model import Arg, ConstInt, Function, GlobalRef, Instr, Undef, Value
 from toolchain.lower.build import compare, const, evaluate
-from toolchain.lower.magic import CALLS
 
 MEMORY_TOP = 0x8000
 FUEL = 200_000
@@ -68,9 +67,7 @@ class Interpreter:
 
     def divided(self, call: Instr, a: ConstInt, b: ConstInt) -> int:
         """A function of the run-time library that divides."""
-        function = call.args[-1]
-        assert isinstance(function, GlobalRef)
-        op = CALLS[function.name]
+        op = str(call.extra["divides"])
         x, d = (a.signed, b.signed) if op[0] == "s" else (a.value, b.value)
         quotient = abs(x) // abs(d) * (1 if (x < 0) == (d < 0) else -1)
         return quotient if op.endswith("div") else x - quotient * d

@@ -188,3 +188,52 @@ def check(source: str, folder: Path) -> None:
 def _case(uart: bytes) -> int:
     words = uart.decode("latin-1").split()
     return int(words[-1]) if words and words[-1].isdigit() else 0
+
+
+OWN_DIVISION = """
+volatile int quotients, remainders;
+volatile unsigned long u = 1000007, by = 70001;
+volatile long s = -1000007, sby = 70001;
+#if OWN & 1
+__attribute__((noinline)) unsigned long __udivsi3(unsigned long a, unsigned long b)
+{
+    unsigned long q = 0;
+    quotients++;
+    for (int k = 31; k >= 0; k--)
+        if (a >> k >= b) a -= b << k, q |= 1ul << k;
+    return q;
+}
+#else
+unsigned long __udivsi3(unsigned long a, unsigned long b);
+#endif
+#if OWN & 2
+__attribute__((noinline)) unsigned long __umodsi3(unsigned long a, unsigned long b)
+{
+    remainders++;
+    while (a >= b) a -= b;
+    return a;
+}
+#endif
+int main(void)
+{
+    if (u / by != 14 || u % by != 19993 || s / sby != -14 || s % sby != -19993) return 1;
+    if (__udivsi3(u, 1000) != 1000 || u % 1000 != 7 || s % 1000 != -7) return 2;
+    if (quotients != (OWN & 1) * 2) return 3;
+#if OWN & 2
+    if (__umodsi3(u, 100000) != 7) return 4;
+    if (remainders < 2) return 5;
+#endif
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("own", [1, 2, 3])
+@pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
+def test_a_program_may_divide_with_its_own_functions(level: str, own: int, tmp_path: Path) -> None:
+    """They take the library's place, which leans on none of them; and a call of one is a call, whatever it divides by."""
+    (tmp_path / "a.c").write_text(OWN_DIVISION)
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", level, f"-DOWN={own}")
+    assert built.status == 0, built.messages
+    ran = run(tmp_path / "a.elf")
+    assert ran.status == 0, ran
