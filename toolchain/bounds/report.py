@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from toolchain.bounds.builder import World
-from toolchain.bounds.explore import LOOP, Explorer, Rules, TooMuch
+from toolchain.bounds.explore import Explorer, TooMuch
 from toolchain.bounds.outcome import Outcome
 from toolchain.bounds.program import Program
+from toolchain.bounds.rules import LOOP, Rules
 from toolchain.bounds.state import LEVELS, Area, State
 from toolchain.bounds.values import Value, span
 from toolchain.errors import ToolError

@@ -1,0 +1,168 @@
+"""Calls and returns: which functions a run goes on into, and what it finds behind them."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Final
+
+from emu.dspic30f.isa.flow import Branch, Skip
+from toolchain.bounds.builder import exact
+from toolchain.bounds.graph import Block, Step
+from toolchain.bounds.rules import ELSEWHERE
+from toolchain.bounds.state import INHERITED, NOWHERE, State
+from toolchain.bounds.steps import Steps
+from toolchain.bounds.values import Value, ends
+
+MAX_DEPTH: Final = 60
+RESULTS: Final = frozenset((0, 1))
+"""Results by which the ways through a function are told apart."""
+CHOICE: Final = 6
+"""Most instructions of a block that tells them apart."""
+
+
+class Calls(Steps):
+    """One function, once: where control leaves it, and comes back."""
+
+    @abstractmethod
+    def _arrive(self, target: int, state: State) -> None:
+        """Go on at a block with that state."""
+
+    @abstractmethod
+    def _block(self, block: Block, state: State) -> None:
+        """Run a block and hand its state on."""
+
+    def _goto(self, last: Step, target: Value, state: State) -> None:
+        inside = self.code.blocks
+        if exact(target) and target in inside and last.pc not in self.code.tails:
+            self._arrive(target, state)
+            return
+        if last.insn.row.mnemonic == "BRA" and not exact(target):
+            for place in self.code.blocks[self._head(last)].following:
+                self._arrive(place, state.copy())
+            return
+        targets = [target] if exact(target) else self._unknown(last.pc, state)
+        for place in targets:
+            self._enter(last, place, state.copy(), tail=True)
+
+    def _head(self, last: Step) -> int:
+        return next(head for head, block in self.code.blocks.items() if block.steps[-1] is last)
+
+    def _call(self, last: Step, target: Value, state: State) -> None:
+        targets = [target] if exact(target) else self._unknown(last.pc, state)
+        if not targets:
+            returned = state.copy()
+            self._lose_registers(returned)
+            returned.w[15] = state.w[15] - 4 & 0xFFFF
+            self._arrive(last.after, returned)
+        for place in targets:
+            self._enter(last, place, state.copy(), tail=False, many=len(targets) > 1)
+
+    def _unknown(self, pc: int, state: State) -> list[int]:
+        if not exact(state.w[15]):
+            self.outcome.left = max(self.outcome.left or 0, state.time)
+            return [entry for entry in self.explorer.rules.resumed() if entry not in self.explorer.active]
+        found = self.explorer.rules.calls(pc, state)
+        if found is None:
+            self.outcome.open[pc] = "the targets of this call through a pointer are not known"
+            return []
+        return found
+
+    def _enter(self, last: Step, target: int, state: State, tail: bool, many: bool = False) -> None:
+        """Call a function, or jump to it, and go on behind it."""
+        explorer = self.explorer
+        if target in explorer.rules.without or explorer.rules.never(last.pc):
+            return
+        if target == 0:  # a weak function that is not linked
+            if not tail:
+                state.w[15] = state.w[15] - 4 & 0xFFFF
+                self._arrive(last.after, state)
+            return
+        depth = explorer.active.count(target)
+        allowed = explorer.rules.recursion(target)
+        if depth >= (MAX_DEPTH if allowed is None else allowed) or len(explorer.active) > 8 * MAX_DEPTH:
+            if allowed is None:
+                self.outcome.open[last.pc] = "recursion"
+            return
+        start, since, stack = state.time, state.since.copy(), state.w[15]
+        if not tail:
+            state.flags = State().flags
+        before = state.copy()
+        found, general = explorer.call(target, state, many)
+        self.outcome.take(found, start, since, (self.code.entry,))
+        level = explorer.rules.back(target)
+        if level is not None and found.left is not None:
+            back = state.copy()
+            self._lose_registers(back)
+            back.time, back.ipl = found.left, (level, level)
+            back.w[15] = stack - 4 & 0xFFFF
+            ends = [back]
+        else:
+            ends = [self._behind(before, end, found.wild) if general else end.copy() for end in found.ends.values()]
+        rare = explorer.rare(last.pc)
+        if rare is not None and ends:
+            cycles = min(end.time for end in ends)
+            self.outcome.share(*rare, cycles)
+            for end in ends:
+                end.shift(-cycles)
+        for end in ends:  # W8-W14 are preserved (abi-elf.md §2.1)
+            if not tail and level is None:
+                end.w[8:15] = before.w[8:15]
+            end.shift(start)
+            end.since = [since[k] if s == INHERITED else s for k, s in enumerate(end.since)]
+            self._levels(end, last.pc)
+            if tail:
+                self._finish(end)
+            elif len(ends) > 1 and self._decides(last.after):
+                self._block(self.code.blocks[last.after], end)
+            else:
+                self._arrive(last.after, end)
+
+    def _behind(self, before: State, end: State, wild: bool) -> State:
+        """The caller's state behind a call that was run for all its calls."""
+        private = self.explorer.world.private
+        new = end.copy()
+        new.w = [*end.w[:15], before.w[15] - 4 & 0xFFFF]
+        kept = {a: v for a, v in before.mem.items() if (a if a >= 0 else ~a) & ~1 not in private}
+        if wild and (before.leaked < NOWHERE or any(self.area.inside(value) for value in before.w[:8])):
+            kept = {}
+        new.mem = kept | {a: v for a, v in end.mem.items() if (a if a >= 0 else ~a) & ~1 in private}
+        new.leaked = min(before.leaked, *(ends(v)[0] if self.area.inside(v) else NOWHERE for v in before.w[:8]))
+        return new
+
+    def _decides(self, head: int) -> bool:
+        """Whether a block does nothing but choose a way: results of a call are kept apart until then."""
+        block = self.code.blocks[head]
+        short = len(block.steps) <= CHOICE and block.steps[-1].flow in (Branch, Skip)
+        return short and head not in self.code.heads
+
+    @staticmethod
+    def _lose_registers(state: State) -> None:
+        """What a call may change (abi-elf.md §2.1)."""
+        fresh = State()
+        state.w[:8] = fresh.w[:8]
+        state.flags = fresh.flags
+
+    def _return(self, target: Value, state: State) -> None:
+        if not exact(state.w[15]):
+            if not self.explorer.rules.switches(self.code.entry):
+                self.outcome.open[self.code.entry] = ELSEWHERE
+            self.outcome.left = max(self.outcome.left or 0, state.time)
+            state.ipl, state.disi = (0, 0), 0  # whatever level it is, this stack is done with it
+            self._levels(state, self.code.entry)
+            return
+        self._finish(state)
+
+    def _finish(self, state: State) -> None:
+        top = state.w[15]
+        above = (
+            {k for k in state.mem if (at := k if k >= 0 else ~k) >= top and self.area.holds(at)} if exact(top) else ()
+        )
+        for key in above:
+            del state.mem[key]
+        state.w[4:8], state.flags = State().w[4:8], State().flags  # not preserved (abi-elf.md §2.1)
+        if exact(top) and state.leaked >= top:
+            state.leaked = NOWHERE  # what has leaked is gone
+        result = state.w[0]
+        shown = result if exact(result) and result in RESULTS else None
+        end = self.outcome.ends.get(shown)
+        self.outcome.ends[shown] = state if end is None else self.area.join(end, state)

@@ -1,0 +1,130 @@
+"""Instructions on sets of values: what each does to a state, its time, the stack's peak and the levels held back."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from emu.dspic30f.isa.flow import Disi, Do, Flow, Repeat
+from toolchain.bounds.builder import exact
+from toolchain.bounds.graph import Code, Step
+from toolchain.bounds.outcome import Outcome
+from toolchain.bounds.rules import MOVED
+from toolchain.bounds.state import INHERITED, LEVELS, State, widened
+from toolchain.bounds.values import ends
+
+if TYPE_CHECKING:
+    from toolchain.bounds.explore import Explorer
+
+REPEATS: Final = 600
+"""Iterations of REPEAT run one by one; behind that only their number counts."""
+
+
+class Steps:
+    """One function, once: its instructions one by one."""
+
+    def __init__(self, explorer: Explorer, code: Code) -> None:
+        self.explorer, self.code = explorer, code
+        self.area: Final = explorer.world.area
+        self.outcome: Final = Outcome(visited={code.entry})
+
+    def _step(self, step: Step, state: State) -> Flow:
+        if state.repeat is not None:
+            return self._repeated(step, state)
+        abstract = self.explorer.abstract
+        level, top = state.ipl, state.w[15]
+        state.time += step.cycles + (state.stall & step.pointers != 0)
+        abstract.begin(step.pc, state)
+        flow: Flow = step.insn.row.does(abstract, step.insn.x)
+        abstract.commit()
+        state.stall = step.writes
+        if abstract.window:
+            state.time += step.window
+        if abstract.wild:
+            self.outcome.wild, abstract.wild = True, False
+        if self.code.framed and exact(top) and not exact(state.w[15]):
+            self.outcome.open[step.pc] = MOVED  # what changes stacks has no frame
+        self._peak(state)
+        match flow:
+            case Repeat(count):
+                state.repeat = count
+            case Do(count, end):
+                state.loops = (*state.loops, (step.after, end, count))
+            case Disi(count):
+                state.disi = max(state.disi, state.time + count)
+                level = (-1, -1)
+        if level != state.ipl or state.disi:
+            self._levels(state, step.pc)
+        return flow
+
+    def _repeated(self, step: Step, state: State) -> Flow:
+        """The target of REPEAT (isa.md §7.5, §13.3): an access to the window costs in its first and last iteration."""
+        abstract, count = self.explorer.abstract, state.repeat
+        state.repeat = None
+        least, most = ends(count)
+        again = int(step.writes & step.pointers != 0)
+        state.time += step.cycles + (state.stall & step.pointers != 0) + most * (step.cycles + again)
+        window = False
+        result: State | None = None
+        current = state
+        for turn in range(min(most, REPEATS) + 1):
+            abstract.begin(step.pc, current)
+            step.insn.row.does(abstract, step.insn.x)
+            abstract.commit()
+            window |= abstract.window
+            self.outcome.wild |= abstract.wild
+            self._peak(current)
+            if turn >= least and turn < most:
+                result = current.copy() if result is None else self.area.join(result, current)
+        if most > REPEATS:
+            current = self._many(step, current, most)
+        final = current if result is None else self.area.join(result, current)
+        state.w, state.flags, state.mem = final.w, final.flags, final.mem
+        state.regs, state.leaked = final.regs, final.leaked
+        state.stall = step.writes
+        if window:
+            state.time += step.window if not most else max(step.window if not least else 0, 4)
+        return None
+
+    def _many(self, step: Step, state: State, most: int) -> State:
+        """Registers a long REPEAT has changed, and what it may have stored."""
+        before = state.copy()
+        abstract = self.explorer.abstract
+        for _ in range(2):
+            abstract.begin(step.pc, state)
+            step.insn.row.does(abstract, step.insn.x)
+            abstract.commit()
+        wide = widened(before, state)
+        if not exact(wide.w[15]):
+            self.outcome.open[step.pc] = "pushes an unknown number of times"
+        wide.mem = {a: v for a, v in wide.mem.items() if (a if a >= 0 else ~a) & ~1 in self.explorer.world.private}
+        wide.leaked = 0
+        return wide
+
+    # -- what is measured ----------------------------------------------------------------------------------------
+
+    def _peak(self, state: State) -> None:
+        top = state.w[15]
+        if exact(top):
+            for number, (lo, hi) in enumerate(self.area.ranges):
+                key = number, state.ipl[0]
+                if lo <= top <= hi and top > self.outcome.peak.get(key, (-1,))[0]:
+                    self.outcome.peak[key] = top, (self.code.entry,)
+        elif self.code.framed and self.area.inside(top):
+            self.outcome.open.setdefault(self.code.entry, MOVED)
+
+    def _levels(self, state: State, pc: int) -> None:
+        """Begin and end the stretches in which levels are held back."""
+        blocked = state.disi > state.time
+        if not blocked:
+            state.disi = 0
+        for level in range(1, LEVELS):
+            since = state.since[level]
+            if state.ipl[1] >= level or (blocked and level < LEVELS - 1):
+                if since is None:
+                    state.since[level] = state.time
+            elif since is not None:
+                if since == INHERITED:
+                    Outcome.longer(self.outcome.prefix, level, state.time, pc)
+                else:
+                    Outcome.longer(self.outcome.masked, level, state.time - since, pc)
+                state.since[level] = None
