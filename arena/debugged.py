@@ -182,11 +182,29 @@ class Debugged:
         stop: Stop | None = self._trial.switch(act)
         return stop
 
-    def anew(self) -> Machine:
+    @property
+    def keeps_moments(self) -> bool:
+        """As `Around.keeps_moments`."""
+        return False
+
+    def anew(self, cycle: int, left: Any) -> Machine:
         """The trial begins again; the robot as it gets power."""
         assert self._trial is not None
         self._trial.switch(_begin_again)
         return self.machine
+
+    def pass_by(self, near: int | None = None) -> None:
+        """As `Around.pass_by`: nothing is kept."""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the trial is."""
+        return self._is_over
+
+    @property
+    def is_left(self) -> bool:
+        """Whether the debugger has left."""
+        return bool(self._debugger.dead)
 
     def seen(self) -> list[tuple[str, str]]:
         """Where everything is, and what the robots are at."""
@@ -203,7 +221,7 @@ class Debugged:
             self._debugger.switch(Stop("limit", self.machine.pc, self.machine.cycle, OVER))
             if not self._debugger.dead:
                 raise AnewError
-        return bool(self._debugger.dead)
+        return self.is_left
 
     def _end_at_cut(self) -> None:
         self._last = min(self._last, self._limit)

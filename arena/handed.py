@@ -71,7 +71,7 @@ class Handed(Debugged):
         self.port: Final[int] = self._listening.getsockname()[1]
         self.is_met = False
         """A client is there."""
-        self.is_over = False
+        self.is_back = False
         """The robot was given back."""
 
     def record(self, machine: Machine) -> Recording:
@@ -98,5 +98,5 @@ class Handed(Debugged):
 
     def close(self) -> None:
         """Nobody can connect any more."""
-        self.is_over = True
+        self.is_back = True
         self._listening.close()

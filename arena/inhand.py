@@ -289,7 +289,7 @@ class InHand:
             if running.is_over:
                 self._handed.over()
                 self._handed.close()
-            if self._handed.is_over:
+            if self._handed.is_back:
                 self._is_altered |= self._handed.is_met
                 self._handed, self._goal = None, None
             return

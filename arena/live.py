@@ -9,7 +9,7 @@ import base64
 import json
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO
 
 from filelock import FileLock, Timeout
 
@@ -32,11 +32,13 @@ class LiveFile:
 
     def __init__(self, path: Path, about: dict[str, Any]) -> None:
         self._path = path
-        self._file: TextIO | None = None
+        self._file: BinaryIO | None = None
+        self._end_at = 0
+        """Where the next row begins. Behind it is only what a process wrote that was further than this copy of it."""
         self._lock = _lock(path)
         with suppress(OSError, Timeout):
             self._lock.acquire()
-            self._file = path.open("w", encoding="utf-8")
+            self._file = path.open("wb")
         self.write(about)
 
     def write(self, row: dict[str, Any]) -> None:
@@ -44,7 +46,10 @@ class LiveFile:
         if self._file is None:
             return
         try:
-            self._file.write(json.dumps(row, default=lambda data: base64.b64encode(data).decode()) + "\n")
+            line = json.dumps(row, default=lambda data: base64.b64encode(data).decode()) + "\n"
+            self._file.seek(self._end_at)
+            self._file.truncate()
+            self._end_at += self._file.write(line.encode())
             self._file.flush()
         except OSError:
             self._end()

@@ -8,22 +8,19 @@ import sys
 import tempfile
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from arena.campaign import Plan, claimed, open_folder, run_one, trial_path
+from arena.campaign import Plan, claimed, open_folder, trial_path
 from arena.commands.arguments import count_or_none, port
 from arena.commands.run import add_plan, kept, planned
-from arena.debugged import AnewError, Debugged, GivenUpError
+from arena.debugged import GivenUpError
+from arena.debugsession import Remote, Session
 from arena.manifest import note_host_time
 from arena.record import RecordError
-from emu.dap.server import Server
 from emu.dap.wire import Wire, wire_over
-from emu.machine import Machine
 from emu.prompt.reader import Prompt
 from emu.status import DONE
 
-OF_ONE_ROBOT: Final = ("board", "selector", "camera", "engine", "strict")
-"""Launch arguments that `emu debug` has and a trial has not."""
 DESCRIPTION: Final = """\
 debug one robot of a trial, the whole world stands with it
 
@@ -66,60 +63,56 @@ def run(options: argparse.Namespace) -> int:
 
 def debugged(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
     """Run the trial with a debugger on its robot."""
-    ended: list[int] = []
-    debugger = partial(prompted, ended=ended) if options.tui else partial(served, port=options.port)
-    robot = Debugged(options.robot, debugger, keeps=options.out is not None)
-    is_recorded = False
-    while True:
-        try:
-            done = run_one(plan, 1, folder, meet=robot.meet)
-            if options.out is not None and not is_recorded:
-                note_host_time(folder, done.trial, done.host_s, done.faults)
-                print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
-                is_recorded = True
-            if not robot.over():
-                print(f"arena debug: robot {options.robot} got no power before the trial was over", file=sys.stderr)
-        except AnewError:
-            continue
-        except GivenUpError:
-            told = "it was recorded before it went back" if is_recorded else "nothing is recorded"
-            print(f"arena debug: the trial was ended, {told}", file=sys.stderr)
-            return max(ended, default=DONE)
-        return max([1 if done.faults else DONE, *ended])
+    session = Session(plan, options.robot, folder, is_recorded=options.out is not None)
+    status = DONE
+    try:
+        if session.is_over:
+            print(f"arena debug: robot {options.robot} got no power before the trial was over", file=sys.stderr)
+        elif options.tui:
+            status = Prompt("arena debug", partial(Remote, session)).serve({}, sys.stdin)
+        else:
+            served(session, options.port)
+        session.finish()
+    except GivenUpError:
+        told = "nothing is recorded"
+        if options.out is not None and session.done is not None:
+            recorded(session, folder)
+            told = "it was recorded before it went back"
+        print(f"arena debug: the trial was ended, {told}", file=sys.stderr)
+        return status
+    finally:
+        session.close()
+    if options.out is not None:
+        recorded(session, folder)
+    return max(status, 1 if session.has_fault else DONE)
 
 
-def prompted(debugged: Debugged, ended: list[int]) -> bool:
-    """Debug at a prompt, or by a script; true if the trial is to go on without it. Its exit status goes to `ended`."""
-    prompt = Prompt("arena debug", lambda _launch: debugged.machine, debugged.record)
-    ended.append(prompt.serve({}, sys.stdin))
-    return debugged.keeps and not prompt.ends_all
+def recorded(session: Session, folder: Path) -> None:
+    """Tell where, and keep the time it took."""
+    assert session.done is not None
+    note_host_time(folder, session.done.trial, session.done.host_s, session.done.faults)
+    print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
 
 
-def served(debugged: Debugged, port: int | None) -> bool:
-    """Serve one client; true if the trial is to go on without it."""
+def served(session: Session, port: int | None) -> None:
+    """Serve one client."""
     if port is None:
         out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
         wire = Wire(sys.stdin.fileno(), out)
         try:
-            return _served(debugged, wire)
+            attend(session, wire)
         finally:
             wire.close()
+        return
     with socket.create_server(("127.0.0.1", port)) as listening:
         print(f"arena debug: listening on 127.0.0.1:{listening.getsockname()[1]}", file=sys.stderr, flush=True)
         connection, _ = listening.accept()
     with wire_over(connection) as wire:
-        return _served(debugged, wire)
+        attend(session, wire)
 
 
-def _served(debugged: Debugged, wire: Wire) -> bool:
-    def machine_of(arguments: dict[str, Any]) -> Machine:
-        for name in OF_ONE_ROBOT:
-            if name in arguments:
-                raise ValueError(f"`{name}` is for a robot alone; in a swarm the scene says it: --set KEY=VALUE")
-        return debugged.machine
-
-    server = Server(wire, machine_of, debugged.record)
-    server.serve()
+def attend(session: Session, wire: Wire) -> None:
+    """Until the client has left; what was wrong with what it sent is told."""
+    session.attend(wire)
     if wire.problem:
         print(f"arena debug: the client sent what is no message: {wire.problem}", file=sys.stderr, flush=True)
-    return debugged.keeps and not server.ends_all

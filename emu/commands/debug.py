@@ -72,13 +72,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _prompted(options: argparse.Namespace) -> int:
     import emu
+    from emu.dap.server import Server
     from emu.prompt.reader import Prompt
 
     if options.port is not None or options.once:
         raise CommandError("--port and --once are for editors, --tui is not")
     machine = emu.load(options.tui, board=board_of(options), engine=options.engine, strict=options.strict)
     set_up(machine, options)
-    return Prompt("emu debug", lambda _launch: machine).serve({}, sys.stdin)
+    return Prompt("emu debug", lambda client: Server(client, lambda _launch: machine)).serve({}, sys.stdin)
 
 
 def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:

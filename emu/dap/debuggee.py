@@ -7,7 +7,7 @@ each way forward has one back.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -273,11 +273,13 @@ class Debuggee:
             self._limit = None
         return halt or Halt("goto" if self.machine.cycle >= cycle else "pause")
 
-    def arrive(self, cycle: int) -> bool:
-        """Run on to a cycle, whatever is on the way, unless somebody wants it to stand; whether it is there."""
+    def arrive(self, cycle: int, pass_by: Callable[[], None] = lambda: None) -> bool:
+        """Run on to a cycle, whatever is on the way, unless somebody wants it to stand; whether it is there. `pass_by`
+        is called now and then."""
         machine, before = self.machine, -1
         while machine.cycle < cycle and machine.cycle > before and not self._wanted():
             before = machine.cycle
+            pass_by()
             self.history.advance(min(before + SLICE, cycle))
         return machine.cycle >= cycle
 
@@ -371,11 +373,11 @@ class Debuggee:
         self.history.seek(self.history.start)
         return Halt("entry")
 
-    def follow(self, other: Debuggee) -> None:
-        """Take over what stops `other`, hits counted."""
-        self.breakpoints.update(other.breakpoints)
-        self.stops_at_faults = other.stops_at_faults
-        other.breakpoints.clear()
+    def stop_at(self, breakpoints: Mapping[str, list[Breakpoint]], stops_at_faults: bool) -> None:
+        """Let what stopped another machine stop this one, and nothing else, hits counted."""
+        self.breakpoints.clear()
+        self.breakpoints.update(breakpoints)
+        self.stops_at_faults = stops_at_faults
         self._rehook()
 
     def leave(self) -> None:

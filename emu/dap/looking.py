@@ -7,13 +7,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Final
 
+from emu.dap.changes import Change, Poked, assigned
 from emu.dap.console import command
 from emu.dap.debuggee import Debuggee, Halt
 from emu.dap.names import completions
 from emu.dap.sfrs import groups
 from emu.dap.sights import Row, Sights, Sources, disassembled
 from emu.debug.expression import evaluate
-from emu.debug.inside import Inside, Value
+from emu.debug.inside import Value
 
 MOST_ROWS: Final = 1 << 16
 """Instructions, or bytes of memory, that one request may ask for: as many as there are of either on a chip."""
@@ -38,7 +39,7 @@ class Looking(ABC):
         """Bring what is around the machine to the time at which it stands. Raises Refused if it was interrupted."""
 
     @abstractmethod
-    def _change(self, act: Callable[[Inside], None]) -> None:
+    def _change(self, change: Change) -> None:
         """Change the machine that stands here, and again whenever it is brought here anew. Raises Refused."""
 
     def _world(self) -> list[tuple[str, str]]:
@@ -109,7 +110,7 @@ class Looking(ABC):
     def _write(self, place: Value, text: str, arguments: Row) -> None:
         value = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
         number = value.get() if isinstance(value, Value) else value
-        self._change(lambda inside: place.within(inside).set(number))
+        self._change(assigned(place, number))
 
     def _do_setVariable(self, arguments: Row) -> Row:
         place = self._sights.find(int(arguments["variablesReference"]), str(arguments["name"]))
@@ -146,7 +147,7 @@ class Looking(ABC):
         data = base64.b64decode(arguments["data"], validate=True)
         if not data:
             return {"bytesWritten": 0}
-        self._change(lambda inside: inside.machine.poke(address, int.from_bytes(data, "little"), len(data)))
+        self._change(Poked(address, data))
         return {"bytesWritten": len(data)}
 
     def _do_completions(self, arguments: Row) -> Row:

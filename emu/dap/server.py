@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING, Any, Final
 from emu.dap.breakpoints import Breakpoint, bad_hit_condition
 from emu.dap.debuggee import STACK_POINTER, Debuggee, Halt
 from emu.dap.launch import checked
-from emu.dap.looking import Looking, Refused
+from emu.dap.looking import Refused
+from emu.dap.returning import Returning
 from emu.dap.sights import Row, Sights, Sources
 from emu.dap.wire import Channel, Message
+from emu.debug.around import WokenError
 from emu.debug.expression import ExpressionError, evaluate
 from emu.debug.history import History
-from emu.debug.inside import Inside, Value
+from emu.debug.inside import Value
 from emu.debug.locate import Unavailable
 
 if TYPE_CHECKING:
@@ -56,16 +58,17 @@ ACCESSES: Final = ("read", "write", "readWrite")
 """What a data breakpoint may wait for."""
 
 
-class Server(Looking):
+class Server(Returning):
     """Serves one client to the end. `make(arguments)` gives a machine; it raises ValueError or OSError for bad ones.
     `record` makes the recording by which it goes back."""
 
     def __init__(
         self, wire: Channel, make: Callable[[Row], Machine], record: Callable[[Machine], History] = History
     ) -> None:
+        super().__init__()
         self._wire: Final = wire
         self._make: Final = make
-        self._record: Final = record
+        self._record = record
         self.ends_all = False
         """The client wants what is debugged to end, not only to be left alone."""
         self._target: Debuggee | None = None
@@ -77,20 +80,28 @@ class Server(Looking):
         self._halt = Halt("entry")
         self._pause = False
         self._waiting: list[Message] = []
-        self._changes: list[tuple[int, Callable[[Inside], None]]] = []
-        """What was changed, and in which cycle."""
         self._said: dict[int, bytearray] = {}
-        self._next_id = 0
+        self._last_id = 0
         self._thread = 1
 
     def serve(self) -> None:
         """Answer until the client leaves."""
+        woken: WokenError | None = None
         while not self._over:
-            message = self._waiting.pop(0) if self._waiting else self._wire.inbox.get()
-            if message is None:
-                break
-            if message.get("type") == "request":
-                self.answer(message)
+            try:
+                if woken is not None:
+                    left, woken = woken.left, None
+                    self._take_over(left)
+                    continue
+                if self._configured:
+                    self._pass_by()
+                message = self._waiting.pop(0) if self._waiting else self._wire.inbox.get()
+                if message is None:
+                    break
+                if message.get("type") == "request":
+                    self.answer(message)
+            except WokenError as error:
+                woken = error
         self.leave()
 
     @property
@@ -171,6 +182,8 @@ class Server(Looking):
             machine.uart[number].listen(partial(self._heard, number))
 
     def _heard(self, number: int, byte: int, _cycle: int) -> None:
+        if self._is_muted:
+            return
         text = self._said.setdefault(number, bytearray())
         text.append(byte & 0xFF)
         if byte == 0x0A or len(text) >= 256:
@@ -214,6 +227,7 @@ class Server(Looking):
     def _wanted(self) -> bool:
         """Whether the client wants the machine to stand; messages that came meanwhile are answered or wait."""
         self._flush()
+        self._pass_by()
         while not self._wire.inbox.empty():
             message = self._wire.inbox.get()
             if message is None:
@@ -232,40 +246,9 @@ class Server(Looking):
     def _go(self, act: Callable[[], Halt]) -> None:
         self._sights.forget()
         self._pause = False
-        halt = act()
+        halt = self._followed(act())
         if not self._over:
             self._stopped(halt)
-
-    def _bring(self) -> None:
-        target, history = self._debuggee, self._debuggee.history
-        if history.around is None or not history.is_past:
-            return
-        cycle = target.machine.cycle
-        self._changes = [one for one in self._changes if one[0] <= cycle]
-        self._say(f"the trial is run again up to cycle {cycle:,}\n")
-        self._pause = False
-        machine = history.around.anew()
-        fresh = Debuggee(machine, self._wanted, self._say, self._record(machine))
-        for at, act in self._changes:
-            if fresh.arrive(at):
-                act(machine.inside)
-        is_there = fresh.arrive(cycle)
-        fresh.follow(target)
-        self._target, self._sights.inside = fresh, machine.inside
-        self._listen(machine)
-        if not is_there:
-            self._changes = [one for one in self._changes if one[0] <= machine.cycle]
-            self._go(lambda: Halt("pause", "on the way back"))
-            raise Refused(f"interrupted on the way back, at cycle {machine.cycle:,}")
-
-    def _change(self, act: Callable[[Inside], None]) -> None:
-        frozen = self._debuggee.history.frozen
-        if frozen:
-            raise Refused(frozen)
-        self._bring()
-        act(self._debuggee.inside)
-        if self._debuggee.history.around is not None:
-            self._changes.append((self._debuggee.machine.cycle, act))
 
     def _stopped(self, halt: Halt) -> None:
         self._flush()
@@ -308,10 +291,10 @@ class Server(Looking):
     # Breakpoints
 
     def _breakpoint(self, wanted: Row, kind: str, places: tuple[int, ...], **more: Any) -> Breakpoint:
-        self._next_id += 1
+        self._last_id += 1
         hit = str(wanted.get("hitCondition") or "")
         made = Breakpoint(
-            self._next_id, kind, places, str(wanted.get("condition") or ""), hit,
+            self._last_id, kind, places, str(wanted.get("condition") or ""), hit,
             str(wanted.get("logMessage") or ""), more.pop("size", 0), more.pop("access", "write"),
         )  # fmt: skip
         missing = more.pop("problem", "there is no code")

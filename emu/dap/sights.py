@@ -34,7 +34,8 @@ class Sights:
         """Of the machine that is looked into; references hold as well for another that stands where it did."""
         self._sources: Final = sources
         self._world: Final = world
-        self._next = 0
+        self.last = 0
+        """The last number that was handed out."""
         self._frames: dict[int, Frame] = {}
         self._lists: dict[int, Callable[[], Iterator[tuple[str, Value | None, str]]]] = {}
 
@@ -57,10 +58,10 @@ class Sights:
         """Stack frames of the protocol."""
         rows = []
         for frame in frames:
-            self._next += 1
-            self._frames[self._next] = frame
+            self.last += 1
+            self._frames[self.last] = frame
             row: Row = {
-                "id": self._next, "name": frame.function + (" <interrupt>" if frame.kind == "interrupt" else ""),
+                "id": self.last, "name": frame.function + (" <interrupt>" if frame.kind == "interrupt" else ""),
                 "line": 0, "column": 0, "instructionPointerReference": f"{frame.pc:#08x}",
             }  # fmt: skip
             if frame.line is not None and frame.line.line:
@@ -130,9 +131,9 @@ class Sights:
         return rows
 
     def _keep(self, rows: Callable[[], Iterator[tuple[str, Value | None, str]]]) -> int:
-        self._next += 1
-        self._lists[self._next] = rows
-        return self._next
+        self.last += 1
+        self._lists[self.last] = rows
+        return self.last
 
     def variables(self, reference: int, start: int = 0, count: int = 0) -> list[Row]:
         """Members of a list; `count` 0 means all."""

@@ -346,10 +346,14 @@ class Value:
             return
         locate.write(self.pieces, encode(self.type, value), self._view)
 
+    @property
+    def frame(self) -> Frame | None:
+        """The frame it is looked up in; none if that is the machine as it stands."""
+        return self._view.frame if isinstance(self._view, FrameView) else None
+
     def within(self, inside: Inside) -> Value:
         """The same place in another machine that stands where this one does."""
-        frame = self._view.frame if isinstance(self._view, FrameView) else None
-        return Value(self.type, self.pieces, inside.view(frame), self.name, self.bits)
+        return Value(self.type, self.pieces, inside.view(self.frame), self.name, self.bits)
 
     def text(self) -> str:
         """For people, in one line; the reason if there is no value."""

@@ -1,5 +1,5 @@
-"""A client of the debug server in the same process: what is asked is answered, and what it lets go has halted, when a
-call comes back."""
+"""A client of a debug server that waits for it: what is asked is answered, and what it lets go has halted, when a call
+comes back."""
 
 from __future__ import annotations
 
@@ -8,14 +8,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, Final
-
-from emu.dap.server import Server
-from emu.debug.history import History
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 if TYPE_CHECKING:
-    from emu.dap.wire import Message
-    from emu.machine import Machine
+    from emu.dap.wire import Channel, Message
 
 Row = dict[str, Any]
 
@@ -24,17 +20,26 @@ class RefusedError(Exception):
     """What was asked for cannot be done; the text is for the user."""
 
 
-class Client:
-    """Owns a server. `make` and `record` are its own; `say(text)` gets what the firmware and the server say."""
+class Answering(Protocol):
+    """A server, here or in another process: `emu.dap.server.Server`."""
 
-    def __init__(
-        self,
-        make: Callable[[Row], Machine],
-        say: Callable[[str], None],
-        record: Callable[[Machine], History] = History,
-    ) -> None:
+    @property
+    def is_over(self) -> bool:
+        """The client has left."""
+
+    def answer(self, message: Message) -> None:
+        """Respond to one request; comes back when the machine stands again."""
+
+    def leave(self) -> None:
+        """Give back what was debugged."""
+
+
+class Client:
+    """Owns what `serving` makes, a server that talks to it; `say(text)` gets what the firmware and the server say."""
+
+    def __init__(self, serving: Callable[[Channel], Answering], say: Callable[[str], None]) -> None:
         self.inbox: Final[SimpleQueue[Message | None]] = SimpleQueue()
-        self.server: Final = Server(self, make, record)
+        self.server: Final = serving(self)
         self._say: Final = say
         self._seq = 0
         self._reply: Message = {}

@@ -6,10 +6,9 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.debug.history import History
 from emu.places import history
 from emu.prompt import breaking, looking, moving  # noqa: F401  they fill the table
-from emu.prompt.client import Client, RefusedError, Row
+from emu.prompt.client import Answering, Client, RefusedError, Row
 from emu.prompt.looking import TOPICS
 from emu.prompt.session import Session
 from emu.prompt.table import TABLE, Command, called
@@ -20,30 +19,20 @@ if TYPE_CHECKING:
     from prompt_toolkit.completion import CompleteEvent, Completion
     from prompt_toolkit.document import Document
 
-    from emu.machine import Machine
+    from emu.dap.wire import Channel
 
 PLACES: Final = ("break", "tbreak", "until", "list", "log", "disassemble")
 """Commands that take a location."""
 
 
 class Prompt:
-    """Debugs what `make` makes to the end. `program` is how the command line is called."""
+    """Debugs by what `serving` makes to the end. `program` is how the command line is called."""
 
-    def __init__(
-        self,
-        program: str,
-        make: Callable[[Row], Machine],
-        record: Callable[[Machine], History] = History,
-    ) -> None:
+    def __init__(self, program: str, serving: Callable[[Channel], Answering]) -> None:
         self._program: Final = program
         self._column = 0
-        self.client: Final = Client(make, self._said, record)
+        self.client: Final = Client(serving, self._said)
         self.session: Final = Session(self.client, self._write)
-
-    @property
-    def ends_all(self) -> bool:
-        """The user wants what is debugged to end, not only to be left alone."""
-        return self.client.server.ends_all
 
     def serve(self, launch: Row, source: TextIO) -> int:
         """Exit status: DONE; of a script also FAULT if it ends at a fault, BAD_INPUT if a command failed."""

@@ -76,7 +76,7 @@ def test_a_record_is_the_same_with_a_debugger_on_a_robot(
     assert records[0] == records[1]
 
 
-def test_who_changes_the_past_takes_the_world_back_and_who_leaves_ends_it(clustering_image: Path) -> None:
+def test_a_change_in_the_past_is_one_of_the_present_and_who_leaves_ends_the_trial(clustering_image: Path) -> None:
     """What was changed before is changed again on the way."""
     client = Client("arena", "debug", "clustering", "--minutes", "9", "--brain", str(clustering_image), "--robot", "0")
     client.ask("initialize", adapterID="openswarm", supportsInvalidatedEvent=True)
@@ -91,11 +91,9 @@ def test_who_changes_the_past_takes_the_world_back_and_who_leaves_ends_it(cluste
     as_changed = world(client)
     moved(client, "stepIn", granularity="instruction")
     moved(client, "stepBack", granularity="instruction")
+    assert world(client) == as_changed, "the world has gone back with the robot"
     scopes = client.ask("scopes", frameId=client.top()["id"])["scopes"]
     lists = {one["name"]: one["variablesReference"] for one in scopes}
-    assert not [one for one in client.events if one.get("event") == "invalidated"]
-    assert world(client) == as_changed
-    assert client.event("invalidated") == {"areas": ["variables"]}, "what was the past is the present"
     shown = client.ask("variables", variablesReference=lists["World"])["variables"]
     assert "\n".join(f"{one['name']}: {one['value']}" for one in shown) == as_changed
     w0 = client.ask("setVariable", variablesReference=lists["Registers"], name="W0", value="7")

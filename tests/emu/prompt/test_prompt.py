@@ -17,6 +17,7 @@ import pytest
 
 import emu
 from emu.cli import main
+from emu.dap.server import Server
 from emu.debug.history import History
 from emu.prompt.looking import TOPICS
 from emu.prompt.reader import Prompt, candidates, carry_out
@@ -42,7 +43,7 @@ def play(program: str, capsys: pytest.CaptureFixture[str]) -> type:
     class Played:
         def __init__(self, *lines: str) -> None:
             machine = emu.load(program)
-            prompt = Prompt("emu debug", lambda _launch: machine)
+            prompt = Prompt("emu debug", lambda client: Server(client, lambda _launch: machine))
             self.status = prompt.serve({}, io.StringIO("\n".join(lines)))
             self.out, self.err = capsys.readouterr()
 
@@ -186,7 +187,7 @@ def test_reverse_finish_goes_to_the_call(program: str) -> None:
     machine = emu.load(program)
     history = History(machine)
     said: list[str] = []
-    prompt = Prompt("test", lambda _launch: machine, lambda _machine: history)
+    prompt = Prompt("test", lambda client: Server(client, lambda _launch: machine, lambda _machine: history))
     prompt.session.write = said.append  # type: ignore[misc]
     prompt.session.start({})
     for line in ("break add if b == 2", "run", "next", "next", "reverse-finish"):
@@ -241,7 +242,7 @@ def test_reverse_step_passes_interrupts_by(tmp_path: Path) -> None:
     source.write_text(TICKING)
     assert driver.main(["-g", "-O0", str(source), "-o", str(image)]) == 0
     machine = emu.load(image)
-    prompt = Prompt("test", lambda _launch: machine)
+    prompt = Prompt("test", lambda client: Server(client, lambda _launch: machine))
     prompt.session.write = lambda _text: None  # type: ignore[misc]
     prompt.session.start({})
     for line in ("break ticking.c:19 if ticks == 3", "run"):
@@ -257,7 +258,7 @@ def test_reverse_step_passes_interrupts_by(tmp_path: Path) -> None:
 
 
 def test_names_are_completed(program: str) -> None:
-    prompt = Prompt("test", lambda _launch: emu.load(program))
+    prompt = Prompt("test", lambda client: Server(client, lambda _launch: emu.load(program)))
     prompt.session.write = lambda _text: None  # type: ignore[misc]
     prompt.session.start({})
 

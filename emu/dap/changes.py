@@ -1,0 +1,50 @@
+"""What a client changes in a machine that stands, as a record: it can be changed again in another that stands there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from emu.debug.inside import Frame, Inside, Value
+from emu.debug.locate import Piece
+from emu.debug.types import Type
+
+
+class Change(Protocol):
+    """Holds plain values only, so it can be told to another process."""
+
+    def do(self, inside: Inside) -> None:
+        """Change it there. Raises locate.Unavailable, ValueError, TypeError."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assigned:
+    """A place of the program got a value."""
+
+    type: Type
+    pieces: tuple[Piece, ...]
+    frame: Frame | None
+    name: str
+    bits: tuple[int, int] | None
+    number: Any
+
+    def do(self, inside: Inside) -> None:
+        """As `Change.do`."""
+        Value(self.type, self.pieces, inside.view(self.frame), self.name, self.bits).set(self.number)
+
+
+@dataclass(frozen=True, slots=True)
+class Poked:
+    """Bytes of data space were written."""
+
+    address: int
+    data: bytes
+
+    def do(self, inside: Inside) -> None:
+        """As `Change.do`."""
+        inside.machine.poke(self.address, int.from_bytes(self.data, "little"), len(self.data))
+
+
+def assigned(place: Value, number: Any) -> Assigned:
+    """`place` gets `number`, wherever the machine stands as it does here."""
+    return Assigned(place.type, place.pieces, place.frame, place.name, place.bits, number)
