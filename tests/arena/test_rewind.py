@@ -15,11 +15,13 @@ from typing import Any
 import pytest
 
 from arena import debugserver, debugsession, moments
-from arena.campaign import Plan
+from arena.campaign import Plan, trial_path
+from arena.cli import main
 from arena.debugsession import Remote, Session
 from arena.live import live_path
 from emu.dap.wire import Message
 from emu.prompt.client import Client
+from tests.emu.dap.node import mocha, node_modules
 from tests.firmware.conftest import built_once
 from tests.fuzz.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
@@ -73,6 +75,25 @@ def test_random_walks_meet_the_world_that_was_there(swarm: Swarm, image_of: Call
     walk(5, image_of, 12, tally, swarm)
     assert tally["met again"] >= 2
     assert tally["back"] + tally["reverse"] + tally["last write"] >= 3
+
+
+@needs_copies
+def test_an_editors_client_takes_the_whole_world_back(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, clustering_image: Path
+) -> None:
+    """The protocol's own test-support package; the record afterwards is that of a trial nobody debugged."""
+    modules = node_modules(tmp_path_factory.mktemp("npm"))
+    trial = ["clustering", "--minutes", "0.02", "--brain", str(clustering_image), "--seed", "3",
+             "--set", "start.selector=8"]  # fmt: skip
+    launcher, debugged = tmp_path / "launcher.py", tmp_path / "debugged"
+    words = ["debug", *trial, "--robot", "2", "--out", str(debugged)]
+    launcher.write_text(
+        f"import sys\nfrom arena.cli import main\nif __name__ == '__main__':\n    sys.exit(main({words}))\n"
+    )
+    told = mocha(modules, Path(__file__).with_name("rewinding.js"), EMU_LAUNCHER=str(launcher))
+    assert "1 passing" in told
+    assert main(["run", *trial, "--trials", "1", "--jobs", "1", "--out", str(tmp_path / "alone")]) == 0
+    assert trial_path(debugged, 1).read_bytes() == trial_path(tmp_path / "alone", 1).read_bytes()
 
 
 @needs_copies
