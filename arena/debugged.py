@@ -216,6 +216,8 @@ class Debugged:
         """The trial is over: what is left is to look at the robot, and back. Whether the debugger has ever seen it.
         Raises AnewError."""
         self._is_over = True
+        if self._recording is not None:
+            self._recording.met()
         if self._debugger and not self._debugger.dead:
             self._trial = self._debugger.parent = getcurrent()
             self._debugger.switch(Stop("limit", self.machine.pc, self.machine.cycle, OVER))

@@ -109,6 +109,12 @@ class Session:
         self._process.join(PATIENCE_S)
 
     @property
+    def process_id(self) -> int:
+        """Of the process in which the trial began; it ends when a copy of it takes over."""
+        assert self._process.pid is not None
+        return self._process.pid
+
+    @property
     def kept(self) -> int:
         """Moments that can be gone back to at once."""
         return len(self._moments)

@@ -17,6 +17,7 @@ import pytest
 from arena import debugserver, debugsession, moments
 from arena.campaign import Plan, trial_path
 from arena.cli import main
+from arena.debugged import OVER
 from arena.debugsession import Remote, Session
 from arena.live import live_path
 from emu.dap.wire import Message
@@ -51,6 +52,11 @@ class Debugger(Client):
 
     def told(self, text: str) -> str:
         return str(self.ask("evaluate", expression=text, context="repl")["result"])
+
+    @property
+    def cycle(self) -> int:
+        """At which the robot stands."""
+        return int(self.told("/time").removeprefix("cycle ").partition(", ")[0].replace(",", ""))
 
     def to(self, cycle: int) -> str:
         """Go to a cycle; the world there."""
@@ -148,6 +154,18 @@ def test_rows_of_a_trial_that_goes_back_are_written_once(tmp_path: Path, image_o
             assert all(one["t"] < other["t"] for one, other in pairwise(rows))
 
 
+def test_the_end_is_met_again(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
+    """With what the last sample did to the robot: it looked how far the motors had come."""
+    with session_of(plan_of(FEW, 7, image_of), tmp_path) as (_, debugger):
+        halt = debugger.go("continue", threadId=1)
+        assert halt["description"] == OVER
+        end, cycle = debugger.told("/world"), debugger.cycle
+        assert debugger.to(cycle) == end
+        assert debugger.to(cycle - 500_000) != end
+        assert debugger.go("continue", threadId=1)["description"] == OVER
+        assert debugger.told("/world") == end
+
+
 def test_where_no_moments_are_kept_the_world_follows_who_looks(
     tmp_path: Path, image_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,6 +209,5 @@ def test_it_can_be_told_to_stand_on_the_way_back(tmp_path: Path, image_of: Calla
         session.hear = heard  # type: ignore[method-assign]
         halt = debugger.go("evaluate", expression="/goto 199000000", context="repl")
         assert (halt["reason"], halt["description"]) == ("pause", "on the way back")
-        stands = int(debugger.told("/time").removeprefix("cycle ").partition(", ")[0].replace(",", ""))
-        assert stands < 199_000_000
+        assert debugger.cycle < 199_000_000
         assert debugger.to(10_000_000) == early

@@ -85,7 +85,7 @@ class Walk:
         cycle, world = self._cycle(), self._told("/world")
         if cycle in self.seen:
             self._tally["met again"] += 1
-            assert world == self.seen[cycle], f"at cycle {cycle}"
+            assert world == self.seen[cycle], f"at cycle {cycle}: {_apart(self.seen[cycle], world)}"
         self.seen[cycle] = world
 
     def _go(self, kind: str, request: str, **arguments: Any) -> None:
@@ -130,6 +130,12 @@ class Walk:
         """Let the trial go on without a debugger."""
         self._stop_at()
         self._client.ask("disconnect", terminateDebuggee=False)
+
+
+def _apart(before: str, now: str) -> str:
+    """Where two worlds differ."""
+    rows = zip(before.splitlines(), now.splitlines(), strict=False)
+    return "; ".join(f"{one} <> {other}" for one, other in rows if one != other)
 
 
 def walk(

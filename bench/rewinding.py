@@ -1,0 +1,107 @@
+"""A debugged swarm taken back: what the way takes, and what it takes to remember.
+
+    python bench/rewinding.py [--minutes M] [--json]
+
+Robot 2 of `clustering` (five robots with cameras) is debugged for M simulated minutes (default 2). Then, in host
+seconds by the clock: a step back with the whole world, the first one and the fastest of the ten after it; back to the
+breakpoint before; back by a minute; forward there, as a trial that is run. And in MB, after half the time and all of
+it: the process of the trial with all moments that are kept, what they share counted once; the mean of a moment alone.
+For Linux.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from arena.campaign import Plan  # noqa: E402
+from arena.commands.run import image_for  # noqa: E402
+from arena.debugsession import Remote, Session  # noqa: E402
+from arena.scene import FCY, load_scene  # noqa: E402
+from emu.prompt.client import Client  # noqa: E402
+
+ROBOT = 2
+
+
+def timed(client: Client, request: str, **arguments: Any) -> float:
+    """Host seconds until it stands again."""
+    start = time.perf_counter()
+    client.go(request, threadId=1, **arguments)
+    return time.perf_counter() - start
+
+
+def memory_mb(pid: int, *kinds: str) -> float:
+    """Of a process, as Linux tells it."""
+    rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+    return sum(int(row.split()[1]) for row in rows if row.startswith(kinds)) / 1024
+
+
+def children(pid: int) -> list[int]:
+    """Of a process, those that live."""
+    found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [int(one) for one in found if Path(f"/proc/{one}/maps").read_text()]
+
+
+def measured(minutes: float) -> dict[str, float]:
+    """Everything, by what is told of it."""
+    scene = load_scene("clustering").with_values(start__selector=8)
+    plan = Plan(scene, "openswarm", "A", image_for("openswarm"), 1, 60 * minutes + 10, 1)
+    found: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        session = Session(plan, ROBOT, Path(folder), is_recorded=False)
+        client = Client(partial(Remote, session), lambda _text: None)
+        client.ask("initialize")
+        client.ask("launch", stopOnEntry=True)
+        client.go("configurationDone")
+
+        def to(seconds: float) -> float:
+            return timed(client, "evaluate", expression=f"/goto {round(seconds * FCY)}", context="repl")
+
+        for part in (0.5, 1.0):
+            to(60 * minutes * part)
+            trial = session.process_id
+            copies = children(trial)
+            after = f"after {minutes * part:g} min, MB"
+            found[f"trial with {len(copies)} moments {after}"] = sum(memory_mb(one, "Pss:") for one in (trial, *copies))
+            found[f"what a moment shares with nobody {after}"] = sum(
+                memory_mb(one, "Private_") for one in copies
+            ) / len(copies)
+        fine = {"granularity": "instruction"}
+        found["first step back, s"] = timed(client, "stepBack", **fine)
+        found["another, s"] = min(timed(client, "stepBack", **fine) for _ in range(10))
+        client.ask("setFunctionBreakpoints", breakpoints=[{"name": "react"}])
+        found["back to a breakpoint, s"] = timed(client, "reverseContinue")
+        client.ask("setFunctionBreakpoints", breakpoints=[])
+        found["back by a minute, s"] = to(60 * minutes - 60)
+        found["forward by 10 s, s"] = to(60 * minutes - 50)
+        session.close()
+    return found
+
+
+def main() -> int:
+    """Measure and print."""
+    assert __doc__ is not None
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=2, help="simulated time, at least 1 (default 2)")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    options = parser.parse_args()
+    found = measured(max(options.minutes, 1.0))
+    if options.json:
+        print(json.dumps(found))
+    else:
+        for name, number in found.items():
+            print(f"{name:52} {number:8.3f}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
