@@ -10,6 +10,8 @@ robots, which are the old ones to the bit.
 
 from __future__ import annotations
 
+from array import array
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -40,6 +42,37 @@ class AnewError(Exception):
     """Whoever debugs wants the trial to be run again."""
 
 
+class _Levels:
+    """Levels of sensors by cycle and channel, and the light around the robot at each: about 20 bytes for one."""
+
+    def __init__(self) -> None:
+        self._cycles: Final = array("q")
+        self._channels: Final = array("B")
+        self._levels: Final = array("q")
+        self._which: Final = array("L")
+        self._lights: Final[list[bytes]] = []
+        """Each that was different from the one before."""
+
+    def add(self, cycle: int, channel: int, level: int, light: bytes) -> None:
+        """The latest. What was later than that has never been."""
+        while self._cycles and self._cycles[-1] > cycle:
+            for column in (self._cycles, self._channels, self._levels, self._which):
+                column.pop()
+        if not self._lights or self._lights[-1] != light:
+            self._lights.append(light)
+        self._cycles.append(cycle)
+        self._channels.append(channel)
+        self._levels.append(level)
+        self._which.append(len(self._lights) - 1)
+
+    def find(self, cycle: int, channel: int) -> tuple[int, bytes] | None:
+        """Level and light, if there was one."""
+        for at in range(bisect_left(self._cycles, cycle), bisect_right(self._cycles, cycle)):
+            if self._channels[at] == channel:
+                return self._levels[at], self._lights[self._which[at]]
+        return None
+
+
 class Shown:
     """What a robot has been shown of the world, by cycle; told again when its past is run again."""
 
@@ -49,7 +82,7 @@ class Shown:
         self._events: Final = machine.events
         self._ir: Final = machine.board.ir
         self._lines: Final[dict[int, NDArray[np.uint8]]] = {}
-        self._levels: Final[dict[tuple[int, int], tuple[int, Any, Any]]] = {}
+        self._levels: Final = _Levels()
         camera, sources = machine.board.camera, machine.board.chip.adc.source
         camera.sample(partial(self._pixels, camera.sampled))
         for channel in SENSORS:
@@ -69,15 +102,19 @@ class Shown:
 
     def _level(self, channel: int, ask: Callable[[int], int], cycle: int) -> int:
         """A sensor's level; what the board keeps of the light around it changes with the answer."""
-        ir, key = self._ir, (channel, cycle)
+        lights = self._ir.reflection, self._ir.ambient
         if self._events.quiet:
-            if key not in self._levels:  # a way it never went
+            found = self._levels.find(cycle, channel)
+            if found is None:  # a way it never went
                 return 0
-            level, ir.reflection[:], ir.ambient[:] = self._levels[key]
+            level, light = found
+            half = len(light) // 2
+            for around, kept in zip(lights, (light[:half], light[half:]), strict=True):
+                around[:] = memoryview(kept).cast("B").cast(around.format)
             return level
         level = ask(cycle)
         if self.keeps:
-            self._levels[key] = level, ir.reflection[:], ir.ambient[:]
+            self._levels.add(cycle, channel, level, b"".join(around.tobytes() for around in lights))
         return level
 
 

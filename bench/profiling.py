@@ -1,10 +1,12 @@
 """What counting costs: `emu profile` beside a plain run of the same image in native code.
 
-    python bench/profiling.py [--seconds S] [--repeat N] [--json]
+    python bench/profiling.py [--seconds S] [--repeat N] [--only WORD] [--json]
 
-Each ratio is the median of N paired runs in host CPU time, with native code of both kinds complete before it is timed:
-bench/c/compute.c, the kernel with busy threads (firmware/apps/compute) and the paper's Listing 1. With --timed,
-what happened is also kept in order, as for --speedscope and --perfetto. With --cold each run is a whole process.
+Host CPU time of each kind is the least of N runs, which take turns; native code of both kinds is complete before it is
+timed. Images: computing C, calls and little else, and interrupts every 100 and every 10 us (bench/c), each at -Os and
+at -O0; the kernel with busy threads (firmware/apps/compute), the paper's Listing 1, and the clustering robot with its
+camera on. With --timed, what happened is also kept in order, as for --speedscope and --perfetto. With --cold each run
+is a whole process.
 """
 
 from __future__ import annotations
@@ -13,42 +15,62 @@ import argparse
 import json
 import resource
 import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
+from emu.boards.epuck.board import Epuck  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 from emu.profile.shares import Profiler  # noqa: E402
 
 MIPS = 14_745_600  # design §4.2
 
 
-def images(folder: Path) -> dict[str, Path]:
-    """What is run."""
-    image = folder / "c.elf"
-    source = ROOT / "bench" / "c" / "compute.c"
-    words = ["-Os", "-g", "-DROUNDS=65535", str(source), "-o", str(image)]
-    subprocess.run([sys.executable, "-m", "toolchain", "cc", *words], check=True, cwd=ROOT)
-    found = {"computing C": image}
-    for app, name in (("compute", "kernel with busy threads"), ("listing1", "Listing 1")):
-        command = ["make", "-s", "-C", str(ROOT / "firmware"), f"APP={app}", f"PYTHON={sys.executable}"]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        found[name] = folder / f"{app}.elf"
-        shutil.copy(ROOT / "firmware" / "build" / app / "firmware.elf", found[name])
+SOURCES = {
+    "computing C": ("compute.c", "-DROUNDS=65535"),
+    "calls": ("calls.c",),
+    "interrupt every 100 us": ("storm.c",),
+    "interrupt every 10 us": ("storm.c", "-DPERIOD=146"),
+}
+FIRMWARE = {"kernel with busy threads": ("compute", 0), "Listing 1": ("listing1", 0), "clustering": ("clustering", 8)}
+"""Applications, and the position of the selector."""
+RED = (80, 0, 0)
+"""What the camera sees: the same work for every line of every frame."""
+
+
+def images(folder: Path, only: str) -> dict[str, Path]:
+    """What is run, where `only` is in its name."""
+    found = {}
+    for name, (source, *words) in SOURCES.items():
+        for level in ("-Os", "-O0"):
+            if only in (title := f"{name} {level}"):
+                found[title] = folder / f"{source}{level}{''.join(words)}.elf"
+                command = ["-m", "toolchain", "cc", level, "-g", *words, str(ROOT / "bench" / "c" / source)]
+                subprocess.run([sys.executable, *command, "-o", str(found[title])], check=True, cwd=ROOT)
+    for name, (app, _) in FIRMWARE.items():
+        if only in name:
+            command = ["make", "-s", "-C", str(ROOT / "firmware"), f"APP={app}", f"PYTHON={sys.executable}"]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            found[name] = folder / f"{app}.elf"
+            shutil.copy(ROOT / "firmware" / "build" / app / "firmware.elf", found[name])
     return found
 
 
-def spent(image: Path, cycles: int, how: str) -> float:
+def spent(image: Path, name: str, cycles: int, how: str) -> float:
     """Host seconds of `cycles` behind as many that are not timed: "plain", "counted" or "timed"."""
-    machine = emu.load(image)
+    _, selector = FIRMWARE.get(name, ("", 0))
+    machine = emu.load(image, board=partial(Epuck, selector=selector))
+    machine.board.camera.show(np.full((480, 640, 3), RED, np.uint8))
     assert isinstance(machine.runner, JitEngine)
     assert machine.image is not None
     machine.runner.wait = True
@@ -61,11 +83,12 @@ def spent(image: Path, cycles: int, how: str) -> float:
     return time.process_time() - start
 
 
-def of_a_process(image: Path, seconds: float, how: str) -> float:
+def of_a_process(image: Path, name: str, seconds: float, how: str) -> float:
     """Host seconds of `emu run` or `emu profile` from start to end."""
     folder = image.parent
     more = {"plain": [], "counted": [], "timed": ["--speedscope", str(folder / "timeline.json")]}[how]
     words = ["run" if how == "plain" else "profile", str(image), "--seconds", f"{seconds:g}", *more]
+    words += ["--selector", str(FIRMWARE[name][1])] if name in FIRMWARE else []
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-m", "emu", *words], check=True, stdout=subprocess.DEVNULL,
                    stderr=subprocess.DEVNULL, cwd=ROOT)  # fmt: skip
@@ -79,25 +102,28 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=20, help="simulated time of a run (default 20)")
     parser.add_argument("--repeat", type=int, default=3, help="pairs of runs (default 3)")
+    parser.add_argument("--only", default="", metavar="WORD", help="images with this in their name")
     parser.add_argument("--timed", action="store_true", help="keep what happened in order too")
     parser.add_argument("--cold", action="store_true", help="whole processes, from start to end")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args()
     how, cycles = "timed" if options.timed else "counted", int(options.seconds * MIPS)
 
-    def once(image: Path, kind: str) -> float:
-        return of_a_process(image, options.seconds, kind) if options.cold else spent(image, cycles, kind)
+    def once(image: Path, name: str, kind: str) -> float:
+        if options.cold:
+            return of_a_process(image, name, options.seconds, kind)
+        return spent(image, name, cycles, kind)
 
+    ratios = {}
     with tempfile.TemporaryDirectory() as folder:
-        ratios = {
-            name: statistics.median(once(image, how) / once(image, "plain") for _ in range(options.repeat))
-            for name, image in images(Path(folder)).items()
-        }
+        for name, image in images(Path(folder), options.only).items():
+            pairs = [(once(image, name, "plain"), once(image, name, how)) for _ in range(options.repeat)]
+            plain, other = map(min, zip(*pairs, strict=True))
+            ratios[name] = other / plain
+            if not options.json:
+                print(f"{name:28} {ratios[name]:6.2f} x the time of a plain run", flush=True)
     if options.json:
         print(json.dumps(ratios))
-    else:
-        for name, ratio in ratios.items():
-            print(f"{name:28} {ratio:6.2f} x the time of a plain run")
     return 0
 
 

@@ -1,8 +1,12 @@
-/* An interrupt every 100 us over a computing main loop; the handler clears its flag, saves registers, calls. */
+/* An interrupt every PERIOD + 1 Tcy, by default 100 us, over a computing main loop; the handler clears its flag, saves registers, calls. */
 #include <p30F6014A.h>
 #include <stdint.h>
 
 #include "dspic_compiler.h"
+
+#ifndef PERIOD
+#define PERIOD 1473 /* 1474 Tcy = 99.96 us at 14.7456 MIPS */
+#endif
 
 static volatile uint16_t ticks;
 static volatile uint16_t crc = 0xFFFF;
@@ -21,7 +25,7 @@ OS_ISR(_T1Interrupt)
 int main(void)
 {
     uint16_t random = 1;
-    PR1 = 1473; /* 1474 Tcy = 99.96 us at 14.7456 MIPS */
+    PR1 = PERIOD;
     IEC0bits.T1IE = 1;
     T1CONbits.TON = 1;
     for (;;) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import random
 import socket
 import subprocess
 import sys
@@ -10,8 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from arena.campaign import Plan, run_one
 from arena.cli import main
+from arena.debugged import Debugged
+from arena.scene import load_scene
 from tests.emu.dap.client import PATIENCE, ROOT, Client
+from tests.firmware.conftest import built_once
 from toolchain import driver
 
 SEED = ("--seed", "3")
@@ -189,3 +194,32 @@ def test_a_robot_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]
     assert "robots 0 to 4" in capsys.readouterr().err
     assert main(["debug", "clustering", "--brain", "scripted", "--robot", "1", "--minutes", "0.01"]) == 2
     assert "no firmware" in capsys.readouterr().err
+
+
+def test_what_a_robot_was_shown_makes_its_past_the_same_to_the_bit(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Of the light at its infrared sensors, with what the board keeps of it, while the world stands still."""
+    image = built_once(tmp_path_factory, "avoidance")
+    plan = Plan(load_scene("avoidance"), "avoidance", "A", None, 1, 1.0, 3, None, (("avoidance", image),))
+    rng, met = random.Random(4), []
+
+    def debugger(debugged: Debugged) -> bool:
+        history = debugged.record(debugged.machine)
+        states = {}
+        for _ in range(40):
+            history.advance(debugged.machine.cycle + rng.randrange(400_000))
+            states[debugged.machine.cycle] = debugged.machine.snapshot()
+        end = history.end
+        for cycle in rng.sample(sorted(states), 20):
+            history.seek(cycle)
+            met.append(debugged.machine.snapshot() == states[cycle])
+        history.seek(end)
+        met.append(debugged.machine.snapshot() == states[end])
+        return True
+
+    robot = Debugged(1, debugger, keeps=True)
+    run_one(plan, 1, tmp_path, meet=robot.meet)
+    assert robot.over()
+    assert len(met) == 21
+    assert all(met)
