@@ -29,8 +29,9 @@ def vectors() -> Path:
 class Assembled:
     """An object with questions tests ask."""
 
-    def __init__(self, obj: ObjectFile) -> None:
+    def __init__(self, obj: ObjectFile, messages: list[str]) -> None:
         self.object = obj
+        self.messages = messages  # of .print and warnings
         self.sections = {s.name: s for s in obj.sections}
         self.symbols = {s.name: s for s in obj.symbols}
 
@@ -55,8 +56,8 @@ def asm() -> Callable[..., Assembled]:
     """Assemble text; the object goes through its file form, so every test also covers writer and reader."""
 
     def run(text: str, **options: object) -> Assembled:
-        obj, _ = assemble(text, "test.s", Options(**options))  # type: ignore[arg-type]
-        return Assembled(read_object(object_bytes(obj), "test.o"))
+        obj, messages = assemble(text, "test.s", Options(**options))  # type: ignore[arg-type]
+        return Assembled(read_object(object_bytes(obj), "test.o"), messages)
 
     return run
 

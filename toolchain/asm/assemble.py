@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from toolchain.asm.conditionals import CONDITIONALS
-from toolchain.asm.directives import DIRECTIVES, REJECTED
+from toolchain.asm.directives import DIRECTIVES, REJECTED, set_symbol
 from toolchain.asm.encode import StatementError, assemble_instruction
 from toolchain.asm.expr import ExprError
 from toolchain.asm.finish import finish
@@ -65,7 +65,7 @@ def _statement(asm: Assembler, line: str) -> None:
         return
     word, operands = match.groups()
     if operands[:1] == "=" and (assignment := _ASSIGN.match(line)):
-        asm.assign(assignment[1], assignment[2])
+        set_symbol(asm, assignment[1], assignment[2])
     elif (macro := asm.macros.get(word.lower())) is not None:
         _call_macro(asm, macro, operands)
     elif word[0] == ".":

@@ -28,6 +28,8 @@ _MODIFIERS: dict[str, SectionFlag] = {
     "ymemory": _F.YMEM,
     "noload": _F.NOLOAD,
 }
+OMITTED = _F.NEAR | _F.XMEM | _F.YMEM | _F.NOLOAD | _F.ABSOLUTE | _F.REVERSE
+"""What the first `.section` of a name says for all later ones, which may leave it out."""
 _RESERVED: dict[str, str] = {
     ".text": "code",
     ".data": "data",

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Callable
 
-from toolchain.asm.data import string_argument
+from toolchain.asm.data import file_argument
 from toolchain.asm.device import include_text, is_device_file
 from toolchain.asm.expr import ExprError
 from toolchain.asm.macro import (
@@ -43,8 +43,7 @@ def symbol_names(text: str) -> list[str]:
 def _macro(asm: Assembler, text: str) -> None:
     name, parameters = parse_head(text)
     if name.lower() in asm.macros:
-        asm.source.block(OPEN_MACRO, CLOSE_MACRO, f".macro {name}")
-        raise ExprError(f"macro {name} is already defined (use .purgem first)")
+        asm.warn(f"macro {name} has been defined before: this definition replaces that one")
     asm.macros[name.lower()] = Macro(name, parameters, asm.source.block(OPEN_MACRO, CLOSE_MACRO, f".macro {name}"))
 
 
@@ -98,11 +97,11 @@ def _stray(directive: str, opener: str) -> Handler:
 
 
 def _include(asm: Assembler, text: str) -> None:
-    name = string_argument(text, ".include")
+    name = file_argument(text, ".include")
     try:
         path = asm.find_file(name)
     except ExprError:
-        if not is_device_file(os.path.basename(name), asm.options.chip):
+        if not is_device_file(os.path.basename(name.replace("\\", "/")), asm.options.chip):
             raise
         asm.source.include(include_text(asm.options.chip), name, asm.conditionals.depth)
         return

@@ -12,7 +12,7 @@ from toolchain.asm.symbols import AsmSymbol
 from toolchain.errors import Place
 
 _COMPARISONS = (".if", ".ifne", ".ifeq", ".ifgt", ".ifge", ".iflt", ".ifle")
-_TESTS = (".ifdef", ".ifndef", ".ifnotdef", ".ifc", ".ifnc", ".ifeqs", ".ifnes")
+_TESTS = (".ifdef", ".ifndef", ".ifnotdef", ".ifdecl", ".ifndecl", ".ifc", ".ifnc", ".ifeqs", ".ifnes")
 _PARTS = (".else", ".elsec", ".elseif", ".endif", ".endc")
 CONDITIONALS = frozenset(_COMPARISONS + _TESTS + _PARTS)
 
@@ -21,6 +21,7 @@ class Context(Protocol):
     """What a condition may ask the assembler."""
 
     symbols: dict[str, AsmSymbol]
+    declared: set[str]
 
     def constant(self, text: str, what: str = "expression") -> int:
         """Value of `text`, which must be a number now."""
@@ -97,11 +98,13 @@ class Conditionals:
 def _condition(word: str, operands: str, context: Context) -> bool:
     if word in _COMPARE:
         return bool(_COMPARE[word](context.constant(operands, "condition")))
-    if word in (".ifdef", ".ifndef", ".ifnotdef"):
+    if word in (".ifdef", ".ifndef", ".ifnotdef", ".ifdecl", ".ifndecl"):
         name = operands.strip()
         if not re.fullmatch(r"[A-Za-z_.$][\w.$]*", name):
             raise ExprError(f"{word} expects one symbol, got {name!r}")
         symbol = context.symbols.get(name)
+        if word.endswith("decl"):  # mentioned before, be it defined or not
+            return (symbol is not None or name in context.declared) == (word == ".ifdecl")
         defined = symbol is not None and (symbol.place is not None or symbol.common is not None)
         return defined == (word == ".ifdef")
     parts = split_arguments(operands, spaces=False)

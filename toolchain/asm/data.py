@@ -44,6 +44,14 @@ def operator_of(value: Known) -> str:
     return ""
 
 
+def file_argument(text: str, directive: str) -> str:
+    """Return the file that the quoted string in `text` names, where a backslash parts folders and escapes nothing."""
+    match = re.fullmatch(r'\s*"([^"]*)"\s*', text)
+    if match is None:
+        raise ExprError(f"{directive} expects a file name in double quotes")
+    return match[1]
+
+
 def string_argument(text: str, directive: str) -> str:
     """Return the text of the single quoted string in `text`."""
     match = re.fullmatch(r'\s*"((?:\\.|[^"\\])*)"\s*', text)
@@ -166,7 +174,7 @@ def _numbers(asm: Assembler, text: str, directive: str, least: int, most: int) -
 def _space(packed: bool) -> Handler:
     def emit(asm: Assembler, text: str) -> None:
         numbers = _numbers(asm, text, ".pspace" if packed else ".space", 1, 2)
-        fill = numbers[1] if len(numbers) > 1 else asm.packed_fill_value if packed else asm.fill_value
+        fill = numbers[1] if len(numbers) > 1 else asm.section.default_fill(packed)
         if packed:
             _check_count(asm, numbers[0])
             _put(asm, bytes((fill & 0xFF,)) * numbers[0], packed=True)
@@ -187,7 +195,7 @@ def _check_count(asm: Assembler, count: int) -> None:
 def _fill(packed: bool) -> Handler:
     def emit(asm: Assembler, text: str) -> None:
         numbers = _numbers(asm, text, ".fill", 1, 3)
-        count, size, value = (*numbers, *(1, 0)[len(numbers) - 1 :])
+        count, size, value = (*numbers, *(1, asm.section.default_fill(packed))[len(numbers) - 1 :])
         if not 0 <= size <= 8:
             raise ExprError(f".fill size {size} is outside 0..8")
         _check_count(asm, count * max(size, 1))
@@ -196,27 +204,44 @@ def _fill(packed: bool) -> Handler:
     return emit
 
 
-def _align(asm: Assembler, text: str) -> None:
-    parts = split_arguments(text, spaces=False)
-    if not 1 <= len(parts) <= 3:
-        raise ExprError(".align expects an alignment, optionally a fill value and a maximum")
-    units = asm.constant(parts[0])
-    fill = asm.constant(parts[1]) if len(parts) > 1 and parts[1] else asm.fill_value
-    if len(parts) > 2 and units > 0 and -asm.section.location() % units > asm.constant(parts[2]):
-        return
-    asm.section.align_to(units, fill)
-    asm.after_repeat = ""
+def _align(packed: bool) -> Handler:
+    def emit(asm: Assembler, text: str) -> None:
+        parts = split_arguments(text, spaces=False)
+        if len(parts) > 3:
+            raise ExprError(".align expects an alignment, optionally a fill value and a maximum")
+        section = asm.section
+        units = asm.constant(parts[0]) if parts else 2
+        fill = asm.constant(parts[1]) if len(parts) > 1 and parts[1] else section.default_fill(packed)
+        most = asm.constant(parts[2]) if len(parts) > 2 else 0
+        if most and units > 0 and section.bytes_to(units) > most:
+            return
+        section.align_to(units, fill, packed)
+        asm.after_repeat = ""
+
+    return emit
 
 
-def _org(asm: Assembler, text: str) -> None:
-    numbers = _numbers(asm, text, ".org", 1, 2)
-    if asm.section.relaxables:
-        raise ExprError(".org after a call that --relax may shorten: use a section of its own")
-    asm.section.align_word()
-    gap = numbers[0] - asm.section.location()
-    if gap < 0:
-        raise ExprError(f".org {numbers[0]:#x} is behind the current location {asm.section.location():#x}")
-    asm.section.skip(gap, numbers[1] if len(numbers) > 1 else asm.fill_value)
+def _org(packed: bool) -> Handler:
+    def emit(asm: Assembler, text: str) -> None:
+        parts = split_arguments(text, spaces=False)
+        if not 1 <= len(parts) <= 2:
+            raise ExprError(".org expects a location and optionally a fill value")
+        section = asm.section
+        fill = asm.constant(parts[1]) if len(parts) > 1 else section.default_fill(packed)
+        if section.relaxables:
+            raise ExprError(".org after a call that --relax may shorten: use a section of its own")
+        target = asm.location(parts[0])
+        section.align_word(fill & 0xFF, packed)
+        gap = target - section.location()
+        if gap < 0:
+            raise ExprError(f".org {target:#x} is behind the current location {section.location():#x}")
+        section.skip(gap, fill, packed)
+
+    return emit
+
+
+move_location: Handler = _org(packed=False)
+"""What an assignment to `.` does; the operands of `.org`."""
 
 
 def _include_binary(packed: bool) -> Handler:
@@ -224,7 +249,7 @@ def _include_binary(packed: bool) -> Handler:
         parts = split_arguments(text, spaces=False)
         if not 1 <= len(parts) <= 3:
             raise ExprError(".incbin expects a file name, optionally bytes to skip and a count")
-        data = read_bytes(asm.find_file(string_argument(parts[0], ".incbin")))
+        data = read_bytes(asm.find_file(file_argument(parts[0], ".incbin")))
         skip = asm.constant(parts[1]) if len(parts) > 1 and parts[1] else 0
         count = asm.constant(parts[2]) if len(parts) > 2 else len(data)
         if skip < 0 or count < 0:
@@ -269,10 +294,10 @@ DATA_DIRECTIVES: dict[str, Handler] = {
     ".pskip": _space(packed=True),
     ".fill": _fill(packed=False),
     ".pfill": _fill(packed=True),
-    ".align": _align,
-    ".palign": _align,
-    ".org": _org,
-    ".porg": _org,
+    ".align": _align(packed=False),
+    ".palign": _align(packed=True),
+    ".org": move_location,
+    ".porg": _org(packed=True),
     ".incbin": _include_binary(packed=False),
     ".pincbin": _include_binary(packed=True),
 }

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from toolchain.asm import attributes
 from toolchain.asm.blocks import BLOCK_DIRECTIVES, symbol_names
-from toolchain.asm.data import DATA_DIRECTIVES, string_argument
+from toolchain.asm.data import DATA_DIRECTIVES, move_location, string_argument
 from toolchain.asm.expr import ExprError
 from toolchain.asm.sections import AsmSection
 from toolchain.asm.state import Assembler
@@ -51,7 +51,7 @@ def _section(asm: Assembler, text: str) -> None:
         _configure(existing, rest)
     elif comma:
         wanted = attributes.parse(rest, name)
-        same = (wanted.flags, wanted.type) == (existing.flags, existing.type)
+        same = wanted.flags | existing.flags & attributes.OMITTED == existing.flags and wanted.type == existing.type
         if not same or wanted.address not in (None, existing.load):
             raise ExprError(f"section {name} already exists with other attributes (first used at {existing.place})")
         existing.keep |= wanted.keep
@@ -109,6 +109,11 @@ def _binder(bind: Bind) -> Handler:
     return set_bind
 
 
+def _declare(asm: Assembler, text: str) -> None:
+    """Nothing but `.ifdecl` sees an `.extern`: what is used and not defined is external anyway."""
+    asm.declared.update(symbol_names(text))
+
+
 def _visibility(value: int) -> Handler:
     def set_visibility(asm: Assembler, text: str) -> None:
         for name in symbol_names(text):
@@ -117,10 +122,18 @@ def _visibility(value: int) -> Handler:
     return set_visibility
 
 
+def set_symbol(asm: Assembler, name: str, value: str, once: bool = False) -> None:
+    """Give symbol `name` the value of the expression `value`; the location counter moves there (.set, =)."""
+    if name in (".", "$"):
+        move_location(asm, value)
+    else:
+        asm.assign(name, value, once)
+
+
 def _equate(once: bool) -> Handler:
     def assign(asm: Assembler, text: str) -> None:
         name, value = _name_and_rest(text, ".equiv" if once else ".equ")
-        asm.assign(name, value, once)
+        set_symbol(asm, name, value, once)
 
     return assign
 
@@ -143,6 +156,14 @@ def _local_common(asm: Assembler, text: str) -> None:
         asm.section.skip(size, 0)
     finally:
         asm.section = current
+
+
+def _bss(asm: Assembler, text: str) -> None:
+    """Section .bss; with operands room in it, as .lcomm makes."""
+    if text:
+        _local_common(asm, text)
+    else:
+        _enter(asm, asm.sections[".bss"])
 
 
 def _sized(asm: Assembler, text: str, directive: str) -> tuple[str, int, int]:
@@ -214,16 +235,15 @@ def _line(asm: Assembler, text: str) -> None:
         asm.source.place = replace(asm.source.place, line=number)
 
 
-def _fill_upper(asm: Assembler, text: str) -> None:
-    asm.section.fill_upper = _byte(asm, text, 0)
+def _fill_setter(attribute: str) -> Handler:
+    def set_fill(asm: Assembler, text: str) -> None:
+        value = _byte(asm, text, 0)
+        if asm.section.is_code:
+            setattr(asm.section, attribute, value)
+        else:
+            asm.warn(f"fill values are of code sections: section {asm.section.name} is none, this line has no effect")
 
-
-def _fill_value(asm: Assembler, text: str) -> None:
-    asm.fill_value = _byte(asm, text, 0)
-
-
-def _packed_fill_value(asm: Assembler, text: str) -> None:
-    asm.packed_fill_value = _byte(asm, text, 0)
+    return set_fill
 
 
 def _byte(asm: Assembler, text: str, default: int) -> int:
@@ -243,7 +263,7 @@ def _unsupported(reason: str) -> Handler:
 DIRECTIVES: dict[str, Handler] = {
     ".text": _fixed_section(".text"),
     ".data": _fixed_section(".data"),
-    ".bss": _fixed_section(".bss"),
+    ".bss": _bss,
     ".section": _section,
     ".sect": _section,
     ".pushsection": _push_section,
@@ -255,7 +275,7 @@ DIRECTIVES: dict[str, Handler] = {
     ".globl": _binder(Bind.GLOBAL),
     ".weak": _binder(Bind.WEAK),
     ".local": _binder(Bind.LOCAL),
-    ".extern": _ignore,
+    ".extern": _declare,
     ".hidden": _visibility(c.STV_HIDDEN),
     ".internal": _visibility(c.STV_INTERNAL),
     ".protected": _visibility(c.STV_PROTECTED),
@@ -273,9 +293,9 @@ DIRECTIVES: dict[str, Handler] = {
     ".print": _print,
     ".file": _file,
     ".line": _line,
-    ".fillupper": _fill_upper,
-    ".fillvalue": _fill_value,
-    ".pfillvalue": _packed_fill_value,
+    ".fillupper": _fill_setter("fill_upper"),
+    ".fillvalue": _fill_setter("fill_value"),
+    ".pfillvalue": _fill_setter("packed_fill_value"),
     **dict.fromkeys((".list", ".nolist", ".eject", ".psize", ".title", ".sbttl", ".ident", ".version"), _ignore),
     **BLOCK_DIRECTIVES,
     **DATA_DIRECTIVES,

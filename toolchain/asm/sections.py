@@ -76,10 +76,9 @@ class AsmSection:
         self.closed_units = 0  # length of all pieces but the current one, as long as nothing is relaxed
         self.fixups: list[Fixup] = []
         self.relaxables: list[Relaxable] = []
-        self.fill_upper = 0
+        self.fill_value = self.fill_upper = self.packed_fill_value = 0  # for what nothing is written into
         self._data_bytes = 0  # data bytes in the last word, 0 or 1
         self._packed_bytes = 0  # .p bytes in the last word, 0..2
-        self._waiting: list[Label] = []  # labels since the last content, to move when an instruction aligns
         self.configure(flags, kind)
 
     def configure(self, flags: int, kind: int) -> None:
@@ -110,14 +109,16 @@ class AsmSection:
         return self.closed_units + self.here()
 
     def label(self) -> Label:
-        """Return a label for the current location; it moves along when an instruction has to be aligned."""
-        if self._packed_bytes:
-            raise ExprError("a label inside a run of .p bytes needs .palign 2 before it")
-        label = Label(self.piece, self.here())
+        """Return a label for the current location, in code the next program word that is free."""
+        self.align_word()
+        return self.dot()
+
+    def dot(self) -> Label:
+        """Return what `.` means: the current location, in code that of the word being filled."""
         self.labelled = True
-        if self._data_bytes:
-            self._waiting.append(label)
-        return label
+        if not self._data_bytes and not self._packed_bytes:
+            return Label(self.piece, self.here())
+        return Label(self.piece, len(self.piece.data) // 2 - 2)
 
     def put_word(self, word: int) -> int:
         """Append one program word, aligned; return its octet offset in the current piece."""
@@ -127,14 +128,20 @@ class AsmSection:
         data += word.to_bytes(OCTETS_PER_WORD, "little")
         return len(data) - OCTETS_PER_WORD
 
-    def align_word(self) -> None:
-        """Go to the next program word; labels just set on the odd location move with it."""
-        if self._data_bytes:
-            end = len(self.piece.data) // 2
-            for label in self._waiting:
-                label.offset = end
+    def align_word(self, fill: int | None = None, packed: bool = False) -> None:
+        """Go to the next program word.  What is left of this one becomes `fill`, by default the section's fill value.
+
+        The upper byte of a word of data is `.fillupper`'s unless `packed` says that all three are filled.
+        """
+        used = self._data_bytes or self._packed_bytes
+        if not used:
+            return
+        packed = packed or bool(self._packed_bytes)
+        fill = self.default_fill(packed) if fill is None else fill
+        lanes = (fill, fill, fill if packed else self.fill_upper)
+        octets = self.piece.data
+        octets[used - OCTETS_PER_WORD : -1] = bytes(lanes[used:])
         self._data_bytes = self._packed_bytes = 0
-        self._waiting.clear()
 
     def put_bytes(self, data: bytes) -> int:
         """Append data bytes; return the offset of the first one within the piece, in octets (code) or bytes."""
@@ -144,12 +151,11 @@ class AsmSection:
             self.piece.data += data
             return offset
         if self._packed_bytes:
-            raise ExprError("data after a run of .p bytes needs .palign 2 before it")
-        self._waiting.clear()
+            self.align_word()
         octets, position = self.piece.data, 0
         first = len(octets) - 3 if self._data_bytes else len(octets)
         if self._data_bytes and data:
-            octets[-3] = data[0]
+            octets[-3:-1] = (data[0], self.fill_upper)
             position = 1
         octets += _spread(data[position:], 2, self.fill_upper)
         self._data_bytes = (self._data_bytes + len(data)) & 1
@@ -161,7 +167,7 @@ class AsmSection:
             raise ExprError(f"section {self.name} holds no program words: .p directives belong into code sections")
         self._check_room(len(data))
         if self._data_bytes:
-            raise ExprError(".p data after an odd number of data bytes needs .align 2 before it")
+            self.align_word()
         octets = self.piece.data
         first = len(octets) - OCTETS_PER_WORD + self._packed_bytes if self._packed_bytes else len(octets)
         room = -self._packed_bytes % 3
@@ -179,25 +185,37 @@ class AsmSection:
         if self.closed_units + len(self.piece.data) + units > 2 * self.limit + 8:
             raise ExprError(f"section {self.name} grows beyond {self.limit:#x} address units")
 
-    def skip(self, units: int, fill: int) -> None:
-        """Advance by `units` locations, bytes of value `fill`."""
+    def default_fill(self, packed: bool) -> int:
+        """Byte that fills when a directive names none; data sections know no fill values."""
+        return self.packed_fill_value if packed else self.fill_value
+
+    def skip(self, units: int, fill: int, packed: bool = False) -> None:
+        """Advance by `units` locations, bytes of value `fill`; `packed`: all three of each word."""
         if units < 0:
             raise ExprError(f"cannot advance by {units}")
         self._check_room(units)
-        self.put_bytes(bytes((fill & 0xFF,)) * units)
+        if packed and self.is_code:
+            self.put_packed(bytes((fill & 0xFF,)) * (units // 2 * 3))
+        else:
+            self.put_bytes(bytes((fill & 0xFF,)) * units)
 
-    def align_to(self, units: int, fill: int) -> None:
-        """Advance to the next multiple of `units` (a power of two)."""
+    def bytes_to(self, units: int) -> int:
+        """How many bytes `.align units` would fill, upper bytes of words of data not counted."""
+        part = 3 - self._packed_bytes if self._packed_bytes else 0
+        return part + -self.location() % units
+
+    def align_to(self, units: int, fill: int, packed: bool = False) -> None:
+        """Advance to the next multiple of `units` (a power of two), filling as `skip` does."""
         if units <= 0 or units & (units - 1):
             raise ExprError(f"alignment {units} is not a power of two")
         if units > self.limit:
             raise ExprError(f"alignment {units} is beyond the address space")
         if self.is_code and units >= 2:
-            self.align_word()
+            self.align_word(fill & 0xFF, packed)
         if self.relaxables and units > 2:
             raise ExprError("alignment beyond 2 after a call that --relax may shorten: use a section of its own")
         self.align = max(self.align, units)
-        self.skip(-self.location() % units, fill)
+        self.skip(-self.location() % units, fill, packed)
 
     def add_fixup(self, offset: int, kind: RelocationType, value: Known, place: Place) -> Fixup:
         """Remember that the field at `offset` of the current piece is to be filled with `value`."""
@@ -219,6 +237,7 @@ class AsmSection:
 
     def content(self) -> bytearray:
         """Return the finished octets of the section."""
+        self.align_word()
         data = bytearray().join(p.data for p in self.pieces)
         if self.is_code:
             return data

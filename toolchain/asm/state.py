@@ -71,17 +71,16 @@ class Assembler:
         self.conditionals = Conditionals()
         self.source.on_end = self._frame_ended
         self.symbols: dict[str, AsmSymbol] = {}
+        self.declared: set[str] = set()  # by .extern
         self.macros: dict[str, Macro] = {}
         self.serial = 0  # number of macro expansions so far, `\@`
         self.findings: list[str] = []
-        self.messages: list[str] = []  # of .print, for the caller to show
+        self.messages: list[str] = []  # of .print and warnings, for the caller to show
         self.sections: dict[str, AsmSection] = {}
         self.section_stack: list[tuple[AsmSection, AsmSection]] = []
         self.numeric: dict[str, int] = {}
         self.anonymous = 0
         self.after_repeat = ""  # mnemonic REPEAT when the previous instruction was one
-        self.fill_value = 0
-        self.packed_fill_value = 0
         self.file_name = ""
         self.label = ""  # the last one defined, for messages
         self.line_rows: list[tuple[Label, Place]] = []
@@ -109,6 +108,10 @@ class Assembler:
         if len(self.findings) >= MAX_ERRORS:
             self.findings.append(f"{self.source.place.file}: error: more than {MAX_ERRORS} errors, giving up")
             raise ToolError.of(self.findings)
+
+    def warn(self, message: str) -> None:
+        """Have the caller show a warning that names the current line."""
+        self.messages.append(f"{self.source.place}: warning: {message}")
 
     # -- symbols and expressions ---------------------------------------------------------------------------------
 
@@ -140,7 +143,7 @@ class Assembler:
     def here(self) -> Known:
         """A label for the current location."""
         self.anonymous += 1
-        return Value(AsmSymbol(f".LH{self.anonymous}", self.section.label()))
+        return Value(AsmSymbol(f".LH{self.anonymous}", self.section.dot()))
 
     def evaluate(self, text: str) -> Known:
         """Value of expression `text` as far as it is known now."""
@@ -159,6 +162,17 @@ class Assembler:
             raise ExprError(f"{what} {text.strip()!r} must be a constant at this point")
         return value
 
+    def location(self, text: str) -> int:
+        """Location in the current section that `text` names: a number, or `.` or a label of it plus a number."""
+        value = self.evaluate(text)
+        if isinstance(value, int):
+            return value
+        place = value.add.place if isinstance(value, Value) and value.add and not (value.sub or value.op) else None
+        if not isinstance(place, Label) or place.frag.section is not self.section:
+            raise ExprError(f"location {text.strip()!r} must be a number, or a place in this section plus a number")
+        assert isinstance(value, Value)
+        return place.frag.start + place.offset + value.offset
+
     def define_label(self, name: str) -> None:
         """Place label `name` at the current location."""
         if name.isdigit():
@@ -172,23 +186,25 @@ class Assembler:
 
     def assign(self, name: str, text: str, once: bool = False) -> None:
         """Set `name` to the value of `text` (.set, .equ, =; `once` for .equiv)."""
-        if name in (".", "$"):
-            raise ExprError("the location counter is moved by .org or .space, not by an assignment")
         symbol = self.symbol(name)
-        if isinstance(symbol.place, Label) or symbol.constant or (once and symbol.place is not None):
+        if isinstance(symbol.place, Label) or (once and symbol.place is not None):
             raise ExprError(f"symbol {name} is already defined")
         value = self.evaluate(text)
         if isinstance(value, Value) and value.add is symbol:
             raise ExprError(f"symbol {name} is defined in terms of itself")
-        symbol.place, symbol.constant = value, once
+        symbol.place = value
 
     def find_file(self, name: str) -> str:
-        """Return the path of an included file: beside the including file, then the current folder, then each -I."""
+        """Return the path of an included file: beside the including file, then the current folder, then each -I.
+
+        Where no file is called `name`, its backslashes part folders, as on the systems pic30-as comes from.
+        """
         beside = os.path.dirname(self.source.place.file)
-        for folder in (beside, "", *self.options.include):
-            path = os.path.join(folder, name)
-            if os.path.isfile(path):
-                return path
+        for spelling in dict.fromkeys((name, name.replace("\\", "/"))):
+            for folder in (beside, "", *self.options.include):
+                path = os.path.join(folder, spelling)
+                if os.path.isfile(path):
+                    return path
         raise ExprError(f"cannot find {name!r} beside the source, here, or in the -I folders")
 
     # -- frames ------------------------------------------------------------------------------------------------------

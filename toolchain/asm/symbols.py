@@ -41,6 +41,5 @@ class AsmSymbol:
     size: Known | None = None
     visibility: int = c.STV_DEFAULT
     common: tuple[int, int] | None = None
-    constant: bool = False  # set by .equiv: not to be redefined
     used: bool = False
     first_use: Place | None = field(default=None)

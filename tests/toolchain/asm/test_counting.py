@@ -31,15 +31,56 @@ def test_packed_bytes_fill_all_three(asm):
     assert asm(".pbyte 1,2,3,4\n .palign 2\n nop\n").words() == [0x030201, 0x000004, 0]
 
 
-def test_a_label_after_an_odd_byte_run_moves_to_the_aligned_instruction(asm):
-    """abi-elf.md §4.4: instructions and labels before them are auto-aligned to 2."""
-    out = asm(".byte 1\nodd: .byte 2\n .byte 3\nf:\ng: nop\n")
-    assert [out.symbols[n].value for n in ("odd", "f", "g")] == [1, 4, 4]
+def test_labels_instructions_and_data_of_the_other_kind_begin_a_word(asm):
+    """pic30-as: program memory is aligned implicitly at each of them; what is left of the word is filled."""
+    out = asm('.byte 1\na: .byte 2\n .pbyte 3\n .byte 4\nb:\nc: nop\n .pasciz "abc"\nd: .pbyte 5\n')
+    assert [out.symbols[n].value for n in "abcd"] == [2, 8, 8, 14]
+    assert out.words() == [1, 2, 3, 4, 0, 0x636261, 0, 5]
+
+
+def test_dot_among_bytes_of_a_word_is_that_word(asm):
+    """pic30-as: the last valid address of the program counter."""
+    out = asm(".pword 7\n .byte 1\n .org . + 2\n .pbyte 2,3\n .org . + 4\n nop\n")
+    assert out.words() == [7, 1, 0x0302, 0, 0]
 
 
 def test_fillupper_sets_the_upper_byte_of_data_words(asm):
     """abi-elf.md §4.3: .fillupper v."""
     assert asm(".fillupper 0x3F\n .word 0x1234\n .fillupper\n .word 1\n").words() == [0x3F1234, 1]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (".byte 1\n .align 2, 0x34\n", [0x003401]), (".byte 1\n .palign 2, 0x34\n", [0x343401]),
+        (".fillvalue 0x34\n .fillupper 0x56\n .byte 1\n .align 2\n", [0x563401]),
+        (".pfillvalue 0x34\n .byte 1\n .palign 4\n", [0x343401, 0x343434]),
+        (".fillvalue 0x34\n .fillupper 0x56\n .org 4\n .byte 1\n", [0x563434, 0x563434, 0x563401]),
+        (".porg 2, 0xAA\n .pfillvalue 0xFF\n .porg . + 2\n", [0xAAAAAA, 0xFFFFFF]),
+        (".fillvalue 0x12\n .fill 2\n .pfillvalue 0x34\n .pfill 2\n .pspace 1\n", [0x1212, 0x343434]),
+        (".byte 1\n .align 4, 0x34, 2\n .byte 2\n", [0x0201]), (".byte 1\n .align 4, 0x34, 0\n", [0x3401, 0x3434]),
+        (".pbyte 1\n .palign 2, 0x34, 1\n .pbyte 2\n", [0x0201]), (".byte 1\n .align\n", [1]),
+    ],
+)  # fmt: skip
+def test_fill_values_reach_every_byte_that_nothing_is_written_into(asm, text, words):
+    """pic30-as: .fillvalue for data, .fillupper above it, .pfillvalue for all three bytes of .p directives."""
+    assert asm(text).words() == words
+
+
+def test_fill_values_are_of_their_section_and_of_code(asm):
+    """pic30-as: RAM is no part of what `.fillvalue` in .text fills."""
+    out = asm(
+        ".fillvalue 0xFF\n .data\n .space 2\n .fill 2\n .bss\n .space 2\n .section b,code\n .fill 2\n .text\n .fill 2\n"
+    )
+    assert (out.bytes(".data"), out.words("b"), out.words()) == (bytes(4), [0], [0xFFFF])
+    assert out.messages == []
+    assert "no effect" in asm(".data\n .fillvalue 1\n").messages[0]
+
+
+@pytest.mark.parametrize("move", [" . = . + 3", " .org . + 3", " .set ., . + 3", " .org x + 3", " . = 4"])
+def test_the_location_counter_moves_relative_to_itself(asm, move):
+    """GNU as: assigning to `.` is .org."""
+    assert asm(f".data\n .byte 1\nx:\n{move}\ny: .byte 2\n").symbols["y"].value == 4
 
 
 def test_data_sections_count_bytes_and_int_is_four_of_them(asm):
@@ -85,7 +126,7 @@ def test_bss_only_counts(asm):
     ("text", "message"),
     [
         (".byte 256", "outside -128..255"), (".word 65536", "outside"), (".data\n .pword 1", "code section"),
-        (".pbyte 1\nx: nop", "palign"), (".pbyte 1\n .byte 1", "palign"), (".byte 1\n .pbyte 1", ".align 2"),
+        (" .org nowhere", "place in this section"), (".data\nx:\n .text\n . = x", "place in this section"),
         (".space -1", "cannot advance"), (".align 3", "power of two"), (".org 4\n .org 2", "behind"),
         (".data\n nop", "not a code section"), (".space 0x7fffffff", "grows beyond"), (".fixed 1.0", "1.15"),
         (".uleb128 -1", "negative"), (".single x", "real number"), ('.ascii abc', "double quotes"),

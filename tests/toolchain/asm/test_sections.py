@@ -147,3 +147,15 @@ def test_modifiers_alone_keep_the_type_the_name_implies(asm):
     )
     assert [out.sections[n].flags for n in (".data", ".bss", ".text")] == [0x01000003, 0x01000003, 0x40000006]
     assert out.sections[".bss"].type == c.SHT_NOBITS
+
+
+def test_a_section_named_again_needs_only_its_type(asm):
+    """pic30-as: address, alignment and kind of memory stay what the first mention says."""
+    out = asm(
+        ".section boot,code,address(0x1100)\n nop\n .section fast,bss,xmemory,near\n .space 2\n .text\n"
+        " .section boot,code\n nop\n .section fast,bss\n .space 2\n"
+    )
+    assert (out.sections["boot"].load, out.words("boot"), out.sections["fast"].units) == (0x1100, [0, 0], 4)
+    for first, second in (("bss", "bss,near"), ("persist", "bss"), ("psv", "code"), ("code", "code,address(16)")):
+        with pytest.raises(ToolError, match="other attributes"):
+            asm(f".section it,{first}\n .space 2\n .section it,{second}\n")

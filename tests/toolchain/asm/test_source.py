@@ -140,7 +140,6 @@ def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
         (".balign 4\n", "use .align"), (".quad 1\n", "two .long"), (".loc 1 2\n", "does not exist"),
         ("1 + 2\n", "cannot read"),
         (".if 1\n .else\n .else\n .endif\n", "second .else"), ("bra 1b\n", "not defined before"),
-        (" . = . + 4\n", ".org"),
         ("bra 9f\n", "label 9: is used but"), (" bra .Lx\n", "label .Lx is used but"),
         (".frob\n", "unknown directive"),
         (".global 1x\n", "expected a symbol"), (".section\n", "bad section name"), (".popsection\n", "without"),
@@ -149,7 +148,7 @@ def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
         (".section a,code,near\n", "data sections"), (".section a,code,data\n", "both code and data"),
         (".local q\n .word q\n", "never defined"),
         ("a = b\n b = a\n .word a\n", "in terms of itself"), (".section a,dma\n", "other than the 30F6014A"),
-        (".macro m\n .endm\n .macro m\n .endm\n", "already defined"), (".comm a\n", "comma"),
+        (".comm a\n", "comma"), (".bss a, -1\n", "outside the data space"),
         (".type a, @frob\n", "unknown symbol type"),
     ],
 )  # fmt: skip
@@ -177,3 +176,45 @@ def test_a_device_include_of_the_users_own_comes_first(tmp_path):
     (tmp_path / "p30f6014A.inc").write_text(" .equ MINE, 7\n")
     obj, _ = assemble(' .include "p30f6014A.inc"\n mov #MINE, w0\n', str(tmp_path / "x.s"))
     assert bytes(obj.sections[0].data) == bytes([0x70, 0, 0x20, 0])
+
+
+def test_a_macro_may_be_defined_anew(asm):
+    """pic30-as warns and takes the last definition, as an include file read twice needs."""
+    out = asm(".macro m\n .word 1\n .endm\n m\n .macro m a\n .word \\a\n .endm\n m 5\n")
+    assert out.words() == [1, 5]
+    assert out.messages == ["test.s:5: warning: macro m has been defined before: this definition replaces that one"]
+
+
+def test_what_equiv_defined_can_be_set_later(asm):
+    """GNU as: .equiv refuses a symbol that has a value; .set takes any that is no label."""
+    assert asm(".equiv depth, 0\n .set depth, depth + 2\n .equ depth, depth + 2\n .word depth\n").words() == [4]
+    with pytest.raises(ToolError, match="already defined"):
+        asm(".set depth, 1\n .equiv depth, 2\n")
+
+
+@pytest.mark.parametrize(
+    ("before", "known"),
+    [(".extern it", True), (".equ it, 9", True), ("it: nop", True), (".global it", True), ("mov #it, w0", True),
+     ("", False)],
+)  # fmt: skip
+def test_ifdecl_asks_whether_a_name_has_been_mentioned(asm, before, known):
+    """pic30-as: declared, not necessarily defined."""
+    text = f"{before}\n .ifdecl it\n .pword 1\n .else\n .pword 2\n .endif\n .ifndecl it\n .pword 3\n .endif\n"
+    assert asm(text).words()[-2 + known :] == ([1] if known else [2, 3])
+
+
+def test_a_file_may_be_named_with_backslashes(asm, tmp_path):
+    """Projects of MPLAB were written on Windows; nothing in a file's name is an escape."""
+    (tmp_path / "new" / "table").mkdir(parents=True)
+    (tmp_path / "new" / "table" / "two.inc").write_text(" .word 2\n")
+    (tmp_path / "new" / "bits.bin").write_bytes(b"\x34\x12")
+    out = asm('.include "new\\table\\two.inc"\n .incbin ".\\new\\bits.bin"\n', include=[str(tmp_path)])
+    assert out.words() == [2, 0x1234]
+    assert asm('.include "..\\inc\\p30F6014A.inc"\n mov #PORTB, w0\n').words()
+
+
+def test_bss_with_operands_reserves_room(asm):
+    """pic30-as: `.bss name, size, alignment`."""
+    out = asm(".bss a, 3\n .bss b, 8, 16\n nop\n")
+    assert [out.symbols[n].value for n in "ab"] == [0, 16]
+    assert (out.sections[".bss"].units, out.words()) == (24, [0])
