@@ -22,6 +22,7 @@ _PRAGMA = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+config\b(.*)$", re.MULTILINE)
 _MARKER = re.compile(r'^# (\d+) "((?:[^"\\]|\\.)*)".*$', re.MULTILINE)
 _HEADER = Path(__file__).parent / "include" / "dspic_compiler.h"
 _MACRO = re.compile(r"^#define (\w+) 0x([0-9A-F]{4})$", re.MULTILINE)
+_PRAGMA_VALUES = {"NONE": 0xFFFF}  # XC16's name of the reserved brown-out voltage; too common a word for a macro
 _SETTING = re.compile(r"\s*(\w+)\s*=\s*(\w+)\s*")
 # What MPLAB X writes, where it differs from the field's own name: setting -> word and fields it may change.
 _SETTINGS = {
@@ -43,8 +44,8 @@ def settings(chip: Chip) -> dict[str, tuple[str, int]]:
 
 
 def values() -> dict[str, int]:
-    """Value macros of the device header: name -> mask with zeros where the setting clears bits."""
-    return {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
+    """Names of values, those of the device header among them: name -> mask with zeros where the setting clears bits."""
+    return _PRAGMA_VALUES | {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
 
 
 def applied(text: str, chip: Chip) -> str:

@@ -6,9 +6,10 @@ files with the generator's output.
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from emu.chips import NAMES, chip_named
@@ -16,17 +17,33 @@ from emu.chips.chip import Chip, Sfr
 from toolchain.files import write_outputs
 
 INCLUDE = Path(__file__).parent / "include"
+ALTERNATIVES: dict[str, dict[str, str]] = {
+    r"I2CSTAT": {"R_NOT_W": "R_W", "D_NOT_A": "D_A"},
+    r"C\dINTF": {
+        "RXB0IF": "RX0IF", "RXB1IF": "RX1IF", "TXB0IF": "TX0IF", "TXB1IF": "TX1IF", "TXB2IF": "TX2IF", "IRXIF": "IVRIF",
+        "RXWARN": "RXWAR", "TXWARN": "TXWAR", "RXBP": "RXEP", "TXBP": "TXEP",
+        "RXB1OVFL": "RX1OVR", "RXB0OVFL": "RX0OVR",
+    },
+    r"C\dINTE": {
+        "RXB0IE": "RX0IE", "RXB1IE": "RX1IE", "TXB0IE": "TX0IE", "TXB1IE": "TX1IE", "TXB2IE": "TX2IE", "IRXIE": "IVRIE",
+    },
+    r"C\dCTRL": {"CANSIDL": "CSIDL"},
+    r"C\dRX0CON": {"FILHIT0": "FILHIT", "DBEN": "RXB0DBEN"},
+    r"U\dTXREG": {"UTXREG8": "UTX8"},
+    r"U\dRXREG": {"URXREG8": "URX8"},
+}  # fmt: skip
+"""Registers by name -> bits that XC16's headers call by a second name too: the data sheet's name -> that one."""
 C_TYPES = {1: "unsigned char", 2: "unsigned int"}
 
 
-def bit_fields(sfr: Sfr, only_bits: bool = False) -> Iterator[str]:
+def bit_fields(fields: Mapping[str, tuple[int, int]], only_bits: bool = False) -> Iterator[str]:
     """Members of one bit-field struct, low bit first; gaps are unnamed fields.
 
     With `only_bits` each bit of a wide field is a member of its own (TCKPS -> TCKPS0, TCKPS1), as in XC16's headers.
     """
     position = 0
-    for name, (lsb, width) in sorted(sfr.fields.items(), key=lambda item: item[1]):
-        if only_bits and (width == 1 or any(f"{name}{bit}" in sfr.fields for bit in range(width))):
+    for name, (lsb, width) in sorted(fields.items(), key=lambda item: item[1]):
+        if only_bits and (width == 1 or any(f"{name}{bit}" in fields for bit in range(width))):
             continue
         if lsb > position:
             yield f"unsigned :{lsb - position};"
@@ -37,14 +54,22 @@ def bit_fields(sfr: Sfr, only_bits: bool = False) -> Iterator[str]:
         position = lsb + width
 
 
+def second_names(sfr: Sfr) -> dict[str, tuple[int, int]]:
+    """Second names of a register's fields, those it has: name -> (lowest bit, width)."""
+    for pattern, names in ALTERNATIVES.items():
+        if re.fullmatch(pattern, sfr.name):
+            return {new: sfr.fields[old] for old, new in names.items() if old in sfr.fields and new not in sfr.fields}
+    return {}
+
+
 def struct_type(sfr: Sfr) -> str:
     """The `typedef` of one register's bit-field struct or union."""
-    whole = " ".join(bit_fields(sfr))
-    single = " ".join(bit_fields(sfr, only_bits=True))
+    views = [bit_fields(sfr.fields), bit_fields(sfr.fields, only_bits=True), bit_fields(second_names(sfr))]
+    structs = [f"struct {{ {text} }}" for text in map(" ".join, views) if text]
     name = f"{sfr.name}BITS"
-    if not single:
-        return f"typedef struct {{ {whole} }} {name};"
-    return f"typedef union {{\n  struct {{ {whole} }};\n  struct {{ {single} }};\n}} {name};"
+    if len(structs) == 1:
+        return f"typedef {structs[0]} {name};"
+    return "\n".join(["typedef union {", *(f"  {struct};" for struct in structs), f"}} {name};"])
 
 
 def declarations(sfr: Sfr) -> Iterator[str]:
@@ -57,9 +82,10 @@ def declarations(sfr: Sfr) -> Iterator[str]:
 
 def bit_macros(chip: Chip) -> Iterator[str]:
     """`_T1IF` for `IFS0bits.T1IF`: one per field name that belongs to one register only."""
-    uses = Counter(field for sfr in chip.sfrs.values() for field in sfr.fields)
+    names = {sfr.name: [*sfr.fields, *second_names(sfr)] for sfr in chip.sfrs.values()}
+    uses = Counter(field for fields in names.values() for field in fields)
     for sfr in chip.sfrs.values():
-        for field in sfr.fields:
+        for field in names[sfr.name]:
             if uses[field] == 1:
                 yield f"#define _{field} {sfr.name}bits.{field}"
 

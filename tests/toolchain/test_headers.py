@@ -67,6 +67,27 @@ def test_bit_fields_are_where_the_chip_table_says(tmp_path: Path) -> None:
     assert run(tmp_path / "a.elf", engine="interp").status == 0
 
 
+def test_second_names_of_bits_are_the_same_bits(tmp_path: Path) -> None:
+    """XC16's headers name bits of CAN, I2C and UARTs by the data sheet's word and by the reference manual's."""
+    same = [
+        ("C1INTF", "RXB0IF", "RX0IF"), ("C2INTF", "TXB2IF", "TX2IF"), ("C1INTF", "IRXIF", "IVRIF"),
+        ("C2INTF", "RXB0OVFL", "RX0OVR"), ("C1INTF", "TXBP", "TXEP"), ("C2INTE", "IRXIE", "IVRIE"),
+        ("C1CTRL", "CANSIDL", "CSIDL"), ("C2RX0CON", "FILHIT0", "FILHIT"), ("C1RX0CON", "DBEN", "RXB0DBEN"),
+        ("I2CSTAT", "R_NOT_W", "R_W"), ("I2CSTAT", "D_NOT_A", "D_A"), ("U1TXREG", "UTXREG8", "UTX8"),
+        ("U2RXREG", "URXREG8", "URX8"),
+    ]  # fmt: skip
+    lines = "".join(
+        f"    {{ union {{ {register}BITS bits; unsigned word; }} a = {{0}}, b = {{0}};"
+        f" a.bits.{first} = 1; b.bits.{second} = 1; if (a.word != b.word || !a.word) return {number}; }}\n"
+        for number, (register, first, second) in enumerate(same, 1)
+    )
+    text = f"#include <dspic30f6014a.h>\nint main(void)\n{{\n{lines}    return _R_W | _D_A;\n}}\n"
+    (tmp_path / "a.c").write_text(text)
+    built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
+    assert (built.status, built.messages) == (0, "")
+    assert run(tmp_path / "a.elf", engine="interp").status == 0
+
+
 @pytest.mark.parametrize("path", sorted(INCLUDE.glob("*.h")), ids=lambda p: p.name)
 def test_header_stands_alone_and_twice(path: Path, tmp_path: Path) -> None:
     """Each header includes what it needs, and may be included again."""

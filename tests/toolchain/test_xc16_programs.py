@@ -121,6 +121,34 @@ def test_configuration_pragmas_make_configuration_words(tmp_path: Path) -> None:
     assert words == {"FOSC": 0xFFE6, "FWDT": 0x7FEF, "FBORPOR": 0xFF6E, "FGS": 0xFFFD, "FICD": 0xFFFD}
 
 
+def test_protection_of_segments_by_pragmas_and_macros(tmp_path: Path) -> None:
+    """Every setting that MPLAB X lists for this device, with its names of values (DS70138, section 20)."""
+    (tmp_path / "main.c").write_text("""
+    #pragma config BODENV = NONE
+    #pragma config BWRP = WR_PROTECT_BOOT_OFF, BSS = NO_BOOT_CODE, EBS = SMALL_BOOT_EEPROM, RBS = MED_BOOT_RAM
+    #pragma config SWRP = WR_PROT_SEC_OFF, SSS = NO_SEC_CODE, ESS = NO_SEC_EEPROM, RSS = NO_SEC_RAM
+    #pragma config GWRP = GWRP_OFF, GCP = GSS_OFF
+    #pragma config ICS = ICS_PGD2
+    int main(void) { return 0; }
+    """)
+    (tmp_path / "macros.c").write_text("""
+    #include <p30F6014A.h>
+    _FBORPOR(PBOR_OFF); _FBS(WR_PROTECT_BOOT_ON & STRD_MEDIUM_BOOT_CODE & NO_BOOT_EEPROM & LARGE_BOOT_RAM);
+    _FSS(WR_PROT_SEC_ON & HIGH_LARGE_SEC_CODE & MED_SEC_EEPROM & SMALL_SEC_RAM); _FGS(GSS_HIGH); _FICD(PGD3);
+    enum { NONE } left_to_the_program;
+    int main(void) { return 0; }
+    """)
+    wanted = {
+        "main": {"FBORPOR": 0xFFFF, "FBS": 0xDEFF, "FSS": 0xFFFF, "FGS": 0xFFFF, "FICD": 0xFFFD},
+        "macros": {"FBORPOR": 0xFF7F, "FBS": 0xCFFA, "FSS": 0xEDF0, "FGS": 0xFFFB, "FICD": 0xFFFC},
+    }
+    for name, words in wanted.items():
+        assert driver.main([str(tmp_path / f"{name}.c"), "-o", str(tmp_path / f"{name}.elf")]) == 0
+        image = load_image(tmp_path / f"{name}.elf")
+        found = {word.name: image.word(word.address) for word in image.chip.config.values()}
+        assert {key: value & 0xFFFF for key, value in found.items() if value is not None} == words
+
+
 def test_a_wrong_configuration_pragma_names_its_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     wrong = "int a;\n#pragma config FPR = XT_PL8\n\n#pragma config FOO = 1\n"
     (tmp_path / "main.c").write_text(wrong + "int main(void) { return 0; }\n")

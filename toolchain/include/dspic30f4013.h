@@ -295,7 +295,10 @@ extern volatile unsigned int I2CCON DSPIC_SFR; /* 0x0206 */
 typedef struct { unsigned SEN:1; unsigned RSEN:1; unsigned PEN:1; unsigned RCEN:1; unsigned ACKEN:1; unsigned ACKDT:1; unsigned STREN:1; unsigned GCEN:1; unsigned SMEN:1; unsigned DISSLW:1; unsigned A10M:1; unsigned IPMIEN:1; unsigned SCLREL:1; unsigned I2CSIDL:1; unsigned :1; unsigned I2CEN:1; } I2CCONBITS;
 extern volatile I2CCONBITS I2CCONbits DSPIC_SFR;
 extern volatile unsigned int I2CSTAT DSPIC_SFR; /* 0x0208 */
-typedef struct { unsigned TBF:1; unsigned RBF:1; unsigned R_NOT_W:1; unsigned S:1; unsigned P:1; unsigned D_NOT_A:1; unsigned I2COV:1; unsigned IWCOL:1; unsigned ADD10:1; unsigned GCSTAT:1; unsigned BCL:1; unsigned :3; unsigned TRSTAT:1; unsigned ACKSTAT:1; } I2CSTATBITS;
+typedef union {
+  struct { unsigned TBF:1; unsigned RBF:1; unsigned R_NOT_W:1; unsigned S:1; unsigned P:1; unsigned D_NOT_A:1; unsigned I2COV:1; unsigned IWCOL:1; unsigned ADD10:1; unsigned GCSTAT:1; unsigned BCL:1; unsigned :3; unsigned TRSTAT:1; unsigned ACKSTAT:1; };
+  struct { unsigned :2; unsigned R_W:1; unsigned :2; unsigned D_A:1; };
+} I2CSTATBITS;
 extern volatile I2CSTATBITS I2CSTATbits DSPIC_SFR;
 extern volatile unsigned int I2CADD DSPIC_SFR; /* 0x020A */
 typedef union {
@@ -316,10 +319,16 @@ typedef union {
 } U1STABITS;
 extern volatile U1STABITS U1STAbits DSPIC_SFR;
 extern volatile unsigned int U1TXREG DSPIC_SFR; /* 0x0210 */
-typedef struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; } U1TXREGBITS;
+typedef union {
+  struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; };
+  struct { unsigned :8; unsigned UTX8:1; };
+} U1TXREGBITS;
 extern volatile U1TXREGBITS U1TXREGbits DSPIC_SFR;
 extern volatile unsigned int U1RXREG DSPIC_SFR; /* 0x0212 */
-typedef struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; } U1RXREGBITS;
+typedef union {
+  struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; };
+  struct { unsigned :8; unsigned URX8:1; };
+} U1RXREGBITS;
 extern volatile U1RXREGBITS U1RXREGbits DSPIC_SFR;
 extern volatile unsigned int U1BRG DSPIC_SFR; /* 0x0214 */
 extern volatile unsigned int U2MODE DSPIC_SFR; /* 0x0216 */
@@ -335,10 +344,16 @@ typedef union {
 } U2STABITS;
 extern volatile U2STABITS U2STAbits DSPIC_SFR;
 extern volatile unsigned int U2TXREG DSPIC_SFR; /* 0x021A */
-typedef struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; } U2TXREGBITS;
+typedef union {
+  struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; };
+  struct { unsigned :8; unsigned UTX8:1; };
+} U2TXREGBITS;
 extern volatile U2TXREGBITS U2TXREGbits DSPIC_SFR;
 extern volatile unsigned int U2RXREG DSPIC_SFR; /* 0x021C */
-typedef struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; } U2RXREGBITS;
+typedef union {
+  struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; };
+  struct { unsigned :8; unsigned URX8:1; };
+} U2RXREGBITS;
 extern volatile U2RXREGBITS U2RXREGbits DSPIC_SFR;
 extern volatile unsigned int U2BRG DSPIC_SFR; /* 0x021E */
 extern volatile unsigned int SPI1STAT DSPIC_SFR; /* 0x0220 */
@@ -729,12 +744,16 @@ extern volatile unsigned int C1RX0B2 DSPIC_SFR; /* 0x0388 */
 extern volatile unsigned int C1RX0B3 DSPIC_SFR; /* 0x038A */
 extern volatile unsigned int C1RX0B4 DSPIC_SFR; /* 0x038C */
 extern volatile unsigned int C1RX0CON DSPIC_SFR; /* 0x038E */
-typedef struct { unsigned FILHIT0:1; unsigned JTOFF:1; unsigned DBEN:1; unsigned RXRTRRO:1; unsigned :3; unsigned RXFUL:1; } C1RX0CONBITS;
+typedef union {
+  struct { unsigned FILHIT0:1; unsigned JTOFF:1; unsigned DBEN:1; unsigned RXRTRRO:1; unsigned :3; unsigned RXFUL:1; };
+  struct { unsigned FILHIT:1; unsigned :1; unsigned RXB0DBEN:1; };
+} C1RX0CONBITS;
 extern volatile C1RX0CONBITS C1RX0CONbits DSPIC_SFR;
 extern volatile unsigned int C1CTRL DSPIC_SFR; /* 0x0390 */
 typedef union {
   struct { unsigned :1; unsigned ICODE:3; unsigned :1; unsigned OPMODE:3; unsigned REQOP:3; unsigned CANCKS:1; unsigned ABAT:1; unsigned CANSIDL:1; unsigned CANFRZ:1; unsigned CANCAP:1; };
   struct { unsigned :1; unsigned ICODE0:1; unsigned ICODE1:1; unsigned ICODE2:1; unsigned :1; unsigned OPMODE0:1; unsigned OPMODE1:1; unsigned OPMODE2:1; unsigned REQOP0:1; unsigned REQOP1:1; unsigned REQOP2:1; };
+  struct { unsigned :13; unsigned CSIDL:1; };
 } C1CTRLBITS;
 extern volatile C1CTRLBITS C1CTRLbits DSPIC_SFR;
 extern volatile unsigned int C1CFG1 DSPIC_SFR; /* 0x0392 */
@@ -750,10 +769,16 @@ typedef union {
 } C1CFG2BITS;
 extern volatile C1CFG2BITS C1CFG2bits DSPIC_SFR;
 extern volatile unsigned int C1INTF DSPIC_SFR; /* 0x0396 */
-typedef struct { unsigned RXB0IF:1; unsigned RXB1IF:1; unsigned TXB0IF:1; unsigned TXB1IF:1; unsigned TXB2IF:1; unsigned ERRIF:1; unsigned WAKIF:1; unsigned IRXIF:1; unsigned EWARN:1; unsigned RXWARN:1; unsigned TXWARN:1; unsigned RXBP:1; unsigned TXBP:1; unsigned TXBO:1; unsigned RXB1OVFL:1; unsigned RXB0OVFL:1; } C1INTFBITS;
+typedef union {
+  struct { unsigned RXB0IF:1; unsigned RXB1IF:1; unsigned TXB0IF:1; unsigned TXB1IF:1; unsigned TXB2IF:1; unsigned ERRIF:1; unsigned WAKIF:1; unsigned IRXIF:1; unsigned EWARN:1; unsigned RXWARN:1; unsigned TXWARN:1; unsigned RXBP:1; unsigned TXBP:1; unsigned TXBO:1; unsigned RXB1OVFL:1; unsigned RXB0OVFL:1; };
+  struct { unsigned RX0IF:1; unsigned RX1IF:1; unsigned TX0IF:1; unsigned TX1IF:1; unsigned TX2IF:1; unsigned :2; unsigned IVRIF:1; unsigned :1; unsigned RXWAR:1; unsigned TXWAR:1; unsigned RXEP:1; unsigned TXEP:1; unsigned :1; unsigned RX1OVR:1; unsigned RX0OVR:1; };
+} C1INTFBITS;
 extern volatile C1INTFBITS C1INTFbits DSPIC_SFR;
 extern volatile unsigned int C1INTE DSPIC_SFR; /* 0x0398 */
-typedef struct { unsigned RXB0IE:1; unsigned RXB1IE:1; unsigned TXB0IE:1; unsigned TXB1IE:1; unsigned TXB2IE:1; unsigned ERRIE:1; unsigned WAKIE:1; unsigned IRXIE:1; } C1INTEBITS;
+typedef union {
+  struct { unsigned RXB0IE:1; unsigned RXB1IE:1; unsigned TXB0IE:1; unsigned TXB1IE:1; unsigned TXB2IE:1; unsigned ERRIE:1; unsigned WAKIE:1; unsigned IRXIE:1; };
+  struct { unsigned RX0IE:1; unsigned RX1IE:1; unsigned TX0IE:1; unsigned TX1IE:1; unsigned TX2IE:1; unsigned :2; unsigned IVRIE:1; };
+} C1INTEBITS;
 extern volatile C1INTEBITS C1INTEbits DSPIC_SFR;
 extern volatile unsigned int C1EC DSPIC_SFR; /* 0x039A */
 typedef struct { unsigned REC0:1; unsigned REC1:1; unsigned REC2:1; unsigned REC3:1; unsigned REC4:1; unsigned REC5:1; unsigned REC6:1; unsigned REC7:1; unsigned TEC0:1; unsigned TEC1:1; unsigned TEC2:1; unsigned TEC3:1; unsigned TEC4:1; unsigned TEC5:1; unsigned TEC6:1; unsigned TEC7:1; } C1ECBITS;
@@ -989,6 +1014,8 @@ extern volatile PMD2BITS PMD2bits DSPIC_SFR;
 #define _BCL I2CSTATbits.BCL
 #define _TRSTAT I2CSTATbits.TRSTAT
 #define _ACKSTAT I2CSTATbits.ACKSTAT
+#define _R_W I2CSTATbits.R_W
+#define _D_A I2CSTATbits.D_A
 #define _I2CADD I2CADDbits.I2CADD
 #define _ALTIO U1MODEbits.ALTIO
 #define _SPIRBF SPI1STATbits.SPIRBF
@@ -1194,10 +1221,10 @@ extern volatile PMD2BITS PMD2bits DSPIC_SFR;
 #define _LATF4 LATFbits.LATF4
 #define _LATF5 LATFbits.LATF5
 #define _LATF6 LATFbits.LATF6
-#define _FILHIT C1RX1CONbits.FILHIT
 #define _FILHIT0 C1RX0CONbits.FILHIT0
 #define _JTOFF C1RX0CONbits.JTOFF
 #define _DBEN C1RX0CONbits.DBEN
+#define _RXB0DBEN C1RX0CONbits.RXB0DBEN
 #define _ICODE C1CTRLbits.ICODE
 #define _OPMODE C1CTRLbits.OPMODE
 #define _REQOP C1CTRLbits.REQOP
@@ -1206,6 +1233,7 @@ extern volatile PMD2BITS PMD2bits DSPIC_SFR;
 #define _CANSIDL C1CTRLbits.CANSIDL
 #define _CANFRZ C1CTRLbits.CANFRZ
 #define _CANCAP C1CTRLbits.CANCAP
+#define _CSIDL C1CTRLbits.CSIDL
 #define _BRP C1CFG1bits.BRP
 #define _SJW C1CFG1bits.SJW
 #define _PRSEG C1CFG2bits.PRSEG
@@ -1230,6 +1258,18 @@ extern volatile PMD2BITS PMD2bits DSPIC_SFR;
 #define _TXBO C1INTFbits.TXBO
 #define _RXB1OVFL C1INTFbits.RXB1OVFL
 #define _RXB0OVFL C1INTFbits.RXB0OVFL
+#define _RX0IF C1INTFbits.RX0IF
+#define _RX1IF C1INTFbits.RX1IF
+#define _TX0IF C1INTFbits.TX0IF
+#define _TX1IF C1INTFbits.TX1IF
+#define _TX2IF C1INTFbits.TX2IF
+#define _IVRIF C1INTFbits.IVRIF
+#define _RXWAR C1INTFbits.RXWAR
+#define _TXWAR C1INTFbits.TXWAR
+#define _RXEP C1INTFbits.RXEP
+#define _TXEP C1INTFbits.TXEP
+#define _RX1OVR C1INTFbits.RX1OVR
+#define _RX0OVR C1INTFbits.RX0OVR
 #define _RXB0IE C1INTEbits.RXB0IE
 #define _RXB1IE C1INTEbits.RXB1IE
 #define _TXB0IE C1INTEbits.TXB0IE
@@ -1238,6 +1278,12 @@ extern volatile PMD2BITS PMD2bits DSPIC_SFR;
 #define _ERRIE C1INTEbits.ERRIE
 #define _WAKIE C1INTEbits.WAKIE
 #define _IRXIE C1INTEbits.IRXIE
+#define _RX0IE C1INTEbits.RX0IE
+#define _RX1IE C1INTEbits.RX1IE
+#define _TX0IE C1INTEbits.TX0IE
+#define _TX1IE C1INTEbits.TX1IE
+#define _TX2IE C1INTEbits.TX2IE
+#define _IVRIE C1INTEbits.IVRIE
 #define _REC0 C1ECbits.REC0
 #define _REC1 C1ECbits.REC1
 #define _REC2 C1ECbits.REC2

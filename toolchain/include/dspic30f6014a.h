@@ -373,7 +373,10 @@ extern volatile unsigned int I2CCON DSPIC_SFR; /* 0x0206 */
 typedef struct { unsigned SEN:1; unsigned RSEN:1; unsigned PEN:1; unsigned RCEN:1; unsigned ACKEN:1; unsigned ACKDT:1; unsigned STREN:1; unsigned GCEN:1; unsigned SMEN:1; unsigned DISSLW:1; unsigned A10M:1; unsigned IPMIEN:1; unsigned SCLREL:1; unsigned I2CSIDL:1; unsigned :1; unsigned I2CEN:1; } I2CCONBITS;
 extern volatile I2CCONBITS I2CCONbits DSPIC_SFR;
 extern volatile unsigned int I2CSTAT DSPIC_SFR; /* 0x0208 */
-typedef struct { unsigned TBF:1; unsigned RBF:1; unsigned R_NOT_W:1; unsigned S:1; unsigned P:1; unsigned D_NOT_A:1; unsigned I2COV:1; unsigned IWCOL:1; unsigned ADD10:1; unsigned GCSTAT:1; unsigned BCL:1; unsigned :3; unsigned TRSTAT:1; unsigned ACKSTAT:1; } I2CSTATBITS;
+typedef union {
+  struct { unsigned TBF:1; unsigned RBF:1; unsigned R_NOT_W:1; unsigned S:1; unsigned P:1; unsigned D_NOT_A:1; unsigned I2COV:1; unsigned IWCOL:1; unsigned ADD10:1; unsigned GCSTAT:1; unsigned BCL:1; unsigned :3; unsigned TRSTAT:1; unsigned ACKSTAT:1; };
+  struct { unsigned :2; unsigned R_W:1; unsigned :2; unsigned D_A:1; };
+} I2CSTATBITS;
 extern volatile I2CSTATBITS I2CSTATbits DSPIC_SFR;
 extern volatile unsigned int I2CADD DSPIC_SFR; /* 0x020A */
 typedef union {
@@ -394,10 +397,16 @@ typedef union {
 } U1STABITS;
 extern volatile U1STABITS U1STAbits DSPIC_SFR;
 extern volatile unsigned int U1TXREG DSPIC_SFR; /* 0x0210 */
-typedef struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; } U1TXREGBITS;
+typedef union {
+  struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; };
+  struct { unsigned :8; unsigned UTX8:1; };
+} U1TXREGBITS;
 extern volatile U1TXREGBITS U1TXREGbits DSPIC_SFR;
 extern volatile unsigned int U1RXREG DSPIC_SFR; /* 0x0212 */
-typedef struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; } U1RXREGBITS;
+typedef union {
+  struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; };
+  struct { unsigned :8; unsigned URX8:1; };
+} U1RXREGBITS;
 extern volatile U1RXREGBITS U1RXREGbits DSPIC_SFR;
 extern volatile unsigned int U1BRG DSPIC_SFR; /* 0x0214 */
 extern volatile unsigned int U2MODE DSPIC_SFR; /* 0x0216 */
@@ -413,10 +422,16 @@ typedef union {
 } U2STABITS;
 extern volatile U2STABITS U2STAbits DSPIC_SFR;
 extern volatile unsigned int U2TXREG DSPIC_SFR; /* 0x021A */
-typedef struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; } U2TXREGBITS;
+typedef union {
+  struct { unsigned UTXREG0:1; unsigned UTXREG1:1; unsigned UTXREG2:1; unsigned UTXREG3:1; unsigned UTXREG4:1; unsigned UTXREG5:1; unsigned UTXREG6:1; unsigned UTXREG7:1; unsigned UTXREG8:1; };
+  struct { unsigned :8; unsigned UTX8:1; };
+} U2TXREGBITS;
 extern volatile U2TXREGBITS U2TXREGbits DSPIC_SFR;
 extern volatile unsigned int U2RXREG DSPIC_SFR; /* 0x021C */
-typedef struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; } U2RXREGBITS;
+typedef union {
+  struct { unsigned URXREG0:1; unsigned URXREG1:1; unsigned URXREG2:1; unsigned URXREG3:1; unsigned URXREG4:1; unsigned URXREG5:1; unsigned URXREG6:1; unsigned URXREG7:1; unsigned URXREG8:1; };
+  struct { unsigned :8; unsigned URX8:1; };
+} U2RXREGBITS;
 extern volatile U2RXREGBITS U2RXREGbits DSPIC_SFR;
 extern volatile unsigned int U2BRG DSPIC_SFR; /* 0x021E */
 extern volatile unsigned int SPI1STAT DSPIC_SFR; /* 0x0220 */
@@ -826,12 +841,16 @@ extern volatile unsigned int C1RX0B2 DSPIC_SFR; /* 0x0388 */
 extern volatile unsigned int C1RX0B3 DSPIC_SFR; /* 0x038A */
 extern volatile unsigned int C1RX0B4 DSPIC_SFR; /* 0x038C */
 extern volatile unsigned int C1RX0CON DSPIC_SFR; /* 0x038E */
-typedef struct { unsigned FILHIT0:1; unsigned JTOFF:1; unsigned DBEN:1; unsigned RXRTRRO:1; unsigned :3; unsigned RXFUL:1; } C1RX0CONBITS;
+typedef union {
+  struct { unsigned FILHIT0:1; unsigned JTOFF:1; unsigned DBEN:1; unsigned RXRTRRO:1; unsigned :3; unsigned RXFUL:1; };
+  struct { unsigned FILHIT:1; unsigned :1; unsigned RXB0DBEN:1; };
+} C1RX0CONBITS;
 extern volatile C1RX0CONBITS C1RX0CONbits DSPIC_SFR;
 extern volatile unsigned int C1CTRL DSPIC_SFR; /* 0x0390 */
 typedef union {
   struct { unsigned :1; unsigned ICODE:3; unsigned :1; unsigned OPMODE:3; unsigned REQOP:3; unsigned CANCKS:1; unsigned ABAT:1; unsigned CANSIDL:1; unsigned CANFRZ:1; unsigned CANCAP:1; };
   struct { unsigned :1; unsigned ICODE0:1; unsigned ICODE1:1; unsigned ICODE2:1; unsigned :1; unsigned OPMODE0:1; unsigned OPMODE1:1; unsigned OPMODE2:1; unsigned REQOP0:1; unsigned REQOP1:1; unsigned REQOP2:1; };
+  struct { unsigned :13; unsigned CSIDL:1; };
 } C1CTRLBITS;
 extern volatile C1CTRLBITS C1CTRLbits DSPIC_SFR;
 extern volatile unsigned int C1CFG1 DSPIC_SFR; /* 0x0392 */
@@ -847,10 +866,16 @@ typedef union {
 } C1CFG2BITS;
 extern volatile C1CFG2BITS C1CFG2bits DSPIC_SFR;
 extern volatile unsigned int C1INTF DSPIC_SFR; /* 0x0396 */
-typedef struct { unsigned RXB0IF:1; unsigned RXB1IF:1; unsigned TXB0IF:1; unsigned TXB1IF:1; unsigned TXB2IF:1; unsigned ERRIF:1; unsigned WAKIF:1; unsigned IRXIF:1; unsigned EWARN:1; unsigned RXWARN:1; unsigned TXWARN:1; unsigned RXBP:1; unsigned TXBP:1; unsigned TXBO:1; unsigned RXB1OVFL:1; unsigned RXB0OVFL:1; } C1INTFBITS;
+typedef union {
+  struct { unsigned RXB0IF:1; unsigned RXB1IF:1; unsigned TXB0IF:1; unsigned TXB1IF:1; unsigned TXB2IF:1; unsigned ERRIF:1; unsigned WAKIF:1; unsigned IRXIF:1; unsigned EWARN:1; unsigned RXWARN:1; unsigned TXWARN:1; unsigned RXBP:1; unsigned TXBP:1; unsigned TXBO:1; unsigned RXB1OVFL:1; unsigned RXB0OVFL:1; };
+  struct { unsigned RX0IF:1; unsigned RX1IF:1; unsigned TX0IF:1; unsigned TX1IF:1; unsigned TX2IF:1; unsigned :2; unsigned IVRIF:1; unsigned :1; unsigned RXWAR:1; unsigned TXWAR:1; unsigned RXEP:1; unsigned TXEP:1; unsigned :1; unsigned RX1OVR:1; unsigned RX0OVR:1; };
+} C1INTFBITS;
 extern volatile C1INTFBITS C1INTFbits DSPIC_SFR;
 extern volatile unsigned int C1INTE DSPIC_SFR; /* 0x0398 */
-typedef struct { unsigned RXB0IE:1; unsigned RXB1IE:1; unsigned TXB0IE:1; unsigned TXB1IE:1; unsigned TXB2IE:1; unsigned ERRIE:1; unsigned WAKIE:1; unsigned IRXIE:1; } C1INTEBITS;
+typedef union {
+  struct { unsigned RXB0IE:1; unsigned RXB1IE:1; unsigned TXB0IE:1; unsigned TXB1IE:1; unsigned TXB2IE:1; unsigned ERRIE:1; unsigned WAKIE:1; unsigned IRXIE:1; };
+  struct { unsigned RX0IE:1; unsigned RX1IE:1; unsigned TX0IE:1; unsigned TX1IE:1; unsigned TX2IE:1; unsigned :2; unsigned IVRIE:1; };
+} C1INTEBITS;
 extern volatile C1INTEBITS C1INTEbits DSPIC_SFR;
 extern volatile unsigned int C1EC DSPIC_SFR; /* 0x039A */
 typedef struct { unsigned REC0:1; unsigned REC1:1; unsigned REC2:1; unsigned REC3:1; unsigned REC4:1; unsigned REC5:1; unsigned REC6:1; unsigned REC7:1; unsigned TEC0:1; unsigned TEC1:1; unsigned TEC2:1; unsigned TEC3:1; unsigned TEC4:1; unsigned TEC5:1; unsigned TEC6:1; unsigned TEC7:1; } C1ECBITS;
@@ -1106,12 +1131,16 @@ extern volatile unsigned int C2RX0B2 DSPIC_SFR; /* 0x0448 */
 extern volatile unsigned int C2RX0B3 DSPIC_SFR; /* 0x044A */
 extern volatile unsigned int C2RX0B4 DSPIC_SFR; /* 0x044C */
 extern volatile unsigned int C2RX0CON DSPIC_SFR; /* 0x044E */
-typedef struct { unsigned FILHIT0:1; unsigned JTOFF:1; unsigned DBEN:1; unsigned RXRTRRO:1; unsigned :3; unsigned RXFUL:1; } C2RX0CONBITS;
+typedef union {
+  struct { unsigned FILHIT0:1; unsigned JTOFF:1; unsigned DBEN:1; unsigned RXRTRRO:1; unsigned :3; unsigned RXFUL:1; };
+  struct { unsigned FILHIT:1; unsigned :1; unsigned RXB0DBEN:1; };
+} C2RX0CONBITS;
 extern volatile C2RX0CONBITS C2RX0CONbits DSPIC_SFR;
 extern volatile unsigned int C2CTRL DSPIC_SFR; /* 0x0450 */
 typedef union {
   struct { unsigned :1; unsigned ICODE:3; unsigned :1; unsigned OPMODE:3; unsigned REQOP:3; unsigned CANCKS:1; unsigned ABAT:1; unsigned CANSIDL:1; unsigned CANFRZ:1; unsigned CANCAP:1; };
   struct { unsigned :1; unsigned ICODE0:1; unsigned ICODE1:1; unsigned ICODE2:1; unsigned :1; unsigned OPMODE0:1; unsigned OPMODE1:1; unsigned OPMODE2:1; unsigned REQOP0:1; unsigned REQOP1:1; unsigned REQOP2:1; };
+  struct { unsigned :13; unsigned CSIDL:1; };
 } C2CTRLBITS;
 extern volatile C2CTRLBITS C2CTRLbits DSPIC_SFR;
 extern volatile unsigned int C2CFG1 DSPIC_SFR; /* 0x0452 */
@@ -1127,10 +1156,16 @@ typedef union {
 } C2CFG2BITS;
 extern volatile C2CFG2BITS C2CFG2bits DSPIC_SFR;
 extern volatile unsigned int C2INTF DSPIC_SFR; /* 0x0456 */
-typedef struct { unsigned RXB0IF:1; unsigned RXB1IF:1; unsigned TXB0IF:1; unsigned TXB1IF:1; unsigned TXB2IF:1; unsigned ERRIF:1; unsigned WAKIF:1; unsigned IRXIF:1; unsigned EWARN:1; unsigned RXWARN:1; unsigned TXWARN:1; unsigned RXBP:1; unsigned TXBP:1; unsigned TXBO:1; unsigned RXB1OVFL:1; unsigned RXB0OVFL:1; } C2INTFBITS;
+typedef union {
+  struct { unsigned RXB0IF:1; unsigned RXB1IF:1; unsigned TXB0IF:1; unsigned TXB1IF:1; unsigned TXB2IF:1; unsigned ERRIF:1; unsigned WAKIF:1; unsigned IRXIF:1; unsigned EWARN:1; unsigned RXWARN:1; unsigned TXWARN:1; unsigned RXBP:1; unsigned TXBP:1; unsigned TXBO:1; unsigned RXB1OVFL:1; unsigned RXB0OVFL:1; };
+  struct { unsigned RX0IF:1; unsigned RX1IF:1; unsigned TX0IF:1; unsigned TX1IF:1; unsigned TX2IF:1; unsigned :2; unsigned IVRIF:1; unsigned :1; unsigned RXWAR:1; unsigned TXWAR:1; unsigned RXEP:1; unsigned TXEP:1; unsigned :1; unsigned RX1OVR:1; unsigned RX0OVR:1; };
+} C2INTFBITS;
 extern volatile C2INTFBITS C2INTFbits DSPIC_SFR;
 extern volatile unsigned int C2INTE DSPIC_SFR; /* 0x0458 */
-typedef struct { unsigned RXB0IE:1; unsigned RXB1IE:1; unsigned TXB0IE:1; unsigned TXB1IE:1; unsigned TXB2IE:1; unsigned ERRIE:1; unsigned WAKIE:1; unsigned IRXIE:1; } C2INTEBITS;
+typedef union {
+  struct { unsigned RXB0IE:1; unsigned RXB1IE:1; unsigned TXB0IE:1; unsigned TXB1IE:1; unsigned TXB2IE:1; unsigned ERRIE:1; unsigned WAKIE:1; unsigned IRXIE:1; };
+  struct { unsigned RX0IE:1; unsigned RX1IE:1; unsigned TX0IE:1; unsigned TX1IE:1; unsigned TX2IE:1; unsigned :2; unsigned IVRIE:1; };
+} C2INTEBITS;
 extern volatile C2INTEBITS C2INTEbits DSPIC_SFR;
 extern volatile unsigned int C2EC DSPIC_SFR; /* 0x045A */
 typedef struct { unsigned REC0:1; unsigned REC1:1; unsigned REC2:1; unsigned REC3:1; unsigned REC4:1; unsigned REC5:1; unsigned REC6:1; unsigned REC7:1; unsigned TEC0:1; unsigned TEC1:1; unsigned TEC2:1; unsigned TEC3:1; unsigned TEC4:1; unsigned TEC5:1; unsigned TEC6:1; unsigned TEC7:1; } C2ECBITS;
@@ -1439,6 +1474,8 @@ extern volatile unsigned int PMD3 DSPIC_SFR; /* 0x0774 */
 #define _BCL I2CSTATbits.BCL
 #define _TRSTAT I2CSTATbits.TRSTAT
 #define _ACKSTAT I2CSTATbits.ACKSTAT
+#define _R_W I2CSTATbits.R_W
+#define _D_A I2CSTATbits.D_A
 #define _I2CADD I2CADDbits.I2CADD
 #define _ALTIO U1MODEbits.ALTIO
 #define _COFSM DCICON1bits.COFSM
