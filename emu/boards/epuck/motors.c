@@ -96,8 +96,11 @@ static void steps_by(const struct motor *m, const i64 *cycles, i64 count, i64 *s
         h->cycle[i] = h->cycle[place + i], h->steps[i] = h->steps[place + i];
 }
 
-// What native code has done to the pins (pins.py), in order; `heard`: ports whose changes others are told too.
-struct ring {
+// Both motors, and what native code has done to the pins (pins.py), in order; `heard`: ports whose changes others are
+// told too.
+struct pair {
+    const struct motor *left, *right;
+    i64 port;
     uint64_t *changes, *count;
     uint16_t *told;
     i64 heard;
@@ -105,23 +108,22 @@ struct ring {
 
 // Both motors' steps, left, right, left and so on, once both know what is in the ring, and what counts by cycle `now`.
 // 0, and nothing is done, if others want to know of it.
-i64 both_by(const struct motor *left, const struct motor *right, const struct ring *ring, i64 port, i64 now,
-            const i64 *cycles, i64 count, i64 *steps)
+i64 both_by(const struct pair *p, i64 now, const i64 *cycles, i64 count, i64 *steps)
 {
-    i64 changes = (i64)*ring->count;
+    i64 changes = (i64)*p->count;
     for (i64 i = 0; i < changes; i++)
-        if (ring->heard >> (ring->changes[i] >> 16 & 0xFF) & 1)
+        if (p->heard >> (p->changes[i] >> 16 & 0xFF) & 1)
             return 0;
-    decode(left, ring->changes, changes, port);
-    decode(right, ring->changes, changes, port);
+    decode(p->left, p->changes, changes, p->port);
+    decode(p->right, p->changes, changes, p->port);
     for (i64 i = 0; i < changes; i++) {
-        ring->told[ring->changes[i] >> 16 & 0xFF] = (uint16_t)ring->changes[i];
-        ring->changes[i] = 0;
+        p->told[p->changes[i] >> 16 & 0xFF] = (uint16_t)p->changes[i];
+        p->changes[i] = 0;
     }
-    *ring->count = 0;
-    settle_by(left, now);
-    settle_by(right, now);
-    steps_by(left, cycles, count, steps);
-    steps_by(right, cycles, count, steps + 1);
+    *p->count = 0;
+    settle_by(p->left, now);
+    settle_by(p->right, now);
+    steps_by(p->left, cycles, count, steps);
+    steps_by(p->right, cycles, count, steps + 1);
     return 1;
 }

@@ -39,8 +39,9 @@ class _Motor(Structure):
     _fields_ = [("state", c_void_p), ("shift", c_int64), ("forward", c_int64), ("history", POINTER(_History))]
 
 
-class _Ring(Structure):
-    _fields_ = [*((name, c_void_p) for name in ("changes", "count", "told")), ("heard", c_int64)]
+class _Pair(Structure):
+    _fields_ = [("left", c_void_p), ("right", c_void_p), ("port", c_int64),
+                *((name, c_void_p) for name in ("changes", "count", "told")), ("heard", c_int64)]  # fmt: skip
 
 
 @cache
@@ -49,7 +50,7 @@ def _code() -> dict[str, Callable[..., int]]:
         "settle_by": (None, (ADDRESS, INT)),
         "change": (None, (ADDRESS, INT, INT)),
         "decode": (None, (ADDRESS, ADDRESS, INT, INT)),
-        "both_by": (INT, (ADDRESS, ADDRESS, ADDRESS, INT, INT, ADDRESS, INT, ADDRESS)),
+        "both_by": (INT, (ADDRESS, INT, ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 
 
@@ -171,8 +172,8 @@ class Motors:
         self.right: Final = Stepper("motor.right", chip, 4, 1)
         self._both_by: Final = _code()["both_by"]
         self._pins: Final = chip.pins
-        self._ring: Final = _Ring(*chip.pins.ring_places, 0)
-        self._ring_at: Final = addressof(self._ring)
+        self._pair: Final = _Pair(self.left.at, self.right.at, PORT, *chip.pins.ring_places, 0)
+        self._pair_at: Final = addressof(self._pair)
 
     def steps(self) -> tuple[int, int]:
         """Steps of both made so far (left, right): what `Stepper.steps` of each says, in one look."""
@@ -200,9 +201,8 @@ class Motors:
             self.steps()
         count = len(cycles)
         asked, made = array("q", cycles), array("q", bytes(16 * count))
-        self._ring.heard = pins.heard_of(2)
-        arguments = (left.at, right.at, self._ring_at, PORT, left.events.now, asked.buffer_info()[0], count,
-                     made.buffer_info()[0])  # fmt: skip
+        self._pair.heard = pins.heard_of(2)
+        arguments = self._pair_at, left.events.now, asked.buffer_info()[0], count, made.buffer_info()[0]
         if not self._both_by(*arguments):
             pins.flush()
             self._both_by(*arguments)
