@@ -405,6 +405,14 @@ static void nagged(bool for_all_rows)
     int n = PROGRAMS - 1, rows = programs[n].facts.rows, last = rows - 1, requests = 0;
     uint32 got = 0;
     take(n);
+    begin_interval(SHORTEST);
+    forget_kinds();
+    for (int t = 0; t < MOST_SERVED; t++) {
+        hear_request(n, (uint8)(t % rows), ALL_PARTS);
+        tick();
+        check(wanted_parts != 0, "there is always something to serve");
+    }
+    check(kinds[ADVERTISED] >= 3, "that does not keep it from advertising");
     forget_kinds();
     for (int t = 0; t < 60 * MINUTE; t++) {
         if (t % 6 == 0) {
@@ -430,6 +438,13 @@ static void nagged(bool for_all_rows)
         }
     }
     check(got == ALL_PARTS, "who lacks the last row has it in an hour");
+    hear_request(n, 0, ALL_PARTS);
+    check(wanted_parts != ALL_PARTS, "a row that was served often is not served whole");
+    for (int t = 0; t < 60 * MINUTE; t++) {
+        tick();
+    }
+    hear_request(n, 0, ALL_PARTS);
+    check(wanted_parts == ALL_PARTS, "but after an hour");
     wanted_parts = 0;
     hear_request(n, 0, 0);
     check(wanted_parts == 0, "who asks for no parts gets none");
@@ -438,20 +453,36 @@ static void nagged(bool for_all_rows)
 /* Who is behind comes first, but not for ever. */
 static void pushed(void)
 {
+    enum { SECOND = 1000 / SYS_SPREAD_TICK };
     int n = PROGRAMS - 1;
+    uint8 m[SYS_SPREAD_BYTES];
+    now += 60000;
     hear_advertisement(programs[n].facts, false);
+    check(!Sys_Spread(++now, m) || (m[0] & KINDS) != REQUEST, "it waits from when it hears on, not from when it spoke");
+    forget_kinds();
+    for (int t = 0; t < 20 * SECOND; t++) {
+        tick();
+    }
+    check(kinds[REQUESTED] >= 4 && kinds[REQUESTED] <= 9, "where nobody answers it asks more and more seldom");
     for (int t = 0; t < MINUTE && row == 0; t++) {
         tick();
         hear_what_is_wanted(1000);
     }
     check(row == 1, "it is at the second row");
     forget_kinds();
-    for (int t = 0; t < POLITENESS / SYS_SPREAD_TICK; t++) {
+    for (int t = 0; t < 5 * SECOND; t++) {
+        hear_request(n, 0, ALL_PARTS);
+        tick();
+    }
+    check(kinds[REQUESTED] > 1, "others' requests for what it has are no reason to wait");
+    forget_kinds();
+    for (int t = 0; t < 12 * SECOND; t++) {
         hear_part(n, 0, (uint8)chance(PARTS));
         tick();
     }
-    check(kinds[REQUESTED] == 0, "it lets others go first");
-    for (int t = 0; t < POLITENESS / SYS_SPREAD_TICK; t++) {
+    check(kinds[REQUESTED] <= 1, "their data are");
+    forget_kinds();
+    for (int t = 0; t < 20 * SECOND; t++) {
         hear_part(n, 0, (uint8)chance(PARTS));
         hear_request(n, 1, ALL_PARTS);
         tick();
@@ -462,7 +493,13 @@ static void pushed(void)
         hear_request(n, 0, ALL_PARTS);
         tick();
     }
-    check(kinds[REQUESTED] <= MOST_ASKED, "requests that nobody answers are no reason to go on, nor to wait");
+    check(kinds[REQUESTED] <= MOST_ASKED, "where there are no more data it ceases");
+    forget_kinds();
+    hear_advertisement(programs[n].facts, false);
+    for (int t = 0; t < MINUTE; t++) {
+        tick();
+    }
+    check(kinds[REQUESTED] == 1, "until somebody says to have it");
 }
 
 /* Flash that holds nothing any more is not asked for, nor written, without end; the store that does is used. */
