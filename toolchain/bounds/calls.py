@@ -8,12 +8,14 @@ from typing import Final
 from emu.dspic30f.isa.flow import Branch, Skip
 from toolchain.bounds.builder import exact
 from toolchain.bounds.graph import Block, Step
-from toolchain.bounds.rules import ELSEWHERE
+from toolchain.bounds.rules import DEEP, ELSEWHERE
 from toolchain.bounds.state import INHERITED, NOWHERE, State
 from toolchain.bounds.steps import Steps
 from toolchain.bounds.values import Value, ends
 
 MAX_DEPTH: Final = 60
+MOST_CALLS: Final = 8 * MAX_DEPTH
+"""Calls under way at once, of all functions (DEEP)."""
 RESULTS: Final = frozenset((0, 1))
 """Results by which the ways through a function are told apart."""
 CHOICE: Final = 6
@@ -70,7 +72,7 @@ class Calls(Steps):
     def _enter(self, last: Step, target: int, state: State, tail: bool, many: bool = False) -> None:
         """Call a function, or jump to it, and go on behind it."""
         explorer = self.explorer
-        if target in explorer.rules.without or explorer.rules.never(last.pc):
+        if target in explorer.rules.without or explorer.rules.never(last.pc, target):
             return
         if target == 0:  # a weak function that is not linked
             if not tail:
@@ -79,7 +81,10 @@ class Calls(Steps):
             return
         depth = explorer.active.count(target)
         allowed = explorer.rules.recursion(target)
-        if depth >= (MAX_DEPTH if allowed is None else allowed) or len(explorer.active) > 8 * MAX_DEPTH:
+        if len(explorer.active) > MOST_CALLS:
+            self.outcome.open[last.pc] = DEEP
+            return
+        if depth >= (MAX_DEPTH if allowed is None else allowed):
             if allowed is None:
                 self.outcome.open[last.pc] = "recursion"
             return
@@ -98,7 +103,7 @@ class Calls(Steps):
             ends = [back]
         else:
             ends = [self._behind(before, end, found.wild) if general else end.copy() for end in found.ends.values()]
-        rare = explorer.rare(last.pc)
+        rare = explorer.rare(last.pc, target)
         if rare is not None and ends:
             cycles = min(end.time for end in ends)
             self.outcome.share(*rare, cycles)

@@ -17,7 +17,7 @@ from toolchain.bounds.calls import Calls
 from toolchain.bounds.compare import Result, refined, tested
 from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step, joined
 from toolchain.bounds.outcome import Outcome, Scope
-from toolchain.bounds.rules import LOOP, Rules
+from toolchain.bounds.rules import LONG, LOOP, MERGED, Rules
 from toolchain.bounds.state import INHERITED, NOWHERE, State, widened
 from toolchain.bounds.values import WORD, Value, ends, span
 
@@ -51,6 +51,8 @@ class Explorer:
         self.codes: Final[dict[int, Code]] = {}
         self.known: Final[dict[object, Outcome]] = {}
         self.hopeless: Final[set[int]] = set()
+        self.long: Final[set[int]] = set()
+        """Heads of loops that were followed no further (LONG)."""
         self.variants: Final[Counter[int]] = Counter()
         self.closed: Final[Counter[int]] = Counter()
         """How many of them left nothing open."""
@@ -100,10 +102,14 @@ class Explorer:
                 return (entry, text), rounds
         return None if total is None else ((None, str(loop.head)), total)
 
-    def rare(self, pc: int) -> tuple[Scope, int] | None:
-        """In which of the calls under way the call at `pc` is made so often at most."""
-        times = self.rules.times(pc) if self.sharing else {}
-        return next((((entry, str(pc)), times[entry]) for entry in self.active if entry in times), None)
+    def rare(self, pc: int, target: int) -> tuple[Scope, int] | None:
+        """In which of the calls under way the call of `target` at `pc` is made so often at most."""
+        times = self.rules.times(pc, target) if self.sharing else {}
+        for entry in self.active:
+            if entry in times:
+                text, most = times[entry]
+                return (entry, text), most
+        return None
 
     def call(self, entry: int, state: State, one_of_many: bool) -> tuple[Outcome, bool]:
         """Run a called function; True: from a state that stands for all its calls, because there are many, or because a
@@ -149,6 +155,8 @@ class _Run(Calls):
     def __init__(self, explorer: Explorer, code: Code) -> None:
         super().__init__(explorer, code)
         self.pending: dict[int, State] = {}
+        self.merged: Final[set[int]] = set()
+        """Heads of loops whose notes say nothing (MERGED)."""
 
     def run(self, state: State) -> Outcome:
         self._peak(state)
@@ -194,9 +202,7 @@ class _Run(Calls):
         explorer, pending = self.explorer, self.pending
         if loop.members.isdisjoint(pending):
             return
-        bound, total = explorer.rules.loop(self.code, loop), explorer.rules.total(self.code, loop)
-        bound = min((most for most in (bound, total) if most is not None), default=None)
-        shared = explorer.shares(self.code, loop, total)
+        bound, shared = self._said(loop)
         limit = HOPELESS_TURNS if loop.head in explorer.hopeless else MAX_TURNS
         before: dict[int, State] = {}
         turns = 0
@@ -206,6 +212,8 @@ class _Run(Calls):
                 if bound is not None and turns > bound:
                     break
                 if turns > limit:
+                    if limit == MAX_TURNS:
+                        explorer.long.add(loop.head)
                     explorer.hopeless.add(loop.head)
                     self._widen(before, now)
                 if shared is not None:
@@ -227,6 +235,17 @@ class _Run(Calls):
             turns += 1
         for head in loop.heads:
             pending.pop(head, None)
+
+    def _said(self, loop: Loop) -> tuple[int | None, tuple[Scope, int] | None]:
+        """Rounds of a loop by notes, and among which others they count; nothing where it may be two of the source."""
+        explorer = self.explorer
+        bound, total = explorer.rules.loop(self.code, loop), explorer.rules.total(self.code, loop)
+        shared = explorer.shares(self.code, loop, total)
+        said = [most for most in (bound, total) if most is not None]
+        if (said or shared is not None) and not explorer.rules.one(self.code, loop):
+            self.merged.add(loop.head)
+            return None, None
+        return min(said, default=None), shared
 
     def _widen(self, before: dict[int, State], now: dict[int, State]) -> None:
         """Give up what differs from the round before."""
@@ -250,7 +269,8 @@ class _Run(Calls):
         exits = any(t not in loop.members for m in loop.members for t in self.code.blocks[m].following)
         returns = any(self.code.blocks[m].steps[-1].flow is Return for m in loop.members)
         if exits or returns:
-            self.outcome.open[loop.head] = LOOP
+            long, merged = loop.head in self.explorer.long, loop.head in self.merged
+            self.outcome.open[loop.head] = MERGED if merged else LONG if long else LOOP
         else:
             self.outcome.forever.add(loop.head)
 

@@ -6,13 +6,15 @@ import ast
 import operator
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from toolchain.elf.model import Executable
 from toolchain.errors import ToolError
 
 SECTION = ".note.bounds"
 _LINE = re.compile(r"(\w+) (.*)@(.+):(\d+)")
+_FUNCTION = re.compile(r"in (\w+)")
+"""Behind a note the compiler tells its function (lower/data.py)."""
 _OPERATORS: dict[type[ast.operator], Callable[[int, int], int]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -30,6 +32,13 @@ class Note:
     text: str
     file: str
     line: int
+    function: str = ""
+    """The function it stands in, where the compiler says so."""
+
+    @property
+    def place(self) -> str:
+        """File and line, for messages."""
+        return f"{self.file}:{self.line}"
 
 
 @dataclass(slots=True)
@@ -50,7 +59,7 @@ class Notes:
         try:
             tree = ast.parse(text.strip(), mode="eval").body
         except SyntaxError:
-            raise ToolError(f"{where.file}:{where.line}: expected a number or an expression, got {text!r}") from None
+            raise ToolError(f"{where.place}: expected a number or an expression, got {text!r}") from None
         return self._value(tree, where)
 
     def _value(self, tree: ast.expr, where: Note) -> int | None:
@@ -70,7 +79,7 @@ class Notes:
                 if known:
                     self.missing = missing
                 return min(known, default=None)
-        raise ToolError(f"{where.file}:{where.line}: expected integers, names, + - * / min, got {ast.unparse(tree)!r}")
+        raise ToolError(f"{where.place}: expected integers, names, + - * / min, got {ast.unparse(tree)!r}")
 
 
 def read_notes(image: Executable, values: Mapping[str, int]) -> Notes:
@@ -79,6 +88,10 @@ def read_notes(image: Executable, values: Mapping[str, int]) -> Notes:
     for section in image.sections:
         if section.name == SECTION:
             for line in bytes(section.data[::2]).replace(b"\0", b"").decode("utf-8", "replace").splitlines():
+                inside = _FUNCTION.fullmatch(line)
+                if inside is not None and result.all:
+                    result.all[-1] = replace(result.all[-1], function=inside[1])
+                    continue
                 match = _LINE.fullmatch(line)
                 if match is None:
                     raise ToolError(f"section {SECTION}: expected `kind text@file:line`, got {line!r}")

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Final
 
 from emu.chips import chip_named, chip_of
 from emu.elffacts import PROCESSOR_MASK
-from emu.lines import Lines
-from toolchain.bounds.graph import Builder, Code, Loop, loops_in
+from toolchain.bounds.bindings import Bindings
+from toolchain.bounds.graph import Builder
+from toolchain.bounds.names import Names
 from toolchain.bounds.notes import Note, Notes
 from toolchain.bounds.signatures import Signatures
+from toolchain.bounds.sources import Sources
 from toolchain.bounds.state import State
 from toolchain.bounds.values import WINDOW
 from toolchain.elf.disassemble import items
@@ -29,14 +31,10 @@ PYTHON_DEPTH = 20_000
 """Frames of Python that deep calls of the firmware may take."""
 
 
-def tail(file: str) -> str:
-    """Folder and name: notes and debug information name the same file from different folders on."""
-    return "/".join(file.replace("\\", "/").split("/")[-2:])
-
-
-def _beside(file: str, name: str) -> str:
-    """The file of that name in the same folder; without a name the file itself."""
-    return file.rpartition("/")[0] + "/" + name if name else file
+def _beside(note: Note) -> str:
+    """The file a note names in its own folder; without a name its own."""
+    name = note.text[1:].strip()
+    return note.file.rpartition("/")[0] + "/" + name if name else note.file
 
 
 class Program:
@@ -57,15 +55,11 @@ class Program:
         }
         self.window: Final = self._window()
         debug = {s.name: bytes(s.data) for s in image.sections if s.name.startswith(".debug_")}
-        self.lines: Final = Lines(debug)
+        self.sources: Final = Sources(debug)
         self.signatures: Final = Signatures(debug)
-        self._ram = {_beside(tail(note.file), note.text[1:].strip()) for note in notes.of("ram")}
-        self._at: dict[str, dict[tuple[str, int], list[Note]]] = {}
-        for note in notes.all:
-            table = self._at.setdefault(note.kind, {})
-            for line in (note.line, note.line + 1):
-                table.setdefault((tail(note.file), line), []).append(note)
-        self._loops: dict[tuple[str, int], dict[int, set[Note]]] = {}
+        self.names: Final = Names(image, self.sources, self.chip, self.calls.entries)
+        self.bindings: Final = Bindings(notes, self.sources, self.names, self.calls.code)
+        self._ram = {file for note in notes.of("ram") for file in self.sources.files(_beside(note))}
 
     def _window(self) -> dict[int, int] | None:
         """Bytes of the PSV window; None if no section lies in it, nothing if its page changes."""
@@ -83,21 +77,12 @@ class Program:
 
     def place(self, pc: int) -> str:
         """Source line of an address, or its symbol."""
-        line = self.lines.find(pc)
+        line = self.sources.lines.find(pc)
         return f"{line} ({self.calls.name(pc)})" if line else self.calls.name(pc)
 
-    def line(self, pc: int) -> tuple[str, int]:
-        """File and line of an address."""
-        found = self.lines.find(pc)
-        return (tail(found.file), found.line) if found else ("", 0)
-
-    def address(self, name: str) -> int | None:
-        """Value of a symbol in C or assembly spelling."""
-        for symbol in self.image.symbols:
-            if symbol.name in (name, "_" + name):
-                return symbol.value
-        sfr = self.chip.sfrs.get(name)
-        return None if sfr is None else sfr.address
+    def address(self, name: str, note: Note | None = None) -> int | None:
+        """Value of a symbol in C or assembly spelling, or the address of a register (Names.find)."""
+        return self.names.find(name, note)
 
     def interesting(self, prefix: str) -> list[str]:
         """Functions of that prefix, else main."""
@@ -109,88 +94,22 @@ class Program:
 
     def links_in_ram(self, pc: int) -> bool:
         """Whether the code there finds only RAM behind pointers it loads."""
-        return bool(self._ram) and self.line(pc)[0] in self._ram
-
-    def rounds(self, code: Code, loop: Loop) -> int | None:
-        """Rounds of a loop by its LOOP_BOUND, the line in front of its condition."""
-        numbers = self._numbers(code, loop, "loop")
-        for note in self.notes.of("loops"):
-            name, _, text = note.text.partition(" ")
-            if self.address(name) == code.entry:
-                numbers.append(self.notes.number(text, note))
-        return None if None in numbers else max((n for n in numbers if n is not None), default=None)
-
-    def total(self, code: Code, loop: Loop) -> int | None:
-        """Rounds of a loop in all, by its LOOP_TOTAL."""
-        numbers = self._numbers(code, loop, "total")
-        return None if None in numbers else max((n for n in numbers if n is not None), default=None)
-
-    def together(self, code: Code, loop: Loop) -> dict[int, tuple[str, int]]:
-        """Rounds of a loop and all others of one LOOP_SHARE in one call of a function: what it says, the number."""
-        notes = [note for head in loop.heads for note in self._bound(code, "share", head)]
-        return {address: (text, number) for address, text, number in self._of_functions(notes)}
-
-    def times(self, pc: int) -> dict[int, int]:
-        """By function, how often the call there is made in one call of it, by CALL_SHARE."""
-        notes = self._at["often"].get(self.line(pc), ()) if "often" in self._at else ()
-        return {address: number for address, _, number in self._of_functions(notes)}
-
-    def _of_functions(self, notes: Iterable[Note]) -> Iterator[tuple[int, str, int]]:
-        """Function, rest and value of notes that begin with a function."""
-        for note in notes:
-            name, _, text = note.text.partition(" ")
-            address, number = self.address(name), self.notes.number(text, note)
-            if address is not None and number is not None:
-                yield address, text, number
-
-    def never(self, pc: int) -> bool:
-        """Whether the call there is not made, by CALL_IF."""
-        notes = self._at["if"].get(self.line(pc), ()) if "if" in self._at else ()
-        return any(self.notes.number(note.text, note) == 0 for note in notes)
-
-    def scopes(self) -> frozenset[int]:
-        """Functions that LOOP_SHARE and CALL_SHARE name."""
-        names = {note.text.partition(" ")[0] for kind in ("share", "often") for note in self.notes.of(kind)}
-        return frozenset(a for name in names if (a := self.address(name)) in self.calls.entries and a is not None)
-
-    def _numbers(self, code: Code, loop: Loop, kind: str) -> list[int | None]:
-        return [self.notes.number(note.text, note) for head in loop.heads for note in self._bound(code, kind, head)]
-
-    def same(self, code: Code) -> set[int]:
-        """Heads of loops that are one with the loop around them, by SAME_LOOP."""
-        return {loop.head for loop in loops_in(code.order) if self._bound(code, "same", loop.head)}
-
-    def _bound(self, code: Code, kind: str, head: int) -> set[Note]:
-        if (kind, code.entry) not in self._loops:
-            self._loops[kind, code.entry] = self._bind(code, kind)
-        return self._loops[kind, code.entry].get(head, set())
-
-    def _bind(self, code: Code, kind: str) -> dict[int, set[Note]]:
-        """Notes by the head of their loop: the innermost one with code of their line, and no loop around that."""
-        table = self._at.get(kind, {})
-        bound: dict[int, set[Note]] = {}
-        for loop in reversed(loops_in(code.order)) if table else ():
-            inner = loops_in(loop.body)
-            own = loop.members - {m for part in inner for m in part.members}
-            below = {note for part in inner for note in bound[part.head]}
-            lines = {self.line(step.pc) for head in own for step in code.blocks[head].steps}
-            bound[loop.head] = {note for line in lines for note in table.get(line, ())} - below
-        return bound
+        return bool(self._ram) and self.sources.at(pc)[0] in self._ram
 
     def targets(self, pc: int, state: State) -> list[int] | None:
         """Where a call through a pointer can lead, by CALL_TARGETS in front of it or by an annotation file."""
         found: set[int] = set()
-        for note in self._at.get("calls", {}).get(self.line(pc), ()):
+        for note in self.bindings.pointed(pc):
             for name in (part.strip() for part in note.text.split(",")):
                 if name.startswith("-"):
-                    found.discard(self.address(name[1:].strip()) or 0)
+                    found.discard(self.address(name[1:].strip(), note) or 0)
                 elif name in self.signatures.types:
                     wanted = self.signatures.types[name]
                     found |= {a for a in self._taken() if self.signatures.functions.get(a) == wanted}
                 else:
-                    address = self.address(name)
+                    address = self.address(name, note)
                     if address is None:
-                        raise ToolError(f"{note.file}:{note.line}: {name} is neither a function nor a type of one")
+                        raise ToolError(f"{note.place}: {name} is neither a function nor a type of one")
                     found.add(address)
             return sorted(found)
         owner = self.calls.name(pc).partition("+")[0]
@@ -252,7 +171,7 @@ class Program:
         """Level at which a function that changes stacks returns, by COMES_BACK."""
         for note in self.notes.of("back"):
             name, _, level = note.text.partition(" ")
-            if self.address(name) == entry:
+            if self.address(name, note) == entry:
                 return self.notes.number(level, note)
         return None
 
@@ -263,8 +182,8 @@ class Program:
 
     def resumed(self) -> list[int]:
         """Functions of RESUMED_BY."""
-        names = [name.strip() for note in self.notes.of("resumed") for name in note.text.split(",")]
-        return [a for name in names if (a := self.address(name)) is not None]
+        said = [(name.strip(), note) for note in self.notes.of("resumed") for name in note.text.split(",")]
+        return [a for name, note in said if (a := self.address(name, note)) is not None]
 
     def recursion(self, entry: int) -> int | None:
         """Activations of a function that exist at once, by annotation."""

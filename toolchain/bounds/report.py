@@ -10,7 +10,7 @@ from toolchain.bounds.builder import World
 from toolchain.bounds.explore import Explorer, TooMuch
 from toolchain.bounds.outcome import Outcome
 from toolchain.bounds.program import Program
-from toolchain.bounds.rules import LOOP, Rules
+from toolchain.bounds.rules import CUT, FOLLOWED, Rules
 from toolchain.bounds.state import LEVELS, Area, State
 from toolchain.bounds.values import Value, span
 from toolchain.errors import ToolError
@@ -51,7 +51,7 @@ class Bound:
     @property
     def stack_is_known(self) -> bool:
         """Whether nothing is open but rounds of loops."""
-        return all(why == LOOP for why in self.open.values())
+        return all(why in FOLLOWED for why in self.open.values())
 
     @property
     def bytes(self) -> int:
@@ -73,13 +73,14 @@ class Analyst:
         kept = {a for a, _ in (*self.private, *self.known)}
         self.world = World(Area(areas), program.words, program.window, kept, program.links_in_ram)
         self.rules = Rules(
-            loop=program.rounds,
-            total=program.total,
-            together=program.together,
-            scopes=program.scopes(),
-            same=program.same,
-            times=program.times,
-            never=program.never,
+            loop=program.bindings.rounds,
+            total=program.bindings.total,
+            together=program.bindings.together,
+            scopes=program.bindings.scopes(),
+            same=program.bindings.same,
+            one=program.bindings.one,
+            times=program.bindings.times,
+            never=program.bindings.never,
             without=program.without(),
             calls=program.targets,
             recursion=program.recursion,
@@ -92,7 +93,7 @@ class Analyst:
         """The stack interrupts move to, by STACK_AREA."""
         for note in self.program.notes.of("stack"):
             name, _, text = note.text.partition(" ")
-            start, size = self.program.address(name), self.program.notes.number(text, note)
+            start, size = self.program.address(name, note), self.program.notes.number(text, note)
             if start is not None and size is not None:
                 return start, start + size
         return None
@@ -107,7 +108,7 @@ class Analyst:
         found: list[tuple[int, Value]] = []
         for note in self.program.notes.of(kind):
             name, _, text = note.text.partition(" ")
-            address, value = self.program.address(name), self.program.notes.number(text, note)
+            address, value = self.program.address(name, note), self.program.notes.number(text, note)
             if address is not None and value is not None:
                 found.append((address & ~1, value))
         return found
@@ -124,7 +125,7 @@ class Analyst:
         for note in self.program.notes.of("argument"):
             name, number, text = note.text.split(None, 2)
             most = self.program.notes.number(text, note)
-            if self.program.address(name) == entry and most is not None:
+            if self.program.address(name, note) == entry and most is not None:
                 state.w[int(number)] = span(0, most)
         return Explorer(self.world, self.program.graph, self.rules, sharing).run(entry, state)
 
@@ -139,7 +140,7 @@ class Analyst:
             if any(self.program.notes.of(kind) for kind in ("total", "share", "often")):
                 shared = [self.explore(entry, level, on_other, thread, sharing=True) for thread in contexts]
         except TooMuch:
-            result.open[self.program.place(entry)] = "too many paths; bound its loops"
+            result.open[self.program.place(entry)] = CUT
             return result
         self._fill(result, found, on_other)
         self._time(result, [found, *others], shared)

@@ -12,7 +12,12 @@ from toolchain.bounds.state import State
 MOVED: Final = "room of a length that is not known is taken from the stack (alloca, array of variable length)"
 ELSEWHERE: Final = "returns where nobody called it from (longjmp, a change of stacks)"
 LOOP: Final = "no bound of this loop is known"
-"""The one reason that leaves the stack bounded: its rounds have been followed until nothing new came of them."""
+LONG: Final = "this loop is followed for 5,000 rounds and no further; say how many there are (LOOP_BOUND)"
+MERGED: Final = "several ways lead back to the beginning of this loop: it may be two of the source (ONE_LOOP)"
+CUT: Final = "its exploration was cut off: too many ways through it; bound its loops"
+DEEP: Final = "calls are followed 480 deep and no further"
+FOLLOWED: Final = frozenset((LOOP, LONG, MERGED))
+"""Reasons that leave the stack bounded: rounds have been followed until nothing new came of them."""
 
 
 @dataclass(slots=True)
@@ -31,10 +36,12 @@ class Rules:
     """Heads of loops that are one with the loop around them."""
     calls: Callable[[int, State], list[int] | None] = lambda _pc, _state: None
     """Targets of a call through a pointer whose value is not known."""
-    times: Callable[[int], dict[int, int]] = lambda _pc: {}
-    """By function: how often the call at an address is made in one call of it."""
-    never: Callable[[int], bool] = lambda _pc: False
-    """Whether the call at an address is not made."""
+    one: Callable[[Code, Loop], bool] = lambda _code, _loop: True
+    """Whether a loop is one of the source, so that what notes say of its rounds is of all of them."""
+    times: Callable[[int, int], dict[int, tuple[str, int]]] = lambda _pc, _target: {}
+    """By function: which call of the source that of a function at an address is, and how often one call makes it."""
+    never: Callable[[int, int], bool] = lambda _pc, _target: False
+    """Whether the call of a function at an address is not made."""
     without: frozenset[int] = frozenset()
     """Functions that are not called: paths that lead into them are left out."""
     recursion: Callable[[int], int | None] = lambda _entry: None

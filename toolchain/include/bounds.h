@@ -8,11 +8,17 @@
 #ifndef _BOUNDS_H_
 #define _BOUNDS_H_
 
-/* In front of a loop, or of the `while` that ends one: it goes round at most `rounds` times. It counts for the innermost
+/* A note "in front of" something is of one line: its own, if code stands there, else the next of its function that has
+ * code. Functions and variables are those that its file can see; `file.c/name` is a static one of another file.
+ *
+ * In front of a loop, or of the `while` that ends one: it goes round at most `rounds` times. It counts for the innermost
  * loop of the machine code with an instruction of that line. Where one loop of the source has become two, one within the
- * other, SAME_LOOP in front of a line of the inner one says so: they share their rounds. */
+ * other, SAME_LOOP in front of a line of the inner one says so: they share their rounds. Where several ways lead back to
+ * the beginning of a loop of the machine code, it may be two of the source in one, and has no bound until ONE_LOOP beside
+ * the note says that it is one. */
 #define LOOP_BOUND(rounds) _BOUNDS_NOTE("loop", rounds)
 #define SAME_LOOP() _BOUNDS_NOTE("same", .)
+#define ONE_LOOP() _BOUNDS_NOTE("one", .)
 /* On the line of a LOOP_BOUND, or alone: in one call of whatever is looked at, all rounds of the loop together, however often
  * it is entered, are at most `rounds`. Of the two ways to count, the one that gives less is taken. */
 #define LOOP_TOTAL(rounds) _BOUNDS_NOTE("total", rounds)
@@ -24,10 +30,11 @@
 /* In front of a call through a pointer: its targets are the functions named, of a type named all whose address is taken,
  * without those behind a minus. */
 #define CALL_TARGETS(...) _BOUNDS_NOTE("calls", __VA_ARGS__)
-/* In front of a call: in one call of that function it is made at most so often. */
-#define CALL_SHARE(function, times) _BOUNDS_NOTE("often", function times)
-/* In front of a call: it is made only where this is not 0. */
-#define CALL_IF(expression) _BOUNDS_NOTE("if", expression)
+/* In front of a call of `callee`, which is no inlined one: in one call of `function` it is made at most so often, all its
+ * copies and all calls of `callee` in that line together. */
+#define CALL_SHARE(callee, function, times) _BOUNDS_NOTE("often", callee function times)
+/* In front of a call of `callee`: it is made only where this is not 0. */
+#define CALL_IF(callee, expression) _BOUNDS_NOTE("if", callee expression)
 /* Anywhere: looked at by itself, the function finds in register Wn at most `most`. */
 #define ARGUMENT_BOUND(function, n, most) _BOUNDS_NOTE("argument", function n most)
 /* Anywhere: the function leaves its stack to another, and comes back to its caller at this interrupt level. */

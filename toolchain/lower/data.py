@@ -29,6 +29,8 @@ from .used import KEEP
 
 WORDS_PER_LINE = 8
 SKIPPED_SECTIONS = ("llvm.metadata",)
+NOTES = ".note.bounds"
+"""Section of the notes of bounds.h."""
 WEAK = ("weak", "weak_odr", "linkonce", "linkonce_odr", "extern_weak", "common")
 SECTION_TYPES = {".const": "psv,page", ".nbss": "bss,near", ".ndata": "data,near", ".bss": "bss", ".data": "data",
                  ".xbss": "bss,xmemory,near", ".xdata": "data,xmemory,near", ".ybss": "bss,ymemory",
@@ -119,6 +121,8 @@ class DataEmitter:
         data.value(var.init, var.type)
         data.pad_to(max(size, 1))
         self.lines += data.text()
+        if var.section == NOTES and "._" in var.name:  # of a function: notes are of one place
+            self.lines.append(f'\t.ascii "in {var.name.partition(".")[0]}\\n"')
 
     def _section(self, var: GlobalVar, name: str, zero: bool, modifiers: str) -> str:
         suffix = name.removeprefix(".L")

@@ -21,10 +21,11 @@
 #define LOOP_TOTAL(rounds)
 #define LOOP_SHARE(function, rounds)
 #define SAME_LOOP()
+#define ONE_LOOP()
 #define LOOPS_OF(function, rounds) struct no_note
 #define CALL_TARGETS(...)
-#define CALL_SHARE(function, times)
-#define CALL_IF(expression)
+#define CALL_SHARE(callee, function, times)
+#define CALL_IF(callee, expression)
 #define PRIVATE_VALUE(variable, value) struct no_note
 #define KNOWN_VALUE(variable, value) struct no_note
 #define ARGUMENT_BOUND(function, n, most) struct no_note

@@ -119,7 +119,7 @@ static HAL_OUTLINE bool wake_waiters(const event *e, message *m)
 {
     bool any = false;
     sys_pcb *next;
-    LOOP_BOUND(n);
+    LOOP_BOUND(n); ONE_LOOP();
     for (sys_pcb *p = os_blocked; p != NULL; p = next) {
         next = p->next;
         if (p->on.awaited == e && (m == NULL || p->wait.condition == NULL)) {
@@ -218,7 +218,7 @@ static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
 {
     bool found = false;
     subscription **link = &e->subscribers;
-    LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s));
+    LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s)); ONE_LOOP();
     while (*link != NULL) {
         if ((*link)->pid == pid && (handler == NULL || (*link)->handler == handler)) {
             unlink_subscription(link);
@@ -403,7 +403,7 @@ void event_deliver_queued(void)
     queue_end = &event_queue;
     os_pending &= (uint16)~OS_MESSAGES;
     hal_unlock(lock);
-    LOOP_BOUND(q);
+    LOOP_BOUND(q); ONE_LOOP();
     while (undelivered != NULL) {
         message *m = undelivered;
         undelivered = m->queued.next;
@@ -427,7 +427,7 @@ void event_release_result(sys_pcb *process)
     if (m == NULL) {
         return;
     }
-    LOOP_BOUND(n);
+    LOOP_BOUND(n); ONE_LOOP();
     while ((p = process_next(p)) != NULL) {
         if (holds(p, m)) {
             return;

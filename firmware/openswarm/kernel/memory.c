@@ -159,13 +159,13 @@ static HAL_OUTLINE void join_run(void)
     }
     run = run_end;
     /* The size of a hole, if one ends here; if not, no hole begins so far below that ends here. */
-    CALL_SHARE(heap_give, RUNS);
+    CALL_SHARE(find_hole, heap_give, RUNS);
     hole **link = find_hole((uintptr_t)begin - *last_step(begin));
     if ((uint8 *)*link + (*link)->size == begin) {
-        CALL_SHARE(heap_give, RUNS);
+        CALL_SHARE(pull_hole, heap_give, RUNS);
         begin = (uint8 *)pull_hole(link);
     }
-    CALL_SHARE(heap_give, RUNS);
+    CALL_SHARE(find_hole, heap_give, RUNS); CALL_SHARE(pull_hole, heap_give, RUNS);
     end += pull_hole(find_hole((uintptr_t)end))->size; /* of nothing: 0 */
     hal_lock_state lock = hal_lock_devices();
     if (end == low) {
@@ -177,7 +177,7 @@ static HAL_OUTLINE void join_run(void)
     }
     hal_unlock(lock);
     if (apart) {
-        CALL_SHARE(heap_give, RUNS);
+        CALL_SHARE(put_hole, heap_give, RUNS);
         put_hole(begin, (uint16)(end - begin));
     }
 }
@@ -188,7 +188,7 @@ static HAL_OUTLINE uint16 renew_reserve(void)
     if (holes->size <= reserve()) {
         return 0;
     }
-    CALL_IF(min(1, x));
+    CALL_IF(pull_hole, min(1, x));
     hole *h = pull_hole(&holes);
     hal_lock_state lock = hal_lock_devices();
     uint8 *from = low, *to = high;

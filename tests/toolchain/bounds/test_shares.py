@@ -81,9 +81,9 @@ def test_rounds_of_two_calls_are_shared_in_the_function_that_makes_them(tmp_path
 
 def test_a_call_is_made_only_so_often(tmp_path: Path, capsys) -> None:
     """Once in ten rounds, or never."""
-    image = built(tmp_path, RARE.replace("NOTE", "CALL_SHARE(work, 1);"))
+    image = built(tmp_path, RARE.replace("NOTE", "CALL_SHARE(mend, work, 1);"))
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
-    image = built(tmp_path, RARE.replace("NOTE", "CALL_IF(x);"))
+    image = built(tmp_path, RARE.replace("NOTE", "CALL_IF(mend, x);"))
     assert report(capsys, image, "--let", "x=0")["cycles"] < 1000 < report(capsys, image, "--let", "x=1")["cycles"]
 
 

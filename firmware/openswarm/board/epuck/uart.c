@@ -74,7 +74,7 @@ static HAL_OUTLINE void empty(uint8 uart)
 {
     volatile registers *r = registers_of(uart);
     uint16 status;
-    LOOP_BOUND(6); /* four places, the shift register, and a byte that comes meanwhile */
+    LOOP_BOUND(6); ONE_LOOP(); /* four places, the shift register, and a byte that comes meanwhile */
     while ((status = r->status) & HAS_BYTE) {
         uint8 byte = (uint8)r->receive;
         if (status & FRAMING_ERROR) {

@@ -1,0 +1,188 @@
+"""Notes are of one place: the line, the function and the file they stand in, the call and the loop they speak of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz.fuzz_bounds import measure
+from tests.toolchain.bounds.test_bounds import built, report
+from tests.toolchain.c_programs import build
+from toolchain.cli import main
+
+SLOW = '__attribute__((noinline)) {} void mend(void) {{ __asm__ volatile("repeat #{}\\n nop"); }}\n'
+TWICE = """
+#include <bounds.h>
+volatile int wanted = 2;
+{slow}
+__attribute__((noinline)) void work(void)
+{{
+    for (int i = 0; i < 10; i++) {{
+        if (wanted == i) {{ {note} mend();
+        }}
+        mend();
+    }}
+}}
+int main(void) {{ work(); return 0; }}
+"""
+PART = """
+#include <bounds.h>
+struct item {{ struct item *next; }} items_{name}[{count}], *volatile head_{name};
+__attribute__((noinline)) static int length(struct item *p)
+{{
+    int c = 0;
+    {note}
+    for (; p; p = p->next) c++;
+    return c;
+}}
+int walk_{name}(void)
+{{
+    for (int i = 1; i < {count}; i++) items_{name}[i - 1].next = &items_{name}[i];
+    head_{name} = items_{name};
+    return length(head_{name});
+}}
+"""
+WAYS_BACK = """
+#include <bounds.h>
+struct item {{ struct item *next; int key, mark; }} items[8], *volatile head;
+volatile int odd;
+__attribute__((noinline)) struct item *after(struct item *p) {{ return p->next; }}
+__attribute__((noinline)) int visit(struct item *p, int key)
+{{
+    {note}
+    while ((p = after(p)) != 0) {{
+        if (p->key != key)
+            continue;
+        if (!(p->mark & 4) ||
+            p->mark == odd)
+            return 1;
+    }}
+    return 0;
+}}
+int main(void)
+{{
+    for (int i = 1; i < 8; i++) items[i - 1].next = &items[i], items[i].mark = 4;
+    head = items;
+    return visit(head, 0);
+}}
+"""
+UNROLLED = """
+#include <bounds.h>
+struct item { struct item *next; int key[2]; } items[8], *volatile head;
+volatile int sum;
+__attribute__((noinline)) void visit(struct item *p)
+{
+    for (; p; p = p->next) {
+        sum++;
+        LOOP_BOUND(2);
+        for (int i = 0; i < 2; i++)
+            sum += p->key[i];
+        sum--;
+    }
+}
+int main(void) { head = items; visit(head); return 0; }
+"""
+
+
+def cycles(image: Path) -> int:
+    seen = measure(image)
+    assert isinstance(seen, dict)
+    return seen["_main"].cycles
+
+
+@pytest.mark.parametrize("level", ["-Os", "-O2"])
+def test_a_note_of_one_call_says_nothing_about_the_next_line(tmp_path: Path, capsys, level: str) -> None:
+    """Both lines call mend(); it is only the first that is made once."""
+    text = TWICE.format(slow=SLOW.format("", 999), note="CALL_SHARE(mend, work, 1);")
+    image = built(tmp_path, text, level)
+    assert cycles(image) <= report(capsys, image)["cycles"] <= 1.1 * cycles(image)
+    image = built(tmp_path, text.replace("CALL_SHARE(mend, work, 1)", "CALL_IF(mend, 0)"), level)
+    assert 10_000 < report(capsys, image)["cycles"] < cycles(image)  # ten calls instead of eleven
+
+
+@pytest.mark.parametrize(
+    ("note", "message"),
+    [
+        ("CALL_SHARE(work, work, 1);", "program.c:9: no call of work stands in line 9"),
+        ("CALL_IF(other, 0);", "program.c:9: no call of other stands in line 9"),
+        ("CALL_SHARE(mend, work, );", "program.c:9: expected 3 arguments, got 'mend work'"),
+    ],
+)
+def test_a_note_of_no_call_is_refused(tmp_path: Path, capsys, note: str, message: str) -> None:
+    """With its place."""
+    image = built(tmp_path, TWICE.format(slow=SLOW.format("", 9), note=note))
+    assert main(["bounds", str(image)]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_note_behind_all_code_is_refused(tmp_path: Path, capsys) -> None:
+    """Nothing could come of it."""
+    text = "#include <bounds.h>\nvolatile int a;\nint main(void)\n{\n    a = 2;\n    return 0;\n    LOOP_BOUND(3);\n}\n"
+    assert main(["bounds", str(built(tmp_path, text))]) == 2
+    assert "program.c:7: no code of main stands behind this note" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("lto", [[], ["-fno-lto"]])
+def test_static_functions_of_one_name_are_told_apart(tmp_path: Path, capsys, lto: list[str]) -> None:
+    """In files and folders of one name, with notes of the same line: 40 items in one list, 5 in the other."""
+    sources = []
+    for name, count, note in (("one", 40, "LOOP_BOUND(40);"), ("two", 5, "LOOP_BOUND(5);")):
+        (tmp_path / name / "part").mkdir(parents=True)
+        sources.append(tmp_path / name / "part" / "list.c")
+        sources[-1].write_text(PART.format(name=name, count=count, note=note))
+    (tmp_path / "main.c").write_text(
+        "int walk_one(void), walk_two(void); int main(void) { return walk_one() + walk_two(); }"
+    )
+    made = build([tmp_path / "main.c", *sources], tmp_path / "a.elf", "-Os", "-g", *lto)
+    assert made.status == 0, made.messages
+    seen = cycles(tmp_path / "a.elf")
+    assert seen <= report(capsys, tmp_path / "a.elf")["cycles"] <= 1.1 * seen
+    for source, most in zip(sources, (40, 5), strict=True):
+        text = source.read_text().replace(f"LOOP_BOUND({most});", "")
+        source.write_text(text.replace("int walk", f"LOOPS_OF(length, {most});\nint walk"))
+    made = build([tmp_path / "main.c", *sources], tmp_path / "a.elf", "-Os", "-g", *lto)
+    assert made.status == 0, made.messages
+    assert cycles(tmp_path / "a.elf") <= report(capsys, tmp_path / "a.elf")["cycles"] <= 1.1 * seen
+    sources[0].write_text(sources[0].read_text().replace("LOOPS_OF(length", "LOOPS_OF(list.c/length"))
+    assert build([tmp_path / "main.c", *sources], tmp_path / "a.elf", "-Os", "-g", *lto).status == 0
+    assert main(["bounds", str(tmp_path / "a.elf")]) == 2
+    assert "list.c/length is several: say " in capsys.readouterr().err
+    assert main(["bounds", str(tmp_path / "a.elf"), "--function", "length"]) == 2
+
+
+def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, capsys) -> None:
+    """`list.c/length` from main.c; without its file it is none that main.c can see."""
+    (tmp_path / "list.c").write_text(PART.format(name="one", count=8, note=""))
+    for note, bounded in (("LOOPS_OF(list.c/length, 8);", True), ("LOOPS_OF(length, 8);", False)):
+        (tmp_path / "main.c").write_text(
+            f"#include <bounds.h>\n{note}\nint walk_one(void); int main(void) {{ return walk_one(); }}"
+        )
+        made = build([tmp_path / "main.c", tmp_path / "list.c"], tmp_path / "a.elf", "-Os", "-g")
+        assert made.status == 0, made.messages
+        assert (report(capsys, tmp_path / "a.elf")["cycles"] is not None) == bounded
+
+
+def test_several_ways_back_are_one_loop_only_where_a_note_says_so(tmp_path: Path, capsys) -> None:
+    """What `continue` leads back to could as well be the condition of a loop within."""
+    image = built(tmp_path, WAYS_BACK.format(note="LOOP_BOUND(8);"), "-Os")
+    row = report(capsys, image)
+    assert row["cycles"] is None
+    assert any("several ways lead back" in why for why in row["open"].values())
+    image = built(tmp_path, WAYS_BACK.format(note="LOOP_BOUND(8); ONE_LOOP();"), "-Os")
+    assert cycles(image) <= report(capsys, image)["cycles"] <= 1.3 * cycles(image)
+
+
+def test_the_note_of_an_unrolled_loop_says_nothing_about_the_one_around_it(tmp_path: Path, capsys) -> None:
+    """At -O2 nothing is left of the inner loop but its line."""
+    row = report(capsys, built(tmp_path, UNROLLED, "-O2"))
+    assert row["cycles"] is None
+    assert "no bound of this loop is known" in row["open"].values()
+
+
+def test_a_loop_that_is_followed_no_further_is_told_so(tmp_path: Path, capsys) -> None:
+    """It has a bound, but its rounds are too many to follow."""
+    text = "volatile unsigned n; int main(void) { for (unsigned i = 0; i < 6000; i++) n = i; return 0; }"
+    row = report(capsys, built(tmp_path, text, "-Os"))
+    assert row["cycles"] is None
+    assert any("followed for 5,000 rounds" in why for why in row["open"].values())
