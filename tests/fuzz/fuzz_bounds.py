@@ -2,7 +2,8 @@
 
 `python tests/fuzz/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
 a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts;
-every second one has what `c_features.py` has, which often leaves no bound. Prints how tight the bounds of `main` are.
+every second one has what `c_features.py` has, which often leaves no bound, and every third is one of `c_notes.py`,
+which only its notes bound. Prints how tight the bounds of `main` are.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from emu.events import NEVER  # noqa: E402
-from tests.fuzz import c_shapes  # noqa: E402
+from tests.fuzz import c_notes, c_shapes  # noqa: E402
 from tests.fuzz.fuzz_compiler import NO_ROOM  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 from tests.toolchain.c_programs import build  # noqa: E402
@@ -32,6 +33,8 @@ LEVELS = ("-Os", "-O0", "-O2", "-O1")
 CYCLES = 400_000
 """Longest run that is measured."""
 HANDLER = "__T1Interrupt"
+NOTED = 1
+"""Of three seeds, the one that makes a program with notes."""
 
 
 @dataclass
@@ -89,7 +92,8 @@ def _follow(machine: emu.Machine, main: int, handler: int | None) -> dict[str, S
 def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]]:
     """One program at one level: what became of it, and what was seen beside what was said."""
     level = LEVELS[seed % len(LEVELS)]
-    files = c_shapes.Program(seed, featured=seed % 2 == 1).files
+    noted = seed % 3 == NOTED
+    files = c_notes.Program(seed).files if noted else c_shapes.Program(seed, featured=seed % 2 == 1).files
     for name, text in files.items():
         (folder / name).write_text(text)
     image = folder / "program.elf"
