@@ -23,9 +23,9 @@ class Names:
             self._symbols.setdefault(plain, []).append(symbol)
 
     def find(self, name: str, note: Note | None = None) -> int | None:
-        """The address of a name, as the file of a note sees it; None if there is none.
+        """The address of a name, as the file of a note sees it; None if there is none, or all its calls are inlined.
 
-        Raises `ToolError` where it is several.
+        Raises `ToolError` where it is several, or static in another file.
         """
         folder, _, plain = name.rpartition("/")
         symbols = self._symbols.get("_" + plain) or self._symbols.get(plain) or []
@@ -35,7 +35,11 @@ class Names:
         elif note is not None:
             own = self.sources.of(note)
             here = [symbol for symbol in symbols if own is not None and self.file(symbol) == own]
-            symbols = here or [s for s in symbols if s.bind is not Bind.LOCAL or not self.file(s)]
+            seen = here or [s for s in symbols if s.bind is not Bind.LOCAL or not self.file(s)]
+            if symbols and not seen and (own is None or not self.sources.declares(own, plain)):
+                where = " or ".join(sorted(map(self._spelled, symbols)))
+                raise ToolError(f"{note.place}: no {name} can be seen from there; there is {where}")
+            symbols = seen
         found = {symbol.value for symbol in symbols}
         if len(found) > 1:
             where = f"{note.place}: " if note is not None else ""

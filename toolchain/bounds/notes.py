@@ -15,6 +15,8 @@ SECTION = ".note.bounds"
 _LINE = re.compile(r"(\w+) (.*)@(.+):(\d+)")
 _FUNCTION = re.compile(r"in (\w+)")
 """Behind a note the compiler tells its function (lower/data.py)."""
+_OF_A_FILE = re.compile(r"(\.\w+) ?/ ?(?=\w)")
+"""`file.c/name`, which formatters of C take for a division."""
 _OPERATORS: dict[type[ast.operator], Callable[[int, int], int]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -95,5 +97,5 @@ def read_notes(image: Executable, values: Mapping[str, int]) -> Notes:
                 match = _LINE.fullmatch(line)
                 if match is None:
                     raise ToolError(f"section {SECTION}: expected `kind text@file:line`, got {line!r}")
-                result.all.append(Note(match[1], match[2].strip(), match[3], int(match[4])))
+                result.all.append(Note(match[1], _OF_A_FILE.sub(r"\1/", match[2].strip()), match[3], int(match[4])))
     return result

@@ -75,6 +75,10 @@ class Sources:
             raise ToolError(f"{note.place}: this may be {' or '.join(files)}: compile them by paths that differ")
         return files[0] if files else None
 
+    def declares(self, file: str, function: str) -> bool:
+        """Whether a file has a function of that name, be it inlined everywhere."""
+        return function in self._begins.get(file, {}).values()
+
     def target(self, note: Note) -> Line | None:
         """The line a note speaks of: its own, if code stands there, else the next of its function that has code.
 

@@ -54,7 +54,7 @@ static HAL_OUTLINE void ring_remove(const sys_pcb *p)
 static HAL_OUTLINE sys_pcb **link_to(const sys_pcb *p)
 {
     sys_pcb **link = &os_blocked;
-    LOOP_BOUND(n); LOOP_SHARE(wake_waiters, n * n / 4); /* those in front that stay, for each that is woken */
+    LOOP_BOUND(n); LOOP_SHARE(event.c / wake_waiters, n * n / 4); /* those in front that stay, for each that is woken */
     while (*link != p) {
         link = &(*link)->next;
     }

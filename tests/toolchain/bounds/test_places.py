@@ -152,15 +152,18 @@ def test_static_functions_of_one_name_are_told_apart(tmp_path: Path, capsys, lto
 
 
 def test_a_static_function_of_another_file_is_named_with_it(tmp_path: Path, capsys) -> None:
-    """`list.c/length` from main.c; without its file it is none that main.c can see."""
+    """`list.c/length` from main.c, however it is spaced; without its file it is none that main.c can see."""
     (tmp_path / "list.c").write_text(PART.format(name="one", count=8, note=""))
-    for note, bounded in (("LOOPS_OF(list.c/length, 8);", True), ("LOOPS_OF(length, 8);", False)):
+    for name in ("list.c/length", "list.c / length", "length"):
         (tmp_path / "main.c").write_text(
-            f"#include <bounds.h>\n{note}\nint walk_one(void); int main(void) {{ return walk_one(); }}"
+            f"#include <bounds.h>\nLOOPS_OF({name}, 8);\nint walk_one(void); int main(void) {{ return walk_one(); }}"
         )
         made = build([tmp_path / "main.c", tmp_path / "list.c"], tmp_path / "a.elf", "-Os", "-g")
         assert made.status == 0, made.messages
-        assert (report(capsys, tmp_path / "a.elf")["cycles"] is not None) == bounded
+        if "/" in name:
+            assert report(capsys, tmp_path / "a.elf")["cycles"] is not None
+    assert main(["bounds", str(tmp_path / "a.elf")]) == 2
+    assert "main.c:2: no length can be seen from there; there is " in capsys.readouterr().err
 
 
 def test_several_ways_back_are_one_loop_only_where_a_note_says_so(tmp_path: Path, capsys) -> None:

@@ -15,7 +15,7 @@ extern void os_resume_yielded(void), os_thread_start(void);
 COMES_BACK(hal_yield, 0);
 COMES_BACK(hal_block, 0);
 RESUMED_BY(os_resume_yielded, resume_preempted, resume_dsp);
-LOOPS_OF(resume_dsp, 0);
+LOOPS_OF(switch.S / resume_dsp, 0);
 STACK_AREA(os_memory, HAL_KERNEL_STACK);
 THREADS(sys_function);
 KNOWN_VALUE(CORCON, 0x0024); /* no DO loop is open; each open one adds 10 bytes and 21 Tcy to a SYS_DSP frame */
