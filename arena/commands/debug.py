@@ -25,9 +25,9 @@ DESCRIPTION: Final = """\
 debug one robot of a trial, the whole world stands with it
 
 A server of the Debug Adapter Protocol on standard input and output, or on a TCP port of this machine (see `emu debug
---help`). Where the robot stops all stand; it steps and goes on with all others, and back by itself: the others follow
-when they are looked at (/world) or something is changed, by running the trial again up to there. Launch arguments:
-stopOnEntry, sourceRoots. With --tui, a prompt here instead (see the same).
+--help`). Where the robot stops all stand; it steps, goes on and goes back with all others (/world shows them): from
+moments that are kept, or by running the trial again up to there. Launch arguments: stopOnEntry, sourceRoots. With
+--tui, a prompt here instead (see the same).
 
 With --out the trial is recorded, to the byte as `arena run --trials 1` does it, and cannot be changed by the debugger;
 a client that disconnects lets it go on to its end, one that terminates ends it without a record."""
