@@ -22,6 +22,7 @@ class Context(Protocol):
 
     symbols: dict[str, AsmSymbol]
     declared: set[str]
+    registers: dict[str, str]
 
     def constant(self, text: str, what: str = "expression") -> int:
         """Value of `text`, which must be a number now."""
@@ -103,6 +104,8 @@ def _condition(word: str, operands: str, context: Context) -> bool:
         if not re.fullmatch(r"[A-Za-z_.$][\w.$]*", name):
             raise ExprError(f"{word} expects one symbol, got {name!r}")
         symbol = context.symbols.get(name)
+        if name in context.registers:
+            return word in (".ifdef", ".ifdecl")
         if word.endswith("decl"):  # mentioned before, be it defined or not
             return (symbol is not None or name in context.declared) == (word == ".ifdecl")
         defined = symbol is not None and (symbol.place is not None or symbol.common is not None)

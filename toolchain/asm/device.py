@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from emu.chips.chip import Chip
+from toolchain.device_header import second_names
 
 _SETTINGS = Path(__file__).resolve().parents[1] / "include" / "dspic_compiler.h"
 """The C header that lists the configuration settings by name; C and assembly share the numbers."""
@@ -26,14 +27,14 @@ _CONFIG_MACRO = """
 
 
 def is_device_file(name: str, chip: Chip) -> bool:
-    """Whether a file of that name is the include file of the device: p30F6014A.inc, or p30fxxxx.inc."""
-    return name.lower() in (f"p{chip.name.lower().removeprefix('dspic')}.inc", "p30fxxxx.inc")
+    """Whether a file of that name is the include file of the device: p30F6014A.inc, p30fxxxx.inc or xc.inc."""
+    return name.lower() in (f"p{chip.name.lower().removeprefix('dspic')}.inc", "p30fxxxx.inc", "xc.inc")
 
 
 def _bits(chip: Chip) -> Iterator[tuple[str, int]]:
     """Bit names and positions; bits of a wide field are numbered: OC1IP0, OC1IP1, OC1IP2."""
     for sfr in chip.sfrs.values():
-        for name, (lsb, width) in sfr.fields.items():
+        for name, (lsb, width) in {**sfr.fields, **second_names(sfr)}.items():
             if width == 1:
                 yield name, lsb
             else:

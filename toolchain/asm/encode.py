@@ -43,7 +43,7 @@ _cache: dict[str, _Known] = {}
 
 def assemble_instruction(asm: Assembler, mnemonic: str, operands: str) -> None:
     """Assemble one instruction at the current location of a code section."""
-    statement = f"{mnemonic} {operands}" if operands else mnemonic
+    statement = f"{mnemonic} {asm.with_registers(operands)}" if operands else mnemonic
     known = _cache.get(statement) or _read(asm, statement)
     parsed = known.parsed
     asm.section.align_word()

@@ -39,6 +39,8 @@ def device_symbols(chip: Chip) -> tuple[str, ...]:
     return (f"__{chip.name.removeprefix('dsPIC')}", *DEVICE_SYMBOLS, *guard)
 
 
+_REGISTER = re.compile(r"[wW](?:1[0-5]|[0-9])")
+_WORD = re.compile(r"'(?:\\.|[^\\])'?|(?<![\w.$])[A-Za-z_.$][\w.$]*")
 _NUMERIC_LABEL = re.compile(r"(\d+)([fb])$")
 
 
@@ -71,6 +73,7 @@ class Assembler:
         self.conditionals = Conditionals()
         self.source.on_end = self._frame_ended
         self.symbols: dict[str, AsmSymbol] = {}
+        self.registers: dict[str, str] = {}  # names that equates gave to working registers
         self.declared: set[str] = set()  # by .extern
         self.macros: dict[str, Macro] = {}
         self.serial = 0  # number of macro expansions so far, `\@`
@@ -179,20 +182,35 @@ class Assembler:
             self.numeric[name] = self.numeric.get(name, 0) + 1
             name = f".LN{name}.{self.numeric[name]}"
         symbol = self.symbol(name)
-        if symbol.place is not None or symbol.common is not None:
+        if symbol.place is not None or symbol.common is not None or name in self.registers:
             raise ExprError(f"symbol {name} is already defined")
         symbol.place = self.section.label()
         self.label = name
 
     def assign(self, name: str, text: str, once: bool = False) -> None:
-        """Set `name` to the value of `text` (.set, .equ, =; `once` for .equiv)."""
-        symbol = self.symbol(name)
-        if isinstance(symbol.place, Label) or (once and symbol.place is not None):
+        """Set `name` to the value of `text` (.set, .equ, =; `once` for .equiv), which may be a working register."""
+        symbol = self.symbols.get(name)
+        known = name in self.registers or (symbol is not None and symbol.place is not None)
+        if (once and known) or (symbol is not None and isinstance(symbol.place, Label)):
             raise ExprError(f"symbol {name} is already defined")
+        register = self.with_registers(text.strip())
+        if _REGISTER.fullmatch(register):
+            if symbol is not None:
+                raise ExprError(f"symbol {name} is already in use: it cannot name a register any more")
+            self.registers[name] = register
+            return
+        self.registers.pop(name, None)
+        symbol = self.symbol(name)
         value = self.evaluate(text)
         if isinstance(value, Value) and value.add is symbol:
             raise ExprError(f"symbol {name} is defined in terms of itself")
         symbol.place = value
+
+    def with_registers(self, operands: str) -> str:
+        """`operands` with working registers in place of the names that equates gave them."""
+        if not self.registers:
+            return operands
+        return _WORD.sub(lambda word: self.registers.get(word[0], word[0]), operands)
 
     def find_file(self, name: str) -> str:
         """Return the path of an included file: beside the including file, then the current folder, then each -I.

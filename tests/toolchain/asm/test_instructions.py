@@ -78,3 +78,27 @@ def test_a_number_known_late_is_checked_like_one_known_early(asm):
     with pytest.raises(ToolError, match="outside"):
         asm("add w0, #late, w1\nlate = 32\n")
     assert asm("call late\nlate = 0x12346\n").words() == [0x022346, 1]
+
+
+def test_equates_may_name_working_registers(asm):
+    """pic30-as: registers are symbols, and DSP sources name what they keep there."""
+    named = asm(
+        ".equ xW, w10\n .set yW, w11\nsumW = W4\n .equ facW, W5\n .equiv sameW, sumW\n .ifdef sumW\n nop\n .endif\n"
+        " mov [xW++], sumW\n mov.b [xW+sumW], [yW+sumW]\n mac sumW*facW, A, [w8]+=2, sumW, [yW]+=2, facW\n"
+        " mul.uu sameW, facW, w0\n mov #'x', xW\n mov [w14-4], w0\n .set xW, 7\n mov #xW, w1\n"
+    )
+    plain = asm(
+        " nop\n mov [w10++], w4\n mov.b [w10+w4], [w11+w4]\n mac w4*w5, A, [w8]+=2, w4, [w11]+=2, w5\n"
+        " mul.uu w4, w5, w0\n mov #'x', w10\n mov [w14-4], w0\n mov #7, w1\n"
+    )
+    assert named.words() == plain.words()
+    assert not {"xW", "sumW", "w10"} & set(named.symbols)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [".equ a, w1\na: nop\n", "a: nop\n .equ a, w1\n", ".equ a, w1\n .equiv a, w2\n", " mov a, w0\n .equ a, w1\n"],
+)
+def test_a_name_is_a_register_s_or_a_symbol_s(asm, text):
+    with pytest.raises(ToolError, match="symbol a is already"):
+        asm(text)

@@ -210,7 +210,8 @@ def test_a_file_may_be_named_with_backslashes(asm, tmp_path):
     (tmp_path / "new" / "bits.bin").write_bytes(b"\x34\x12")
     out = asm('.include "new\\table\\two.inc"\n .incbin ".\\new\\bits.bin"\n', include=[str(tmp_path)])
     assert out.words() == [2, 0x1234]
-    assert asm('.include "..\\inc\\p30F6014A.inc"\n mov #PORTB, w0\n').words()
+    for device in ("..\\inc\\p30F6014A.inc", "xc.inc", "p30fxxxx.inc"):
+        assert asm(f'.include "{device}"\n .word IVRIF, ACKSTAT\n').words() == [7, 15]
 
 
 def test_bss_with_operands_reserves_room(asm):
