@@ -1,7 +1,7 @@
 """`.include "p30F6014A.inc"`: Microchip's device include, made from the chip's tables when no such file is found.
 
-It names register bits and configuration settings and defines the macro `config`; registers themselves stay undefined,
-for the linker to resolve (abi-elf.md §2.6, §3.3).
+It names register bits, bytes of registers and configuration settings and defines the macro `config`; registers
+themselves stay undefined, for the linker to resolve (abi-elf.md §2.6, §3.3).
 """
 
 from __future__ import annotations
@@ -41,12 +41,22 @@ def _bits(chip: Chip) -> Iterator[tuple[str, int]]:
                 yield from ((f"{name}{bit}", lsb + bit) for bit in range(width))
 
 
+def _bytes(chip: Chip) -> Iterator[tuple[str, int]]:
+    """Bytes of registers and their addresses: SRL and SRH of SR, as far as no register has that name."""
+    for sfr in chip.sfrs.values():
+        if sfr.size == 2:
+            for name, address in ((f"{sfr.name}L", sfr.address), (f"{sfr.name}H", sfr.address + 1)):
+                if name not in chip.sfrs:
+                    yield name, address
+
+
 def include_text(chip: Chip) -> str:
     """Return the include file.  A bit name that means different positions in two registers is left out."""
     positions: dict[str, set[int]] = {}
     for name, bit in _bits(chip):
         positions.setdefault(name, set()).add(bit)
     lines = [f"        .equiv {name}, {bits.pop()}" for name, bits in positions.items() if len(bits) == 1]
+    lines += [f"        .equiv {name}, {address:#x}" for name, address in _bytes(chip) if name not in positions]
     lines += ["        .equiv SLEEP_MODE, 0", "        .equiv IDLE_MODE, 1"]
     lines += [f"        .equiv {name}, {value}" for name, value in _SETTING.findall(_SETTINGS.read_text())]
     return "\n".join(lines) + _CONFIG_MACRO

@@ -30,6 +30,7 @@ def _name_and_rest(text: str, directive: str) -> tuple[str, str]:
 
 
 def _enter(asm: Assembler, section: AsmSection) -> None:
+    asm.section.align_word()
     asm.previous, asm.section = asm.section, section
     asm.after_repeat = ""
 

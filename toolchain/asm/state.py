@@ -149,8 +149,8 @@ class Assembler:
         return Value(AsmSymbol(f".LH{self.anonymous}", self.section.dot()))
 
     def evaluate(self, text: str) -> Known:
-        """Value of expression `text` as far as it is known now."""
-        return self.value_of(expr.parse(text))
+        """Value of expression `text` as far as it is known now; a `#` before it means nothing."""
+        return self.value_of(expr.parse(text.strip().removeprefix("#")))
 
     def value_of(self, tree: expr.Tree) -> Known:
         """Value of a parsed expression as far as it is known now."""

@@ -38,6 +38,15 @@ def test_labels_instructions_and_data_of_the_other_kind_begin_a_word(asm):
     assert out.words() == [1, 2, 3, 4, 0, 0x636261, 0, 5]
 
 
+def test_a_section_left_ends_its_word(asm):
+    """pic30-as: alignment is implicit upon transition between sections."""
+    assert asm(".byte 1\n .data\n .byte 2\n .text\n .byte 3\n .section c,code\n .previous\n .pbyte 4\n").words() == [
+        1,
+        3,
+        4,
+    ]
+
+
 def test_dot_among_bytes_of_a_word_is_that_word(asm):
     """pic30-as: the last valid address of the program counter."""
     out = asm(".pword 7\n .byte 1\n .org . + 2\n .pbyte 2,3\n .org . + 4\n nop\n")

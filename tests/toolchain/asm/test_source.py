@@ -219,3 +219,15 @@ def test_bss_with_operands_reserves_room(asm):
     out = asm(".bss a, 3\n .bss b, 8, 16\n nop\n")
     assert [out.symbols[n].value for n in "ab"] == [0, 16]
     assert (out.sections[".bss"].units, out.words()) == (24, [0])
+
+
+def test_the_device_include_names_bytes_of_registers(asm):
+    """Microchip's include files: `bset.b CORCONL, #PSV`; names that registers have stay theirs."""
+    named = asm('.include "xc.inc"\n bset.b CORCONL, #PSV\n mov.b SRH, WREG\n mov #OSCCONL, w1\n clr.b MODCONH\n')
+    plain = asm(" bset.b 0x44, #2\n mov.b 0x43, WREG\n mov #OSCCONL, w1\n clr.b 0x47\n")
+    assert (named.words(), named.relocs()) == (plain.words(), plain.relocs())
+
+
+def test_a_number_sign_before_a_value_means_nothing(asm):
+    """pic30-as takes it in every expression."""
+    assert asm(".equ rate, #0x70\n .word #rate, # 5\n mov #rate, w0\n").words() == [0x70, 5, 0x200700]
