@@ -76,6 +76,9 @@ class Bus:
         self.name: Final = [""] * words
         self.compute: Final[list[ReadHook | None]] = [None] * words
         """Registers that are a function of the cycle and device state; no side effects."""
+        self.refresh: Final[dict[int, Callable[[int], bool]]] = {}
+        """By register: refresh(cycle) has what its rule reads in the record brought up to date, if that is what native
+        code waits for in `cycle`; False if not."""
         self.on_read: Final[list[ReadHook | None]] = [None] * words
         """Registers whose read changes something; returns the word read."""
         self.on_write: Final[list[WriteHook | None]] = [None] * words

@@ -54,9 +54,10 @@ class Port(Peripheral):
         self.lat.ruled(Rule(places, None, write_latch))
         self.port.ruled(Rule(places, read_port, write_port))
 
-    def show(self, stretch: Stretch) -> None:
-        """Something outside shows bytes of the record on pins it drives as a waveform."""
+    def show(self, stretch: Stretch, refresh: Callable[[int], bool]) -> None:
+        """Something outside shows bytes of the record on pins it drives as a waveform; `refresh` is that of `Bus`."""
         self._rule(stretch)
+        self.bus.refresh[self.port.address >> 1] = refresh
 
     def stops_in(self, mode: int) -> bool:
         """Never: latches hold and pins are watched in every power mode."""

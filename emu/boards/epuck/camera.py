@@ -62,7 +62,7 @@ class Camera(Part, I2cDevice):
         self._line_to: Final = self.cell("line_to", "Q")
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
         places = (place_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
-        chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places))
+        chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places), self._refresh)
         self._pixels: PixelSource | None = None
         self._timing: Timing
         self._picture: Picture
@@ -208,6 +208,13 @@ class Camera(Part, I2cDevice):
     def nth_rise(self, mask: int, after: int, count: int) -> int:
         """The data lines clock nothing inside the chip."""
         return NEVER
+
+    def _refresh(self, cycle: int) -> bool:
+        """What `bits` does with a new line, for native code that reads its bytes from the record."""
+        u64 = self._u64
+        if not self._plugged.value or u64[self._line_from.index] <= cycle < u64[self._line_to.index]:
+            return False
+        return self._render(cycle)
 
     def _render(self, cycle: int) -> bool:
         """Put the line that is on the bus in `cycle` into the record. False between lines."""

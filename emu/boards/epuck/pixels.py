@@ -66,17 +66,18 @@ class Readout:
         """Write the bytes of a line in which a source's pixels come `brightness` times as bright to an address of the
         host; how many bytes that were. Raises ValueError if the source has not as many pixels as it was asked for."""
         seen = (source or darkness)(self._rows[line], self._columns, cycle)
-        if seen.shape != (len(self._columns), 3):
-            raise ValueError(f"a line of {len(self._columns)} pixels was asked for, not an array of shape {seen.shape}")
+        count = len(self._columns)
         if brightness != self._brightness:
             self._brightness = brightness
             self._factors[:] = [gain * brightness for gain in self._gains]
         held, at = self._held.get(line, (None, 0))
         if seen is not held:  # who paints every line of a frame into the same array is not asked for its address again
+            if seen.shape != (count, 3):
+                raise ValueError(f"a line of {count} pixels was asked for, not an array of shape {seen.shape}")
             whole = np.ascontiguousarray(seen, dtype=np.uint8)
             at = whole.ctypes.data
             self._held[line] = whole, at
-        return encode(at, len(seen), self._form, self._factors, address)
+        return encode(at, count, self._form, self._factors, address)
 
 
 @cache

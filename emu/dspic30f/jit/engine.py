@@ -245,11 +245,13 @@ class JitEngine:
             word = self._computed[pc] = self._computed_word(pc)
         if not word or self._core.events.deadline <= cycle:
             return False
-        compute = self._core.bus.compute[word]
+        bus = self._core.bus
+        compute, refresh = bus.compute[word], bus.refresh.get(word)
         if compute is None:
             return False
         self._core.events.now = cycle
-        compute()
+        if refresh is None or not refresh(cycle):
+            compute()
         return True
 
     def _computed_word(self, pc: int) -> int:
