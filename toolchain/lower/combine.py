@@ -14,8 +14,8 @@ from __future__ import annotations
 from ..ir.model import Block, ConstInt, Function, GlobalRef, Instr, Value
 from . import induction, magic
 from .cfg import dead_code, loop_depths, predecessors, reverse_postorder, use_counts
+from .compare import COUNTED
 
-COUNTED = ("eq", "ne", "sle", "sgt")  # tests against 0 that the flags of the decrement answer
 REMAINDER = {"udiv": "urem", "sdiv": "srem"}
 
 
@@ -191,6 +191,13 @@ def increments(f: Function) -> None:
                 continue
             others = [u for u in users[id(p)] if u is not i]
             places = {id(home[id(u)]): home[id(u)] for u in others}
+            behind = _last_place(_places(p, others, home, f), b, users[id(i)], dominators)
+            if behind is not None and depths[behind.name] == depths[b.name]:
+                b.instrs.remove(i)
+                behind.instrs.insert(len(behind.instrs) - 1, i)
+                home[id(i)] = behind
+                _to_last_use(behind, i, users)
+                continue
             if any(u.op == "phi" for u in others):
                 continue
             if len(places) == 1 and all(u.op in ("load", "store", "add") for u in others):
@@ -202,6 +209,26 @@ def increments(f: Function) -> None:
                     _to_last_use(target, i, users)
                     continue
             _to_last_use(b, i, users)
+
+
+def _places(p: Instr, users: list[Instr], home: dict[int, Block], f: Function) -> list[Block]:
+    """Blocks that want `p`; a phi wants it at the end of the block it comes from."""
+    blocks = {b.name: b for b in f.blocks}
+    found: dict[str, Block] = {}
+    for u in users:
+        ends = [blocks[n] for v, n in zip(u.args, u.blocks, strict=True) if v is p] if u.op == "phi" else [home[id(u)]]
+        found |= {b.name: b for b in ends}
+    return list(found.values())
+
+
+def _last_place(places: list[Block], b: Block, phis: list[Instr], idom: dict[str, str]) -> Block | None:
+    """The block behind `b` that all others of `places` come before, on every way to the phis that take the step."""
+    last = next((t for t in places if all(_dominates(idom, other, t) for other in places)), None)
+    if last is None or last is b or not _dominates(idom, b, last):
+        return None
+    step = {name for phi in phis for v, name in zip(phi.args, phi.blocks, strict=True)
+            if isinstance(v, Instr) and v.op == "add" and v.args[0] is phi}  # fmt: skip
+    return last if len(phis) == 1 and len(step) == 1 and _named_dominates(idom, last.name, next(iter(step))) else None
 
 
 def _to_last_use(b: Block, i: Instr, users: dict[int, list[Instr]]) -> None:
@@ -245,8 +272,12 @@ def _intersect(idom: dict[str, str], number: dict[str, int], a: str, b: str) -> 
 
 
 def _dominates(idom: dict[str, str], a: Block, b: Block) -> bool:
-    n = b.name
-    while n != a.name:
+    return _named_dominates(idom, a.name, b.name)
+
+
+def _named_dominates(idom: dict[str, str], a: str, b: str) -> bool:
+    n = b
+    while n != a:
         if idom[n] == n:
             return False
         n = idom[n]
@@ -261,10 +292,14 @@ def countdowns(f: Function) -> None:
     for b in f.blocks:
         br = b.instrs[-1]
         c = br.args[0] if br.op == "br" and br.args else None
-        if not isinstance(c, Instr) or c.op != "icmp" or c.pred not in COUNTED or c not in b.instrs:
+        if not isinstance(c, Instr) or c.op != "icmp" or c not in b.instrs:
             continue
         x, zero = c.args
-        if not isinstance(zero, ConstInt) or zero.value > 1 or x.type.bits not in (8, 16) or not isinstance(x, Instr):
+        if not isinstance(zero, ConstInt) or x.type.bits not in (8, 16) or not isinstance(x, Instr):
+            continue
+        if not zero.value and x.op == "add" and x in b.instrs:
+            _to_test(b, x, c, users)
+        if zero.value > 1 or c.pred not in COUNTED[zero.value]:
             continue
         for source in [b, *(blocks[s] for s in br.blocks if preds[s] == [b.name])]:
             step = next((i for i in source.instrs if _is_decrement(i, x)), None)
@@ -273,6 +308,13 @@ def countdowns(f: Function) -> None:
             source.instrs.remove(step)
             b.instrs.insert(len(b.instrs) - 1, step)
             break
+
+
+def _to_test(b: Block, step: Instr, c: Instr, users: dict[int, list[Instr]]) -> None:
+    """Place a step and the test of its result against 0 right before the branch, where the step's flags answer it."""
+    alone = all(u is c or u.op == "phi" or u not in b.instrs for u in users.get(id(step), ()))
+    if alone and users.get(id(c)) == [b.instrs[-1]]:
+        b.instrs = [*(i for i in b.instrs[:-1] if i is not step and i is not c), step, c, b.instrs[-1]]
 
 
 def _is_decrement(i: Instr, x: Value) -> bool:

@@ -20,7 +20,10 @@ ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "
 
 # Tests of x against 0 by the flags of x - 1: DEC borrows exactly for 0, and N^OV is the sign of the true difference.
 # Against 1 they say what they say of the result.
-COUNTED = ({"eq": "nc", "ne": "c", "sle": "lt", "sgt": "ge"}, {"eq": "z", "ne": "nz", "sle": "le", "sgt": "gt"})
+COUNTED = (
+    {"eq": "nc", "ne": "c", "sle": "lt", "sgt": "ge"},
+    {"eq": "z", "ne": "nz", "sle": "le", "sgt": "gt", "ule": "leu", "ugt": "gtu"},
+)
 
 
 def condition(s: Selector, c: Value, user: Instr) -> str:
@@ -44,9 +47,9 @@ def condition(s: Selector, c: Value, user: Instr) -> str:
 def _countdown(s: Selector, c: Instr) -> Instr | None:
     """y = x - 1 of this block, wanted only after it, for a test of x against 0 or 1."""
     x, against = c.args
-    if c.pred not in COUNTED[0] or not isinstance(against, ConstInt) or against.value > 1 or c.type is not I1:
+    if not isinstance(against, ConstInt) or against.value > 1 or c.pred not in COUNTED[against.value]:
         return None
-    if x.type.bits not in (8, 16):
+    if x.type.bits not in (8, 16) or c.type is not I1:
         return None
     for y in s.users.get(id(x), ()):
         if y.op == "add" and isinstance(y.args[1], ConstInt) and y.args[1].signed == -1 and s.same_block(y):

@@ -175,6 +175,8 @@ def _make_pointer(loop: Loop, counter: Counter, scale: int, sums: list[tuple[Ins
     home = next(block for block in loop.body if counter.step in block.instrs)
     stride = counter.amount * scale
     early = next((i for i, _, ahead in sums if stride < 0 and ahead == stride and i in home.instrs), None)
+    if early is not None and any(i is not early and _follows(loop, home, early, i) for i, _, _ in sums):
+        early = None  # the pointer before the step is still wanted behind it, which would cost a copy
     if early is not None:  # walking down, the stepped pointer is the one wanted: addressing gets [--Wn]
         home.instrs.insert(home.instrs.index(early), step)
     else:
@@ -187,6 +189,14 @@ def _make_pointer(loop: Loop, counter: Counter, scale: int, sums: list[tuple[Ins
             i.args = [pointer, const(I16, ahead)]
         else:
             _replace(loop.f, i, pointer)
+
+
+def _follows(loop: Loop, home: Block, early: Instr, i: Instr) -> bool:
+    """Whether an address is wanted behind another one of block `home`."""
+    behind = home.instrs[home.instrs.index(early) :]
+    return any(u in behind for u in _users(loop.f, i)) or any(
+        u in b.instrs for u in _users(loop.f, i) for b in loop.body if b is not home
+    )
 
 
 def _replace(f: Function, old: Instr, new: Instr) -> None:

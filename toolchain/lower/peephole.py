@@ -224,7 +224,7 @@ def _fold_after(b: MBlock, at: int, r: int, amount: int) -> bool:
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
             return _modify(mi, r, amount, "++" if amount > 0 else "--")
-        if mi.info.fixed or mi.pred:
+        if mi.info.fixed and mi.op not in SKIPS:
             return False
     return False
 
@@ -235,7 +235,7 @@ def _fold_before(b: MBlock, at: int, r: int, amount: int) -> bool:
         mi = b.insts[k]
         if r in mi.uses() or r in mi.defs():
             return _modify(mi, r, amount, "+" if amount > 0 else "-")
-        if mi.info.fixed or mi.pred:
+        if mi.info.fixed and mi.op not in SKIPS:
             return False
     return False
 

@@ -181,6 +181,45 @@ def test_a_loop_that_counts_to_n_needs_no_limit_of_its_own() -> None:
     assert lines[3].startswith("bra ge,")
 
 
+LOOPS = [
+    (
+        "a step behind skips is made by the load before them",
+        "2",
+        """void f(int *a, int n, int *lo, int *hi){ int l = a[0], h = a[0];
+           for (int i = 1; i < n; i++) { if (a[i] < l) l = a[i]; if (a[i] > h) h = a[i]; } *lo = l; *hi = h; }""",
+        ["mov [w6++],w1", "cpsgt w1,w5", "mov w1,w5", "cpslt w1,w4", "mov w1,w4", "dec w7,w7", "bra nz"],
+    ),
+    (
+        "DEC answers whether more than one was left",
+        "2",
+        "void f(int *d, const int *s, int n){ while (n-- > 0) d[n] = s[n]; }",
+        ["mov [--w5],w6", "mov w6,[--w7]", "dec w2,w2", "bra gtu"],
+    ),
+    (
+        "steps stand where the old value is wanted last, in whichever block of the loop",
+        "2",
+        """void f(int *a, int n){ for (int i = 1; i < n; i++) { int x = a[i], j = i - 1;
+           while (j >= 0 && a[j] > x) { a[j + 1] = a[j]; j--; } a[j + 1] = x; } }""",
+        ["mov [w7-2],w5", "cp w5,w6", "bra le", "mov w5,[w7--]", "dec w4,w4", "bra gt"],
+    ),
+    (
+        "the counter's step is the last of a loop, so that its flags are those of the branch",
+        "2",
+        """struct s { int v[10]; };
+           void f(struct s *d, const struct s *s, int n){ for (int i = 0; i < n; i++) d[i] = s[i]; }""",
+        ["add w1,#20,w1", "add w0,#20,w0", "dec w2,w2", "bra nz"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "level", "source", "expected"), LOOPS, ids=[i[0] for i in LOOPS])
+def test_a_loop_keeps_no_copy_of_what_it_steps(name: str, level: str, source: str, expected: list[str]) -> None:
+    """Inner loops by instruction, targets of branches left out."""
+    lines = [line.split(",.L")[0] for line in body(assembly(source, level), "f")]
+    places = range(len(lines) - len(expected) + 1)
+    assert any(lines[k : k + len(expected)] == expected for k in places), lines
+
+
 def test_division_by_a_constant_multiplies_where_speed_counts() -> None:
     """isa.md §6.7: DIV takes 19 cycles; at -Os its two words stay."""
     source = "unsigned f(unsigned a){ return a / 10; } int g(int a){ return a % 7; }"
