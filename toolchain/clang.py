@@ -48,8 +48,8 @@ LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "
 WARNINGS_OF_C = ["implicit-function-declaration", "implicit-int", "int-conversion", "incompatible-pointer-types",
                  "incompatible-function-pointer-types", "return-mismatch"]  # fmt: skip
 # Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
-ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp2", "exp2f", "exp10", "ldexp",
-                    "ldexpf", "memccpy", "strndup", "log1p", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
+ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp10", "ldexp",
+                    "ldexpf", "memccpy", "strndup", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
 # abi-elf.md §2.9 predefined macros; __XC16__ and __C30__ stay undefined, they select Microchip's attribute spellings.
 PREDEFINED = ["__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_5VOLTS__"]  # beside the part's own
 # Freestanding C++: no exceptions, no run-time types, no threads that could meet in a guard, nothing to do at the end.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* C11 7.12, the functions listed; double is 64-bit IEEE, float 32-bit. There is no errno reporting. */
+/* C11 7.12 without erf, erfc, lgamma and tgamma; double is 64-bit IEEE, float 32-bit. There is no errno reporting. */
 #ifndef MATH_H
 #define MATH_H
 
@@ -68,6 +68,33 @@ double log(double x);
 double log10(double x);
 double pow(double x, double y);
 double hypot(double x, double y);
+double sinh(double x);
+double cosh(double x);
+double tanh(double x);
+double asinh(double x);
+double acosh(double x);
+double atanh(double x);
+double exp2(double x);
+double expm1(double x);
+double log2(double x);
+double log1p(double x);
+double cbrt(double x);
+double rint(double x);
+double nearbyint(double x);
+long lrint(double x);
+long long llrint(double x);
+long lround(double x);
+long long llround(double x);
+double logb(double x);
+double scalbn(double x, int exponent);
+double scalbln(double x, long exponent);
+double nextafter(double x, double towards);
+double nexttoward(double x, long double towards);
+double remainder(double x, double y);
+double remquo(double x, double y, int *quotient); /* the quotient's three lowest bits and its sign */
+double fdim(double x, double y);
+double fma(double x, double y, double z);
+double nan(const char *payload);
 
 float fabsf(float x);
 float floorf(float x);
@@ -95,6 +122,89 @@ float logf(float x);
 float log10f(float x);
 float powf(float x, float y);
 float hypotf(float x, float y);
+float sinhf(float x);
+float coshf(float x);
+float tanhf(float x);
+float asinhf(float x);
+float acoshf(float x);
+float atanhf(float x);
+float exp2f(float x);
+float expm1f(float x);
+float log2f(float x);
+float log1pf(float x);
+float cbrtf(float x);
+float rintf(float x);
+float nearbyintf(float x);
+long lrintf(float x);
+long long llrintf(float x);
+long lroundf(float x);
+long long llroundf(float x);
+float logbf(float x);
+float scalbnf(float x, int exponent);
+float scalblnf(float x, long exponent);
+float nextafterf(float x, float towards);
+float nexttowardf(float x, long double towards);
+float remainderf(float x, float y);
+float remquof(float x, float y, int *quotient); /* the quotient's three lowest bits and its sign */
+float fdimf(float x, float y);
+float fmaf(float x, float y, float z);
+float nanf(const char *payload);
+
+/* long double is double (abi-elf.md §1.1), and so are its functions. */
+#define MATH_LONG(result, name, ...) result name##l(__VA_ARGS__) __asm__(#name)
+MATH_LONG(long double, acos, long double x);
+MATH_LONG(long double, asin, long double x);
+MATH_LONG(long double, atan, long double x);
+MATH_LONG(long double, ceil, long double x);
+MATH_LONG(long double, cos, long double x);
+MATH_LONG(long double, cosh, long double x);
+MATH_LONG(long double, sinh, long double x);
+MATH_LONG(long double, tanh, long double x);
+MATH_LONG(long double, acosh, long double x);
+MATH_LONG(long double, asinh, long double x);
+MATH_LONG(long double, atanh, long double x);
+MATH_LONG(long double, exp, long double x);
+MATH_LONG(long double, exp2, long double x);
+MATH_LONG(long double, expm1, long double x);
+MATH_LONG(long double, fabs, long double x);
+MATH_LONG(long double, floor, long double x);
+MATH_LONG(long double, log, long double x);
+MATH_LONG(long double, log10, long double x);
+MATH_LONG(long double, log1p, long double x);
+MATH_LONG(long double, log2, long double x);
+MATH_LONG(long double, logb, long double x);
+MATH_LONG(long double, cbrt, long double x);
+MATH_LONG(long double, nearbyint, long double x);
+MATH_LONG(long double, rint, long double x);
+MATH_LONG(long double, round, long double x);
+MATH_LONG(long double, sin, long double x);
+MATH_LONG(long double, sqrt, long double x);
+MATH_LONG(long double, tan, long double x);
+MATH_LONG(long double, trunc, long double x);
+MATH_LONG(long double, atan2, long double x, long double y);
+MATH_LONG(long double, copysign, long double x, long double y);
+MATH_LONG(long double, fdim, long double x, long double y);
+MATH_LONG(long double, fmax, long double x, long double y);
+MATH_LONG(long double, fmin, long double x, long double y);
+MATH_LONG(long double, fmod, long double x, long double y);
+MATH_LONG(long double, hypot, long double x, long double y);
+MATH_LONG(long double, nextafter, long double x, long double y);
+MATH_LONG(long double, pow, long double x, long double y);
+MATH_LONG(long double, remainder, long double x, long double y);
+MATH_LONG(long double, nexttoward, long double x, long double y);
+MATH_LONG(long double, fma, long double x, long double y, long double z);
+MATH_LONG(long double, frexp, long double x, int *exponent);
+MATH_LONG(long double, ldexp, long double x, int exponent);
+MATH_LONG(long double, modf, long double x, long double *whole);
+MATH_LONG(long double, scalbn, long double x, int exponent);
+MATH_LONG(long double, scalbln, long double x, long exponent);
+MATH_LONG(long double, remquo, long double x, long double y, int *quotient);
+MATH_LONG(long double, nan, const char *payload);
+MATH_LONG(long, lrint, long double x);
+MATH_LONG(long long, llrint, long double x);
+MATH_LONG(long, lround, long double x);
+MATH_LONG(long long, llround, long double x);
+#undef MATH_LONG
 
 #ifdef __cplusplus
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Input and output (C11 7.21). Conversions of printf: d i u x X o c s p % with flags - 0 + space #, width, precision, *, and
+/* Input and output (C11 7.21). Conversions of printf: d i u x X o c s p n % with flags - 0 + space #, width, precision, *, and
  * lengths hh h l ll z t j; f F e E g G are there when a program that uses them calls the _float variants.
  * There are no files: stdout and stderr both go to the hook __putchar, stdin is the hook __getchar, and fopen fails. */
 #ifndef STDIO_H

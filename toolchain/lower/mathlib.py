@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 SAME_NAME = {
     "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "exp2", "log", "log2",
     "log10", "pow", "floor", "ceil", "trunc", "rint", "nearbyint", "round", "roundeven", "fma", "ldexp",
+    "lrint", "llrint", "lround", "llround",
 }  # fmt: skip
 RENAMED = {"minnum": "fmin", "maxnum": "fmax", "minimumnum": "fmin", "maximumnum": "fmax"}
 TWO_RESULTS = {"modf", "frexp"}  # the second one through a pointer

@@ -181,8 +181,31 @@ conversion:
         sub     w1,w2,w2
         cp      w2,#2                   ; e f g
         bra     leu,floating
-        lsr     w13,#8,w1               ; anything else stands for itself
-        rcall   put
+        lsr     w13,#8,w1
+        mov     #'n',w2
+        cp      w1,w2
+        bra     z,count
+        rcall   put                     ; anything else stands for itself
+        bra     next
+
+count:  dec2    w10,w10                 ; how many characters so far, in as many words as the length says
+        mov     [w10],w3
+        mov     [w8+6],w0
+        btsc    w13,#BYTE
+        bra     1f
+        mov     w0,[w3++]
+        btsc    w13,#WIDE
+        bra     2f
+        clr     w1
+        btsc    w13,#LONG
+        mov     w1,[w3]
+        bra     next
+1:      mov.b   w0,[w3]
+        bra     next
+2:      clr     w1
+        mov     w1,[w3++]
+        mov     w1,[w3++]
+        mov     w1,[w3]
         bra     next
 
 pointer:

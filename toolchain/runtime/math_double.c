@@ -144,6 +144,12 @@ static const double exponential[] = {0.5,
                                      2.5105337244665209e-08,
                                      2.0914772832237191e-09};
 
+/* exp(x) - 1 for |x| <= (ln 2) / 2. */
+static double less_one(double x)
+{
+    return x + x * x * polynomial(exponential, 11, x);
+}
+
 /* exp(x + tail) for a tail below one unit in the last place of x. */
 static double exponential_of(double x, double tail)
 {
@@ -155,12 +161,37 @@ static double exponential_of(double x, double tail)
         return 0;
     double twos = round(x * ONE_OVER_LN2);
     double rest = ((x - twos * LN2_1) - twos * LN2_2) + tail;
-    return ldexp(1 + (rest + rest * rest * polynomial(exponential, 11, rest)), (int)twos);
+    return ldexp(1 + less_one(rest), (int)twos);
 }
 
 double exp(double x)
 {
     return exponential_of(x, 0);
+}
+
+double expm1(double x)
+{
+    if (isnan(x) || x == 0) /* -0 stays */
+        return x;
+    if (x > 40)
+        return exp(x); /* the 1 is below half a unit in the last place */
+    if (x < -40)
+        return -1;
+    double twos = round(x * ONE_OVER_LN2);
+    double value = less_one((x - twos * LN2_1) - twos * LN2_2);
+    return twos == 0 ? value : ldexp(value, (int)twos) + (ldexp(1, (int)twos) - 1);
+}
+
+double exp2(double x)
+{
+    if (isnan(x))
+        return x;
+    if (x >= 1024)
+        return HUGE_VAL;
+    if (x < -1100)
+        return 0;
+    double twos = round(x);
+    return ldexp(1 + less_one((x - twos) * M_LN2), (int)twos);
 }
 
 static const double logarithm[] = {0.66666666666666696, 0.39999999999899311, 0.28571428626063622, 0.22222211120421034,
@@ -207,6 +238,29 @@ double log(double x)
 double log10(double x)
 {
     return log(x) * 0.43429448190325182765;
+}
+
+double log2(double x)
+{
+    double tail;
+    int twos;
+    if (!(x > 0) || isinf(x))
+        return log(x);
+    double m = frexp(x, &twos);
+    if (m < M_SQRT2 / 2) {
+        m *= 2;
+        twos--;
+    }
+    return twos + logarithm_of(m, &tail) * ONE_OVER_LN2; /* the whole part is exact */
+}
+
+/* 1 + x loses low bits of x; what log makes of the rest is right in proportion to it. */
+double log1p(double x)
+{
+    volatile double sum = 1 + x;
+    if (sum == 1 || sum == HUGE_VAL) /* -0 stays */
+        return x;
+    return sum > 0 ? log(sum) * x / (sum - 1) : log(sum);
 }
 
 /* 2 for even integers, 1 for odd ones, 0 for other numbers. */

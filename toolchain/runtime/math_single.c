@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* math.h in single precision. Elementary functions have polynomials of their own, so that a program that uses only
- * float links no double arithmetic; powf and fmodf go through double. Errors stay below 4 units in the last place for
+ * float links no double arithmetic; powf, fmodf, exp2f, log2f, expm1f and log1pf go through double. Errors stay below 4 units in the last place for
  * |x| < 5000 in the trigonometric functions. */
 #include "softfloat.h"
 
@@ -291,6 +291,26 @@ float logf(float x)
 float log10f(float x)
 {
     return logf(x) * 0.434294482f;
+}
+
+float exp2f(float x)
+{
+    return (float)exp2(x);
+}
+
+float expm1f(float x)
+{
+    return (float)expm1(x);
+}
+
+float log2f(float x)
+{
+    return (float)log2(x);
+}
+
+float log1pf(float x)
+{
+    return (float)log1p(x);
 }
 
 float powf(float x, float y)

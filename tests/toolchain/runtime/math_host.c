@@ -9,11 +9,16 @@
 #define FLOAT_NAME(function) rt_##function##f
 #define DECLARE1(f) double rt_##f(double); float FLOAT_NAME(f)(float);
 #define DECLARE2(f) double rt_##f(double, double); float FLOAT_NAME(f)(float, float);
-#define ONE(X) X(sin) X(cos) X(tan) X(asin) X(acos) X(atan) X(exp) X(log) X(log10) X(sqrt) X(floor) X(ceil) X(trunc) X(round) X(fabs)
-#define TWO(X) X(atan2) X(pow) X(fmod) X(hypot) X(fmin) X(fmax) X(copysign)
+#define ONE(X) X(sin) X(cos) X(tan) X(asin) X(acos) X(atan) X(exp) X(log) X(log10) X(sqrt) X(floor) X(ceil) X(trunc) X(round) X(fabs) \
+    X(sinh) X(cosh) X(tanh) X(asinh) X(acosh) X(atanh) X(exp2) X(expm1) X(log2) X(log1p) X(cbrt) X(rint) X(nearbyint) X(logb)
+#define TWO(X) X(atan2) X(pow) X(fmod) X(hypot) X(fmin) X(fmax) X(copysign) X(nextafter) X(remainder) X(fdim)
 ONE(DECLARE1)
 TWO(DECLARE2)
 double rt_frexp(double, int *), rt_ldexp(double, int), rt_modf(double, double *);
+double rt_fma(double, double, double), rt_scalbn(double, int), rt_scalbln(double, long), rt_remquo(double, double, int *);
+float rt_fmaf(float, float, float), rt_scalblnf(float, long), rt_remquof(float, float, int *), rt_nexttowardf(float, long double);
+long rt_lrint(double), rt_lround(double), rt_lrintf(float), rt_lroundf(float);
+long long rt_llrint(double), rt_llround(double), rt_llrintf(float), rt_llroundf(float);
 int rt_ilogb(double), rt_ilogbf(float);
 float rt_frexpf(float, int *), rt_ldexpf(float, int), rt_modff(float, float *);
 
@@ -90,6 +95,40 @@ static double sample(long i, int low, int high)
     }                                                                                                               \
     report(#f "f", boundf);
 
+/* What has results of several kinds or three arguments: all exactly as the host's. */
+static void check_exact(long n)
+{
+    for (long i = 0; i < n; i++) {
+        double x = sample(i, -10, 40), y = sample(i * 3 + 1, -10, 20), z = sample(i * 5 + 2, -60, 60);
+        int got, want;
+        measure(x, y, rt_remquo(x, y, &got), remquo(x, y, &want), 53, -1021);
+        if (isfinite(x) && !isnan(y) && y != 0)
+            failed |= (got & 7) != (want & 7);
+        measure(x, y, rt_fma(x, y, z), fma(x, y, z), 53, -1021);
+        double near = fma(-x, y, sample(i, -1, 1)); /* cancels most of the product */
+        measure(x, y, rt_fma(x, y, near), fma(x, y, near), 53, -1021);
+        double tiny = sample(i * 11, -1022, -400), small = sample(i * 13, -620, -400);
+        measure(tiny, small, rt_fma(tiny, small, small), fma(tiny, small, small), 53, -1021);
+        measure(tiny, small, rt_fma(small, small, tiny), fma(small, small, tiny), 53, -1021);
+        float a = (float)x, b = (float)y, c = (float)z;
+        measure(a, b, rt_fmaf(a, b, c), fmaf(a, b, c), 24, -125);
+        measure(a, b, rt_remquof(a, b, &got), remquof(a, b, &want), 24, -125);
+        measure(a, b, rt_nexttowardf(a, (long double)y), nexttowardf(a, (long double)y), 24, -125);
+        measure(a, b, rt_nexttowardf(a, (long double)-y), nexttowardf(a, (long double)-y), 24, -125);
+        measure(x, 0, rt_scalbn(x, (int)(i % 2200) - 1100), scalbn(x, (int)(i % 2200) - 1100), 53, -1021);
+        measure(x, 0, rt_scalbln(x, i * 1000003), scalbln(x, i * 1000003), 53, -1021);
+        measure(a, 0, rt_scalblnf(a, -i), scalblnf(a, -i), 24, -125);
+        if (fabs(x) < 1e9)
+            failed |= rt_lrint(x) != lrint(x) || rt_lround(x) != lround(x) || rt_lrintf(a) != lrintf(a) ||
+                      rt_lroundf(a) != lroundf(a) || rt_llrint(x) != llrint(x) || rt_llround(x) != llround(x) ||
+                      rt_llrintf(a) != llrintf(a) || rt_llroundf(a) != llroundf(a);
+    }
+    report("remquo fma nexttoward scalbn lrint lround", 0);
+}
+
+/* The host's own is further from the root than the bound. */
+#define cbrt(x) (double)cbrtl(x)
+
 int main(int argc, char **argv)
 {
     long n = argc > 1 ? atol(argv[1]) : 1000000;
@@ -115,6 +154,24 @@ int main(int argc, char **argv)
     CHECK2(fmin, -60, 60, 0, 0)
     CHECK2(fmax, -60, 60, 0, 0)
     CHECK2(copysign, -60, 60, 0, 0)
+    CHECK1(sinh, -60, 11, 4, 1)
+    CHECK1(cosh, -60, 11, 4, 1)
+    CHECK1(tanh, -60, 8, 4, 1)
+    CHECK1(asinh, -60, 200, 4, 1)
+    CHECK1(acosh, -1, 200, 4, 1)
+    CHECK1(atanh, -60, 1, 4, 1)
+    CHECK1(exp2, -60, 12, 2, 1)
+    CHECK1(expm1, -60, 10, 3, 1)
+    CHECK1(log2, -1022, 1023, 3, 1)
+    CHECK1(log1p, -60, 200, 4, 1)
+    CHECK1(cbrt, -1022, 1023, 1, 1)
+    CHECK1(rint, -60, 60, 0, 0)
+    CHECK1(nearbyint, -60, 60, 0, 0)
+    CHECK1(logb, -1022, 1023, 0, 0)
+    CHECK2(nextafter, -3, 3, 0, HUGE_VAL) /* the neighbours among doubles are not those among floats */
+    CHECK2(remainder, -20, 20, 0, 0)
+    CHECK2(fdim, -60, 60, 0, 0)
+    check_exact(n);
     for (long i = 0; i < n; i++) {
         int exponent = (int)(random64() % 4400) - 2200, got, want;
         double x = sample(i, -1022, 1023), whole, rt_whole;

@@ -160,3 +160,28 @@ def test_special_floating_values(tmp_path: Path) -> None:
         "inf", "-INF", "  nan|", "-0.000000", "     inf", "1e+300", "1e-300", "1.798e+308", "10000000000000000000000.0",
         "1e-05", "1E-10", "100000", "1e+06", "1.00000",
     ]  # fmt: skip
+
+
+COUNT_PROGRAM = r"""
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+static struct { signed char a, guard; int b; long c; long long d; intmax_t e; int after; } v;
+int main(void)
+{
+    char to[8];
+    memset(&v, 0x5A, sizeof v);
+    if (snprintf(to, sizeof to, "%n12%hhn345%hn%%6789%ln%d%lln%jn", &v.after, &v.a, &v.b, &v.c, -12345, &v.d, &v.e) != 16)
+        return 1;
+    if (v.after != 0 || v.a != 2 || v.guard != 0x5A || v.b != 5)
+        return 2;
+    return v.c == 10 && v.d == 16 && v.e == 16 && !strcmp(to, "12345%6") ? 0 : 3;
+}
+"""
+
+
+def test_characters_are_counted(tmp_path: Path) -> None:
+    """C11 7.21.6.1p8: %n stores as many bytes as its length says, and counts what did not fit, too."""
+    (tmp_path / "a.c").write_text(COUNT_PROGRAM)
+    assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall").status == 0
+    assert run(tmp_path / "a.elf", engine="interp").status == 0

@@ -69,7 +69,7 @@ def test_the_comparison_notices_a_wrong_rounding(tmp_path: Path) -> None:
 def test_math_functions_stay_within_their_error_bounds(tmp_path: Path) -> None:
     """C11 7.12; exact functions exactly, elementary ones within the bounds stated in math_host.c."""
     objects = []
-    for name in ("round", "double", "single"):
+    for name in ("round", "exact", "double", "hyperbolic", "single"):
         objects.append(tmp_path / f"math_{name}.o")
         compile_host(
             objects[-1], "-include", HERE / "math_prefix.h", "-isystem", INCLUDE, "-c", RUNTIME / f"math_{name}.c"
