@@ -46,6 +46,7 @@ long double strtold(const char *__restrict text, char **__restrict end);
 
 void *malloc(size_t size);
 void *calloc(size_t count, size_t size);
+void *aligned_alloc(size_t alignment, size_t size); /* NULL unless the alignment is a power of two */
 void *realloc(void *memory, size_t size);
 void free(void *memory);
 

@@ -104,4 +104,5 @@ PARAM_WORDS = {
     "noundef", "signext", "zeroext", "inreg", "noalias", "nocapture", "nofree", "nest", "returned", "nonnull",
     "readonly",
     "readnone", "writeonly", "immarg", "swiftself", "noext", "writable", "dead_on_unwind", "allocptr", "dead_on_return",
+    "allocalign",
 }  # fmt: skip

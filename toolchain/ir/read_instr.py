@@ -10,6 +10,7 @@ from .model import (
     PTR,
     VOID,
     ConstInt,
+    GlobalRef,
     Instr,
     MetaRef,
     Type,
@@ -300,12 +301,22 @@ class InstrReader(ValueReader):
         while c.peek() not in ("", ","):
             word = c.next()
             if word == "[":
-                raise c.error("operand bundle on a call")
+                self._assumption(c, callee)
+                continue
             if c.peek() == "(":
                 c.skip_parens()
             flags.add(word)
         i.extra["flags"] = flags
         return i
+
+    def _assumption(self, c: Cursor, callee: Value) -> None:
+        """Operand bundles of llvm.assume, such as `"align"(ptr %p, i16 8)`, are hints; no others are known."""
+        if not (isinstance(callee, GlobalRef) and callee.name == "llvm.assume"):
+            raise c.error("operand bundle on a call")
+        while not c.accept("]"):
+            c.next()
+            c.skip_parens()
+            c.accept(",")
 
     def _meta_arg(self, c: Cursor) -> Value:
         if c.peek().startswith("!"):

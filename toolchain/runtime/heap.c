@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* malloc, calloc, realloc, free (C11 7.22.3) in the linker's heap (-Wl,--heap=BYTES; without it malloc fails).
+/* malloc, calloc, aligned_alloc, realloc, free (C11 7.22.3) in the linker's heap (-Wl,--heap=BYTES; without it malloc fails).
  * First fit over one list of blocks in address order; neighbours join when a block is freed. 2 bytes per block. */
 #include <stdint.h>
 #include <stdlib.h>
@@ -66,6 +66,24 @@ void *calloc(size_t count, size_t size)
         return NULL;
     void *memory = malloc((size_t)bytes);
     return memory ? memset(memory, 0, (size_t)bytes) : NULL;
+}
+
+/* The part in front of the first aligned place that leaves room for a block becomes one, and is free. */
+void *aligned_alloc(size_t alignment, size_t size)
+{
+    if (!alignment || alignment & (alignment - 1) || alignment > LARGEST / 2 || size > LARGEST / 2)
+        return NULL;
+    if (alignment <= HEADER) /* what every block is */
+        return malloc(size);
+    char *memory = malloc(size + alignment + 2 * HEADER);
+    if (!memory || !((uintptr_t)memory & (alignment - 1)))
+        return memory;
+    uintptr_t least = (uintptr_t)memory + 2 * HEADER;
+    char *aligned = memory + 2 * HEADER + (-least & (alignment - 1));
+    header_t front = (header_t)(aligned - memory);
+    *at(aligned - HEADER) = *at(memory - HEADER) - front; /* still in use */
+    *at(memory - HEADER) = front;
+    return aligned;
 }
 
 void *realloc(void *memory, size_t size)

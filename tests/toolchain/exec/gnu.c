@@ -47,3 +47,5 @@ static volatile int copies;
 void *memcpy(void *restrict to, const void *restrict from, size_t n) { char *t = to; const char *f = from; copies++; while (n--) *t++ = *f++; return to; }
 TEST(own_memcpy_beside_memmove, "C11 7.24.2.2") { static char s[] = "abcdef"; copies = 0; memmove(s, s + 1, U(5)); CHECK(copies == 0 && strcmp(s, "bcdeff") == 0); memcpy(s, "xy", U(2)); CHECK(copies == 1 && s[0] == 'x'); }
 TEST(printing_to_streams, "C11 7.21.6.1") { CHECK(fprintf(stdout, "%s", "") == 0 && fputs("", stderr) == 0 && fflush(stdout) == 0); }
+static NOINLINE int first_of(const int *p) { const int *q = __builtin_assume_aligned(p, 8); __builtin_assume(q[1] > 3); return q[0]; }
+TEST(assumed_alignment, "GCC 6.59") { static const int pair[] __attribute__((aligned(8))) = {7, 9}; CHECK(first_of(pair) == 7 && __builtin_assume_aligned(pair + I(1), 8, 2) == pair + 1); }

@@ -144,3 +144,24 @@ def test_violations_of_well_formedness_are_reported() -> None:
     assert any("not defined" in what for what in check(f))
     f.blocks[0].instrs.clear()
     assert any("terminator" in what for what in check(f))
+
+
+ASSUMPTION = """
+declare void @llvm.assume(i1)
+declare ptr @g(i16 allocalign, i16)
+define ptr @f(ptr %p, i16 %n) {{
+  call void @{callee}(i1 true) [ "align"(ptr %p, i16 8), "nonnull"(ptr %p) ]
+  %q = call ptr @g(i16 allocalign %n, i16 4)
+  ret ptr %q
+}}
+"""
+
+
+def test_assumptions_are_hints_and_other_bundles_are_refused() -> None:
+    """Operand bundles: those of llvm.assume say what may be relied on, any other would change what a call means."""
+    module = read_module(ASSUMPTION.format(callee="llvm.assume"))
+    f = module.functions["f"]
+    assert check(f) == []
+    assert [i.op for i in f.blocks[0].instrs] == ["call", "call", "ret"]
+    with pytest.raises(UnsupportedError, match="operand bundle"):
+        read_module(ASSUMPTION.format(callee="f2"))

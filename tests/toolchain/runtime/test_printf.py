@@ -171,7 +171,9 @@ int main(void)
 {
     char to[8];
     memset(&v, 0x5A, sizeof v);
-    if (snprintf(to, sizeof to, "%n12%hhn345%hn%%6789%ln%d%lln%jn", &v.after, &v.a, &v.b, &v.c, -12345, &v.d, &v.e) != 16)
+    int written = snprintf(to, sizeof to, "%n12%hhn345%hn%%6789%ln%d%lln%jn", &v.after, &v.a, &v.b, &v.c, -12345,
+                           &v.d, &v.e);
+    if (written != 16)
         return 1;
     if (v.after != 0 || v.a != 2 || v.guard != 0x5A || v.b != 5)
         return 2;
