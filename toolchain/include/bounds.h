@@ -9,7 +9,8 @@
 #define _BOUNDS_H_
 
 /* A note "in front of" something is of one line: its own, if code stands there, else the next of its function that has
- * code. Functions and variables are those that its file can see; `file.c/name` is a static one of another file.
+ * code. Functions and variables are those that its file can see; `file.c/name` is a static one of another file, without
+ * which naming that is an error.
  *
  * In front of a loop, or of the `while` that ends one: it goes round at most `rounds` times. It counts for the innermost
  * loop of the machine code with an instruction of that line. Where one loop of the source has become two, one within the

@@ -14,7 +14,7 @@ HAL_ASSUME(kernel_stack_is_the_ports, SYS_KERNEL_STACK == HAL_KERNEL_STACK);
 extern void os_resume_yielded(void), os_thread_start(void);
 COMES_BACK(hal_yield, 0);
 COMES_BACK(hal_block, 0);
-RESUMED_BY(os_resume_yielded, resume_preempted, resume_dsp);
+RESUMED_BY(os_resume_yielded, switch.S / resume_preempted, switch.S / resume_dsp);
 LOOPS_OF(switch.S / resume_dsp, 0);
 STACK_AREA(os_memory, HAL_KERNEL_STACK);
 THREADS(sys_function);
