@@ -213,9 +213,9 @@ class EmulatedBrain:
             self._probe_at = reached + 1 + self._below(2 * PROBE_TCY)
 
     def _below(self, end: int) -> int:
-        """What `integers(end)` would draw next, for a tenth of its time: Lemire's method on 32 bits."""
+        """What `integers(end)` of the generator would draw next: Lemire's method on 32 bits."""
         while True:
-            drawn = self._draw(self._drawn_from) * end
+            drawn: int = self._draw(self._drawn_from) * end
             if (drawn & _DRAWN_MASK) >= (1 << _DRAWN_BITS) % end:
                 return drawn >> _DRAWN_BITS
 

@@ -233,3 +233,12 @@ def test_firmware_without_the_word_or_without_wheels_is_refused(
     assert "no word 'nothing' to watch" in capsys.readouterr().err
     assert main(["reaction", "--brain", str(talking_image), "--word", "PORTD"]) == 2
     assert "the firmware stopped: fault" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("end", [1 << 10, 294_912, 3 << 30])
+def test_moments_of_probes_are_those_the_generator_would_draw(clustering_image: Path, alone: Scene, end: int) -> None:
+    """Also where a third of what is drawn is refused."""
+    brain = EmulatedBrain(alone, 1, 0, clustering_image)
+    twin = np.random.default_rng()
+    twin.bit_generator.state = brain._rng.bit_generator.state
+    assert [brain._below(end) for _ in range(2000)] == [int(twin.integers(end)) for _ in range(2000)]

@@ -7,10 +7,12 @@ yet. Code arrives from the disk cache at once or from the compile process later;
 from __future__ import annotations
 
 import ctypes
+import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any, Final, Protocol
+from weakref import WeakValueDictionary
 
 from emu.dspic30f.core import Core
 from emu.dspic30f.facts import facts_of
@@ -45,11 +47,13 @@ from emu.dspic30f.jit.surroundings import (
     identity_of,
     offsets,
     surroundings_of,
+    wiring_of,
 )
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.ledger import STRETCH, Ledger
 from emu.dspic30f.modes import Key, Modes
 from emu.dspic30f.state import NOT_REPEATING, RUN
+from emu.straight import Rule
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM effort for blocks and for single-step code."""
@@ -73,9 +77,12 @@ class Cold(Protocol):
         """As `Engine.forget`."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Code:
-    """Native code for one set of processor modes: tables of addresses by program word, and what they came from."""
+    """Native code for one set of processor modes: tables of addresses by program word, and what they came from.
+
+    Machines of one kind with the same program share it: what one of them has met is there for all.
+    """
 
     context: Context
     around: Surroundings
@@ -93,6 +100,10 @@ class Code:
     """Leaders of all requested regions."""
     heat: dict[int, int] = field(default_factory=dict)
     """How often an address without code was reached."""
+
+
+_shared: Final[WeakValueDictionary[object, Code]] = WeakValueDictionary()
+"""For as long as a machine uses it: by all it depends on."""
 
 
 @dataclass
@@ -145,6 +156,7 @@ class JitEngine:
         self._mode: Final = core.state.at["cpu.mode"]
         self._modes: Final = Modes(core.state)
         self._offset: Final = offsets(core)
+        self._wiring: tuple[list[Rule | None], bytes] = [], b""
         self.counts: Final = Counts()
         self.seconds: dict[str, float] | None = None
         """Host seconds by activity once `measure_time` was called."""
@@ -162,7 +174,8 @@ class JitEngine:
             self._collect()
         self._select()
         if self._dispatch is None:
-            if not self.counts.regions:
+            assert self._code is not None
+            if not self._code.regions:
                 self._miss(limit)
                 return
             self._prepare()
@@ -356,9 +369,18 @@ class JitEngine:
         self._env[POINTED] = code.pointed.address
 
     def _new_code(self, key: Key) -> Code:
-        around = surroundings_of(self._core, key, frozenset(self._hooks), self._offset)
-        table = ctypes.c_uint64 * self._words
-        return Code(key.context, around, identity_of(key.context, around), self._pointed(around), table(), table())
+        core = self._core
+        around = surroundings_of(core, key, frozenset(self._hooks), self._offset)
+        if self._wiring[0] != core.bus.rules:
+            self._wiring = core.bus.rules[:], wiring_of(around)
+        identity = identity_of(key.context, around, self._wiring[1])
+        program = hashlib.sha256(core.program.flash).digest()
+        shared = identity, program, around.hooks, core.bus.off, frozenset(core.bus.watched), self.wait, self._ledger
+        code = _shared.get(shared)
+        if code is None:
+            table = ctypes.c_uint64 * self._words
+            code = _shared[shared] = Code(key.context, around, identity, self._pointed(around), table(), table())
+        return code
 
     def _pointed(self, around: Surroundings) -> Loaded:
         """Native accesses to registers that are reached by pointer."""

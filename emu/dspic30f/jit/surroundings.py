@@ -80,9 +80,15 @@ class Surroundings:
         return None
 
 
-def identity_of(context: Context, around: Surroundings) -> bytes:
-    """Hash of processor modes and surroundings, without the hooks: those in a region belong to the region."""
-    facts = vars(around) | {"hooks": None}
+def wiring_of(around: Surroundings) -> bytes:
+    """Hash of what is the same in all modes of a machine, and long: where things are, and the rules of devices."""
+    return hashlib.sha256(repr((sorted(around.offset.items()), sorted(around.rules.items()))).encode()).digest()
+
+
+def identity_of(context: Context, around: Surroundings, wiring: bytes) -> bytes:
+    """Hash of processor modes and surroundings, whose `wiring_of` is given, without the hooks: those in a region belong
+    to the region."""
+    facts = vars(around) | {"hooks": None, "offset": None, "rules": wiring}
     parts = [sorted(part.items()) if isinstance(part, Mapping) else part for part in facts.values()]
     return hashlib.sha256(repr((context, parts)).encode()).digest()
 

@@ -268,3 +268,22 @@ def test_registers_of_a_module_that_goes_off_and_on_are_its_own_again() -> None:
     for length in (*range(1, 60), 997, 5003):
         assert plain.run(length) == native.run(length)
         assert not difference(plain, native)
+
+
+def test_machines_with_one_program_share_what_was_translated() -> None:
+    """What one of a swarm has met costs the others nothing; one that programs itself has code of its own."""
+    first, second, third = eager(), eager(), eager()
+    for machine in (first, second, third):
+        load(machine, counting_firmware())
+    third.program.put_flash(0x1000, words_of("DEC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0))
+    for machine in (first, second, third):
+        machine.run(3_000)
+    assert not difference(first, second)
+    assert first.w[2] != third.w[2]
+    held = [{id(code) for code in machine.runner.translated()} for machine in (first, second, third)]
+    assert held[0] == held[1]
+    assert not held[0] & held[2]
+    assert [bool(machine.runner.counts.regions) for machine in (first, second, third)] == [True, False, True]
+    second.program.put_flash(0x1000, words_of("DEC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0))
+    second.run(100)
+    assert {id(code) for code in second.runner.translated()} <= held[2]
