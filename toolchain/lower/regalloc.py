@@ -2,11 +2,11 @@
 
 Terms. Nodes are registers; W0-W14 are nodes with their own colour. Two nodes interfere when one is written while the
 other is live. A word node may take any of W0-W14, a pair node an even register below W14 and the one after it.
-Method. Build the graph; merge copies when the merged node stays colourable (Briggs for two virtual registers, George
-against a real one); remove nodes in order of colourability, spilling candidates optimistically (Briggs, Cooper,
-Torczon 1994; the weights for pairs follow Smith, Ramsey, Holloway 2004); colour in reverse, preferring the register of
-a copy partner. What finds no colour is rematerialised when it is a constant, else kept in a frame slot, and all is
-repeated.
+Method. Build the graph; merge copies when the merged node stays colourable (Briggs for two virtual registers, on trial
+George, too, who is asked against a real one); remove nodes in order of colourability, spilling candidates
+optimistically (Briggs, Cooper, Torczon 1994; the weights for pairs follow Smith, Ramsey, Holloway 2004); colour in
+reverse, preferring the register of a copy partner. What finds no colour is rematerialised when it is a constant, else
+kept in a frame slot, and all is repeated.
 """
 
 from __future__ import annotations
@@ -116,8 +116,10 @@ class Graph:
 
     # -- coalescing ---------------------------------------------------------------------------------------------------
 
-    def coalesce(self, eager: bool) -> None:
-        """Merge copies, most frequent first, while that is safe; `eager` merges with real registers too."""
+    def coalesce(self, eager: bool, thorough: bool) -> None:
+        """Merge copies, most frequent first, while that is safe; `eager` merges with real registers too.
+
+        `thorough` takes George's test for virtual registers, too: fewer moves, but what is spilled later is more."""
         pending = sorted(self.moves, key=lambda m: -m[0])
         changed = True
         while changed and pending:
@@ -127,7 +129,7 @@ class Graph:
                 a, b = self.find(source), self.find(dest)
                 if a == b:
                     continue
-                if (eager or min(a, b) >= FIRST_VIRTUAL) and self._mergeable(a, b):
+                if (eager or min(a, b) >= FIRST_VIRTUAL) and self._mergeable(a, b, thorough):
                     self._merge(a, b)
                     changed = True
                 else:
@@ -139,7 +141,7 @@ class Graph:
                 self.hints.setdefault(a, []).append((b, 0))
                 self.hints.setdefault(b, []).append((a, 0))
 
-    def _mergeable(self, a: int, b: int) -> bool:
+    def _mergeable(self, a: int, b: int, thorough: bool) -> bool:
         if a == 15 or b == 15 or self.adjacent[a] >> b & 1:
             return False
         if (a < FIRST_VIRTUAL and b < FIRST_VIRTUAL) or (a in self.m.pairs) != (b in self.m.pairs):
@@ -147,10 +149,11 @@ class Graph:
         if b < FIRST_VIRTUAL:
             a, b = b, a
         if a < FIRST_VIRTUAL:  # George: every neighbour of b already lives with a, or cannot cause trouble
-            trouble = self.adjacent[b] & ~self.adjacent[a] & ~REAL
-            return all(self.pressure(t, self.adjacent[t]) < self.limit(t) for t in members(trouble))
+            return self._harmless(a, b)
         both = self.adjacent[a] | self.adjacent[b]
         if self.pressure(a, both) < self.limit(a):
+            return True
+        if thorough and (self._harmless(a, b) or self._harmless(b, a)):
             return True
         significant = (both & REAL).bit_count()
         for t in members(both & ~REAL):
@@ -159,6 +162,13 @@ class Graph:
             if self.pressure(t, mask) - (1 if shared else 0) >= self.limit(t):
                 significant += 2 if t in self.m.pairs else 1
         return significant < self.limit(a)
+
+    def _harmless(self, a: int, b: int) -> bool:
+        """Whether every neighbour of b already lives with a, or finds a register in any case."""
+        trouble = self.adjacent[b] & ~self.adjacent[a]
+        if a >= FIRST_VIRTUAL and trouble & REAL:
+            return False
+        return all(self.pressure(t, self.adjacent[t]) < self.limit(t) for t in members(trouble & ~REAL))
 
     def _merge(self, a: int, b: int) -> None:
         if b < FIRST_VIRTUAL:
@@ -284,28 +294,27 @@ def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
     """Replace virtual registers by W0-W14. Ensures: pairs are even-aligned, split and join are moves or gone.
 
     Merging a value with an argument or result register is usually right and sometimes crowds others out, so small
-    functions are allocated both ways and the cheaper result is kept.
+    functions are allocated both ways, and with more merging among values, and the cheapest result is kept.
     """
     remove_dead(m)
     size = sum(len(b.insts) for b in m.blocks)
     if size > TRIAL_LIMIT:
-        _allocate(m, True, verify)
+        _allocate(m, True, False, verify)
         return m
     trials = []
-    for eager in (True, False):
+    for number, (eager, thorough) in enumerate(((True, False), (False, False), (True, True))):
         trial = m.clone()
-        _allocate(trial, eager, verify)
-        cost = _cost(trial, for_size)
-        trials.append((cost, not eager, trial))
-        if eager and not _crowded(trial):
+        _allocate(trial, eager, thorough, verify)
+        trials.append((_cost(trial, for_size), number, trial))
+        if not number and not _crowded(trial):
             return trial
     return min(trials, key=lambda t: t[:2])[2]
 
 
-def _allocate(m: MFunction, eager: bool, verify: bool) -> None:
+def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool) -> None:
     for _ in range(MAX_ROUNDS):
         g = Graph(m)
-        g.coalesce(eager)
+        g.coalesce(eager, thorough)
         colouring = Colouring(g)
         colouring.run(g.simplify())
         if not colouring.spilled:

@@ -209,6 +209,15 @@ LOOPS = [
            void f(struct s *d, const struct s *s, int n){ for (int i = 0; i < n; i++) d[i] = s[i]; }""",
         ["add w1,#20,w1", "add w0,#20,w0", "dec w2,w2", "bra nz"],
     ),
+    (
+        "where nearly all registers are in use, too",
+        "2",
+        """void f(const unsigned *a, const unsigned *b, unsigned *r, int n){ for (int i = 0; i < n; i++) {
+           unsigned carry = 0; for (int j = 0; j < n; j++) {
+           unsigned long t = (unsigned long)a[i] * b[j] + r[i + j] + carry;
+           r[i + j] = (unsigned)t; carry = (unsigned)(t >> 16); } r[i + n] = carry; } }""",
+        ["mov w0,[w7++]", "dec w5,w5", "bra nz"],
+    ),
 ]
 
 
