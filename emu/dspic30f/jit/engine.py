@@ -129,6 +129,8 @@ class JitEngine:
         """Times an address without code is reached before code is made for it."""
         self.wait = False
         """Let code be compiled before it is run (tests, benchmarks)."""
+        self.circle: object = None
+        """Translations are shared with machines that have the same here: who changes them sets one of its own."""
         self._longest = NATIVE_CYCLES
         self._ledger: Ledger | None = None
         self._row_of: RowOf = lambda pc: pc
@@ -375,7 +377,9 @@ class JitEngine:
             self._wiring = core.bus.rules[:], wiring_of(around)
         identity = identity_of(key.context, around, self._wiring[1])
         program = hashlib.sha256(core.program.flash).digest()
-        shared = identity, program, around.hooks, core.bus.off, frozenset(core.bus.watched), self.wait, self._ledger
+        counted = 0 if self._ledger is None else self._env_address  # code that counts names its own ledger
+        switches = core.bus.off, frozenset(core.bus.watched), self.wait, counted, self.circle
+        shared = identity, program, around.hooks, *switches
         code = _shared.get(shared)
         if code is None:
             table = ctypes.c_uint64 * self._words

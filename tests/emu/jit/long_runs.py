@@ -97,6 +97,7 @@ class CountedExact:
         runner = machine.runner
         assert isinstance(runner, JitEngine)
         self._runner: Final = runner
+        runner.circle = object()
         self.python = 0
         execute = machine.core.sequencer.execute
 
