@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The rest of math.h that is exact or correctly rounded: rounding to integers as the processor would, scaling, neighbours,
- * remainders, fused products (C11 7.12.6, 7.12.9-7.12.13), in both precisions. The one rounding direction is to nearest. */
+/* The rest of math.h that is exact or correctly rounded: rounding to integers as the processor would, scaling,
+ * neighbours, remainders, fused products (C11 7.12.6, 7.12.9-7.12.13), in both precisions. The one rounding direction
+ * is to nearest. */
 #include "softfloat.h"
 
 #include <float.h>
@@ -278,8 +279,9 @@ double fma(double x, double y, double z)
     wide_t large = product_of(f64_bits(x), f64_bits(y)), small = {0, 0, 0};
     small.high = __f64_unpack(f64_bits(z) & ~F64_SIGN, &small.exponent) >> 1;
     int differ = sign != sign_z;
-    if (small.exponent > large.exponent || (small.exponent == large.exponent &&
-        (small.high > large.high || (small.high == large.high && small.low > large.low)))) {
+    if (small.exponent > large.exponent ||
+        (small.exponent == large.exponent &&
+         (small.high > large.high || (small.high == large.high && small.low > large.low)))) {
         wide_t other = large;
         large = small;
         small = other;
@@ -302,8 +304,8 @@ double fma(double x, double y, double z)
     return f64_value(__f64_pack(sign, large.exponent, large.high | (large.low != 0)));
 }
 
-/* The product is exact in double. Its sum with z is rounded to odd there, after which rounding to single is right: double
- * has more than two bits beyond it. */
+/* The product is exact in double. Its sum with z is rounded to odd there, after which rounding to single is right:
+ * double has more than two bits beyond it. */
 float fmaf(float x, float y, float z)
 {
     double product = (double)x * y, sum = product + z;

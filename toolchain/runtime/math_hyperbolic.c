@@ -4,9 +4,9 @@
 
 #include <math.h>
 
-#define ONLY_EXP 22    /* beyond it, exp(-x) is below half a unit in the last place of exp(x) */
+#define ONLY_EXP 22     /* beyond it, exp(-x) is below half a unit in the last place of exp(x) */
 #define ONLY_LOG 0x1p28 /* beyond it, sqrt(x*x + 1) is x */
-#define NEAR_END 709   /* a little below where exp overflows */
+#define NEAR_END 709    /* a little below where exp overflows */
 
 /* exp(x) / 2 where exp(x) alone may overflow. */
 static double half_exp(double x)

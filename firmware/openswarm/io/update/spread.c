@@ -41,8 +41,8 @@ static uint8 row, asked, doublings, buffer[PARTS * PART];
 static bool is_asking, is_polite;
 static uint32 lacking; /* parts of `row`; bit n: part n */
 static uint8 wanted_row, part_sent;
-static uint32 wanted_parts;           /* of `wanted_row`, by others */
-static uint8 served[HAL_UPDATE_ROWS]; /* parts of each row, by whomever, less what has been forgiven */
+static uint32 wanted_parts;   /* of `wanted_row`, by others */
+static uint8 served[ROW + 1]; /* parts of each row a message can name, by whomever, less what is forgiven */
 static uint32 forgiven_at;
 static uint32 clock, interval, begun, advertise_at, ask_at, useful_at;
 static uint8 heard;
@@ -338,7 +338,7 @@ static bool advertise(uint8 *m)
 static void forgive(void)
 {
     forgiven_at = clock;
-    for (uint8 r = 0; r < HAL_UPDATE_ROWS; r++) {
+    for (uint8 r = 0; r <= ROW; r++) {
         served[r] -= served[r] != 0;
     }
 }
