@@ -12,6 +12,7 @@ from skips import Skips
 
 from emu import machine
 from emu.dspic30f.engines import NAMES, make_engine
+from emu.dspic30f.jit import engine as jit
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -25,6 +26,12 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(config.getoption("--allowed-skips")), "skips")
+
+
+@pytest.fixture(autouse=True)
+def own_translations() -> None:
+    """No test finds native code of a machine that another one has left: machines with one program share it."""
+    jit._shared.clear()
 
 
 @pytest.fixture(scope="session", autouse=True)
