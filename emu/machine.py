@@ -447,6 +447,7 @@ class Machine(Contents, BySource):
         """
         self.pins.flush()
         self.peripherals.tell()
+        self.peripherals.settle()
         self.core.exceptions.forget()
         self.events.kick()
         return self.record.snapshot()

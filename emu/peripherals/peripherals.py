@@ -101,6 +101,8 @@ class Peripherals:
         self.fit(crystal=kit.crystal)
         self.on_restored: Final[list[Callable[[], None]]] = []
         """Parts of a board that keep something derived from the record."""
+        self.on_settle: Final[list[Callable[[], None]]] = []
+        """Parts of a board that find out late, when somebody looks, what has happened."""
 
     def _modules(self) -> dict[str, Peripheral]:
         """Peripherals by the name their PMD bit carries."""
@@ -176,6 +178,11 @@ class Peripherals:
         """Tell who listens to UARTs what native code has sent."""
         for uart in self.uart.values():
             uart.tell()
+
+    def settle(self) -> None:
+        """Have found out what would be found out late, so that the record does not depend on who has looked."""
+        for listener in self.on_settle:
+            listener()
 
     def restored(self) -> None:
         """Call after the record was replaced by a snapshot."""

@@ -77,6 +77,7 @@ class Stepper(Part):
         self.at: Final = addressof(self._motor)
         """Where `struct motor` of motors.c is."""
         self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True, reader=self._read)
+        chip.on_settle.append(self._catch_up)
 
     @property
     def steps(self) -> int:

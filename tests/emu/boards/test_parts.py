@@ -128,6 +128,16 @@ def test_standing_pattern_that_is_no_phase_is_counted_as_illegal(robot):
     assert robot.at(16).board.motors.left.illegal == 1
 
 
+def test_who_looks_at_the_motors_leaves_no_trace(robot):
+    """A pattern counts late, when somebody looks: a copy of the whole state is the same whether somebody has."""
+    other = Robot()
+    for one in (robot, other):
+        one.write("TRISD", 0xFF00)
+        one.write("LATD", 0x05)
+    assert robot.at(40).board.motors.steps() == (0, 0)
+    assert robot.at(60).machine.snapshot() == other.at(60).machine.snapshot()
+
+
 def test_coils_off_keep_the_rotor_in_place(robot):
     """§3: power save switches the coils off between steps."""
     drive(robot, 4, [0, None, 1, None, 2])
