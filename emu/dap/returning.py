@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from emu.dap.breakpoints import Breakpoint
 from emu.dap.changes import Change
 from emu.dap.debuggee import Debuggee, Halt
-from emu.dap.looking import Looking, Refused
+from emu.dap.looking import Refused
+from emu.dap.stopping import Stopping
 from emu.debug.history import History
 
 if TYPE_CHECKING:
@@ -41,12 +42,11 @@ class Left(NamedTuple):
     ends_all: bool
 
 
-class Returning(Looking):
+class Returning(Stopping):
     """Brings the world to where the machine stands. `_record` makes the recording by which that goes back."""
 
     _record: Callable[[Machine], History]
     _waiting: list[Message]
-    _last_id: int
     ends_all: bool
     _over: bool
     _pause: bool
