@@ -5,7 +5,7 @@ remainders   x - x/c*c back to x % c, and quotient and remainder of one division
 conditional  x op (c ? y : 0) is c ? x op y : x, where the operation stands under a skip
 selects      those on one condition stand together and share the test
 increments   pointer and counter steps next to the last use of the old value, so both share a register and the step can
-             become a post-increment
+             become a post-increment; those by the size of a block stand before its copy, which makes them
 countdowns   `n-- != 0`: the decrement moves to the test, whose carry answers it
 """
 
@@ -15,8 +15,7 @@ from ..ir.model import Block, ConstInt, Function, GlobalRef, Instr, Value
 from . import induction, magic
 from .cfg import dead_code, loop_depths, predecessors, reverse_postorder, use_counts
 from .compare import COUNTED
-
-REMAINDER = {"udiv": "urem", "sdiv": "srem"}
+from .magic import REMAINDER
 
 
 def users_of(f: Function) -> dict[int, list[Instr]]:
@@ -35,11 +34,12 @@ def combine(f: Function, for_size: bool, for_speed: bool = False) -> None:
     quotients(f)
     conditional(f)
     selects(f)
-    remainders(f)
+    remainders(f, for_size)
     magic.run(f, for_size, for_speed)
     pair_divisions(f)
     induction.run(f)
     increments(f)
+    block_steps(f)
     countdowns(f)
 
 
@@ -110,31 +110,36 @@ def selects(f: Function) -> None:
                 b.instrs.insert(to - 1, b.instrs.pop(at))
 
 
-def remainders(f: Function) -> None:
-    """sub x, (mul (div x, c), c) -> rem x, c."""
+def remainders(f: Function, for_size: bool) -> None:
+    """sub x, (mul (div x, c), c) -> rem x, c. For c = 2^k the product is a shift, and DIV, which has both results, is
+    there for size only."""
     for b in f.blocks:
         for i in b.instrs:
             if i.op == "sub" and i.type.bits == 16:
-                _recover_remainder(i)
+                _recover_remainder(i, for_size)
             elif i.op == "add" and i.type.bits == 16:
                 _recover_negative(i)
 
 
-def _division_of(x: Value, product: Value, sign: int) -> tuple[Instr, Value] | None:
-    """The division q = x / c behind product = q * (sign*c)."""
-    if not isinstance(product, Instr) or product.op != "mul":
+def _division_of(x: Value, product: Value, sign: int, shifts: bool) -> tuple[Instr, Value] | None:
+    """The division q = x / c behind product = q * (sign*c), or with `shifts` q << k for c = 2^k."""
+    if not isinstance(product, Instr) or product.op not in ("mul", "shl"):
         return None
     q, c = product.args
     if not isinstance(q, Instr) or q.op not in REMAINDER or q.args[0] is not x:
         return None
     d = q.args[1]
+    if product.op == "shl":
+        if not shifts or q.op != "sdiv" or not isinstance(d, ConstInt) or not isinstance(c, ConstInt):
+            return None
+        return (q, d) if d.signed == 1 << c.value else None
     if isinstance(d, ConstInt) and isinstance(c, ConstInt):
         return (q, d) if (d.value * sign - c.value) % 0x10000 == 0 else None
     return (q, d) if d is c and sign > 0 else None
 
 
-def _recover_remainder(i: Instr) -> None:
-    found = _division_of(i.args[0], i.args[1], 1)
+def _recover_remainder(i: Instr, for_size: bool) -> None:
+    found = _division_of(i.args[0], i.args[1], 1, for_size)
     if found is not None:
         i.op = REMAINDER[found[0].op]
         i.args = [i.args[0], found[1]]
@@ -143,7 +148,7 @@ def _recover_remainder(i: Instr) -> None:
 def _recover_negative(i: Instr) -> None:
     """x + q * -c, the form the middle end prefers for constants."""
     for x, product in ((i.args[0], i.args[1]), (i.args[1], i.args[0])):
-        found = _division_of(x, product, -1)
+        found = _division_of(x, product, -1, False)
         if found is not None:
             i.op = REMAINDER[found[0].op]
             i.args = [x, found[1]]
@@ -209,6 +214,20 @@ def increments(f: Function) -> None:
                     _to_last_use(target, i, users)
                     continue
             _to_last_use(b, i, users)
+
+
+def block_steps(f: Function) -> None:
+    """Move p + size in front of the operation on a block of that size at p, whose pointer ends there (`blocks`)."""
+    for b in f.blocks:
+        for block in [i for i in b.instrs if i.op in ("blockcopy", "blockfill")]:
+            count, unit = block.extra["count"], block.extra["unit"]
+            assert isinstance(count, int)
+            assert isinstance(unit, int)
+            size, at = count * unit, b.instrs.index(block)
+            for step in [i for i in b.instrs[at:] if i.op == "add" and i.args[0] in block.args[:2]]:
+                if isinstance(step.args[1], ConstInt) and step.args[1].signed == size:
+                    b.instrs.remove(step)
+                    b.instrs.insert(at, step)
 
 
 def _places(p: Instr, users: list[Instr], home: dict[int, Block], f: Function) -> list[Block]:

@@ -1,7 +1,7 @@
 """Division by constants as multiplication: x / d is the high word of x * m, shifted (Granlund, Montgomery 1994).
 
 MUL takes a cycle where REPEAT DIV takes 19 (isa.md §6.7). Signed division by 2^k is a shift of x, made 2^k - 1 larger
-where it is negative. Needs: legal IR. For size only where the product takes no more words than DIV. 32 bits, which
+where it is negative. Needs: legal IR. For size only where this takes no more words than DIV. 32 bits, which
 otherwise call the run-time library, only for speed: 17 words and cycles where the call takes 3 words and 50 cycles.
 """
 
@@ -11,6 +11,7 @@ from ..ir.model import I16, I32, Block, ConstInt, Function, Instr, Value
 from .build import Builder, const
 
 OPERATIONS = frozenset(("udiv", "sdiv", "urem", "srem"))
+REMAINDER = {"udiv": "urem", "sdiv": "srem"}
 
 
 def run(f: Function, for_size: bool, for_speed: bool = False) -> None:
@@ -55,12 +56,13 @@ def _divides(op: str, x: Value, d: Value) -> bool:
 
 
 def _short(i: Instr, others: list[Instr]) -> bool:
-    """MOV, MUL, LSR instead of MOV, REPEAT, DIV, unless that DIV gives a remainder too."""
+    """MOV, MUL, LSR or LSR, ADD, ASR instead of MOV, REPEAT, DIV, unless that DIV gives a remainder too."""
     d = i.args[1]
     assert isinstance(d, ConstInt)
-    if i.op != "udiv" or unsigned_factor(d.value)[0] >= 1 << 16:
+    halved = i.op == "sdiv" and d.value == 2
+    if not halved and (i.op != "udiv" or unsigned_factor(d.value)[0] >= 1 << 16):
         return False
-    same = [o for o in others if o.op == "urem" and o.args[0] is i.args[0]]
+    same = [o for o in others if o.op == REMAINDER[i.op] and o.args[0] is i.args[0]]
     return not any(isinstance(o.args[1], ConstInt) and o.args[1].value == d.value for o in same)
 
 

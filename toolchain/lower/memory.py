@@ -1,4 +1,4 @@
-"""Selection of loads, stores, read-modify-write forms and block operations."""
+"""Selection of loads, stores and read-modify-write forms."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from .rules import COMMUTES, FILE_BINARY, FILE_CARRY, FILE_UNARY, REGISTER_OP, i
 
 if TYPE_CHECKING:
     from .select import Selector
-
-INLINE_WORDS = 3  # copies and fills of up to this many units are written out
 
 
 def _words(v: Value) -> int:
@@ -286,52 +284,7 @@ def _modify_wide(s: Selector, store: Instr, op: Instr, p: Value) -> bool:
 
 
 # ---------------------------------------------------------------------------------------------------------------------
-# blocks and the stack pointer
-
-
-def _pointer(s: Selector, p: Value) -> int:
-    """A private copy of a pointer, to be advanced."""
-    r = s.temp()
-    if s.is_leaf(p):
-        s.load_leaf(p, 0, r)
-    else:
-        s.copy(s.reg(p), r)
-    return r
-
-
-def select_blockcopy(s: Selector, i: Instr) -> None:
-    """MOV [Ws++],[Wd++], under REPEAT when long (isa.md §15)."""
-    count, unit = i.extra["count"], i.extra["unit"]
-    assert isinstance(count, int)
-    dest, source = _pointer(s, i.args[0]), _pointer(s, i.args[1])
-    byte = unit == 1
-    if count <= INLINE_WORDS:
-        for k in range(count):
-            mode = "++" if k < count - 1 else "ind"
-            s.emit("mov", Mem(mode, source), Mem(mode, dest), byte=byte)
-        return
-    s.emit("repmov", Imm(count - 1), source, dest, byte=byte)
-
-
-def select_blockfill(s: Selector, i: Instr) -> None:
-    """CLR [Wd++] or MOV Ws,[Wd++], under REPEAT when long."""
-    count, unit = i.extra["count"], i.extra["unit"]
-    assert isinstance(count, int)
-    value, byte = i.args[1], unit == 1
-    zero = isinstance(value, ConstInt) and value.value == 0
-    source = None if zero else s.reg(value)
-    dest = _pointer(s, i.args[0])
-    if count <= INLINE_WORDS:
-        for k in range(count):
-            mode = "++" if k < count - 1 else "ind"
-            if source is None:
-                s.emit("clr", Mem(mode, dest), byte=byte)
-            else:
-                s.emit("mov", source, Mem(mode, dest), byte=byte)
-    elif source is None:
-        s.emit("repclr", Imm(count - 1), dest, byte=byte)
-    else:
-        s.emit("repfill", Imm(count - 1), dest, source, byte=byte)
+# the stack pointer
 
 
 def select_dynalloca(s: Selector, i: Instr) -> None:
@@ -369,8 +322,6 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "loadpair": select_loadpair,
     "storepair": select_storepair,
     "store": select_store,
-    "blockcopy": select_blockcopy,
-    "blockfill": select_blockfill,
     "dynalloca": select_dynalloca,
     "getsp": select_getsp,
     "setsp": select_setsp,

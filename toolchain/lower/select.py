@@ -18,7 +18,7 @@ from ..ir.model import (
     UnsupportedError,
     Value,
 )
-from . import arith, calls, choose, compare, memory, multiply, shifts
+from . import arith, blocks, calls, choose, compare, memory, multiply, shifts
 from .address import AddressSelector
 from .cfg import loop_depths, predecessors
 from .mir import CONSTANT, GONE, MI, MBlock, MFunction
@@ -213,5 +213,6 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     **choose.SELECT,
     **compare.SELECT,
     **memory.SELECT,
+    **blocks.SELECT,
     **calls.SELECT,
 }

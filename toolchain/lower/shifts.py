@@ -29,6 +29,8 @@ def select_shift(s: Selector, i: Instr) -> None:
             _shift_wide_constant(s, i.op, s.regs(a), n.value, s.value_regs(i))
     elif _words(i) == 1:
         _shift_word_variable(s, i)
+    elif _low_word_suffices(s, i):
+        s.emit("sl", s.regs(a)[0], s.regs(n)[0], s.value_regs(i)[0])
     else:
         _shift_wide_variable(s, i)
 
@@ -66,6 +68,13 @@ def _shift_word_variable(s: Selector, i: Instr) -> None:
     d, byte = s.result(i), i.type.bits == 8
     a = _extended_byte(s, i.args[0], i.op == "ashr", i) if byte and i.op != "shl" else s.reg(i.args[0])
     s.emit(SHIFT_OP[i.op], a, s.reg(i.args[1]), d)
+
+
+def _low_word_suffices(s: Selector, i: Instr) -> bool:
+    """Whether two words go left and only the lower is read: SL gives 0 for the counts of 16 to 31 (isa.md §6.5)."""
+    if i.op != "shl" or _words(i) != 2:
+        return False
+    return all(user.op == "trunc" and _words(user) == 1 for user in s.users[id(i)])
 
 
 def _shift_wide_constant(s: Selector, op: str, a: tuple[int, ...], n: int, d: tuple[int, ...]) -> None:

@@ -18,6 +18,7 @@ class Interpreter:
         self.memory: dict[int, int] = {}
         self.values: dict[int, int] = {id(a): k for a, k in zip(f.args, arguments, strict=True)}
         self.next_slot = MEMORY_TOP
+        self.accesses: list[tuple[str, int, int]] = []  # volatile ones: load or store, address, value
 
     def byte(self, at: int) -> int:
         return self.memory.get(at & 0xFFFF, (at * 37 + 11) & 0xFF)
@@ -52,6 +53,9 @@ class Interpreter:
                     before, name = name, self.target(i)
                     break
                 result = self.step(i)
+                if i.volatile:
+                    moved = result if result is not None else self.value(i.args[0])
+                    self.accesses.append((i.op, self.value(i.args[-1]), moved))
                 if result is not None:
                     self.values[id(i)] = result & ((1 << i.type.bits) - 1)
 

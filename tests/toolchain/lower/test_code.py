@@ -77,6 +77,21 @@ IDIOMS = [
         "int g(int,int); int f(int *a,int *b,int i){ return g(a[i], b[i]); }",
         ["sl w2,w7", "mov [w0+w7],w0", "mov [w1+w7],w1", "bra _g"],
     ),
+    (
+        "of a long that goes left by a variable only the lower word is made where no other is read",
+        "unsigned f(unsigned long a, unsigned n){ return (unsigned)(a << n); }",
+        ["sl w0,w2,w0", "return"],
+    ),
+    (
+        "half of an int is no division",
+        "int f(int a){ return a / 2; }",
+        ["lsr w0,#15,w7", "add w0,w7,w7", "asr w7,w0", "return"],
+    ),
+    (
+        "DIV has what is left of a division by a power of two",
+        "int f(int a, int *r){ *r = a % 8; return a / 8; }",
+        ["mov w1,w7", "mov #8,w6", "repeat #17", "div.s w0,w6", "mov w1,[w7]", "return"],
+    ),
     ("a zero store is CLR", "void f(int *p){ *p = 0; }", ["clr [w0]", "return"]),
 ]
 
@@ -205,9 +220,28 @@ LOOPS = [
     (
         "the counter's step is the last of a loop, so that its flags are those of the branch",
         "2",
+        """struct s { int v[10]; }; struct t { struct s s; int k; };
+           void f(struct t *d, const struct t *s, int n){ for (int i = 0; i < n; i++) d[i].s = s[i].s; }""",
+        ["add w1,#22,w1", "add w0,#22,w0", "dec w2,w2", "bra nz"],
+    ),
+    (
+        "a copy of a struct leaves its pointers at the next ones",
+        "2",
         """struct s { int v[10]; };
            void f(struct s *d, const struct s *s, int n){ for (int i = 0; i < n; i++) d[i] = s[i]; }""",
-        ["add w1,#20,w1", "add w0,#20,w0", "dec w2,w2", "bra nz"],
+        ["repeat #9", "mov [w1++],[w0++]", "dec w2,w2", "bra nz"],
+    ),
+    (
+        "and so does one without REPEAT",
+        "s",
+        "struct s { int x, y, z; }; void f(struct s *d, const struct s *s, unsigned n){ while (n--) *d++ = *s++; }",
+        [*["mov [w1++],[w0++]"] * 3, "dec w2,w2", "bra geu"],
+    ),
+    (
+        "and so does filling",
+        "2",
+        "struct s { int v[10]; }; void f(struct s *d, int n){ for (int i = 0; i < n; i++) d[i] = (struct s){{0}}; }",
+        ["repeat #9", "clr [w0++]"],
     ),
     (
         "where nearly all registers are in use, too",

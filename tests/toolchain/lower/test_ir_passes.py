@@ -37,11 +37,20 @@ unsigned long bits(unsigned long v) { unsigned long r = 0;
   for (int i = 0; i < 32; i++) { r = r << 1 | (v & 1); v >>= 1; }
   return r; }
 unsigned long tens(unsigned long x) { return x / 10 * 3 + x % 10 - x / 7 + x % 1000; }
+volatile unsigned port, other; volatile unsigned char latch;
+void one_of_two(int x) { if (x & 1) port |= 4; else port &= ~8u; }
+void on_or_off(int x) { if (x & 1) latch |= 16; else latch &= ~16; other = x; }
+void one_of_three(int x) { if (x > 3) { other = 1; port |= 4; } else if (x == 2) port ^= 32; else { port = 7; } }
+int polled(int n) { int k = 0; n &= 7;
+  while (n--) { if (other & n) port ^= 4; else port &= ~1u; k += port; } return k; }
+int twice(int x) { unsigned p = port; port = x & 1 ? p | 4 : p & ~4u; port = x & 2 ? p | 64 : p & ~2u; return p; }
+void words_too(int x) { unsigned p = port; port = x & 1 ? p | 6 : p & ~9u; if (x & 4) port |= 1; else port = x; }
 long signed_tens(long x) { return x / -10 + x % 10 * 5 - x / 4096 + x % 7; }
 """
 PASSES: dict[str, Callable[[Function], None]] = {
     "dead code": cfg.dead_code,
-    "remainders": combine.remainders,
+    "remainders": partial(combine.remainders, for_size=False),
+    "remainders for size": partial(combine.remainders, for_size=True),
     "quotients": combine.quotients,
     "conditional": combine.conditional,
     "selects": combine.selects,
@@ -51,6 +60,7 @@ PASSES: dict[str, Callable[[Function], None]] = {
     "paired divisions": combine.pair_divisions,
     "induction": induction.run,
     "increments": combine.increments,
+    "blocks": combine.block_steps,
     "countdowns": combine.countdowns,
     "logical branches": cfg.split_logical_branches,
     "sunk compares": cfg.sink_compares,
@@ -80,12 +90,13 @@ def divides(call: Instr) -> bool:
 
 
 def outcomes(f: Function, seed: int) -> list[object]:
-    """Results and memory for 20 random argument lists."""
+    """Results, memory and volatile accesses for 20 random argument lists."""
     rng = random.Random(seed)
     found: list[object] = []
     for _ in range(20):
         arguments = [rng.choice((rng.randrange(40), rng.randrange(1 << a.type.bits))) for a in f.args]
-        found.append(Interpreter(f, arguments).run())
+        run = Interpreter(f, arguments)
+        found.append((run.run(), run.accesses))
     return found
 
 

@@ -137,6 +137,8 @@ CASES: dict[str, tuple[str, str, str, Callable[..., Term]]] = {
        for n in (1, 2, 3, 4, 5, 8, 12)},
     **{f"shr_{n}": ("unsigned long", "L", f"a >> {n}", lambda a, n=n: z3.LShR(a, n)) for n in (1, 4, 8, 9)},
     **{f"sar_{n}": ("long", "l", f"a >> {n}", lambda a, n=n: a >> n) for n in (1, 8)},
+    "shl_low_word": ("unsigned", "Lu", "(unsigned)(a << (b & 31))",
+                     lambda a, b: z3.Extract(15, 0, a << z3.ZeroExt(16, b & 31))),
     # truth values and comparisons
     "lt32": ("int", "ll", "a < b", lambda a, b: bit(a < b)),
     "leu32": ("int", "LL", "a <= b", lambda a, b: bit(z3.ULE(a, b))),
@@ -191,7 +193,7 @@ CASES: dict[str, tuple[str, str, str, Callable[..., Term]]] = {
                      lambda a, b, c: word_at(a + 2 * c) + word_at(b + 2 * c)),
     **branches(),
 }  # fmt: skip
-DIVIDES = {"sdiv_8", "sdiv_2", "sdiv_minus_4", "srem_8"}
+DIVIDES = {"sdiv_8", "sdiv_minus_4", "srem_8"}
 FAST = {n for n in CASES if n.startswith(("udiv32_", "sdiv32_", "srem32_"))}
 """Inline at -O2, calls at the other levels."""
 PRODUCTS = FAST & {"udiv32_10", "udiv32_1000", "sdiv32_minus_7"}
