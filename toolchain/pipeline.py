@@ -34,6 +34,7 @@ from .lower import (
     returns,
     schedule,
     select,
+    single_bits,
     switch,
     tails,
     used,
@@ -146,6 +147,11 @@ def _combine(c: Context) -> None:
         combine.combine(c.function, c.for_size, c.options.level == "2")
 
 
+def _single_bits(c: Context) -> None:
+    if c.options.level != "0":
+        single_bits.run(c.function, lambda name: data.is_near(c.module, name))
+
+
 def _returns(c: Context) -> None:
     if c.options.level != "0":
         returns.run(c.m)
@@ -172,6 +178,7 @@ FUNCTION_PASSES = [
     Pass("sink-compares", lambda c: cfg.sink_compares(c.function), ("legal",)),
     Pass("switch", lambda c: switch.lower_switches(c.function, c.for_size), ("legal",), ("no-switch",)),
     Pass("critical-edges", lambda c: cfg.split_critical_edges(c.function), ("no-switch",), ("no-critical-edges",)),
+    Pass("single-bits", _single_bits, ("legal", "no-critical-edges")),
     Pass("select", _select, ("legal", "reachable", "no-switch", "no-critical-edges"), ("machine",)),
     Pass("repeats", _repeats, ("machine",)),
     Pass("constants", _constants, ("machine",)),

@@ -71,7 +71,7 @@ def _shift_word_variable(s: Selector, i: Instr) -> None:
 
 
 def _low_word_suffices(s: Selector, i: Instr) -> bool:
-    """Whether two words go left and only the lower is read: SL gives 0 for the counts of 16 to 31 (isa.md §6.5)."""
+    """Whether two words go left and only the lower is read: SL gives 0 for the counts of 16 to 31 (isa.md §6.3)."""
     if i.op != "shl" or _words(i) != 2:
         return False
     return all(user.op == "trunc" and _words(user) == 1 for user in s.users[id(i)])

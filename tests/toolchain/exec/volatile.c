@@ -29,3 +29,19 @@ TEST(bit_fields_in_place, "6.7.3p7")
     port.middle = U(2);
     CHECK(port.low == 9 && port.middle == 2 && port.top == 0x155);
 }
+TEST(bits_in_branches, "6.7.3p7")
+{
+    for (unsigned k = 0; k < 4; k++) {
+        byte_flag = 0x12;
+        pair[0] = 0xFF00;
+        if (U(k) & 1)
+            byte_flag |= 0x80;
+        else
+            byte_flag &= ~0x10;
+        if (U(k) & 2)
+            pair[0] ^= 0x8000;
+        else
+            pair[0] |= 1;
+        CHECK(byte_flag == (k & 1 ? 0x92 : 0x02) && pair[0] == (k & 2 ? 0x7F00 : 0xFF01));
+    }
+}

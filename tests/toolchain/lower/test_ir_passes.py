@@ -12,7 +12,7 @@ from tests.toolchain.lower.compiled import llvm
 from tests.toolchain.lower.interpret import Interpreter
 from toolchain.ir.model import Function, Instr
 from toolchain.ir.read import read_module
-from toolchain.lower import cfg, combine, induction, legalize, magic, switch
+from toolchain.lower import cfg, combine, induction, legalize, magic, single_bits, switch
 
 SOURCE = """
 int walk(int *a, int n) { int s = 0; n &= 15;
@@ -67,6 +67,7 @@ PASSES: dict[str, Callable[[Function], None]] = {
     "switches for size": lambda f: switch.lower_switches(f, True),
     "switches for speed": lambda f: switch.lower_switches(f, False),
     "critical edges": cfg.split_critical_edges,
+    "single bits": partial(single_bits.run, near=lambda name: True),
 }
 TEXTS: dict[str, str] = {}
 

@@ -69,3 +69,26 @@ def _later(place: str, words: str) -> str:
 def test_accesses_stay_in_number_and_order(level: str, source: str, expected: list[str]) -> None:
     """The same sequence at each level."""
     assert accesses(body(assembly(DECLARED + source, level), "f")) == expected
+
+
+BITS = [
+    ("another bit in each branch", "void f(int x){ if (x) A |= 4; else A &= ~8; }", ["bclr _A,#3", "bset _A,#2"]),
+    ("the same bit", "void f(int x){ if (x) A |= 4; else A &= ~4; }", ["bclr _A,#2", "bset _A,#2"]),
+    ("of a byte", "void f(int x){ if (x) C |= 4; else C ^= 128; }", ["bset.b _C,#2", "btg.b _C,#7"]),
+    ("behind calls",
+     "void g(void); void f(int x){ if (x) { g(); A |= 4; } else if (B) A &= ~4; else { g(); A |= 8; } }",
+     ["bclr _A,#2", "bset _A,#2", "bset _A,#3"]),
+    ("of a variable at an address", """#define D (*(volatile unsigned *)0x2D6)
+     void f(int x){ if (x) D |= 4; else D &= ~8; }""", ["bclr 0x02D6,#3", "bset 0x02D6,#2"]),
+    ("in a loop", "void f(int n){ while (n--) { if (B & 2) A |= 4; else A &= ~8; } }", ["bclr _A,#3", "bset _A,#2"]),
+    ("beside a whole value", "void f(int x){ if (x & 1) A |= 4; else A = x; B = 1; }", ["bset _A,#2"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("level", LEVELS[1:])
+@pytest.mark.parametrize(("source", "expected"), [row[1:] for row in BITS], ids=[row[0] for row in BITS])
+def test_bits_written_in_branches_are_one_instruction_each(level: str, source: str, expected: list[str]) -> None:
+    """isa.md §5.4: an interrupt between a load and a store of the same word would lose what it wrote."""
+    lines = body(assembly(f"{DECLARED}\n{source}", level), "f")
+    assert sorted(line for line in lines if line.startswith(("bset", "bclr", "btg"))) == expected
+    assert not any(line.startswith("mov _A,") for line in lines)
