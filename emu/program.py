@@ -62,13 +62,10 @@ class ProgramMemory:
 
     def erase(self) -> None:
         """Everything as from the factory: all ones, EEPROM and latches too."""
-        for word in range(len(self.flash)):
-            self.flash[word] = ERASED_WORD
-        for half in (self.eeprom, self.config):
-            for word in range(len(half)):
-                half[word] = ERASED_HALF
-        for word in range(len(self.unit)):
-            self.unit[word] = ERASED_WORD
+        for words, erased in (
+            (self.flash, ERASED_WORD), (self.eeprom, ERASED_HALF), (self.config, ERASED_HALF), (self.unit, ERASED_WORD)
+        ):  # fmt: skip
+            words.cast("B")[:] = erased.to_bytes(words.itemsize, "little") * len(words)
         self.clear_latches()
         self._announce(0, self._flash_end)
 

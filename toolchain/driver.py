@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,15 +22,17 @@ from toolchain.files import read_bytes, read_text, write_outputs
 if TYPE_CHECKING:
     from toolchain.cc_link import Program
 
+FrontEnd = Callable[[CcOptions, Path], dict[Input, bytes]]
 IR_SOURCES = {"c", "cpp-output", "c++", "c++-cpp-output"}
 CXX_OF = {"c": "c++", "cpp-output": "c++-cpp-output"}
 MAX_INVENTIONS = 4  # runs of the middle end; each forbids what the one before made up
 
 
-def main(argv: list[str], cxx: bool = False) -> int:
+def main(argv: list[str], cxx: bool = False, front: FrontEnd | None = None) -> int:
     """Run the compiler driver on `argv` (without program name); return the exit status, never raise on bad input.
 
-    With `cxx` C sources are compiled as C++.
+    With `cxx` C sources are compiled as C++. `front` stands for `front_end` where files are compiled and linked at
+    once: who builds the same sources in several ways can keep what it gave.
     """
     from toolchain.clang import CompileError
 
@@ -44,7 +47,7 @@ def main(argv: list[str], cxx: bool = False) -> int:
         else:
             with tempfile.TemporaryDirectory(prefix="dspic-cc-") as scratch:
                 try:
-                    _run(options, Path(scratch))
+                    _run(options, Path(scratch), front or front_end)
                 except ToolError as error:
                     raise _explained(options, error, Path(scratch)) from error
     except CompileError:
@@ -68,10 +71,10 @@ def _explained(options: CcOptions, error: ToolError, scratch: Path) -> ToolError
     again = replace(options, debug=True, clang=[*options.clang, "-w"], dependency=[], map_file=None, verbose=False)
     if not options.debug and options.stage != "compile":
         try:
-            _run(replace(again, output=scratch / "again.elf", save_temps=False), scratch)
+            _run(replace(again, output=scratch / "again.elf", save_temps=False), scratch, front_end)
         except ToolError as found:
             error = found
-    return with_places(error, lambda: (ir.decode() for ir in _front_end(again, scratch).values()))
+    return with_places(error, lambda: (ir.decode() for ir in front_end(again, scratch).values()))
 
 
 def _print_version() -> None:
@@ -86,15 +89,15 @@ def _print_version() -> None:
     print(f"Target: {NAMES[0]}")
 
 
-def _run(options: CcOptions, scratch: Path) -> None:
+def _run(options: CcOptions, scratch: Path, front: FrontEnd) -> None:
     if options.stage == "preprocess":
         _preprocess(options)
     elif options.stage == "link":
         from toolchain.cc_link import link_program
 
-        link_program(options, _compile_program(options, scratch))
+        link_program(options, _compile_program(options, scratch, front))
     else:
-        modules = _front_end(options, scratch)
+        modules = front_end(options, scratch)
         outputs = [_translate(options, item, modules, scratch) for item in options.inputs]
         write_outputs(outputs)
 
@@ -107,7 +110,7 @@ def _preprocess(options: CcOptions) -> None:
     run_jobs(jobs, options.jobs, options.verbose)
 
 
-def _front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
+def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     """Unoptimised IR of every input that has any; all C files are compiled before an error ends the run."""
     from toolchain.clang import ir_job, repaired, run_jobs
     from toolchain.first_values import marked
@@ -199,7 +202,7 @@ def _assembly_text(options: CcOptions, item: Input, scratch: Path) -> str:
 
 def object_of(options: CcOptions, item: Input, scratch: Path) -> bytes:
     """Native object of one C, IR or assembly input."""
-    modules = _front_end(replace(options, inputs=[item]), scratch)
+    modules = front_end(replace(options, inputs=[item]), scratch)
     return _object(options, item, modules, scratch)
 
 
@@ -234,13 +237,13 @@ def _output(options: CcOptions, item: Input, suffix: str) -> Path:
     return options.output or Path(item.path.stem + suffix)
 
 
-def _compile_program(options: CcOptions, scratch: Path) -> Program:
+def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Program:
     """Everything the linker needs: native objects in command-line order, merged C code last, archives."""
     from toolchain import polled_flags
     from toolchain.cc_link import Program, find_library, output_path
     from toolchain.runtime_archive import library
 
-    modules = _front_end(options, scratch)
+    modules = front(options, scratch)
     program = Program(runtime=library(object_of, options.jobs) if options.runtime or options.startup else b"")
     for item in options.inputs:
         if item.language == "archive":

@@ -3,8 +3,9 @@ simavr the same one.
 
 `python tests/fuzz/csmith_campaign.py [--count N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`.
 Needs Debian's `csmith`; the AVR, another machine with 16-bit int, joins in when `gcc-avr avr-libc simavr` are there.
-Programs that run too long at -O0 or do not fit into 8 kB of RAM are skipped. FILE gets a line per program, and programs
-it names are not run again. Exit status 0 when all checksums agree; DIR keeps sources of failures.
+Programs that run too long at -O0 or do not fit into 8 kB of RAM are skipped. With FILE a campaign can be interrupted
+and gone on with, and several processes can share it (`verdicts.py`). Exit status 0 when all checksums agree; DIR keeps
+sources of failures. Shapes whose images are equal to the byte are run once.
 
 Two things csmith leaves undefined here are repaired, because a compiler may do anything with them:
 - its shift wrappers allow distances below 32 for every type; here the limit is the width of the shifted value;
@@ -13,27 +14,24 @@ Two things csmith leaves undefined here are repaired, because a compiler may do 
 
 from __future__ import annotations
 
-import argparse
 import atexit
 import functools
-import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tests.fuzz.seeds import SKIPPED, base_seed  # noqa: E402
-from tests.toolchain.c_programs import build, run  # noqa: E402
+from emu.status import BAD_INPUT  # noqa: E402
+from tests.fuzz.seeds import SKIPPED, Course, parser  # noqa: E402
+from tests.fuzz.verdicts import Book, LogError, Verdict, run_all  # noqa: E402
+from tests.toolchain.c_programs import FrontEndOnce, build, run  # noqa: E402
 
 RUNTIME = Path(__file__).parent / "csmith_runtime"
 HEADERS = Path("/usr/include/csmith")
@@ -51,19 +49,8 @@ GENERATOR = [
 ]
 AVR = ["avr-gcc", "-mmcu=atmega1284p", "-Os", "-w"]
 AVR_SECONDS = 20
-BATCH = 6
-"""Programs between two looks at the clock."""
 MEMORY = re.compile(r"does not fit|no room for the stack|overflow")
 MEMBER_ADDRESS = re.compile(r"&\w+(\[\w+\])*(\.|->)f\d")
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """`kind` is agreed, skipped or failed."""
-
-    seed: int
-    kind: str
-    reason: str = ""
 
 
 def available() -> bool:
@@ -106,16 +93,26 @@ def flags() -> list[str]:
     return ["-std=gnu11", f"-I{RUNTIME}", f"-I{headers()}", f"-I{HEADERS}"]
 
 
-def ours(source: Path, level: str, alone: str, folder: Path) -> tuple[str, str]:
-    """(checksum, "") or ("", why there is none)."""
-    image = folder / f"{source.stem}{level}{alone}.elf"
-    built = build([source], image, level, *alone.split(), "-w", *flags())
-    if built.status != 0:
-        return "", f"memory: {built.first_error}" if MEMORY.search(built.messages) else f"build: {built.first_error}"
-    ran = run(image, CYCLES, engine="interp", native_after=SHORT)
-    if ran.status is None:
-        return "", ran.why
-    return ran.uart.decode("latin-1").strip(), ""
+class OnTheChip:
+    """One program by our compiler, on the emulator."""
+
+    def __init__(self, source: Path, folder: Path) -> None:
+        self.source, self.folder = source, folder
+        self._front = FrontEndOnce()
+        self._ran: dict[bytes, tuple[str, str]] = {}
+
+    def checksum(self, level: str, alone: str) -> tuple[str, str]:
+        """(checksum, "") or ("", why there is none)."""
+        image = self.folder / f"{self.source.stem}{level}{alone}.elf"
+        built = build([self.source], image, level, *alone.split(), "-w", *flags(), front=self._front)
+        if built.status != 0:
+            stage = "memory" if MEMORY.search(built.messages) else "build"
+            return "", f"{stage}: {built.first_error}"
+        content = image.read_bytes()
+        if content not in self._ran:
+            ran = run(image, CYCLES, engine="interp", native_after=SHORT)
+            self._ran[content] = ("", ran.why) if ran.status is None else (ran.uart.decode("latin-1").strip(), "")
+        return self._ran[content]
 
 
 def on_avr(source: Path, folder: Path) -> str:
@@ -151,76 +148,45 @@ def examine(seed: int, keep: Path | None = None, shapes: tuple[Shape, ...] = SHA
 def compare(seed: int, source: Path, folder: Path, shapes: tuple[Shape, ...] = SHAPES) -> Verdict:
     """Checksums of one program in all shapes, -O0 first, and on the AVR. The compiler verifies its machine code."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
-    sums = {}
+    chip, sums = OnTheChip(source, folder), {}
     for level, alone in shapes:
         shape = f"{level} {alone}".strip()
-        sums[shape], why = ours(source, level, alone, folder)
+        sums[shape], why = chip.checksum(level, alone)
+        verdict = partial(Verdict, seed, shapes=tuple(sums))
         if why.startswith("memory"):
-            return Verdict(seed, "skipped", "does not fit into the device's memory")
+            return verdict("skipped", "does not fit into the device's memory")
         if why == "trap: stack error":
-            return Verdict(seed, "skipped", "needs more stack than there is RAM")
+            return verdict("skipped", "needs more stack than there is RAM")
         if why.startswith("limit") and len(sums) == 1:
-            return Verdict(seed, "skipped", f"still running after {CYCLES} cycles at {shape}")
+            return verdict("skipped", f"still running after {CYCLES} cycles at {shape}")
         if why:
-            return Verdict(seed, "failed", f"{shape}: {why}")
+            return verdict("failed", f"{shape}: {why}")
     reference = on_avr(source, folder) if avr_available() else ""
     first = next(iter(sums.values()))
     if len(set(sums.values())) != 1:
-        return Verdict(seed, "failed", f"{sums}, avr {reference or 'unknown'}")
+        return verdict("failed", f"{sums}, avr {reference or 'unknown'}")
     if reference and reference != first:
-        return Verdict(seed, "failed", f"{first} at every level, avr {reference}")
-    return Verdict(seed, "agreed", "with avr" if reference else "levels only")
-
-
-def _examine(work: tuple[int, Path | None]) -> Verdict:
-    try:
-        return examine(*work)
-    except Exception as error:
-        return Verdict(work[0], "failed", f"internal error: {type(error).__name__}: {error}")
+        return verdict("failed", f"{first} at every level, avr {reference}")
+    return verdict("agreed", "with avr" if reference else "levels only")
 
 
 def main() -> int:
     """Command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="example: csmith_campaign.py --count 1000 --jobs 2")  # fmt: skip
-    parser.add_argument("--count", type=int, help="programs (default 1000; with --seconds no limit)")
-    parser.add_argument("--seed", type=int, default=base_seed(), help="of the first program (default: from the commit)")
-    parser.add_argument("--seconds", type=float, help="begin no new program after S seconds", metavar="S")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--log", type=Path, help="file of verdicts, read and continued")
-    parser.add_argument("--keep", type=Path, help="folder for the sources of failures")
-    options = parser.parse_args()
+    options = parser(__doc__)
+    options.epilog = "example: csmith_campaign.py --count 1000 --jobs 2"
+    options.add_argument("--jobs", type=int, default=2)
+    options.add_argument("--log", type=Path, help="file of verdicts, read and continued")
+    options.add_argument("--keep", type=Path, help="folder for the sources of failures")
+    course = Course(options, "count", 1000, "programs")
+    given = course.parse()
     if not available():
         print("csmith is not installed (Debian package csmith): nothing to do", file=sys.stderr)
         return SKIPPED
-    count = options.count if options.count is not None or options.seconds is not None else 1000
-    done, start, seed = known(options.log), time.monotonic(), options.seed
-    with ProcessPoolExecutor(options.jobs) as pool:
-        while count is None or seed < options.seed + count:
-            if options.seconds is not None and time.monotonic() - start >= options.seconds:
-                break
-            end = seed + BATCH if count is None else min(seed + BATCH, options.seed + count)
-            work = [(number, options.keep) for number in range(seed, end) if number not in done]
-            seed = end
-            for verdict in pool.map(_examine, work):
-                done[verdict.seed] = verdict
-                if options.log:
-                    with options.log.open("a") as log:
-                        print(json.dumps(asdict(verdict)), file=log)
-                if verdict.kind == "failed":
-                    print(f"FAILED at seed {verdict.seed}: {verdict.reason}", flush=True)
-                    print(f"again: python tests/fuzz/csmith_campaign.py --seed {verdict.seed} --count 1", flush=True)
-    counts = Counter(f"{v.kind} {v.reason if v.kind != 'failed' else ''}".strip() for v in done.values())
-    print("\n".join(f"{count} {kind}" for kind, count in sorted(counts.items())))
-    return 1 if counts["failed"] else 0
-
-
-def known(log: Path | None) -> dict[int, Verdict]:
-    """Verdicts of an earlier, interrupted campaign."""
-    if log is None or not log.exists():
-        return {}
-    return {row["seed"]: Verdict(**row) for row in map(json.loads, log.read_text().splitlines())}
+    try:
+        return run_all(course, partial(examine, keep=given.keep), Book(given.log, "csmith"), given.jobs)
+    except LogError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
 
 
 if __name__ == "__main__":

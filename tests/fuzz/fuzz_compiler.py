@@ -1,8 +1,10 @@
 """Random firmware-like C (`c_shapes.py`) at every level, with and without -fno-lto, on the emulator: one checksum and
 one sequence of accesses to volatile registers, those of the host's model where gcc is installed.
 
-`python tests/fuzz/fuzz_compiler.py [--programs N] [--seed S] [--seconds T] [--jobs J] [--keep DIR]`; exits 1 with the
-first program that differs; DIR gets its sources. The compiler verifies its machine code after every pass meanwhile.
+`python tests/fuzz/fuzz_compiler.py [--programs N] [--seed S] [--seconds T] [--jobs J] [--log FILE] [--keep DIR]`;
+exits 1 if a program differs; DIR gets its sources. With FILE a campaign can be interrupted and gone on with, and
+several processes can share it (`verdicts.py`). The compiler verifies its machine code after every pass meanwhile.
+Shapes whose images are equal to the byte are run once.
 """
 
 from __future__ import annotations
@@ -13,20 +15,19 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
+from emu.status import BAD_INPUT  # noqa: E402
 from tests.fuzz.c_shapes import Program  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
-from tests.toolchain.c_programs import build  # noqa: E402
+from tests.fuzz.verdicts import Book, LogError, Verdict, run_all  # noqa: E402
+from tests.toolchain.c_programs import FrontEndOnce, build  # noqa: E402
 
 SHAPES = tuple((level, alone) for level in ("-O0", "-O1", "-Os", "-O2") for alone in ("", "-fno-lto"))
 CYCLES = 3_000_000
@@ -43,14 +44,6 @@ class Seen:
     trace: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """`kind` is agreed, skipped or failed."""
-
-    kind: str
-    reason: str
-
-
 def model(folder: Path) -> Seen | None:
     """The program on the host, None where there is no gcc."""
     if shutil.which("gcc") is None:
@@ -63,12 +56,29 @@ def model(folder: Path) -> Seen | None:
     return Seen(checksum, tuple(trace))
 
 
-def on_the_chip(folder: Path, level: str, alone: str) -> Seen | str:
-    """The program on the emulator, or why there is no result."""
-    image = folder / f"program{level}{alone}.elf"
-    built = build([folder / name for name in SOURCES], image, level, *alone.split(), "-w", "-std=gnu11")
-    if built.status:
-        return f"build: {built.first_error}"
+class OnTheChip:
+    """One program by our compiler, on the emulator."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._front = FrontEndOnce()
+        self._ran: dict[bytes, Seen | str] = {}
+
+    def seen(self, level: str, alone: str) -> Seen | str:
+        """What a run shows, or why there is no result."""
+        image = self.folder / f"program{level}{alone}.elf"
+        sources = [self.folder / name for name in SOURCES]
+        built = build(sources, image, level, *alone.split(), "-w", "-std=gnu11", front=self._front)
+        if built.status:
+            return f"build: {built.first_error}"
+        content = image.read_bytes()
+        if content not in self._ran:
+            self._ran[content] = seen_of(image)
+        return self._ran[content]
+
+
+def seen_of(image: Path) -> Seen | str:
+    """What a run of the image shows, or why it did not end."""
     machine = emu.load(image, engine="interp")
     trace: list[str] = []
     for k, name in enumerate(PORTS):
@@ -91,53 +101,53 @@ def examine(seed: int, keep: Path | None = None) -> Verdict:
         for file, text in Program(seed).files.items():
             (folder / file).write_text(text)
         try:
-            verdict = compare(folder)
+            verdict = compare(seed, folder)
         except Exception as error:
-            verdict = Verdict("failed", f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}")
+            said = str(error).splitlines()
+            verdict = Verdict(seed, "failed", f"{type(error).__name__}: {said[0] if said else ''}")
         if verdict.kind == "failed" and keep is not None:
             shutil.copytree(folder, keep / str(seed), dirs_exist_ok=True)
         return verdict
 
 
-def compare(folder: Path) -> Verdict:
+def compare(seed: int, folder: Path) -> Verdict:
     """All shapes with the model, or with each other."""
     expected, whose = model(folder), "the host's model"
+    chip, compared = OnTheChip(folder), []
     for level, alone in SHAPES:
-        seen = on_the_chip(folder, level, alone)
+        seen = chip.seen(level, alone)
         shape = f"{level} {alone}".strip()
+        compared.append(shape)
+        verdict = partial(Verdict, seed, shapes=tuple(compared))
         if isinstance(seen, str):
             if NO_ROOM.search(seen):
-                return Verdict("skipped", "does not fit into the device's memory")
-            return Verdict("failed", f"{shape}: {seen}")
+                return verdict("skipped", "does not fit into the device's memory")
+            return verdict("failed", f"{shape}: {seen}")
         if expected is None:
             expected, whose = seen, shape
         if seen.trace != expected.trace:
             at = next((k for k, (a, b) in enumerate(zip(seen.trace, expected.trace, strict=False)) if a != b),
                       min(len(seen.trace), len(expected.trace)))  # fmt: skip
-            return Verdict("failed", f"{shape}: access {at} is {seen.trace[at : at + 4]}, of {whose} "
+            return verdict("failed", f"{shape}: access {at} is {seen.trace[at : at + 4]}, of {whose} "
                                      f"{expected.trace[at : at + 4]}")  # fmt: skip
         if seen.checksum != expected.checksum:
-            return Verdict("failed", f"{shape}: {seen.checksum}, {whose} {expected.checksum}")
-    return Verdict("agreed", "")
+            return verdict("failed", f"{shape}: {seen.checksum}, {whose} {expected.checksum}")
+    return verdict("agreed")
 
 
 def main() -> int:
     """Command line."""
     options = parser(__doc__)
     options.add_argument("--jobs", type=int, default=2)
-    options.add_argument("--keep", type=Path, help="folder for the sources of a failure")
+    options.add_argument("--log", type=Path, help="file of verdicts, read and continued")
+    options.add_argument("--keep", type=Path, help="folder for the sources of failures")
     course = Course(options, "programs", 200, "programs")
     given = course.parse()
-    counts: Counter[str] = Counter()
-    seeds = iter(course)
-    with ProcessPoolExecutor(given.jobs) as pool:
-        while batch := list(islice(seeds, 2 * given.jobs)):
-            for seed, verdict in zip(batch, pool.map(partial(examine, keep=given.keep), batch), strict=True):
-                counts[f"{verdict.kind} {verdict.reason}".strip()] += 1
-                if verdict.kind == "failed":
-                    course.seed = seed
-                    return course.failed(verdict.reason)
-    return course.ended(", ".join(f"{n} {kind}" for kind, n in sorted(counts.items())))
+    try:
+        return run_all(course, partial(examine, keep=given.keep), Book(given.log, "compiler"), given.jobs)
+    except LogError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
 
 
 if __name__ == "__main__":

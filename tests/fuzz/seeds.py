@@ -95,26 +95,27 @@ class Course:
         print(f"{self.done} {self.option} from seed {self.first}, {self.spent:.0f} s: {seen}", flush=True)
         return 0
 
-    def failed(self, seen: object) -> int:
-        """Name the seed that is being tried and the command that tries it again; status 1."""
-        print(f"FAILED at seed {self.seed}: {seen}", flush=True)
+    def failed(self, seen: object, seed: int | None = None) -> int:
+        """Name `seed` (default: the one that is being tried) and the command that tries it again; status 1."""
+        seed = self.seed if seed is None else seed
+        print(f"FAILED at seed {seed}: {seen}", flush=True)
         script = Path(sys.argv[0]).resolve()
         place = script.relative_to(ROOT) if script.is_relative_to(ROOT) else script
-        print(f"again: python {place} {' '.join(self._again())}", flush=True)
+        print(f"again: python {place} {' '.join(self._again(seed))}", flush=True)
         return 1
 
-    def _again(self) -> list[str]:
-        """The options of this run, for the seed that failed alone."""
+    def _again(self, seed: int) -> list[str]:
+        """The options of this run, for the seed that failed alone, whatever a file of verdicts says of it."""
         kept: list[str] = []
         words = iter(sys.argv[1:])
         for word in words:
             name, equals, _ = word.partition("=")
-            if name in ("--seed", "--seconds", f"--{self.option}"):
+            if name in ("--seed", "--seconds", "--log", f"--{self.option}"):
                 if not equals:
                     next(words, None)
             else:
                 kept.append(word)
-        return [*kept, "--seed", str(self.seed), f"--{self.option}", "1"]
+        return [*kept, "--seed", str(seed), f"--{self.option}", "1"]
 
 
 def parser(text: str | None) -> argparse.ArgumentParser:

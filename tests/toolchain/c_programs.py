@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import contextlib
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import emu
 from toolchain import driver
+from toolchain.cc_options import CcOptions, Input
 
 INTCON1_TRAPS = {1: "oscillator", 2: "stack error", 3: "address error", 4: "math error"}
 """Trap flags of INTCON1 by bit (isa.md §14.4)."""
@@ -41,11 +42,30 @@ class Ran:
     cycles: int
 
 
-def build(sources: list[Path], output: Path, *options: str) -> Built:
-    """`python -m toolchain cc options sources -o output` without starting a process."""
+class FrontEndOnce:
+    """The front end for one program that is built in several ways: what it gave is kept.
+
+    Its answer depends on sources, level and options of C, not on what comes behind it (-fno-lto, the output's name).
+    Sources must not change meanwhile; what the front end says is told once.
+    """
+
+    def __init__(self) -> None:
+        self._made: dict[str, dict[Input, bytes]] = {}
+
+    def __call__(self, options: CcOptions, scratch: Path) -> dict[Input, bytes]:
+        """As `driver.front_end`."""
+        assert not options.dependency, "a dependency file names the output"
+        key = repr(replace(options, lto=None, output=None))
+        if key not in self._made:
+            self._made[key] = driver.front_end(options, scratch)
+        return self._made[key]
+
+
+def build(sources: list[Path], output: Path, *options: str, front: driver.FrontEnd | None = None) -> Built:
+    """`python -m toolchain cc options sources -o output` without starting a process; `front` as for `driver.main`."""
     said = io.StringIO()
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
-        status = driver.main([*options, *map(str, sources), "-o", str(output)])
+        status = driver.main([*options, *map(str, sources), "-o", str(output)], front=front)
     return Built(status, said.getvalue())
 
 

@@ -1,0 +1,137 @@
+"""Files of verdicts: gone on with, shared, and of one compiler."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz import verdicts
+from tests.fuzz.seeds import ROOT, Course, parser
+from tests.fuzz.verdicts import Book, LogError, Verdict, run_all
+
+OTHER = """
+import sys, time
+from pathlib import Path
+from tests.fuzz.verdicts import Book, Verdict
+book = Book(Path(sys.argv[1]), "made up")
+print(*[seed for seed in range(4) if book.take(seed)], flush=True)
+book.put(Verdict(0, "agreed"))
+print("put", flush=True)
+time.sleep(60)
+"""
+SLOW = """
+import sys, time
+from functools import partial
+from pathlib import Path
+from tests.fuzz.seeds import Course, parser
+from tests.fuzz.verdicts import Book, Verdict, run_all
+def examine(seed):
+    Path(sys.argv[1] + ".begun").touch()
+    time.sleep(0.5)
+    return Verdict(seed, "agreed", "", ("-O0",))
+course = Course(parser("text"), "programs", 1000, "programs")
+course.parse(["--seed", "1"])
+sys.exit(run_all(course, examine, Book(Path(sys.argv[1]), "made up"), 1))
+"""
+
+
+def judge(differing: set[int], seed: int) -> Verdict:
+    """A verdict without work."""
+    return Verdict(seed, "failed", "it differs") if seed in differing else Verdict(seed, "agreed", "", ("-O0", "-Os"))
+
+
+def course(count: int) -> Course:
+    """Seeds from 1 on."""
+    made = Course(parser("text"), "programs", count, "programs")
+    made.parse(["--seed", "1"])
+    return made
+
+
+def test_a_campaign_goes_on_where_its_file_ends(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What has a verdict is not examined again and counts all the same; failures are named and stop nothing."""
+    log = tmp_path / "log"
+    assert run_all(course(3), partial(judge, {2}), Book(log, "made up"), 1) == 1
+    assert "FAILED at seed 2: it differs" in capsys.readouterr().out
+    known = Book(log, "made up").verdicts
+    assert known == {1: judge(set(), 1), 2: judge({2}, 2), 3: judge(set(), 3)}
+    assert run_all(course(4), partial(judge, {1, 3}), Book(log, "made up"), 1) == 1
+    assert "3 agreed, 1 failed" in capsys.readouterr().out
+    assert len(log.read_text().splitlines()) == 1 + 4
+
+
+def test_two_processes_share_the_seeds_and_a_killed_one_leaves_its_own(tmp_path: Path) -> None:
+    """Nobody takes what another is at; verdicts are seen by all."""
+    log = tmp_path / "log"
+    with subprocess.Popen([sys.executable, "-c", OTHER, str(log)], cwd=ROOT, stdout=subprocess.PIPE, text=True) as one:
+        assert one.stdout is not None
+        assert one.stdout.readline().split() == ["0", "1", "2", "3"]
+        assert one.stdout.readline() == "put\n"
+        book = Book(log, "made up")
+        assert [seed for seed in range(6) if book.take(seed)] == [4, 5]
+        assert 0 in book.verdicts
+        one.kill()
+        one.wait()
+        assert [seed for seed in range(4) if book.take(seed)] == [1, 2, 3]
+
+
+def test_an_interrupted_campaign_writes_down_what_it_was_at(tmp_path: Path) -> None:
+    """Status 130, and a file that is gone on with."""
+    log = tmp_path / "log"
+    with subprocess.Popen([sys.executable, "-c", SLOW, str(log)], cwd=ROOT, stderr=subprocess.PIPE) as running:
+        while not log.with_name("log.begun").exists():
+            time.sleep(0.05)
+        running.send_signal(signal.SIGINT)
+        running.communicate(timeout=60)
+    assert running.returncode == verdicts.INTERRUPTED
+    done = Book(log, "made up").verdicts
+    assert 1 in done
+    assert len(done) < 10
+
+
+def test_workers_do_not_outlive_a_killed_campaign(tmp_path: Path) -> None:
+    """A process of the pool waits for work without end otherwise."""
+    log = tmp_path / "log"
+    with subprocess.Popen([sys.executable, "-c", SLOW, str(log)], cwd=ROOT, stderr=subprocess.PIPE) as running:
+        while not log.with_name("log.begun").exists():
+            time.sleep(0.05)
+        running.kill()
+        running.communicate(timeout=60)  # ends when no worker holds the other end of the pipe
+
+
+def test_verdicts_on_another_compiler_or_of_another_campaign_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the file's name and what to do."""
+    log = tmp_path / "log"
+    Book(log, "made up").put(Verdict(1, "agreed"))
+    with pytest.raises(LogError, match="not a file of the campaign 'other'"):
+        Book(log, "other")
+    monkeypatch.setattr(verdicts, "judged", lambda: "0123")
+    with pytest.raises(LogError, match="another compiler or emulator; begin another file"):
+        Book(log, "made up")
+
+
+def test_damaged_files_are_refused_and_half_a_line_is_no_verdict(tmp_path: Path) -> None:
+    """A process that is killed while it writes costs its own verdict only."""
+    log = tmp_path / "log"
+    book = Book(log, "made up")
+    book.put(Verdict(1, "agreed"))
+    with log.open("ab") as stream:
+        stream.write(b'{"seed": 2, "ki')
+    book.put(Verdict(3, "agreed"))
+    assert set(Book(log, "made up").verdicts) == {1, 3}
+    with log.open("ab") as stream:
+        stream.write(b"[]\n")
+    size = os.path.getsize(log)
+    with pytest.raises(LogError, match=f"no verdict before offset {size}"):
+        Book(log, "made up")
+    log.write_text("seeds\n")
+    with pytest.raises(LogError, match="line 1"):
+        Book(log, "made up")

@@ -1,0 +1,241 @@
+"""Long campaigns over programs: verdicts in a file, several processes on one file, interrupted and gone on with.
+
+Enters: seeds, and a function that examines one. Leaves: `Verdict`s, counted and written down as they come. The file has
+a line of JSON per verdict, behind a first line that says which campaign and which compiler it is about. Who works on a
+seed holds a lock on that byte of the file beside it (`FILE.lock`), so processes share the seeds between them, and those
+of one that was killed are free again.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import gc
+import hashlib
+import json
+import os
+import signal
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from tests.fuzz.seeds import ROOT, Course
+
+INTERRUPTED = 130
+"""Exit status of a campaign that was ended by SIGINT or SIGTERM, and failed in nothing until then."""
+JUDGED = ("toolchain", "emu")
+"""What verdicts are about, relative to the project."""
+SUFFIXES = {".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv"}
+LOOK_AGAIN = 1.0
+"""Seconds between two looks whether a campaign was interrupted, or is gone."""
+COLLECT_EVERY = 100_000
+"""Objects between two collections of garbage: a compilation makes millions and leaves few cycles."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """`kind` is agreed, skipped or failed; `shapes` are the levels and ways of linking that were compared."""
+
+    seed: int
+    kind: str
+    reason: str = ""
+    shapes: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        """The words under which it is counted."""
+        return f"{self.kind} {self.reason if self.kind != 'failed' else ''}".strip()
+
+
+class LogError(Exception):
+    """A file of verdicts that cannot be gone on with."""
+
+
+def judged() -> str:
+    """Hash of the compiler, the library and the emulator that verdicts are about."""
+    digest = hashlib.sha256()
+    for folder in JUDGED:
+        for path in sorted(path for path in (ROOT / folder).rglob("*") if path.suffix in SUFFIXES):
+            digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:20]
+
+
+class Book:
+    """Verdicts by seed, in `path` if there is one, and who works on which seed."""
+
+    def __init__(self, path: Path | None, campaign: str) -> None:
+        """Read what is there. Raises LogError when it is of another campaign or compiler, or damaged."""
+        self.path = path
+        self.verdicts: dict[int, Verdict] = {}
+        self._head = {"campaign": campaign, "judged": judged() if path is not None else ""}
+        self._read_to = 0
+        if path is None:
+            return
+        self._locks = os.open(path.with_name(path.name + ".lock"), os.O_RDWR | os.O_CREAT, 0o666)
+        with self._alone():
+            if not path.exists() or not path.stat().st_size:
+                self._append(self._head)
+            self._read()
+
+    def take(self, seed: int) -> bool:
+        """Whether the seed is to be done here: it has no verdict, and no other process is at it."""
+        if self.path is None:
+            return seed not in self.verdicts
+        try:
+            fcntl.lockf(self._locks, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, 1 + seed)
+        except OSError:
+            return False
+        self._read()
+        if seed in self.verdicts:
+            self._let_go(seed)
+        return seed not in self.verdicts
+
+    def put(self, verdict: Verdict) -> None:
+        """Write a verdict down."""
+        self.verdicts[verdict.seed] = verdict
+        if self.path is not None:
+            with self._alone():
+                self._append(asdict(verdict))
+            self._let_go(verdict.seed)
+
+    def _let_go(self, seed: int) -> None:
+        fcntl.lockf(self._locks, fcntl.LOCK_UN, 1, 1 + seed)
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Nobody else reads the file's beginning or writes meanwhile: byte 0 of the locks."""
+        fcntl.lockf(self._locks, fcntl.LOCK_EX, 1, 0)
+        try:
+            yield
+        finally:
+            fcntl.lockf(self._locks, fcntl.LOCK_UN, 1, 0)
+
+    def _append(self, row: dict[str, object]) -> None:
+        """One line. What a killed process began to write is ended first."""
+        assert self.path is not None
+        with self.path.open("a+b") as log:
+            if log.tell():
+                log.seek(-1, os.SEEK_END)
+                if log.read(1) != b"\n":
+                    log.write(b"\n")
+            log.write(json.dumps(row).encode() + b"\n")
+
+    def _read(self) -> None:
+        """Lines that have come since the last time; half a line, of a process that was killed, is no verdict."""
+        assert self.path is not None
+        with self.path.open("rb") as log:
+            log.seek(self._read_to)
+            lines = log.read().splitlines(keepends=True)
+        for line in lines:
+            if not line.endswith(b"\n"):
+                break
+            first = not self._read_to
+            self._read_to += len(line)
+            try:
+                row = json.loads(line)
+            except ValueError:
+                if first:
+                    raise LogError(f"{self.path}: line 1 is not that of a file of verdicts") from None
+                continue
+            if first:
+                self._check(row)
+                continue
+            try:
+                self.verdicts[row["seed"]] = Verdict(**row | {"shapes": tuple(row["shapes"])})
+            except (TypeError, KeyError):
+                raise LogError(f"{self.path}: no verdict before offset {self._read_to}") from None
+
+    def _check(self, row: object) -> None:
+        if not isinstance(row, dict) or row.get("campaign") != self._head["campaign"]:
+            raise LogError(f"{self.path}: not a file of the campaign '{self._head['campaign']}'")
+        if row.get("judged") != self._head["judged"]:
+            raise LogError(f"{self.path}: its verdicts are about another compiler or emulator; begin another file")
+
+
+def run_all(course: Course, examine: Callable[[int], Verdict], book: Book, jobs: int) -> int:
+    """Examine the seeds of `course` in `jobs` processes; the exit status.
+
+    It goes on behind failures. After SIGINT or SIGTERM the programs being examined are ended and written down; a second
+    signal ends at once.
+    """
+    stopped: list[int] = []
+
+    def stop(number: int, _frame: object) -> None:
+        stopped.append(number)
+        signal.signal(number, signal.SIG_DFL)
+        print("ending: what is being examined is written down", file=sys.stderr, flush=True)
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    done: dict[int, Verdict] = {}
+    elsewhere: set[int] = set()
+    try:
+        with ProcessPoolExecutor(jobs, initializer=_worker) as pool:
+            running: set[Future[Verdict]] = set()
+            for seed in course:
+                while len(running) > jobs and not stopped:
+                    running = _noted(running, book, done, course)
+                if stopped:
+                    break
+                if book.take(seed):
+                    running.add(pool.submit(_examined, examine, seed))
+                elif seed in book.verdicts:
+                    done[seed] = book.verdicts[seed]
+                else:
+                    elsewhere.add(seed)
+            for future in running if stopped else ():
+                future.cancel()
+            while running := {future for future in running if not future.cancelled()}:
+                running = _noted(running, book, done, course)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    counts = Counter(verdict.summary for verdict in done.values())
+    if elsewhere:
+        counts["with another process"] = len(elsewhere)
+    course.ended(", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "nothing")
+    if counts["failed"]:
+        return 1
+    return INTERRUPTED if stopped else 0
+
+
+def _worker() -> None:
+    """A process of the pool: signals of a terminal are for the campaign, and collections seldom pay."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_leave_with, args=(os.getppid(),), daemon=True).start()
+    gc.freeze()
+    gc.set_threshold(COLLECT_EVERY)
+
+
+def _leave_with(campaign: int) -> None:
+    """End this process when the campaign's is gone, which a pool does not."""
+    while os.getppid() == campaign:
+        time.sleep(LOOK_AGAIN)
+    os._exit(1)
+
+
+def _noted(running: set[Future[Verdict]], book: Book, done: dict[int, Verdict], course: Course) -> set[Future[Verdict]]:
+    """Wait for a verdict, write down what there is; what is left."""
+    finished, left = wait(running, LOOK_AGAIN, FIRST_COMPLETED)
+    for future in finished:
+        if future.cancelled():
+            continue
+        verdict = future.result()
+        book.put(verdict)
+        done[verdict.seed] = verdict
+        if verdict.kind == "failed":
+            course.failed(verdict.reason, verdict.seed)
+    return left
+
+
+def _examined(examine: Callable[[int], Verdict], seed: int) -> Verdict:
+    try:
+        return examine(seed)
+    except Exception as error:
+        said = str(error).splitlines()
+        return Verdict(seed, "failed", f"internal error: {type(error).__name__}: {said[0] if said else ''}")
