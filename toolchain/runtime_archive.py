@@ -12,7 +12,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -23,10 +23,13 @@ RUNTIME_DIR = Path(__file__).parent / "runtime"
 PACKAGE_DIRS = ("toolchain", "emu/dspic30f/isa", "emu/chips")
 """What the compiled library depends on, relative to the folder that holds `toolchain`."""
 UNRELATED = ("toolchain/link", "toolchain/cli.py", "toolchain/README.md")
+SUFFIXES = (".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv")
 LEVEL = "s"
 LANGUAGES = {".c": "c", ".cpp": "c++", ".s": "assembler"}
 
 
+Dependency = tuple[tuple[str, ...], int, int]
+"""Parts of a file's path below the folder that holds `toolchain`, its size in bytes, when it was changed (ns)."""
 Compile = Callable[[CcOptions, Input, Path], bytes]
 """Makes an object of one source with a scratch folder: the driver, which itself needs this library."""
 
@@ -47,19 +50,29 @@ def library(compile_one: Compile, jobs: int = 0) -> bytes:
 
 def fingerprint() -> str:
     """Hash of the library's sources, the headers, the compiler's code and the packages it runs on."""
-    root = Path(__file__).parent.parent
+    return _hash_of(tuple(sorted(_dependencies(str(Path(__file__).parent.parent)))))
+
+
+@cache
+def _hash_of(dependencies: tuple[Dependency, ...]) -> str:
+    """The files are read again when one has another size or time of change: a process may link many programs."""
     digest = hashlib.sha256(f"{version('ziglang')} {version('llvmlite')} {sys.version_info[:2]}".encode())
-    for path in sorted(_dependencies(root)):
-        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    root = Path(__file__).parent.parent
+    for parts, _, _ in dependencies:
+        name = "/".join(parts)
+        digest.update(name.encode() + b"\0" + (root / name).read_bytes())
     return digest.hexdigest()[:20]
 
 
-def _dependencies(root: Path) -> Iterator[Path]:
-    for folder in PACKAGE_DIRS:
-        for path in (root / folder).rglob("*"):
-            name = path.relative_to(root).as_posix()
-            if path.suffix in (".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv") and not name.startswith(UNRELATED):
-                yield path
+def _dependencies(root: str) -> Iterator[Dependency]:
+    for package in PACKAGE_DIRS:
+        for folder, _, names in os.walk(os.path.join(root, package)):
+            place = os.path.relpath(folder, root).replace(os.sep, "/")
+            for name in names:
+                path = f"{place}/{name}"
+                if name.endswith(SUFFIXES) and not path.startswith(UNRELATED):
+                    status = os.stat(os.path.join(folder, name))
+                    yield tuple(path.split("/")), status.st_size, status.st_mtime_ns
 
 
 def build(compile_one: Compile, jobs: int = 0) -> bytes:

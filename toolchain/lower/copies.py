@@ -12,6 +12,8 @@ from .mir import MI, File, Imm, MBlock, Mem, MFunction
 Known = tuple[str, object]
 Facts = dict[int, int | Known]
 """Register -> the register it is a copy of, or the constant it holds."""
+Effect = tuple[int, int, Known | None, int]
+"""Registers an instruction writes, the one it copies (-1: none), the constant it loads, and the one for either (-1)."""
 
 
 def run(m: MFunction) -> bool:
@@ -29,12 +31,13 @@ def _solve(m: MFunction) -> dict[str, Facts]:
     starts: dict[str, Facts] = {entry: {}}
     starts |= {b.name: {} for b in m.blocks if b.address_taken}
     blocks = m.block_map()
+    effects = {b.name: [_effect(mi) for mi in b.insts] for b in m.blocks}
     work = list(starts)
     while work:
         name = work.pop()
         facts = dict(starts[name])
-        for mi in blocks[name].insts:
-            _follow(mi, facts)
+        for effect in effects[name]:
+            _follow(effect, facts)
         for s in dict.fromkeys(blocks[name].succs):
             old = starts.get(s)
             new = facts if old is None else {r: v for r, v in old.items() if facts.get(r) == v}
@@ -44,17 +47,22 @@ def _solve(m: MFunction) -> dict[str, Facts]:
     return {b.name: starts.get(b.name, {}) for b in m.blocks}
 
 
-def _follow(mi: MI, facts: Facts) -> None:
-    """Facts after one instruction."""
+def _effect(mi: MI) -> Effect:
+    """What one instruction does to facts."""
     copied = mi.args[0] if mi.is_copy() else None
-    value: int | Known | None = _constant(mi)
-    if isinstance(copied, int) and copied < SP:
-        value = facts.get(copied, copied)
-    if facts:
-        _forget(mi.register_sets()[1], facts)
+    source = copied if isinstance(copied, int) and copied < SP else -1
     dest = mi.args[-1] if mi.args else None
-    if value is not None and isinstance(dest, int) and dest < SP and value != dest:
-        facts[dest] = value
+    return mi.register_sets()[1], source, _constant(mi), dest if isinstance(dest, int) and dest < SP else -1
+
+
+def _follow(effect: Effect, facts: Facts) -> None:
+    """Facts after one instruction."""
+    written, source, value, dest = effect
+    result: int | Known | None = value if source < 0 else facts.get(source, source)
+    if facts:
+        _forget(written, facts)
+    if dest >= 0 and result is not None and result != dest:
+        facts[dest] = result
 
 
 def _forget(written: int, facts: Facts) -> None:
@@ -91,8 +99,9 @@ def _rewrite(b: MBlock, facts: Facts) -> bool:
             changed = True
             continue
         changed |= _use_originals(mi, made)
-        _follow(mi, facts)
-        _follow(mi, made)
+        effect = _effect(mi)
+        _follow(effect, facts)
+        _follow(effect, made)
         out.append(mi)
     b.insts = out
     return changed

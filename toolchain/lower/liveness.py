@@ -74,16 +74,29 @@ def solve(m: MFunction, gen: dict[str, int], kill: dict[str, int], at_return: in
 
 def remove_dead(m: MFunction) -> None:
     """Drop instructions whose results and flags nobody reads. Repeats until nothing changes."""
+    gen: dict[str, int] = {}
+    kill: dict[str, int] = {}
+    for b in m.blocks:
+        gen[b.name], kill[b.name] = summary(b)
+    known: dict[str, int] = {}  # what was live behind a block when its dead code was dropped
     changed = True
     while changed:
-        out = live_out(m)
+        out = solve(m, gen, kill)
         changed = False
         for b in m.blocks:
-            changed |= drop_dead(b, out[b.name])
+            if known.get(b.name) == out[b.name]:
+                continue
+            known[b.name] = out[b.name]
+            if drop_dead(b, out[b.name]):
+                changed = True
+                gen[b.name], kill[b.name] = summary(b)
 
 
 def drop_dead(b: MBlock, live: int) -> bool:
-    """The same in one block, `live` being the registers live at its end; flags never live across blocks."""
+    """The same in one block, `live` being the registers live at its end; flags never live across blocks.
+
+    Once more with the same `live` it finds nothing.
+    """
     kept: list[MI] = []
     flags: set[str] = set()
     for mi in reversed(b.insts):

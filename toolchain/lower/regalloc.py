@@ -11,6 +11,8 @@ kept in a frame slot, and all is repeated.
 
 from __future__ import annotations
 
+import copy
+
 from ..ir.model import UnsupportedError
 from ..target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
 from . import variables
@@ -40,6 +42,14 @@ class Graph:
         self.hints: dict[int, list[tuple[int, int]]] = {}  # node -> (partner, colour offset from the partner)
         self.pair_mask = bits(sorted(m.pairs))
         self._build()
+
+    def of_copy(self, m: MFunction) -> Graph:
+        """The graph of an independent copy of the function, independent as well."""
+        new = copy.copy(self)
+        new.m = m
+        new.adjacent, new.alias, new.moves, new.cost = {**self.adjacent}, {**self.alias}, [*self.moves], {**self.cost}
+        new.hints = {n: [*partners] for n, partners in self.hints.items()}
+        return new
 
     def _build(self) -> None:
         out = live_out(self.m)
@@ -274,20 +284,27 @@ class Colouring:
             best = max(votes, key=lambda c: (votes[c], -self._fresh(c), -c))
             if not self._fresh(best) or votes[best] > 3:
                 return best
-        return min(members(allowed), key=lambda c: self._rank(n, c))
+        return self._best(n, allowed)
 
     def _fresh(self, c: int) -> int:
         """1 when the register would have to be saved only for this node."""
         return int(c in CALLEE_SAVED and not self.used_saved >> c & 1)
 
-    def _rank(self, n: int, c: int) -> tuple[int, int, int]:
+    def _best(self, n: int, allowed: int) -> int:
+        """The register that costs least: one that needs no saving, of the half its pair wants, in a fixed order."""
+        registers = members(allowed)
         if self.m.interrupt:
-            return (0, 0, c)
-        wants_pair = n in self.partner
-        low = self.partner.get(n, [(0, 0)])[0][1] < 0
-        mismatch = int(wants_pair and (c % 2 == 0) != low)
-        order = 7 - c if c in CALLER_SAVED and not wants_pair else c
-        return (self._fresh(c) * (1 + (c == 14)), mismatch, order)
+            return registers[0]
+        partners = self.partner.get(n)
+        low = partners is not None and partners[0][1] < 0
+        best, least = -1, (3, 0, 0)
+        for c in registers:
+            mismatch = int(partners is not None and (c % 2 == 0) != low)
+            order = 7 - c if partners is None and c in CALLER_SAVED else c
+            rank = (self._fresh(c) * (1 + (c == 14)), mismatch, order)
+            if rank < least:
+                best, least = c, rank
+        return best
 
 
 def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
@@ -302,18 +319,20 @@ def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
         _allocate(m, True, False, verify)
         return m
     trials = []
+    untouched = Graph(m)
     for number, (eager, thorough) in enumerate(((True, False), (False, False), (True, True))):
         trial = m.clone()
-        _allocate(trial, eager, thorough, verify)
+        _allocate(trial, eager, thorough, verify, untouched.of_copy(trial))
         trials.append((_cost(trial, for_size), number, trial))
         if not number and not _crowded(trial):
             return trial
     return min(trials, key=lambda t: t[:2])[2]
 
 
-def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool) -> None:
+def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: Graph | None = None) -> None:
+    """`first` is the graph of the first round where it is known."""
     for _ in range(MAX_ROUNDS):
-        g = Graph(m)
+        g, first = first or Graph(m), None
         g.coalesce(eager, thorough)
         colouring = Colouring(g)
         colouring.run(g.simplify())

@@ -15,7 +15,7 @@ State = tuple[list[int], int]  # contents of W0-W15, registers possibly written
 class Step:
     """One instruction as it moves values between registers."""
 
-    __slots__ = ("mi", "names", "source", "uses", "wiped", "written")
+    __slots__ = ("kept", "mi", "names", "source", "uses", "wiped", "written")
 
     def __init__(self, m: MFunction, mi: MI, colour: dict[int, int]) -> None:
         self.mi = mi
@@ -36,6 +36,7 @@ class Step:
             places = [colour[r], colour[r] + 1] if r in m.pairs else [colour[r]]
             self.wiped += places
             self.written += [(k, 1 << r) for k in places]
+        self.kept = ~self.names
 
 
 def check(m: MFunction, colour: dict[int, int]) -> None:
@@ -61,8 +62,8 @@ def check(m: MFunction, colour: dict[int, int]) -> None:
 
 
 def _meet(a: State, b: State) -> State:
-    held = [(x | ~a[1]) & (y | ~b[1]) & (a[1] | b[1]) for x, y in zip(a[0], b[0], strict=True)]
-    return held, a[1] | b[1]
+    anywhere, here, written = ~a[1], ~b[1], a[1] | b[1]
+    return [(x | anywhere) & (y | here) & written for x, y in zip(a[0], b[0], strict=True)], written
 
 
 def _through(steps: list[Step], state: State, checked: str) -> State:
@@ -77,7 +78,8 @@ def _through(steps: list[Step], state: State, checked: str) -> State:
         for k in step.wiped:
             held[k] = 0
         if step.names:
-            held = [x & ~step.names for x in held]
+            kept = step.kept
+            held = [x & kept for x in held]
             written |= step.names
         for k, name in step.written:
             held[k] = value | name

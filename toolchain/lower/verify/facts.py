@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..liveness import summary
 from ..mir import MI, MBlock, MFunction
 from . import flags, registers, stack, traces
 
@@ -24,8 +23,7 @@ class Facts:
     def __init__(self, b: MBlock, key: list[Key]) -> None:
         self.key = key
         self.sources = flags.walk(b)
-        self.reads, self.kill = summary(b)
-        self.pushed, self.written = registers.saves(b)
+        self.reads, self.kill, self.pushed, self.written = registers.summary(b)
         self.stack = stack.plain_change(b)
         self.word, self.numbers = traces.seen_outside(b)
 

@@ -67,16 +67,16 @@ def _skip(b: MBlock, k: int) -> None:
 def _registers(m: MFunction, b: MBlock, mi: MI, allocated: bool) -> None:
     for role, a in zip(mi.info.roles, mi.args, strict=False):
         if not isinstance(a, int):
-            if isinstance(a, Mem) and allocated and not 0 <= a.base < FIRST_VIRTUAL:
+            if allocated and isinstance(a, Mem) and not 0 <= a.base < FIRST_VIRTUAL:
                 fail("a virtual register is left", b.name, mi)
-            continue
-        if allocated and a >= FIRST_VIRTUAL:
+        elif a < FIRST_VIRTUAL:
+            if role in "SDB" and (a % 2 or a >= 14):
+                fail("a pair starts with an even register below W14", b.name, mi)
+        elif allocated:
             fail("a virtual register is left", b.name, mi)
-        wide = role in "SDB"
-        if a >= FIRST_VIRTUAL and wide != (a in m.pairs) and role != "n":
+        elif role != "n" and (role in "SDB") != (a in m.pairs):
+            wide = role in "SDB"
             fail("a pair where a word belongs" if not wide else "a word where a pair belongs", b.name, mi)
-        if a < FIRST_VIRTUAL and wide and (a % 2 or a >= 14):
-            fail("a pair starts with an even register below W14", b.name, mi)
     near_byte = mi.op == "mov" and mi.byte and any(isinstance(a, File) for a in mi.args)
     if near_byte and any(isinstance(a, int) and a != 0 for a in mi.args):
         fail("near bytes move through W0 only", b.name, mi)

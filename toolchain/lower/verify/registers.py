@@ -13,7 +13,7 @@ KEPT = bits(list(CALLEE_SAVED))
 def undefined_at_entry(m: MFunction, reads: dict[str, int], kill: dict[str, int]) -> int:
     """Registers somebody may read before the function has written them: arguments, and values C leaves undefined.
 
-    `reads` and `kill` are the blocks' summaries (`liveness.summary`).
+    `reads` and `kill` are the blocks' (`summary`).
     """
     first = m.blocks[0].name
     return (reads[first] | solve(m, reads, kill)[first] & ~kill[first]) & ~(1 << SP)
@@ -26,20 +26,24 @@ def compare(before: int, after: int) -> None:
         raise MachineError(f"{names} is read before it is written")
 
 
-def saves(b: MBlock) -> tuple[int, int]:
-    """Registers a block pushes, and those it writes outside of an epilogue."""
-    pushed = written = 0
-    for mi in b.insts:
+def summary(b: MBlock) -> tuple[int, int, int, int]:
+    """`liveness.summary`: registers read before they are written, and written; those it pushes, and those it writes
+    outside of an epilogue."""
+    reads = kill = pushed = written = 0
+    for mi in reversed(b.insts):
+        u, d = mi.register_sets()
+        reads = reads & ~d | u
+        kill |= d
         pushed |= _pushed(mi)
         if not mi.epilogue:
-            written |= mi.register_sets()[1]
-    return pushed, written
+            written |= d
+    return reads, kill, pushed, written
 
 
 def check_saved(m: MFunction, pushed: int, written: int) -> None:
     """Registers that must survive are pushed before they are written. Interrupt functions save what they write.
 
-    `pushed` and `written` are of all blocks together (`saves`).
+    `pushed` and `written` are of all blocks together (`summary`).
     """
     saved = pushed | (bits([0, 1, 2, 3]) if "shadow" in m.interrupt else 0)
     if m.uses_fp:

@@ -23,7 +23,7 @@ def letters(mi: MI) -> list[Letter]:
     """What one instruction does that can be seen from outside, in order."""
     if mi.op in ("call", "tailcall", "callr", "asm"):
         return [("call" if mi.op != "asm" else "asm", 0, "")]
-    if not any(isinstance(a, MEMORY) and a.volatile for a in mi.args):
+    if not mi.volatile:
         return []
     out: list[Letter] = []
     for directions, roles in (("r", "sSbB"), ("w", "dDbB")):
