@@ -19,7 +19,7 @@ from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step, join
 from toolchain.bounds.outcome import Outcome, Scope
 from toolchain.bounds.rules import LONG, LOOP, MERGED, Rules
 from toolchain.bounds.state import INHERITED, NOWHERE, State, widened
-from toolchain.bounds.values import WORD, Value, ends, span
+from toolchain.bounds.values import LINK, WORD, Value, ends, is_ram, span
 
 MAX_TURNS: Final = 5_000
 HOPELESS_TURNS: Final = 6
@@ -144,9 +144,9 @@ class Explorer:
 
 
 def magnitude(value: Value) -> Value:
-    """Numbers below a power of two; a set that could be an address says nothing."""
+    """Numbers below a power of two; a set that could be an address says at most that it leads to RAM."""
     high = ends(value)[1]
-    return span(0, (1 << high.bit_length()) - 1) if high < SMALL else WORD
+    return span(0, (1 << high.bit_length()) - 1) if high < SMALL else LINK if is_ram(value) else WORD
 
 
 class _Run(Calls):

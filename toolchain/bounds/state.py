@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from toolchain.bounds.values import EITHER, WORD, Span, Value, ends, key_of, union
+from toolchain.bounds.values import EITHER, LINK, WORD, Span, Value, ends, is_ram, key_of, union
 
 FLAGS = ("C", "Z", "OV", "N", "DC", "OA", "OB", "SA", "SB")
 LEVELS = 8
@@ -143,11 +143,17 @@ def longest(time: int, *ways: tuple[int | None, int]) -> int | None:
 def widened(before: State, after: State) -> State:
     """`after` with every value that differs from `before` given up: two rounds of a loop at most reach an end."""
     new = after.copy()
-    new.w = [b if key_of(a) == key_of(b) else WORD for a, b in zip(before.w, after.w, strict=True)]
+    new.w = [_given_up(a, b) for a, b in zip(before.w, after.w, strict=True)]
     new.mem = {k: v for k, v in after.mem.items() if k in before.mem and key_of(before.mem[k]) == key_of(v)}
     new.regs = {k: v for k, v in after.regs.items() if k in before.regs and key_of(before.regs[k]) == key_of(v)}
     new.flags = {k: v if key_of(before.flags[k]) == key_of(v) else EITHER for k, v in after.flags.items()}
     return new
+
+
+def _given_up(before: Value, after: Value) -> Value:
+    if key_of(before) == key_of(after):
+        return after
+    return LINK if is_ram(before) and is_ram(after) else WORD
 
 
 __all__ = ["INHERITED", "LEVELS", "Area", "Span", "State", "widened"]

@@ -30,13 +30,18 @@ class Span:
 
     def __add__(self, other: Value) -> Value:
         lo, hi = ends(other)
-        return span(self.lo + lo, self.hi + hi, ram=self.ram and isinstance(other, int))
+        return span(self.lo + lo, self.hi + hi, ram=self._moved(other))
 
     __radd__ = __add__
 
     def __sub__(self, other: Value) -> Value:
         lo, hi = ends(other)
-        return span(self.lo - hi, self.hi - lo, ram=self.ram and isinstance(other, int))
+        return span(self.lo - hi, self.hi - lo, ram=self._moved(other))
+
+    def _moved(self, by: Value) -> bool:
+        """Whether it still leads to RAM. A constant that, in 16 bits, is an address of the window may be one, and this
+        the index; and a number below 0 is one such."""
+        return self.ram and isinstance(by, int) and 0 <= by < WINDOW
 
     def __rsub__(self, other: Value) -> Value:
         lo, hi = ends(other)
@@ -56,6 +61,8 @@ class Span:
             width = other.bit_length()
             if self.lo >> width == self.hi >> width:
                 return span(self.lo & other, self.hi & other, self.mask & other, self.bits & other, self.ram)
+        if self.ram and isinstance(other, int) and other == WORD.hi:  # an address that was moved, in a register
+            return LINK
         mask, bits = known(other)
         both = self.mask & mask | self.mask & ~self.bits | mask & ~bits
         result = of_bits(both, self.bits & bits & both)
@@ -182,8 +189,13 @@ def union(a: Value, b: Value) -> Value:
         return a
     (la, ha), (lb, hb), (ma, ba), (mb, bb) = ends(a), ends(b), known(a), known(b)
     mask = ma & mb & ~(ba ^ bb)
-    ram = getattr(a, "ram", la < WINDOW) and getattr(b, "ram", lb < WINDOW)
-    return span(min(la, lb), max(ha, hb), mask, ba & mask, ram)
+    return span(min(la, lb), max(ha, hb), mask, ba & mask, is_ram(a) and is_ram(b))
+
+
+def is_ram(value: Value) -> bool:
+    """Whether reading there does not read the window."""
+    lo, hi = ends(value)
+    return (lo >= 0 and hi < WINDOW) or (isinstance(value, Span) and value.ram)
 
 
 def key_of(value: Value) -> Any:

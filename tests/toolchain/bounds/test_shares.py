@@ -55,6 +55,39 @@ __attribute__((noinline)) int main(void)
     return sum;
 }
 """
+LINKS = """
+#include <bounds.h>
+LINKS_IN_RAM();
+struct item { struct item *next; int key; } items[12], *head;
+volatile const int constant = 5; /* there is something behind the window */
+__attribute__((noinline)) struct item **link_of(int key)
+{
+    struct item **link = &head;
+    LOOP_BOUND(11);
+    while (*link && (*link)->key != key) link = &(*link)->next;
+    return link;
+}
+int main(void)
+{
+    for (int i = 0; i < 11; i++) { items[i].key = i; items[i].next = i < 10 ? &items[i + 1] : 0; }
+    head = items;
+    return *link_of(constant + 100) == 0;
+}
+"""
+INDEXED = """
+#include <bounds.h>
+LINKS_IN_RAM();
+static const char letters[80] __attribute__((space(auto_psv))) = {1, 2, 3, 4, 5, 6, 7};
+unsigned places[20];
+volatile int found;
+__attribute__((noinline)) int sum(const unsigned *place)
+{
+    int s = 0;
+    for (int i = 0; i < 20; i++) s += letters[place[i]];
+    return s;
+}
+int main(void) { for (int i = 0; i < 20; i++) places[i] = i; return sum(places); }
+"""
 LONG_JUMP = """
 #include <setjmp.h>
 static jmp_buf back;
@@ -92,6 +125,19 @@ def test_constants_behind_the_window_have_both_their_bytes(tmp_path: Path, capsy
     """A loop that goes round as often as one of them says."""
     image = built(tmp_path, CONSTANTS, level)
     assert measured(image) <= report(capsys, image)["cycles"] <= 1.1 * measured(image)
+
+
+def test_an_address_that_is_moved_still_leads_to_ram(tmp_path: Path, capsys) -> None:
+    """Such as that of a link within what was loaded: following it takes no cycle of the window."""
+    image = built(tmp_path, LINKS)
+    assert measured(image) <= report(capsys, image)["cycles"] <= 1.03 * measured(image)
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
+def test_an_index_that_is_loaded_may_lead_into_the_window(tmp_path: Path, capsys, level: str) -> None:
+    """It is no pointer, although it comes from where pointers lead to RAM."""
+    image = built(tmp_path, INDEXED, level)
+    assert measured(image) <= report(capsys, image)["cycles"]
 
 
 def test_a_long_jump_leaves_no_bound(tmp_path: Path, capsys) -> None:
