@@ -1,11 +1,11 @@
 """Bounds of our kernel's calls beside the worst that runs of its applications take: one table.
 
 `python -m bench.bounds [--image NAME] [--times X] [--json]`. Each call is bounded in the image it is measured in, with
-as many events, subscriptions, messages and holes as there were at most before or behind any call of the run. Measured
-is from the first instruction to behind the return, as bounds are; a call that was interrupted, or in which threads were
-switched, is not counted; a thread that ends itself goes on into the scheduler, so of its end `bury` has a row and
-`Sys_Kill_Process` is that of others. "Plain" leaves out the ways on which memory is short, the reserve is exchanged, a
-handler has left something to join, or the call is refused; they count in the other column.
+as many threads, events, subscriptions, messages and holes as there were at most while its longest was under way (--json
+tells them). Measured is from the first instruction to behind the return, as bounds are; a call that was interrupted, or
+in which threads were switched, is not counted; a thread that ends itself goes on into the scheduler, so of its end
+`bury` has a row and `Sys_Kill_Process` is that of others. "Plain" leaves out the ways on which memory is short, the
+reserve is exchanged, a handler has left something to join, or the call is refused; they count in the other column.
 """
 
 from __future__ import annotations
@@ -45,17 +45,20 @@ ALSO = ("_bury",)
 SWITCHES = ("hal_yield", "hal_block", "hal_abandon")
 TARGET = "../tests/firmware/target"
 IMAGES = {
-    "stress": ("apps", 2.0, {"n": 12, "i": 0, "u": 100, "d": 24}),
-    "points": (TARGET, 2.0, {"n": 3, "i": 0, "u": 100, "d": 24}),
-    "crowded": (TARGET, 0.1, {"n": 12, "i": 0, "u": 60, "d": 2}),
+    "stress": ("apps", 2.0, {"i": 0, "u": 100, "d": 24, "k": 384}),
+    "points": (TARGET, 2.0, {"i": 0, "u": 100, "d": 24, "k": 192}),
+    "crowded": (TARGET, 0.15, {"i": 0, "u": 60, "d": 2, "k": 400}),
 }
 """Images, where they are, seconds in which they do everything, and limits that are not counted (bounds --help)."""
+ROUND, NEWEST, LAST = "numbers_are_round", "newest_pid", 0xFFFF
+"""Where an image has this function, the last number of threads has just been given; to start so many takes too long."""
 CALL_BYTES = 4
 
 
 @dataclass
 class Row:
-    """One call in one image: cycles; None where there is no bound, or it never came undisturbed."""
+    """One call in one image: cycles of its longest and of its bound, None where it has none, or never came undisturbed;
+    the most there was of everything during the longest."""
 
     image: str
     call: str
@@ -63,6 +66,8 @@ class Row:
     bound: int | None = None
     plain_seen: int | None = None
     plain_bound: int | None = None
+    limits: dict[str, int] = field(default_factory=dict)
+    plain_limits: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass
@@ -74,15 +79,27 @@ class Open:
     start: int
     counts: bool = True
     plain: bool = True
+    most: dict[str, int] = field(default_factory=dict)
+
+
+def _cycles(longest: tuple[int, dict[str, int]]) -> int:
+    return longest[0]
+
+
+def _merge(into: dict[str, int], found: dict[str, int]) -> None:
+    """The larger of each."""
+    for name, number in found.items():
+        into[name] = max(into.get(name, 0), number)
 
 
 @dataclass
 class Meter:
-    """Times calls on a running machine."""
+    """Times calls on a running machine, and counts the most there is of everything while each is under way."""
 
     machine: emu.Machine
     structures: Structures
-    worst: dict[tuple[str, bool], int] = field(default_factory=dict)
+    worst: dict[tuple[str, bool], tuple[int, dict[str, int]]] = field(default_factory=dict)
+    """Of a call, plain or not: cycles of its longest, and the most of everything meanwhile."""
     under_way: list[Open] = field(default_factory=list)
     watched: set[int] = field(default_factory=set)
 
@@ -93,8 +110,8 @@ class Meter:
             machine = self.machine
             top = machine.w[15]
             back = machine.peek(top - 4) | (machine.peek(top - 2) & 0x7F) << 16
-            self.structures.look()
             self.under_way.append(Open(name, top - CALL_BYTES, machine.cycle))
+            self.look()
             if back not in self.watched:
                 self.watched.add(back)
                 machine.hook_pc(back, self.leave)
@@ -105,12 +122,26 @@ class Meter:
     def leave(self) -> bool:
         """Where some call came from."""
         top = self.machine.w[15]
-        for one in [one for one in self.under_way if one.top == top]:
+        ended = [one for one in self.under_way if one.top == top]
+        if ended:
+            self.look()
+        for one in ended:
             self.under_way.remove(one)
-            self.structures.look()
             if one.counts:
-                key = one.name, one.plain
-                self.worst[key] = max(self.worst.get(key, 0), self.machine.cycle - one.start)
+                key, cycles = (one.name, one.plain), self.machine.cycle - one.start
+                if cycles > self.worst.get(key, (0, {}))[0]:
+                    self.worst[key] = cycles, one.most
+        return False
+
+    def look(self) -> None:
+        """Count everything, for all calls under way."""
+        found = self.structures.look()
+        for one in self.under_way:
+            _merge(one.most, found)
+
+    def turn_round(self) -> bool:
+        """Where numbers of threads begin again."""
+        self.machine.poke(NEWEST, LAST)
         return False
 
     def tree(self, exchange: range) -> Callable[[], bool]:
@@ -118,7 +149,7 @@ class Meter:
 
         def hook() -> bool:
             top = self.machine.w[15]
-            self.structures.look()
+            self.look()
             if (self.machine.peek(top - 4) & ~1) in exchange:
                 self.apart()
             return False
@@ -146,7 +177,7 @@ def build(app: str, apps: str, out: Path) -> Path:
 
 
 def measure(path: Path, program: Program, names: list[str], seconds: float) -> Meter:
-    """The worst of each function, plain and otherwise, and the most of everything there was before and behind calls."""
+    """The worst of each function, plain and otherwise, and the most of everything there was meanwhile."""
     machine = emu.load(path)
     meter = Meter(machine, Structures(machine))
     for handler in program.interrupts():
@@ -156,6 +187,8 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> M
             address = program.address(name)
             if address in program.calls.entries:
                 machine.hook_pc(address, hook)
+    if program.address(ROUND) in program.calls.entries:
+        machine.hook_pc(ROUND, meter.turn_round)
     exchange = _extent(program, EXCHANGE)
     for name in TREE:
         address = program.address(name)
@@ -185,20 +218,28 @@ def rows_of(app: str, path: Path, values: dict[str, int], seconds: float) -> lis
     bare = Program(image, annotations, read_notes(image, values))
     names = [*bare.interesting("_Sys_"), *(name for name in ALSO if bare.address(name) in bare.calls.entries)]
     meter = measure(path, bare, names, seconds)
-    values = values | meter.structures.most
-    print(f"{app}: " + ", ".join(f"{name}={value}" for name, value in sorted(values.items())), file=sys.stderr)
     seen = meter.worst
     there = [name for name in (ITSELF, *APART) if bare.address(name) in bare.calls.entries]
-    whole = Program(image, annotations, read_notes(image, values), [name for name in there if name == ITSELF])
-    plain = Program(image, annotations, read_notes(image, values | PLAIN), there)
+    itself = [name for name in there if name == ITSELF]
+
+    def bound(name: str, limits: dict[str, int], left_out: list[str]) -> int | None:
+        program = Program(image, annotations, read_notes(image, values | limits), left_out)
+        at = program.address(name)
+        assert at is not None
+        return Analyst(program).bound(name, at, "call").cycles
+
     rows = []
     for name in names:
-        at = whole.address(name)
-        assert at is not None
-        both = [seen[name, kind] for kind in (True, False) if (name, kind) in seen]
-        if both:
-            bounds = [Analyst(program).bound(name, at, "call").cycles for program in (whole, plain)]
-            rows.append(Row(app, name.lstrip("_"), max(both), bounds[0], seen.get((name, True)), bounds[1]))
+        row = Row(app, name.lstrip("_"))
+        plain = seen.get((name, True))
+        longest = max((seen[name, kind] for kind in (True, False) if (name, kind) in seen), key=_cycles, default=None)
+        if longest is not None:
+            row.seen, row.limits = longest
+            row.bound = bound(name, row.limits, itself)
+            rows.append(row)
+        if plain is not None:
+            row.plain_seen, row.plain_limits = plain
+            row.plain_bound = bound(name, row.plain_limits | PLAIN, there)
     return rows
 
 

@@ -2,48 +2,50 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import emu
 
 BUCKETS = 8
 MOST = 200
 """Members of a list that is followed: more are none."""
-NEXT_EVENT, SUBSCRIBERS, SIDES, HOLE_SIZE = 2, 4, (0, 2), 4
-"""Where links stand in event and hole, and a hole's size (kernel.h, memory.c)."""
+NEXT_EVENT, SUBSCRIBERS, OWNER, NEXT_THREAD, SIDES, HOLE_SIZE = 2, 4, 6, 14, (0, 2), 4
+"""Where links stand in event, thread and hole, a subscription's thread and a hole's size (kernel.h, memory.c)."""
 HEAP_STEP = 2
 """Bytes (kernel.h)."""
 
 
 @dataclass
 class Structures:
-    """The most there was of everything when `look` was called.
+    """What there is when `look` is called.
 
-    m events, b events of one bucket, s subscriptions of one event, t of all, q queued messages, h holes on a
-    path of the tree (bounds --help).
+    n threads, m events, b events of one bucket, s subscriptions of one event, o of one thread, t of all, q queued
+    messages, h holes on a path of the tree (bounds --help).
     """
 
     machine: emu.Machine
-    most: dict[str, int] = field(default_factory=lambda: dict.fromkeys("mbstqh", 0))
 
-    def look(self) -> None:
-        """Count everything, unless some list is being changed: an ISR's call comes there, too."""
+    def look(self) -> dict[str, int]:
+        """Count everything; nothing where some list is being changed: an ISR's call comes there, too."""
         try:
-            found = self._found()
+            return self._found()
         except _Torn:
-            return
-        for name, number in found.items():
-            self.most[name] = max(self.most[name], number)
+            return {}
 
     def _found(self) -> dict[str, int]:
         buckets = [list(self._list(self._at("_events") + 2 * k, NEXT_EVENT)) for k in range(BUCKETS)]
-        subscriptions = [sum(1 for _ in self._list(event + SUBSCRIBERS, 0)) for events in buckets for event in events]
+        subscriptions = [list(self._list(event + SUBSCRIBERS, 0)) for events in buckets for event in events]
+        owners = Counter(self._word(one + OWNER) for those in subscriptions for one in those)
         return {
+            "n": len(self._ring(self._word(self._at("_os_ring"))))
+            + len(list(self._list(self._at("_os_blocked"), NEXT_THREAD))),
             "m": sum(map(len, buckets)),
             "b": max(map(len, buckets)),
-            "s": max(subscriptions, default=0),
-            "t": sum(subscriptions),
+            "s": max(map(len, subscriptions), default=0),
+            "o": max(owners.values(), default=0),
+            "t": owners.total(),
             "q": sum(1 for name in ("_event_queue", "_undelivered") for _ in self._list(self._at(name), 0)),
             "h": self._depth(self.machine.peek("_holes")),
         }
@@ -69,6 +71,14 @@ class Structures:
             yield member
             link = member + step
         raise _Torn
+
+    def _ring(self, first: int) -> set[int]:
+        """Addresses of the threads that are ready."""
+        found: set[int] = set()
+        while first and first not in found:
+            found.add(first)
+            first = self._word(first + NEXT_THREAD)
+        return found
 
     def _depth(self, hole: int) -> int:
         if hole == self._at("_no_hole"):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
 import emu
+from bench.bounds import IMAGES, rows_of
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import HEADERS
 from toolchain.bounds.notes import read_notes
@@ -17,7 +19,7 @@ from toolchain.cli import main
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
 
-LOAD = {"n": 4, "m": 4, "b": 1, "s": 1, "q": 1, "i": 0, "u": 100, "d": 2}
+LOAD = {"n": 4, "m": 4, "b": 1, "s": 1, "q": 1, "i": 0, "u": 100, "d": 2, "k": 224}
 SHORT = ("renew_reserve", "refuse_message", "first_waiter")
 """Not called while memory is not short, the event is known and somebody has subscribed to it."""
 SWITCH = ("os_schedule", "save_dsp", "resume_dsp")
@@ -42,6 +44,11 @@ LINK = ("Sys_Send_Neighbours", "Sys_Get_Neighbours", "Sys_Get_RobotNumber", "Sys
         "Sys_Set_InfraredThreshold", "Sys_Estimate_Range")  # fmt: skip
 """Calls of openswarm_infrared.h; those that start something are made once."""
 RETURN_ADDRESS = 4
+CLOSE = ("Sys_Kill_Process", "bury", "Sys_Register_Event", "Sys_Unregister_Event", "Sys_Subscribe_to_Event",
+         "Sys_Unsubscribe_Handler", "Sys_Send_Event", "Sys_Send_IntEvent", "Sys_Start_ProcessWith",
+         "Sys_Get_ProcessState", "Sys_Start_CriticalSection", "Sys_End_CriticalSection")  # fmt: skip
+"""Calls whose worst case the image `crowded` builds: bounds are within 1.3 x of it."""
+SCENES = 4
 DEVICES_MASKED = 56
 """Longest time levels 4 and 5 are held back: with the frame of a SYS_DSP thread (port/dspic30f/README.md)."""
 
@@ -105,3 +112,32 @@ def test_everything_in_an_image_of_ours_is_bounded(image: Build, capsys: pytest.
     assert report["stacks"]["kernel stack"] <= 204
     held = [row["masked"][level][0] for row in rows if row["level"] < 4 for level in "45" if level in row["masked"]]
     assert 0 < max(held) <= DEVICES_MASKED
+
+
+@pytest.fixture(scope="module")
+def crowded(image: Build) -> Path:
+    """The image that builds the worst shapes of the kernel's structures."""
+    return image("crowded", TARGET_APPS)
+
+
+def test_a_longer_memory_has_longer_paths(crowded: Path) -> None:
+    """Of its tree: 11 nodes in more than 4 kB, without being told how many there are."""
+    executable = read_executable(crowded.read_bytes(), str(crowded))
+    cycles = []
+    for holes in ({"h": 10}, {"h": 11}, {}):
+        program = Program(executable, Annotations(), read_notes(executable, LOAD | holes))
+        cycles.append(Analyst(program).bound("heap_give", program.address("heap_give"), "call").cycles)
+    assert cycles[0] < cycles[1] == cycles[2]
+
+
+def test_bounds_are_close_where_structures_are_at_their_worst(crowded: Path) -> None:
+    """And nothing is above its bound. One round of the scenes, each of which does what it says."""
+    _, seconds, values = IMAGES["crowded"]
+    rows = {row.call: row for row in rows_of("crowded", crowded, values, seconds / 2)}
+    assert all(row.seen <= row.bound for row in rows.values() if row.bound is not None)
+    for call in CLOSE:
+        row = rows[call]
+        assert row.plain_seen <= row.plain_bound <= 1.3 * row.plain_seen, call
+    machine = emu.load(crowded)
+    machine.run(seconds=seconds / 2)
+    assert (machine.peek("scenes") >= SCENES, machine.peek("failures")) == (True, 0)

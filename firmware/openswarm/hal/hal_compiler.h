@@ -12,8 +12,9 @@
 
 /* What bounds of time and stack take from the source (toolchain/include/bounds.h); nothing to other compilers. n threads,
  * m events, b newer events in the same bucket, s subscriptions of one event, q queued messages, i times idle, u bytes of a
- * stack never used; where they are told, t subscriptions of all events together, h holes on a path of the heap's tree, j runs
- * of pieces given back that wait to be joined (0 outside of handlers), x holes that become larger than the reserve. */
+ * stack never used, k bytes of the largest stack; where they are told, t subscriptions of all events together, o of one
+ * thread, h holes on a path of the heap's tree, j runs of pieces given back that wait to be joined (0 outside of handlers),
+ * x holes that become larger than the reserve. */
 #if defined(__clang__) && defined(__dsPIC30F__)
 #include <bounds.h>
 #else

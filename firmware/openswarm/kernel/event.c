@@ -218,9 +218,12 @@ static bool unsubscribe(event *e, uint16 pid, sys_handler handler)
 {
     bool found = false;
     subscription **link = &e->subscribers;
-    LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s)); ONE_LOOP();
+    LOOP_BOUND(s); LOOP_TOTAL(min(t, m * s)); LOOP_SHARE(Sys_Unsubscribe_Handler, s); ONE_LOOP();
     while (*link != NULL) {
         if ((*link)->pid == pid && (handler == NULL || (*link)->handler == handler)) {
+            /* Those of one thread, each once. */
+            CALL_SHARE(unlink_subscription, Sys_Unsubscribe_Handler, min(s, o));
+            CALL_SHARE(unlink_subscription, process.c / bury, min(t, m * s, o));
             unlink_subscription(link);
             found = true;
         } else {

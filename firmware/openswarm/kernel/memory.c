@@ -62,9 +62,13 @@ HAL_OUTLINE void heap_note_use(void)
     }
 }
 
-/* For bounds: nodes of a path (README.md); runs joined when a piece is given back, itself and perhaps what came before;
- * paths searched and pulled meanwhile, one more where the reserve is exchanged. */
+/* For bounds: nodes of a path, of which a memory twice as large has one more (README.md); runs joined when a piece is given
+ * back, itself and perhaps what came before; paths searched and pulled meanwhile, one more where the reserve is exchanged. */
+#if SYS_KERNEL_STACK + SYS_HEAP > 0x1000
+#define PATH min(11, h)
+#else
 #define PATH min(10, h)
+#endif
 #define RUNS min(2, 1 + j)
 #define PATHS (2 * RUNS + min(1, x)) * PATH
 
@@ -158,14 +162,16 @@ static HAL_OUTLINE void join_run(void)
         return;
     }
     run = run_end;
-    /* The size of a hole, if one ends here; if not, no hole begins so far below that ends here. */
-    CALL_SHARE(find_hole, heap_give, RUNS);
+    /* The size of a hole, if one ends here; if not, no hole begins so far below that ends here. Who starts a thread gives
+     * nothing back (but where hal_stack_init() may fail): it joins what waits. */
+    CALL_SHARE(find_hole, heap_give, RUNS); CALL_SHARE(find_hole, process.c / start, min(1, j));
     hole **link = find_hole((uintptr_t)begin - *last_step(begin));
     if ((uint8 *)*link + (*link)->size == begin) {
-        CALL_SHARE(pull_hole, heap_give, RUNS);
+        CALL_SHARE(pull_hole, heap_give, RUNS); CALL_SHARE(pull_hole, process.c / start, min(1, j));
         begin = (uint8 *)pull_hole(link);
     }
     CALL_SHARE(find_hole, heap_give, RUNS); CALL_SHARE(pull_hole, heap_give, RUNS);
+    CALL_SHARE(find_hole, process.c / start, min(1, j)); CALL_SHARE(pull_hole, process.c / start, min(1, j));
     end += pull_hole(find_hole((uintptr_t)end))->size; /* of nothing: 0 */
     hal_lock_state lock = hal_lock_devices();
     if (end == low) {
@@ -177,7 +183,7 @@ static HAL_OUTLINE void join_run(void)
     }
     hal_unlock(lock);
     if (apart) {
-        CALL_SHARE(put_hole, heap_give, RUNS);
+        CALL_SHARE(put_hole, heap_give, RUNS); CALL_SHARE(put_hole, process.c / start, min(1, j));
         put_hole(begin, (uint16)(end - begin));
     }
 }

@@ -120,7 +120,7 @@ sys_pcb *process_find(uint16 pid)
     sys_pcb *p = NULL;
     do {
         p = process_next(p);
-        LOOP_BOUND(n);
+        LOOP_BOUND(n); LOOP_SHARE(start, n * (n + 1) / 2); /* each that is taken is found at another place */
     } while (p != NULL && p->pid != pid);
     return p;
 }

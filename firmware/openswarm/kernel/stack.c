@@ -11,7 +11,7 @@ HAL_OUTLINE void stack_paint(void *begin, const void *end)
     volatile uint16 *word = begin; /* volatile: as a call of memset it takes more room */
     do {
         *word++ = PAINT * 0x101u;
-        LOOP_BOUND(SYS_DEFAULT_STACK / 2);
+        LOOP_BOUND(k / 2 - 1);
     } while (word != end);
 }
 

@@ -1,30 +1,42 @@
-/* The kernel's structures at their worst for its calls, built on purpose; nothing interrupts, so that calls longer than a
- * tick are measured as they are (bench/bounds.py). A scene's heap, behind everything that stays:
- *
- *      T                                                                                     T + 0x7E
- *      | hole 6 | kept 6 | hole 8 | kept 6 | hole 10 | ... | hole 18 | kept 6 |  the root  | subscriptions ... |
- *
- * All holes lie in the half of the heap from T on, the smaller the nearer, so that the tree is one path: taking out its
- * root pulls up all others, and putting it in pushes them down again. The victim's subscriptions come in the order in
- * which killing it gives them back, each to the end of the root. */
+/* The kernel's structures at their worst for its calls, built on purpose; nothing interrupts, so that calls longer than
+ * a tick are measured as they are (bench/bounds.py). Of each scene the heap's tree is the worst for what it measures:
+ * the pieces of a layout (layouts.h) are taken from the reserve, one behind the other, and then its holes are given
+ * back. */
 #include <openswarm.h>
 #include <p30F6014A.h>
 
 #include "kernel.h"
+#include "layouts.h"
 
-enum { FIRST = SYS_FIRST_USER_EVENT, BUCKETS = 8, WAITERS = 9, MESSAGES = 20, LEVELS = 7, KEPT = 6, SMALLEST = 6, ROOT = 60 };
-enum { T = 0x1000, EVENTS = 11 };
-/* In bucket 0 the oldest event is LATE, then comes GATHERING, then the others; FRESH is registered last. */
-enum { LATE = FIRST + BUCKETS * 8, GATHERING = LATE + BUCKETS, TOKEN = FIRST + 1, FRESH = LATE + 2 * BUCKETS };
+enum {
+    FIRST = SYS_FIRST_USER_EVENT,
+    BUCKETS = 8,
+    WAITERS = 9,
+    MESSAGES = 20,
+    CROWD = 8,
+    HANDLERS = 3,
+    KEPT_BYTES = 6,
+    NEAR = 5
+};
+/* In bucket 0 the oldest event is LATE, then comes GATHERING, then the crowd; FRESH is registered last. */
+enum { TOKEN = FIRST + 1, LATE = FIRST + BUCKETS * 40, GATHERING = LATE + BUCKETS, FRESH = GATHERING + BUCKETS };
 
 volatile uint16 scenes __attribute__((used)), failures __attribute__((used));
 
-static uint16 waiting[WAITERS];
+static uint16 waiting[WAITERS], victim_pid;
 static volatile bool late, asleep;
+static uint8 *pad;
+static uint16 padding, pieces;
+static struct {
+    void *at;
+    uint16 size; /* 0: not ours */
+    bool is_hole;
+} taken[PIECES];
 static bool (*const volatile kill)(uint16 pid) = Sys_Kill_Process; /* calls, not copies of their code */
-static bool (*const volatile subscribe)(uint16 id, uint16 pid, sys_handler handler, sys_condition condition) =
-    Sys_Subscribe_to_Event;
+static bool (*const volatile subscribe)(uint16 id, uint16 pid, sys_handler handler,
+                                        sys_condition condition) = Sys_Subscribe_to_Event;
 static bool (*const volatile unsubscribe)(uint16 id, uint16 pid, sys_handler handler) = Sys_Unsubscribe_Handler;
+static bool (*const volatile send)(uint16 id, const void *data, uint16 size) = Sys_Send_Event;
 
 static void expect(bool holds)
 {
@@ -41,7 +53,7 @@ static void waiter(void *last)
     }
 }
 
-/* Keeps a message and is the last on the list of those that do not run. */
+/* Keeps a message and does not run any more. */
 static void victim(void *unused)
 {
     (void)unused;
@@ -62,95 +74,188 @@ static bool second_handler(uint16 pid, uint16 event, sys_event_data *data)
     return first_handler(pid, event, data);
 }
 
-static void until_all_wait(uint16 pid)
+static bool third_handler(uint16 pid, uint16 event, sys_event_data *data)
 {
-    for (uint16 k = 0; k < WAITERS; k++) {
-        while (Sys_Get_ProcessState(waiting[k]) != SYS_BLOCKED) {
-            Sys_Yield();
-        }
-    }
-    while (pid != 0 && Sys_Get_ProcessState(pid) != SYS_BLOCKED) {
+    return first_handler(pid, event, data);
+}
+
+static const sys_handler handlers[HANDLERS] = {first_handler, second_handler, third_handler};
+
+static void until_blocked(uint16 pid)
+{
+    while (Sys_Get_ProcessState(pid) != SYS_BLOCKED) {
         Sys_Yield();
     }
 }
 
-/* Events that the victim subscribes to: four of bucket 0, the rest of bucket 2. */
-static uint16 other(uint16 k)
+static void until_all_wait(void)
 {
-    return (uint16)(k < 4 ? FIRST + BUCKETS * k : FIRST + 2 + BUCKETS * k);
+    for (uint16 k = 0; k < WAITERS; k++) {
+        until_blocked(waiting[k]);
+    }
+    until_blocked(victim_pid);
 }
 
-static void *taken(uint16 size)
+/* What the victim subscribes to, in the order in which killing it gives that back: bucket after bucket, the newest
+ * first. */
+static uint16 event_of(uint16 k)
 {
-    void *piece = heap_take(size);
-    expect(piece != NULL);
-    return piece;
+    return (uint16)(FIRST + k % CROWD * BUCKETS + k / CROWD * 2);
 }
 
-static void scene(void)
+static void subscribe_to_many(uint16 k)
 {
-    static const sys_process_config sleeper = {victim, NULL, 128, 0, 0, 0, 0};
-    void *holes[LEVELS], *kept[LEVELS], *root;
-    uint16 k;
+    expect(subscribe(event_of(k), victim_pid, first_handler, NULL));
+}
+
+static void subscribe_to_late(uint16 k)
+{
+    expect(subscribe(LATE, victim_pid, handlers[k], NULL));
+}
+
+static void subscribe_to_gathering(uint16 k)
+{
+    expect(subscribe(GATHERING, victim_pid, handlers[k], NULL));
+}
+
+/* Where whoever measures lets the numbers of threads begin again at 0: all of those that live are taken then. */
+__attribute__((noinline, used)) static void numbers_are_round(void)
+{
+    __asm__ volatile("");
+}
+
+static void take(uint16 size, bool is_hole)
+{
+    uint16 *at = heap_take(size);
+    expect(at != NULL);
+    at[size / 2 - 1] = NEAR; /* read as the size of a hole that ends here, it leads a little below */
+    taken[pieces].at = at;
+    taken[pieces].size = size;
+    taken[pieces++].is_hole = is_hole;
+}
+
+static void give(bool holes)
+{
+    for (uint16 k = 0; k < pieces; k++) {
+        if (taken[k].is_hole == holes) {
+            heap_give(taken[k].at, taken[k].size);
+        }
+    }
+}
+
+static void build(const layout *l, void (*subscribe_kth)(uint16 k))
+{
+    pad = heap_take(2);
+    padding = (uint16)(os_memory.bytes + l->begin - pad);
+    expect(pad != NULL && padding < 0x1000 && heap_take(padding - 2u) == pad + 2);
+    pieces = 0;
+    for (const signed char *piece = l->pieces; *piece != END; piece++) {
+        if (*piece == EVENT) {
+            expect(Sys_Register_Event(GATHERING));
+        } else if (*piece < 0) {
+            subscribe_kth((uint16)(-1 - *piece));
+        } else if (*piece == KEPT) {
+            take(KEPT_BYTES, false);
+        } else {
+            take((uint16)*piece, true);
+        }
+    }
+}
+
+/* Everything but the holes; the thread that waits for LATE is the last on the list of those that do not run. */
+static void set(const layout *l, void (*subscribe_kth)(uint16 k), bool is_event_in_layout, uint16 events)
+{
+    static const sys_process_config sleeper = {victim, NULL, 400, 0, 0, 0, 0};
     late = true;
     asleep = false;
-    expect(Sys_Register_Event(LATE) && Sys_Register_Event(GATHERING) && Sys_Register_Event(TOKEN));
-    until_all_wait(0);
-    uint16 pid = Sys_Start_ProcessWith(&sleeper);
-    for (k = 0; k < EVENTS; k++) {
-        expect(Sys_Register_Event(other(k)));
+    expect(Sys_Register_Event(LATE) && Sys_Register_Event(TOKEN));
+    expect(is_event_in_layout || Sys_Register_Event(GATHERING));
+    numbers_are_round();
+    victim_pid = Sys_Start_ProcessWith(&sleeper);
+    until_blocked(victim_pid);
+    for (uint16 k = events; k-- > 0;) {
+        expect(Sys_Register_Event(event_of(k)));
     }
-    until_all_wait(pid);
-    uint8 *pad = taken(2);
-    uint16 padding = (uint16)(os_memory.bytes + T - pad);
-    expect(padding < 0x1000 && heap_take(padding - 2u) != NULL);
-    for (k = 0; k < LEVELS; k++) {
-        holes[k] = taken(SMALLEST + 2u * k);
-        kept[k] = taken(KEPT);
-    }
-    root = taken(ROOT);
-    expect(subscribe(GATHERING, pid, first_handler, NULL));
-    expect(subscribe(GATHERING, pid, second_handler, NULL));
-    for (k = 4; k-- > 0;) { /* as killing meets them: the newest of a bucket first */
-        expect(subscribe(other(k), pid, first_handler, NULL) && subscribe(other(k), pid, second_handler, NULL));
-    }
-    for (k = EVENTS; k-- > 4;) {
-        expect(subscribe(other(k), pid, first_handler, NULL) && subscribe(other(k), pid, second_handler, NULL));
+    build(l, subscribe_kth);
+    for (uint16 k = 0; events == 0 && k < CROWD; k++) {
+        expect(Sys_Register_Event(event_of(k)));
     }
     expect(Sys_Send_IntEvent(TOKEN, 1));
     while (!asleep) {
         Sys_Yield();
     }
-    until_all_wait(pid);
-    for (k = 0; k < LEVELS; k++) {
-        heap_give(holes[k], SMALLEST + 2u * k);
-    }
-    heap_give(root, ROOT);
+    until_all_wait();
+}
 
+static void move_late_waiter(void)
+{
     expect(Sys_Send_IntEvent(LATE, 1));
-    late = false;
-    until_all_wait(0);
-    expect(Sys_Register_Event(FRESH));
-    expect(Sys_Unregister_Event(FRESH));
-    expect(subscribe(LATE, pid, first_handler, NULL));
-    expect(unsubscribe(LATE, pid, first_handler));
-    expect(subscribe(GATHERING, waiting[0], first_handler, NULL));
-    for (k = 0; k < MESSAGES; k++) {
-        expect(Sys_Send_IntEvent(GATHERING, k));
-    }
-    expect(Sys_Unregister_Event(GATHERING));
-    expect(kill(pid));
+    Sys_Yield();
+    until_all_wait();
+}
 
-    for (k = 0; k < EVENTS; k++) {
-        expect(Sys_Unregister_Event(other(k)));
+static void clear(uint16 events)
+{
+    (void)kill(victim_pid);
+    for (uint16 k = 0; k < (events != 0 ? events : CROWD); k++) {
+        expect(Sys_Unregister_Event(event_of(k)));
     }
     expect(Sys_Unregister_Event(LATE) && Sys_Unregister_Event(TOKEN));
-    for (k = 0; k < LEVELS; k++) {
-        heap_give(kept[k], KEPT);
-    }
+    (void)Sys_Unregister_Event(GATHERING);
+    give(false);
     heap_give(pad, padding);
     Sys_Yield();
     scenes++;
+}
+
+static void scene_of_keeping(void)
+{
+    uint16 last = waiting[WAITERS - 1];
+    set(&chain, NULL, false, 0);
+    move_late_waiter();
+    expect(subscribe(LATE, last, first_handler, NULL) && subscribe(LATE, last, second_handler, NULL));
+    give(true);
+    expect(Sys_Get_ProcessState(0xFFFF) == SYS_UNKNOWN);
+    expect(Sys_Register_Event(FRESH));
+    expect(Sys_Unregister_Event(FRESH));
+    expect(subscribe(LATE, last, third_handler, NULL));
+    clear(0);
+}
+
+static void scene_of_unsubscribing(void)
+{
+    set(&three_given_back, subscribe_to_late, false, 0);
+    give(true);
+    expect(unsubscribe(LATE, victim_pid, NULL));
+    clear(0);
+}
+
+static void scene_of_unregistering(void)
+{
+    static const struct {
+        uint16 first, second;
+    } words = {0, 0};
+    set(&three_and_event_given_back, subscribe_to_gathering, true, 0);
+    move_late_waiter();
+    move_late_waiter(); /* now it is the last */
+    give(true);
+    expect(send(LATE, (const uint8 *)&words + 1, 2));
+    late = false;
+    Sys_Yield();
+    until_all_wait();
+    for (uint16 k = 0; k < MESSAGES; k++) {
+        expect(Sys_Send_IntEvent(GATHERING, k));
+    }
+    expect(Sys_Unregister_Event(GATHERING));
+    clear(0);
+}
+
+static void scene_of_killing(void)
+{
+    set(&many_given_back, subscribe_to_many, false, SUBSCRIPTIONS);
+    give(true);
+    expect(kill(victim_pid));
+    clear(SUBSCRIPTIONS);
 }
 
 static void driver(void *unused)
@@ -158,7 +263,10 @@ static void driver(void *unused)
     (void)unused;
     IEC0 = IEC1 = IEC2 = 0;
     for (;;) {
-        scene();
+        scene_of_killing();
+        scene_of_keeping();
+        scene_of_unsubscribing();
+        scene_of_unregistering();
     }
 }
 
