@@ -1,0 +1,301 @@
+"""Drills: very short random programs, many to one image, that access device registers in every way there is.
+
+A drill is a few instructions that touch registers by address or by pointer, as words and bytes, plainly, under REPEAT,
+in a DO loop or around Idle, and a branch to itself. Handlers do the same. Every row of the instruction table that
+reads or writes data memory takes part. Where pointers point is not in the code but in the W registers a run begins
+with, so one piece of native code reaches many registers. All follows from seed and chip.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+from dataclasses import dataclass, field
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, Final
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "jit"))
+
+from random_firmware import words_of
+
+from emu.chips.chip import Chip
+from emu.dspic30f.isa import codec, table
+from emu.dspic30f.isa.fields import Operands
+from emu.dspic30f.isa.row import Row
+
+from .device_programs import CHIPS, family
+from .device_scenes import SCENES, Scene
+
+CODE: Final = 0x200
+DRILLS: Final = 40
+"""Drills of an image."""
+KINDS: Final = {"plain": 4, "REPEAT": 3, "DO": 4, "handler": 4, "stack": 2, "nap": 1}
+"""Kinds of drill and their shares."""
+HANDLERS: Final = 4
+MODES: Final = ("CORCON", "MODCON", "XBREV", "SPLIM", "INTCON1", "SR", "DOSTARTL", "DOENDL")
+"""Drawn less often: every value makes native code of its own."""
+CONTROL: Final = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
+"""Drawn less often: they stop, reset or switch off everything else."""
+_FLOWS: Final = ("BRA", "CALL", "GOTO", "RCALL", "DO", "REPEAT", "RETURN", "RETFIE", "RETLW", "RESET", "PWRSAV", "LNK",
+                 "ULNK", "DISI", "CPSEQ", "CPSNE", "CPSGT", "CPSLT")  # fmt: skip
+MEMORY: Final = [row for row in table.ROWS if row.mnemonic not in _FLOWS and set("pqghofi") & set(row.fields)]
+"""Rows that can access data memory and go on with the next instruction or skip it."""
+BY_ADDRESS: Final = [row for row in MEMORY if "f" in row.fields]
+BY_POINTER: Final = [row for row in MEMORY if "f" not in row.fields and "i" not in row.fields]
+PREFETCHING: Final = [row for row in MEMORY if "i" in row.fields]
+PLAIN: Final = [row for row in BY_ADDRESS + BY_POINTER if not row.mnemonic.startswith(("BTSS", "BTSC"))]
+_REGISTERS_FIRST: Final = 0x20
+"""First data address behind the memory-mapped W registers (isa.md §1.2)."""
+
+
+@cache
+def registers_of(chip: str) -> list[Any]:
+    """Every register of one of CHIPS, those of the CPU too, the W registers left out."""
+    return [sfr for sfr in CHIPS[chip].sfrs.values() if sfr.size == 2 and sfr.address >= _REGISTERS_FIRST]
+
+
+@dataclass
+class Image:
+    """Program words by address, where the drills are, and what W registers are for."""
+
+    chip: Chip
+    words: dict[int, int] = field(default_factory=dict)
+    drills: list[tuple[int, str]] = field(default_factory=list)
+    """First address and kind."""
+    rest: int = 0
+    """A branch to itself."""
+    handlers: range = range(0)
+    """Program addresses of the interrupt handlers."""
+    end: int = 0
+    scenes: list[Scene] = field(default_factory=list)
+    """Devices at work, one scene or several to a base state."""
+    pool: list[Any] = field(default_factory=list)
+    """Registers the image is about."""
+    pointers: list[int] = field(default_factory=list)
+    index: int = 0
+    data: list[int] = field(default_factory=list)
+    """W registers by use."""
+
+    def stretches(self) -> dict[int, list[int]]:
+        """The words in runs of consecutive ones, by first address."""
+        found: dict[int, list[int]] = {}
+        start = -2
+        for address in sorted(self.words):
+            if start < 0 or address != start + 2 * len(found[start]):
+                start = address
+                found[start] = []
+            found[start].append(self.words[address])
+        return found
+
+
+class ImageWriter:
+    """Writes one image."""
+
+    def __init__(self, seed: int, chip: Chip) -> None:
+        self.draw: Final = random.Random(f"{seed} drills")
+        self.image: Final = Image(chip)
+        self.at = CODE
+        self.leaves: list[int] = []
+        draw, image = self.draw, self.image
+        everything = registers_of(chip.name)
+        names = draw.sample(sorted(SCENES), 4)
+        image.scenes = [SCENES[name](draw) for name in names]
+        about = {family(name) for scene in image.scenes for name, _ in scene}
+        image.pool = everything
+        choice = draw.random()
+        if choice < 0.5:
+            image.pool = [sfr for sfr in everything if family(sfr.name) in about] or everything
+        elif choice < 0.6:  # W registers as memory
+            image.pool = [sfr for sfr in chip.sfrs.values() if sfr.address < _REGISTERS_FIRST]
+        registers = list(range(15))
+        draw.shuffle(registers)
+        if draw.random() < 0.5:
+            registers.sort(key=lambda number: number not in (8, 9, 10, 11, 13))
+        image.pointers, image.index, image.data = registers[:7], registers[7], registers[8:]
+
+    def register(self) -> Any:
+        """A register an instruction names."""
+        draw = self.draw
+        while True:
+            sfr = draw.choice(self.image.pool if draw.random() < 0.8 else registers_of(self.image.chip.name))
+            if sfr.name in MODES + CONTROL and draw.random() < 0.7:
+                continue
+            return sfr
+
+    def put(self, words: list[int]) -> None:
+        """The next words."""
+        for word in words:
+            self.image.words[self.at] = word
+            self.at += 2
+
+    def access(self, rows: list[Row] | None = None, repeated: bool = False) -> list[int]:
+        """One instruction that reads or writes data memory, as words."""
+        draw = self.draw
+        while True:
+            kind = draw.random()
+            chosen = rows or (BY_ADDRESS if kind < 0.45 else BY_POINTER if kind < 0.95 else PREFETCHING)
+            row = draw.choice(chosen)
+            if repeated and not row.repeat_ok:
+                continue
+            x = self.operands(row)
+            if x is not None:
+                return list(codec.encode(row, x))
+
+    def operands(self, row: Row) -> Operands | None:
+        """Random fields of `row`, pointers where it wants addresses; None if they turn out illegal."""
+        draw, image, fields = self.draw, self.image, row.fields
+        x = Operands(**{f.letter: f.get(*[draw.getrandbits(24) for _ in row.pattern.mask]) for f in row.pattern.fields})
+        if "z" in fields:
+            x.z = 0
+        if "f" in fields:
+            byte = fields["f"].scale == 1 and getattr(x, "B", 1)
+            where = draw.random()
+            address = self.register().address if where < 0.95 else draw.randrange(0, 32)
+            x.f = address & ~1 | (draw.randrange(2) if byte else 0)
+        if draw.random() < 0.07:  # registers for several things at once, the stack pointer too
+            return None if row.broken(x) else x
+        for letter in "pqgh":
+            if letter in fields and draw.random() < 0.2:
+                setattr(x, letter, 0)
+        offset = "o" in fields
+        loads, stores = offset and row.syntax.endswith("Wnd"), offset and not row.syntax.endswith("Wnd")
+        for register, modes, indexed in (("s", "pg", loads), ("d", "qh", stores)):
+            if register in fields:
+                pointing = indexed or any(letter in fields and getattr(x, letter) for letter in modes)
+                number = draw.choice(image.pointers if pointing else image.data)
+                setattr(x, register, number // fields[register].scale * fields[register].scale)
+        if "w" in fields:
+            wanted = ("g" in fields and x.g >= 6) or ("h" in fields and x.h >= 6)
+            x.w = image.index if wanted else draw.choice(image.data)
+        if offset:
+            x.o = draw.choice((0, 1, -1, 2, draw.randrange(-20, 20)))
+        return None if row.broken(x) else x
+
+    def loop_end(self) -> None:
+        """An access that may be the last instruction of a DO loop."""
+        self.put(self.access(PLAIN))
+
+    def drill(self) -> None:
+        """One drill of a random kind."""
+        draw, start = self.draw, self.at
+        kind = draw.choices(*zip(*KINDS.items(), strict=True))[0]
+        if kind == "plain":
+            for _ in range(draw.randrange(2, 6)):
+                self.put(self.access())
+        elif kind == "REPEAT":
+            for _ in range(2):
+                if draw.random() < 0.7:
+                    self.put(words_of("REPEAT #lit14", k=draw.choice((0, 1, 2, 3, 7))))
+                else:
+                    self.put(words_of("REPEAT Wn", s=draw.choice((self.image.index, draw.choice(self.image.data)))))
+                self.put(self.access(repeated=True))
+        elif kind == "DO":
+            self.loop()
+        elif kind == "stack":
+            for _ in range(draw.randrange(2, 5)):
+                self.put(self.stacking())
+        elif kind == "nap":
+            self.put(self.access())
+            self.put(words_of("PWRSAV #lit1", k=int(draw.random() < 0.8)))
+            self.put(self.access())
+        else:  # the handlers do the accesses
+            self.put(words_of("NOP") * draw.randrange(3))
+            self.put(words_of("DISI #lit14", k=draw.randrange(6)) if draw.random() < 0.3 else [])
+            self.put(self.access())
+            self.put(words_of("NOP") * 2)
+        self.put(words_of("BRA Expr", n=-1))
+        self.image.drills.append((start, kind))
+
+    def loop(self) -> None:
+        """A DO loop of accesses; the last instruction is one."""
+        draw, start = self.draw, self.at
+        self.put([0, 0])
+        for _ in range(draw.randrange(1, 4)):
+            if draw.random() < 0.2:
+                self.put(words_of("REPEAT #lit14", k=draw.randrange(3)))
+                self.put(self.access(repeated=True))
+            else:
+                self.put(self.access())
+        self.put(words_of("NOP"))
+        self.loop_end()
+        length = (self.at - 2 - start - 4) // 2
+        for word in words_of("DO #lit14, Expr", k=draw.choice((0, 1, 2)), n=length):
+            self.image.words[start] = word
+            start += 2
+
+    def stacking(self) -> list[int]:
+        """One use of the stack: pushes, pops, calls and frames of every form (isa.md §10)."""
+        draw = self.draw
+        w, even = draw.randrange(15), draw.randrange(0, 14, 2)
+        leaf = draw.choice(self.leaves)
+        return draw.choice((
+            partial(words_of, "PUSH f", f=self.register().address),
+            partial(words_of, "POP f", f=self.register().address),
+            partial(words_of, "MOV{.B} Ws, Wd", s=w, g=0, d=15, h=3, w=0, B=0),
+            partial(words_of, "MOV{.B} Ws, Wd", s=w, g=0, d=15, h=5, w=0, B=draw.randrange(2)),
+            partial(words_of, "MOV{.B} Ws, Wd", s=15, g=4, d=w, h=0, w=0, B=0),
+            partial(words_of, "MOV{.B} Ws, Wd", s=15, g=4, d=15, h=3, w=0, B=0),
+            partial(words_of, "MOV.D Wns, Wd", s=even, d=15, q=3),
+            partial(words_of, "MOV.D Ws, Wnd", s=15, p=4, d=even),
+            partial(words_of, "INC{.B} Ws, Wd", s=w, p=0, d=15, q=3, B=0),
+            partial(words_of, "MOV{.B} Wns, [Wd+Slit10]", s=w, d=15, o=draw.randrange(-4, 5), B=0),
+            partial(words_of, "PUSH.S"),
+            partial(words_of, "POP.S"),
+            partial(words_of, "LNK #lit14", k=draw.randrange(0, 12, 2)),
+            partial(words_of, "ULNK"),
+            partial(words_of, "RCALL Expr", n=(leaf - self.at - 2) // 2),
+            partial(words_of, "CALL Expr", n=leaf),
+            partial(words_of, "RCALL Expr", n=0),
+        ))()  # fmt: skip
+
+    def leaf(self) -> int:
+        """A callee; its address."""
+        start = self.at
+        self.put(self.access(PLAIN))
+        end = self.draw.choice(("RETURN", "RETLW{.B} #lit10, Wn", "RETFIE"))
+        self.put(words_of(end, d=self.draw.choice(self.image.data), k=17, B=0) if "RETLW" in end else words_of(end))
+        return start
+
+    def handler(self, number: int) -> int:
+        """Accesses, flags cleared if `number` is even, and back; its address."""
+        start = self.at
+        for _ in range(self.draw.randrange(1, 4)):
+            if self.draw.random() < 0.15:
+                self.put(words_of("REPEAT #lit14", k=self.draw.randrange(4)))
+                self.put(self.access(PLAIN, repeated=True))
+            else:
+                self.put(self.access(PLAIN))
+        if not number & 1:
+            for name in ("IFS0", "IFS1", "IFS2"):
+                self.put(words_of("CLR{.B} f", B=0, f=self.image.chip.sfrs[name].address))
+        self.put(words_of("RETFIE"))
+        return start
+
+    def write(self) -> Image:
+        """The whole image."""
+        image, chip = self.image, self.image.chip
+        image.words |= {0: 0x040000 | CODE, 2: 0}
+        image.rest = self.at
+        self.put(words_of("BRA Expr", n=-1))
+        self.leaves = [self.leaf() for _ in range(3)]
+        handlers = [self.handler(number) for number in range(HANDLERS)]
+        trap = self.at
+        image.handlers = range(handlers[0], trap, 2)
+        self.put(words_of("CLR{.B} f", B=0, f=chip.sfrs["INTCON1"].address))
+        self.put(words_of("CLR{.B} f", B=0, f=chip.sfrs["CORCON"].address) if self.draw.random() < 0.5 else [])
+        self.put(words_of("RETFIE"))
+        for irq in chip.interrupts:
+            vector = chip.vectors[irq + 8]
+            image.words[vector.ivt] = image.words[vector.aivt] = handlers[irq % HANDLERS]
+        for vector in chip.vectors[:8]:
+            image.words[vector.ivt] = image.words[vector.aivt] = trap
+        for _ in range(DRILLS):
+            self.drill()
+        image.end = self.at
+        return image
+
+
+def image_of(seed: int, chip: Chip) -> Image:
+    """The image of a seed."""
+    return ImageWriter(seed, chip).write()

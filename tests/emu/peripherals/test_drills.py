@@ -1,0 +1,79 @@
+"""A sample of tests/fuzz/fuzz_drills.py: engines agree, every kind of access is made, differences show."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from emu.machine import Machine
+
+from .access_census import WAYS, ways_of
+from .device_drills import registers_of
+from .device_programs import CHIPS
+from .drill_runs import Tally, check, crew_of
+
+REAL, MADE_UP = CHIPS
+
+
+@pytest.mark.parametrize(("seed", "chip"), [(1, REAL), (2, REAL), (3, MADE_UP)])
+def test_engines_agree_on_drills(seed: int, chip: str) -> None:
+    """Design §4: same state in the same cycle; registers in every way, events in the very cycle of an access."""
+    tally = Tally()
+    assert check(seed, CHIPS[chip], tally, drills=14, rounds=8) is None
+    assert tally.programs > 0.9 * 14 * 8
+
+
+@pytest.fixture(scope="module")
+def made() -> Counter[tuple[str, int, bool, int, str]]:
+    """What a seeded sample of drills does to registers, counted where the plain engine does it."""
+    tally = Tally()
+    for seed in range(100, 116):
+        assert check(seed, CHIPS[REAL], tally, engines=("plain",), rounds=8) is None
+    return ways_of(tally.accesses)
+
+
+FLOORS = {"address": 0.37, "pointer": 0.90, "REPEAT": 0.52, "DO": 0.50, "handler": 0.78, "event": 0.62}
+"""Shares of registers, a tenth below the least that was measured over sizes, reads and writes."""
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("size", [1, 2])
+@pytest.mark.parametrize("write", [False, True])
+def test_a_sample_of_drills_reaches_most_registers(made, way: str, size: int, write: bool) -> None:
+    """Every register of every device, read and written, byte and word, each way: the share a small sample has."""
+    registers = registers_of(REAL)
+    reached = sum(bool(made[REAL, sfr.address, write, size, way]) for sfr in registers)
+    assert reached >= FLOORS[way] * len(registers), [
+        sfr.name for sfr in registers if not made[REAL, sfr.address, write, size, way]
+    ]
+
+
+def late(machine: Machine) -> None:
+    """Events due in the cycle of an access happen behind it."""
+    events = machine.core.events
+    arrive = events.arrive
+    events.arrive = lambda cycle: arrive(cycle - 1)  # type: ignore[method-assign]
+
+
+def narrow(machine: Machine) -> None:
+    """Byte writes of registers lose their upper bit."""
+    bus = machine.bus
+    write = bus.write
+    bus.write = lambda address, value, lanes=0xFFFF: write(address, value & (lanes >> 1 | 0x80), lanes)  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("defect", [late, narrow])
+def test_a_defect_of_one_machine_is_found(defect) -> None:
+    """The comparison can fail, and tells which drill did it."""
+    crew_of.cache_clear()
+    seeds = iter(range(200, 206))
+    try:
+        assert check(next(seeds), CHIPS[REAL], drills=1, rounds=1, engines=("plain", "interp")) is None
+        for robot in (False, True):
+            for slip in (0, 1):
+                defect(crew_of(REAL, robot, slip, ("plain", "interp")).machines[1])
+        found = [check(seed, CHIPS[REAL], engines=("plain", "interp"), rounds=6) for seed in seeds]
+        assert any(text and "interp differs" in text for text in found)
+    finally:
+        crew_of.cache_clear()

@@ -1,0 +1,90 @@
+"""Engines against each other on very short programs, hundreds to an image, that access registers in every way there is.
+
+`python tests/fuzz/fuzz_drills.py [--images N] [--seed S] [--seconds T] [--chip NAME] [--jobs N] [--table]`.
+Exits 1 at the first difference. Every fourth seed runs on a made-up chip unless --chip names one for all. At the end it
+tells how many combinations of register, read or write, byte or word and way were never made; --table which ones.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from itertools import islice
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu")]
+
+from peripherals.access_census import WAYS, ways_of  # noqa: E402
+from peripherals.device_drills import registers_of  # noqa: E402
+from peripherals.device_programs import CHIPS  # noqa: E402
+from peripherals.drill_runs import Tally, check  # noqa: E402
+
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+
+
+def one(seed: int, chip: str) -> tuple[str | None, Tally]:
+    """What differs on the image of a seed, and what was run."""
+    tally = Tally()
+    return check(seed, CHIPS[chip], tally), tally
+
+
+def results(course: Course, chip: str | None, jobs: int) -> Iterator[tuple[str | None, Tally]]:
+    """The seeds of a course, `jobs` at a time, each told of in order."""
+    real, made_up = CHIPS
+
+    def named(seed: int) -> str:
+        return chip or (made_up if seed % 4 == 3 else real)
+
+    if jobs < 2:
+        for seed in course:
+            yield one(seed, named(seed))
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        ahead = iter(range(course.first, 1 << 40))
+        waiting = [pool.submit(one, seed, named(seed)) for seed in islice(ahead, 2 * jobs)]
+        for _seed in course:
+            yield waiting.pop(0).result()
+            following = next(ahead)
+            waiting.append(pool.submit(one, following, named(following)))
+        for future in waiting:
+            future.cancel()
+
+
+def never(tally: Tally, chip: str) -> dict[tuple[str, int, str], list[str]]:
+    """Registers of a chip without an access, by read or write, size and way."""
+    made = ways_of(tally.accesses)
+    return {
+        (kind, size, way): [sfr.name for sfr in registers_of(chip) if not made[chip, sfr.address, write, size, way]]
+        for kind, write in (("read", False), ("write", True))
+        for size in (1, 2)
+        for way in WAYS
+    }
+
+
+def main() -> int:
+    course = Course(parser(__doc__), "images", 60, "images of 40 drills, each run 30 times")
+    course.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
+    course.parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
+    course.parser.add_argument("--table", action="store_true", help="print what accesses were never made")
+    options = course.parse()
+    total = Tally()
+    for found, tally in results(course, options.chip, options.jobs):
+        if found is not None:
+            return course.failed(found)
+        total.add(tally)
+    kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(total.kinds.items()))
+    print(f"{total.programs} programs ({kinds}), {total.cycles} Tcy, {total.left} images left early")
+    for chip in CHIPS:
+        if any(key[0] == chip for key in total.accesses):
+            gaps = never(total, chip)
+            cells = len(gaps) * len(registers_of(chip))
+            print(f"{chip}: {cells - sum(map(len, gaps.values()))} of {cells} kinds of access made")
+            for (kind, size, way), names in gaps.items() if options.table else ():
+                print(f"  {kind} {'byte' if size == 1 else 'word'} {way}: {len(names)} not: {' '.join(names)}")
+    return course.ended("no difference")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
