@@ -48,9 +48,9 @@ class LlvmBuilder:
         """Some instruction of the function writes accumulator flags, so SR in the record may lack them."""
         self.before_slow: Callable[[], None] = lambda: None
         """Writes what goes into a slow exit first."""
-        self.reach: Callable[[], Number] | None = None
-        """Truth of "no event is due up to the access", for pointers that turn out to lead to a register. None: such an
-        access is the interpreter's."""
+        self.reach: Callable[[Number], Number] | None = None
+        """Truth of "no event is due up to the access, which waits for so many cycles", for pointers that turn out to
+        lead to a register. None: such an access is the interpreter's."""
         self.loads_ahead = 0
         """Loads that follow the next one of the instruction: each is made a cycle later (design §4.2)."""
         self.several_stores = False
@@ -220,7 +220,7 @@ class LlvmBuilder:
         if self.reach is None:
             e.end(f"br label %{self.slow_label}")
         else:
-            self.guard(self.reach() & ((ea & (size - 1)) == 0))
+            self.guard(self.reach(0) & ((ea & (size - 1)) == 0))
             word = self._pointed(now, ea & 0xFFFE, 0, 0, "memory(read)")
             self.guard(word >= 0)
             found.append((wide(word if size == 2 else (word >> ((ea & 1) << 3)) & 0xFF), e.block.label))
@@ -254,6 +254,15 @@ class LlvmBuilder:
         e.line(f"{function} = load ptr, ptr {place}")
         numbers = ", ".join(f"i64 {wide(one)}" for one in (now, word, lanes, value))
         return e.let(f"call {CONVENTION} i64 {function}(ptr %rec, {numbers}) cold nounwind {effect}")
+
+    def waited(self) -> Number:
+        """Cycles that reads of the PSV window have added to the instruction (isa.md §13.3)."""
+        if not self.pending.psv or self.psv_cycles is None:
+            return 0
+        any_window: Number = 0
+        for read in self.pending.psv:
+            any_window = any_window | read
+        return self.select(any_window, self.psv_cycles, 0)
 
     def _load_static(self, ea: int, size: Size) -> Number:
         if size == 2 and ea & 1:
@@ -306,10 +315,11 @@ class LlvmBuilder:
         ram, device, done = (e.fresh(name) for name in ("ram", "device", "done"))
         e.end(f"br i1 {truth(s.in_ram)}, label %{ram}, label %{device}, !prof !0")
         e.start(device)
-        self.guard(self.reach() & ((s.address & (s.size - 1)) == 0))
+        waited = self.waited()
+        self.guard(self.reach(waited) & ((s.address & (s.size - 1)) == 0))
         odd = s.address & 1
         lanes, placed = (0xFFFF, s.value) if s.size == 2 else (0xFF << (odd << 3), s.value << (odd << 3))
-        self.guard(self._pointed(self.now, s.address & 0xFFFE, lanes, placed) != 0)
+        self.guard(self._pointed(self.now + waited, s.address & 0xFFFE, lanes, placed) != 0)
         written = e.block.label
         e.end(f"br label %{done}")
         e.start(ram)

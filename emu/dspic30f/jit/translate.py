@@ -286,7 +286,7 @@ class Translator:
         b.several_stores = step.facts.stores > 1
         b.loads_ahead = max(step.facts.loads - 1, 0)
         if step.pc not in self._polled:  # iterations that are skipped may not read what time changes
-            b.reach = lambda: self.fits(row.cycles + stall, start) if self.exact else 1
+            b.reach = lambda waited: self.fits(row.cycles + stall + waited, start) if self.exact else 1
         flow = row.does(b, step.insn.x)  # type: ignore[arg-type]
         if flow is not None and step.pc == self.around.do_end:
             raise NeedsInterpreter  # undefined on silicon; the sequencer says what happens here
@@ -314,12 +314,7 @@ class Translator:
             else:
                 b.guard(fits)
         b.commit()
-        cycles: Number = row.cycles + stall
-        if b.pending.psv:
-            any_window = b.pending.psv[0]
-            for other in b.pending.psv[1:]:
-                any_window = any_window | other
-            cycles = cycles + b.select(any_window, step.facts.window_cycles, 0)
+        cycles: Number = row.cycles + stall + b.waited()
         if self.exact and isinstance(flow, Return):  # an event up to the second cycle may end it there
             due = self.e.let(f"icmp uge i64 {wide(start + cycles - 2)}, %before", bit=True)
             self._unsure = due if self._unsure is None else due | self._unsure

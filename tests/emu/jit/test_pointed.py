@@ -77,6 +77,15 @@ def test_accesses_by_pointer_are_native_where_direct_ones_are(name: str, accesse
     assert compare(plain, native) < 6
 
 
+@pytest.mark.parametrize("name", ["LATD", "TMR2", "PR2", "IFS0"])
+def test_a_constant_reaches_a_register_when_the_window_has_been_read(name: str) -> None:
+    """isa.md §13.3: reading the PSV window takes one or two cycles more, and the store comes behind them: what is due
+    in them happens before it."""
+    lines = [f"mov #{AT[name]}, w8", "mov #0x8200, w6", "mov [w6++], [w8]", "ior w1, [w6], [w8]", "mov.b [w6], [w8]"]
+    plain, native = machines(lines, "0x24")
+    compare(plain, native)
+
+
 @pytest.mark.parametrize(("name", "access"), PYTHONS.values(), ids=PYTHONS)
 def test_what_a_direct_access_leaves_to_python_a_pointer_leaves_too(name: str, access: str) -> None:
     """Devices without a rule, traps, modes, and two writes of which the second may be refused."""
