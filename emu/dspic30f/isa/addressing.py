@@ -133,7 +133,10 @@ class Place:
 
 
 def source(m: Builder, x: Operands, size: Size, mode: int | None = None) -> Place:
-    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index. Its pointer moves at once."""
+    """Ws in mode ``p``, or in ``mode`` of the 8-mode set with Wb as index. Its pointer moves at once.
+
+    UNVERIFIED: where it points to its own place in data memory, the new value is read.
+    """
     mode = x.p if mode is None else mode
     if mode == 0:
         place = Place(m, x.s, size)

@@ -31,6 +31,12 @@ def test_a_store_to_the_pointer_register_wins_over_its_update(engine: str) -> No
     assert after(engine, "mov w1, [w2++]", w1=0x1234, w2=4).machine.w[2] == 0x1234
 
 
+def test_a_pointer_that_moves_onto_itself_reads_its_new_value(engine: str) -> None:
+    """docs/accuracy.md, UNVERIFIED: INC [++W3],W0 with 4 in W3 reads W3 at 6; INC.B [W2--],W0 reads the low byte."""
+    assert after(engine, "inc [++w3], w0", w3=4).machine.w[0] == 7
+    assert after(engine, "inc.b [w2--], w0", w0=0, w2=4).machine.w[0] == 4
+
+
 def test_an_explicit_write_of_sr_wins_over_flags(engine: str) -> None:
     """isa.md §2.3, UNVERIFIED: IOR to SR would set N and Z; the stored value stays."""
     rig = after(engine, "ior.b 0x42", w0=0x01)

@@ -30,9 +30,11 @@ from .device_scenes import SCENES, Scene
 CODE: Final = 0x200
 DRILLS: Final = 40
 """Drills of an image."""
-KINDS: Final = {"plain": 4, "REPEAT": 3, "DO": 4, "handler": 4, "stack": 2, "nap": 1}
+KINDS: Final = {"plain": 4, "REPEAT": 3, "DO": 4, "handler": 4, "stack": 2, "nap": 1, "program": 0.3}
 """Kinds of drill and their shares."""
 HANDLERS: Final = 4
+ROW: Final = 64
+"""Program addresses of a row of flash (dspic30f6014a.md §16)."""
 MODES: Final = ("CORCON", "MODCON", "XBREV", "SPLIM", "INTCON1", "SR", "DOSTARTL", "DOENDL")
 """Drawn less often: every value makes native code of its own."""
 CONTROL: Final = ("OSCCON", "RCON", "NVMCON", "PMD1", "PMD2", "PMD3")
@@ -68,6 +70,8 @@ class Image:
     handlers: range = range(0)
     """Program addresses of the interrupt handlers."""
     end: int = 0
+    row: int = 0
+    """A row of flash with code that drills program anew and call."""
     scenes: list[Scene] = field(default_factory=list)
     """Devices at work, one scene or several to a base state."""
     pool: list[Any] = field(default_factory=list)
@@ -195,6 +199,8 @@ class ImageWriter:
         elif kind == "stack":
             for _ in range(draw.randrange(2, 5)):
                 self.put(self.stacking())
+        elif kind == "program":
+            self.programming()
         elif kind == "nap":
             self.put(self.access())
             self.put(words_of("PWRSAV #lit1", k=int(draw.random() < 0.8)))
@@ -223,6 +229,36 @@ class ImageWriter:
         for word in words_of("DO #lit14, Expr", k=draw.choice((0, 1, 2)), n=length):
             self.image.words[start] = word
             start += 2
+
+    def programming(self) -> None:
+        """The key and WR, mostly as they should be, and a call into the row (dspic30f6014a.md §16)."""
+        draw, sfrs = self.draw, self.image.chip.sfrs
+        w = draw.choice(self.image.data)
+        for key in (0x55, 0xAA):
+            self.put(words_of("MOV{.W} #lit16, Wnd", k=key, d=w))
+            self.put(words_of("MOV{.W} Wns, f", s=w, f=sfrs["NVMKEY"].address))
+            self.put(words_of("NOP") * (draw.random() < 0.1))
+        if draw.random() < 0.8:
+            self.put(words_of("BSET{.B} f, #bit4", f=sfrs["NVMCON"].address + 1, b=7))
+        else:
+            self.put(words_of("MOV{.W} Wns, f", s=draw.choice(self.image.data), f=sfrs["NVMCON"].address))
+        self.put(words_of("NOP") * draw.randrange(3))
+        self.put(words_of("CALL Expr", n=self.image.row + 2 * draw.choice((0, 0, 1, 2))))
+        self.put(self.access(PLAIN))
+
+    def programmed_row(self) -> None:
+        """A row of accesses and literals that ends in a return, erased or not."""
+        while self.at % ROW:
+            self.put(words_of("NOP"))
+        self.image.row = self.at
+        while self.at < self.image.row + ROW - 4:
+            if self.draw.random() < 0.4:
+                self.put(words_of("MOV{.W} #lit16, Wnd", k=0xFFFF, d=self.draw.choice(self.image.data)))
+            else:
+                self.put(self.access([row for row in PLAIN if not row.word2]))
+        self.put(words_of("RETURN"))
+        self.put(words_of("NOP"))
+        self.put(words_of("RETURN"))
 
     def stacking(self) -> list[int]:
         """One use of the stack: pushes, pops, calls and frames of every form (isa.md §10)."""
@@ -290,6 +326,7 @@ class ImageWriter:
             image.words[vector.ivt] = image.words[vector.aivt] = handlers[irq % HANDLERS]
         for vector in chip.vectors[:8]:
             image.words[vector.ivt] = image.words[vector.aivt] = trap
+        self.programmed_row()
         for _ in range(DRILLS):
             self.drill()
         image.end = self.at

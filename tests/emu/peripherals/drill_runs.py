@@ -254,20 +254,41 @@ def prepare(draw: random.Random, machine: Machine, image: Image, start: int, kin
         if draw.random() < 0.6:
             word, bit = source.enable
             machine.write(word, machine.peek(word) | 1 << bit)
+    if kind == "program":
+        program(draw, machine, image)
     machine.pc = start
     return tuple(held)
 
 
-def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | None]:
-    """So many Tcy, in one piece or cut; longer while it sleeps."""
-    end = machine.cycle + cycles
-    stops = []
-    if draw.random() < 0.4:
-        stops.append(machine.run_until(machine.cycle + draw.randrange(1, 30)))
-    stops.append(machine.run_until(end))
-    while machine.is_asleep and machine.cycle < end + SLEPT and stops[-1] is None:
-        stops.append(machine.run_until(machine.cycle + draw.choice((1, 20, 400, 3000))))
-    return [stop for stop in stops if stop is not None]
+def program(draw: random.Random, machine: Machine, image: Image) -> None:
+    """A row of flash or EEPROM is chosen, and latches that leave some of its instructions as they are."""
+    machine.write("NVMCON", draw.choice((0x4041, 0x4001, 0x4001, 0x4045, 0x4005, 0x4004, 0x4044, 0x0001)))
+    eeprom = image.chip.program["eedata"].start
+    address = draw.choice((image.row, image.row, image.row + 6, eeprom, draw.randrange(0x1000000) & ~1))
+    machine.write("NVMADR", address & 0xFFFF)
+    machine.write("NVMADRU", address >> 16)
+    for index in range(len(machine.program.flash_latch)):
+        machine.program.flash_latch[index] = draw.choice((0xFFFFFF, 0xFFFFFF, 0xFFFFFF, 0xFF0FFF, 0))
+
+
+def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | int | None]:
+    """So many Tcy, in one piece, cut or with limits in passing; longer while it sleeps, and as long again behind a row
+    of flash. Returns how pieces ended, and where limits fell."""
+    end, way = machine.cycle + cycles, draw.random()
+    ended: list[Stop | int | None] = []
+    if way < 0.4:
+        ended.append(machine.run_until(machine.cycle + draw.randrange(1, 30)))
+    if way < 0.7:
+        ended.append(machine.run_until(end))
+    else:
+        cuts: list[int] = []
+        ended.append(machine.run_past(machine.cycle + draw.randrange(1, 9), draw.randrange(1, 13), end, cuts))
+        ended += cuts
+    while machine.is_asleep and machine.cycle < end + SLEPT and not isinstance(ended[-1], Stop):
+        ended.append(machine.run_until(machine.cycle + draw.choice((1, 20, 400, 3000))))
+    if machine.cycle > end + SLEPT // 2:
+        ended.append(machine.run_until(machine.cycle + cycles))
+    return ended
 
 
 def based(seed: int, crew: Crew, image: Image) -> Iterator[list[Kept] | str]:
@@ -313,15 +334,15 @@ def check(
             crew.back(draw.choice(bases))
             cycles = draw.randrange(12, 50)
             held: tuple[int, ...] = ()
-            stops = []
+            ends = []
             for place, machine in enumerate(crew.machines):
                 held = prepare(random.Random(f"{name} prepare"), machine, image, start, kind)
                 crew.census.open = not place
-                stops.append(run(random.Random(f"{name} cut"), machine, cycles))
+                ends.append(run(random.Random(f"{name} cut"), machine, cycles))
                 crew.census.open = False
             found = crew.compare()
-            if found or any(stop != stops[0] for stop in stops):
-                told = f"{found} {stops}" if found else str(stops)
+            if found or any(end != ends[0] for end in ends):
+                told = f"{found} {ends}" if found else str(ends)
                 return f"drill {drill} ({kind}), round {number}: {told}\n{listing(image, start)}"
             tally.runs += 1
             tally.cycles += cycles
