@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from greenlet import getcurrent, greenlet
 from numpy.typing import NDArray
 
 import emu
+from arena.ahead import Ahead
 from arena.brain import STRIP_COLUMNS, STRIP_PIXELS, Lights, Line, Reading, switched_on, told_at
 from arena.ether import LINES, Ether
 from arena.infrared import Ring
@@ -30,6 +32,7 @@ from emu.boards.epuck.remote import REPEAT_SECONDS
 from emu.boards.epuck.simple import LED_PINS, Battery
 from emu.boards.epuck.stimulus import parse
 from emu.faults import VECNUM
+from emu.native import Call
 
 PROBE_TCY: Final = 147_456
 """Mean time between two looks at whether the CPU is idle, at random cycles: 10 ms, 90,000 looks in 15 minutes."""
@@ -57,6 +60,8 @@ _DRAWN_MASK: Final = (1 << _DRAWN_BITS) - 1
 
 LookAt = Callable[[int], tuple[Poses, Poses]]
 """look_at(tick): poses at the beginning of a quantum, and a quantum before."""
+Ride = Callable[[], int]
+"""ride(): native code run by whoever runs all robots; what it came back for. Only in the robot's own greenlet."""
 
 
 class EmulatedBrain:
@@ -88,7 +93,8 @@ class EmulatedBrain:
         self._board: Epuck = self.machine.board
         assert self._board.camera is not None
         self._board.camera.lamp = scene.light.brightness
-        self._board.camera.sample(self._pixels)
+        self._sees_leds: Final = scene.camera.sees_leds
+        self._board.camera.sample(self._pixels, is_lent=not self._sees_leds)
         self._begin(scene)
         self.machine.uart[1].listen(self._byte, lazy=True)
         self._ether: Final = ether or Ether.of(scene)
@@ -100,13 +106,22 @@ class EmulatedBrain:
         self.lived = 0
         """Quanta that are over for this robot."""
         self._cuts: list[int] = []
-        self._first_cut = self._told_cuts = 0
+        self._first_cut = 0
         self.wheels: Final = Wheels(self._quantum)
         self._board.motors.remember()
+        self.ahead: Final = Ahead(
+            quantum=self._quantum, on_at=self._on_at, probe_at=1, stuck_at=-1, probe_span=2 * PROBE_TCY, kept=CUTS_KEPT,
+            first_strip=_STRIP_ROWS.start, last_strip=_STRIP_ROWS.stop - 1, strip=-1, colours=self._colours_at,
+            noise=self._noise_at, noise_shift=_DRAWN_BITS - _NOISE_BITS,
+        )  # fmt: skip
+        """What compiled code knows of the robot; Python and it go on with the same looks at the CPU."""
+        self.ahead.join(self._board, self._sight, self.wheels, self._draw, self._drawn_from)
+        self._ride: Ride | None = None
+        self._life: greenlet | None = None
+        """Where it lives."""
         self._enables: Final = tuple(self.machine.chip.sfrs[name].address >> 1 for name in _ENABLES)
         self._lights: list[Lights] = []
         self._leds = 0
-        self._sees_leds: Final = scene.camera.sees_leds
         for bit, pin in enumerate(LED_PINS.values()):
             self.machine.peripherals.pins.watch(pin, partial(self._lit, bit), lazy=not self._sees_leds)
         self._strip: tuple[NDArray[np.intp], NDArray[np.uint8]] | None = None
@@ -114,13 +129,10 @@ class EmulatedBrain:
         self._text = bytearray()
         self._spoken: bytearray | None = None
         self._text_at = 0
-        self._busy = self._probes = 0
-        self._probe_at = 1
         self._fault = ""
         self._patience = scene.start.silent_s * FCY
         self._active_at = 0
         self._steps = (0, 0)
-        self._stuck_at = -1
         self._told = ""
 
     def _begin(self, scene: Scene) -> None:
@@ -153,6 +165,24 @@ class EmulatedBrain:
         self._look_at = look_at
         self._ring.look = self._sense_first
 
+    def lend(self, ride: Ride) -> None:
+        """Let native code be run by `ride` from now on, where there is any."""
+        self._ride = ride
+        self.ahead.run_by(self.machine.lend(self._run_native))
+
+    def _run_native(self, call: Call, record: int, env: int) -> int:
+        """Native code is to be run: what compiled code is to know before. Who runs it elsewhere than in the robot's
+        life (a debugger, its past) runs it alone."""
+        if getcurrent() is not self._life:
+            return call(record, env)
+        ahead = self.ahead
+        ahead.taken = self._first_cut + len(self._cuts)
+        if ahead.told < ahead.taken:
+            self._settle()
+        _, ahead.pair = self._board.motors.lend()
+        assert self._ride is not None
+        return self._ride()
+
     @property
     def has_stopped(self) -> bool:
         """Whether the firmware has stopped for good."""
@@ -164,6 +194,7 @@ class EmulatedBrain:
 
     def live(self, ticks: int) -> None:
         """Live until so many quanta are over. A robot whose infrared sensors are read sees every one of them begin."""
+        self._life = getcurrent()
         while self.lived < ticks:
             if self.lived == self._off_tick:
                 self._go_dark()
@@ -193,11 +224,12 @@ class EmulatedBrain:
 
     def _run(self, ticks: int) -> None:
         """Run until so many quanta are over, or to the next probe."""
-        machine = self.machine
-        if len(self._cuts) == self._told_cuts or len(self._cuts) >= CUTS_KEPT:
+        machine, ahead = self.machine, self.ahead
+        if ahead.told >= self._first_cut + len(self._cuts) or len(self._cuts) >= CUTS_KEPT:
             self._settle()
-            self._cuts, self._first_cut, self._told_cuts = [], self.lived, 0
-        last = min(self._probe_at, self._end_of(ticks - 1))
+            self._cuts, self._first_cut, ahead.told = [], self.lived, self.lived
+        ahead.end = self._end_of(ticks - 1)
+        last = min(ahead.probe_at, ahead.end)
         stop = machine.run_past(self._end_of(self.lived), self._quantum, last, self._cuts)
         self.lived = self._first_cut + len(self._cuts)
         if stop is not None:
@@ -206,11 +238,11 @@ class EmulatedBrain:
             self._fault = self._told if self._told and machine.is_asleep else said
             return
         reached = machine.cycle
-        if reached >= self._probe_at:
-            self._probes += 1
-            self._busy += not machine.is_asleep
+        if reached >= ahead.probe_at:
+            ahead.probes += 1
+            ahead.busy += not machine.is_asleep
             self._watch()
-            self._probe_at = reached + 1 + self._below(2 * PROBE_TCY)
+            ahead.probe_at = reached + 1 + self._below(2 * PROBE_TCY)
 
     def _below(self, end: int) -> int:
         """What `integers(end)` of the generator would draw next: Lemire's method on 32 bits."""
@@ -221,11 +253,11 @@ class EmulatedBrain:
 
     def _settle(self) -> None:
         """Tell the speeds of the wheels in quanta that are over, before the world goes on: by the steps made then."""
-        told = self._told_cuts
-        new = self._cuts[told:] if told else self._cuts
+        told = self.ahead.told
+        new = self._cuts[told - self._first_cut :]
         if new:
-            self._told_cuts += len(new)
-            self.wheels.turned(self._first_cut + told, self._board.motors.steps_by(new))
+            self.ahead.told += len(new)
+            self.wheels.turned(told, self._board.motors.steps_by(new))
 
     def _see(self, tick: int, poses: Poses, before: Poses) -> None:
         """A quantum begins with `poses`; `before` are those a quantum ago."""
@@ -259,14 +291,14 @@ class EmulatedBrain:
         elif machine.is_asleep and not any(machine.record.u16[word] for word in self._enables):
             why = "sleeps with every interrupt off"
         if not why:
-            self._stuck_at = -1
-        elif self._stuck_at < 0:
-            self._stuck_at = machine.cycle
-        elif not self._told.startswith(why) and machine.cycle - self._stuck_at > STUCK_TCY:
+            self.ahead.stuck_at = -1
+        elif self.ahead.stuck_at < 0:
+            self.ahead.stuck_at = machine.cycle
+        elif not self._told.startswith(why) and machine.cycle - self.ahead.stuck_at > STUCK_TCY:
             where = f" in {machine.image.symbols.text(machine.pc)}" if machine.image else ""
             fault = machine.stopped("halt").fault
             why += f": {fault.cause.rstrip(',')}" if fault is not None else ""
-            self._told = f"{why} since {(self._stuck_at + self._on_at) / FCY:.2f} s, at {machine.pc:#08x}{where}"
+            self._told = f"{why} since {(self.ahead.stuck_at + self._on_at) / FCY:.2f} s, at {machine.pc:#08x}{where}"
 
     def _listen(self) -> None:
         """Notice firmware that nothing is seen or heard of."""
@@ -290,7 +322,9 @@ class EmulatedBrain:
         quanta = (cycle - self._start) / self._quantum
         pixels = self._sight.line(self._poses, self._before, quanta, y, columns, self._colours_at, noise)
         if y in _STRIP_ROWS:
-            self._strip = columns, pixels
+            self._strip, self.ahead.strip = (columns, pixels), -1
+        if self._ride is not None:
+            self.ahead.know(y, self._sight.fan(y, columns))
         return pixels
 
     def _byte(self, byte: int, cycle: int) -> None:
@@ -324,8 +358,12 @@ class EmulatedBrain:
         self.machine.peripherals.pins.flush()
         self._listen()
         self._board.battery.volts = volts_after(self._scene.battery, self.machine.cycle / FCY)
-        load = self._busy / self._probes if self._probes else 0.0
-        self._busy = self._probes = 0
+        ahead = self.ahead
+        load = ahead.busy / ahead.probes if ahead.probes else 0.0
+        ahead.busy = ahead.probes = 0
+        fan = ahead.last_strip_fan
+        if fan is not None and fan.columns is not None:
+            self._strip = fan.columns, fan.pixels
         strip = strip_of(*self._strip) if self._strip is not None else b""
         return Reading(-1, load, self._leds, strip, self._ring.readings, self._fault or self._told)
 

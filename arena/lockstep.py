@@ -9,11 +9,13 @@ the same poses either way.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from ctypes import addressof, c_void_p
+from ctypes import POINTER, addressof, c_void_p, pointer
+from functools import partial
 from typing import Final, Protocol, runtime_checkable
 
 from greenlet import getcurrent, greenlet
 
+from arena.ahead import AWAY, LOOKS, OVER, RUNS, WORLD, Ahead, Swarm, run_all
 from arena.ether import Ether
 from arena.wheels import ROOM, Wheels
 from arena.world import Poses, Stretch, World
@@ -32,15 +34,26 @@ class Runner(Protocol):
     wheels: Wheels
     """How fast they turned in quanta that are over."""
 
+    ahead: Ahead
+    """What compiled code knows of it."""
+
+    def lend(self, ride: Callable[[], int]) -> None:
+        """Let `ride` run native code from now on, where there is any: called in the greenlet in which the robot lives,
+        it gives what native code came back for."""
+
     def join(self, look_at: Callable[[int], tuple[Poses, Poses]]) -> None:
         """Get poses from `look_at` from now on: those at the beginning of a quantum, and a quantum before. All quanta
         before it must be over for the robot when it asks."""
 
 
 class LockStep:
-    """`world`, the robots that are in it, all of them, and what carries their infrared light."""
+    """`world`, the robots that are in it, all of them, and what carries their infrared light. Without `is_native`
+    Python runs native code and sees each look: the same, more slowly.
+    """
 
-    def __init__(self, world: World, robots: Sequence[Runner], ether: Ether | None = None) -> None:
+    def __init__(
+        self, world: World, robots: Sequence[Runner], ether: Ether | None = None, is_native: bool = True
+    ) -> None:
         self._world: Final = world
         self._robots: Final = robots
         self._ether: Final = ether or Ether.of(world.scene)
@@ -48,34 +61,61 @@ class LockStep:
         self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
         self._stretches: list[Stretch] = []
         self._hub: greenlet = getcurrent()
+        self._lives: list[greenlet | None] = [None] * len(robots)
         self._speeds: Final = (c_void_p * len(robots))(*(robot.wheels.address for robot in robots))
         self._speeds_at: Final = addressof(self._speeds)
-        for robot in robots:
+        self._aheads: Final = (POINTER(Ahead) * len(robots))(*(pointer(robot.ahead) for robot in robots))
+        self._swarm: Final = Swarm(len(robots), addressof(self._aheads), self._speeds_at, ROOM, addressof(world.ground))
+        self._run_all: Final = partial(run_all(), addressof(self._swarm))
+        for place, robot in enumerate(robots):
             robot.join(self.look_at)
+            if is_native:
+                robot.lend(partial(self._ride, place))
 
     def advance(self, ticks: int) -> list[tuple[float, float]]:
         """Let so many quanta be over for everybody; wheel speeds of the last of them."""
         while ticks - self._world.ticks > ROOM:
             self.advance(self._world.ticks + ROOM)
         self._hub = getcurrent()
-        waiting = {greenlet(robot.live): self._world.ticks for robot in self._robots if robot.lived < ticks}
-        asked: tuple[int, ...] = (ticks,)  # the first time a greenlet is switched to it gets the argument of `live`
-        ready = list(waiting)
-        while ready:
-            for life in ready:
-                looks_at = life.switch(*asked)
-                if life.dead:
-                    del waiting[life]
-                else:
-                    waiting[life] = looks_at
-            asked = ()
-            until = min(waiting.values(), default=ticks)
-            self._step_to(until)
-            ready = [life for life, tick in waiting.items() if tick == until]
+        for place, robot in enumerate(self._robots):
+            robot.ahead.stands = AWAY
+            if robot.lived < ticks:
+                self._lives[place] = greenlet(robot.live)
+                self._go_on(place, ticks)
+        while (needed := self._next(ticks)) != OVER:
+            if needed == WORLD:
+                self._step_to(self._swarm.wanted)
+            else:
+                self._go_on(needed, self._robots[needed].ahead.why)
         for tick in [tick for tick in self._past if tick < ticks - 1]:
             del self._past[tick]
         self._stretches = [stretch for stretch in self._stretches if stretch.last >= ticks - 1]
         return [robot.wheels.speed(ticks - 1) for robot in self._robots]
+
+    def _next(self, ticks: int) -> int:
+        """Run all robots in compiled code, and the world behind them, until Python is needed; for whom."""
+        world = self._world
+        world.lend(self._poses(world.ticks), self._poses(world.ticks - 1))
+        needed: int = self._run_all(ticks)
+        self._note(world.take())
+        return needed
+
+    def _go_on(self, place: int, answer: int) -> None:
+        """Let Python go on with a robot until it is to be run, waits for poses, or is through."""
+        life, ahead = self._lives[place], self._robots[place].ahead
+        assert life is not None
+        tick = life.switch(answer)
+        if life.dead:
+            self._lives[place] = None
+        elif tick == _RUN:
+            ahead.stands = RUNS
+        else:
+            ahead.stands, ahead.tick = LOOKS, tick
+
+    def _ride(self, place: int) -> int:
+        """Native code of a robot is to be run."""
+        why: int = self._hub.switch(_RUN)
+        return why
 
     def look_at(self, tick: int) -> tuple[Poses, Poses]:
         """Poses at the beginning of a quantum, and a quantum before."""
@@ -101,8 +141,17 @@ class LockStep:
 
     def _step_to(self, ticks: int) -> None:
         """Let the world make the quanta that all robots have lived."""
+        if ticks > self._world.ticks:
+            self._note(self._world.go(self._speeds_at, ROOM, ticks - self._world.ticks))
+
+    def _note(self, made: list[Stretch]) -> None:
+        """Quanta have been made."""
         world = self._world
-        if ticks > world.ticks:
-            self._stretches += world.go(self._speeds_at, ROOM, ticks - world.ticks)
-            self._past[ticks] = world.poses  # whoever looks looks at these
+        if made:
+            self._stretches += made
+            self._past[world.ticks] = world.poses  # whoever looks looks at these
         self._ether.slowest = world.ticks * self._ether.quantum
+
+
+_RUN: Final = -1
+"""What a robot says that is to be run: no tick."""

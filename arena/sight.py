@@ -19,7 +19,7 @@ from arena.look import COLOURS, LAMPS, NOTHING, OBJECT, ROBOT, led_kinds, look_o
 from arena.scene import Scene
 from arena.vision import NEAREST, VOTES, WINDOW_COLUMNS, WINDOW_ROWS
 from arena.world import Poses, Traits
-from emu.hostcode import ADDRESS, DOUBLE, INT, functions
+from emu.hostcode import ADDRESS, DOUBLE, INT, address_of, functions
 
 ROWS_KEPT: Final = 2048
 """Rows whose rays are remembered: more than any setting of a sensor has."""
@@ -110,7 +110,7 @@ def _things_of(scene: Scene) -> _Things:
     return kept[1]
 
 
-class _Fan:
+class Fan:
     """Rays in the form the code wants, with room for what they meet."""
 
     def __init__(self, left: Floats, up: Floats, columns: NDArray[np.intp] | None = None,
@@ -120,10 +120,12 @@ class _Fan:
         """What it is known by: it lives as long."""
         self.seen: Final = np.zeros(len(left), dtype=np.uint8)
         self.pixels: Final = np.zeros((len(left), 3), dtype=np.uint8)
+        """Red, green and blue as they were painted last."""
         self._rays: Final = _Rays(self._arrays[0].ctypes.data, self._arrays[1].ctypes.data, len(left),
                                   float(np.min(left)), float(np.max(left)), self.seen.ctypes.data,
                                   self.pixels.ctypes.data, None if bright is None else bright.ctypes.data)  # fmt: skip
         self.address: Final = addressof(self._rays)
+        """Of `struct rays`."""
 
 
 class Sight:
@@ -151,9 +153,9 @@ class Sight:
         self._address: Final = addressof(self._view)
         self._counts = scene.robots.count, len(things.things)
         self._sensed: Final = things.sensed.ctypes.data
-        self._fans: Final[dict[tuple[float, int], _Fan]] = {}
+        self._fans: Final[dict[tuple[float, int], Fan]] = {}
         self._dark: Final = scene.camera.vignetting
-        self._window: _Fan | None = None
+        self._window: Fan | None = None
 
     def look(self, poses: Poses, before: Poses | None = None, quanta: float = 0.0) -> None:
         """Look at `poses` from the own one, extrapolated by `quanta` of the way it has come since `before`."""
@@ -186,16 +188,24 @@ class Sight:
         self._line(self._address, poses.address, before.address, quanta, fan.address, colours, noise)
         return fan.pixels
 
+    def lend(self) -> tuple[int, int]:
+        """For compiled code: where `line` of sight.c is, and `struct view`."""
+        return address_of(self._line), self._address
+
+    def fan(self, v: int, columns: NDArray[np.intp]) -> Fan:
+        """What `line` paints a row with, for who calls it from compiled code; whoever does keeps it."""
+        return self._fan(v, columns)
+
     def sensor(self) -> int:
         """OBJECT, ROBOT or NOTHING by the votes of the window's pixels with perfect colours (`vision.sensor_of`)."""
         if self._window is None:
             rays = [ray for u in WINDOW_COLUMNS for ray in self.lens.column(u, WINDOW_ROWS)]
             left, up = np.array(rays).T
-            self._window = _Fan(left, up)
+            self._window = Fan(left, up)
         objects, robots = divmod(self._votes(self._address, self._window.address, self._sensed), 256)
         return OBJECT if objects >= VOTES else ROBOT if robots >= VOTES else NOTHING
 
-    def _fan(self, v: int, columns: NDArray[np.intp]) -> _Fan:
+    def _fan(self, v: int, columns: NDArray[np.intp]) -> Fan:
         """A camera asks for the same rows and columns again and again."""
         key = v, id(columns)
         fan = self._fans.get(key)
@@ -203,5 +213,5 @@ class Sight:
             if len(self._fans) >= ROWS_KEPT:
                 self._fans.clear()
             bright = self.lens.vignetting(v, columns, self._dark) if self._dark else None
-            fan = self._fans[key] = _Fan(*self.lens.line(v, columns), columns, bright)
+            fan = self._fans[key] = Fan(*self.lens.line(v, columns), columns, bright)
         return fan

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from arena import bodies
 from arena.scene import FCY
-from emu.hostcode import ADDRESS, INT, functions
+from emu.hostcode import ADDRESS, INT, address_of, functions
 
 WINDOW_S: Final = 0.010
 """Motor steps are counted over at least this long to make a speed."""
@@ -53,6 +53,10 @@ class Wheels:
     def turned(self, first: int, steps: array[int]) -> None:
         """Quanta from `first` on are over, by whose ends the motors had made `steps`, left and right in turn."""
         self._turned(self._at, first, len(steps) >> 1, steps.buffer_info()[0])
+
+    def lend(self) -> tuple[int, int]:
+        """For compiled code: where `turned` of wheels.c is, and `struct drive`."""
+        return address_of(self._turned), self._at
 
     def rested(self, tick: int) -> None:
         """A quantum is over in which the robot was off or stopped: nothing turns."""

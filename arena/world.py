@@ -22,7 +22,7 @@ from arena import bodies, geometry
 from arena.placement import place_all
 from arena.scene import Scene
 from arena.scenery import ObjectKind
-from emu.hostcode import ADDRESS, INT, functions
+from emu.hostcode import ADDRESS, INT, address_of, functions
 
 ITERATIONS: Final = 20
 """Of the constraint solver (epuck.md §4)."""
@@ -149,6 +149,17 @@ class _World(Structure):
     ]  # fmt: skip
 
 
+class Ground(Structure):
+    """For compiled code that makes quanta itself: `struct ground` of lockstep.c."""
+
+    _fields_ = [
+        *((name, c_void_p) for name in ("quanta", "world", "wheels")), ("numbers", c_int64),
+        ("ticks", c_int64),  # quanta that are over
+        ("until", c_int64),  # how far it may go
+        *((name, c_void_p) for name in ("row", "now", "before")),  # poses: room for the next, the present, those before
+    ]  # fmt: skip
+
+
 @cache
 def _code() -> dict[str, Callable[..., Any]]:
     return functions(Path(__file__).with_name("world.c"), {
@@ -237,6 +248,8 @@ class World:
         self._numbers = 3 * len(self.robots) + 2 * len(self.objects)
         self._sheet, self._sheet_at, self._row = np.empty((0, self._numbers)), 0, 0
         self._row_bytes = self._sheet.itemsize * self._numbers
+        self.ground = Ground(address_of(self._quanta), self._at, self._wheels_at, self._numbers)
+        """What `lend` leaves."""
 
     # -- building ----------------------------------------------------------------------------------------------------
 
@@ -334,6 +347,26 @@ class World:
         if made:
             self.poses = self.at(made[-1], self.ticks)
         return made
+
+    def lend(self, now: Poses, before: Poses) -> None:
+        """Let compiled code make quanta by `ground` up to where noise is drawn, or poses need another sheet; `before`
+        are the poses a quantum before those of now."""
+        ground, row = self.ground, self._room()
+        noisy = self.ticks % self._noise_ticks
+        more = min(self._noise_ticks - noisy, ROWS - row) if noisy or not self.scene.robots.wheel_noise else 0
+        ground.ticks, ground.until = self.ticks, self.ticks + more
+        ground.row, ground.now, ground.before = self._sheet_at + row * self._row_bytes, now.address, before.address
+
+    def take(self) -> list[Stretch]:
+        """What has been made by `ground` since."""
+        ticks, count = self.ground.ticks, self.ground.ticks - self.ticks
+        if not count:
+            return []
+        made = Stretch(self.ticks + 1, ticks, self._sheet, self._row, self._sheet_at + self._row * self._row_bytes)
+        self._row += count
+        self.ticks = ticks
+        self.poses = self.at(made, ticks)
+        return [made]
 
     def at(self, stretch: Stretch, tick: int) -> Poses:
         """Poses at the end of so many quanta, which are in that stretch."""

@@ -21,6 +21,7 @@ from emu.dspic30f.faults import RESTART, Breakpoint, DeviceReset, Violation
 from emu.dspic30f.state import PC_MASK, RUN, W15_INITIALISED
 from emu.events import NEVER, Events
 from emu.image import Image
+from emu.native import Native, Run
 from emu.peripherals import Peripherals, Wires, build
 from emu.program import ProgramMemory
 from emu.record import Record
@@ -222,6 +223,11 @@ class Machine(Contents, BySource):
                 cuts.append(now)
             if now >= self._last:
                 return None
+
+    def lend(self, run: Run) -> Native | None:
+        """Let `run` run native code from now on, for who runs many machines at once (emu/native.py); None for an engine
+        that has none. It may end a `run_past` later than was asked by moving `Native.last`."""
+        return self.runner.lend(run)
 
     def end_at_cut(self) -> None:
         """Let the `run_past` in which this is called end at its next cut, or before."""

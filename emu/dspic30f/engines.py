@@ -7,6 +7,7 @@ from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
 from emu.dspic30f.specialised import SpecialisedEngine
+from emu.native import Native, Run
 
 NAMES: Final = ("plain", "interp", "jit", "auto")
 
@@ -34,6 +35,10 @@ class Engine(Protocol):
     def passed(self) -> list[int]:
         """The first boundaries at or after the limits that were passed since the last call, in Tcy."""
 
+    def lend(self, run: Run) -> Native | None:
+        """From now on `run` is called where native code would be, in `natively`, while nobody counts or measures it; it
+        finds what it needs in the result. None: there is no native code."""
+
 
 class PlainEngine:
     """One instruction at a time through the sequencer."""
@@ -60,6 +65,9 @@ class PlainEngine:
     def passed(self) -> list[int]:
         """None."""
         return []
+
+    def lend(self, run: Run) -> None:
+        """There is nothing to lend."""
 
 
 def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:

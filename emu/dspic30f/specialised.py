@@ -20,6 +20,7 @@ from emu.dspic30f.modes import Key, Modes
 from emu.dspic30f.places import places_of
 from emu.dspic30f.pysource import PLAIN, Source, Unsupported
 from emu.dspic30f.state import LAST, RA
+from emu.native import Run
 
 MODES_KEPT: Final = 64
 """Combinations of processor modes (a DO loop counts as one) whose functions are kept."""
@@ -112,6 +113,9 @@ class SpecialisedEngine:
     def passed(self) -> list[int]:
         """As `Engine.passed`."""
         return []
+
+    def lend(self, run: Run) -> None:
+        """As `Engine.lend`: there is nothing to lend."""
 
     def forget(self) -> None:
         """Hooks have changed: write everything anew."""

@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.exposure import Exposure
+from emu.boards.epuck.lent import LentCamera
 from emu.boards.epuck.scan import HREF, LINE_PIXELS, PCLK, VSYNC, Scan, course_of
 from emu.boards.epuck.sensors import SENSORS, Picture, Timing
 from emu.boards.part import Part
@@ -63,6 +64,9 @@ class Camera(Part, I2cDevice):
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
         places = (place_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
         chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places), self._refresh)
+        self.lent: Final = LentCamera.of(self.record)
+        """For compiled code that paints what `sample` was given."""
+        self._is_lent, self._settings = False, 0
         self._pixels: PixelSource | None = None
         self._timing: Timing
         self._picture: Picture
@@ -92,12 +96,14 @@ class Camera(Part, I2cDevice):
         """Let the camera see what `rows(y, cycle)` returns for each line when it is read out."""
         self.sample(lambda y, columns, cycle: rows(y, cycle)[columns])
 
-    def sample(self, pixels: PixelSource) -> None:
+    def sample(self, pixels: PixelSource, is_lent: bool = False) -> None:
         """Let the camera see what `pixels(y, columns, cycle)` returns for each line when it is read out.
 
         It is called with the cycle in which the line's HREF rises, only for lines that somebody reads, once per line.
+        `is_lent`: there is compiled code that paints the same, by `lent`, whoever of the two is asked.
         """
-        self._pixels = pixels
+        self._pixels, self._is_lent = pixels, is_lent
+        self.lent.setting = 0
         self._line_to.value = 0
 
     @property
@@ -136,6 +142,9 @@ class Camera(Part, I2cDevice):
             from emu.boards.epuck.pixels import Readout
 
             self._readout = Readout(self._timing, self._picture, self.scan.course.lines)
+        if self._is_lent and not self.lent.setting:
+            self._settings += 1
+            self._readout.tell(self.lent, self._settings, self._picture)
         brightness = self._exposure.brightness(self._picture.exposure, cycle, self.scan.course.frame_tcy)
         return self._readout.put(self._pixels, line, cycle, brightness, address)
 
@@ -277,6 +286,7 @@ class Camera(Part, I2cDevice):
         self._timing = self.sensor.timing(self.register)
         self._picture = self.sensor.picture(self.register)
         self._readout = None
+        self.lent.setting = 0
         self._line_to.value = 0
 
     # -- reset -------------------------------------------------------------------------------------------------------

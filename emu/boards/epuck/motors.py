@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from emu.boards.part import Part
-from emu.hostcode import ADDRESS, INT, functions
+from emu.hostcode import ADDRESS, INT, address_of, functions
 from emu.peripherals import Peripherals
 
 PORT: Final = 3
@@ -193,6 +193,12 @@ class Motors:
         """Steps made inside the block are not kept for `steps_by`: they have been made before, and are made again."""
         with self.left.unremembered(), self.right.unremembered():
             yield
+
+    def lend(self) -> tuple[int, int]:
+        """For compiled code: where `both_by` of motors.c is, and `struct pair`, which is up to date until somebody
+        begins or ceases to watch pins; 0 while somebody is told of each step."""
+        self._pair.heard = self._pins.heard_of(2)
+        return address_of(self._both_by), 0 if self.left.tells or self.right.tells else self._pair_at
 
     def steps_by(self, cycles: Sequence[int]) -> array[int]:
         """Steps of both (left, right, left and so on) as they were in some cycles, which rise from call to call; see

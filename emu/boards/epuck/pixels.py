@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from emu.boards.epuck.lent import LentCamera
 from emu.boards.epuck.scan import course_of
 from emu.boards.epuck.sensors import GREY, HEIGHT, RGB565, WIDTH, YUV, Picture, Timing
 from emu.hostcode import ADDRESS, INT, functions
@@ -46,7 +47,7 @@ Gains = ctypes.c_double * 3
 def encode(pixels: int, count: int, form: str, gains: ctypes.Array[ctypes.c_double], address: int) -> int:
     """Write the bytes a sensor sends for a line of `count` pixels after its gains to an address of the host, from
     another (`line.c`); how many they are."""
-    _encoder()(pixels, count, _FORMS.index(form), gains, address)
+    line_code()["encode"](pixels, count, _FORMS.index(form), gains, address)
     return count * _SIZES[form]
 
 
@@ -56,11 +57,19 @@ class Readout:
     def __init__(self, timing: Timing, picture: Picture, lines: int) -> None:
         self._columns: Final = scene_columns(timing, picture)
         self._rows: Final = [scene_row(timing, picture, line) for line in range(lines)]
+        self._row_numbers: Final = (ctypes.c_int64 * lines)(*self._rows)
         self._gains: Final = picture.gains
         self._form: Final = picture.form
         self._factors: Final = Gains(*picture.gains)
         self._brightness = 1.0
         self._held: Final[dict[int, tuple[Pixels, int]]] = {}
+
+    def tell(self, camera: LentCamera, setting: int, picture: Picture) -> None:
+        """Let compiled code know this setting, by a number of its own. It must live as long as it is in force."""
+        camera.row, camera.count = ctypes.addressof(self._row_numbers), len(self._columns)
+        camera.form, camera.gains[:] = _FORMS.index(self._form), self._gains
+        camera.manual = -1.0 if picture.exposure is None else picture.exposure
+        camera.setting = setting
 
     def put(self, source: PixelSource | None, line: int, cycle: int, brightness: float, address: int) -> int:
         """Write the bytes of a line in which a source's pixels come `brightness` times as bright to an address of the
@@ -81,9 +90,13 @@ class Readout:
 
 
 @cache
-def _encoder() -> Callable[..., None]:
-    arguments = (ADDRESS, INT, INT, ADDRESS, ADDRESS)
-    return functions(Path(__file__).with_name("line.c"), {"encode": (None, arguments)})["encode"]
+def line_code() -> dict[str, Callable[..., int]]:
+    """The functions of line.c."""
+    return functions(Path(__file__).with_name("line.c"), {
+        "encode": (None, (ADDRESS, INT, INT, ADDRESS, ADDRESS)),
+        "asked": (INT, (ADDRESS, INT, ADDRESS)),
+        "send": (None, (ADDRESS, INT, ADDRESS)),
+    })  # fmt: skip
 
 
 def decode(data: bytes, form: str) -> Pixels:

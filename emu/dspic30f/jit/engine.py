@@ -10,6 +10,7 @@ import ctypes
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from time import perf_counter
 from typing import Any, Final, Protocol
 from weakref import WeakValueDictionary
@@ -28,11 +29,13 @@ from emu.dspic30f.jit.runtime import (
     BOUNDARY,
     ENTERED,
     ENV_WORDS,
+    FRESH,
     LAST,
     LIMIT,
     NOTED,
     NOTES,
     PERIOD,
+    ROOM,
     STEPS,
     dispatch_text,
 )
@@ -53,6 +56,7 @@ from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.ledger import STRETCH, Ledger
 from emu.dspic30f.modes import Key, Modes
 from emu.dspic30f.state import NOT_REPEATING, RUN
+from emu.native import FRESH_ROOM, Native, Run
 from emu.straight import Rule
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
@@ -63,6 +67,11 @@ COLD_CYCLES: Final = 1000
 
 NATIVE_CYCLES: Final = 30_000_000
 """Longest native run before Python can handle signals, in Tcy."""
+
+NATIVE_FIELDS: Final = {"cycle": "cpu.cycle", "now": "events.now", "deadline": "events.deadline", "pc": "cpu.pc",
+                        "mode": "cpu.mode"}  # fmt: skip
+NATIVE_SFRS: Final = {"corcon": "CORCON", "ie0": "IEC0", "ie1": "IEC1", "ie2": "IEC2"}
+"""Where in the record `Native` has what it names."""
 
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
@@ -148,6 +157,9 @@ class JitEngine:
         self._dispatch: Any = None
         self._dispatcher: Loaded | None = None
         self._native: Callable[..., Any] = lambda record, env: self._dispatch(record, env)
+        self._run: Run | None = None
+        self._lent: Callable[..., Any] | None = None
+        self._lent_as: Native | None = None
         self._interpret: Callable[[], None] = core.sequencer.execute
         self._run_cold: Callable[[int], None] = cold.run
         self._u64: Final = core.record.u64
@@ -209,7 +221,8 @@ class JitEngine:
         if self.compiler.busy:
             self._collect()
         self._select()
-        env, native, record, surroundings = self._env, self._native, self._core.record.address, self._env_address
+        env, record, surroundings = self._env, self._core.record.address, self._env_address
+        native = self._native if self._lent is None or self._native is not self._dispatch else self._lent
         env[LIMIT] = min(limit, start + self._longest)
         env[BOUNDARY] = 1
         why = native(record, surroundings)
@@ -252,6 +265,24 @@ class JitEngine:
         self._env[NOTED] = 0
         return list(self._env[NOTES : NOTES + count])
 
+    def lend(self, run: Run) -> Native:
+        """As `Engine.lend`."""
+        core, env, record = self._core, self._env_address, self._core.record
+        at = {name: record.address + record.fields[field].offset for name, field in NATIVE_FIELDS.items()}
+        at |= {name: record.address + core.chip.sfrs[sfr].address for name, sfr in NATIVE_SFRS.items()}
+        words = {"begins": BOUNDARY, "limit": LIMIT, "last": LAST, "noted": NOTED, "notes": NOTES, "fresh": FRESH}
+        at |= {name: env + 8 * word for name, word in words.items()}
+        self._run = run
+        self._lent_as = Native(record=record.address, env=env, room=ROOM, interpret=INTERPRET, service=SERVICE,
+                               awake=RUN, **at)  # fmt: skip
+        self._hand_out()
+        return self._lent_as
+
+    def _hand_out(self) -> None:
+        """Who runs native code gets to know what there is."""
+        if self._run is not None and self._lent_as is not None and self._dispatcher is not None:
+            self._lent, self._lent_as.entry = partial(self._run, self._dispatch), self._dispatcher.address
+
     def _refresh(self, pc: int, cycle: int) -> bool:
         """Have a device bring up to date what native code reads from the record, if that is what the instruction at
         `pc` waits for."""
@@ -267,7 +298,20 @@ class JitEngine:
         self._core.events.now = cycle
         if refresh is None or not refresh(cycle):
             compute()
+        else:
+            self._note_fresh(pc | word << 32)
         return True
+
+    def _note_fresh(self, instruction: int) -> None:
+        """Let who runs native code know for what it came back; where there is no room it hears of it each time."""
+        fresh = self._env[FRESH : FRESH + FRESH_ROOM]
+        place = fresh.index(0)
+        if instruction not in fresh and place < FRESH_ROOM - 1:
+            self._env[FRESH + place] = instruction
+
+    def _forget_computed(self) -> None:
+        self._computed.clear()
+        self._env[FRESH : FRESH + FRESH_ROOM] = [0] * FRESH_ROOM
 
     def _computed_word(self, pc: int) -> int:
         """Index of the register a one-cycle instruction reads by address, if native code can read it; else 0."""
@@ -325,7 +369,7 @@ class JitEngine:
     def forget(self) -> None:
         """Hooked addresses must come back to Python: translate anew around them."""
         self._codes.clear()
-        self._computed.clear()
+        self._forget_computed()
         self._key = None
         self._cold.forget()
 
@@ -402,6 +446,7 @@ class JitEngine:
         text = dispatch_text(self._core, 2 * self._words, counts)
         self._dispatcher = self._at_once(text, BLOCK_LEVEL)
         self._dispatch = Call(self._dispatcher.address)
+        self._hand_out()
         if self.seconds is None and ledger is None:
             self._native = self._dispatch
 
@@ -460,5 +505,5 @@ class JitEngine:
     def _flash_changed(self, start: int, end: int) -> None:
         """Program words in [start, end) are new: whatever was made from the old ones is stale."""
         self._codes.clear()
-        self._computed.clear()
+        self._forget_computed()
         self._key = None

@@ -14,6 +14,7 @@ from emu.dspic30f.jit.service import DONE, service_text
 from emu.dspic30f.jit.surroundings import ARRIVE, DEADLINE, INTERPRET, MISS, NEXT, RETFIE, SERVICE
 from emu.dspic30f.jit.translate import ARRIVED
 from emu.events import NEVER
+from emu.native import FRESH_ROOM
 
 LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single
@@ -23,7 +24,9 @@ PERIOD, LAST, NOTED = range(7, 10)
 NOTES: Final = POINTED + 1
 ROOM: Final = 1024
 """Notes that are kept until Python takes them."""
-ENV_WORDS: Final = NOTES + ROOM
+FRESH: Final = NOTES + ROOM
+"""Instructions whose devices have been brought up to date (`Native.fresh`)."""
+ENV_WORDS: Final = FRESH + FRESH_ROOM
 
 DISPATCH: Final = """
 declare i64 @llvm.cttz.i64(i64, i1)
