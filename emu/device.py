@@ -73,10 +73,15 @@ FLAG_WORDS: Final = 4
 """The flag registers of a chip are consecutive and at most this many."""
 
 
+def flag_row(flag_address: int) -> int:
+    """Place of an interrupt flag register's bit 0 in `irq.since`."""
+    return (flag_address >> 1) % FLAG_WORDS * 16
+
+
 def flag_since(record: Record, flag_address: int, flag_bit: int) -> int:
     """Index in `record.u64` of the cycle in which an interrupt flag was first 1: c of isa.md §14.3."""
     table = record.fields.get("irq.since") or record.reserve("irq.since", "Q", 16 * FLAG_WORDS)
-    return table.index + (flag_address >> 1) % FLAG_WORDS * 16 + flag_bit
+    return table.index + flag_row(flag_address) + flag_bit
 
 
 class Irq:

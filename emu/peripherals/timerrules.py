@@ -37,6 +37,11 @@ class TimerPlaces:
     listeners: Place
     """How many devices plan by this timer."""
     frozen: Place
+    source: Place
+    pair: Place
+    """The TxCON that T32 is in."""
+    t32: int
+    """T32, 0 for a timer that is not one of a pair."""
     match: Slot
     line: Line
 
@@ -53,7 +58,8 @@ def read_count(m: Reader, t: TimerPlaces) -> Number:
 def write_count(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
     """The written count stands from the next cycle, with an empty prescaler (§7 rules 6, 8).
 
-    Of a timer on a described clock only clearing is here, where the device has foretold what that leads to.
+    Of a timer on a described clock only clearing is here, where the device has foretold what that leads to; of one that
+    stands with no match on its way, all.
     """
     if lanes != 0xFFFF:
         return False
@@ -62,14 +68,17 @@ def write_count(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
     plain = (period != 0) & (limit != 0)
     known = m.below(m.now, m.get(t.clear_until)) & (m.get(t.clear_from) <= m.now) & (due != following)
     foretold = (start == 0) & known
-    m.need((plain | foretold) & _alone(m, t))
+    still = (m.get(t.source) == STOPPED) & ((m.get(t.pair) & t.t32) == 0) & (due == NEVER)
+    m.need((plain | foretold | still) & _alone(m, t))
     stands = plain & (due == following)
-    m.put(t.before, m.select(foretold, 0, m.get(t.before)))
-    m.put(t.phase, m.select(foretold, 0, m.get(t.phase)))
+    m.put(t.before, m.select(plain, m.get(t.before), start))
+    m.put(t.phase, m.select(plain, m.get(t.phase), 0))
     posted = m.select(foretold, m.get(t.clear_due), following + _counts_until(m, start, limit) * tick + 1)
+    posted = m.select(still, NEVER, posted)
     m.put(t.tmr, start)
     m.put(t.base, following)
-    m.put(t.period, m.select(foretold | stands, 0, (limit + 1) * tick))
+    m.put(t.clear_until, m.select(still, 0, m.get(t.clear_until)))
+    m.put(t.period, m.select(foretold | still | stands, 0, (limit + 1) * tick))
     m.post(t.match, m.select(stands, due, posted))
     return True
 
@@ -121,11 +130,6 @@ class MatchPlaces:
     tcs: int
     tckps: int
     """Its lowest bit."""
-    t32: int
-    """T32, 0 for a timer that is not one of a pair."""
-    pair: Place
-    """The TxCON that T32 is in."""
-    source: Place
     clock: ClockPin
     pin: int
 
@@ -139,8 +143,8 @@ def fire_match(m: Reader, p: MatchPlaces) -> None:
         m.post(t.match, m.now + period)
     else:
         wave, attached = clock
-        narrow = (m.get(p.pair) & p.t32) == 0
-        counts = (m.get(p.source) == WAVE) & narrow & (m.get(attached) != 0)
+        narrow = (m.get(t.pair) & t.t32) == 0
+        counts = (m.get(t.source) == WAVE) & narrow & (m.get(attached) != 0)
         waves = counts & (m.get(t.pr) != 0) & (m.get(t.listeners) == 0) & (period == 0)
         m.need((period != 0) | waves)
         cells = (t.clear_from, t.clear_until, t.clear_due)
@@ -168,35 +172,35 @@ def next_edges(m: Reader, p: MatchPlaces, nth_rise: Callable[[Number, Number], N
 
 def switch(m: Reader, p: MatchPlaces, value: Number, lanes: int) -> bool:
     """TON changes and nothing else, on a described clock. Off: the count is known if there was no edge since it was
-    written, or just those to the match. On: counting begins with the next cycle. The prescaler is empty (§7 rule 6)."""
+    written, or just those to the match. On: counting begins with the next cycle. The prescaler is empty (§7 rule 6).
+    Nothing changes: that is no new course."""
     t, clock = p.timer, p.clock.described
     if clock is None or not lanes & p.ton:
         return False
     wave, attached = clock
-    old, source, tmr, limit = m.get(p.con), m.get(p.source), m.get(t.tmr), m.get(t.pr)
+    old, source, tmr, limit = m.get(p.con), m.get(t.source), m.get(t.tmr), m.get(t.pr)
     free = p.writable & lanes
     new = (old & (0xFFFF & ~free)) | (value & free)
     starts = (new & p.ton) != 0
-    counts = ((new & p.tcs) != 0) & (source == m.select(starts, STOPPED, WAVE)) & ((m.get(p.pair) & p.t32) == 0)
-    m.need(((old ^ new) == p.ton) & counts & (m.get(attached) != 0) & (limit != 0) & _alone(m, t))
+    same = old == new
+    counts = ((new & p.tcs) != 0) & (source == m.select(starts, STOPPED, WAVE)) & ((m.get(t.pair) & t.t32) == 0)
+    m.need(same | (((old ^ new) == p.ton) & counts & (m.get(attached) != 0) & (limit != 0) & _alone(m, t)))
     prescale = m.table(PRESCALE, new >> p.tckps & len(PRESCALE) - 1)
     clocks = _counts_until(m, tmr, limit) * prescale - m.select(starts, 0, m.get(t.phase))
     after = m.select(starts, m.now, m.get(t.base) - 1)
     edge = wave.text_of_rise(m, p.pin, after, clocks)
     matched = m.select(starts, 0, m.below(m.now, edge) == 0)
     following = wave.text_of_rise(m, p.pin, after, m.select(matched, clocks, 0) + 1)
-    m.need(starts | m.below(m.now, following))
+    m.need(same | starts | m.below(m.now, following))
     count, due = m.select(matched, limit, tmr), m.get(t.match.due)
     stands = (due == m.now + 1) | (starts & (due == m.now + 2) & (count == limit))
     posted = m.select(starts & (edge != NEVER), edge + 2, NEVER)
     m.put(p.con, new)
-    m.put(t.tmr, count)
-    m.put(t.base, m.now + 1)
-    m.put(t.before, count)
-    for place in (t.phase, t.tick, t.period, t.clear_until):
-        m.put(place, 0)
-    m.put(p.source, m.select(starts, WAVE, STOPPED))
-    m.post(t.match, m.select(stands, due, posted))
+    changed = [(t.tmr, count), (t.base, m.now + 1), (t.before, count), (t.source, m.select(starts, WAVE, STOPPED))]
+    changed += [(place, 0) for place in (t.phase, t.tick, t.period, t.clear_until)]
+    for place, value in changed:
+        m.put(place, m.select(same, m.get(place), value))
+    m.post(t.match, m.select(same | stands, due, posted))
     return True
 
 

@@ -76,11 +76,20 @@ class Timer(Counter):
                  "frozen")  # fmt: skip
         places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
         match, line = slot_of(self.record, self._match), self.line.line
-        return TimerPlaces(tmr=self.tmr.place, pr=self.pr.place, match=match, line=line, **places)
+        pair = self.con if self.site.kind != "C" else self.register(f"T{self.site.partner}CON")
+        return TimerPlaces(
+            tmr=self.tmr.place,
+            pr=self.pr.place,
+            source=self._source.place,
+            pair=pair.place,
+            t32=1 << self.kit.chip.sfrs[pair.name].fields["T32"][0] if self.site.kind != "A" else 0,
+            match=match,
+            line=line,
+            **places,
+        )
 
     def _match_places(self, places: TimerPlaces) -> MatchPlaces:
-        sfrs, kind = self.kit.chip.sfrs, self.site.kind
-        con, pair = sfrs[self.con.name], self.con if kind != "C" else self.register(f"T{self.site.partner}CON")
+        con = self.kit.chip.sfrs[self.con.name]
         ton, tcs = (1 << con.fields[name][0] for name in ("TON", "TCS"))
         return MatchPlaces(
             timer=places,
@@ -89,9 +98,6 @@ class Timer(Counter):
             ton=ton,
             tcs=tcs,
             tckps=con.fields["TCKPS"][0],
-            t32=1 << sfrs[pair.name].fields["T32"][0] if kind != "A" else 0,
-            pair=pair.place,
-            source=self._source.place,
             clock=ClockPin(self.kit.pins.described, (self._port, self._pin)),
             pin=self._pin,
         )
@@ -211,6 +217,8 @@ class Timer(Counter):
         self._plan()
 
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
+        if old == new:
+            return
         if self.high is not None and (old ^ new) & self._t32:
             self._join_changed(old, new)
             return

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from emu.device import flag_row
 from emu.dspic30f import flowrules
 from emu.dspic30f.data import W_END
 from emu.dspic30f.isa.builder import Context, Side, Size
@@ -365,10 +366,18 @@ class LlvmBuilder:
             return
         if how == "flags":
             old = self.e.load(pointer(self.e, word_address), 16)
-            self.guard((placed & (mask & lanes) & (old ^ 0xFFFF)) == 0)
+            rises = placed & (mask & lanes) & (old ^ 0xFFFF)
+            self.guard((rises & (rises - 1)) == 0)
+            self.pending.stores.append(lambda: self._rise(word_address, rises))
         if how in ("irq", "flags"):
             self.pending.stop = True
         self.pending.stores.append(lambda: self._store_masked(word_address, placed, mask & lanes))
+
+    def _rise(self, address: int, rises: Number) -> None:
+        """A flag that software sets, one at most, is first 1 in the next cycle."""
+        bit = self.ctz16(rises | 0x8000)
+        since = pointer(self.e, (bit << 3) + self.around.offset["irq.since"] + 8 * flag_row(address))
+        self.e.store(since, self.select(rises == 0, self.e.load(since, 64), self.now + 1), 64)
 
     def _store_accumulator(self, i: int, shift: int, v: Number, free: int) -> None:
         """A data write to 16 bits of accumulator `i`, or to the 8 that are kept of the upper word (isa.md §2.1)."""

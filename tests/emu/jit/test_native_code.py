@@ -109,6 +109,29 @@ def test_returns_in_which_an_event_is_due_are_native() -> None:
     assert native.runner.counts.interpreted < 20
 
 
+@pytest.mark.parametrize("bit", [0, 7, 15])
+def test_flags_that_software_sets_are_native(bit: int) -> None:
+    """A request made by BSET is first visible in the next cycle (isa.md §14.3), whether it is enabled or not."""
+    firmware = counting_firmware()
+    at = next(a for a in range(0x100, 0x400, 2) if firmware.flash.get(a) == words_of("BRA Expr", n=-2)[0])
+    byte, place = 0x84 + bit // 8, bit % 8
+    firmware.put(0x14 + 2 * bit, [0x1100])
+    handler = words_of("INC{.B} Ws, Wd", B=0, s=3, p=0, d=3, q=0)
+    firmware.put(0x1100, handler + words_of("BCLR{.B} f, #bit4", f=byte, b=place) + words_of("RETFIE"))
+    enables = [*to_sfr("IEC0", 8 | 1 << bit)]
+    loop = words_of("BSET{.B} f, #bit4", f=byte, b=place) + words_of("INC{.B} Ws, Wd", B=0, s=4, p=0, d=4, q=0)
+    loop += [*enables, *to_sfr("IEC0", 8), *words_of("BSET{.B} f, #bit4", f=byte, b=place)]
+    loop += words_of("BCLR{.B} f, #bit4", f=byte, b=place)
+    firmware.put(at, loop + words_of("BRA Expr", n=-len(loop) - 1))
+    plain, native = pair(firmware)
+    for cycles in (1_000, 1, 17, 20_000, 313):
+        assert plain.run(cycles) == native.run(cycles)
+        assert not difference(plain, native)
+    assert native.w[3] > 500
+    assert isinstance(native.runner, JitEngine)
+    assert native.runner.counts.interpreted < 40
+
+
 @pytest.mark.parametrize("watchdog", [False, True])
 def test_clearing_the_watchdog_blocking_and_table_writes_are_native(watchdog: bool) -> None:
     """A boot loader's loop stays in native code while the watchdog is off; latches and NVMADR come out right."""
