@@ -14,6 +14,7 @@ from arena.lockstep import LockStep
 from arena.scene import Scene, load_scene
 from arena.trial import run_trial
 from arena.world import Poses, World
+from emu.dspic30f.jit.engine import JitEngine
 
 
 class Stepwise:
@@ -80,3 +81,44 @@ def test_robots_do_run_ahead(clustering_image: Path) -> None:
     lockstep.advance(400)
     assert world.ticks == 400
     assert max(gaps) > 20
+
+
+def samples(image: Path, is_native: bool, seconds: float = 3.0) -> tuple[list[Any], int, int]:
+    """What robots read and where everything is, twice a second; how often Python painted a line, and ran an instruction
+    in place of native code, in the last second."""
+    scene = load_scene("clustering").with_values(robots__count=3, objects__count=8)
+    robots = [EmulatedBrain(scene, 5, i, image, 0) for i in range(3)]
+    painted = interpreted = 0
+    found: list[Any] = []
+    for robot in robots:
+        assert isinstance(robot.machine.runner, JitEngine)
+        robot.machine.runner.wait = True
+        camera, paint = robot.machine.board.camera, robot._pixels
+
+        def counted(*line: Any, paint: Any = paint) -> Any:
+            nonlocal painted
+            painted += 1
+            return paint(*line)
+
+        camera.sample(counted, is_lent=True)
+    world = World(scene, 5)
+    lockstep = LockStep(world, robots, is_native=is_native)
+    for moment in range(500, round(seconds * 1000) + 1, 500):
+        if moment == round(seconds * 1000) - 500:
+            painted, interpreted = 0, sum(robot.machine.runner.counts.interpreted for robot in robots)
+        wheels = lockstep.advance(moment)
+        readings = [(robot.reading(), robot.lines(), robot.lights()) for robot in robots]
+        found.append((wheels, readings, world.poses.values.tolist()))
+    return found, painted, sum(robot.machine.runner.counts.interpreted for robot in robots) - interpreted
+
+
+def test_compiled_code_sees_and_probes_as_python_does_and_leaves_it_out(clustering_image: Path) -> None:
+    """Lines of cameras, ends of quanta and looks at the CPU: the same numbers, Python only where a device says so."""
+    native, painted, interpreted = samples(clustering_image, True)
+    plain, seen, _ = samples(clustering_image, False)
+    assert native == plain
+    assert any(reading.load for reading, _, _ in native[-1][1])
+    assert any(reading.strip for reading, _, _ in native[-1][1])
+    assert seen > 200
+    assert painted == 0
+    assert interpreted < 40

@@ -1,0 +1,101 @@
+"""Compiled code that paints lines instead of Python (`line.c`): the same record, line by line, in every setting."""
+
+from __future__ import annotations
+
+import random
+from ctypes import addressof, c_int64
+
+import numpy as np
+import pytest
+
+from emu.boards.epuck.camera import Camera
+from emu.boards.epuck.pixels import line_code
+
+from .conftest import Robot
+from .test_camera import po3030, po6030, scene
+
+DARK = [(0, 0xD4, 0x2C)]
+"""Manual exposure of a PO3030K."""
+
+
+def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tuple[bool, bool]:
+    """Whether Python and compiled code put a line into the record in a cycle; if both do, it is the same record."""
+    record, href = robot.machine.record, c_int64()
+    before = record.snapshot()
+    by_python = camera._refresh(cycle)
+    python = record.snapshot()
+    record.restore(before)
+    code = line_code()
+    line = code["asked"](addressof(camera.lent), cycle, addressof(href))
+    if line < 0:
+        record.restore(python)
+        return by_python, False
+    row = (c_int64 * 480).from_address(camera.lent.row)[line]
+    seen = np.ascontiguousarray(pixels[row][camera._readout._columns])
+    code["send"](addressof(camera.lent), href.value, seen.ctypes.data)
+    assert record.snapshot() == python
+    return by_python, True
+
+
+@pytest.mark.parametrize(("sensor", "writes"), [
+    ("PO6030K", po6030()), ("PO6030K", po6030(scale=2, form="yuv")), ("PO6030K", po6030(scale=1, form="grey")),
+    ("PO3030K", po3030()), ("PO3030K", po3030(scale=1, form="grey") + DARK), ("PO3030K", po3030(form="yuv") + DARK),
+])  # fmt: skip
+@pytest.mark.parametrize("lamp", [1.0, 0.37])
+def test_a_line_is_painted_alike_whoever_is_asked(sensor: str, writes: list[tuple[int, int, int]], lamp: float) -> None:
+    """Only a camera whose automatic exposure is not what it was made with leaves all lines to Python."""
+    robot, pixels, draw = Robot(camera=sensor), scene(), random.Random(repr((sensor, writes)))
+    robot.configure(writes)
+    camera = robot.board.camera
+    camera.sample(lambda y, columns, _cycle: pixels[y, columns], is_lent=True)
+    camera.lamp = lamp
+    course = camera.scan.course
+    assert camera._refresh(camera.scan.href(0, 3))  # Python is asked first
+    assert camera.lent.setting
+    both = 0
+    for _ in range(300):
+        line = draw.randrange(course.lines)
+        cycle = camera.scan.href(line, draw.randrange(9)) + draw.randrange(-course.byte_tcy, course.line_tcy)
+        by_python, by_code = rendered(robot, camera, cycle, pixels)
+        assert by_code <= by_python
+        steady = lamp == 1.0 or writes[-1:] == DARK
+        assert by_code == (by_python and steady)
+        both += by_code
+    assert not steady or both > 10
+
+
+def test_python_is_asked_first_in_every_new_setting() -> None:
+    """Registers, sources and snapshots change what lines are made of."""
+    robot, pixels = Robot(), scene()
+    robot.configure(po6030())
+    camera, href = robot.board.camera, c_int64()
+
+    def asked() -> bool:
+        cycle = camera.scan.href(3, 2)
+        camera._line_to.value = 0
+        first = line_code()["asked"](addressof(camera.lent), cycle, addressof(href))
+        assert camera._refresh(cycle)
+        camera._line_to.value = 0
+        again = line_code()["asked"](addressof(camera.lent), cycle, addressof(href))
+        assert again in (first, 3)
+        assert first in (-1, 3)
+        return first < 0 <= again
+
+    def source(y, columns, _cycle):
+        return pixels[y, columns]
+
+    camera.sample(source, is_lent=True)
+    assert asked()
+    assert not asked()
+    kept = robot.machine.snapshot()
+    robot.configure(po6030(form="yuv"))
+    assert asked()
+    robot.machine.restore(kept)
+    assert asked()
+    camera.sample(source)
+    assert not asked()
+    assert not camera.lent.setting
+    camera.sample(source, is_lent=True)
+    assert asked()
+    camera.unplug()
+    assert line_code()["asked"](addressof(camera.lent), camera.scan.href(3, 2), addressof(href)) == -1
