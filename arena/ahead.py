@@ -63,14 +63,13 @@ class Ahead(Structure):
         assert board.camera is not None
         lines = line_code()
         line, self.view = sight.lend()
-        both_by, _ = board.motors.lend()
         turned, self.drive = wheels.lend()
         self.generator = generator
         self._camera: LentCamera = board.camera.lent
         self.camera = addressof(self._camera)
         self.data_port = board.chip.ports[DATA_PORT].port.address >> 1
         self.code = pointer(
-            _Code(*map(address_of, (lines["asked"], lines["send"])), line, both_by, turned, address_of(draw))
+            _Code(*map(address_of, (lines["asked"], lines["send"])), line, board.motors.code, turned, address_of(draw))
         )
         self._fans_kept: dict[int, Fan] = {}
         self._native: Native | None = None

@@ -179,7 +179,7 @@ class EmulatedBrain:
         ahead.taken = self._first_cut + len(self._cuts)
         if ahead.told < ahead.taken:
             self._settle()
-        _, ahead.pair = self._board.motors.lend()
+        ahead.pair = self._board.motors.lend()
         assert self._ride is not None
         return self._ride()
 

@@ -48,7 +48,7 @@ class Runner(Protocol):
 
 class LockStep:
     """`world`, the robots that are in it, all of them, and what carries their infrared light. Without `is_native`
-    Python runs native code and sees each look: the same, more slowly.
+    Python runs native code and the world and sees each look: the same, more slowly.
     """
 
     def __init__(
@@ -60,6 +60,7 @@ class LockStep:
         self._ether.slowest = 0
         self._past: Final[dict[int, Poses]] = {world.ticks: world.poses}
         self._stretches: list[Stretch] = []
+        self._is_native: Final = is_native
         self._hub: greenlet = getcurrent()
         self._lives: list[greenlet | None] = [None] * len(robots)
         self._speeds: Final = (c_void_p * len(robots))(*(robot.wheels.address for robot in robots))
@@ -95,7 +96,7 @@ class LockStep:
     def _next(self, ticks: int) -> int:
         """Run all robots in compiled code, and the world behind them, until Python is needed; for whom."""
         world = self._world
-        world.lend(self._poses(world.ticks), self._poses(world.ticks - 1))
+        world.lend(self._poses(world.ticks), self._poses(world.ticks - 1), self._is_native)
         needed: int = self._run_all(ticks)
         self._note(world.take())
         return needed

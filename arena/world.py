@@ -348,12 +348,13 @@ class World:
             self.poses = self.at(made[-1], self.ticks)
         return made
 
-    def lend(self, now: Poses, before: Poses) -> None:
-        """Let compiled code make quanta by `ground` up to where noise is drawn, or poses need another sheet; `before`
-        are the poses a quantum before those of now."""
+    def lend(self, now: Poses, before: Poses, is_lent: bool = True) -> None:
+        """Let compiled code make quanta by `ground` up to where noise is drawn, or poses need another sheet, or none;
+        `before` are the poses a quantum before those of now."""
         ground, row = self.ground, self._room()
         noisy = self.ticks % self._noise_ticks
-        more = min(self._noise_ticks - noisy, ROWS - row) if noisy or not self.scene.robots.wheel_noise else 0
+        may = is_lent and (noisy or not self.scene.robots.wheel_noise)
+        more = min(self._noise_ticks - noisy, ROWS - row) if may else 0
         ground.ticks, ground.until = self.ticks, self.ticks + more
         ground.row, ground.now, ground.before = self._sheet_at + row * self._row_bytes, now.address, before.address
 

@@ -194,11 +194,16 @@ class Motors:
         with self.left.unremembered(), self.right.unremembered():
             yield
 
-    def lend(self) -> tuple[int, int]:
-        """For compiled code: where `both_by` of motors.c is, and `struct pair`, which is up to date until somebody
-        begins or ceases to watch pins; 0 while somebody is told of each step."""
+    @property
+    def code(self) -> int:
+        """Where `both_by` of motors.c is."""
+        return address_of(self._both_by)
+
+    def lend(self) -> int:
+        """For compiled code that calls it: where `struct pair` is, up to date until somebody begins or ceases to watch
+        pins; 0 while somebody is told of each step."""
         self._pair.heard = self._pins.heard_of(2)
-        return address_of(self._both_by), 0 if self.left.tells or self.right.tells else self._pair_at
+        return 0 if self.left.tells or self.right.tells else self._pair_at
 
     def steps_by(self, cycles: Sequence[int]) -> array[int]:
         """Steps of both (left, right, left and so on) as they were in some cycles, which rise from call to call; see
