@@ -47,8 +47,8 @@ class Clock:
 
 
 def measured(scene: Scene, make: Callable[[], list[Brain]], seconds: float, warm_up: float) -> dict[str, float]:
-    """CPU seconds per simulated second, and the shares of physics and rendering in it: of these by a second run in which
-    Python calls both, so that they come out rather too large."""
+    """CPU seconds per simulated second, and the shares of physics and rendering in it: of these by a second run in
+    which Python calls both, so that they come out rather too large."""
     cpu, _, _ = measure(scene, make(), seconds, warm_up, True)
     apart, physics, rendering = measure(scene, make(), seconds, warm_up, False)
     return {
