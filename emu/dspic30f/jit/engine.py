@@ -41,6 +41,7 @@ from emu.dspic30f.jit.runtime import (
 )
 from emu.dspic30f.jit.surroundings import (
     DEADLINE,
+    ENTERS,
     HOOK,
     INTERPRET,
     MISS,
@@ -201,6 +202,8 @@ class JitEngine:
         self.counts.runs += 1
         if why == RETFIE:
             sequencer.after_retfie()
+        elif why == ENTERS:
+            sequencer.boundary(limit)
         elif (why == INTERPRET and (state.cycle == start or state.pc not in self._hooks)) or (
             why == HOOK and state.cycle == start  # behind the hook the block did not fit: exact code stops there again
         ):
@@ -250,6 +253,9 @@ class JitEngine:
             return True
         if why == RETFIE:
             self._core.sequencer.after_retfie()
+            return True
+        if why == ENTERS:
+            self._core.sequencer.boundary(limit)
             return True
         return cycle >= limit or (why != SERVICE and cycle != start)
 

@@ -10,8 +10,8 @@ from typing import Final
 from emu.dspic30f.core import Core
 from emu.dspic30f.jit.counting import BoundaryCount
 from emu.dspic30f.jit.pointed import POINTED
-from emu.dspic30f.jit.service import DONE, service_text
-from emu.dspic30f.jit.surroundings import ARRIVE, DEADLINE, INTERPRET, MISS, NEXT, RETFIE, SERVICE
+from emu.dspic30f.jit.service import DONE, HALFWAY, service_text
+from emu.dspic30f.jit.surroundings import ARRIVE, DEADLINE, ENTERS, INTERPRET, MISS, NEXT, RETFIE, SERVICE
 from emu.dspic30f.jit.translate import ARRIVED
 from emu.events import NEVER
 from emu.native import FRESH_ROOM
@@ -129,6 +129,12 @@ serve:
   %served = icmp eq i64 %rest, {done}
   br i1 %served, label %loop, label %boundary
 boundary:
+  %rest1 = phi i64 [ %rest3, %accepted ], [ %rest, %serve ]
+  %halfway = icmp eq i64 %rest1, {halfway}
+  br i1 %halfway, label %enters, label %limited
+enters:
+  ret i64 {enters}
+limited:
   %limit_now = load i64, ptr %env
   %cycle_place2 = getelementptr i8, ptr %rec, i64 {cycle}
   %cycle5 = load i64, ptr %cycle_place2
@@ -190,6 +196,8 @@ def dispatch_text(core: Core, flash_end: int, counts: BoundaryCount | None = Non
         service=SERVICE,
         miss=MISS,
         done=DONE,
+        halfway=HALFWAY,
+        enters=ENTERS,
         period=PERIOD,
         last=LAST,
         noted=NOTED,

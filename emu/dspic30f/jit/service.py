@@ -19,8 +19,9 @@ from emu.dspic30f.state import IDLE, RUN, STACK_POINTER
 from emu.events import NEVER
 from emu.straight import Number, Place, place_of, slot_of
 
-DONE, PYTHON = 0, 1
-"""Results: the boundary has no work left; Python must do it."""
+DONE, PYTHON, HALFWAY = 0, 1, 2
+"""Results: the boundary has no work left; Python must do it; or go on with it, as somebody was accepted already: a
+limit that has been reached since does not count before it ends."""
 
 LANES: Final = 8
 """Due cycles in the widest vector register."""
@@ -66,18 +67,23 @@ def _head(core: Core, counts: BoundaryCount) -> str:
             "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {",
             "first:",
             *(f"  %p.{name} = getelementptr i8, ptr %rec, i64 {offset}" for name, offset in offsets.items()),
-            f"""  %hold = load i64, ptr %p.hold
+            f"""  %left = alloca i64
+  store i64 {PYTHON}, ptr %left
+  %hold = load i64, ptr %p.hold
   %waits = icmp ne i64 %hold, 0
   br i1 %waits, label %python, label %again
 python:
   store i64 0, ptr %p.deadline
-  ret i64 {PYTHON}
+  %why = load i64, ptr %left
+  ret i64 %why
 done:
   ret i64 {DONE}
 stop:
   ret i64 {PYTHON}
 again:
   %within = phi i1 [ false, %first ], [ false, %jump ], [ false, %asleep ], [ true, %rouse ], [ true, %entered.one ]
+  %half = select i1 %within, i64 {HALFWAY}, i64 {PYTHON}
+  store i64 %half, ptr %left
   %cycle = load i64, ptr %p.cycle
   %before = sub i64 %cycle, 1
   %deadline = load i64, ptr %p.deadline

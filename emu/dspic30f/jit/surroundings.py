@@ -14,10 +14,11 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.modes import REGISTERS, Key
 from emu.straight import Rule
 
-NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK, MODES, ARRIVE = range(9)
+NEXT, INTERPRET, DEADLINE, SERVICE, MISS, RETFIE, HOOK, MODES, ARRIVE, ENTERS = range(10)
 """Why native code came back: go on at PC; interpret the instruction at PC; the block at PC reaches the deadline;
 look at events and interrupts before PC; no native code at PC; a RETFIE has run for two cycles;
-PC is hooked; the processor modes are others at PC; events are due before the access of the instruction at PC."""
+PC is hooked; the processor modes are others at PC; events are due before the access of the instruction at PC; the
+boundary before PC has begun and goes on, whatever limit has been reached."""
 
 Access = Literal["plain", "slow", "irq", "flags", "sr"]
 """How native code treats an SFR: memory under a mask; Python only; memory that may make an interrupt acceptable;

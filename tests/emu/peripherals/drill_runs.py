@@ -271,17 +271,19 @@ def program(draw: random.Random, machine: Machine, image: Image) -> None:
         machine.program.flash_latch[index] = draw.choice((0xFFFFFF, 0xFFFFFF, 0xFFFFFF, 0xFF0FFF, 0))
 
 
-def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | None]:
+def run(draw: random.Random, machine: Machine, cycles: int) -> list[Stop | int | None]:
     """So many Tcy, in one piece, cut or with limits in passing; longer while it sleeps, and as long again behind a row
-    of flash. Returns how pieces ended."""
+    of flash. Returns how pieces ended, and where limits fell."""
     end, way = machine.cycle + cycles, draw.random()
-    ended: list[Stop | None] = []
+    ended: list[Stop | int | None] = []
     if way < 0.4:
         ended.append(machine.run_until(machine.cycle + draw.randrange(1, 30)))
     if way < 0.7:
         ended.append(machine.run_until(end))
     else:
-        ended.append(machine.run_past(machine.cycle + draw.randrange(1, 9), draw.randrange(1, 13), end, []))
+        cuts: list[int] = []
+        ended.append(machine.run_past(machine.cycle + draw.randrange(1, 9), draw.randrange(1, 13), end, cuts))
+        ended += cuts
     while machine.is_asleep and machine.cycle < end + SLEPT and not isinstance(ended[-1], Stop):
         ended.append(machine.run_until(machine.cycle + draw.choice((1, 20, 400, 3000))))
     if machine.cycle > end + SLEPT // 2:
