@@ -25,7 +25,6 @@ WORD_COLOURS = bits(list(ALLOCATABLE))
 PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
 REAL = (1 << FIRST_VIRTUAL) - 1
 LOOP_WEIGHT = 8
-MAX_ROUNDS = 12
 EXACT_SPILL_NODES = 300  # up to this many, the best victim is looked for anew at every step
 TRIAL_LIMIT = 400  # instructions; larger functions are allocated once
 
@@ -330,8 +329,9 @@ def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
 
 
 def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: Graph | None = None) -> None:
-    """`first` is the graph of the first round where it is known."""
-    for _ in range(MAX_ROUNDS):
+    """`first` is the graph of the first round where it is known. Every round that finds no colour for something of the
+    program keeps one register less of it, so there is a last one."""
+    while True:
         g, first = first or Graph(m), None
         g.coalesce(eager, thorough)
         colouring = Colouring(g)
@@ -342,8 +342,9 @@ def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: Gr
             _apply(m, g, colouring.colour)
             return
         groups = {n: list(g_members(g, n)) for n in colouring.spilled}
+        if m.temps.issuperset(r for group in groups.values() for r in group):
+            raise UnsupportedError("register allocation does not converge", m.name)
         rewrite_spills(m, groups)
-    raise UnsupportedError("register allocation does not converge", m.name)
 
 
 def _crowded(m: MFunction) -> bool:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 from .mir import MI, FrameObject, Imm, MFunction, Slot, covered
 
 REMATERIALISABLE = {"clr", "setm", "lea"}
+UNIT_REGISTERS = 12  # what a skip covers may name so many at once: there are 15, some of them live across it
 
 
 def rewrite_spills(m: MFunction, groups: dict[int, list[int]]) -> None:
@@ -21,7 +24,7 @@ def rewrite_spills(m: MFunction, groups: dict[int, list[int]]) -> None:
         for r in group:
             slot_of[r] = len(m.frame) - 1
     for b in m.blocks:
-        b.insts = _rewrite_block(m, b.insts, slot_of, again)
+        b.insts = _rewrite_block(m, _narrow_skips(b.insts, slot_of.keys() | again.keys()), slot_of, again)
 
 
 def _single_definitions(m: MFunction, wanted: set[int]) -> dict[int, MI]:
@@ -89,6 +92,28 @@ def _rewrite_block(m: MFunction, insts: list[MI], slot_of: dict[int, int], again
             chain = len(out)
         out += kept
         out += after
+    return out
+
+
+def _narrow_skips(insts: list[MI], spilled: Set[int]) -> list[MI]:
+    """A skip that covers more than there are registers for is made again in front of the rest: flags are as they were.
+
+    Loads for what is covered come before the skip, and stores behind it, so all of it is in registers at once."""
+    out: list[MI] = []
+    skip = None
+    named: set[int] = set()
+    for k, mi in enumerate(insts):
+        if mi.op == "skip":
+            unit = insts[k + 1 : k + 1 + covered(insts, k)]
+            wide = any(r in spilled for one in unit for r in (*one.uses(), *one.defs()))
+            skip, named = (mi if wide and not any(one.info.writes for one in unit) else None), set()
+        elif mi.pred and skip is not None:
+            registers = {*mi.uses(), *mi.defs()}
+            if len(named | registers) > UNIT_REGISTERS:
+                out.append(skip.clone())
+                named = set()
+            named |= registers
+        out.append(mi)
     return out
 
 

@@ -79,3 +79,40 @@ TEST(divide_32_by_constants, "C11 6.5.5p6")
         }
     }
 }
+
+/* Two selects of 64 bits by one condition, and more values than registers. */
+static NOINLINE long long first_above(const long long *sorted, long long count, long long wanted)
+{
+    long long low = 0, high = count;
+    while (low < high) {
+        long long middle = (low + high) / 2;
+        if (sorted[middle] <= wanted)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static NOINLINE void both(long long a, long long b, long long *more, long long *less)
+{
+    long long x = a < b ? a : b, y = a < b ? b : a, d = a < b ? y - x : b;
+    *less = x ^ d;
+    *more = y;
+}
+
+TEST(bisect_among_64_bits, "C11 6.5.15p4")
+{
+    static const long long sorted[] = {-0x7000000000000000, -5000000000, -1, 0, 3, 70000, 5000000000, 0x7000000000000000};
+    enum { COUNT = sizeof sorted / sizeof *sorted };
+    for (int k = 0; k < COUNT; k++) {
+        CHECK(first_above(sorted, LL(COUNT), LL(sorted[k])) == k + 1);
+        CHECK(first_above(sorted, LL(COUNT), LL(sorted[k] - 1)) == k);
+        for (int n = 0; n < COUNT; n++) {
+            long long more, less;
+            both(LL(sorted[k]), LL(sorted[n]), &more, &less);
+            CHECK(more == sorted[k > n ? k : n]);
+            CHECK(less == (sorted[k < n ? k : n] ^ (k < n ? more - sorted[k] : sorted[n])));
+        }
+    }
+}
