@@ -321,8 +321,9 @@ class EmulatedBrain:
         noise = self._noise_at + self._noise.itemsize * (self._draw(self._drawn_from) >> _DRAWN_BITS - _NOISE_BITS)
         quanta = (cycle - self._start) / self._quantum
         pixels = self._sight.line(self._poses, self._before, quanta, y, columns, self._colours_at, noise)
+        self._take_strip()  # before the camera's setting becomes another
         if y in _STRIP_ROWS:
-            self._strip, self.ahead.strip = (columns, pixels), -1
+            self._strip = columns, pixels
         if self._ride is not None:
             self.ahead.know(y, self._sight.fan(y, columns))
         return pixels
@@ -358,14 +359,17 @@ class EmulatedBrain:
         self.machine.peripherals.pins.flush()
         self._listen()
         self._board.battery.volts = volts_after(self._scene.battery, self.machine.cycle / FCY)
+        self._take_strip()
         ahead = self.ahead
         load = ahead.busy / ahead.probes if ahead.probes else 0.0
         ahead.busy = ahead.probes = 0
-        fan = ahead.last_strip_fan
-        if fan is not None and fan.columns is not None:
-            self._strip = fan.columns, fan.pixels
         strip = strip_of(*self._strip) if self._strip is not None else b""
         return Reading(-1, load, self._leds, strip, self._ring.readings, self._fault or self._told)
+
+    def _take_strip(self) -> None:
+        """Take over the last line that is recorded, if compiled code has painted it."""
+        if (fan := self.ahead.last_strip_fan) is not None and fan.columns is not None:
+            self._strip = fan.columns, fan.pixels
 
     def lines(self) -> list[Line]:
         """As `Brain.lines`."""

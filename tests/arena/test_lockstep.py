@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from arena.scene import Scene, load_scene
 from arena.trial import run_trial
 from arena.world import Poses, World
 from emu.dspic30f.jit.engine import JitEngine
+from tests.arena.images import BEGIN
 
 
 class Stepwise:
@@ -122,3 +124,43 @@ def test_compiled_code_sees_and_probes_as_python_does_and_leaves_it_out(clusteri
     assert seen > 200
     assert painted == 0
     assert interpreted < 40
+
+
+LOOKING = f"""{BEGIN}
+1:      mov     PORTD, w0
+        bra     1b
+"""
+
+
+def test_the_strip_is_the_last_line_of_a_window_that_is_left_in_its_middle(assembled: Callable[[str], Path]) -> None:
+    """Rows that are recorded are read in two frames, and up to one of them in the third; none is in the new window."""
+    image = assembled(LOOKING)
+    scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
+    strips = []
+    for is_native in (True, False):
+        robot = EmulatedBrain(scene, 5, 0, image, 0)
+        assert isinstance(robot.machine.runner, JitEngine)
+        robot.machine.runner.wait = True
+        lockstep, camera = LockStep(World(scene, 5), [robot], is_native=is_native), robot.machine.board.camera
+
+        def write(register: int, value: int, camera: Any = camera, machine: Any = robot.machine) -> None:
+            camera.start(False, machine.cycle)
+            camera.write(register, machine.cycle)
+            camera.write(value, machine.cycle)
+
+        lockstep.advance(200)
+        write(0x1D, 0)  # the fastest clock: a row lasts 1704 Tcy, a quantum 14,746
+        lockstep.advance(500)
+        camera.align(robot.machine.cycle + 1000, line=226)
+        lockstep.advance(501)
+        strips.append(robot.reading().strip)
+        lockstep.advance(700)
+        camera.align(robot.machine.cycle + 1000, line=230)
+        lockstep.advance(701)
+        write(0x0F, 100)  # the window's last row, its upper byte is 1
+        write(0x0E, 0)
+        lockstep.advance(900)
+        strips.append(robot.reading().strip)
+    assert strips[:2] == strips[2:]
+    assert all(strips)
+    assert strips[0] != strips[1]
