@@ -29,6 +29,7 @@ from arena.wheels import Wheels
 from arena.world import STREAM_SENSORS, Poses, generator, traits_of
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.remote import REPEAT_SECONDS
+from emu.boards.epuck.scan import LINE_PIXELS
 from emu.boards.epuck.simple import LED_PINS, Battery
 from emu.boards.epuck.stimulus import parse
 from emu.faults import VECNUM
@@ -84,7 +85,8 @@ class EmulatedBrain:
         self._colours = colours_of(scene).astype(np.int16)
         self._colours_at: Final = self._colours.ctypes.data
         noise = self._rng.normal(0.0, scene.camera.pixel_noise, (1 << _NOISE_BITS) + 3 * 640)
-        self._noise: NDArray[np.int16] = np.rint(noise).astype(np.int16)
+        drawn: NDArray[np.int16] = np.rint(noise).astype(np.int16)
+        self._noise: Final = np.append(drawn, drawn[: 3 * (LINE_PIXELS - 640)])  # a window may be wider than the scene
         self._noise_at: Final = self._noise.ctypes.data
         generating = self._rng.bit_generator.ctypes  # its upper bits are what `integers` gives for a power of two
         self._draw, self._drawn_from = generating.next_uint32, generating.state

@@ -15,6 +15,7 @@ from arena.lockstep import LockStep
 from arena.scene import Scene, load_scene
 from arena.trial import run_trial
 from arena.world import Poses, World
+from emu.boards.epuck.scan import LINE_PIXELS
 from emu.dspic30f.jit.engine import JitEngine
 from tests.arena.images import BEGIN
 
@@ -132,6 +133,26 @@ LOOKING = f"""{BEGIN}
 """
 
 
+def write(robot: EmulatedBrain, register: int, value: int) -> None:
+    """Give the camera's register another value, as over I2C."""
+    machine = robot.machine
+    machine.board.camera.start(False, machine.cycle)
+    machine.board.camera.write(register, machine.cycle)
+    machine.board.camera.write(value, machine.cycle)
+
+
+def test_there_is_noise_for_the_widest_line_a_camera_sends(assembled: Callable[[str], Path]) -> None:
+    """A window of 1024 columns: noise of a line may begin at each of the values drawn, and lasts to the line's end."""
+    scene = load_scene("clustering").with_values(robots__count=1, camera__sensor="PO3030K")
+    robot = EmulatedBrain(scene, 5, 0, assembled(LOOKING), 0)
+    LockStep(World(scene, 5), [robot]).advance(200)
+    for register, value in ((0x04, 8), (0x08, 0), (0x09, 0), (0x0C, 7), (0x0D, 255)):
+        write(robot, register, value)
+    width = robot.machine.board.camera.frame().shape[1]
+    assert width == LINE_PIXELS
+    assert len(robot._noise) >= 2**14 - 1 + 3 * width
+
+
 def test_the_strip_is_the_last_line_of_a_window_that_is_left_in_its_middle(assembled: Callable[[str], Path]) -> None:
     """Rows that are recorded are read in two frames, and up to one of them in the third; none is in the new window."""
     image = assembled(LOOKING)
@@ -142,14 +163,8 @@ def test_the_strip_is_the_last_line_of_a_window_that_is_left_in_its_middle(assem
         assert isinstance(robot.machine.runner, JitEngine)
         robot.machine.runner.wait = True
         lockstep, camera = LockStep(World(scene, 5), [robot], is_native=is_native), robot.machine.board.camera
-
-        def write(register: int, value: int, camera: Any = camera, machine: Any = robot.machine) -> None:
-            camera.start(False, machine.cycle)
-            camera.write(register, machine.cycle)
-            camera.write(value, machine.cycle)
-
         lockstep.advance(200)
-        write(0x1D, 0)  # the fastest clock: a row lasts 1704 Tcy, a quantum 14,746
+        write(robot, 0x1D, 0)  # the fastest clock: a row lasts 1704 Tcy, a quantum 14,746
         lockstep.advance(500)
         camera.align(robot.machine.cycle + 1000, line=226)
         lockstep.advance(501)
@@ -157,8 +172,8 @@ def test_the_strip_is_the_last_line_of_a_window_that_is_left_in_its_middle(assem
         lockstep.advance(700)
         camera.align(robot.machine.cycle + 1000, line=230)
         lockstep.advance(701)
-        write(0x0F, 100)  # the window's last row, its upper byte is 1
-        write(0x0E, 0)
+        write(robot, 0x0F, 100)  # the window's last row, its upper byte is 1
+        write(robot, 0x0E, 0)
         lockstep.advance(900)
         strips.append(robot.reading().strip)
     assert strips[:2] == strips[2:]
