@@ -70,7 +70,7 @@ compare: bclr IFS0, #2
 retfie
 trap: retfie
 """
-"""Python sets the flag of OC1, while timer 1 is native code's: some COMPAREs have it set while that is being entered."""
+"""Python sets the flag of OC1, while timer 1 is native code's: some COMPAREs set it while that is being entered."""
 
 
 @pytest.mark.parametrize("engine", ["interp", "jit"])
