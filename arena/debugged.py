@@ -189,6 +189,9 @@ class Debugged:
         brain = brains[self._number]
         if not isinstance(brain, EmulatedBrain):
             raise ValueError(f"--robot {self._number}: it has no firmware, its brain is scripted")
+        for one in brains:
+            if isinstance(one, EmulatedBrain):
+                one.is_native = False
         self._world, self._brains = world, brains
         self.machine = brain.machine
         self._shown = Shown(self.machine)

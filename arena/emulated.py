@@ -119,6 +119,9 @@ class EmulatedBrain:
         """What compiled code knows of the robot; Python and it go on with the same looks at the CPU."""
         self.ahead.join(self._board, self._sight, self.wheels, self._draw, self._drawn_from)
         self._ride: Ride | None = None
+        self.is_native = True
+        """Whether `lend` is listened to. Not beside a debugged robot: where that stands in the middle of a quantum, it
+        shows how far the others have come, and that depends on who runs them."""
         self._life: greenlet | None = None
         """Where it lives."""
         self._enables: Final = tuple(self.machine.chip.sfrs[name].address >> 1 for name in _ENABLES)
@@ -169,6 +172,8 @@ class EmulatedBrain:
 
     def lend(self, ride: Ride) -> None:
         """Let native code be run by `ride` from now on, where there is any."""
+        if not self.is_native:
+            return
         self._ride = ride
         self.ahead.run_by(self.machine.lend(self._run_native))
 
