@@ -9,7 +9,7 @@ from collections.abc import Callable
 from ctypes import POINTER, Structure, addressof, c_int64, c_void_p, pointer
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from arena.sight import Fan, Sight
 from arena.wheels import Wheels
@@ -17,6 +17,7 @@ from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.camera import DATA_PORT
 from emu.boards.epuck.lent import LentCamera
 from emu.boards.epuck.pixels import line_code
+from emu.boards.epuck.sensors import HEIGHT
 from emu.hostcode import ADDRESS, INT, address_of, functions
 from emu.native import Native
 
@@ -24,8 +25,6 @@ AWAY, RUNS, PAINTS, LOOKS = range(4)
 """What is to be done with a robot."""
 OVER, WORLD = -1, -2
 """Results of `run_all` that are no robot's number."""
-ROWS: Final = 480
-"""Of a scene's picture."""
 
 
 class _Code(Structure):
@@ -39,10 +38,11 @@ class Ahead(Structure):
         *((name, c_int64) for name in ("stands", "tick", "why")), ("native", c_void_p), ("code", POINTER(_Code)),
         *((name, c_int64) for name in ("quantum", "on_at", "taken", "told", "end", "probe_at", "probes", "busy",
                                        "stuck_at", "probe_span", "kept")),
-        ("camera", c_void_p), ("data_port", c_int64), ("view", c_void_p), ("fans", c_void_p * ROWS),
+        ("camera", c_void_p), ("data_port", c_int64), ("view", c_void_p), ("fans", c_void_p),
         *((name, c_int64) for name in ("setting", "first_strip", "last_strip", "strip")),
         ("colours", c_void_p), ("noise", c_void_p), ("noise_shift", c_int64),
-        *((name, c_void_p) for name in ("pair", "drive", "generator", "steps")), ("href", c_int64),
+        *((name, c_void_p) for name in ("pair", "drive", "generator", "steps")),
+        *((name, c_int64) for name in ("row", "href")),
     ]  # fmt: skip
     stands: int
     tick: int
@@ -72,6 +72,8 @@ class Ahead(Structure):
             _Code(*map(address_of, (lines["asked"], lines["send"])), line, board.motors.code, turned, address_of(draw))
         )
         self._fans_kept: dict[int, Fan] = {}
+        self._fans_at = (c_void_p * HEIGHT)()
+        self.fans = addressof(self._fans_at)
         self._native: Native | None = None
 
     def run_by(self, native: Native | None) -> None:
@@ -85,11 +87,11 @@ class Ahead(Structure):
         """How a row is painted in the present setting of the camera."""
         setting = self._camera.setting
         if setting != self.setting:
-            self.fans[:] = [None] * ROWS
+            self._fans_at[:] = [None] * HEIGHT
             self._fans_kept.clear()
             self.setting = setting
         self._fans_kept[row] = fan
-        self.fans[row] = fan.address
+        self._fans_at[row] = fan.address
 
     @property
     def last_strip_fan(self) -> Fan | None:

@@ -189,10 +189,8 @@ class Debugged:
         brain = brains[self._number]
         if not isinstance(brain, EmulatedBrain):
             raise ValueError(f"--robot {self._number}: it has no firmware, its brain is scripted")
-        for one in brains:
-            if isinstance(one, EmulatedBrain):
-                one.is_native = False
         self._world, self._brains = world, brains
+        self._let_run_natively(False)
         self.machine = brain.machine
         self._shown = Shown(self.machine)
         self._trial: greenlet | None = None
@@ -265,6 +263,12 @@ class Debugged:
                 raise AnewError
         return self.is_left
 
+    def _let_run_natively(self, is_native: bool) -> None:
+        """Whether compiled code runs all robots, or Python does (`EmulatedBrain.is_native`)."""
+        for brain in self._brains:
+            if isinstance(brain, EmulatedBrain):
+                brain.is_native = is_native
+
     def _end_at_cut(self) -> None:
         self._last = min(self._last, self._limit)
 
@@ -301,6 +305,7 @@ class Debugged:
 
     def _release(self, goes_on: bool) -> None:
         """The debugger has left."""
+        self._let_run_natively(True)
         for name in ("run_past", "end_at_cut", "cuts_so_far"):
             del vars(self.machine)[name]
         self._recording, self._shown.keeps = None, False

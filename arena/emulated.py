@@ -30,6 +30,7 @@ from arena.world import STREAM_SENSORS, Poses, generator, traits_of
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.remote import REPEAT_SECONDS
 from emu.boards.epuck.scan import LINE_PIXELS
+from emu.boards.epuck.sensors import WIDTH
 from emu.boards.epuck.simple import LED_PINS, Battery
 from emu.boards.epuck.stimulus import parse
 from emu.faults import VECNUM
@@ -84,9 +85,9 @@ class EmulatedBrain:
         self._sight = Sight(scene, robot, traits_of(scene, seed, robot))
         self._colours = colours_of(scene).astype(np.int16)
         self._colours_at: Final = self._colours.ctypes.data
-        noise = self._rng.normal(0.0, scene.camera.pixel_noise, (1 << _NOISE_BITS) + 3 * 640)
+        noise = self._rng.normal(0.0, scene.camera.pixel_noise, (1 << _NOISE_BITS) + 3 * WIDTH)
         drawn: NDArray[np.int16] = np.rint(noise).astype(np.int16)
-        self._noise: Final = np.append(drawn, drawn[: 3 * (LINE_PIXELS - 640)])  # a window may be wider than the scene
+        self._noise: Final = np.append(drawn, drawn[: 3 * (LINE_PIXELS - WIDTH)])  # a window may be wider
         self._noise_at: Final = self._noise.ctypes.data
         generating = self._rng.bit_generator.ctypes  # its upper bits are what `integers` gives for a power of two
         self._draw, self._drawn_from = generating.next_uint32, generating.state
@@ -120,8 +121,8 @@ class EmulatedBrain:
         self.ahead.join(self._board, self._sight, self.wheels, self._draw, self._drawn_from)
         self._ride: Ride | None = None
         self.is_native = True
-        """Whether `lend` is listened to. Not beside a debugged robot: where that stands in the middle of a quantum, it
-        shows how far the others have come, and that depends on who runs them."""
+        """Whether native code is run as `lend` says. Not beside a debugged robot: where that stands in the middle of a
+        quantum, it shows how far the others have come, and that depends on who runs them."""
         self._life: greenlet | None = None
         """Where it lives."""
         self._enables: Final = tuple(self.machine.chip.sfrs[name].address >> 1 for name in _ENABLES)
@@ -172,15 +173,13 @@ class EmulatedBrain:
 
     def lend(self, ride: Ride) -> None:
         """Let native code be run by `ride` from now on, where there is any."""
-        if not self.is_native:
-            return
         self._ride = ride
         self.ahead.run_by(self.machine.lend(self._run_native))
 
     def _run_native(self, call: Call, record: int, env: int) -> int:
         """Native code is to be run: what compiled code is to know before. Who runs it elsewhere than in the robot's
         life (a debugger, its past) runs it alone."""
-        if getcurrent() is not self._life:
+        if not self.is_native or getcurrent() is not self._life:
             return call(record, env)
         ahead = self.ahead
         ahead.taken = self._first_cut + len(self._cuts)

@@ -15,8 +15,6 @@ enum { AWAY, RUNS, PAINTS, LOOKS };
 // Results of `run_all` that are no robot's number.
 enum { OVER = -1, WORLD = -2 };
 
-enum { ROWS = 480, TRAP = 1 << 3 };
-
 // A machine (emu/native.py).
 struct native {
     i64 (*entry)(void *record, void *env);
@@ -24,31 +22,15 @@ struct native {
     u64 *begins, *limit, *last, *noted, *notes, *fresh, *cycle, *now, *deadline;
     uint32_t *pc;
     uint16_t *mode, *corcon, *enables[3];
-    i64 room, interpret, service, awake;
+    i64 room, interpret, service, awake, trap;
 };
 
-// Its camera (emu/boards/epuck/lent.py); the rest is line.c's.
-struct camera {
-    const void *places[8];
-    i64 setting;
-    const i64 *row;
-};
-
-// As in sight.c.
-struct rays {
-    const f64 *left, *up;
-    i64 count;
-    f64 right_most, left_most;
-    uint8_t *seen, *pixels;
-    const f64 *bright;
-};
-
-// Functions of other files.
+// Functions of other files, which know what a camera, a view and rays are (line.c, sight.c).
 struct code {
-    i64 (*asked)(const struct camera *, i64 cycle, i64 *href);
-    void (*send)(const struct camera *, i64 href, const uint8_t *pixels);
-    void (*line)(void *view, const f64 *poses, const f64 *before, f64 quanta, const struct rays *,
-                 const int16_t *colours, const int16_t *noise);
+    i64 (*asked)(const void *camera, i64 setting, i64 cycle, i64 *href);
+    void (*send)(const void *camera, i64 href, const uint8_t *pixels);
+    const uint8_t *(*line)(void *view, const f64 *poses, const f64 *before, f64 quanta, const void *rays,
+                           const int16_t *colours, const int16_t *noise);
     i64 (*both_by)(const void *pair, i64 now, const u64 *cycles, i64 count, i64 *steps);
     void (*turned)(void *drive, i64 first, i64 count, const i64 *steps);
     uint32_t (*draw)(void *generator);
@@ -66,18 +48,18 @@ struct robot {
     i64 probe_at, probes, busy, stuck_at; // looks at whether the CPU is idle: the next; how many, and how many found it
                                           // at work; since when something seems wrong, -1: nothing
     i64 probe_span, kept; // the random time between two is below this; wheels are told after so many quanta
-    const struct camera *camera;
+    const void *camera;
     i64 data_port; // index of the register that the picture is read from
     void *view;
-    const struct rays *fans[ROWS]; // of each row of the scene, of one setting of the camera
+    const void *const *fans; // rays of each row of the scene, of one setting of the camera
     i64 setting;
     i64 first_strip, last_strip, strip; // rows whose pixels are recorded; the last one painted of them, -1: none
     const int16_t *colours, *noise;
     i64 noise_shift; // a random number of 32 bits, shifted, is where noise of a line begins
     const void *pair;
     void *drive, *generator;
-    i64 *steps; // room for those of all notes
-    i64 href;   // of the line to be painted
+    i64 *steps;    // room for those of all notes
+    i64 row, href; // of the scene and of the line that is to be painted
 };
 
 // The world (world.py).
@@ -138,7 +120,7 @@ static int probe(struct robot *r)
     int awake = *n->mode == n->awake;
     if (!*n->last || now < (i64)*n->last || now < r->probe_at || now >= r->end)
         return 0;
-    if (*n->corcon & TRAP || !(awake || *n->enables[0] || *n->enables[1] || *n->enables[2]))
+    if (*n->corcon & n->trap || !(awake || *n->enables[0] || *n->enables[1] || *n->enables[2]))
         return 0;
     for (; end_of(r, tick) <= now; tick++) {
         if ((i64)*n->noted == n->room)
@@ -164,10 +146,10 @@ static int looks(struct robot *r, const struct ground *g)
     const u64 *fresh = n->fresh;
     while (*fresh && *fresh != instruction)
         fresh++;
-    if (!*fresh || *n->deadline <= *n->cycle || !r->setting || r->setting != r->camera->setting)
+    if (!*fresh || *n->deadline <= *n->cycle)
         return 0;
-    i64 line = r->code->asked(r->camera, (i64)*n->cycle, &r->href);
-    if (line < 0 || !r->fans[r->camera->row[line]] || !settle(r))
+    r->row = r->code->asked(r->camera, r->setting, (i64)*n->cycle, &r->href);
+    if (r->row < 0 || !r->fans[r->row] || !settle(r))
         return 0;
     r->tick = r->taken + (i64)*n->noted;
     if (r->tick < g->ticks)
@@ -179,16 +161,15 @@ static int looks(struct robot *r, const struct ground *g)
 // The line that is read, as `EmulatedBrain._pixels` and `Camera` have it.
 static void paint(struct robot *r, const struct ground *g)
 {
-    i64 href, line = r->code->asked(r->camera, (i64)*r->native->cycle, &href), y = r->camera->row[line];
-    const struct rays *rays = r->fans[y];
     i64 start = r->tick * r->quantum - r->on_at;
     const int16_t *noise = r->noise + (r->code->draw(r->generator) >> r->noise_shift);
-    f64 quanta = (f64)(href - start) / (f64)r->quantum;
+    f64 quanta = (f64)(r->href - start) / (f64)r->quantum;
     *r->native->now = *r->native->cycle;
-    r->code->line(r->view, g->now, start > 0 ? g->before : g->now, quanta, rays, r->colours, noise);
-    if (r->first_strip <= y && y <= r->last_strip)
-        r->strip = y;
-    r->code->send(r->camera, href, rays->pixels);
+    const f64 *before = start > 0 ? g->before : g->now;
+    const uint8_t *pixels = r->code->line(r->view, g->now, before, quanta, r->fans[r->row], r->colours, noise);
+    if (r->first_strip <= r->row && r->row <= r->last_strip)
+        r->strip = r->row;
+    r->code->send(r->camera, r->href, pixels);
     *r->native->begins = 0; // the boundary before the instruction has been done
     r->stands = RUNS;
 }

@@ -355,9 +355,10 @@ i64 votes(const struct view *v, const struct rays *rays, const uint8_t *sensed)
     return found;
 }
 
-// A line of a picture for a pose: collected, classified and painted. `noise` goes on from value to value.
-void line(struct view *v, const f64 *poses, const f64 *before, f64 quanta, const struct rays *rays,
-          const int16_t *colours, const int16_t *noise)
+// A line of a picture for a pose: collected, classified and painted. `noise` goes on from value to value. Returns its
+// pixels.
+const uint8_t *line(struct view *v, const f64 *poses, const f64 *before, f64 quanta, const struct rays *rays,
+                    const int16_t *colours, const int16_t *noise)
 {
     collect(v, poses, before, quanta);
     classes(v, rays);
@@ -369,4 +370,5 @@ void line(struct view *v, const f64 *poses, const f64 *before, f64 quanta, const
             value += noise[3 * i + c];
             rays->pixels[3 * i + c] = (uint8_t)(value < 0 ? 0 : value > 255 ? 255 : value);
         }
+    return rays->pixels;
 }

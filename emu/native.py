@@ -37,5 +37,6 @@ class Native(Structure):
             "room",  # notes that are kept
             "interpret", "service",  # results: an instruction that needs Python; an event that does, or the limit
             "awake",  # the mode in which the CPU runs
+            "trap",  # the bit of CORCON that is 1 while a trap is handled
         )),
     ]  # fmt: skip

@@ -83,6 +83,14 @@ def test_random_walks_meet_the_world_that_was_there(swarm: Swarm, image_of: Call
     assert tally["back"] + tally["reverse"] + tally["last write"] >= 3
 
 
+def test_others_stand_in_the_middle_of_a_quantum_where_they_stood(image_of: Callable[[str], Path]) -> None:
+    """A walk that stands there twice. Run by compiled code, others would have come as far as native code that happened
+    to be ready took them."""
+    tally: Counter[str] = Counter()
+    walk(249942260, image_of, 40, tally)
+    assert tally["met again"] > 20
+
+
 @needs_copies
 def test_an_editors_client_takes_the_whole_world_back(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, clustering_image: Path

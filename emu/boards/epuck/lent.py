@@ -5,8 +5,9 @@ What it answers by itself is what `Camera` would; wherever it does not, Python i
 
 from __future__ import annotations
 
-from ctypes import Structure, c_double, c_int64, c_void_p
+from ctypes import Structure, c_double, c_int64, c_uint64, c_void_p
 
+from emu.boards.epuck.exposure import ONE
 from emu.record import Record
 
 
@@ -16,7 +17,7 @@ class LentCamera(Structure):
     _fields_ = [
         *((name, c_void_p) for name in ("scan", "plugged", "lamp", "exposure", "begin", "end", "byte_tcy", "line")),
         ("setting", c_int64), ("row", c_void_p), ("count", c_int64), ("form", c_int64), ("gains", c_double * 3),
-        ("manual", c_double),
+        ("manual", c_double), ("one", c_uint64),
     ]  # fmt: skip
     setting: int
 
@@ -24,4 +25,4 @@ class LentCamera(Structure):
     def of(cls, record: Record) -> LentCamera:
         """That of the camera in a record."""
         cells = ("frame_tcy", "plugged", "lamp", "exposure", "line_from", "line_to", "line_byte_tcy", "line")
-        return cls(*(record.address + record.fields[f"camera.{cell}"].offset for cell in cells))
+        return cls(*(record.address + record.fields[f"camera.{cell}"].offset for cell in cells), one=ONE)

@@ -3,6 +3,7 @@
 #include <stdint.h>
 
 typedef int64_t i64;
+typedef uint64_t u64;
 typedef double f64;
 
 enum form { RGB565, GREY, YUV };
@@ -54,28 +55,28 @@ struct scan {
 struct camera {
     const struct scan *scan;
     const uint8_t *plugged;
-    const uint64_t *lamp, *exposure; // 1 = UNITY
-    uint64_t *from, *to, *byte_tcy;  // when the bytes of the line in the record are on the bus
+    const u64 *lamp, *exposure; // in 1 / `one`
+    u64 *from, *to, *byte_tcy;  // when the bytes of the line in the record are on the bus
     uint8_t *line;
     i64 setting;    // another number whenever what is below, or who paints, has changed; 0: Python is to be asked
     const i64 *row; // of the upright scene, of each line
     i64 count, form;
     f64 gains[3], manual; // manual exposure, less than 0 for an automatic one
+    u64 one;
 };
 
-enum { UNITY = 1 << 16 };
-
-// The line whose byte is on the bus in a cycle and that is not in the record yet, as in `Scan.line_at`, and when its
-// HREF rises. -1: there is none, or automatic exposure is on its way: then Python answers.
-i64 asked(const struct camera *c, i64 cycle, i64 *href)
+// The row of the scene of the line whose byte is on the bus in a cycle and that is not in the record yet, as in
+// `Scan.line_at`, and when its HREF rises. -1: there is none, the setting is not this one, or automatic exposure is on
+// its way: then Python answers.
+i64 asked(const struct camera *c, i64 setting, i64 cycle, i64 *href)
 {
     const struct scan *s = c->scan;
     i64 since = cycle + s->byte_tcy / 2 - s->start;
-    if (!c->setting || !*c->plugged || !s->running || since < 0)
+    if (!setting || c->setting != setting || !*c->plugged || !s->running || since < 0)
         return -1;
     if ((i64)*c->from <= cycle && cycle < (i64)*c->to)
         return -1;
-    if (c->manual < 0 && !(*c->lamp == UNITY && *c->exposure == UNITY))
+    if (c->manual < 0 && !(*c->lamp == c->one && *c->exposure == c->one))
         return -1;
     i64 offset = since % s->frame_tcy - s->first_href;
     if (offset < 0)
@@ -84,17 +85,17 @@ i64 asked(const struct camera *c, i64 cycle, i64 *href)
     if (line >= s->lines || behind >= s->line_bytes * s->byte_tcy)
         return -1;
     *href = s->start + since / s->frame_tcy * s->frame_tcy + s->first_href + line * s->line_tcy;
-    return line;
+    return c->row[line];
 }
 
 // Put a line whose HREF rises in a cycle into the record, as `Camera._render` does.
 void send(const struct camera *c, i64 href, const uint8_t *pixels)
 {
-    f64 brightness = c->manual < 0 ? 1 : (f64)*c->lamp / UNITY * c->manual;
+    f64 brightness = c->manual < 0 ? 1 : (f64)*c->lamp / (f64)c->one * c->manual;
     f64 gains[3] = {c->gains[0] * brightness, c->gains[1] * brightness, c->gains[2] * brightness};
     encode(pixels, c->count, c->form, gains, c->line);
     i64 begin = href - c->scan->byte_tcy / 2;
-    *c->from = (uint64_t)begin;
-    *c->to = (uint64_t)(begin + c->count * (c->form == GREY ? 1 : 2) * c->scan->byte_tcy);
-    *c->byte_tcy = (uint64_t)c->scan->byte_tcy;
+    *c->from = (u64)begin;
+    *c->to = (u64)(begin + c->count * (c->form == GREY ? 1 : 2) * c->scan->byte_tcy);
+    *c->byte_tcy = (u64)c->scan->byte_tcy;
 }

@@ -94,7 +94,7 @@ def line_code() -> dict[str, Callable[..., int]]:
     """The functions of line.c."""
     return functions(Path(__file__).with_name("line.c"), {
         "encode": (None, (ADDRESS, INT, INT, ADDRESS, ADDRESS)),
-        "asked": (INT, (ADDRESS, INT, ADDRESS)),
+        "asked": (INT, (ADDRESS, INT, INT, ADDRESS)),
         "send": (None, (ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 

@@ -56,7 +56,7 @@ from emu.dspic30f.jit.surroundings import (
 from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
 from emu.dspic30f.ledger import STRETCH, Ledger
 from emu.dspic30f.modes import Key, Modes
-from emu.dspic30f.state import NOT_REPEATING, RUN
+from emu.dspic30f.state import IPL3, NOT_REPEATING, RUN
 from emu.native import FRESH_ROOM, Native, Run
 from emu.straight import Rule
 
@@ -280,7 +280,7 @@ class JitEngine:
         at |= {name: env + 8 * word for name, word in words.items()}
         self._run = run
         self._lent_as = Native(record=record.address, env=env, room=ROOM, interpret=INTERPRET, service=SERVICE,
-                               awake=RUN, **at)  # fmt: skip
+                               awake=RUN, trap=IPL3, **at)  # fmt: skip
         self._hand_out()
         return self._lent_as
 

@@ -26,11 +26,10 @@ def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tu
     python = record.snapshot()
     record.restore(before)
     code = line_code()
-    line = code["asked"](addressof(camera.lent), cycle, addressof(href))
-    if line < 0:
+    row = code["asked"](addressof(camera.lent), camera.lent.setting, cycle, addressof(href))
+    if row < 0:
         record.restore(python)
         return by_python, False
-    row = (c_int64 * 480).from_address(camera.lent.row)[line]
     seen = np.ascontiguousarray(pixels[row][camera._readout._columns])
     code["send"](addressof(camera.lent), href.value, seen.ctypes.data)
     assert record.snapshot() == python
@@ -70,15 +69,18 @@ def test_python_is_asked_first_in_every_new_setting() -> None:
     robot.configure(po6030())
     camera, href = robot.board.camera, c_int64()
 
+    def painted_by_code(cycle: int) -> int:
+        return line_code()["asked"](addressof(camera.lent), camera.lent.setting, cycle, addressof(href))
+
     def asked() -> bool:
         cycle = camera.scan.href(3, 2)
         camera._line_to.value = 0
-        first = line_code()["asked"](addressof(camera.lent), cycle, addressof(href))
+        first = painted_by_code(cycle)
         assert camera._refresh(cycle)
         camera._line_to.value = 0
-        again = line_code()["asked"](addressof(camera.lent), cycle, addressof(href))
-        assert again in (first, 3)
-        assert first in (-1, 3)
+        again, row = painted_by_code(cycle), camera._readout._rows[3]
+        assert again in (first, row)
+        assert first in (-1, row)
         return first < 0 <= again
 
     def source(y, columns, _cycle):
@@ -97,5 +99,8 @@ def test_python_is_asked_first_in_every_new_setting() -> None:
     assert not camera.lent.setting
     camera.sample(source, is_lent=True)
     assert asked()
+    setting = camera.lent.setting
+    assert painted_by_code(camera.scan.href(3, 2)) >= 0
+    assert line_code()["asked"](addressof(camera.lent), setting + 1, camera.scan.href(3, 2), addressof(href)) == -1
     camera.unplug()
-    assert line_code()["asked"](addressof(camera.lent), camera.scan.href(3, 2), addressof(href)) == -1
+    assert painted_by_code(camera.scan.href(3, 2)) == -1
