@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from ctypes import POINTER, Structure, addressof, c_int64, c_void_p, pointer
-from functools import cache
-from pathlib import Path
-from typing import Any
 
 from arena.sight import Fan, Sight
 from arena.wheels import Wheels
@@ -18,13 +15,11 @@ from emu.boards.epuck.camera import DATA_PORT
 from emu.boards.epuck.lent import LentCamera
 from emu.boards.epuck.pixels import line_code
 from emu.boards.epuck.sensors import HEIGHT
-from emu.hostcode import ADDRESS, INT, address_of, functions
+from emu.hostcode import address_of
 from emu.native import Native
 
 AWAY, RUNS, PAINTS, LOOKS = range(4)
 """What is to be done with a robot."""
-OVER, WORLD = -1, -2
-"""Results of `run_all` that are no robot's number."""
 
 
 class _Code(Structure):
@@ -98,16 +93,3 @@ class Ahead(Structure):
         """What the last line that is recorded was painted with, since this was asked last."""
         row, self.strip = self.strip, -1
         return self._fans_kept.get(row)
-
-
-class Swarm(Structure):
-    """`struct swarm`."""
-
-    _fields_ = [("count", c_int64), *((name, c_void_p) for name in ("robots", "speeds")), ("room", c_int64),
-                ("ground", c_void_p), ("wanted", c_int64)]  # fmt: skip
-
-
-@cache
-def run_all() -> Callable[..., Any]:
-    """run_all(swarm, goal) of lockstep.c."""
-    return functions(Path(__file__).with_name("lockstep.c"), {"run_all": (INT, (ADDRESS, INT))})["run_all"]

@@ -158,10 +158,10 @@ def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brai
 
 def run_one(
     plan: Plan, number: int, folder: Path, report: Report | None = None, processes: int = 1,
-    meet: Callable[[World, Sequence[Brain]], None] | None = None,
+    meet: Callable[[World, Sequence[Brain]], None] | None = None, threads: int = 1,
 ) -> Done:  # fmt: skip
-    """Run trial `number` (from 1), its robots in `processes`, and write its file. `meet` is shown world and
-    robots first.
+    """Run trial `number` (from 1), its robots in `processes` or run by `threads` of this one, and write its file.
+    `meet` is shown world and robots first.
 
     Raises SceneError, RecordError, emu.LoadError."""
     start = time.perf_counter()
@@ -176,7 +176,7 @@ def run_one(
             if meet is not None:
                 meet(world, brains)
             result = run_trial(plan.scene, seed, brains, plan.seconds, progress, world, on_row, crews, ether,
-                               plan.to_do)  # fmt: skip
+                               plan.to_do, threads)  # fmt: skip
         about["faults"] = [list(fault) for fault in result.faults]
         write_trial(trial_path(folder, number), result.rows, about)
     finally:
@@ -226,17 +226,18 @@ def run_all(
     plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None],
     processes: int = 1,
 ) -> None:  # fmt: skip
-    """Run trials `numbers` on `jobs` workers; 1 = in this process. With several `processes` trials are run one after
-    the other, their emulated robots spread over them. Raises what a trial raises, after the others of its moment;
-    files of finished trials stay."""
+    """Run trials `numbers` on `jobs` workers; 1 = in this process. Where there are fewer trials than that, each gets
+    some threads. With several `processes` trials are run one after the other, their emulated robots spread over them.
+    Raises what a trial raises, after the others of its moment; files of finished trials stay."""
+    threads = max(jobs // max(len(numbers), 1), 1)
     if jobs <= 1 or len(numbers) <= 1 or processes > 1:
         for number in numbers:
-            done(run_one(plan, number, folder, report, processes if plan.has_firmware else 1))
+            done(run_one(plan, number, folder, report, processes if plan.has_firmware else 1, threads=threads))
         return
     context = multiprocessing.get_context("spawn")
     queue: Any = context.Queue()
     with ProcessPoolExecutor(min(jobs, len(numbers)), context, _begin, (queue,)) as pool:
-        pending = {pool.submit(_work, plan, number, folder) for number in numbers}
+        pending = {pool.submit(_work, plan, number, folder, threads) for number in numbers}
         try:
             while pending:
                 finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
@@ -263,5 +264,5 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _work(plan: Plan, number: int, folder: Path) -> Done:
-    return run_one(plan, number, folder, lambda trial, seconds: _queue.put((trial, seconds)))
+def _work(plan: Plan, number: int, folder: Path, threads: int) -> Done:
+    return run_one(plan, number, folder, lambda trial, seconds: _queue.put((trial, seconds)), threads=threads)

@@ -1,6 +1,7 @@
 // Robots that run ahead, each until it looks at something, and the world that follows the slowest: the loop of
 // lockstep.py. Native code runs a robot; a line of its camera, ends of quanta and looks at whether its CPU is idle are
-// done here; for whatever else native code comes back, Python goes on with the robot.
+// done here; for whatever else native code comes back, Python goes on with the robot. What robots do between two steps
+// of the world touches nothing of each other, so threads share them.
 
 #include <stdint.h>
 
@@ -9,11 +10,14 @@ typedef uint64_t u64;
 typedef double f64;
 
 // What is to be done with a robot: Python has it, or it is through; it runs; it waits for poses to paint a line with,
-// or Python waits for them.
-enum { AWAY, RUNS, PAINTS, LOOKS };
+// or Python waits for them; native code has come back for Python.
+enum { AWAY, RUNS, PAINTS, LOOKS, CAME_BACK };
 
 // Results of `run_all` that are no robot's number.
 enum { OVER = -1, WORLD = -2 };
+
+// Looks of a helper before it sleeps: longer than a step of the world takes.
+enum { PATIENCE = 10000 };
 
 // A machine (emu/native.py).
 struct native {
@@ -73,6 +77,12 @@ struct ground {
     const f64 *now, *before;
 };
 
+// A thread that helps. It sleeps in a lock of Python's, for which it needs no global lock.
+struct helper {
+    void *lock;
+    i64 sleeps, runs; // runs: of robots, so far
+};
+
 struct swarm {
     i64 count;
     struct robot *const *robots;
@@ -80,6 +90,13 @@ struct swarm {
     i64 room; // quanta for which speeds are kept
     struct ground *ground;
     i64 wanted; // how far the world is to go, by Python
+    i64 helpers;
+    struct helper *helper;
+    int (*acquire)(void *lock, int waits);
+    void (*release)(void *lock);
+    // A round: robots with something to do, how many of them nobody has (0 or less: none), and how many are through.
+    struct robot **ready;
+    i64 left, through, rounds, is_over;
 };
 
 static i64 end_of(const struct robot *r, i64 tick)
@@ -178,13 +195,91 @@ static void paint(struct robot *r, const struct ground *g)
 static void run(struct robot *r, const struct ground *g)
 {
     const struct native *n = r->native;
+    if (r->stands == PAINTS)
+        paint(r, g);
     while (r->stands == RUNS) {
         r->why = n->entry(n->record, n->env);
         if (r->why == n->interpret ? looks(r, g) : r->why == n->service && probe(r))
             continue;
         *n->begins = 1;
-        r->stands = AWAY;
+        r->stands = CAME_BACK;
     }
+}
+
+// Run robots of a round as long as there are some that nobody has. How many.
+static i64 share(struct swarm *s)
+{
+    i64 left, runs = 0;
+    while ((left = __atomic_fetch_sub(&s->left, 1, __ATOMIC_ACQ_REL)) > 0) {
+        run(s->ready[left - 1], s->ground);
+        runs++;
+        __atomic_fetch_add(&s->through, 1, __ATOMIC_RELEASE);
+    }
+    return runs;
+}
+
+static void wait_a_little(void)
+{
+#if defined(__x86_64__) || defined(__i386__)
+    __builtin_ia32_pause();
+#endif
+}
+
+// Let helpers look. One that is about to sleep sees the new number, or is seen.
+static void call(struct swarm *s)
+{
+    __atomic_fetch_add(&s->rounds, 1, __ATOMIC_SEQ_CST);
+    for (i64 i = 0; i < s->helpers; i++)
+        if (__atomic_exchange_n(&s->helper[i].sleeps, 0, __ATOMIC_SEQ_CST))
+            s->release(s->helper[i].lock);
+}
+
+// The life of a helper, a thread. A round does not wait for one that comes late.
+void help(struct swarm *s, struct helper *h)
+{
+    i64 seen = 0, now;
+    while (!__atomic_load_n(&s->is_over, __ATOMIC_SEQ_CST)) {
+        for (i64 looks = 0; (now = __atomic_load_n(&s->rounds, __ATOMIC_SEQ_CST)) == seen && looks < PATIENCE; looks++)
+            wait_a_little();
+        if (now != seen) {
+            seen = now;
+            h->runs += share(s);
+            continue;
+        }
+        __atomic_store_n(&h->sleeps, 1, __ATOMIC_SEQ_CST);
+        if (__atomic_load_n(&s->rounds, __ATOMIC_SEQ_CST) == seen ||
+            !__atomic_exchange_n(&h->sleeps, 0, __ATOMIC_SEQ_CST))
+            s->acquire(h->lock, 1);
+    }
+}
+
+// No helper is needed any more.
+void dismiss(struct swarm *s)
+{
+    __atomic_store_n(&s->is_over, 1, __ATOMIC_SEQ_CST);
+    call(s);
+}
+
+// Run all that run, or wait for poses that are there now.
+static void run_ready(struct swarm *s)
+{
+    i64 among = 0;
+    for (i64 i = 0; i < s->count; i++) {
+        struct robot *r = s->robots[i];
+        if (r->stands == RUNS || (r->stands == PAINTS && r->tick <= s->ground->ticks))
+            s->ready[among++] = r;
+    }
+    if (!s->helpers || among < 2) {
+        for (i64 i = 0; i < among; i++)
+            run(s->ready[i], s->ground);
+        return;
+    }
+    s->through = 0; // nobody has one of an earlier round any more
+    __atomic_store_n(&s->left, among, __ATOMIC_RELEASE);
+    call(s);
+    share(s);
+    while (__atomic_load_n(&s->through, __ATOMIC_ACQUIRE) < among)
+        wait_a_little();
 }
 
 // Quanta that all robots have lived. 0: Python has something to do before.
@@ -208,32 +303,21 @@ static int go(struct ground *g, const struct swarm *s, i64 until)
 i64 run_all(struct swarm *s, i64 goal)
 {
     for (;;) {
-        i64 until = goal, found = 0;
+        run_ready(s);
+        i64 until = goal, waiting = 0;
         for (i64 i = 0; i < s->count; i++) {
             struct robot *r = s->robots[i];
-            if (r->stands == RUNS) {
-                run(r, s->ground);
-                if (r->stands == AWAY)
-                    return i;
+            if (r->stands == CAME_BACK || (r->stands == LOOKS && r->tick <= s->ground->ticks)) {
+                r->stands = AWAY;
+                return i;
             }
-            if (r->stands != AWAY && r->tick < until)
-                until = r->tick;
+            if (r->stands != AWAY && r->tick <= until)
+                until = r->tick, waiting = 1;
         }
         s->wanted = until;
         if (!go(s->ground, s, until))
             return WORLD;
-        for (i64 i = 0; i < s->count; i++) {
-            struct robot *r = s->robots[i];
-            if (r->stands == AWAY || r->tick > until)
-                continue;
-            if (r->stands == LOOKS) {
-                r->stands = AWAY;
-                return i;
-            }
-            paint(r, s->ground);
-            found = 1;
-        }
-        if (!found)
+        if (!waiting)
             return OVER;
     }
 }

@@ -9,14 +9,15 @@ the same poses either way.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from ctypes import POINTER, addressof, c_void_p, pointer
+from ctypes import addressof, c_void_p
 from functools import partial
 from typing import Final, Protocol, runtime_checkable
 
 from greenlet import getcurrent, greenlet
 
-from arena.ahead import AWAY, LOOKS, OVER, RUNS, WORLD, Ahead, Swarm, run_all
+from arena.ahead import AWAY, LOOKS, RUNS, Ahead
 from arena.ether import Ether
+from arena.swarm import OVER, WORLD, Swarm
 from arena.wheels import ROOM, Wheels
 from arena.world import Poses, Stretch, World
 
@@ -47,13 +48,14 @@ class Runner(Protocol):
 
 
 class LockStep:
-    """`world`, the robots that are in it, all of them, and what carries their infrared light. Without `is_native`
-    Python runs native code and the world and sees each look: the same, more slowly.
+    """`world`, the robots that are in it, all of them, and what carries their infrared light. So many `threads` run
+    native code. Without `is_native` Python runs it and the world and sees each look: the same, more slowly.
     """
 
     def __init__(
-        self, world: World, robots: Sequence[Runner], ether: Ether | None = None, is_native: bool = True
-    ) -> None:
+        self, world: World, robots: Sequence[Runner], ether: Ether | None = None, is_native: bool = True,
+        threads: int = 1,
+    ) -> None:  # fmt: skip
         self._world: Final = world
         self._robots: Final = robots
         self._ether: Final = ether or Ether.of(world.scene)
@@ -65,9 +67,8 @@ class LockStep:
         self._lives: list[greenlet | None] = [None] * len(robots)
         self._speeds: Final = (c_void_p * len(robots))(*(robot.wheels.address for robot in robots))
         self._speeds_at: Final = addressof(self._speeds)
-        self._aheads: Final = (POINTER(Ahead) * len(robots))(*(pointer(robot.ahead) for robot in robots))
-        self._swarm: Final = Swarm(len(robots), addressof(self._aheads), self._speeds_at, ROOM, addressof(world.ground))
-        self._run_all: Final = partial(run_all(), addressof(self._swarm))
+        aheads = [robot.ahead for robot in robots]
+        self.swarm: Final = Swarm(aheads, self._speeds_at, ROOM, addressof(world.ground), threads)
         for place, robot in enumerate(robots):
             robot.join(self.look_at)
             if is_native:
@@ -85,7 +86,7 @@ class LockStep:
                 self._go_on(place, ticks)
         while (needed := self._next(ticks)) != OVER:
             if needed == WORLD:
-                self._step_to(self._swarm.wanted)
+                self._step_to(self.swarm.wanted)
             else:
                 self._go_on(needed, self._robots[needed].ahead.why)
         for tick in [tick for tick in self._past if tick < ticks - 1]:
@@ -97,7 +98,7 @@ class LockStep:
         """Run all robots in compiled code, and the world behind them, until Python is needed; for whom."""
         world = self._world
         world.lend(self._poses(world.ticks), self._poses(world.ticks - 1), self._is_native)
-        needed: int = self._run_all(ticks)
+        needed = self.swarm.run(ticks)
         self._note(world.take())
         return needed
 

@@ -74,7 +74,7 @@ def _code() -> dict[str, Callable[..., Any]]:
 
 
 class _Things:
-    """What all cameras of a scene share: what things look like, and room for what one of them collects."""
+    """What all cameras of a scene share: what things look like."""
 
     def __init__(self, scene: Scene) -> None:
         look = look_of(scene) if scene.is_furnished else None
@@ -90,8 +90,6 @@ class _Things:
             _Patch(patch.x_cm, patch.y_cm, patch.radius_cm, corners.ctypes.data, len(corners), kind)
             for (patch, kind), corners in zip(patches, self.corners, strict=True)
         ))  # fmt: skip
-        self.discs: Final = (_Disc * (count + scene.robots.count))()
-        self.sides: Final = (_Side * len(sides))()
         sensed = look.sensed if look is not None else range(len(COLOURS))
         self.sensed: Final = np.array(sensed, dtype=np.uint8)
         self.lamps: Final = (_Lamp * len(LAMPS))(*(_Lamp(*one) for one in LAMPS))
@@ -140,6 +138,8 @@ class Sight:
         self._things: Final = things
         self.leds: Final = np.zeros(scene.robots.count, dtype=np.int64)
         """Of each robot, bit n: LED n is lit as it is seen, 8 front, 9 body; for scenes that want it."""
+        self._discs: Final = (_Disc * (len(things.things) + scene.robots.count))()
+        self._sides: Final = (_Side * len(things.outlines))()
         self._view: Final = _View(
             bodies.CAMERA_AHEAD, bodies.CAMERA_HEIGHT, bodies.WALL_HEIGHT, NEAREST,
             scene.arena.width_cm, scene.arena.height_cm, scene.camera.range_cm, self.lens.widest, traits.yaw,
@@ -148,7 +148,7 @@ class Sight:
             bodies.LED_COS,
             _Disc(0.0, 0.0, bodies.ROBOT_RADIUS, bodies.ROBOT_HEIGHT, ROBOT), things.things,
             things.fixed, len(things.fixed), things.outlines, len(things.outlines),
-            things.patches, len(things.patches), things.discs, 0, things.sides, 0,
+            things.patches, len(things.patches), self._discs, 0, self._sides, 0,
         )  # fmt: skip
         self._address: Final = addressof(self._view)
         self._counts = scene.robots.count, len(things.things)

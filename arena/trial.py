@@ -46,9 +46,10 @@ class Result:
 class Running:
     """A trial that goes on when it is told to: a world, its brains, and what of it is recorded.
 
-    Some of the brains may live in other processes, `crews`; `ether` is that of the brains of this one. A robot whose
-    firmware stops stands still; the others go on. `experiment` may have a supervisor (stage.py), who can end the trial.
-    `on_row(row)` is called for every sample. Raises SceneError if there is no room or the supervisor fails.
+    Some of the brains may live in other processes, `crews`; `ether` is that of the brains of this one, and so many
+    `threads` run them if they can run ahead. A robot whose firmware stops stands still; the others go on. `experiment`
+    may have a supervisor (stage.py), who can end the trial. `on_row(row)` is called for every sample. Raises SceneError
+    if there is no room or the supervisor fails.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class Running:
         crews: Sequence[Crew] = (),
         ether: Ether | None = None,
         experiment: Experiment | None = None,
+        threads: int = 1,
     ) -> None:
         self.world: Final = world or World(scene, seed)
         self.brains: Final = brains
@@ -77,7 +79,7 @@ class Running:
         self._sample_s: Final = scene.clock.sample_s
         self._recorder.sample([STOPPED] * len(brains))
         self._samples = 1
-        self._ahead: Final = None if crews else _together(self.world, brains, ether)
+        self._ahead: Final = None if crews else _together(self.world, brains, ether, threads)
         self._is_over = False
 
     @property
@@ -135,10 +137,11 @@ def run_trial(
     crews: Sequence[Crew] = (),
     ether: Ether | None = None,
     experiment: Experiment | None = None,
+    threads: int = 1,
 ) -> Result:
     """Let `brains` live in a new world for `seconds`; `progress(seconds)` is called once per simulated second. The rest
     is that of `Running`, which says what it raises."""
-    running = Running(scene, seed, brains, seconds, world, on_row, crews, ether, experiment)
+    running = Running(scene, seed, brains, seconds, world, on_row, crews, ether, experiment, threads)
     while not running.is_over:
         running.go_on()
         if progress is not None and running.world.ticks % running.per_second == 0:
@@ -146,10 +149,10 @@ def run_trial(
     return running.result
 
 
-def _together(world: World, brains: Sequence[Brain], ether: Ether | None) -> LockStep | None:
+def _together(world: World, brains: Sequence[Brain], ether: Ether | None, threads: int) -> LockStep | None:
     """Demand lock-step, if all robots can run ahead."""
     robots = [brain for brain in brains if isinstance(brain, Runner)]
-    return LockStep(world, robots, ether) if brains and len(robots) == len(brains) else None
+    return LockStep(world, robots, ether, threads=threads) if brains and len(robots) == len(brains) else None
 
 
 def _quantum(

@@ -30,7 +30,13 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(description="run trials; finished ones are kept and skipped", epilog=EXAMPLE)
     made.add_argument("--trials", type=count, default=10, metavar="N")
     add_plan(made)
-    made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes")
+    made.add_argument(
+        "--jobs",
+        type=count,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="cores to use (default all): trials at a time, threads of one where there are fewer trials",
+    )
     made.add_argument(
         "--processes",
         type=count,

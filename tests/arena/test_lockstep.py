@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import gc
+import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from threading import enumerate as enumerate_threads
 from typing import Any
 
 import pytest
 
+import arena
 from arena.brain import Brain, Lights, Line, Reading
 from arena.emulated import EmulatedBrain
 from arena.ether import Ether
@@ -86,11 +91,13 @@ def test_robots_do_run_ahead(clustering_image: Path) -> None:
     assert max(gaps) > 20
 
 
-def samples(image: Path, is_native: bool, seconds: float = 3.0) -> tuple[list[Any], int, int]:
+def samples(
+    image: Path, is_native: bool, seconds: float = 3.0, count: int = 3, threads: int = 1
+) -> tuple[list[Any], int, int]:
     """What robots read and where everything is, twice a second; how often Python painted a line, and ran an instruction
     in place of native code, in the last second."""
-    scene = load_scene("clustering").with_values(robots__count=3, objects__count=8)
-    robots = [EmulatedBrain(scene, 5, i, image, 0) for i in range(3)]
+    scene = load_scene("clustering").with_values(robots__count=count, objects__count=8)
+    robots = [EmulatedBrain(scene, 5, i, image, 0) for i in range(count)]
     painted = interpreted = 0
     found: list[Any] = []
     for robot in robots:
@@ -105,13 +112,14 @@ def samples(image: Path, is_native: bool, seconds: float = 3.0) -> tuple[list[An
 
         camera.sample(counted, is_lent=True)
     world = World(scene, 5)
-    lockstep = LockStep(world, robots, is_native=is_native)
+    lockstep = LockStep(world, robots, is_native=is_native, threads=threads)
     for moment in range(500, round(seconds * 1000) + 1, 500):
         if moment == round(seconds * 1000) - 500:
             painted, interpreted = 0, sum(robot.machine.runner.counts.interpreted for robot in robots)
         wheels = lockstep.advance(moment)
         readings = [(robot.reading(), robot.lines(), robot.lights()) for robot in robots]
         found.append((wheels, readings, world.poses.values.tolist()))
+    assert (lockstep.swarm.helped > 100) == (threads > 1)
     return found, painted, sum(robot.machine.runner.counts.interpreted for robot in robots) - interpreted
 
 
@@ -125,6 +133,44 @@ def test_compiled_code_sees_and_probes_as_python_does_and_leaves_it_out(clusteri
     assert seen > 200
     assert painted == 0
     assert interpreted < 40
+
+
+def test_it_cannot_show_which_thread_runs_a_robot(clustering_image: Path) -> None:
+    """More threads than cores, too."""
+    alone, *_ = samples(clustering_image, True, 2.0, 12)
+    for threads in (2, 5):
+        found, painted, _ = samples(clustering_image, True, 2.0, 12, threads)
+        assert found == alone
+        assert painted == 0
+
+
+def test_threads_end_with_their_swarm(clustering_image: Path) -> None:
+    before = set(enumerate_threads())
+    scene = load_scene("clustering").with_values(robots__count=3)
+    robots = [EmulatedBrain(scene, 1, i, clustering_image, 8) for i in range(3)]
+    lockstep = LockStep(World(scene, 1), robots, threads=3)
+    lockstep.advance(50)
+    helpers = set(enumerate_threads()) - before
+    assert len(helpers) == 2
+    for robot in robots:
+        robot.close()
+    del lockstep, robots, robot
+    gc.collect()
+    for helper in helpers:
+        helper.join(10)
+        assert not helper.is_alive()
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="the sanitizers of gcc are needed")
+@pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
+def test_rounds_have_no_race(sanitizer: str, tmp_path: Path) -> None:
+    """Threads that come late, fall asleep, and are dismissed."""
+    source, program = Path(arena.__path__[0]) / "lockstep.c", tmp_path / "race"
+    command = ["gcc", "-g", "-O1", "-std=c11", "-Wall", "-Wextra", "-Werror", f"-fsanitize={sanitizer}", "-include"]
+    command += [str(source), str(Path(__file__).with_name("race.c")), "-o", str(program), "-lpthread"]
+    subprocess.run(command, check=True)
+    done = subprocess.run([program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 LOOKING = f"""{BEGIN}

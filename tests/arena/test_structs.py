@@ -11,7 +11,7 @@ import pytest
 
 import arena
 import emu.boards.epuck
-from arena import ahead, ether, infrared, optics, sight, wheels, world
+from arena import ahead, ether, infrared, optics, sight, swarm, wheels, world
 from emu.boards.epuck import analog, lent, motors
 from emu.hostcode import INT, functions
 from emu.native import Native
@@ -20,7 +20,7 @@ ARENA, BOARD = Path(arena.__path__[0]), Path(emu.boards.epuck.__path__[0])
 
 TWINS: dict[Path, dict[str, type[Structure]]] = {
     ARENA / "lockstep.c": {"native": Native, "code": ahead._Code, "robot": ahead.Ahead,
-                           "ground": world.Ground, "swarm": ahead.Swarm},
+                           "ground": world.Ground, "helper": swarm._Helper, "swarm": swarm._Swarm},
     ARENA / "sight.c": {"disc": sight._Disc, "lamp": sight._Lamp, "side": sight._Side, "patch": sight._Patch,
                         "view": sight._View, "rays": sight._Rays},
     ARENA / "wheels.c": {"drive": wheels._Drive},
