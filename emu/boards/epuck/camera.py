@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # loaded when the first picture is: most runs start faster wi
     import numpy as np
     from numpy.typing import NDArray
 
-    from emu.boards.epuck.pixels import Pixels, PixelSource, Readout
+    from emu.boards.epuck.pixels import Pixels, PixelSource, Readout, Still
 
 ADDRESS: Final = 0x6E
 """7-bit I2C address: 0xDC to write, 0xDD to read (epuck.md §7.1)."""
@@ -66,8 +66,12 @@ class Camera(Part, I2cDevice):
         chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places), self._refresh)
         self.lent: Final = LentCamera.of(self.record)
         """For compiled code that paints what `sample` was given."""
+        self._lent_at: Final = ctypes.addressof(self.lent)
         self._is_lent, self._settings = False, 0
         self._pixels: PixelSource | None = None
+        self._still: Still | None = None
+        self._href: Final = ctypes.c_int64()
+        self._href_at: Final = ctypes.addressof(self._href)
         self._timing: Timing
         self._picture: Picture
         self._readout: Readout | None
@@ -87,10 +91,11 @@ class Camera(Part, I2cDevice):
         `turned` = 90, 180 or 270 turns it counter-clockwise before a sensor that is mounted turned (§7.1).
         Raises ValueError for something that is no picture.
         """
-        from emu.boards.epuck.pixels import as_vga
+        from emu.boards.epuck.pixels import Still, as_vga
 
-        scene = as_vga(image, turned)
-        self.sample(lambda y, columns, _cycle: scene[y, columns])
+        still = Still(as_vga(image, turned))
+        self.sample(still, is_lent=True)
+        self._still = still
 
     def look(self, rows: RowSource) -> None:
         """Let the camera see what `rows(y, cycle)` returns for each line when it is read out."""
@@ -102,7 +107,7 @@ class Camera(Part, I2cDevice):
         It is called with the cycle in which the line's HREF rises, only for lines that somebody reads, once per line.
         `is_lent`: there is compiled code that paints the same, by `lent`, whoever of the two is asked.
         """
-        self._pixels, self._is_lent = pixels, is_lent
+        self._pixels, self._is_lent, self._still = pixels, is_lent, None
         self.lent.setting = 0
         self._line_to.value = 0
 
@@ -223,7 +228,16 @@ class Camera(Part, I2cDevice):
         u64 = self._u64
         if not self._plugged.value or u64[self._line_from.index] <= cycle < u64[self._line_to.index]:
             return False
-        return self._render(cycle)
+        return (self._still is not None and self._sent_at_once(self._still, cycle)) or self._render(cycle)
+
+    def _sent_at_once(self, still: Still, cycle: int) -> bool:
+        """A line of a still picture put into the record by compiled code, if that would do what `_render` does and the
+        row has been looked at before."""
+        row = still.asked(self._lent_at, self.lent.setting, cycle, self._href_at)
+        pixels = still.place(row)
+        if pixels:
+            still.send(self._lent_at, self._href.value, pixels)
+        return bool(pixels)
 
     def _render(self, cycle: int) -> bool:
         """Put the line that is on the bus in `cycle` into the record. False between lines."""

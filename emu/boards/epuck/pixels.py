@@ -40,6 +40,35 @@ def darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
     return np.zeros((len(columns), 3), dtype=np.uint8)
 
 
+class Still:
+    """A picture that stays as it is (480 x 640 x 3): a row cut to the same columns is the same array each time."""
+
+    def __init__(self, scene: Pixels) -> None:
+        self._scene: Final = scene
+        self._columns: NDArray[np.intp] | None = None
+        self._cut: Final[dict[int, Pixels]] = {}
+        self._places: Final[dict[int, int]] = {}
+        code = line_code()
+        self.asked: Final = code["asked"]
+        self.send: Final = code["send"]
+
+    def __call__(self, y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
+        """A row's pixels in these columns."""
+        if columns is not self._columns:
+            self._columns = columns
+            self._cut.clear()
+            self._places.clear()
+        found = self._cut.get(y)
+        if found is None:
+            found = self._cut[y] = np.ascontiguousarray(self._scene[y, columns])
+            self._places[y] = found.ctypes.data
+        return found
+
+    def place(self, y: int) -> int:
+        """Where a row lies that was asked for in the present columns; 0 if it was not."""
+        return self._places.get(y, 0)
+
+
 Gains = ctypes.c_double * 3
 """Factors of red, green and blue."""
 

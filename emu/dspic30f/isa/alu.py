@@ -23,14 +23,14 @@ def ones(size: Size) -> int:
 def adder(m: Builder, size: Size, a: Value, b: Value, carry: Value, sticky: bool = False) -> Value:
     """a + b + carry and all five flags; ``sticky`` Z can only be cleared (isa.md §6.1)."""
     bits, half = 8 * size, 4 * size
-    low = (1 << half) - 1
     total = m.let(a + b + carry)
+    apart = a ^ b  # a sum without its carries
     result = m.let(total & ones(size))
     zero = result == 0
     m.set_flags(
-        DC=((a & low) + (b & low) + carry) >> half,
+        DC=(apart ^ total) >> half & 1,
         N=result >> bits - 1,
-        OV=(~(a ^ b) & (a ^ result)) >> bits - 1 & 1,
+        OV=(~apart & (a ^ result)) >> bits - 1 & 1,
         Z=m.flag("Z") & zero if sticky else zero,
         C=total >> bits,
     )

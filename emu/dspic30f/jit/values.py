@@ -6,7 +6,8 @@ block being built. Plain Python ints are constants. Rows never know which of the
 
 from __future__ import annotations
 
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, Literal
 
 
 class Block:
@@ -95,15 +96,28 @@ class Emitter:
         return "\n".join(parts)
 
 
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Of what a value is the truth: whether `word` is zero, has its bit `place`, or any from there on ("above")."""
+
+    kind: Literal["zero", "bit", "above"]
+    word: Value
+    place: int
+
+
 class Value:
-    """A value known only when the code runs."""
+    """A value known only when the code runs. `origin` is what its truth was made of, where that is known."""
 
-    __slots__ = ("bit", "emitter", "text")
+    __slots__ = ("bit", "emitter", "origin", "text")
 
-    def __init__(self, emitter: Emitter, text: str, bit: bool) -> None:
+    def __init__(self, emitter: Emitter, text: str, bit: bool, origin: Origin | None = None) -> None:
         self.emitter: Final = emitter
         self.text: Final = text
         self.bit: Final = bit
+        self.origin: Final = origin
+
+    def _made_of(self, kind: Literal["zero", "bit", "above"], word: Value, place: int) -> Value:
+        return self if word.bit else Value(self.emitter, self.text, self.bit, Origin(kind, word, place))
 
     def _op(self, op: str, left: Number, right: Number) -> Value:
         if (
@@ -138,7 +152,10 @@ class Value:
         return self._op("mul", other, self)
 
     def __and__(self, other: Number) -> Value:
-        return self._op("and", self, other)
+        made, shifted = self._op("and", self, other), self.origin
+        if isinstance(other, int) and other == 1 and shifted is not None and shifted.kind == "above":
+            return made._made_of("bit", shifted.word, shifted.place)
+        return made
 
     def __rand__(self, other: int) -> Value:
         return self._op("and", other, self)
@@ -162,7 +179,8 @@ class Value:
         return self._op("shl", other, self)
 
     def __rshift__(self, other: Number) -> Value:
-        return self._op("ashr", self, other)
+        made = self._op("ashr", self, other)
+        return made._made_of("above", self, other) if isinstance(other, int) else made
 
     def __rrshift__(self, other: int) -> Value:
         return self._op("ashr", other, self)
@@ -187,7 +205,8 @@ class Value:
 
     def __eq__(self, other: object) -> Value:  # type: ignore[override]
         assert isinstance(other, (int, Value))
-        return self._compare("eq", other)
+        made = self._compare("eq", other)
+        return made._made_of("zero", self, 0) if isinstance(other, int) and other == 0 else made
 
     def __ne__(self, other: object) -> Value:  # type: ignore[override]
         assert isinstance(other, (int, Value))

@@ -1,7 +1,8 @@
 """Registers and flags of the machine while translated code runs: SSA variables, in the record only at its edges.
 
 Each is an `alloca` that LLVM turns into registers. The prologue loads those a region uses from the record, the exit
-stores back those it writes; SR is put together there and nowhere else.
+stores back those it writes; SR is put together there and nowhere else. Arithmetic flags are carried by words
+(`carried.py`).
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from emu.dspic30f.jit.carried import PLACES, carried, told
 from emu.dspic30f.jit.values import Emitter, Number, Value, truth, wide
 from emu.dspic30f.state import FLAGS, OAB, SAB
 
@@ -41,14 +43,23 @@ class Variables:
         """Current value: "W0".."W15", a flag of `state.FLAGS`, "A0"/"A1" (accumulators), "cycle", "stall", "pc"."""
         self._used.setdefault(name)
         if name not in self._known:
-            bit = name in BITS
-            self._known[name] = self._emitter.let(f"load {'i1' if bit else 'i64'}, ptr %x.{name}", bit)
+            self._known[name] = self._loaded(self._emitter, name)
         return self._known[name]
+
+    @staticmethod
+    def _loaded(emitter: Emitter, name: str) -> Value:
+        bit = name in BITS and name not in PLACES
+        found = emitter.let(f"load {'i1' if bit else 'i64'}, ptr %x.{name}", bit)
+        return told(name, found) if name in PLACES else found
 
     def set(self, name: str, value: Number) -> None:
         """Assign."""
         self._used.setdefault(name)
         self._written.add(name)
+        if name in PLACES:
+            self._emitter.line(f"store i64 {carried(self._emitter, name, value)}, ptr %x.{name}")
+            self._known[name] = Value(self._emitter, truth(value), True)
+            return
         bit = name in BITS
         text = truth(value) if bit else wide(value)
         self._emitter.line(f"store {'i1' if bit else 'i64'} {text}, ptr %x.{name}")
@@ -71,14 +82,16 @@ class Variables:
     def prologue(self, emitter: Emitter) -> None:
         """Declare and load everything used; goes into the function's first block, written last."""
         for name in self._used:
-            bit = name in BITS
-            emitter.line(f"%x.{name} = alloca {'i1' if bit else 'i64'}")
+            emitter.line(f"%x.{name} = alloca {'i1' if name in BITS and name not in PLACES else 'i64'}")
         sr = emitter.load(pointer(emitter, self._offset["SR"]), 16) if any(n in BITS for n in self._used) else None
         for name in self._used:
             if name in BITS:
                 assert sr is not None
-                bit_text = truth(sr & (1 << BITS[name]))
-                emitter.line(f"store i1 {bit_text}, ptr %x.{name}")
+                bit = sr & (1 << BITS[name])
+                if name in PLACES:
+                    emitter.line(f"store i64 {carried(emitter, name, bit)}, ptr %x.{name}")
+                else:
+                    emitter.line(f"store i1 {truth(bit)}, ptr %x.{name}")
             elif name[0] == "A":
                 value = accumulator(emitter, self._offset["ACCBL" if name == "A1" else "ACCAL"])
                 emitter.line(f"store i64 {value.text}, ptr %x.{name}")
@@ -106,8 +119,7 @@ class Variables:
         mask = sum(1 << BITS[name] for name in flags)
         word: Number = emitter.load(place, 16) & (0xFFFF & ~mask)
         for name in flags:
-            bit = emitter.let(f"load i1, ptr %x.{name}", bit=True)
-            word = word | (bit << BITS[name])
+            word = word | (self._loaded(emitter, name) << BITS[name])
         emitter.store(place, word, 16)
 
     def _home(self, name: str) -> tuple[int, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from ctypes import addressof, c_int64
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,6 +62,40 @@ def test_a_line_is_painted_alike_whoever_is_asked(sensor: str, writes: list[tupl
         assert by_code == (by_python and steady)
         both += by_code
     assert not steady or both > 10
+
+
+@pytest.mark.parametrize("sensor", ["PO6030K", "PO3030K"])
+def test_a_still_picture_is_seen_as_any_other(sensor: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings, light and the connector change on the way; compiled code paints what it has been told."""
+    pixels, draw = scene(), random.Random(sensor)
+    still, other = Robot(camera=sensor), Robot(camera=sensor)
+    still.board.camera.show(pixels)
+    other.board.camera.sample(lambda y, columns, _cycle: pixels[y, columns])
+    at_once = 0
+    paint = Camera._sent_at_once
+
+    def counted(*line: Any) -> bool:
+        nonlocal at_once
+        done = paint(*line)
+        at_once += done
+        return done
+
+    monkeypatch.setattr(Camera, "_sent_at_once", counted)
+    settings = [po6030(), po6030(scale=2, form="yuv")] if sensor == "PO6030K" else [po3030(), po3030(form="yuv") + DARK]
+    for _ in range(12):
+        writes, lamp, is_plugged = draw.choice(settings), draw.choice([1.0, 1.0, 1.0, 1.0, 0.5]), draw.random() < 0.9
+        for robot in (still, other):
+            robot.configure(writes)
+            robot.board.camera.lamp = lamp
+            (robot.board.camera.plug if is_plugged else robot.board.camera.unplug)()
+        scan = still.board.camera.scan
+        for _ in range(200):
+            line = draw.randrange(10)
+            cycle = scan.href(line, draw.randrange(9)) + draw.randrange(-scan.course.byte_tcy, scan.course.line_tcy)
+            found = [robot.board.camera._refresh(cycle) for robot in (still, other)]
+            assert found[0] == found[1]
+            assert still.machine.record.snapshot() == other.machine.record.snapshot()
+    assert at_once > 100
 
 
 def test_python_is_asked_first_in_every_new_setting() -> None:
