@@ -176,7 +176,11 @@ def _dump_native(address: int, machine: Machine, image: Image, text: str) -> Non
         item = instruction(image, pc, insn.word1, insn.word2)
         return "" if item is None else item.text
 
-    stretches = list(dump(machine.runner, address, naming))
+    def is_meant(pc: int) -> bool:
+        function = None if text.lower().startswith("0x") else image.symbols.code(pc)
+        return pc == address if function is None else function[0].address == address
+
+    stretches = list(dump(machine.runner, is_meant, naming))
     if not stretches:
         raise CommandError(f"--dump-native: no native code was made for {text}: it was reached too seldom")
     print("\n".join(stretches))

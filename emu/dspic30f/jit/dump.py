@@ -1,13 +1,13 @@
 """What native code was made of a stretch of program, for whoever debugs the engine.
 
-Enters: an engine that has run, a program address. Leaves: text, for every set of processor modes in which that address
-was reached: the LLVM IR with the instruction of each part in front of it, then the host's assembly, whose blocks are
+Enters: an engine that has run, and which addresses are meant. Leaves: text, for every set of processor modes in which
+one of them was reached: the LLVM IR with the instruction of each part in front of it, then the host's assembly, whose blocks are
 named by program addresses (`b434`) as in the IR.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from typing import Protocol
 
@@ -35,12 +35,12 @@ class _Annotated(Translator):
         return super()._instruction(step, written)
 
 
-def dump(engine: JitEngine, address: int, naming: Naming) -> Iterator[str]:
-    """The stretches that hold the instruction at `address`, a text each; none if it was never translated."""
+def dump(engine: JitEngine, is_meant: Callable[[int], bool], naming: Naming) -> Iterator[str]:
+    """The stretches with an instruction at an address that is meant, a text each; none if none was translated."""
     backend = Backend()
     for code in engine.translated():
         for region in code.regions.values():
-            if address in region.steps:
+            if any(map(is_meant, region.steps)):
                 yield _stretch(backend, code, region, naming)
 
 

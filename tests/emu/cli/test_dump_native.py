@@ -31,6 +31,22 @@ def test_the_code_of_a_place_shows_guest_addresses(spin: str, place: str, capsys
     assert re.search(r"# %b102\b", host)
 
 
+def test_a_function_is_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It was begun once, before there was native code, and is in its loop since."""
+    path = tmp_path / "loop.elf"
+    path.write_bytes(executable("""
+work:
+    clr w0
+    inc w0, w0
+    mov w0, 0x800
+    bra 0x102
+"""))  # fmt: skip
+    assert main(["run", str(path), "--engine", "jit", "--cycles", "200000", "--dump-native", "work"]) == 0
+    ir, host = capsys.readouterr().out.split("; host code", 1)
+    assert "000104  mov.w w0" in ir
+    assert re.search(r"# %b102\b", host)
+
+
 def test_what_is_nowhere_is_said_before_the_run(spin: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which has no end here."""
     monkeypatch.setattr("emu.session.Session.run", lambda _session: pytest.fail("it ran"))
