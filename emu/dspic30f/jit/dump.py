@@ -1,8 +1,8 @@
 """What native code was made of a stretch of program, for whoever debugs the engine.
 
 Enters: an engine that has run, and which addresses are meant. Leaves: text, for every set of processor modes in which
-one of them was reached: the LLVM IR with the instruction of each part in front of it, then the host's assembly, whose blocks are
-named by program addresses (`b434`) as in the IR.
+one of them was reached: the LLVM IR with the instruction of each part in front of it, then the host's assembly, whose
+blocks are named by program addresses (`b434`) as in the IR.
 """
 
 from __future__ import annotations
