@@ -65,6 +65,7 @@ class LockStep:
         self._is_native: Final = is_native
         self._hub: greenlet = getcurrent()
         self._lives: list[greenlet | None] = [None] * len(robots)
+        self._is_left = False
         self._speeds: Final = (c_void_p * len(robots))(*(robot.wheels.address for robot in robots))
         self._speeds_at: Final = addressof(self._speeds)
         aheads = [robot.ahead for robot in robots]
@@ -75,9 +76,28 @@ class LockStep:
                 robot.lend(partial(self._ride, place))
 
     def advance(self, ticks: int) -> list[tuple[float, float]]:
-        """Let so many quanta be over for everybody; wheel speeds of the last of them."""
-        while ticks - self._world.ticks > ROOM:
-            self.advance(self._world.ticks + ROOM)
+        """Let so many quanta be over for everybody; wheel speeds of the last of them. Raises RuntimeError if an exception
+        has ended an earlier call: robots were left in the middle of a run."""
+        if self._is_left:
+            raise RuntimeError("an exception has left robots in the middle of a quantum: begin another trial")
+        try:
+            while self._world.ticks < ticks:
+                self._live(min(ticks, self._world.ticks + ROOM))
+        except BaseException:
+            self._leave()
+            raise
+        return [robot.wheels.speed(ticks - 1) for robot in self._robots]
+
+    def _leave(self) -> None:
+        """Let no robot stay in the middle of its run: its greenlet would keep it, and all others, for ever."""
+        self._is_left = True
+        for life in self._lives:
+            if life is not None:
+                life.throw()
+        self._lives = [None] * len(self._lives)
+
+    def _live(self, ticks: int) -> None:
+        """As `advance`, at most ROOM quanta."""
         self._hub = getcurrent()
         for place, robot in enumerate(self._robots):
             robot.ahead.stands = AWAY
@@ -92,7 +112,6 @@ class LockStep:
         for tick in [tick for tick in self._past if tick < ticks - 1]:
             del self._past[tick]
         self._stretches = [stretch for stretch in self._stretches if stretch.last >= ticks - 1]
-        return [robot.wheels.speed(ticks - 1) for robot in self._robots]
 
     def _next(self, ticks: int) -> int:
         """Run all robots in compiled code, and the world behind them, until Python is needed; for whom."""

@@ -213,9 +213,11 @@ class Machine(Contents, BySource):
         while True:
             limit = first + period * (len(cuts) - began)
             runner.pass_limits(period, self._last)
-            stop = self.run_until(min(limit, self._last))
-            runner.pass_limits(0, 0)
-            cuts += runner.passed()
+            try:
+                stop = self.run_until(min(limit, self._last))
+            finally:  # a callback may raise: later runs have limits of their own
+                runner.pass_limits(0, 0)
+                cuts += runner.passed()
             now = self.state.cycle
             if stop is not None:
                 return stop
