@@ -76,8 +76,8 @@ class LockStep:
                 robot.lend(partial(self._ride, place))
 
     def advance(self, ticks: int) -> list[tuple[float, float]]:
-        """Let so many quanta be over for everybody; wheel speeds of the last of them. Raises RuntimeError if an exception
-        has ended an earlier call: robots were left in the middle of a run."""
+        """Let so many quanta be over for everybody; wheel speeds of the last of them. Raises RuntimeError if an
+        exception has ended an earlier call: robots were left in the middle of a run."""
         if self._is_left:
             raise RuntimeError("an exception has left robots in the middle of a quantum: begin another trial")
         try:
