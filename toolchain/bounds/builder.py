@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from emu.dspic30f.isa.builder import Context, Side, Size
+from toolchain.bounds.rules import ADDRESSING, COUNTED, EARLY
 from toolchain.bounds.state import NOWHERE, Area, State, hides
 from toolchain.bounds.values import (
     ACCUMULATOR,
@@ -29,6 +30,13 @@ from toolchain.bounds.values import (
 )
 
 SR, CORCON, TBLPAG = 0x42, 0x44, 0x32
+DO_REGISTERS = range(0x38, 0x42)
+"""DCOUNT, DOSTART and DOEND."""
+ENABLES = {0x46: 0xC000, 0x50: 0x8000}
+"""MODCON and XBREV: the bits that turn modulo and bit-reversed addressing on (isa.md §8)."""
+EDT = 1 << 11
+"""Bit of CORCON that ends a DO loop early (isa.md §7.6)."""
+SFR_END = 0x800
 IPL3 = TRAP = 8
 """Bit of CORCON that a trap sets and code can only clear, and what it adds to the priority (isa.md §2.4)."""
 W_END = 0x20
@@ -71,12 +79,17 @@ class Abstract:
         self.window = False
         self.wild = False
         """Something was stored where the address said nothing."""
+        self.refused: str | None = None
+        """Why what the instruction does has no bound."""
+        self.lowest = NOWHERE
+        """The lowest address of a stack it has read."""
         self._saw = NOWHERE
         self._stores: list[tuple[Value, Value, Size]] = []
 
     def begin(self, pc: int, state: State) -> None:
         """Prepare for the instruction at `pc`."""
         self.pc, self.state, self.window, self._saw = pc, state, False, NOWHERE
+        self.refused, self.lowest = None, NOWHERE
         self._stores.clear()
 
     def commit(self) -> None:
@@ -202,6 +215,9 @@ class Abstract:
         """Flash is not written in the code looked at."""
 
     def _read(self, ea: Value, size: Size) -> Value:
+        low, high = ends(ea)
+        if any(low < end and start <= high for start, end in self.world.area.ranges) and not hides(ea):
+            self.lowest = min(self.lowest, low)
         unknown = BYTE if size == 1 else LINK if self.world.links_in_ram(self.pc) else WORD
         if exact(ea):
             if ea >= WINDOW:
@@ -251,8 +267,9 @@ class Abstract:
         if exact(ea):
             if ea == CORCON and known(~value)[1] & known(value)[0] & IPL3:
                 state.ipl = state.ipl[0] & ~TRAP, state.ipl[1] & ~TRAP
+            self._control(ea, value, size)
             if ea < W_END:
-                (self.set_w if size == 2 else self.set_wb)(ea >> 1, value if size == 2 or not ea & 1 else BYTE)
+                self._register(ea, value, size)
             elif ea & ~1 == SR:
                 if not ea & 1:
                     self._set_status(value)
@@ -267,12 +284,61 @@ class Abstract:
         if area.inside(value) and state.w[15] is not value:  # nothing lives behind the top of the stack
             state.leaked = min(state.leaked, ends(value)[0])
         if not hides(ea):
-            self._forget(*ends(ea))
+            low, high = ends(ea)
+            self._forget(low, high + size - 1)
+            if high < SFR_END:
+                self._overwritten(low, high + size - 1, value if size == 2 else WORD)
             return
         self.wild = True
         if state.leaked < NOWHERE:
             for lo, hi in area.ranges:
                 self._forget(lo, hi)
+
+    def _register(self, ea: int, value: Value, size: Size) -> None:
+        """A store to a working register, of which a byte leaves the other."""
+        number = ea >> 1
+        if size == 2:
+            self.set_w(number, value)
+        elif ea & 1:
+            self.set_w(number, self.state.w[number] & 0xFF | (value & 0xFF) << 8)
+        else:
+            self.set_wb(number, value)
+
+    def _control(self, ea: int, value: Value, size: Size) -> None:
+        """A store to what governs DO loops and the arithmetic of addresses. A value that is not known is one that was
+        read there, in which EDT is 0 and addressing as it was."""
+        shift = 8 * (ea & 1) if size == 1 else 0
+        register, (mask, bits) = ea & ~1, known(value)
+        if size == 1:
+            mask &= 0xFF
+        ones, zeros = (mask & bits) << shift, (mask & ~bits) << shift
+        reached = 0xFFFF if size == 2 else 0xFF << shift
+        state = self.state
+        if register == CORCON and EDT & reached & ~zeros:
+            if state.loops:
+                start, end, count = state.loops[-1]
+                state.loops = (*state.loops[:-1], (start, end, span(0, ends(count)[1])))
+            elif ones & EDT:
+                self.refused = EARLY
+        elif register in DO_REGISTERS and state.loops:
+            self.refused = COUNTED
+        elif ones & ENABLES.get(register, 0):
+            self.refused = ADDRESSING
+
+    def _overwritten(self, low: int, high: int, value: Value) -> None:
+        """One of the registers in the SFR space was written, which is not known; it may hold `value`."""
+        state = self.state
+        for number in range(low >> 1, min(high >> 1, STACK) + 1):
+            state.w[number] = union(state.w[number], value)
+        if low <= SR <= high:
+            self._set_status(BYTE)
+        if low <= CORCON + 1 and high >= CORCON:
+            state.ipl = state.ipl[0] & ~TRAP, state.ipl[1]
+            if state.loops:
+                start, end, count = state.loops[-1]
+                state.loops = (*state.loops[:-1], (start, end, span(0, ends(count)[1])))
+        if low < DO_REGISTERS.stop and DO_REGISTERS.start <= high and state.loops:
+            self.refused = COUNTED
 
     def _keep(self, ea: int, value: Value, size: Size) -> None:
         mem = self.state.mem

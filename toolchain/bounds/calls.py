@@ -8,7 +8,8 @@ from typing import Final
 from emu.dspic30f.isa.flow import Branch, Skip
 from toolchain.bounds.builder import exact
 from toolchain.bounds.graph import Block, Step
-from toolchain.bounds.rules import DEEP, ELSEWHERE
+from toolchain.bounds.outcome import Outcome
+from toolchain.bounds.rules import DEEP, ELSEWHERE, JUMP
 from toolchain.bounds.state import INHERITED, NOWHERE, State
 from toolchain.bounds.steps import Steps
 from toolchain.bounds.values import Value, ends
@@ -39,7 +40,10 @@ class Calls(Steps):
             self._arrive(target, state)
             return
         if last.insn.row.mnemonic == "BRA" and not exact(target):
-            for place in self.code.blocks[self._head(last)].following:
+            table = self.code.blocks[self._head(last)].following
+            if not table:
+                self.outcome.open[last.pc] = JUMP
+            for place in table:
                 self._arrive(place, state.copy())
             return
         targets = [target] if exact(target) else self._unknown(last.pc, state)
@@ -94,6 +98,7 @@ class Calls(Steps):
         before = state.copy()
         found, general = explorer.call(target, state, many)
         self.outcome.take(found, start, since, (self.code.entry,))
+        self.outcome.arguments |= tail and found.arguments
         level = explorer.rules.back(target)
         if level is not None and found.left is not None:
             back = state.copy()
@@ -102,7 +107,7 @@ class Calls(Steps):
             back.w[15] = stack - 4 & 0xFFFF
             ends = [back]
         else:
-            ends = [self._behind(before, end, found.wild) if general else end.copy() for end in found.ends.values()]
+            ends = [self._behind(before, end, found) if general else end.copy() for end in found.ends.values()]
         rare = explorer.rare(last.pc, target)
         if rare is not None and ends:
             cycles = min(end.time for end in ends)
@@ -122,16 +127,18 @@ class Calls(Steps):
             else:
                 self._arrive(last.after, end)
 
-    def _behind(self, before: State, end: State, wild: bool) -> State:
+    def _behind(self, before: State, end: State, found: Outcome) -> State:
         """The caller's state behind a call that was run for all its calls."""
         private = self.explorer.world.private
         new = end.copy()
         new.w = [*end.w[:15], before.w[15] - 4 & 0xFFFF]
         kept = {a: v for a, v in before.mem.items() if (a if a >= 0 else ~a) & ~1 not in private}
-        if wild and (before.leaked < NOWHERE or any(self.area.inside(value) for value in before.w[:8])):
+        handed = [*before.w[:8], *(before.mem.values() if found.arguments else ())]
+        shown = min((ends(value)[0] for value in handed if self.area.inside(value)), default=NOWHERE)
+        if found.wild and min(before.leaked, shown) < NOWHERE:
             kept = {}
         new.mem = kept | {a: v for a, v in end.mem.items() if (a if a >= 0 else ~a) & ~1 in private}
-        new.leaked = min(before.leaked, *(ends(v)[0] if self.area.inside(v) else NOWHERE for v in before.w[:8]))
+        new.leaked = min(before.leaked, shown)
         return new
 
     def _decides(self, head: int) -> bool:

@@ -17,9 +17,10 @@ from toolchain.bounds.calls import Calls
 from toolchain.bounds.compare import Result, refined, tested
 from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step, joined
 from toolchain.bounds.outcome import Outcome, Scope
-from toolchain.bounds.rules import LONG, LOOP, MERGED, Rules
+from toolchain.bounds.rules import LAST, LONG, LOOP, MERGED, WAYS_IN, Rules
 from toolchain.bounds.state import INHERITED, NOWHERE, State, widened
 from toolchain.bounds.values import LINK, WORD, Value, ends, is_ram, span
+from toolchain.stack.effects import CALL_BYTES
 
 MAX_TURNS: Final = 5_000
 HOPELESS_TURNS: Final = 6
@@ -160,6 +161,7 @@ class _Run(Calls):
 
     def run(self, state: State) -> Outcome:
         self._peak(state)
+        self.floor = max(0, state.w[15] - CALL_BYTES) if exact(state.w[15]) else 0
         for lost in self.code.lost:
             self.outcome.open[lost] = "no instruction is here"
         if self.code.entry in self.code.blocks:
@@ -193,7 +195,15 @@ class _Run(Calls):
             self._block(block, state)  # not joined, so that results are told apart
             return
         waiting = self.pending.get(target)
+        if waiting is not None and self._mixed(target, waiting, state):
+            self.outcome.open[target] = WAYS_IN
         self.pending[target] = state if waiting is None else self.area.join(waiting, state)
+
+    @staticmethod
+    def _mixed(target: int, *ways: State) -> bool:
+        """Whether ways into a DO loop meet that are within different ones."""
+        one, other = ([(start, end) for start, end, _ in way.loops] for way in ways)
+        return one != other and any(start <= target <= end for start, end in (*one, *other))
 
     # -- loops ---------------------------------------------------------------------------------------------------
 
@@ -292,6 +302,11 @@ class _Run(Calls):
             else:
                 flow = self._step(step, state)
         last = block.steps[-1]
+        if last.pc in self.code.ends:
+            if last.flow is not None:
+                self.outcome.open[last.pc] = LAST
+            elif not state.loops or state.loops[-1][1] != last.pc:
+                self.outcome.open[last.pc] = WAYS_IN
         if state.loops and last.pc == state.loops[-1][1] and not isinstance(flow, Branch | Goto | Return):
             self._loop_end(state, last)
             return

@@ -65,6 +65,8 @@ class Code:
     """Addresses it leads to where no instruction is."""
     tails: dict[int, int] = field(default_factory=dict)
     """Jumps to other functions: place -> target."""
+    ends: set[int] = field(default_factory=set)
+    """Last instructions of DO loops."""
     framed: bool = False
     """It has a frame of its own (LNK), in which alloca takes room."""
 
@@ -126,6 +128,7 @@ class Builder:
             if targets != [step.after] or step.flow in (Call, Goto):
                 heads.update(targets)
             work += targets
+        result.ends = set(ends)
         for end, start in ends.items():
             if end in following:
                 following[end] = [*following[end], start]

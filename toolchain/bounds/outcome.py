@@ -30,6 +30,8 @@ class Outcome:
     """Longest time to a change to another stack, from which it does not return by itself."""
     wild: bool = False
     """It stores where the address says nothing."""
+    arguments: bool = False
+    """It reads its caller's part of the stack."""
     visited: set[int] = field(default_factory=set)
     """Functions run."""
     shared: dict[Scope, tuple[int, int]] = field(default_factory=dict)

@@ -16,6 +16,12 @@ LONG: Final = "this loop is followed for 5,000 rounds and no further; say how ma
 MERGED: Final = "several ways lead back to the beginning of this loop: it may be two of the source (ONE_LOOP)"
 CUT: Final = "its exploration was cut off: too many ways through it; bound its loops"
 DEEP: Final = "calls are followed 480 deep and no further"
+EARLY: Final = "ends a DO loop early (CORCON.EDT) that begins elsewhere"
+COUNTED: Final = "changes DCOUNT, DOSTART or DOEND within a DO loop"
+ADDRESSING: Final = "turns modulo or bit-reversed addressing on: where pointers lead is not followed"
+WAYS_IN: Final = "a DO loop is reached by a branch into it, or out of one within it"
+LAST: Final = "a DO loop ends with an instruction that leads elsewhere"
+JUMP: Final = "no table of BRA or RETLW is behind this jump"
 FOLLOWED: Final = frozenset((LOOP, LONG, MERGED))
 """Reasons that leave the stack bounded: rounds have been followed until nothing new came of them."""
 

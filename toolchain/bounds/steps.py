@@ -26,6 +26,8 @@ class Steps:
         self.explorer, self.code = explorer, code
         self.area: Final = explorer.world.area
         self.outcome: Final = Outcome(visited={code.entry})
+        self.floor = 0
+        """Where its own part of the stack begins."""
 
     def _step(self, step: Step, state: State) -> Flow:
         if state.repeat is not None:
@@ -41,6 +43,7 @@ class Steps:
             state.time += step.window
         if abstract.wild:
             self.outcome.wild, abstract.wild = True, False
+        self._notice(step)
         if self.code.framed and exact(top) and not exact(state.w[15]):
             self.outcome.open[step.pc] = MOVED  # what changes stacks has no frame
         self._peak(state)
@@ -72,6 +75,7 @@ class Steps:
             abstract.commit()
             window |= abstract.window
             self.outcome.wild |= abstract.wild
+            self._notice(step)
             self._peak(current)
             if turn >= least and turn < most:
                 result = current.copy() if result is None else self.area.join(result, current)
@@ -99,6 +103,13 @@ class Steps:
         wide.mem = {a: v for a, v in wide.mem.items() if (a if a >= 0 else ~a) & ~1 in self.explorer.world.private}
         wide.leaked = 0
         return wide
+
+    def _notice(self, step: Step) -> None:
+        """What the instruction did that concerns the whole function."""
+        abstract = self.explorer.abstract
+        if abstract.refused is not None:
+            self.outcome.open[step.pc] = abstract.refused
+        self.outcome.arguments |= abstract.lowest < self.floor
 
     # -- what is measured ----------------------------------------------------------------------------------------
 

@@ -1,0 +1,120 @@
+"""Programs made to get past their bounds: each is bounded by no less than its worst, or its line is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import emu
+from tests.toolchain.c_programs import build
+from toolchain.bounds.notes import read_notes
+from toolchain.bounds.program import Program
+from toolchain.bounds.report import Analyst, Bound
+from toolchain.bounds.rules import ADDRESSING, COUNTED, JUMP, LAST, WAYS_IN
+from toolchain.elf.read import read_executable
+from toolchain.stack.annotations import Annotations
+
+DATA = "volatile unsigned in, out; __attribute__((used)) unsigned get(void) { return in; }\n"
+HEAD = "    .text\n    .global _main\n_main:\n    mov _in,w0\n"
+WAIT = "1:  repeat #99\n    nop\n    dec w1,w1\n    bra gtu,1b\n    return\n"
+CYCLES = 20_000
+PROGRAMS = {
+    "a branch past DO": (
+        "clr w1\n btss w0,#0\n do #9,1f\n nop\n repeat #50\n nop\n nop\n1: inc w1,w1\n return\n", 8, (WAYS_IN, 8)),
+    "a branch out of the inner of two DO loops": (
+        "clr w1\n mov #30,w4\n do #4,3f\n do #4,1f\n dec w4,w4\n cp w0,w4\n bra z,2f\n nop\n1: inc w1,w1\n2: nop\n"
+        " nop\n3: nop\n mov w4,w1\n" + WAIT, 32, (WAYS_IN, 14)),
+    "a call at the end of DO": (
+        "do #3,1f\n nop\n nop\n1: rcall s1\n return\ns1: repeat #90\n nop\n return\n", 1, (LAST, 8)),
+    "EDT": (
+        "mov #10,w1\n do #9,1f\n dec w1,w1\n cpsne w0,w1\n bset.b 0x45,#3\n nop\n1: nop\n" + WAIT, 12, None),
+    "DCOUNT": (
+        "clr w1\n do #3,1f\n mov #5,w2\n cpsne w0,w1\n mov w2,0x38\n inc w1,w1\n nop\n nop\n1: nop\n return\n", 4,
+        (COUNTED, 9)),
+    "the upper byte of a register": ("mov #1,w1\n bset.b 0x03,#0\n1: dec w1,w1\n bra gtu,1b\n return\n", 1, None),
+    "registers by their addresses": (
+        "and w0,#6,w0\n mov #100,w5\n mov #1,w3\n mov w5,[w0]\n1: dec w3,w3\n bra gtu,1b\n return\n", 8, None),
+    "half a word of the stack": (
+        "lnk #8\n mov.b #1,w0\n add w14,#3,w1\n mov.b w0,[w1]\n mov _in,w2\n and w2,#2,w2\n add w14,w2,w3\n"
+        " mov #0x1400,w0\n mov w0,[w3]\n ze [w1],w4\n1: dec w4,w4\n bra gtu,1b\n ulnk\n return\n", 4, None),
+    "a jump into what is no table": (
+        "cp w0,#3\n bra gtu,2f\n bra w0\n repeat #200\n nop\n nop\n nop\n2: return\n", 5, (JUMP, 7)),
+    "modulo addressing": (
+        "mov #0x900,w0\n mov w0,0x48\n mov #0x91f,w0\n mov w0,0x4a\n mov #0x8ff1,w0\n mov w0,0x46\n nop\n"
+        " mov #0x910,w1\n mov #100,w3\n1: mov [w1++],w2\n mov #0x920,w4\n dec w3,w3\n bra z,2f\n cp w1,w4\n bra nz,1b\n"
+        "2: clr 0x46\n nop\n return\n", 1, (ADDRESSING, 10)),
+}  # fmt: skip
+"""What gets past -> the code behind `mov _in,w0`, how many inputs there are, and the reason and line of what is
+refused (None: it is bounded)."""
+LOOSE = {"half a word of the stack": 11}
+"""How far a bound may lie above the worst where it is not 1.1: here a byte is any."""
+NINTH = """
+__attribute__((noinline)) void set(int a, int b, int c, int d, int e, int f, int g, int h, unsigned *p)
+{
+    *p = 60 + (a & 1);
+    out += a + b + c + d + e + f + g + h;
+}
+int main(void)
+{
+    unsigned n;
+    CALLS
+    for (unsigned i = 0; i < n; i++) out++;
+    return 0;
+}
+"""
+"""A variable that only a pointer among the arguments on the stack leads to, in more contexts than are kept apart."""
+
+
+def bound_of(image: Path) -> Bound:
+    """What is said of main."""
+    executable = read_executable(image.read_bytes(), str(image))
+    program = Program(executable, Annotations(), read_notes(executable, {}))
+    address = program.address("_main")
+    assert address is not None
+    return Analyst(program).bound("_main", address, "call")
+
+
+def worst(image: Path, inputs: int) -> int:
+    """Cycles of main's longest run, of those with 0 and upwards in `in`."""
+    longest = 0
+    for value in range(inputs):
+        machine = emu.load(image, engine="plain")
+        assert machine.run(until="main", seconds=1).reason == "until"
+        machine.poke("in", value)
+        start, top = machine.cycle, machine.w[15]
+        while machine.w[15] >= top and machine.cycle - start < CYCLES:
+            machine.run(until=None, cycles=1)
+        longest = max(longest, machine.cycle - start)
+    assert 0 < longest < CYCLES
+    return longest
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_assembly_stays_within_its_bound_or_is_refused_by_its_line(tmp_path: Path, name: str) -> None:
+    """Whatever it does with loops, registers in memory, tables and addressing."""
+    text, inputs, refused = PROGRAMS[name]
+    most = LOOSE.get(name, 1.1)
+    (tmp_path / "p.s").write_text(HEAD + text)
+    (tmp_path / "c.c").write_text(DATA)
+    built = build([tmp_path / "p.s", tmp_path / "c.c"], tmp_path / "p.elf", "-Os", "-g", "-fno-lto")
+    assert built.status == 0, built.messages
+    bound = bound_of(tmp_path / "p.elf")
+    if refused is not None:
+        reason, line = refused
+        assert bound.cycles is None
+        assert [where for where, why in bound.open.items() if why == reason and f"p.s:{line} " in where], bound.open
+    else:
+        seen = worst(tmp_path / "p.elf", inputs)
+        assert bound.cycles is not None
+        assert seen <= bound.cycles <= most * seen
+
+
+def test_a_pointer_to_the_stack_among_arguments_on_the_stack(tmp_path: Path) -> None:
+    """What is called may store there."""
+    calls = " ".join(f"n = {k}; set({k}, 2, 3, 4, 5, 6, 7, 8, &n);" for k in range(14))
+    (tmp_path / "p.c").write_text(DATA + NINTH.replace("CALLS", calls))
+    built = build([tmp_path / "p.c"], tmp_path / "p.elf", "-O0", "-g")
+    assert built.status == 0, built.messages
+    bound = bound_of(tmp_path / "p.elf")
+    assert bound.cycles is None or bound.cycles >= worst(tmp_path / "p.elf", 1)
