@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from emu.dspic30f.isa.builder import Context, Side, Size
-from toolchain.bounds.rules import ADDRESSING, COUNTED, EARLY
+from toolchain.bounds.rules import ADDRESSING, EARLY
 from toolchain.bounds.state import NOWHERE, Area, State, hides
 from toolchain.bounds.values import (
     ACCUMULATOR,
@@ -30,8 +30,6 @@ from toolchain.bounds.values import (
 )
 
 SR, CORCON, TBLPAG = 0x42, 0x44, 0x32
-DO_REGISTERS = range(0x38, 0x42)
-"""DCOUNT, DOSTART and DOEND."""
 ENABLES = {0x46: 0xC000, 0x50: 0x8000}
 """MODCON and XBREV: the bits that turn modulo and bit-reversed addressing on (isa.md §8)."""
 EDT = 1 << 11
@@ -320,8 +318,6 @@ class Abstract:
                 state.loops = (*state.loops[:-1], (start, end, span(0, ends(count)[1])))
             elif ones & EDT:
                 self.refused = EARLY
-        elif register in DO_REGISTERS and state.loops:
-            self.refused = COUNTED
         elif ones & ENABLES.get(register, 0):
             self.refused = ADDRESSING
 
@@ -337,8 +333,6 @@ class Abstract:
             if state.loops:
                 start, end, count = state.loops[-1]
                 state.loops = (*state.loops[:-1], (start, end, span(0, ends(count)[1])))
-        if low < DO_REGISTERS.stop and DO_REGISTERS.start <= high and state.loops:
-            self.refused = COUNTED
 
     def _keep(self, ea: int, value: Value, size: Size) -> None:
         mem = self.state.mem

@@ -17,7 +17,6 @@ MERGED: Final = "several ways lead back to the beginning of this loop: it may be
 CUT: Final = "its exploration was cut off: too many ways through it; bound its loops"
 DEEP: Final = "calls are followed 480 deep and no further"
 EARLY: Final = "ends a DO loop early (CORCON.EDT) that begins elsewhere"
-COUNTED: Final = "changes DCOUNT, DOSTART or DOEND within a DO loop"
 ADDRESSING: Final = "turns modulo or bit-reversed addressing on: where pointers lead is not followed"
 WAYS_IN: Final = "a DO loop is reached by a branch into it, or out of one within it"
 LAST: Final = "a DO loop ends with an instruction that leads elsewhere"

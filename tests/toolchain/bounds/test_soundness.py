@@ -11,7 +11,7 @@ from tests.toolchain.c_programs import build
 from toolchain.bounds.notes import read_notes
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Analyst, Bound
-from toolchain.bounds.rules import ADDRESSING, COUNTED, JUMP, LAST, WAYS_IN
+from toolchain.bounds.rules import ADDRESSING, JUMP, LAST, WAYS_IN
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
 
@@ -29,9 +29,6 @@ PROGRAMS = {
         "do #3,1f\n nop\n nop\n1: rcall s1\n return\ns1: repeat #90\n nop\n return\n", 1, (LAST, 8)),
     "EDT": (
         "mov #10,w1\n do #9,1f\n dec w1,w1\n cpsne w0,w1\n bset.b 0x45,#3\n nop\n1: nop\n" + WAIT, 12, None),
-    "DCOUNT": (
-        "clr w1\n do #3,1f\n mov #5,w2\n cpsne w0,w1\n mov w2,0x38\n inc w1,w1\n nop\n nop\n1: nop\n return\n", 4,
-        (COUNTED, 9)),
     "the upper byte of a register": ("mov #1,w1\n bset.b 0x03,#0\n1: dec w1,w1\n bra gtu,1b\n return\n", 1, None),
     "registers by their addresses": (
         "and w0,#6,w0\n mov #100,w5\n mov #1,w3\n mov w5,[w0]\n1: dec w3,w3\n bra gtu,1b\n return\n", 8, None),
