@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from toolchain.errors import ToolError
 
 _UNDEFINED = re.compile(r"error: undefined symbol (\S+), referenced at ")
-_REFUSED = re.compile(r"not supported: (?:LLVM IR line|in function|function) ")
+_REFUSED = re.compile(r"not supported: (?:LLVM IR line|in function|in variable|function) ")
 _FUNCTION = re.compile(r'^define .*?@("[^"]+"|[\w$.]+)\(')
 _NAME = re.compile(r'@("[^"]+"|[\w$.]+)')
 _LOCATION = re.compile(r"!dbg (!\d+)")

@@ -81,3 +81,22 @@ def test_a_global_variable_in_a_register_is_refused_in_words(
     assert driver.main([str(source), "-o", str(tmp_path / "x")]) == 2
     said = "a global variable in a register: only A and B, the accumulators, can be one"
     assert capsys.readouterr().err == f"error: not supported: {source}:3: {said}\n"
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=" ".join)
+@pytest.mark.parametrize(("declared", "said"), [
+    ("struct __attribute__((packed)) { char a; int *p; } volatile odd = { 1, (int *)&n };",
+     "address in an initialiser at an odd offset (packed struct)"),
+    ("int f(int k) { static const int step[] = { &&a - &&a, &&b - &&a }; goto *(&&a + step[k]); a: n++; b: return n; }",
+     "a difference of labels in an initialiser: keep the labels themselves (&&label)"),
+], ids=["odd address", "labels"])  # fmt: skip
+def test_a_refused_initialiser_names_the_line_of_its_variable(
+    declared: str, said: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither without a place nor in terms of assembly that nobody has seen."""
+    source = tmp_path / "main.c"
+    read = "f(n)" if "f(int" in declared else "*odd.p"
+    source.write_text(f"volatile int n;\n\n{declared}\nint main(void) {{ return {read}; }}\n")
+    assert driver.main([*options, str(source), "-o", str(tmp_path / "x")]) == 2
+    assert capsys.readouterr().err == f"error: not supported: {source}:3: {said}\n"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["main.c"]

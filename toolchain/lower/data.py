@@ -116,13 +116,22 @@ class DataEmitter:
         if zero and not var.constant:
             self.lines.append(f"\t.space {max(size, 1)}")
             return
-        assert var.init is not None
-        data = Image(self.module)
-        data.value(var.init, var.type)
-        data.pad_to(max(size, 1))
-        self.lines += data.text()
+        self.lines += self._content(var, size)
         if var.section == NOTES and "._" in var.name:  # of a function: notes are of one place
             self.lines.append(f'\t.ascii "in {var.name.partition(".")[0]}\\n"')
+
+    def _content(self, var: GlobalVar, size: int) -> list[str]:
+        """Directives of the initialiser."""
+        assert var.init is not None
+        data = Image(self.module)
+        try:
+            data.value(var.init, var.type)
+            data.pad_to(max(size, 1))
+            return data.text()
+        except UnsupportedError as e:
+            place = self.info.declared(var.dbg)
+            where = f"{place[0]}:{place[1]}" if place is not None else f"in variable '{var.name}'"
+            raise UnsupportedError(e.what, where) from e
 
     def _section(self, var: GlobalVar, name: str, zero: bool, modifiers: str) -> str:
         suffix = name.removeprefix(".L")
@@ -200,6 +209,9 @@ class Image:
                 return symbol(self.module, v.name) + (f"{offset:+d}" if offset else "")
             case ConstInt():
                 return str(v.value)
+            case ConstExpr(op="sub", args=args) if any(_is_label(a) for a in args):
+                # a handle may be that of a jump to the label: the distance of two says nothing
+                raise UnsupportedError("a difference of labels in an initialiser: keep the labels themselves (&&label)")
             case ConstExpr(op="add" | "sub", args=[a, b]):
                 return f"({self.expression(a)}{'+' if v.op == 'add' else '-'}{self.expression(b)})"
             case ConstExpr(op="ptrtoint" | "inttoptr" | "bitcast" | "zext" | "trunc", args=[a]):
@@ -255,6 +267,12 @@ class Image:
         while k + n < len(self.items) and self.items[k + n] == 0:
             n += 1
         return n & ~1
+
+
+def _is_label(v: Value) -> bool:
+    while isinstance(v, ConstExpr) and v.op in ("ptrtoint", "inttoptr", "bitcast", "zext", "trunc"):
+        v = v.args[0]
+    return isinstance(v, BlockAddress)
 
 
 def emit_data(module: Module, notes: dict[str, set[str]], used: frozenset[str], info: DebugInfo) -> list[str]:

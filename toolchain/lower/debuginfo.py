@@ -74,10 +74,13 @@ class DebugInfo:
         elsewhere = os.path.isabs(directory) and directory != os.getcwd()
         return (os.path.join(directory, name) if elsewhere else name), line
 
+    def declared(self, ref: str | None) -> tuple[str, int] | None:
+        """(file name, line) of a DISubprogram, or of the variable a DIGlobalVariableExpression is of."""
+        return self.position(self.node(ref).get("var", ref) if ref is not None else None)
+
     def marker(self, ref: str | None) -> list[str]:
         """Assembly that says of what follows where in the source it is from: of a DISubprogram or of a variable."""
-        node = self.node(ref) if ref is not None else {}
-        place = self.position(node.get("var", ref))
+        place = self.declared(ref)
         return [f'# {place[1]} "{place[0]}"'] if place is not None else []
 
     def subprogram(self, ref: str) -> str:
