@@ -10,6 +10,9 @@ sources of failures. Shapes whose images are equal to the byte are run once.
 Two things csmith leaves undefined here are repaired, because a compiler may do anything with them:
 - its shift wrappers allow distances below 32 for every type; here the limit is the width of the shifted value;
 - addresses of packed members may be odd, which an AVR does not mind; such programs come without packed structs.
+
+What is read through a union of another member that is a struct depends on where that has its members, and an AVR, which
+aligns nothing, has them elsewhere: about a program with such a union its answer decides nothing.
 """
 
 from __future__ import annotations
@@ -50,6 +53,7 @@ GENERATOR = [
 AVR = ["avr-gcc", "-mmcu=atmega1284p", "-Os", "-w"]
 AVR_SECONDS = 20
 MEMORY = re.compile(r"does not fit|no room for the stack|overflow")
+STRUCT_IN_UNION = re.compile(r"^union \w+ \{[^}]*\bstruct \w+ +f\d", re.MULTILINE)
 MEMBER_ADDRESS = re.compile(r"&\w+(\[\w+\])*(\.|->)f\d")
 
 
@@ -165,6 +169,8 @@ def compare(seed: int, source: Path, folder: Path, shapes: tuple[Shape, ...] = S
     first = next(iter(sums.values()))
     if len(set(sums.values())) != 1:
         return verdict("failed", f"{sums}, avr {reference or 'unknown'}")
+    if reference and reference != first and STRUCT_IN_UNION.search(source.read_text()):
+        return verdict("agreed", "levels only, a union holds a struct")
     if reference and reference != first:
         return verdict("failed", f"{first} at every level, avr {reference}")
     return verdict("agreed", "with avr" if reference else "levels only")
