@@ -161,7 +161,7 @@ def test_threads_end_with_their_swarm(clustering_image: Path) -> None:
         assert not helper.is_alive()
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="the sanitizers of gcc are needed")
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no sanitizers here (Debian package gcc)")
 @pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
 def test_rounds_have_no_race(sanitizer: str, tmp_path: Path) -> None:
     """Threads that come late, fall asleep, and are dismissed."""
