@@ -90,7 +90,7 @@ class LlvmBuilder:
             place = pointer(self.e, self.around.offset["cpu.initialised"])
             self.e.store(place, self.e.load(place, 16) | unknown, 16)
         if p.sr is not None:
-            self._commit_sr(p.sr)
+            self._commit_sr(*p.sr)
 
     @property
     def slow_label(self) -> str:
@@ -360,8 +360,7 @@ class LlvmBuilder:
             old = self.sr_word()
             nstdis = self.e.load(pointer(self.e, self.around.offset["INTCON1"]), 16) & NSTDIS
             self.guard(((old & (SA | SB | SAB)) | nstdis) == 0)
-            free = mask & lanes
-            self.pending.sr = (old & (0xFFFF & ~free)) | (placed & free)
+            self.pending.sr = placed, mask & lanes
             self.pending.stop = True
             return
         if how == "flags":
@@ -470,7 +469,9 @@ class LlvmBuilder:
         assert isinstance(word, Value)
         return word
 
-    def _commit_sr(self, word: Number) -> None:
+    def _commit_sr(self, placed: Number, free: int) -> None:
+        """The data write to the bits `free` of SR; it comes behind the flags that the instruction sets by itself."""
+        word = (self.sr_word() & (0xFFFF & ~free)) | (placed & free)
         self.e.store(pointer(self.e, self.around.offset["SR"]), word, 16)
         self.v.set_flags({name: (word & (1 << FLAGS[name])) != 0 for name in ("C", "Z", "OV", "N", "DC")})
 

@@ -39,7 +39,8 @@ class Pending:
     """An SFR that events may change, or that devices hear of, is accessed."""
     taken: bool = False
     """A device changes because it is read."""
-    sr: Number | None = None
+    sr: tuple[Number, int] | None = None
+    """A data write to SR: what, and to which bits."""
     pointed: Store | None = None
     """A store of which only the address that it has when it is made says whether it is to RAM or to a register."""
     left: Value | None = None

@@ -67,7 +67,7 @@ class NativeReader(LlvmReader):
     def put(self, place: Place, value: Number, index: Number = 0) -> None:
         """Store, with the instruction's other effects."""
         if place == self._b.around.flow.sr:
-            self._b.pending.sr = value
+            self._b.pending.sr = value, 0xFFFF
             return
         e, offset = self.e, index * (place.bits // 8) + place.offset
         self._b.pending.stores.append(lambda: e.store(pointer(e, offset), value, place.bits))

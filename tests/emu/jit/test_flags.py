@@ -1,0 +1,80 @@
+"""Flags in native code: a sample of tests/fuzz/fuzz_flags.py, and writes to SR by instructions that set flags."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from flag_drills import FLAGS, Tally, all_pairs, asked, check, kind, pairs_of, rows, written
+from random_firmware import BY_SYNTAX, Firmware, difference, words_of
+from rowmachine import SR
+from twins import twins
+
+from emu.dspic30f.isa import codec
+from emu.dspic30f.isa.fields import Operands
+from emu.dspic30f.isa.row import Insn
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_drills_end_equally_in_every_cycle(seed: int) -> None:
+    """Design §4.3; most instructions are native."""
+    tally = Tally()
+    assert check(seed, tally) is None
+    turns = {all_pairs()[(2 * 24 * seed + turn) % len(all_pairs())] for turn in range(48)}
+    assert len(turns & tally.pairs.keys()) > 35
+    assert len(tally.pairs) > 80
+    assert tally.runs > 300
+    assert tally.executed > 5 * tally.python > 0
+
+
+def test_readers_and_writers_of_flags_are_told_from_the_table() -> None:
+    """isa.md §5, §6: some that everybody knows."""
+    writers, readers, others = ({row.mnemonic for row in some} for some in rows())
+    assert {"ADD", "RLC", "CP0", "DAW.B", "FBCL", "DIV.S", "BTST.C", "BTSTS", "POP.S", "ZE"} <= writers
+    assert {"ADDC", "SUBBR", "CPB", "RRC", "BSW.Z", "BRA", "DAW.B", "PUSH.S"} <= readers
+    assert {"MUL.UU", "BTG", "SWAP", "EXCH"} <= others
+
+
+def of(syntax: str, **fields: int) -> Insn:
+    """An instruction by the syntax of its row."""
+    insn = codec.decode(*codec.encode(BY_SYNTAX[syntax], Operands(**fields)))
+    assert insn is not None
+    return insn
+
+
+def test_a_pair_is_a_flag_that_is_written_and_read_with_no_other_writer_between() -> None:
+    """What the campaign counts."""
+    add, shift = of("ADD{.B} #lit10, Wn", B=0, k=1, d=1), of("SL{.B} Ws, Wd", B=1, s=1, p=0, d=1, q=0)
+    borrow, status = of("SUBB{.B} #lit10, Wn", B=0, k=1, d=1), of("MOV{.W} f, Wnd", f=SR, d=2)
+    assert written(shift) == {"C", "Z", "N"}
+    assert asked(borrow) == {"C", "Z"}
+    assert asked(status) == set(FLAGS)
+    assert set(pairs_of([add, shift, borrow])) == {(kind(shift), "C", kind(borrow)), (kind(shift), "Z", kind(borrow))}
+    assert (kind(add), "DC", kind(status)) in set(pairs_of([add, shift, status]))
+    assert (kind(add), "C", kind(status)) not in set(pairs_of([add, shift, status]))
+
+
+STORING = [row for row in rows()[0] if row.syntax.endswith("{.B} f") and not row.syntax.startswith("CP")]
+
+
+@pytest.mark.parametrize("row", STORING, ids=lambda row: row.mnemonic)
+def test_an_instruction_that_sets_flags_may_write_sr_or_a_byte_of_it(row: object) -> None:
+    """Where the data write does not reach, the flags are the result's: N and Z of COM.B SRH (isa.md §2.3)."""
+    for size, address in ((0, SR), (1, SR), (1, SR + 1)):
+        firmware = Firmware(2)
+        firmware.put(0, words_of("GOTO Expr", n=0x100))
+        at = firmware.put(0x100, list(codec.encode(row, Operands(B=size, f=address))[:1]))  # type: ignore[arg-type]
+        firmware.put(at, words_of("BRA Expr", n=-1))
+        plain, native = twins(firmware, 0, 0)
+        for value, status in itertools.product((0, 0x7F, 0x80, 0xFFFF), (0, 0x10F, 0x00A, 0x105)):
+            for machine in (plain, native):
+                machine.w[0] = value
+                machine.poke("SR", status)
+                machine.pc = 0x100
+                machine.run(5)
+            assert not difference(plain, native), (size, address, value, status)
