@@ -173,7 +173,8 @@ class SpecialisedEngine:
 
     def _write_repeat(self, pc: int) -> Block | None:
         insn = self._fetch(pc)
-        if insn is None or (self._modes.loop is not None and pc == self._modes.loop[1]):
+        last_of_loop = self._modes.loop is not None and pc == self._modes.loop[1]
+        if insn is None or last_of_loop or pc in self._hooks:  # an iteration is an arrival
             return None
         source = self._source()
         try:

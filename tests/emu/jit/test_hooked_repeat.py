@@ -1,4 +1,4 @@
-"""A hook on a REPEAT under native code."""
+"""Hooks on a REPEAT and on its target."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from random_firmware import Firmware, difference, literal, load, to_sfr, words_of
 from twins import twins
+
+from emu.dspic30f.specialised import SpecialisedEngine
+from emu.machine import Machine
 
 
 def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None:
@@ -36,3 +39,23 @@ def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None
     assert arrivals[0] == arrivals[1]
     assert len(arrivals[0]) > 10
     assert not difference(plain, native)
+
+
+def test_each_iteration_of_a_hooked_target_is_an_arrival() -> None:
+    """As a boundary is (isa.md §7.5), in every engine."""
+    firmware = Firmware(0)
+    firmware.put(0, words_of("GOTO Expr", n=0x100))
+    at = firmware.put(0x100, literal(0, 2) + words_of("REPEAT #lit14", k=5))
+    firmware.put(at, words_of("INC{.B} Ws, Wd", B=0, s=2, p=0, d=2, q=0) + words_of("BRA Expr", n=-1))
+    interpreter = Machine(engine="interp")
+    assert isinstance(interpreter.runner, SpecialisedEngine)
+    interpreter.runner.warm = 1
+    arrivals: list[list[int]] = []
+    for machine in (*twins(firmware, 0, 2), interpreter):
+        seen: list[int] = []
+        load(machine, firmware)
+        machine.hook_pc(at, lambda m=machine, s=seen: s.append(m.cycle))  # type: ignore[misc]
+        machine.run(100)
+        arrivals.append(seen)
+    assert arrivals == [arrivals[0]] * 3
+    assert len(arrivals[0]) == 6
