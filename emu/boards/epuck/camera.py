@@ -131,14 +131,14 @@ class Camera(Part, I2cDevice):
         present window, format and exposure."""
         import numpy as np
 
-        from emu.boards.epuck.pixels import decode
+        from emu.boards.epuck.pixels import decode_line
 
         at = self.now if cycle is None else cycle
         room = (ctypes.c_uint8 * (2 * LINE_PIXELS))()
         lines = []
         for line in range(self.scan.course.lines):
             count = self._sent(line, at, ctypes.addressof(room))
-            lines.append(decode(bytes(room[:count]), self._picture.form))
+            lines.append(decode_line(bytes(room[:count]), self._picture.form))
         return np.stack(lines) if lines else np.zeros((0, 0, 3), np.uint8)
 
     def _sent(self, line: int, cycle: int, address: int) -> int:

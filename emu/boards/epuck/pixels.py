@@ -141,6 +141,13 @@ def decode(data: bytes, form: str) -> Pixels:
     return _DECODERS[form](np.frombuffer(data, dtype=np.uint8))
 
 
+def decode_line(data: bytes, form: str) -> Pixels:
+    """The pixels of a whole line. In YUV it may end with the first of two that share a colour: that is sent without its
+    red, which is then taken as grey."""
+    is_alone = form == YUV and len(data) % 4 == _SIZES[YUV]
+    return decode(data + bytes((128, data[-1])), form)[:-1] if is_alone else decode(data, form)
+
+
 def as_vga(image: NDArray[np.uint8], turned: int = 0) -> NDArray[np.uint8]:
     """Any grey, RGB or RGBA picture as 480 x 640 x 3 by nearest pixel, `turned` by 0, 90, 180 or 270 degrees counter-
     clockwise first (sensors mounted turned, epuck.md §7.1). Raises ValueError for other shapes and angles."""

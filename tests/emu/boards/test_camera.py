@@ -456,6 +456,18 @@ def test_frame_is_the_picture_the_sensor_sends(robot):
     assert np.array_equal(frame[38], picture[152, 236::4] & [0xF8, 0xFC, 0xF8])
 
 
+@pytest.mark.parametrize(("sensor", "writes"), [("PO6030K", po6030(form="yuv")), ("PO3030K", po3030(236, form="yuv"))])
+def test_a_line_of_an_odd_number_of_pixels_in_yuv_is_shown_whole(sensor, writes):
+    """§7.4: the last pixel shares its colour with none behind it; its brightness is sent, and so is its blue."""
+    robot = Robot(camera=sensor)
+    robot.board.camera.show(np.repeat(scene()[:, :, :1], 3, axis=2))
+    robot.configure(writes)
+    frame, readout = robot.board.camera.frame(), robot.board.camera._readout
+    assert frame.shape[1] % 2
+    grey = scene()[:, :, 0][np.ix_(readout._rows, readout._columns)].astype(int)
+    assert np.abs(frame - grey[:, :, None]).max() <= 4
+
+
 @pytest.mark.parametrize("form", ["rgb565", "grey", "yuv"])
 def test_decoding_gives_back_what_the_format_keeps(form):
     """Grey scales survive every format to its precision; colours survive RGB565 and, within 3, YUV pairs."""
