@@ -1,0 +1,198 @@
+"""Swarms of random robots, run in every way there is: `python tests/fuzz/fuzz_swarm.py [--trials N] [--seconds S]`.
+
+A trial is a scene of two or three robots with up to two random programs (`tests/arena/random_robots.py`), while
+somebody talks to the robots and moves them about. Quantum after quantum, in lock-step by Python, and in compiled code
+with one thread and with several: what is recorded, where everything is, registers and RAM are the same, to the bit. At
+the end it tells what there was of all that it is to show, and fails if many trials had none of something.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import random
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from arena.emulated import EmulatedBrain  # noqa: E402
+from arena.ether import Ether  # noqa: E402
+from arena.lockstep import LockStep  # noqa: E402
+from arena.scene import Scene, load_scene  # noqa: E402
+from arena.world import World  # noqa: E402
+from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
+from tests.arena.random_robots import program  # noqa: E402
+from tests.fuzz.seeds import Course, parser  # noqa: E402
+
+STEPWISE: Final = "quantum after quantum"
+QUANTA: Final = 150
+"""Of a trial, at least: two pictures of most sensors."""
+EXPECTED: Final = (
+    "lines painted by compiled code", "lines painted by Python", "resets", "faults", "robots asleep", "robots away",
+    "turns of other threads", "lines heard", "changes of LEDs", "robots that measure light",
+)  # fmt: skip
+MANY: Final = 25
+"""Trials after which there must have been all of it."""
+
+
+def assembled(folder: Path, name: str, text: str) -> Path:
+    """The image of a program."""
+    source, image = folder / f"{name}.s", folder / f"{name}.elf"
+    source.write_text(text)
+    subprocess.run([sys.executable, "-m", "toolchain", "cc", str(source), "-o", str(image)], check=True, cwd=ROOT)
+    return image
+
+
+def scene_of(draw: random.Random) -> Scene:
+    """A small arena with two or three robots, switched on within 14 ms."""
+    count = draw.randrange(2, 4)
+    values: dict[str, Any] = {
+        "start__spread_tcy": 200_000, "robots__count": count, "objects__count": draw.choice((0, 5, 20)),
+        "camera__sensor": draw.choice(("PO3030K", "PO6030K", "PO8030D")), "camera__sees_leds": draw.random() < 0.1,
+    }  # fmt: skip
+    if draw.random() < 0.3:
+        values["start__off"] = ((draw.randrange(count), round(draw.uniform(0.01, 0.14), 3)),)
+    if draw.random() < 0.3:
+        values["start__remote"] = str(draw.randrange(10))
+    if draw.random() < 0.2:
+        values["light__brightness"] = draw.choice((0.3, 1.7))
+    if draw.random() < 0.3:
+        values["robots__wheel_noise"] = 0.2
+    return load_scene("clustering").with_values(**values)
+
+
+class Robot(EmulatedBrain):
+    """One that counts the lines Python paints for it."""
+
+    painted = 0
+
+    def _pixels(self, *line: Any) -> Any:
+        self.painted += 1
+        return super()._pixels(*line)
+
+
+class Trial:
+    """One trial, the same each time it is run; `seed` says all of it."""
+
+    def __init__(self, seed: int, folder: Path) -> None:
+        draw = random.Random(seed)
+        self.seed: Final = seed
+        self.scene: Final = scene_of(draw)
+        sensor, count = self.scene.camera.sensor, self.scene.robots.count
+        images = [assembled(folder, f"{seed}_{n}", program(draw, sensor)) for n in range(draw.randrange(1, 3))]
+        self._images: Final = [draw.choice(images) for _ in range(count)]
+        self._selectors: Final = [draw.randrange(16) for _ in range(count)]
+        self._waits: Final = draw.random() < 0.5
+        """Whether no robot goes on before its code is translated: else native code comes in anywhere."""
+        self.threads: Final = draw.choice((2, 5))
+        moment, moments = 0, []
+        while moment < QUANTA:
+            moment += draw.choice((1, 2, 13, 40))
+            moments.append((moment, draw.randrange(6), draw.randrange(count), draw.random()))
+        self._moments: Final = moments
+        self.quanta: Final = moment
+
+    @property
+    def ways(self) -> tuple[str, ...]:
+        """All that are compared; the first one tells what is right."""
+        return STEPWISE, "Python", "1 thread", f"{self.threads} threads"
+
+    def run(self, way: str, tally: Counter[str]) -> list[list[Any]]:
+        """What is seen at each of its moments."""
+        scene, ether, world = self.scene, Ether.of(self.scene), World(self.scene, self.seed)
+        several = enumerate(zip(self._images, self._selectors, strict=True))
+        robots = [Robot(scene, self.seed, number, image, selector, ether) for number, (image, selector) in several]
+        for robot in robots:
+            assert isinstance(robot.machine.runner, JitEngine)
+            robot.machine.runner.wait = self._waits
+        lockstep = None
+        if way != STEPWISE:
+            threads = int(way.split()[0]) if "thread" in way else 1
+            lockstep = LockStep(world, robots, ether, is_native=way != "Python", threads=threads)
+        wheels: list[tuple[float, float]] = []
+        seen = []
+        for until, what, who, where in self._moments:
+            if lockstep is not None:
+                wheels = lockstep.advance(until)
+            while world.ticks < until:
+                wheels = [robot.think(world.ticks, world.poses) for robot in robots]
+                world.step(wheels)
+            seen.append([until, wheels, *map(partial(look, until, tally), robots), world.poses.values.tolist()])
+            if what == 0:
+                robots[who].tell(b"hello\n")
+            elif what == 1:
+                width, height = scene.arena.width_cm, scene.arena.height_cm
+                world.move(world.robots[who], 10 + where * (width - 20), height / 2, 6 * where)
+            if lockstep is not None:
+                lockstep.moved()
+        tally["interpreted"] += sum(robot.machine.runner.counts.interpreted for robot in robots)
+        tally["Tcy"] += sum(robot.machine.cycle for robot in robots)
+        tally["resets"] += sum(cycle > 0 for robot in robots for cycle, _ in robot.machine.resets)
+        tally["faults"] += sum(robot.has_stopped for robot in robots)
+        tally["robots away"] += sum(scene.off_tick(number) < self.quanta for number in range(len(robots)))
+        tally[f"painted, {way}"] += sum(robot.painted for robot in robots)
+        if lockstep is not None:
+            tally["turns of other threads"] += lockstep.swarm.helped
+        return seen
+
+
+def look(until: int, tally: Counter[str], robot: EmulatedBrain) -> list[Any]:
+    """A robot between two quanta; every other time it is not asked, which nobody may notice."""
+    machine = robot.machine
+    tally["robots asleep"] += machine.is_asleep
+    seen = [machine.cycle, machine.pc, hashlib.sha256(machine.record.bytes[:0x2800]).hexdigest()]
+    if until % 2:
+        reading, lines, lights = robot.reading(), robot.lines(), robot.lights()
+        tally["lines heard"] += len(lines)
+        tally["changes of LEDs"] += len(lights)
+        tally["robots that measure light"] += reading.infrared is not None
+        seen += [reading, lines, lights]
+    return seen
+
+
+def check(trial: Trial, tally: Counter[str]) -> str | None:
+    """Run a trial in all ways; what differs, None if nothing does."""
+    expected: list[list[Any]] = []
+    painted = Counter[str]()
+    for way in trial.ways:
+        own = Counter[str]()
+        found = trial.run(way, own)
+        painted[way] = own.pop(f"painted, {way}")
+        tally.update(own)
+        expected = expected or found
+        for one, other in zip(expected, found, strict=True):
+            if one != other:
+                parts = [place for place, (a, b) in enumerate(zip(one, other, strict=True)) if a != b]
+                return f"{way}: by quantum {one[0]} parts {parts} differ: {one[parts[0]]} | {other[parts[0]]}"
+    if painted["Python"] != painted[STEPWISE]:
+        return f"{painted[STEPWISE]} lines painted quantum after quantum, in lock-step {painted['Python']}"
+    for way in trial.ways:
+        tally["lines painted by Python"] += painted[way]
+        tally["lines painted by compiled code"] += painted[STEPWISE] - painted[way]
+    return None
+
+
+def main() -> int:
+    course = Course(parser(__doc__), "trials", 30, "trials")
+    course.parse()
+    tally = Counter[str]()
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in course:
+            if found := check(Trial(seed, Path(folder)), tally):
+                return course.failed(found)
+    missing = [what for what in EXPECTED if not tally[what]]
+    if missing and course.done >= MANY:
+        return course.failed(f"{course.done} trials without {', '.join(missing)}")
+    told = ", ".join(f"{tally[what]} {what}" for what in EXPECTED)
+    share = 1e6 * tally["interpreted"] / tally["Tcy"]
+    return course.ended(f"no difference; {told}; {share:.0f} instructions in a million Tcy were Python's")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
