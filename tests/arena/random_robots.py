@@ -69,13 +69,16 @@ def _sleeps(_chance: Chance, _n: int) -> str:
 
 
 def _turns(chance: Chance, _n: int) -> str:
-    """Both motors."""
-    phases = chance.sample((0x55, 0x66, 0xAA, 0x99, 0x00, 0xA5), 3)
+    """Both motors by four steps, forwards or backwards, or anyhow."""
+    phases = [0x55, 0x66, 0xAA, 0x99][:: chance.choice((1, 1, -1))]
+    if chance.random() < 0.2:
+        phases = chance.sample((0x55, 0x66, 0xAA, 0x99, 0x00, 0xA5), 3)
+    wait = chance.randrange(200, 1 << 14)
     return "".join(
         f"""
         mov     #{phase:#x}, w0
         mov     w0, LATD
-        repeat  #{chance.randrange(400)}
+        repeat  #{wait}
         nop"""
         for phase in phases
     )

@@ -35,7 +35,7 @@ QUANTA: Final = 150
 """Of a trial, at least: two pictures of most sensors."""
 EXPECTED: Final = (
     "lines painted by compiled code", "lines painted by Python", "resets", "faults", "robots asleep", "robots away",
-    "turns of other threads", "lines heard", "changes of LEDs", "robots that measure light",
+    "wheels turning", "turns of other threads", "lines heard", "changes of LEDs", "robots that measure light",
 )  # fmt: skip
 MANY: Final = 25
 """Trials after which there must have been all of it."""
@@ -123,6 +123,7 @@ class Trial:
             while world.ticks < until:
                 wheels = [robot.think(world.ticks, world.poses) for robot in robots]
                 world.step(wheels)
+            tally["wheels turning"] += sum(map(any, wheels))
             seen.append([until, wheels, *map(partial(look, until, tally), robots), world.poses.values.tolist()])
             if what == 0:
                 robots[who].tell(b"hello\n")
