@@ -150,6 +150,8 @@ def _combine(c: Context) -> None:
 def _single_bits(c: Context) -> None:
     if c.options.level != "0":
         single_bits.run(c.function, lambda name: data.is_near(c.module, name))
+    else:
+        single_bits.one_operation(c.function)
 
 
 def _returns(c: Context) -> None:

@@ -10,7 +10,8 @@ import pytest
 from tests.toolchain.lower.compiled import assembly, body
 
 LEVELS = ("0", "1", "s", "2")
-DECLARED = "extern volatile unsigned A, B; extern volatile unsigned char C; extern volatile unsigned long L;"
+DECLARED = """extern volatile unsigned A, B; extern volatile unsigned char C; extern volatile unsigned long L;
+extern volatile struct { unsigned a : 1, b : 1, : 14; } F;"""
 
 ORDERED = [
     ("high word stored first", "void f(volatile unsigned *p){ p[1] = 5; p[0] = 7; }", ["[w+2]=", "[w]="]),
@@ -82,6 +83,16 @@ BITS = [
      void f(int x){ if (x) D |= 4; else D &= ~8; }""", ["bclr 0x02D6,#3", "bset 0x02D6,#2"]),
     ("in a loop", "void f(int n){ while (n--) { if (B & 2) A |= 4; else A &= ~8; } }", ["bclr _A,#3", "bset _A,#2"]),
     ("beside a whole value", "void f(int x){ if (x & 1) A |= 4; else A = x; B = 1; }", ["bset _A,#2"]),
+    ("by a bit of an argument", "void f(int x){ if (x & 1) A |= 8; else A &= ~8; }", ["bclr _A,#3", "bset _A,#3"]),
+    ("by a bit above", "void f(int x){ if (x & 0x400) A |= 8; else A &= ~8; }", ["bclr _A,#3", "bset _A,#3"]),
+    ("by a sign", "void f(int x){ if (x < 0) A &= 0x7FFF; else A |= 0x8000; }", ["bclr _A,#15", "bset _A,#15"]),
+    ("of a byte by a bit of a word", "void f(int x){ if (x & 0x400) C |= 2; else C &= ~2; }",
+     ["bclr.b _C,#1", "bset.b _C,#1"]),
+    ("a bit that is copied", "void f(void){ F.a = F.b; }", ["bclr _F,#0", "bset _F,#0"]),
+    ("a bit that is turned", "void f(void){ F.a ^= 1; }", ["bclr _F,#0", "bset _F,#0"]),
+    ("the contrary of a bit", "void f(void){ F.b = !F.a; }", ["bclr _F,#1", "bset _F,#1"]),
+    ("in a switch", """void f(int x){ switch (x) { case 0: A |= 1; break; case 1: A &= ~1; break;
+     case 2: A |= 2; break; default: A &= ~2; } }""", ["bclr _A,#0", "bclr _A,#1", "bset _A,#0", "bset _A,#1"]),
 ]  # fmt: skip
 
 
@@ -92,3 +103,13 @@ def test_bits_written_in_branches_are_one_instruction_each(level: str, source: s
     lines = body(assembly(f"{DECLARED}\n{source}", level), "f")
     assert sorted(line for line in lines if line.startswith(("bset", "bclr", "btg"))) == expected
     assert not any(line.startswith("mov _A,") for line in lines)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_bit_fields_are_set_and_cleared_by_one_instruction(level: str) -> None:
+    """The front end clears a field before it sets it; XC16 writes BSET at every level, and programs count on it."""
+    near = body(assembly(f"{DECLARED} void f(void) {{ F.a = 1; F.b = 0; F.b = 1; }}", level), "f")
+    assert [line for line in near if "_F" in line] == ["bset _F,#0", "bclr _F,#1", "bset _F,#1"]
+    assert not any(line.startswith("mov") for line in near)
+    text = assembly("struct S { unsigned a : 1, b : 1, : 14; }; void f(volatile struct S *p) { p->b = 1; }", level)
+    assert [line[:5] + line[-2:] for line in body(text, "f") if line.startswith("b")] == ["bset #1".replace(" ", " ")]
