@@ -166,7 +166,7 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
     from toolchain.ir.model import UnsupportedError
     from toolchain.isr_names import check
 
-    check(ir_text)
+    check(ir_text, lambda ref: pipeline.place_in(ir_text, ref))
     try:
         return pipeline.compile_module(ir_text, options)
     except UnsupportedError as error:

@@ -13,6 +13,7 @@ from toolchain.errors import ToolError
 
 _UNDEFINED = re.compile(r"error: undefined symbol (\S+), referenced at ")
 _REFUSED = re.compile(r"not supported: (?:LLVM IR line|in function|in variable|function) ")
+_HANDLER = re.compile(r"error: (interrupt )?function '")
 _FUNCTION = re.compile(r'^define .*?@("[^"]+"|[\w$.]+)\(')
 _NAME = re.compile(r'@("[^"]+"|[\w$.]+)')
 _LOCATION = re.compile(r"!dbg (!\d+)")
@@ -20,10 +21,10 @@ MOST_PLACES = 3  # shown of one symbol
 
 
 def concerns_generated_code(error: ToolError) -> bool:
-    """Whether debug information could tell more: an assembler's message, a symbol that nobody defines, or what the back
-    end does not do."""
+    """Whether debug information could tell more: an assembler's message, a symbol that nobody defines, what the back
+    end does not do, or a handler's wrong name."""
     return any(
-        re.match(r"[^:\n]+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line)
+        re.match(r"[^:\n]+: error: ", line) or _UNDEFINED.search(line) or _REFUSED.search(line) or _HANDLER.match(line)
         for line in error.findings
     )
 

@@ -6,6 +6,7 @@ Enters: IR text. A function with a vector's name must be an interrupt function, 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from emu.chips.family import SLOTS
 from toolchain.errors import ToolError
@@ -27,34 +28,39 @@ def irq_name(number: int) -> str:
     return SLOTS[number + FIRST_INTERRUPT].name
 
 
-_DEFINITION = re.compile(r'^define [^@\n]*@("[^"]+"|[\w$.]+)\(', re.MULTILINE)
+_DEFINITION = re.compile(r'^define [^@\n]*@("[^"]+"|[\w$.]+)\([^\n]*?(?: !dbg (!\d+))? \{$', re.MULTILINE)
 _ANNOTATIONS = re.compile(r"^@llvm\.global\.annotations = .*$", re.MULTILINE)
 _ANNOTATED = re.compile(r"\{ ptr @([\w$.]+), ptr (@[\w$.]+),")
 _STRING = re.compile(r'^(@[\w$.]+) = [^\n]*c"interrupt\\00"', re.MULTILINE)
 _NUMBERED = re.compile(r'^(@[\w$.]+) = [^\n]*c"(irq|altirq):([^"]*)\\00"', re.MULTILINE)
 
 
-def check(ir_text: str) -> None:
-    """Raise `ToolError` listing every handler whose name and kind disagree."""
+def check(ir_text: str, place: Callable[[str], str]) -> None:
+    """Raise `ToolError` listing every handler whose name and kind disagree; `place` gives "file:line" of metadata."""
     marks = set(_STRING.findall(ir_text))
     annotations = _ANNOTATIONS.search(ir_text)
     pairs = _ANNOTATED.findall(annotations[0]) if annotations else []
     handlers = {function for function, mark in pairs if mark in marks}
     numbers = {mark: text for mark, _, text in _NUMBERED.findall(ir_text)}
     numbered = {function: numbers[mark] for function, mark in pairs if mark in numbers}
-    defined = {name.strip('"') for name in _DEFINITION.findall(ir_text)}
+    defined_at = {name.strip('"'): ref for name, ref in _DEFINITION.findall(ir_text)}
+    defined = set(defined_at)
+
+    def error(name: str) -> str:
+        return f"{place(defined_at[name])}: error" if defined_at.get(name) else "error"
+
     findings = [
-        f"error: function '{name}' has the name of an interrupt vector but is not an interrupt function "
+        f"{error(name)}: function '{name}' has the name of an interrupt vector but is not an interrupt function "
         f"(define it with OS_ISR({name}))"
         for name in sorted((defined & VECTOR_FUNCTIONS) - handlers)
     ]
     findings += [
-        f"error: interrupt function '{name}' does not have a vector's name, so nothing would call it "
+        f"{error(name)}: interrupt function '{name}' does not have a vector's name, so nothing would call it "
         f"(names look like {_nearest(name)})"
         for name in sorted((defined & handlers) - VECTOR_FUNCTIONS - set(numbered))
     ]
     findings += [
-        f"error: interrupt function '{name}': irq({number}) is not an interrupt number of this chip "
+        f"{error(name)}: interrupt function '{name}': irq({number}) is not an interrupt number of this chip "
         f"(expected 0 to {len(SLOTS) - FIRST_INTERRUPT - 1})"
         for name, number in sorted(numbered.items())
         if not _is_irq(number)

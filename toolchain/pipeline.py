@@ -287,11 +287,11 @@ class ModuleCompiler:
         self.notes = isr.annotations_of(module)
         self.used = used.kept(module)
         module.large_data = options.large_data
-        module.far = data.beyond_near(self.notes)
         self.lines: list[str] = []
         self.serial = 0
         self.taken = taken_blocks(module)
         self.dwarf = DwarfWriter(module)
+        module.far = data.beyond_near(self.notes, self.declared)
 
     def run(self) -> str:
         """All functions, then all data, then aliases."""
@@ -309,14 +309,21 @@ class ModuleCompiler:
             self.lines += self.dwarf.text()
         return "\n".join(self.lines) + "\n"
 
+    def declared(self, name: str) -> str:
+        """ "file:line" of a function or variable, or its name."""
+        found = self.module.functions.get(name) or self.module.globals.get(name)
+        place = self.dwarf.info.declared(found.dbg) if found is not None else None
+        kind = "function" if name in self.module.functions else "variable"
+        return f"{place[0]}:{place[1]}" if place is not None else f"in {kind} '{name}'"
+
     def function(self, f: Function) -> None:
         """Compile one definition."""
         self.serial += 1
         notes = self.notes.get(f.name, set())
-        interrupt = isr.interrupt_kind(f.name, notes)
+        interrupt = isr.interrupt_kind(notes, self.declared(f.name))
         probe = isr.wants_probe(notes, self.options.stack_check and not interrupt)
         if interrupt and (f.args or f.ret.kind != "void"):
-            raise UnsupportedError("an interrupt function takes and returns nothing", f"function '{f.name}'")
+            raise UnsupportedError("an interrupt function takes and returns nothing", self.declared(f.name))
         if not self.options.debug:
             f.dbg_records = []
         bindings.bind(f, self.dwarf.info)
@@ -393,7 +400,11 @@ def compile_module(ll_text: str, options: CompileOptions) -> str:
     try:
         module = read_module(ll_text)
     except UnsupportedError as e:
-        metadata = Module(metadata=dict(METADATA.findall(ll_text)))
-        found = DebugInfo(metadata).position(e.line)
-        raise UnsupportedError(e.what, f"{found[0]}:{found[1]}" if found is not None else e.where) from None
+        raise UnsupportedError(e.what, place_in(ll_text, e.line) or e.where) from None
     return ModuleCompiler(module, options).run()
+
+
+def place_in(ll_text: str, ref: str | None) -> str:
+    """ "file:line" of a !dbg reference of a module that is not read, or ""."""
+    found = DebugInfo(Module(metadata=dict(METADATA.findall(ll_text)))).position(ref)
+    return f"{found[0]}:{found[1]}" if found is not None else ""

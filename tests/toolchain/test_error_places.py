@@ -100,3 +100,31 @@ def test_a_refused_initialiser_names_the_line_of_its_variable(
     assert driver.main([*options, str(source), "-o", str(tmp_path / "x")]) == 2
     assert capsys.readouterr().err == f"error: not supported: {source}:3: {said}\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["main.c"]
+
+
+HANDLER = "void __attribute__((interrupt{}, no_auto_psv)) {}({}) {{}}"
+REFUSED = [
+    (HANDLER.format("", "_T1Interrupt", "int x"), "an interrupt function takes and returns nothing"),
+    (HANDLER.format(", auto_psv", "_T1Interrupt", "void"), "both auto_psv and no_auto_psv"),
+    (HANDLER.format("", "_T9Int", "void"), "interrupt function '_T9Int' does not have a vector's name"),
+    (HANDLER.format("(irq(99))", "f", "void"), "interrupt function 'f': irq(99) is not an interrupt number"),
+    ("void _T1Interrupt(void) {}", "function '_T1Interrupt' has the name of an interrupt vector"),
+    ("int x __attribute__((address(y), used));", "attribute address(y): the argument must be a number"),
+    ("__attribute__((used)) int f(int n) { volatile char a[40000]; a[n] = 1; return a[3]; }", "(limit 16382)"),
+    ("""volatile int v; __attribute__((used)) void f(void) { __asm__("" :: "r"(v), "r"(v), "r"(v), "r"(v), "r"(v),
+     "r"(v) : "w0", "w1", "w2", "w3", "w4", "w5", "w6", "w7", "w8", "w9"); }""",
+     "inline assembly: its operands and clobbers want more registers than there are"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=" ".join)
+@pytest.mark.parametrize(("line", "said"), REFUSED, ids=[row[1] for row in REFUSED])
+def test_what_is_refused_of_a_function_names_its_line(
+    line: str, said: str, options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "main.c"
+    source.write_text(f"\n{line}\nint main(void) {{ return 0; }}\n")
+    assert driver.main([*options, str(source), "-o", str(tmp_path / "x.elf")]) == 2
+    assert f"{source}:2" in (heard := capsys.readouterr().err)
+    assert said in heard
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["main.c"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from ..ir.model import (
     BlockAddress,
@@ -63,12 +64,12 @@ def is_near(module: Module, name: str) -> bool:
     return not var.section or var.section.startswith((".nbss", ".ndata"))
 
 
-def beyond_near(notes: dict[str, set[str]]) -> frozenset[str]:
-    """Objects whose `address(N)` lies where file-register instructions do not reach."""
+def beyond_near(notes: dict[str, set[str]], place: Callable[[str], str]) -> frozenset[str]:
+    """Objects whose `address(N)` lies where file-register instructions do not reach; `place` is for errors."""
     return frozenset(
         name
         for name, texts in notes.items()
-        if any(what == "address" and number >= NEAR_END for what, number in numbers(name, texts))
+        if any(what == "address" and number >= NEAR_END for what, number in numbers(place(name), texts))
     )
 
 

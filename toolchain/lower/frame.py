@@ -59,7 +59,7 @@ class FrameBuilder:
             o.offset = at
             at += (o.size + 1) // 2 * 2
         if at > LNK_MAX:
-            raise UnsupportedError(f"frame of {at} bytes (limit {LNK_MAX})", self.m.name)
+            raise UnsupportedError(f"frame of {at} bytes (limit {LNK_MAX})")
         return at
 
     # -- addresses ----------------------------------------------------------------------------------------------------

@@ -32,13 +32,16 @@ def _text(module: Module, v: Value) -> str:
     return init.data.rstrip(b"\0").decode() if isinstance(init, ConstBytes) else ""
 
 
-def interrupt_kind(name: str, notes: set[str]) -> str:
-    """ "" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5)."""
+def interrupt_kind(notes: set[str], place: str) -> str:
+    """ "" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5).
+
+    Raises UnsupportedError at `place` for both at once.
+    """
     words = {w for n in notes for w in n.removeprefix(PREFIX).split(",")} & WORDS
     if not any(n.startswith(PREFIX) for n in notes) and "interrupt" not in words:
         return ""
     if {"auto_psv", "no_auto_psv"} <= words:
-        raise UnsupportedError("both auto_psv and no_auto_psv", name)
+        raise UnsupportedError("both auto_psv and no_auto_psv", place)
     kind = "no_auto_psv" if "no_auto_psv" in words else "auto_psv"
     return kind + (",shadow" if "shadow" in words else "")
 
@@ -88,8 +91,9 @@ def section_modifiers(name: str, notes: set[str]) -> str:
     return out + "".join(f",{what}(0x{number:X})" for what, number in numbers(name, notes))
 
 
-def numbers(name: str, notes: set[str]) -> list[tuple[str, int]]:
-    """("address" or "reverse", N) of the notes of one object. Raises UnsupportedError for what is no number."""
+def numbers(place: str, notes: set[str]) -> list[tuple[str, int]]:
+    """("address" or "reverse", N) of the notes of one object, which `place` names in the UnsupportedError that is
+    raised for what is no number."""
     out = []
     for note in sorted(notes):
         found = re.fullmatch(r"(address|reverse)\((.*)\)", note)
@@ -98,5 +102,5 @@ def numbers(name: str, notes: set[str]) -> list[tuple[str, int]]:
         try:
             out.append((found[1], int(found[2].strip("() ").rstrip("uUlL"), 0)))
         except ValueError:
-            raise UnsupportedError(f"attribute {note}: the argument must be a number", name) from None
+            raise UnsupportedError(f"attribute {note}: the argument must be a number", place) from None
     return out

@@ -343,8 +343,19 @@ def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: Gr
             return
         groups = {n: list(g_members(g, n)) for n in colouring.spilled}
         if m.temps.issuperset(r for group in groups.values() for r in group):
-            raise UnsupportedError("register allocation does not converge", m.name)
+            raise _no_room(m, {r for group in groups.values() for r in group})
         rewrite_spills(m, groups)
+
+
+def _no_room(m: MFunction, registers: set[int]) -> UnsupportedError:
+    """What to say where values of one instruction find no registers: only inline assembly can want that many."""
+    wanting = [mi for b in m.blocks for mi in b.insts if registers & {*mi.uses(), *mi.defs()}]
+    crowded = next((mi for mi in wanting if mi.op == "asm"), None)
+    if crowded is None:
+        return UnsupportedError("register allocation does not converge")
+    error = UnsupportedError("inline assembly: its operands and clobbers want more registers than there are")
+    error.line = crowded.line
+    return error
 
 
 def _crowded(m: MFunction) -> bool:
