@@ -277,10 +277,14 @@ class EmulatedBrain:
         return self._look_now()
 
     def _look_now(self) -> Poses:
-        """Poses of the quantum in which the firmware looks at something, in the middle of a run."""
+        """Poses of the quantum in which the firmware looks at something, in the middle of a run. Of a robot that has
+        no power yet, no more, or has stopped, somebody outside looks: at the world as it is for the others."""
         if self._look_at is not None:
             tick = self._first_cut + len(self.machine.cuts_so_far())
-            if tick != self._looked:
+            if tick < self.lived:
+                self._looked, self._start = self.lived, self.machine.cycle
+                self._poses = self._before = self._look_at(self.lived)[0]
+            elif tick != self._looked:
                 self._settle()
                 poses, before = self._look_at(tick)
                 self._looked, self._start = tick, tick * self._quantum - self._on_at

@@ -199,6 +199,28 @@ def test_there_is_noise_for_the_widest_line_a_camera_sends(assembled: Callable[[
     assert len(robot._noise) >= 2**14 - 1 + 3 * width
 
 
+@pytest.mark.parametrize("off_s", [0.0, 0.1, 60.0], ids=["never on", "no more", "on"])
+def test_the_camera_of_a_robot_without_power_sees_the_world_as_it_is(
+    off_s: float, assembled: Callable[[str], Path]
+) -> None:
+    """For who looks from outside, like that of a robot which runs; its own time stands still."""
+    scene = load_scene("clustering").with_values(
+        robots__count=1, objects__count=1, robots__wheel_noise=0.0, start__off=[[0, off_s]]
+    )
+    world = World.of(scene, 1, [(200, 150, 0.0)], [(20, 20)])
+    robot = EmulatedBrain(scene, 1, 0, assembled(LOOKING), 0)
+    lockstep = LockStep(world, [robot])
+    reds = []
+    for ticks, place in ((2000, (240, 150)), (2200, (20, 20)), (2400, (240, 150))):
+        lockstep.advance(ticks)
+        world.move(world.objects[0], *place)
+        lockstep.moved()
+        lockstep.advance(ticks + 2)
+        frame = robot.machine.board.camera.frame().astype(int)
+        reds.append((frame[:, :, 0] - frame[:, :, 1] > 40).mean())
+    assert reds[1] < 0.001 < 0.02 < min(reds[0], reds[2])
+
+
 def test_the_strip_is_the_last_line_of_a_window_that_is_left_in_its_middle(assembled: Callable[[str], Path]) -> None:
     """Rows that are recorded are read in two frames, and up to one of them in the third; none is in the new window."""
     image = assembled(LOOKING)
