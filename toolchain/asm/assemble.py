@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from toolchain.asm.conditionals import CONDITIONALS
-from toolchain.asm.directives import DIRECTIVES, REJECTED, set_symbol
+from toolchain.asm.directives import DIRECTIVES, rejection, set_symbol
 from toolchain.asm.encode import StatementError, assemble_instruction
 from toolchain.asm.expr import ExprError
 from toolchain.asm.finish import finish
@@ -82,8 +82,8 @@ def _directive(asm: Assembler, word: str, operands: str) -> None:
         handler(asm, operands)
     elif word in CONDITIONALS:
         asm.conditionals.obey(word, operands, asm.source.place, asm)
-    elif word in REJECTED:
-        raise ExprError(f"directive {word} does not exist in this assembler: {REJECTED[word]}")
+    elif (instead := rejection(word)) is not None:
+        raise ExprError(f"directive {word} does not exist in this assembler: {instead}")
     else:
         raise ExprError(f"unknown directive {word}")
 

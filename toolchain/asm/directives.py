@@ -324,3 +324,10 @@ REJECTED: dict[str, str] = {  # abi-elf.md §4.3: refused by pic30-as, so refuse
     ".ln": "use .line",
     ".warning": "use .print",
 }
+
+
+def rejection(word: str) -> str | None:
+    """What to do instead of a directive that pic30-as refuses; None for others."""
+    if word.startswith(".cfi_"):
+        return "leave it out, who called assembly is found by its instructions"
+    return REJECTED.get(word)

@@ -138,6 +138,8 @@ def test_all_errors_of_a_file_are_reported_with_their_lines(asm):
         (".if undefined\n .endif\n", "must be a constant"),
         (".error \"stop\"\n", "error: stop"), (".err\n", ".err"), (".abort\n", ".abort"), (".zero 4\n", "use .space"),
         (".balign 4\n", "use .align"), (".quad 1\n", "two .long"), (".loc 1 2\n", "does not exist"),
+        (".cfi_startproc\n", ".cfi_startproc does not exist in this assembler: leave it out"),
+        (".cfi_def_cfa_offset 8\n", "found by its instructions"),
         ("1 + 2\n", "cannot read"),
         (".if 1\n .else\n .else\n .endif\n", "second .else"), ("bra 1b\n", "not defined before"),
         ("bra 9f\n", "label 9: is used but"), (" bra .Lx\n", "label .Lx is used but"),
