@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+import emu
 from tests.toolchain.c_programs import build
 
 
@@ -53,3 +56,56 @@ def test_auto_psv_handler_loads_and_restores_psvpag(tmp_path: Path) -> None:
     assert "#__const_psvpage" in body
     assert body.endswith("retfie")
     assert body.index("pop _PSVPAG") > body.index("#__const_psvpage")
+
+
+SHARED = """
+volatile unsigned in = 0x15, word, ran; volatile unsigned char byte;
+volatile struct { unsigned a : 1, b : 1, c : 1, : 5, d : 1; } field;
+OS_ISR(_T1Interrupt) { _T1IF = 0; ran++; word |= 0x100; byte |= 0x80; field.d = 1; _LATD0 = 1; }
+__attribute__((noinline)) void work(void)
+{
+    field.a = 1; field.b = 1; field.b = 0; _LATD1 = 1; word |= 2; word ^= 4;
+    if (in & 1) field.b = 1; else field.b = 0;
+    if (in & 0x10) word |= 0x40; else word &= ~0x40;
+    if (in & 0x200) byte |= 2; else byte &= ~2;
+    if ((int)in < 0) word &= ~0x8000; else word |= 0x8000;
+    switch (in & 3) {
+    case 0: word |= 0x400; break;
+    case 1: word &= ~0x400; break;
+    case 2: word |= 0x800; break;
+    default: word &= ~0x800;
+    }
+    _LATD3 = in & 8 ? 1 : 0;
+    field.c = field.a;
+    field.a ^= 1;
+}
+__attribute__((noinline)) void done(void) { Nop(); Nop(); Nop(); Nop(); Nop(); }
+int main(void)
+{
+    _T1IE = 1;
+    work();
+    done();
+    return ran * 100 + (word & 0x100) / 0x20 + (byte & 0x80) / 0x20 + field.d * 2 + _LATD0;
+}
+"""
+
+
+@pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
+def test_no_bit_of_a_handler_is_lost_wherever_it_comes(level: str, tmp_path: Path) -> None:
+    """isa.md §5.4: the program writes single bits of words in which the handler sets others; T1 asks in every cycle."""
+    (tmp_path / "x.c").write_text(f"#include <dspic30f6014a.h>\n{SHARED}")
+    built = build([tmp_path / "x.c"], tmp_path / "x.elf", level)
+    assert built.status == 0, built.messages
+    machine = emu.load(tmp_path / "x.elf", engine="interp")
+    machine.run(until="work", cycles=100_000)
+    first, state = machine.cycle, machine.snapshot()
+    machine.run(until="done", cycles=100_000)
+    last = machine.cycle
+    assert last - first > 40
+    for cycle in range(first, last):
+        machine.restore(state)
+        machine.run_until(cycle)
+        state = machine.snapshot()
+        machine.poke("IFS0", machine.peek("IFS0") | 8)
+        assert machine.run(cycles=100_000).reason == "halt"
+        assert machine.w[0] == 100 + 8 + 4 + 2 + 1, cycle - first

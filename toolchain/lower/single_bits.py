@@ -44,8 +44,9 @@ def run(f: Function, near: Near) -> None:
     one_operation(f)
     for b in f.blocks:
         _store_in_branches(f, b, near)
-    for b in f.blocks:
-        _load_in_branches(f, b, near)
+    written = _bits_written(f, near)
+    for b in f.blocks if written else ():
+        _load_in_branches(f, b, near, written)
     for b in list(f.blocks):
         _branches_for_choice(f, b, near)
     dead_code(f)
@@ -64,6 +65,12 @@ def one_operation(f: Function) -> None:
             last, (old, op, k) = steps[-1], change
             last.op, last.extra, last.args = op, {}, [old, ConstInt(old.type, k)]
     dead_code(f)
+
+
+def _bits_written(f: Function, near: Near) -> list[Value]:
+    """Places to which a store of the function writes one bit."""
+    stores = [(i, _place(i, near)) for b in f.blocks for i in b.instrs if i.op == "store"]
+    return [p for i, p in stores if p is not None and _writes(i.args[0], p)]
 
 
 def _place(i: Instr, near: Near) -> Value | None:
@@ -233,7 +240,7 @@ def _store_in_branches(f: Function, b: Block, near: Near) -> None:
         _store_in_branches(f, s, near)
 
 
-def _load_in_branches(f: Function, b: Block, near: Near) -> None:
+def _load_in_branches(f: Function, b: Block, near: Near, written: list[Value]) -> None:
     """The last access of a block that goes on to two others, which alone want its value: a load in each of them.
 
     Blocks without an access are passed; a switch is a tree of such blocks by now.
@@ -244,7 +251,7 @@ def _load_in_branches(f: Function, b: Block, near: Near) -> None:
         return
     load = b.instrs[at]
     p = _place(load, near)
-    if p is None or load.op != "load":
+    if p is None or load.op != "load" or not any(_same(p, q) for q in written):
         return
     targets = [x for x in f.blocks if x.name in ways.blocks]
     preds = predecessors(f)
@@ -267,7 +274,7 @@ def _load_in_branches(f: Function, b: Block, near: Near) -> None:
         if record.value is load:
             record.value = None
     for t in targets:
-        _load_in_branches(f, t, near)
+        _load_in_branches(f, t, near, written)
 
 
 def _behind(f: Function, t: Block, preds: dict[str, list[str]]) -> list[Block]:
