@@ -133,7 +133,7 @@ def front_end(options: CcOptions, scratch: Path) -> dict[Input, bytes]:
     return modules
 
 
-def _optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
+def optimise(options: CcOptions, ir: bytes, scratch: Path) -> str:
     """Clang's middle end over a module (text or bitcode).
 
     It may recognise a loop as a library function. When the run-time library has no such function, it must not, and
@@ -208,7 +208,7 @@ def object_of(options: CcOptions, item: Input, scratch: Path) -> bytes:
 
 def _object(options: CcOptions, item: Input, modules: dict[Input, bytes], scratch: Path) -> bytes:
     if item in modules:
-        text = _to_assembly(options, _optimise(options, modules[item], scratch))
+        text = _to_assembly(options, optimise(options, modules[item], scratch))
         return _assemble(options, text, item.path.name, compiled=True)
     if item.language == "object":
         return read_bytes(item.path)
@@ -227,7 +227,7 @@ def _translate(options: CcOptions, item: Input, modules: dict[Input, bytes], scr
         return _output(options, item, ".o"), _object(options, item, modules, scratch)
     if item not in modules:
         return _output(options, item, ".s"), _assembly_text(options, item, scratch).encode()
-    ir_text = _optimise(options, modules[item], scratch)
+    ir_text = optimise(options, modules[item], scratch)
     if options.emit_llvm:
         return _output(options, item, ".ll"), ir_text.encode()
     return _output(options, item, ".s"), _to_assembly(options, ir_text).encode()
@@ -256,7 +256,7 @@ def _compile_program(options: CcOptions, scratch: Path, front: FrontEnd) -> Prog
         if "-w" not in options.clang:
             for finding in polled_flags.findings(merged.decode()):
                 print(finding, file=sys.stderr)
-        ir_text = _optimise(options, merged, scratch)
+        ir_text = optimise(options, merged, scratch)
         assembly = _to_assembly(options, ir_text)
         if options.save_temps:
             base = output_path(options)

@@ -272,6 +272,13 @@ def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
     return out
 
 
+def named_places(f: Function, m: MFunction) -> dict[str, int]:
+    """Offsets from W15 at entry of the variables and struct parameters that lie in the frame, by their IR names."""
+    slots = [(str(i.extra["source"]), i) for i in f.blocks[0].instrs if i.op == "slot" and "source" in i.extra]
+    named = [*slots, *((a.name, a) for a in f.args)]
+    return {name: offset_of(m, m.slot_of[id(value)]) for name, value in named if id(value) in m.slot_of}
+
+
 def offset_of(m: MFunction, index: int) -> int:
     """Bytes from W15 at entry to an object of the frame."""
     o = m.frame[index]
@@ -292,6 +299,8 @@ class ModuleCompiler:
         self.taken = taken_blocks(module)
         self.dwarf = DwarfWriter(module)
         module.far = data.beyond_near(self.notes, self.declared)
+        self.placed: dict[str, dict[str, int]] = {}
+        """By function: bytes from W15 at entry to its variables that have addresses, by their names in the IR."""
 
     def run(self) -> str:
         """All functions, then all data, then aliases."""
@@ -339,6 +348,7 @@ class ModuleCompiler:
                     verifier.check(p.name, c.m)
         except UnsupportedError as e:
             raise UnsupportedError(e.what, e.where or where(self.dwarf.info, f, e.line)) from e
+        self.placed[f.name] = named_places(f, c.m)
         self.lines += self.dwarf.info.marker(f.dbg)
         self.header(f, interrupt)
         name = symbol(self.module, f.name)

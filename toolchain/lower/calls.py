@@ -24,7 +24,8 @@ def _byval(attrs: dict[str, object]) -> Type | None:
     return t if isinstance(t, Type) else None
 
 
-def _shape(v: Value, attrs: dict[str, object]) -> Shape:
+def shape_of(v: Value, attrs: dict[str, object]) -> Shape:
+    """What placement needs to know of an argument or parameter with such attributes."""
     t = _byval(attrs)
     if t is None:
         return scalar_shape(v.type)
@@ -44,7 +45,7 @@ def is_struct(a: Arg) -> bool:
 
 def parameter_places(f: Function) -> list[Place]:
     """Where every parameter travels."""
-    return place_arguments([_shape(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
+    return place_arguments([shape_of(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
 
 
 def incoming(s: Selector) -> None:
@@ -101,7 +102,7 @@ def select_call(s: Selector, i: Instr) -> None:
     assert isinstance(attrs, list)
     named = i.extra["fixed"] if i.extra.get("vararg") else None
     assert named is None or isinstance(named, int)
-    places = place_arguments([_shape(a, k) for a, k in zip(args, attrs, strict=True)], named)
+    places = place_arguments([shape_of(a, k) for a, k in zip(args, attrs, strict=True)], named)
     target: int | str
     target = symbol(s.module, callee.name) if isinstance(callee, GlobalRef) else s.reg(callee)
     pushed = _push_stack_arguments(s, args, attrs, places)

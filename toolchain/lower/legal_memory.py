@@ -66,7 +66,7 @@ class MemoryLegalizer(LegalizerBase):
         assert isinstance(align, int)
         slack = align if align > 2 else 0
         if isinstance(count, ConstInt) and (self.blocks[0] is self.b.block):
-            return self.aligned(self.b.emit("slot", I16, [], size=size * count.value + slack), slack)
+            return self.aligned(self.b.emit("slot", I16, [], size=size * count.value + slack, source=i.name), slack)
         if count.type.bits > 16:
             count = self.b.cast("trunc", count, I16)
         elif count.type.bits < 16:

@@ -1,0 +1,104 @@
+"""How much of the kernel, its drivers and the run-time library is proved to do what its IR says.
+
+`python -m bench.proofs [--part NAME] [--level -Os] [--jobs N] [--json]`. Every function of every C file of a part, each
+file compiled by itself: proved, refuted, undecided, those without loops and those with. Exits 1 if one is refuted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import track
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from emu.status import DONE, FAULT  # noqa: E402
+
+SYSTEM = ROOT / "firmware" / "openswarm"
+PARTS = {
+    "kernel": ("kernel/*.c", "option/*.c"),
+    "io": ("io/*.c", "io/*/*.c"),
+    "port": ("port/dspic30f/*.c", "board/epuck/*.c", "board/epuck/*/*.c"),
+}
+LIBRARY = ROOT / "toolchain" / "runtime"
+KINDS = ("proved", "refuted", "undecided")
+
+
+def files() -> dict[str, list[Path]]:
+    """By part."""
+    found = {part: sorted(f for pattern in patterns for f in SYSTEM.glob(pattern)) for part, patterns in PARTS.items()}
+    return found | {"library": sorted(LIBRARY.glob("*.c"))}
+
+
+def options_of(part: str, level: str) -> list[str]:
+    """How its files are compiled."""
+    if part == "library":
+        return [level, "-w", "-std=c11", "-ffreestanding"]
+    folders = [SYSTEM / name for name in ("include", "hal", "kernel", "io", "port/dspic30f", "board/epuck")]
+    folders += [f for name in ("io", "board/epuck") for f in sorted((SYSTEM / name).iterdir()) if f.is_dir()]
+    return [level, "-w", "-std=gnu99", *(f"-I{folder}" for folder in folders)]
+
+
+def look(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[str, Any]]]:
+    """Part, file and verdicts of one file; none where it cannot be compiled by itself."""
+    from toolchain.clang import CompileError
+    from toolchain.errors import ToolError
+    from toolchain.proof.prove import verdicts
+    from toolchain.proof.subject import subject
+
+    part, file = work
+    name = file.relative_to(ROOT).as_posix()
+    try:
+        return part, name, [asdict(v) for v in verdicts(subject([str(file), *options_of(part, level)]))]
+    except (ToolError, CompileError) as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return part, name, []
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--part", choices=[*PARTS, "library"], help="only this one")
+    parser.add_argument("--level", default="-Os", help="of optimisation (default %(default)s): --level=-O2")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="files at once (default 1)")
+    parser.add_argument("--json", action="store_true", help="every verdict, as JSON")
+    options = parser.parse_args()
+    work = [(part, file) for part, list_ in files().items() if options.part in (None, part) for file in list_]
+    rows: list[dict[str, Any]] = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        results = pool.map(partial(look, options.level), work)
+        for part, name, found in track(results, "proofs", len(work), console=Console(stderr=True)):
+            rows += [{"part": part, "file": name, **verdict} for verdict in found]
+    print(json.dumps(rows, indent=1) if options.json else table(rows))
+    return FAULT if any(row["kind"] == "refuted" for row in rows) else DONE
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Counts by part, and why there is no verdict."""
+    lines = ["| part | loops | proved | refuted | undecided | share |", "|---|---|---|---|---|---|"]
+    for part in [*dict.fromkeys(row["part"] for row in rows), "all"]:
+        for loops in (False, True):
+            of = Counter(row["kind"] for row in rows if row["loops"] == loops and part in ("all", row["part"]))
+            total = sum(of.values())
+            if total:
+                counts = " | ".join(f"{of[kind]}" for kind in KINDS)
+                lines.append(
+                    f"| {part} | {'with' if loops else 'none'} | {counts} | {100 * of['proved'] / total:.0f} % |"
+                )
+    reasons = Counter(row["why"].split(":")[0] for row in rows if row["kind"] == "undecided" and not row["loops"])
+    lines += ["", "undecided without loops:", *(f"{count:5} {why}" for why, count in reasons.most_common())]
+    lines += [f"refuted: {row['file']} {row['function']}: {row['why']}" for row in rows if row["kind"] == "refuted"]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

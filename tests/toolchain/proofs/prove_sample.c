@@ -1,0 +1,49 @@
+/* One function for each kind of code that test_prove.py plants a fault in. */
+struct pair { int first, second; };
+extern volatile unsigned first_port, second_port;
+extern volatile unsigned long wide_port;
+extern int outside(int, int);
+extern int another(int, int);
+int words[8];
+
+int larger(int a, int b) { return a > b ? a : b; }
+unsigned shifted(unsigned a) { return a >> 3; }
+int halved(int a) { return a >> 1; }
+long difference(long a, long b) { return a - b; }
+long product(int a, int b) { return (long)a * b; }
+unsigned quotient(unsigned a, unsigned b) { return a / b; }
+int widened(signed char *p) { return p[1]; }
+void stored(struct pair *p, int a, int b) { p->first = b; p->second = a; }
+void copied(unsigned char *p, unsigned char *q) { q[2] = p[1]; }
+unsigned ports(void) { unsigned a = first_port; second_port = a; first_port = 7; return a; }
+void one_bit(void) { first_port |= 0x0400; }
+int kept(int a) { return outside(a, 3) + a; }
+int decided(unsigned a) { if (a & 4) return outside(1, a); return another(a, 2); }
+int local(int i)
+{
+    int list[4];
+    list[0] = i; list[1] = 2; list[2] = 3; list[3] = i + 1;
+    return outside(list[i & 3], i);
+}
+int chosen(unsigned a)
+{
+    switch (a) {
+    case 0: return outside(9, 1);
+    case 1: return another(11, 2);
+    case 2: return outside(14, 7);
+    case 3: return another(2, 21);
+    case 4: return outside(31, 12);
+    default: return -1;
+    }
+}
+int indexed(unsigned i) { return words[i]; }
+int summed(void)
+{
+    int s = 0;
+    for (int i = 0; i < 8; i++) s += words[i];
+    return s;
+}
+float scaled(float a, float b) { return a * b + 1.0f; }
+int below(float a, float b) { return a < b; }
+void guarded(void) { words[0] = 1; __asm__ volatile("" ::: "memory"); first_port = 1; words[1] = 2; }
+void barrier(void) { __asm__ volatile("disi #5"); first_port = 1; }

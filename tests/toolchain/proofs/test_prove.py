@@ -1,0 +1,149 @@
+"""`toolchain prove`: right code is proved, and a fault in it is found, of whatever kind."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import emu
+from emu.status import BAD_INPUT, DONE, FAULT
+from toolchain.cli import main
+
+pytest.importorskip("z3", reason="the solver is not installed (extra: test)")
+
+from toolchain.proof.prove import Verdict, verdicts
+from toolchain.proof.subject import subject
+from toolchain.proof.witness import image
+
+SAMPLE = Path(__file__).with_name("prove_sample.c")
+SYSTEM = Path(__file__).resolve().parents[3] / "firmware" / "openswarm"
+KERNEL = SYSTEM / "kernel"
+FOLDERS = ("include", "hal", "kernel", "io", "port/dspic30f", "board/epuck")
+PLANTED = {
+    "another operation": ("difference", "sub w0,w2,w0", "add w0,w2,w0"),
+    "operands swapped": ("difference", "sub w0,w2,w0", "sub w2,w0,w0"),
+    "carry forgotten": ("difference", "subb w1,w3,w1", "sub w1,w3,w1"),
+    "wrong register": ("larger", "mov w1,w0", "mov w2,w0"),
+    "skip the other way": ("larger", "cpsgt w0,w1", "cpslt w0,w1"),
+    "unsigned where signed": ("larger", "cpsgt w0,w1\n\tmov w1,w0", "cp w0,w1\n\tbra gtu,1f\n\tmov w1,w0\n1:"),
+    "shifted too far": ("shifted", "lsr w0,#3,w0", "lsr w0,#4,w0"),
+    "sign kept": ("shifted", "lsr w0,#3,w0", "asr w0,#3,w0"),
+    "sign lost": ("halved", "asr w0,w0", "lsr w0,w0"),
+    "unsigned product": ("product", "mul.ss w1,w0,w0", "mul.uu w1,w0,w0"),
+    "remainder for quotient": ("quotient", "div.u w0,w7", "div.u w0,w7\n\texch w0,w1"),
+    "signed quotient": ("quotient", "div.u w0,w7", "div.s w0,w7"),
+    "zeros for the sign": ("widened", "se w7,w0", "ze w7,w0"),
+    "wrong offset": ("stored", "mov w1,[w0+2]", "mov w1,[w0+4]"),
+    "stores exchanged": ("stored", "mov w2,[w0]\n\tmov w1,[w0+2]", "mov w1,[w0]\n\tmov w2,[w0+2]"),
+    "store dropped": ("stored", "mov w1,[w0+2]", "nop"),
+    "a word for a byte": ("copied", "mov.b w7,[w1+2]", "mov w7,[w1+2]"),
+    "pointer moved": ("copied", "mov.b [w0+1],w7", "mov.b [++w0],w7\n\tmov.b [++w0],w7"),
+    "volatile read twice": ("ports", "mov _first_port,w0", "mov _first_port,w0\n\tmov _first_port,w0"),
+    "volatile write dropped": ("ports", "mov w0,_second_port", "nop"),
+    "volatile order": ("ports", "mov w0,_second_port\n\tmov #7,w7\n\tmov w7,_first_port",
+                       "mov #7,w7\n\tmov w7,_first_port\n\tmov w0,_second_port"),
+    "another bit": ("one_bit", "bset _first_port,#10", "bset _first_port,#11"),
+    "bit cleared": ("one_bit", "bset _first_port,#10", "bclr _first_port,#10"),
+    "register not saved": ("kept", "mov [--w15],w8", "sub w15,#2,w15"),
+    "stack not level": ("kept", "mov w8,[w15++]", "mov w8,[w15]"),
+    "kept where calls do not": ("kept", "add w0,w8,w0", "add w0,w1,w0"),
+    "wrong argument": ("kept", "mov #3,w1", "mov #4,w1"),
+    "another function": ("decided", "bra _another", "bra _outside"),
+    "another condition": ("decided", "bra z,", "bra nz,"),
+    "variable too small": ("local", "add w15,#8,w15", "add w15,#6,w15"),
+    "value in the wrong element": ("local", "mov w7,[w15-4]", "mov w7,[w15-6]"),
+    "jump table out of order": ("chosen", r"(\tbra (\.L\d+_\d+)\n)(\tbra (\.L\d+_\d+)\n)", r"\3\1"),
+    "index not scaled": ("indexed", "sl w0,w7", "mov w0,w7"),
+    "a round too few": ("summed", "mov #8,w7", "mov #7,w7"),
+    "float operands exchanged": ("below", "rcall ___ltsf2", "exch w0,w2\n\texch w1,w3\n\trcall ___ltsf2"),
+    "another library function": ("scaled", "rcall ___mulsf3", "rcall ___divsf3"),
+    "moved over a barrier": ("guarded", "mov w7,_words\n\tmov w7,_first_port", "mov w7,_first_port\n\tmov w7,_words"),
+    "assembly moved": ("barrier", "disi #5\n\tmov #1,w7\n\tmov w7,_first_port",
+                       "mov #1,w7\n\tmov w7,_first_port\n\tdisi #5"),
+}  # fmt: skip
+"""By kind of fault: the function, what its code at -Os says, and what is put there instead."""
+
+
+def planted(kind: str) -> Verdict:
+    """The verdict on a function with a fault."""
+    function, right, wrong = PLANTED[kind]
+
+    def edit(text: str) -> str:
+        start = text.index(f"\n_{function}:")
+        end = text.index(f".size _{function},")
+        pattern = right if "(" in right else re.escape(right)
+        body, count = re.subn(pattern, wrong if "(" in right else wrong.replace("\\", r"\\"), text[start:end], count=1)
+        assert count, f"{right!r} is not in the code:{text[start:end]}"
+        return text[:start] + body + text[end:]
+
+    made = subject([str(SAMPLE), "-Os", "-w"], edit)
+    (verdict,) = verdicts(made, function)
+    return verdict
+
+
+@pytest.mark.parametrize("level", ["-O1", "-Os", "-O2"])
+def test_right_code_is_proved(level: str) -> None:
+    found = {v.function: v.kind for v in verdicts(subject([str(SAMPLE), level, "-w"]))}
+    assert set(found.values()) == {"proved"}, found
+
+
+@pytest.mark.parametrize("kind", PLANTED)
+def test_a_planted_fault_is_refuted(kind: str) -> None:
+    verdict = planted(kind)
+    assert verdict.kind == "refuted", verdict
+
+
+def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> None:
+    """The larger of two, which gives the smaller: the emulator runs it on what the solver found."""
+    made = subject([str(SAMPLE), "-Os", "-w"], lambda text: text.replace("cpsgt w0,w1", "cpslt w0,w1"))
+    (verdict,) = verdicts(made, "larger")
+    assert verdict.witness is not None
+    file = tmp_path / "larger.elf"
+    file.write_bytes(image(made, verdict.witness))
+    machine = emu.load(file, engine="interp")
+    assert machine.run(until="__returned", cycles=1000).reason == "until"
+    a, b = (((verdict.witness.registers.get(n, 0) ^ 0x8000) - 0x8000) for n in (0, 1))
+    assert machine.w[0] == min(a, b) & 0xFFFF != max(a, b) & 0xFFFF
+
+
+def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
+    """A byte of a table is read from the wrong place."""
+    made = subject(
+        [str(SAMPLE), "-Os", "-w"], lambda text: text.replace("mov.b [w0+1],w7\n\tse", "mov.b [w0+2],w7\n\tse")
+    )
+    (verdict,) = verdicts(made, "widened")
+    assert verdict.witness is not None
+    file = tmp_path / "widened.elf"
+    file.write_bytes(image(made, verdict.witness))
+    machine = emu.load(file, engine="interp")
+    assert machine.run(until="__returned", cycles=10_000).reason == "until"
+    first, second = (machine.peek(verdict.witness.registers[0] + k & 0xFFFF, 1) for k in (1, 2))
+    assert machine.w[0] == ((second ^ 0x80) - 0x80) & 0xFFFF != ((first ^ 0x80) - 0x80) & 0xFFFF
+
+
+@pytest.mark.parametrize("file", ["clock.c", "error.c", "fault.c", "init.c"])
+def test_nothing_of_the_kernel_is_refuted(file: str) -> None:
+    """And what has no loop is proved."""
+    made = subject([str(KERNEL / file), "-Os", "-w", "-std=gnu99", *(f"-I{SYSTEM / name}" for name in FOLDERS)])
+    found = list(verdicts(made))
+    assert not [v for v in found if v.kind == "refuted"]
+    assert not [v for v in found if v.kind != "proved" and not v.loops]
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "one.c"
+    rounds = "int rounds(int n) { int s = 0; while (n--) s ^= s + n * n; return s; }"
+    source.write_text(f"int twice(int a) {{ return 2 * a; }}\n{rounds}\n")
+    assert main(["prove", str(source), "-Os", "--json"]) == DONE
+    found = {v["function"]: v for v in json.loads(capsys.readouterr().out)}
+    assert found["twice"]["kind"] == "proved"
+    assert not found["twice"]["loops"]
+    assert found["rounds"]["kind"] == "undecided"
+    assert found["rounds"]["loops"]
+    assert main(["prove", str(source), "--function", "absent"]) == BAD_INPUT
+    assert "no function absent" in capsys.readouterr().err
+    source.write_text("int broken(")
+    assert main(["prove", str(source)]) == FAULT

@@ -1,0 +1,81 @@
+"""`prove`: does machine code do what the optimised IR says?"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import Counter
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from emu.status import DONE, FAULT
+from toolchain.commands.parser import parser
+from toolchain.errors import ToolError
+from toolchain.files import write_outputs
+
+if TYPE_CHECKING:
+    from toolchain.proof.prove import Verdict
+
+DESCRIPTION = """Proves for each function of a C file, for all inputs, that its machine code does what the optimised
+LLVM IR says: same volatile accesses and calls in the same order, same result, same memory, W8-W15 and the return
+address kept. The instruction table is what the code means; z3 looks for an input that makes a difference.
+
+Per function: proved; refuted, with an input for which both differ (--keep writes an image that starts with it, to be
+run or debugged: it ends at __returned); or undecided, with the reason. Loops are followed as far as the input does not
+say how often they go round. What the proof takes for granted stands in toolchain/proof/README.md.
+Options of `cc` go behind the file."""
+
+
+def options_of() -> argparse.ArgumentParser:
+    """The options of the command."""
+    p = parser("prove", DESCRIPTION, "python -m toolchain prove filter.c -Os -Iinclude")
+    p.add_argument("file", help="C, C++ or LLVM IR")
+    p.add_argument("--function", metavar="NAME", help="only this one")
+    p.add_argument("--keep", metavar="FOLDER", help="images that start with the inputs found, FUNCTION.elf, for `emu`")
+    p.add_argument("--json", action="store_true", help="machine-readable output")
+    return p
+
+
+def main(arguments: list[str]) -> int:
+    """Print the verdicts; returns 0, or 1 when one is a refutation. Raises ToolError."""
+    options, rest = options_of().parse_known_args(arguments)
+    if find_spec("z3") is None:
+        raise ToolError("prove needs z3: python -m pip install z3-solver")
+    from toolchain.clang import CompileError
+    from toolchain.proof.prove import verdicts
+    from toolchain.proof.subject import subject
+
+    try:
+        made = subject([options.file, *rest])
+    except CompileError:
+        return FAULT
+    if options.function is not None and options.function not in made.module.functions:
+        raise ToolError(f"{options.file}: no function {options.function}")
+    found = []
+    for verdict in verdicts(made, options.function):
+        found.append(verdict)
+        if not options.json:
+            print(_line(verdict), flush=True)
+    counts = Counter(verdict.kind for verdict in found)
+    if options.keep is not None:
+        from toolchain.proof.witness import image
+
+        kept = [(v.function, image(made, v.witness)) for v in found if v.witness is not None]
+        write_outputs([(Path(options.keep) / f"{name}.elf", content) for name, content in kept])
+    if options.json:
+        print(json.dumps([asdict(verdict) for verdict in found], indent=1))
+    else:
+        print(", ".join(f"{counts[kind]} {kind}" for kind in ("proved", "refuted", "undecided")), file=sys.stderr)
+    return FAULT if counts["refuted"] else DONE
+
+
+def _line(verdict: Verdict) -> str:
+    text = f"{verdict.kind:10} {verdict.function}{' (loops)' if verdict.loops else ''}"
+    if verdict.why:
+        text += f": {verdict.why}"
+    if verdict.witness is not None:
+        text += f"\n           for {verdict.witness.text or 'every input'}"
+    return text

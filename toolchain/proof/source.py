@@ -1,0 +1,513 @@
+"""Optimised LLVM IR on symbolic inputs: one path after the other, with what the world sees of each.
+
+A value is a vector and the condition under which it is poison (None: never); an aggregate is a list of values. What
+would be undefined becomes an assumption of its path. The reader keeps no `nsw`, `nuw` or `exact`, so sums wrap here as
+they do in the machine: what is proved holds for more inputs than the IR promises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeAlias
+
+import z3
+
+from toolchain.ir.model import (
+    Arg,
+    Block,
+    ConstAgg,
+    ConstBytes,
+    ConstExpr,
+    ConstInt,
+    ConstZero,
+    Function,
+    GlobalRef,
+    InlineAsm,
+    Instr,
+    Type,
+    Undef,
+    Value,
+    size_of,
+    store_size,
+    struct_offsets,
+)
+from toolchain.proof import floats
+from toolchain.proof.intrinsics import INTRINSICS, base_of
+from toolchain.proof.memory import RAM, Frame, Memory
+from toolchain.proof.solver import Undecided, feasible
+from toolchain.proof.terms import Term, known, one_bit, product, truth, vector
+
+Symbolic: TypeAlias = tuple[Term, Term | None]
+"""A vector, and when it is poison."""
+MOST_VISITS: Final = 70
+"""Rounds of a loop that are followed on one path,"""
+MOST_FORKS: Final = 4
+"""and how many of them may end there or not, as the input says."""
+MOST_PATHS: Final = 400
+COMPARISONS: Final[dict[str, Callable[[Term, Term], Term]]] = {
+    "eq": lambda a, b: a == b, "ne": lambda a, b: a != b, "ugt": z3.UGT, "uge": z3.UGE, "ult": z3.ULT, "ule": z3.ULE,
+    "sgt": lambda a, b: a > b, "sge": lambda a, b: a >= b, "slt": lambda a, b: a < b, "sle": lambda a, b: a <= b,
+}  # fmt: skip
+SUMS: Final[dict[str, Callable[[Term, Term], Term]]] = {
+    "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": product, "and": lambda a, b: a & b,
+    "or": lambda a, b: a | b, "xor": lambda a, b: a ^ b,
+}  # fmt: skip
+SHIFTS: Final[dict[str, Callable[[Term, Term], Term]]] = {
+    "shl": lambda a, b: a << b, "lshr": z3.LShR, "ashr": lambda a, b: a >> b,
+}  # fmt: skip
+QUOTIENTS: Final[dict[str, Callable[[Term, Term], Term]]] = {
+    "udiv": z3.UDiv, "sdiv": lambda a, b: a / b, "urem": z3.URem, "srem": z3.SRem,
+}  # fmt: skip
+
+
+@dataclass
+class Event:
+    """What the world sees: a volatile access, a call, an assembly statement.
+
+    `kind` read, write, call or asm. `value` is what was read or written, of a call what it gives back, by words.
+    """
+
+    kind: str
+    address: Any = None
+    """Of an access or a call through a pointer a 16-bit term; of another call its name; of assembly its text."""
+    size: int = 0
+    value: Any = None
+    arguments: list[tuple[Value, Any, dict[str, object]]] = field(default_factory=list)
+    named: int | None = None
+    memory: Memory | None = None
+    """What must have been written before: of a call, and behind a barrier."""
+    after: Any = None
+    """The array behind it, where others may have written."""
+
+
+@dataclass
+class Path:
+    """One way through the function, up to now."""
+
+    memory: Memory
+    values: dict[int, Any] = field(default_factory=dict)
+    taken: list[Term] = field(default_factory=list)
+    """Conditions of its branches."""
+    assumed: list[Term] = field(default_factory=list)
+    """What must hold for it to mean anything."""
+    preferred: list[Term] = field(default_factory=list)
+    """What would be usual for it: pointers lead into RAM. An example of an input shows more so."""
+    events: list[Event] = field(default_factory=list)
+    visits: dict[str, int] = field(default_factory=dict)
+    forks: dict[str, int] = field(default_factory=dict)
+    result: Any = None
+    ended: str = ""
+    """ret or unreachable."""
+
+    def copy(self) -> Path:
+        """An independent path."""
+        return Path(self.memory.copy(), dict(self.values), [*self.taken], [*self.assumed], [*self.preferred],
+                    [*self.events], dict(self.visits), dict(self.forks))  # fmt: skip
+
+    @property
+    def known(self) -> list[Term]:
+        """All that holds on it."""
+        return self.taken + self.assumed
+
+
+class Evaluator:
+    """Follows one function. `address` gives a global's place, `frame` says where its variables lie."""
+
+    def __init__(self, function: Function, frame: Frame, address: Callable[[str], int]) -> None:
+        self.function: Final = function
+        self.frame: Final = frame
+        self.address: Final = address
+        self.blocks: Final = {b.name: b for b in function.blocks}
+        self.fresh = 0
+        self._slots = {i.name: i for b in function.blocks for i in b.instrs if i.op == "alloca"}
+
+    def paths(self, start: Path) -> Iterator[Path]:
+        """Every path that some input takes. Raises Undecided."""
+        work: list[tuple[Path, Block, str]] = [(start, self.function.blocks[0], "")]
+        ended = 0
+        while work:
+            path, block, came = work.pop()
+            while True:
+                following = self._block(path, block, came)
+                if not following:
+                    ended += 1
+                    if ended > MOST_PATHS:
+                        raise Undecided(f"more than {MOST_PATHS} ways through it")
+                    yield path
+                    break
+                possible = (
+                    following if len(following) == 1 else [(c, n) for c, n in following if feasible([*path.known, c])]
+                )
+                if not possible:
+                    break
+                came = block.name
+                if len(possible) > 1:
+                    path.forks[came] = path.forks.get(came, 0) + 1
+                    if path.forks[came] > MOST_FORKS:
+                        raise Undecided("a loop whose rounds are not known")
+                for condition, name in possible[1:]:
+                    other = path.copy()
+                    other.taken.append(condition)
+                    work.append((other, self.blocks[name], came))
+                condition, name = possible[0]
+                if len(following) > 1:
+                    path.taken.append(condition)
+                block = self.blocks[name]
+
+    # -- a block -----------------------------------------------------------------------------------------------------
+
+    def _block(self, path: Path, block: Block, came: str) -> list[tuple[Term, str]]:
+        """Run it; where it goes on, by condition."""
+        path.visits[block.name] = path.visits.get(block.name, 0) + 1
+        if path.visits[block.name] > MOST_VISITS:
+            raise Undecided("a loop whose rounds are not known")
+        entered = [(phi, self.value(path, phi.args[phi.blocks.index(came)])) for phi in block.phis()]
+        for phi, value in entered:
+            path.values[id(phi)] = value
+        for i in block.instrs:
+            if i.op == "phi":
+                continue
+            if i.op in ("br", "switch", "ret", "unreachable", "indirectbr"):
+                return self._leave(path, i)
+            found = self._instruction(path, i)
+            if found is not None:
+                path.values[id(i)] = found
+        raise Undecided("a block without an end")
+
+    def _leave(self, path: Path, i: Instr) -> list[tuple[Term, str]]:
+        if i.op == "ret":
+            path.result, path.ended = (self.value(path, i.args[0]) if i.args else None), "ret"
+            return []
+        if i.op == "unreachable":
+            path.ended = "unreachable"
+            return []
+        if i.op == "indirectbr":
+            raise Undecided("a computed goto")
+        if not i.args:
+            return [(z3.BoolVal(True), i.blocks[0])]
+        term = self.sure(path, i.args[0])
+        if i.op == "br":
+            if i.blocks[0] == i.blocks[1]:
+                return [(z3.BoolVal(True), i.blocks[0])]
+            place = known(term)
+            if place is not None:
+                return [(z3.BoolVal(True), i.blocks[0 if place else 1])]
+            return [(truth(term), i.blocks[0]), (z3.Not(truth(term)), i.blocks[1])]
+        cases = i.extra["cases"]
+        assert isinstance(cases, list)
+        out: dict[str, list[Term]] = {}
+        for case, name in zip(cases, i.blocks[1:], strict=True):
+            out.setdefault(name, []).append(term == vector(case, term.size()))
+        rest = z3.And(*(term != vector(case, term.size()) for case in cases)) if cases else z3.BoolVal(True)
+        out.setdefault(i.blocks[0], []).append(rest)
+        return [(z3.Or(*conditions), name) for name, conditions in out.items()]
+
+    # -- operands ----------------------------------------------------------------------------------------------------
+
+    def value(self, path: Path, v: Value) -> Any:
+        """What an operand is."""
+        match v:
+            case Instr() | Arg():
+                return path.values[id(v)]
+            case ConstInt():
+                return vector(v.value, v.type.bits), None
+            case GlobalRef():
+                return vector(self._place(v.name) + v.offset, 16), None
+            case Undef():
+                return self._of_type(v.type, lambda t: (self.unknown("undef", t.bits), z3.BoolVal(True)))
+            case ConstZero():
+                return self._of_type(v.type, lambda t: (vector(0, t.bits), None))
+            case ConstAgg():
+                return [self.value(path, e) for e in v.elems]
+            case ConstBytes():
+                return [(vector(b, 8), None) for b in v.data]
+            case ConstExpr():
+                return self._expression(path, v)
+            case _:
+                raise Undecided(f"an operand {type(v).__name__}")
+
+    def _place(self, name: str) -> int:
+        try:
+            return self.address(name)
+        except KeyError:
+            raise Undecided(f"no address of {name}") from None
+
+    def _expression(self, path: Path, v: ConstExpr) -> Symbolic:
+        parts = [self.value(path, a) for a in v.args]
+        if v.op in SUMS:
+            return SUMS[v.op](parts[0][0], parts[1][0]), None
+        return self._cast(v.op, parts[0], v.type)
+
+    def _of_type(self, t: Type, make: Callable[[Type], Any]) -> Any:
+        if t.kind in ("int", "ptr", "float"):
+            return make(t)
+        if t.kind == "struct":
+            return [self._of_type(e, make) for e in t.elems]
+        if t.kind == "array":
+            return [self._of_type(t.elems[0], make) for _ in range(t.count)]
+        raise Undecided(f"a value of type {t}")
+
+    def sure(self, path: Path, v: Value) -> Term:
+        """An operand that must not be poison."""
+        term, poison = self._scalar(path, v)
+        if poison is not None:
+            path.assumed.append(z3.Not(poison))
+        return term
+
+    def _scalar(self, path: Path, v: Value) -> Symbolic:
+        found = self.value(path, v)
+        if isinstance(found, list):
+            raise Undecided(f"an aggregate of type {v.type}")
+        return found  # type: ignore[no-any-return]
+
+    def unknown(self, name: str, bits: int) -> Term:
+        """A new free vector."""
+        self.fresh += 1
+        return z3.BitVec(f"{name}.{self.fresh}", bits)
+
+    # -- instructions ------------------------------------------------------------------------------------------------
+
+    def _instruction(self, path: Path, i: Instr) -> Any:
+        if i.op in SUMS | SHIFTS | QUOTIENTS:
+            return self._binary(path, i)
+        if i.op in floats.SUMS:
+            (a, p), (b, q) = self._scalar(path, i.args[0]), self._scalar(path, i.args[1])
+            return floats.arithmetic(i.op, a, b), either(p, q)
+        handler = _HANDLERS.get(i.op)
+        if handler is None:
+            if i.op in ("sitofp", "uitofp", "fptosi", "fptoui", "fpext", "fptrunc"):
+                a, p = self._scalar(path, i.args[0])
+                return floats.converted(i.op, a, i.type.bits), p
+            if i.op in ("zext", "sext", "trunc", "ptrtoint", "inttoptr", "bitcast", "addrspacecast", "ptrtoaddr"):
+                return self._cast(i.op, self._scalar(path, i.args[0]), i.type)
+            raise Undecided(f"the instruction {i.op}")
+        return handler(self, path, i)
+
+    def _binary(self, path: Path, i: Instr) -> Symbolic:
+        (a, p), (b, q) = self._scalar(path, i.args[0]), self._scalar(path, i.args[1])
+        poison = either(p, q)
+        if i.op in QUOTIENTS:
+            b = self.sure(path, i.args[1])
+            path.assumed.append(b != 0)
+            if i.op in ("sdiv", "srem"):
+                least = vector(1 << i.type.bits - 1, i.type.bits)
+                path.assumed.append(z3.Not(z3.And(a == least, b == vector(-1, i.type.bits))))
+            return QUOTIENTS[i.op](a, b), poison
+        if i.op in SHIFTS:
+            amount = known(b)
+            if amount is None:
+                poison = either(poison, z3.UGE(b, vector(i.type.bits, i.type.bits)))
+            elif amount >= i.type.bits:
+                poison = z3.BoolVal(True)
+            return SHIFTS[i.op](a, b), poison
+        return SUMS[i.op](a, b), poison
+
+    def _cast(self, op: str, value: Symbolic, t: Type) -> Symbolic:
+        term, poison = value
+        more = t.bits - term.size()
+        if op == "sext" and more > 0:
+            return z3.SignExt(more, term), poison
+        if more > 0:
+            return z3.ZeroExt(more, term), poison
+        return (z3.Extract(t.bits - 1, 0, term) if more < 0 else term), poison
+
+    def _compare(self, path: Path, i: Instr) -> Symbolic:
+        (a, p), (b, q) = self._scalar(path, i.args[0]), self._scalar(path, i.args[1])
+        if i.op == "fcmp":
+            return floats.compared(i.pred, a, b), either(p, q)
+        return one_bit(COMPARISONS[i.pred](a, b)), either(p, q)
+
+    def _negated(self, path: Path, i: Instr) -> Symbolic:
+        term, poison = self._scalar(path, i.args[0])
+        return term ^ vector(1 << i.type.bits - 1, i.type.bits), poison
+
+    def _select(self, path: Path, i: Instr) -> Any:
+        c, poison = self._scalar(path, i.args[0])
+        place = known(c)
+        a, b = self.value(path, i.args[1]), self.value(path, i.args[2])
+        if place is not None:
+            return a if place else b
+        if isinstance(a, list):
+            raise Undecided("a choice of aggregates")
+        mixed = None
+        if a[1] is not None or b[1] is not None:
+            false = z3.BoolVal(False)
+            mixed = z3.If(truth(c), false if a[1] is None else a[1], false if b[1] is None else b[1])
+        return z3.If(truth(c), a[0], b[0]), either(poison, mixed)
+
+    def _freeze(self, path: Path, i: Instr) -> Any:
+        term, poison = self._scalar(path, i.args[0])
+        if poison is not None and feasible([*path.known, poison]):
+            raise Undecided("freeze of what may be undefined")
+        return term, None
+
+    def _alloca(self, path: Path, i: Instr) -> Symbolic:
+        if i.name not in self.frame.objects:
+            raise Undecided("a variable without a place in the frame")
+        return vector(self.frame.objects[i.name][0], 16), None
+
+    def _address(self, path: Path, i: Instr) -> Symbolic:
+        """getelementptr: bases and strides are exact, the rest wraps."""
+        base, poison = self._scalar(path, i.args[0])
+        t = i.extra["type"]
+        assert isinstance(t, Type)
+        for k, index in enumerate(i.args[1:]):
+            if k and t.kind == "struct":
+                assert isinstance(index, ConstInt)
+                base = base + vector(struct_offsets(t)[index.value], 16)
+                t = t.elems[index.value]
+                continue
+            t = t.elems[0] if k else t
+            term, wrong = self._scalar(path, index)
+            place = self._cast("sext", (term, None), Type("int", 16))[0]
+            base, poison = base + place * vector(size_of(t), 16), either(poison, wrong)
+        number = known(base)
+        return (vector(number, 16) if number is not None else base), poison
+
+    def _load(self, path: Path, i: Instr) -> Any:
+        address = self._accessed(path, i.args[0], i.type, i)
+        if i.volatile:
+            size = store_size(i.type)
+            value = self.unknown("read", 8 * size)
+            path.events.append(Event("read", address, size, value, memory=self._settled(path)))
+            return self._cast("trunc", (value, None), i.type)
+        return self._loaded(path, address, i.type)
+
+    def _loaded(self, path: Path, address: Term, t: Type) -> Any:
+        if t.kind == "struct":
+            offsets = struct_offsets(t)
+            return [self._loaded(path, address + o, e) for o, e in zip(offsets, t.elems, strict=False)]
+        if t.kind not in ("int", "ptr", "float"):
+            raise Undecided(f"a value of type {t}")
+        return self._cast("trunc", (path.memory.read(address, store_size(t)), None), t)
+
+    def _store(self, path: Path, i: Instr) -> None:
+        t = i.args[0].type
+        address = self._accessed(path, i.args[1], t, i)
+        value = self.value(path, i.args[0])
+        if i.volatile:
+            term = self._cast("zext", (self.sure(path, i.args[0]), None), Type("int", 8 * store_size(t)))[0]
+            path.events.append(Event("write", address, store_size(t), term, memory=self._settled(path)))
+            return
+        self._stored(path, address, t, value)
+
+    def _stored(self, path: Path, address: Term, t: Type, value: Any) -> None:
+        if t.kind == "struct":
+            for o, e, part in zip(struct_offsets(t), t.elems, value, strict=False):
+                self._stored(path, address + o, e, part)
+            return
+        term, poison = value
+        if poison is not None:
+            path.assumed.append(z3.Not(poison))
+        path.memory.write(address, term)
+
+    def _accessed(self, path: Path, pointer: Value, t: Type, i: Instr) -> Term:
+        """The address, with what may be assumed of it: nothing private lies there, words are even."""
+        address = self.sure(path, pointer)
+        size = store_size(t) if t.kind in ("int", "ptr", "float") else size_of(t)
+        return self.reached(path, address, size, str(i.extra.get("align", "")) != "1")
+
+    def reached(self, path: Path, address: Term, size: int, even: bool) -> Term:
+        """As `_accessed`, of bytes at an address."""
+        if known(address) is None:
+            path.assumed.append(self.frame.spared(address, size))
+            path.preferred.append(z3.And(z3.UGE(address, RAM), z3.ULT(address, self.frame.lowest - size)))
+            if size > 1 and even:
+                path.assumed.append(z3.Extract(0, 0, address) == 0)
+        return address
+
+    def _extract(self, path: Path, i: Instr) -> Any:
+        found = self.value(path, i.args[0])
+        indices = i.extra["indices"]
+        assert isinstance(indices, list)
+        for k in indices:
+            found = found[k]
+        return found
+
+    def _insert(self, path: Path, i: Instr) -> Any:
+        whole, part = self.value(path, i.args[0]), self.value(path, i.args[1])
+        indices = i.extra["indices"]
+        assert isinstance(indices, list)
+        return _replaced(whole, indices, part)
+
+    def _call(self, path: Path, i: Instr) -> Any:
+        callee = i.args[-1]
+        if isinstance(callee, InlineAsm):
+            return self._assembly(path, i, callee)
+        if isinstance(callee, GlobalRef) and callee.name.startswith("llvm."):
+            base = base_of(callee.name)
+            handler = INTRINSICS.get(base)
+            if handler is None:
+                raise Undecided(f"the intrinsic {base}")
+            return handler(self, path, i)
+        attributes = i.extra["attrs"]
+        assert isinstance(attributes, list)
+        target = callee.name if isinstance(callee, GlobalRef) else self._even(path, self.sure(path, callee))
+        event = self.called(path, target, i.args[:-1], attributes)
+        if i.extra.get("vararg"):
+            assert isinstance(i.extra["fixed"], int)
+            event.named = i.extra["fixed"]
+        if i.type.kind != "void":
+            event.value = self._of_type(i.type, lambda t: (self.unknown("result", t.bits), None))
+        return event.value
+
+    def _even(self, path: Path, pointer: Term) -> Term:
+        """A pointer to code: no function has an odd address, and the machine does not look at that bit."""
+        path.assumed.append(z3.Extract(0, 0, pointer) == 0)
+        return pointer
+
+    def called(
+        self, path: Path, target: Any, values: list[Value], attributes: list[dict[str, object]] | None = None
+    ) -> Event:
+        """A call of something that may change whatever others can reach."""
+        attributes = attributes or [{} for _ in values]
+        arguments = [(v, self.value(path, v), k) for v, k in zip(values, attributes, strict=True)]
+        event = Event("call", target, arguments=arguments, memory=path.memory.copy())
+        path.events.append(event)
+        self._others_run(path, event)
+        return event
+
+    def _assembly(self, path: Path, i: Instr, code: InlineAsm) -> None:
+        outside = [word for word in code.constraints.split(",") if not word.startswith("~")]
+        if (outside and outside != [""]) or i.args[:-1]:
+            raise Undecided("assembly with operands")
+        clobbers = "~{memory}" in code.constraints
+        path.memory.settled = clobbers
+        if code.text.strip():
+            event = Event("asm", code.text, memory=self._settled(path))
+            path.events.append(event)
+            if clobbers:
+                self._others_run(path, event)
+
+    def _settled(self, path: Path) -> Memory | None:
+        """Memory as it must be here, if a barrier stands right in front."""
+        return path.memory.copy() if path.memory.settled else None
+
+    def _others_run(self, path: Path, event: Event) -> None:
+        event.after = z3.Array(f"memory.{len(path.events)}", z3.BitVecSort(16), z3.BitVecSort(8))
+        path.memory.become(event.after, self.frame.kept())
+
+    def _nothing(self, path: Path, i: Instr) -> None:
+        """A fence: the order of accesses is compared anyway."""
+
+
+def either(a: Term | None, b: Term | None) -> Term | None:
+    """Whether one of them is poison."""
+    if a is None or b is None:
+        return b if a is None else a
+    return z3.Or(a, b)
+
+
+def _replaced(whole: list[Any], indices: list[int], part: Any) -> list[Any]:
+    out = list(whole)
+    out[indices[0]] = part if len(indices) == 1 else _replaced(whole[indices[0]], indices[1:], part)
+    return out
+
+
+_HANDLERS: Final[dict[str, Callable[[Evaluator, Path, Instr], Any]]] = {
+    "icmp": Evaluator._compare, "fcmp": Evaluator._compare, "fneg": Evaluator._negated, "select": Evaluator._select,
+    "freeze": Evaluator._freeze, "alloca": Evaluator._alloca, "getelementptr": Evaluator._address,
+    "load": Evaluator._load, "store": Evaluator._store, "call": Evaluator._call, "extractvalue": Evaluator._extract,
+    "insertvalue": Evaluator._insert, "fence": Evaluator._nothing,
+}  # fmt: skip
