@@ -180,7 +180,7 @@ def measure(path: Path, program: Program, names: list[str], seconds: float) -> M
     """The worst of each function, plain and otherwise, and the most of everything there was meanwhile."""
     machine = emu.load(path)
     meter = Meter(machine, Structures(machine))
-    for handler in program.interrupts():
+    for handler, _, _ in program.interrupts():
         machine.hook_pc(handler, meter.disturb)
     for hooked, hook in ((SWITCHES, meter.disturb), (APART, meter.apart)):
         for name in hooked:

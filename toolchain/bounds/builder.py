@@ -7,11 +7,11 @@ destination it spares the stack until an address of the stack has got out of sig
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from emu.dspic30f.isa.builder import Context, Side, Size
-from toolchain.bounds.rules import ADDRESSING, EARLY
+from toolchain.bounds.rules import ADDRESSING, EARLY, LOOP_REGISTER, STACK_POINTER
 from toolchain.bounds.state import NOWHERE, Area, State, hides
 from toolchain.bounds.values import (
     ACCUMULATOR,
@@ -29,7 +29,14 @@ from toolchain.bounds.values import (
     union,
 )
 
-SR, CORCON, TBLPAG = 0x42, 0x44, 0x32
+SR, CORCON, TBLPAG, DISICNT, INTCON1 = 0x42, 0x44, 0x32, 0x52, 0x80
+DCOUNT, DOSTARTL, DOSTARTH, DOENDL, DOENDH = LOOP_REGISTERS = range(0x38, 0x42, 2)
+DL = 0x0700
+"""Bits of CORCON that count open DO loops (isa.md §2.4)."""
+NSTDIS = 1 << 15
+"""Bit of INTCON1 with which no interrupt interrupts another (isa.md §14.1)."""
+COUNTS = 0x3FFF
+"""What DCOUNT and DISICNT hold at most."""
 ENABLES = {0x46: 0xC000, 0x50: 0x8000}
 """MODCON and XBREV: the bits that turn modulo and bit-reversed addressing on (isa.md §8)."""
 EDT = 1 << 11
@@ -59,11 +66,22 @@ class World:
     """Word addresses of variables that nobody but the code looked at changes."""
     links_in_ram: Callable[[int], bool] = lambda _pc: False
     """Whether the instruction at an address finds nothing but RAM behind pointers it loads."""
+    priorities: Mapping[int, list[tuple[int, str, int]]] = field(default_factory=dict)
+    """Registers that give interrupts their priority: address -> shift, name, told level of each that has a handler."""
+    enables: frozenset[int] = frozenset()
+    """Registers that enable interrupts."""
 
 
 def exact(value: Value) -> bool:
     """Whether it is one integer."""
     return not isinstance(value, Span)
+
+
+def levels_in(status: Value) -> tuple[int, int]:
+    """Least and greatest priority that a value for SR sets."""
+    mask, bits = known(status)
+    low = (bits & mask & IPL_BITS) >> 5
+    return low, low | (~mask & IPL_BITS) >> 5
 
 
 class Abstract:
@@ -81,13 +99,19 @@ class Abstract:
         """Why what the instruction does has no bound."""
         self.lowest = NOWHERE
         """The lowest address of a stack it has read."""
+        self.rewrote = False
+        """Whether a store has reached flags or registers that branches ask for."""
+        self.unnested = False
+        """Whether it has turned nesting off."""
+        self.level: str | None = None
+        """Which interrupt it has given another priority than is told."""
         self._saw = NOWHERE
         self._stores: list[tuple[Value, Value, Size]] = []
 
     def begin(self, pc: int, state: State) -> None:
         """Prepare for the instruction at `pc`."""
         self.pc, self.state, self.window, self._saw = pc, state, False, NOWHERE
-        self.refused, self.lowest = None, NOWHERE
+        self.refused, self.lowest, self.rewrote = None, NOWHERE, False
         self._stores.clear()
 
     def commit(self) -> None:
@@ -243,8 +267,9 @@ class Abstract:
         if ea < W_END:
             word = state.w[ea >> 1]
             return word if size == 2 else word >> 8 * (ea & 1) & 0xFF
-        if ea & ~1 == SR:
-            return self._status() if size == 2 else self._status() >> 8 * (ea & 1) & 0xFF
+        register = self._core_register(ea & ~1)
+        if register is not None:
+            return register if size == 2 else register >> 8 * (ea & 1) & 0xFF
         if size == 2:
             if ea in mem:
                 return mem[ea]
@@ -253,6 +278,22 @@ class Abstract:
         if ea & ~1 in mem:
             return mem[ea & ~1] >> 8 * (ea & 1) & 0xFF
         return mem.get(~ea, BYTE)
+
+    def _core_register(self, ea: int) -> Value | None:
+        """What is known of SR, of DISICNT, and within a DO loop of CORCON and the registers of the loop."""
+        state = self.state
+        if ea == SR:
+            return self._status()
+        if ea == DISICNT:
+            return span(0, min(COUNTS, state.blocked + 1)) if state.disi else 0
+        if not state.loops:
+            return None
+        if ea == CORCON:
+            return state.mem[ea] & ~DL | Span(0, DL, ~DL, 0) if ea in state.mem else WORD
+        if ea not in LOOP_REGISTERS:
+            return None
+        start, end, count = state.loops[-1]
+        return (count, start & 0xFFFF, start >> 16, end & 0xFFFF, end >> 16)[LOOP_REGISTERS.index(ea)]
 
     def _status(self) -> Value:
         """SR: of it the level is known where it is one."""
@@ -273,6 +314,8 @@ class Abstract:
                     self._set_status(value)
             elif ea == TBLPAG:
                 state.regs["TBLPAG"] = value
+            elif ea & ~1 in self.world.enables:
+                self._enable(ea & ~1, value if size == 2 else WORD)
             elif area.holds(ea) or ea & ~1 in self.world.private:
                 self._keep(ea, value, size)
                 return
@@ -284,8 +327,8 @@ class Abstract:
         if not hides(ea):
             low, high = ends(ea)
             self._forget(low, high + size - 1)
-            if high < SFR_END:
-                self._overwritten(low, high + size - 1, value if size == 2 else WORD)
+            if low < SFR_END:
+                self._overwritten(low, min(high + size, SFR_END) - 1, value if size == 2 else WORD)
             return
         self.wild = True
         if state.leaked < NOWHERE:
@@ -294,6 +337,7 @@ class Abstract:
 
     def _register(self, ea: int, value: Value, size: Size) -> None:
         """A store to a working register, of which a byte leaves the other."""
+        self.rewrote = True
         number = ea >> 1
         if size == 2:
             self.set_w(number, value)
@@ -312,7 +356,16 @@ class Abstract:
         ones, zeros = (mask & bits) << shift, (mask & ~bits) << shift
         reached = 0xFFFF if size == 2 else 0xFF << shift
         state = self.state
-        if register == CORCON and EDT & reached & ~zeros:
+        if register in LOOP_REGISTERS:
+            self._loop_register(register, value, size)
+        elif register == DISICNT:
+            blocked = ends(value)[1] & COUNTS if size == 2 and ends(value)[1] <= COUNTS else COUNTS
+            state.disi = state.time + blocked if blocked else 0
+        elif register == INTCON1 and ones & NSTDIS:
+            self.unnested = True
+        elif register in self.world.priorities:
+            self._priorities(register, ones, zeros)
+        elif register == CORCON and EDT & reached & ~zeros:
             if state.loops:
                 start, end, count = state.loops[-1]
                 state.loops = (*state.loops[:-1], (start, end, span(0, ends(count)[1])))
@@ -321,13 +374,51 @@ class Abstract:
         elif ones & ENABLES.get(register, 0):
             self.refused = ADDRESSING
 
+    def _enable(self, register: int, value: Value) -> None:
+        """A store that enables interrupts, or none."""
+        if exact(value) and not value:
+            self.state.regs[f"{register:#x}"] = 0
+        else:
+            self.state.regs.pop(f"{register:#x}", None)
+
+    def disabled(self, state: State) -> bool:
+        """Whether no interrupt is enabled: then none is requested."""
+        return all(f"{register:#x}" in state.regs for register in self.world.enables)
+
+    def _loop_register(self, register: int, value: Value, size: int) -> None:
+        """A store to DCOUNT, DOSTART or DOEND. Without an open loop of ours it is somebody else's that is brought back,
+        so on a stack that is not ours: a change of threads."""
+        state = self.state
+        if not state.loops or not exact(state.w[STACK]):
+            return
+        start, end, _ = state.loops[-1]
+        if register == DCOUNT and size == 2 and ends(value)[1] <= COUNTS:
+            state.loops = (*state.loops[:-1], (start, end, value))
+        elif size == 1 or not exact(value) or value != self._core_register(register):
+            self.refused = LOOP_REGISTER
+
+    def _priorities(self, register: int, ones: int, zeros: int) -> None:
+        """A store to the priorities of interrupts, of which bits are known: each may be set to what is told, or off."""
+        for shift, name, told in self.world.priorities[register]:
+            on, off = ones >> shift & 7, zeros >> shift & 7
+            if all(on & ~level or off & level for level in (0, told)):
+                self.level = f"{name}: {on}" if on | off == 7 else name
+
     def _overwritten(self, low: int, high: int, value: Value) -> None:
         """One of the registers in the SFR space was written, which is not known; it may hold `value`."""
+        self.rewrote = True
         state = self.state
-        for number in range(low >> 1, min(high >> 1, STACK) + 1):
+        for number in range(low >> 1, min(high >> 1, STACK - 1) + 1):
             state.w[number] = union(state.w[number], value)
+        if low <= 2 * STACK + 1 and high >= 2 * STACK:
+            self.refused = STACK_POINTER
         if low <= SR <= high:
             self._set_status(BYTE)
+        if state.loops and low <= DOENDH + 1 and high >= DCOUNT:
+            self.refused = LOOP_REGISTER
+        for register in self.world.enables:
+            state.regs.pop(f"{register:#x}", None)
+        self.unnested |= low <= INTCON1 + 1 and high >= INTCON1
         if low <= CORCON + 1 and high >= CORCON:
             state.ipl = state.ipl[0] & ~TRAP, state.ipl[1]
             if state.loops:
@@ -355,9 +446,9 @@ class Abstract:
                 self.state.leaked = min(self.state.leaked, ends(value)[0])
 
     def _set_status(self, value: Value) -> None:
+        self.rewrote = True
+        low, high = levels_in(value)
         mask, bits = known(value)
-        low = (bits & mask & IPL_BITS) >> 5
-        high = low | (~mask & IPL_BITS) >> 5
         self.state.ipl = self.state.ipl[0] & TRAP | low, self.state.ipl[1] & TRAP | high
         for name, bit in (("C", 0), ("Z", 1), ("OV", 2), ("N", 3)):
             self.state.flags[name] = bits >> bit & 1 if mask >> bit & 1 else EITHER

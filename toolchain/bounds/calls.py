@@ -6,10 +6,10 @@ from abc import abstractmethod
 from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Skip
-from toolchain.bounds.builder import exact
+from toolchain.bounds.builder import TRAP, exact, levels_in
 from toolchain.bounds.graph import Block, Step
 from toolchain.bounds.outcome import Outcome
-from toolchain.bounds.rules import DEEP, ELSEWHERE, JUMP
+from toolchain.bounds.rules import DEEP, ELSEWHERE, JUMP, TABLE
 from toolchain.bounds.state import INHERITED, NOWHERE, State
 from toolchain.bounds.steps import Steps
 from toolchain.bounds.values import Value, ends
@@ -43,8 +43,12 @@ class Calls(Steps):
             table = self.code.blocks[self._head(last)].following
             if not table:
                 self.outcome.open[last.pc] = JUMP
+            least, most = ends(target)
             for place in table:
-                self._arrive(place, state.copy())
+                if least <= place <= most:
+                    self._arrive(place, state.copy())
+            if table and not table[0] <= least <= most <= table[-1]:
+                self.outcome.open[last.pc] = TABLE
             return
         targets = [target] if exact(target) else self._unknown(last.pc, state)
         for place in targets:
@@ -65,7 +69,7 @@ class Calls(Steps):
 
     def _unknown(self, pc: int, state: State) -> list[int]:
         if not exact(state.w[15]):
-            self.outcome.left = max(self.outcome.left or 0, state.time)
+            self._leave(state)
             return [entry for entry in self.explorer.rules.resumed() if entry not in self.explorer.active]
         found = self.explorer.rules.calls(pc, state)
         if found is None:
@@ -92,18 +96,20 @@ class Calls(Steps):
             if allowed is None:
                 self.outcome.open[last.pc] = "recursion"
             return
-        start, since, stack = state.time, state.since.copy(), state.w[15]
+        start, since, stack, waits = state.time, state.since.copy(), state.w[15], state.waits
         if not tail:
             state.flags = State().flags
         before = state.copy()
         found, general = explorer.call(target, state, many)
         self.outcome.take(found, start, since, (self.code.entry,))
+        if found.left is not None:
+            self.outcome.waits |= found.waits | waits
         self.outcome.arguments |= tail and found.arguments
         level = explorer.rules.back(target)
         if level is not None and found.left is not None:
             back = state.copy()
             self._lose_registers(back)
-            back.time, back.ipl = found.left, (level, level)
+            back.time, back.ipl, back.waits = found.left, (level, level), frozenset(found.waits)
             back.w[15] = stack - 4 & 0xFFFF
             ends = [back]
         else:
@@ -118,6 +124,7 @@ class Calls(Steps):
             if not tail and level is None:
                 end.w[8:15] = before.w[8:15]
             end.shift(start)
+            end.waits |= waits
             end.since = [since[k] if s == INHERITED else s for k, s in enumerate(end.since)]
             self._levels(end, last.pc)
             if tail:
@@ -154,11 +161,22 @@ class Calls(Steps):
         state.w[:8] = fresh.w[:8]
         state.flags = fresh.flags
 
+    def _leave(self, state: State) -> None:
+        """Control goes to another stack."""
+        self.outcome.left = max(self.outcome.left or 0, state.time)
+        self.outcome.waits |= state.waits
+
+    @staticmethod
+    def _restored(state: State, srl: Value, ipl3: Value) -> None:
+        """RETFIE brings the level back that was stacked (isa.md §7.4)."""
+        (low, high), trap = levels_in(srl), ends(ipl3)
+        state.ipl = low | (TRAP if trap[0] else 0), high | (TRAP if trap[1] else 0)
+
     def _return(self, target: Value, state: State) -> None:
         if not exact(state.w[15]):
             if not self.explorer.rules.switches(self.code.entry):
                 self.outcome.open[self.code.entry] = ELSEWHERE
-            self.outcome.left = max(self.outcome.left or 0, state.time)
+            self._leave(state)
             state.ipl, state.disi = (0, 0), 0  # whatever level it is, this stack is done with it
             self._levels(state, self.code.entry)
             return

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
-from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Reset, Return, Skip, Sleep
+from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Reset, Return, Skip
 from toolchain.bounds.builder import Abstract, World, exact
 from toolchain.bounds.calls import Calls
 from toolchain.bounds.compare import Result, refined, tested
@@ -76,6 +76,7 @@ class Explorer:
         """Run from the first instruction of `entry`; the outcome's times count from there."""
         state.shift(-state.time)
         state.since = [None if s is None else INHERITED for s in state.since]
+        state.waits = frozenset()
         key = self._key(entry, state)
         found = self.known.get(key)
         if found is None:
@@ -233,7 +234,7 @@ class _Run(Calls):
                 if {h: s.key() for h, s in now.items()} == {h: s.key() for h, s in before.items()}:
                     if bound is None:
                         explorer.hopeless.add(loop.head)
-                        self._endless(loop)
+                        self._endless(loop, before, now)
                         break
                     if len(loop.heads) == 1:
                         self._rounds(before[loop.head], now[loop.head], bound - turns)
@@ -270,12 +271,13 @@ class _Run(Calls):
         """As many rounds more as the one from `before` to `state`, which changed nothing but the time."""
         cycles = (state.time - before.time) * count
         state.time += cycles
-        state.disi += cycles
+        if state.disi:
+            state.disi += cycles
         for level, (was, now) in enumerate(zip(before.since, state.since, strict=True)):
             if was is not None and now is not None and was != now:
                 state.since[level] = now + cycles
 
-    def _endless(self, loop: Loop) -> None:
+    def _endless(self, loop: Loop, before: dict[int, State], now: dict[int, State]) -> None:
         exits = any(t not in loop.members for m in loop.members for t in self.code.blocks[m].following)
         returns = any(self.code.blocks[m].steps[-1].flow is Return for m in loop.members)
         if exits or returns:
@@ -283,6 +285,15 @@ class _Run(Calls):
             self.outcome.open[loop.head] = MERGED if merged else LONG if long else LOOP
         else:
             self.outcome.forever.add(loop.head)
+            for head in before.keys() & now.keys():
+                if not self.explorer.abstract.disabled(now[head]):
+                    self._hold(head, before[head], now[head])
+
+    def _hold(self, head: int, before: State, now: State) -> None:
+        """A stretch that has become longer by a round of an endless loop has no end."""
+        for level, (was, since) in enumerate(zip(before.since, now.since, strict=True)):
+            if was is not None and since is not None and now.time - since > before.time - was:
+                self.outcome.held[level] = head
 
     # -- instructions --------------------------------------------------------------------------------------------
 
@@ -294,6 +305,7 @@ class _Run(Calls):
             raise TooMuch
         flow: Flow = None
         result: Result | None = None
+        rewritten = False
         for index, step in enumerate(block.steps):
             if index == block.tested:
                 before = state.w.copy()
@@ -301,6 +313,7 @@ class _Run(Calls):
                 result = Result.of(step, before, state.w)
             else:
                 flow = self._step(step, state)
+            rewritten = explorer.abstract.rewrote or (rewritten and not step.insn.row.flags)
         last = block.steps[-1]
         if last.pc in self.code.ends:
             if last.flow is not None:
@@ -310,7 +323,7 @@ class _Run(Calls):
         if state.loops and last.pc == state.loops[-1][1] and not isinstance(flow, Branch | Goto | Return):
             self._loop_end(state, last)
             return
-        self._follow(block, flow, state, result)
+        self._follow(block, flow, state, None if rewritten else (result,))
 
     def _loop_end(self, state: State, last: Step) -> None:
         """Behind the last instruction of a DO loop (isa.md §7.6)."""
@@ -324,8 +337,9 @@ class _Run(Calls):
             state.loops = state.loops[:-1]
             self._arrive(last.after, state)
 
-    def _follow(self, block: Block, flow: Flow, state: State, result: Result | None) -> None:
-        """Where control goes behind a block."""
+    def _follow(self, block: Block, flow: Flow, state: State, compared: tuple[Result | None] | None) -> None:
+        """Where control goes behind a block. `compared`: the result its flags tell of, if it still stands; None if
+        a store has changed flags or registers since."""
         last = block.steps[-1]
         match flow:
             case Branch(cond, target):
@@ -335,9 +349,9 @@ class _Run(Calls):
                     return
                 taken = state.copy()
                 taken.time += 1
-                if refined(block.steps, taken, True, result):
+                if compared is None or refined(block.steps, taken, True, *compared):
                     self._arrive(target, taken)
-                if refined(block.steps, state, False, result):
+                if compared is None or refined(block.steps, state, False, *compared):
                     self._arrive(last.after, state)
             case Skip(cond):
                 if not exact(cond) or cond:
@@ -352,11 +366,11 @@ class _Run(Calls):
                 self._goto(last, target, state)
             case Call(target):
                 self._call(last, target, state)
-            case Return(_, target):
+            case Return(kind, target, srl, ipl3):
+                if kind == "retfie":
+                    self._restored(state, srl, ipl3)
                 self._return(target, state)
             case Reset():
                 return
-            case Sleep():
-                self._arrive(last.after, state)
             case _:
                 self._arrive(last.after, state)

@@ -34,6 +34,16 @@ class Outcome:
     """It reads its caller's part of the stack."""
     visited: set[int] = field(default_factory=set)
     """Functions run."""
+    waits: set[int] = field(default_factory=set)
+    """PWRSAV on the ways to another stack; those on the ways to its return are in `ends`."""
+    held: dict[int, int] = field(default_factory=dict)
+    """Levels held back for ever: level -> head of the endless loop."""
+    slowest: int = 0
+    """Most cycles from one instruction boundary to the next."""
+    unnested: set[int] = field(default_factory=set)
+    """Where it turns the nesting of interrupts off (INTCON1.NSTDIS)."""
+    levels: dict[int, str] = field(default_factory=dict)
+    """Where it gives an interrupt another priority than is told: place -> which."""
     shared: dict[Scope, tuple[int, int]] = field(default_factory=dict)
     """Rounds of loops that its times leave out (`Explorer.sharing`): the longest of them, and how many in all."""
 
@@ -63,6 +73,10 @@ class Outcome:
         self.forever |= other.forever
         self.visited |= other.visited
         self.wild |= other.wild
+        self.held = other.held | self.held
+        self.slowest = max(self.slowest, other.slowest)
+        self.unnested |= other.unnested
+        self.levels |= other.levels
         for scope, (cycles, total) in other.shared.items():
             self.share(scope, total, cycles)
         if other.left is not None:

@@ -126,8 +126,46 @@ class Program:
                 found |= {a for a in self._taken() if wanted is not None and self.signatures.functions.get(a) == wanted}
         return sorted(found)
 
-    def interrupts(self) -> dict[int, int]:
-        """Level by handler: of traps above 7, told by INTERRUPT_LEVEL or `os_level_of_`, else that after a reset."""
+    def interrupts(self) -> list[tuple[int, str, int]]:
+        """Handler, name and level of everything that has a handler: of traps above 7, told by INTERRUPT_LEVEL or
+        `os_level_of_`, else that after a reset. A handler of several vectors is there once for each."""
+        traps = {vector.name: vector.level for vector in self.chip.vectors if vector.irq is None}
+        told = self._told()
+        found: dict[tuple[int, str], int] = {}
+        for handler, vectors in self.calls.vectors.items():
+            name = self.calls.name(handler)
+            if name == UNUSED:
+                continue
+            plain = list(dict.fromkeys(vector.removeprefix("Alt") for vector in vectors.split()))
+            for vector in plain:
+                level = traps.get(vector, told.get(vector.removesuffix("Interrupt"), RESET_LEVEL))
+                found[handler, name if len(plain) == 1 else "__" + vector] = level
+        return [(handler, name, level) for (handler, name), level in found.items()]
+
+    def priorities(self) -> dict[int, list[tuple[int, str, int]]]:
+        """By register that gives priorities: shift, name and told level of each interrupt that has a handler."""
+        told = self._told()
+        handled = {
+            vector.removeprefix("Alt")
+            for handler, names in self.calls.vectors.items()
+            if self.calls.name(handler) != UNUSED
+            for vector in names.split()
+        }
+        found: dict[int, list[tuple[int, str, int]]] = {}
+        for vector in self.chip.vectors:
+            if vector.irq is not None and vector.name in handled and vector.irq in self.chip.interrupts:
+                register, shift = self.chip.interrupts[vector.irq].priority
+                source = vector.name.removesuffix("Interrupt")
+                field = shift, source, told.get(source, RESET_LEVEL)
+                found.setdefault(self.chip.sfrs[register].address, []).append(field)
+        return found
+
+    def enables(self) -> frozenset[int]:
+        """Registers that enable interrupts."""
+        return frozenset(self.chip.sfrs[source.enable[0]].address for source in self.chip.interrupts.values())
+
+    def _told(self) -> dict[str, int]:
+        """Levels told, by source."""
         told: dict[str, int] = {}
         for note in self.notes.of("level"):
             name, _, text = note.text.partition(" ")
@@ -137,16 +175,7 @@ class Program:
         for symbol in self.image.symbols:
             if symbol.name.startswith("os_level_of_"):
                 told[symbol.name.removeprefix("os_level_of_")] = symbol.value
-        traps = {vector.name: vector.level for vector in self.chip.vectors if vector.irq is None}
-        found: dict[int, int] = {}
-        for handler, names in self.calls.vectors.items():
-            if self.calls.name(handler) == UNUSED:
-                continue
-            for name in names.split():
-                plain = name.removeprefix("Alt")
-                level = traps.get(plain, told.get(plain.removesuffix("Interrupt"), RESET_LEVEL))
-                found[handler] = max(found.get(handler, 0), level)
-        return found
+        return told
 
     def outside(self) -> set[int]:
         """Handlers of OUTSIDE_ONLY."""

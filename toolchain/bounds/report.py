@@ -1,28 +1,23 @@
-"""Bounds of the functions and entries of an image: what each costs alone, then together by interrupt priority."""
+"""Bounds of the functions and entries of an image, each alone; together.py adds what interrupts what."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import partial
 
+from emu.dspic30f.facts import flow_of
+from emu.dspic30f.isa.flow import Sleep
 from toolchain.bounds.builder import World
 from toolchain.bounds.explore import Explorer, TooMuch
 from toolchain.bounds.outcome import Outcome
 from toolchain.bounds.program import Program
-from toolchain.bounds.rules import CUT, FOLLOWED, Rules
+from toolchain.bounds.rules import CUT, FOLLOWED, SLEEPS, WAITS, Rules
 from toolchain.bounds.state import LEVELS, Area, State
 from toolchain.bounds.values import Value, span
-from toolchain.errors import ToolError
 from toolchain.stack.effects import CALL_BYTES
 
 RAM = (0x0800, 0x2800)
 STACK_END = 0x8000
 """Where the stack that functions are tried on ends: behind all RAM, so that none is too deep."""
-LATENCY = 5
-"""Cycles from a request to the handler's first instruction: 4, and one more behind an instruction of two
-(isa.md §14.3)."""
-TRAP_LEVEL = 8
 
 
 @dataclass(slots=True)
@@ -47,6 +42,17 @@ class Bound:
     open: dict[str, str] = field(default_factory=dict)
     """What is not known: source line -> why."""
     forever: bool = False
+    held: dict[int, str] = field(default_factory=dict)
+    """By level: the endless loop in which it is held back for ever."""
+    behind: int = 0
+    """Cycles for which DISI goes on behind its end."""
+    returns: bool = False
+    slowest: int = 0
+    """Cycles of its longest instruction."""
+    unnested: str = ""
+    """Where it turns the nesting of interrupts off."""
+    levels: dict[str, str] = field(default_factory=dict)
+    """Where it gives an interrupt another priority than is told."""
 
     @property
     def stack_is_known(self) -> bool:
@@ -71,7 +77,15 @@ class Analyst:
             areas.append(self.other)
         self.private, self.known = self._values("private"), self._values("known")
         kept = {a for a, _ in (*self.private, *self.known)}
-        self.world = World(Area(areas), program.words, program.window, kept, program.links_in_ram)
+        self.world = World(
+            Area(areas),
+            program.words,
+            program.window,
+            kept,
+            program.links_in_ram,
+            program.priorities(),
+            program.enables(),
+        )
         self.rules = Rules(
             loop=program.bindings.rounds,
             total=program.bindings.total,
@@ -152,14 +166,27 @@ class Analyst:
         Rounds that loops share are counted where they are as often as one entry may have them, or once for all, with
         the longest of them; the smaller sum is the bound.
         """
+        place = self.program.place
         for found in contexts:
-            result.open |= {self.program.place(pc): why for pc, why in found.open.items()}
+            result.open |= {place(pc): why for pc, why in found.open.items()}
+            for pc in found.waits.union(*(end.waits for end in found.ends.values())):
+                result.open.setdefault(place(pc), SLEEPS if self._stops_clock(pc) else WAITS)
         sums = [max(times) for group in (contexts, shared) if (times := _times(group))]
         if sums and not result.open:
             result.cycles = min(sums)
 
+    def _stops_clock(self, pc: int) -> bool:
+        """Whether the PWRSAV at an address is Sleep, in which nothing but the outside goes on."""
+        insn = self.program.calls.code[pc].insn
+        return insn is not None and flow_of(insn, pc) == Sleep("sleep")
+
     def _fill(self, result: Bound, found: Outcome, on_other: bool) -> None:
         place = self.program.place
+        result.held = {level: place(head) for level, head in found.held.items()}
+        result.returns, result.slowest = bool(found.ends), found.slowest
+        result.unnested = next(map(place, sorted(found.unnested)), "")
+        result.levels = {place(pc): which for pc, which in found.levels.items()}
+        result.behind = max((end.blocked for end in found.ends.values()), default=0)
         result.forever = not found.ends and found.left is None and bool(found.forever)
         start = CALL_BYTES + (self.other[0] if on_other and self.other is not None else self.base)
         deepest = -1
@@ -178,7 +205,8 @@ class Analyst:
             for level in range(1, LEVELS):
                 since = end.since[level]
                 if since is not None:
-                    cycles = end.time - max(since, 0)
+                    blocked = end.blocked if level < LEVELS - 1 else 0
+                    cycles = end.time + blocked - max(since, 0)
                     if cycles > result.masked.get(level, (-1, ""))[0]:
                         result.masked[level] = cycles, "its end"
 
@@ -191,102 +219,3 @@ def _times(contexts: list[Outcome]) -> list[int]:
         found += [end.time + rounds for end in one.ends.values()]
         found += [one.left + rounds] if one.left is not None else []
     return found
-
-
-@dataclass(slots=True)
-class Response:
-    """An interrupt: cycles from the request to its handler's first instruction if every other interrupt comes once
-    meanwhile."""
-
-    name: str
-    level: int
-    masked: int | None
-    where: str
-    cycles: int | None
-
-
-@dataclass(slots=True)
-class Report:
-    """Everything about one image."""
-
-    calls: list[Bound]
-    threads: list[Bound]
-    interrupts: list[Bound]
-    nested: list[Bound]
-    """The same interrupts, entered on the other stack."""
-    responses: list[Response] = field(default_factory=list)
-    stacks: dict[str, int | None] = field(default_factory=dict)
-    """Bytes by stack: of each thread with everything that interrupts it, and of the other stack."""
-
-
-def report_of(program: Program, functions: Iterable[str]) -> Report:
-    """Bounds of the named functions, of all threads and interrupts, and what follows for stacks and responses.
-
-    Raises `ToolError` for a name that is no function.
-    """
-    analyst = Analyst(program)
-    calls, threads, interrupts, nested = [], [], [], []
-    for name in functions:
-        address = program.address(name)
-        if address not in program.calls.entries:
-            raise ToolError(f"no function is called {name}")
-        calls.append(analyst.bound(name, address, "call"))
-    for entry in program.threads():
-        threads.append(analyst.bound(program.calls.name(entry), entry, "thread"))
-    for entry, level in program.interrupts().items():
-        name = program.calls.name(entry)
-        interrupts.append(analyst.bound(name, entry, "interrupt", level))
-        if analyst.other is not None:
-            nested.append(analyst.bound(name, entry, "interrupt", level, on_other=True))
-    report = Report(calls, threads, interrupts, nested)
-    report.responses = [_response(report, one) for one in interrupts if one.level < TRAP_LEVEL]
-    _stacks(report, analyst)
-    return report
-
-
-def _response(report: Report, one: Bound) -> Response:
-    """Held back by the longest stretch of anything else, then by every interrupt of a higher level once, and by those
-    of its own level that come first."""
-    level = one.level
-    longest, where = 0, ""
-    open_ended = False
-    for other in (*report.calls, *report.threads, *report.interrupts):
-        if other is one:
-            continue
-        if other.level < level:
-            cycles, place = other.masked.get(level, (0, ""))
-            if cycles > longest:
-                longest, where = cycles, f"{place} in {other.name}"
-            open_ended |= bool(other.open)
-    others = [o for o in report.interrupts if o is not one and level <= o.level < TRAP_LEVEL]
-    if any(o.cycles is None for o in others):
-        return Response(one.name, level, None if open_ended else longest, where, None)
-    more = sum((o.cycles or 0) + LATENCY for o in others)
-    return Response(one.name, level, longest, where, None if open_ended else longest + more + LATENCY)
-
-
-def _stacks(report: Report, analyst: Analyst) -> None:
-    """Each stack with the deepest chain of interrupts of rising priority on top."""
-
-    def known(*parts: Bound) -> bool:
-        return all(part.stack_is_known for part in parts)
-
-    on_thread = partial(_on_top, report.interrupts)
-    on_other = partial(_on_top, report.nested)
-    for thread in report.threads:
-        total = max((depth + on_thread(level) for level, depth in thread.stack.items()), default=0)
-        report.stacks[thread.name] = CALL_BYTES + total if known(thread, *report.interrupts) else None
-    if analyst.other is not None:
-        users = [*report.calls, *report.threads, *report.interrupts]
-        depths = [depth + on_other(level) for user in users for level, depth in user.other.items()]
-        report.stacks["kernel stack"] = max(depths, default=0) if known(*users, *report.nested) else None
-
-
-def _on_top(interrupts: list[Bound], level: int) -> int:
-    """Bytes that interrupts above a level can put on a stack, one within the other."""
-    best = 0
-    for one in interrupts:
-        if level < one.level < TRAP_LEVEL:
-            for at, depth in one.stack.items():
-                best = max(best, CALL_BYTES + depth + _on_top(interrupts, max(at, one.level)))
-    return best

@@ -17,11 +17,17 @@ MERGED: Final = "several ways lead back to the beginning of this loop: it may be
 CUT: Final = "its exploration was cut off: too many ways through it; bound its loops"
 DEEP: Final = "calls are followed 480 deep and no further"
 EARLY: Final = "ends a DO loop early (CORCON.EDT) that begins elsewhere"
+LOOP_REGISTER: Final = "writes a register of the DO loop it is in (DCOUNT, DOSTART, DOEND)"
+STACK_POINTER: Final = "may store to W15, by an address that is not known: where the stack goes on is not followed"
+TABLE: Final = "this jump may lead past the end of its table of BRA or RETLW"
+WAITS: Final = "waits for an interrupt (PWRSAV), for how long is not known"
+SLEEPS: Final = "stops the clock (PWRSAV #0): how long it waits and the oscillator takes to start is not known"
+NESTED: Final = "a third DO loop within two others: their registers are in no shadow"
 ADDRESSING: Final = "turns modulo or bit-reversed addressing on: where pointers lead is not followed"
 WAYS_IN: Final = "a DO loop is reached by a branch into it, or out of one within it"
 LAST: Final = "a DO loop ends with an instruction that leads elsewhere"
 JUMP: Final = "no table of BRA or RETLW is behind this jump"
-FOLLOWED: Final = frozenset((LOOP, LONG, MERGED))
+FOLLOWED: Final = frozenset((LOOP, LONG, MERGED, WAITS, SLEEPS))
 """Reasons that leave the stack bounded: rounds have been followed until nothing new came of them."""
 
 

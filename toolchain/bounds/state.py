@@ -24,9 +24,12 @@ class State:
     repeat   count of the REPEAT in front of the next instruction, None without one
     stall    registers whose use as a source address costs a cycle now
     leaked   the lowest address of the stack that is kept where it is not tracked, NOWHERE without one
+    waits    where the CPU has stood still since the function was entered: PWRSAV
     """
 
-    __slots__ = ("disi", "flags", "ipl", "leaked", "loops", "mem", "regs", "repeat", "since", "stall", "time", "w")
+    __slots__ = (
+        "disi", "flags", "ipl", "leaked", "loops", "mem", "regs", "repeat", "since", "stall", "time", "w", "waits",
+    )  # fmt: skip
 
     def __init__(self) -> None:
         self.w: list[Value] = [WORD] * 16
@@ -41,6 +44,7 @@ class State:
         self.loops: tuple[tuple[int, int, Value], ...] = ()
         self.repeat: Value | None = None
         self.leaked = NOWHERE
+        self.waits: frozenset[int] = frozenset()
 
     def copy(self) -> State:
         """An independent state."""
@@ -48,7 +52,7 @@ class State:
         new.w, new.flags, new.mem = self.w.copy(), self.flags.copy(), self.mem.copy()
         new.regs, new.since = self.regs.copy(), self.since.copy()
         new.time, new.stall, new.ipl, new.disi = self.time, self.stall, self.ipl, self.disi
-        new.loops, new.repeat, new.leaked = self.loops, self.repeat, self.leaked
+        new.loops, new.repeat, new.leaked, new.waits = self.loops, self.repeat, self.leaked, self.waits
         return new
 
     def key(self) -> tuple[Any, ...]:
@@ -60,17 +64,24 @@ class State:
             frozenset((address, key_of(v)) for address, v in self.mem.items()),
             self.stall,
             self.ipl,
-            max(0, self.disi - self.time),
+            self.blocked,
             tuple(s is None for s in self.since),
             tuple((start, end, key_of(n)) for start, end, n in self.loops),
             None if self.repeat is None else key_of(self.repeat),
             self.leaked,
+            self.waits,
         )
+
+    @property
+    def blocked(self) -> int:
+        """Cycles for which DISI still blocks."""
+        return max(0, self.disi - self.time)
 
     def shift(self, cycles: int) -> None:
         """Move its clock."""
         self.time += cycles
-        self.disi += cycles
+        if self.disi:
+            self.disi += cycles
         self.since = [s if s is None or s == INHERITED else s + cycles for s in self.since]
 
 
@@ -111,7 +122,9 @@ class Area:
         new.time = max(a.time, b.time)
         new.stall = a.stall | b.stall
         new.ipl = min(a.ipl[0], b.ipl[0]), max(a.ipl[1], b.ipl[1])
-        new.disi = max(a.disi, b.disi)
+        blocked = max(a.blocked, b.blocked)
+        new.disi = new.time + blocked if blocked else 0
+        new.waits = a.waits | b.waits
         if a.since != b.since or a.time != b.time:
             new.since = [longest(new.time, (x, a.time), (y, b.time)) for x, y in zip(a.since, b.since, strict=True)]
         new.loops = tuple((s, e, union(n, m)) for (s, e, n), (_, _, m) in zip(a.loops, b.loops, strict=False))

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from emu.dspic30f.isa.flow import Disi, Do, Flow, Repeat
+from emu.dspic30f.isa.flow import Branch, Disi, Do, Flow, Repeat, Return, Skip, Sleep
 from toolchain.bounds.builder import exact
 from toolchain.bounds.graph import Code, Step
 from toolchain.bounds.outcome import Outcome
-from toolchain.bounds.rules import MOVED
+from toolchain.bounds.rules import MOVED, NESTED
 from toolchain.bounds.state import INHERITED, LEVELS, State, widened
 from toolchain.bounds.values import ends
 
 if TYPE_CHECKING:
     from toolchain.bounds.explore import Explorer
 
+TAKEN: Final[dict[type, int]] = {Branch: 1, Skip: 2, Return: -1}
+"""What a branch or a skip adds at most to the cycles of its row, and what a return is shorter by if an interrupt waits
+(isa.md §14.3)."""
+DO_LEVELS: Final = 2
+"""Open DO loops that the core keeps (isa.md §7.6)."""
+REPEATED_WINDOW: Final = 4
+"""Cycles that a read of the PSV window adds to all iterations of a REPEAT (isa.md §13.3)."""
 REPEATS: Final = 600
 """Iterations of REPEAT run one by one; behind that only their number counts."""
 
@@ -33,7 +40,7 @@ class Steps:
         if state.repeat is not None:
             return self._repeated(step, state)
         abstract = self.explorer.abstract
-        level, top = state.ipl, state.w[15]
+        level, top, start, blocked = state.ipl, state.w[15], state.time, state.disi
         state.time += step.cycles + (state.stall & step.pointers != 0)
         abstract.begin(step.pc, state)
         flow: Flow = step.insn.row.does(abstract, step.insn.x)
@@ -51,11 +58,16 @@ class Steps:
             case Repeat(count):
                 state.repeat = count
             case Do(count, end):
+                if len(state.loops) >= DO_LEVELS:
+                    self.outcome.open[step.pc] = NESTED
                 state.loops = (*state.loops, (step.after, end, count))
+            case Sleep():
+                state.waits |= {step.pc}
             case Disi(count):
                 state.disi = max(state.disi, state.time + count)
-                level = (-1, -1)
-        if level != state.ipl or state.disi:
+        taken = TAKEN.get(step.flow, 0) if step.flow is not None else 0
+        self.outcome.slowest = max(self.outcome.slowest, state.time - start + taken)
+        if level != state.ipl or blocked or state.disi:
             self._levels(state, step.pc)
         return flow
 
@@ -68,7 +80,7 @@ class Steps:
         state.time += step.cycles + (state.stall & step.pointers != 0) + most * (step.cycles + again)
         window = False
         result: State | None = None
-        current = state
+        current, level = state, state.ipl
         for turn in range(min(most, REPEATS) + 1):
             abstract.begin(step.pc, current)
             step.insn.row.does(abstract, step.insn.x)
@@ -83,10 +95,13 @@ class Steps:
             current = self._many(step, current, most)
         final = current if result is None else self.area.join(result, current)
         state.w, state.flags, state.mem = final.w, final.flags, final.mem
-        state.regs, state.leaked = final.regs, final.leaked
+        state.regs, state.leaked, state.ipl, state.loops = final.regs, final.leaked, final.ipl, final.loops
         state.stall = step.writes
+        self.outcome.slowest = max(self.outcome.slowest, step.cycles + 1 + (REPEATED_WINDOW if window else 0))
         if window:
-            state.time += step.window if not most else max(step.window if not least else 0, 4)
+            state.time += step.window if not most else max(step.window if not least else 0, REPEATED_WINDOW)
+        if level != state.ipl or state.disi:
+            self._levels(state, step.pc)
         return None
 
     def _many(self, step: Step, state: State, most: int) -> State:
@@ -110,6 +125,12 @@ class Steps:
         if abstract.refused is not None:
             self.outcome.open[step.pc] = abstract.refused
         self.outcome.arguments |= abstract.lowest < self.floor
+        if abstract.unnested:
+            self.outcome.unnested.add(step.pc)
+            abstract.unnested = False
+        if abstract.level is not None:
+            self.outcome.levels[step.pc] = abstract.level
+            abstract.level = None
 
     # -- what is measured ----------------------------------------------------------------------------------------
 

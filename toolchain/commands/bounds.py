@@ -8,7 +8,8 @@ from dataclasses import asdict
 
 from toolchain.bounds.notes import Notes, read_notes
 from toolchain.bounds.program import Program
-from toolchain.bounds.report import Bound, Report, report_of
+from toolchain.bounds.report import Bound
+from toolchain.bounds.together import Report, report_of
 from toolchain.commands.parser import parser
 from toolchain.elf.read import read_executable
 from toolchain.errors import ToolError
@@ -68,7 +69,7 @@ def _pair(option: str, text: str) -> tuple[str, int]:
 
 def as_text(report: Report, notes: Notes) -> str:
     """The report as tables."""
-    rows = [*report.calls, *report.threads, *report.interrupts]
+    rows = report.rows
     width = max((len(row.name) for row in rows), default=8)
     lines = [f"{'':9} {'':{width}}   cycles  stack  held back: level 1    4    5    6  deepest path"]
     lines += [_row(row, width) for row in rows]
@@ -81,7 +82,7 @@ def as_text(report: Report, notes: Notes) -> str:
     if report.stacks:
         lines += ["", "stack with all that interrupts it, by priority:"]
         lines += [f"  {name:{width}} {_number(size):>6}" for name, size in report.stacks.items()]
-    unknown = {place: why for row in rows for place, why in row.open.items()}
+    unknown = report.open | report.endless | {place: why for row in rows for place, why in row.open.items()}
     if unknown:
         lines += ["", "not bounded; annotate (bounds.h):"]
         lines += [f"  {place}: {why}" for place, why in sorted(unknown.items())]
@@ -103,11 +104,7 @@ def _number(value: int | None) -> str:
 
 
 def _check(report: Report, name: str, limit: int, what: str) -> int:
-    rows = [
-        row
-        for row in (*report.calls, *report.threads, *report.interrupts)
-        if row.name in (name, name.removeprefix("_"))
-    ]
+    rows = [row for row in report.rows if row.name in (name, name.removeprefix("_"))]
     if not rows:
         raise ToolError(f"no function that was looked at is called {name}")
     value = rows[0].cycles if what == "cycles" else rows[0].bytes if rows[0].stack_is_known else None

@@ -11,7 +11,7 @@ from tests.toolchain.c_programs import build
 from toolchain.bounds.notes import read_notes
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Analyst, Bound
-from toolchain.bounds.rules import ADDRESSING, JUMP, LAST, WAYS_IN
+from toolchain.bounds.rules import ADDRESSING, JUMP, LAST, LOOP_REGISTER, NESTED, STACK_POINTER, TABLE, WAITS, WAYS_IN
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
 
@@ -37,6 +37,42 @@ PROGRAMS = {
         " mov #0x1400,w0\n mov w0,[w3]\n ze [w1],w4\n1: dec w4,w4\n bra gtu,1b\n ulnk\n return\n", 4, None),
     "a jump into what is no table": (
         "cp w0,#3\n bra gtu,2f\n bra w0\n repeat #200\n nop\n nop\n nop\n2: return\n", 5, (JUMP, 7)),
+    "a jump past the end of its table": (
+        "cp w0,#3\n bra gtu,2f\n bra w0\n bra 2f\n bra 2f\n repeat #200\n nop\n nop\n2: return\n", 4, (TABLE, 7)),
+    "a jump into its table": (
+        "and w0,#1,w0\n bra w0\n bra 1f\n bra 2f\n bra 3f\n1: repeat #20\n nop\n2: return\n3: repeat #200\n nop\n"
+        " return\n", 4, None),
+    "DCOUNT made more": (
+        "clr w1\n do #3,1f\n cp0 w1\n bra nz,2f\n mov #300,w2\n mov w2,0x38\n inc w1,w1\n2: nop\n nop\n1: nop\n"
+        " return\n", 1, None),
+    "DCOUNT put back": (
+        "mov #2,w2\n do #4,1f\n nop\n push 0x38\n push 0x3e\n clr 0x38\n nop\n pop 0x3e\n pop 0x38\n"
+        " nop\n nop\n1: nop\n return\n", 1, None),
+    "DOEND moved": (
+        "do #3,1f\n mov 0x3e,w1\n add w1,#8,w1\n mov w1,0x3e\n nop\n nop\n1: nop\n nop\n nop\n nop\n repeat #90\n"
+        " nop\n return\n", 1, (LOOP_REGISTER, 8)),
+    "a third DO within two": (
+        "clr w1\n do #1,3f\n do #1,2f\n do #1,1f\n nop\n inc w1,w1\n1: nop\n nop\n2: nop\n nop\n3: nop\n"
+        " mov #8,w2\n sub w2,w1,w1\n bra z,5f\n4: repeat #90\n nop\n dec w1,w1\n bra nz,4b\n5: return\n", 1,
+        (NESTED, 8)),
+    "Idle": (
+        "mov #500,w1\n mov w1,0x102\n bset 0x8c,#3\n bset 0x104,#15\n bset 0x42,#7\n pwrsav #1\n nop\n return\n", 1,
+        (WAITS, 10)),
+    "registers, or what lies behind them all": (
+        "mov #0xffe,w1\n and w0,w1,w0\n mov #100,w5\n mov #1,w3\n mov w5,[w0]\n1: dec w3,w3\n bra gtu,1b\n return\n",
+        8, (STACK_POINTER, 9)),
+    "SR, or what lies behind the registers": (
+        "and w0,#1,w0\n sl w0,#11,w0\n mov #0x42,w1\n add w0,w1,w0\n mov #2,w5\n mov w5,[w0]\n bra z,1f\n return\n"
+        "1: repeat #90\n nop\n return\n", 2, None),
+    "SR between a comparison and its branch": (
+        "and w0,#1,w1\n cp w1,#3\n mov #2,w2\n mov w2,0x42\n bra z,1f\n return\n1: repeat #90\n nop\n return\n", 2,
+        None),
+    "a compared register by its address": (
+        "mov #99,w3\n cp w0,#4\n mov w3,0x0\n bra gtu,1f\n cp w0,#5\n bra ltu,1f\n repeat #90\n nop\n1: return\n", 2,
+        None),
+    "RETFIE of a function": (
+        "and w0,#1,w2\n rcall s2\n mov 0x42,w1\n lsr w1,#5,w1\n and w1,#7,w1\n bra z,1f\n return\n1: repeat #90\n"
+        " nop\n return\ns2: bset 0x42,#7\n retfie\n", 2, None),
     "modulo addressing": (
         "mov #0x900,w0\n mov w0,0x48\n mov #0x91f,w0\n mov w0,0x4a\n mov #0x8ff1,w0\n mov w0,0x46\n nop\n"
         " mov #0x910,w1\n mov #100,w3\n1: mov [w1++],w2\n mov #0x920,w4\n dec w3,w3\n bra z,2f\n cp w1,w4\n bra nz,1b\n"

@@ -1,0 +1,91 @@
+"""Programs with interrupts, timed as they run: how late a handler begins, and what is then on the stack."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import emu
+from emu.chips import chip_named
+from emu.device import flag_since
+from emu.events import NEVER
+
+CHIP = chip_named()
+
+
+@dataclass
+class Handled:
+    """One handler: its longest time from the first cycle of a request, not counted while it serves the one before."""
+
+    late: int = 0
+    times: int = 0
+
+
+@dataclass
+class Watched:
+    """A run, or the worst of several: handlers by C name without `_`, and bytes of stack above main's."""
+
+    handlers: dict[str, Handled]
+    stack: int = 0
+
+    def add(self, other: Watched) -> None:
+        """Keep the worst of both."""
+        self.stack = max(self.stack, other.stack)
+        for name, one in other.handlers.items():
+            mine = self.handlers.setdefault(name, Handled())
+            mine.late, mine.times = max(mine.late, one.late), mine.times + one.times
+
+
+def watched(image: Path, names: Iterable[str], phases: Iterable[Mapping[str, int]], cycles: int) -> Watched:
+    """The worst of runs of `cycles` Tcy from main, each with the values of one phase in the variables it names."""
+    machine = emu.load(image, engine="plain")
+    assert machine.image is not None
+    vectors = {vector.name: vector for vector in CHIP.vectors}
+    assert machine.run(until="main", seconds=1).reason == "until"
+    begin = machine.snapshot()
+    found = Watched({})
+    entries: dict[int, list[tuple[str, int]]] = {}
+    for name in names:
+        source = CHIP.interrupts[vectors[name].irq]
+        register, bit = source.flag
+        symbol = machine.image.symbols.find("__" + name)
+        assert symbol is not None, name
+        since = flag_since(machine.core.state.record, CHIP.sfrs[register].address, bit)
+        entries.setdefault(symbol.address, []).append((name, since))
+    for phase in phases:
+        machine.restore(begin)
+        for variable, value in phase.items():
+            machine.poke(variable, value)
+        found.add(_run(machine, entries, cycles))
+    return found
+
+
+def _run(machine: emu.Machine, entries: dict[int, list[tuple[str, int]]], cycles: int) -> Watched:
+    seen = Watched({name: Handled() for names in entries.values() for name, _ in names})
+    u64 = machine.core.state.record.u64
+    base, limit = machine.w[15], machine.cycle + cycles
+    ended: dict[str, int] = {}
+    open_: list[tuple[int, str]] = []
+    while machine.cycle < limit:
+        stop = machine.approach(NEVER)
+        assert stop is None, stop
+        for name, since in entries.get(machine.pc, []):
+            if len(entries[machine.pc]) > 1 and machine.peek("INTTREG") & 0x3F != _slot(name):
+                continue
+            request = u64[since]
+            if request > ended.get(name, -1) and all(name != other for _, other in open_):
+                one = seen.handlers[name]
+                one.late, one.times = max(one.late, machine.cycle - request), one.times + 1
+            open_.append((machine.w[15] - 4, name))
+        seen.stack = max(seen.stack, machine.w[15] - base)
+        stop = machine.step()
+        assert stop is None, stop
+        seen.stack = max(seen.stack, machine.w[15] - base)
+        while open_ and machine.w[15] <= open_[-1][0]:
+            ended[open_.pop()[1]] = machine.cycle
+    return seen
+
+
+def _slot(name: str) -> int:
+    return next(vector.slot for vector in CHIP.vectors if vector.name == name)
