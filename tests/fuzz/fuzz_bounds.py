@@ -3,7 +3,9 @@
 `python tests/fuzz/fuzz_bounds.py [--programs N] [--seed S] [--seconds T]`; exits 1 with the first program that exceeds
 a bound. The programs are those of `c_shapes.py`: interrupts, escapes, volatile, large frames, loops of fixed counts;
 every second one has what `c_features.py` has, which often leaves no bound, and every third is one of `c_notes.py`,
-which only its notes bound. Prints how tight the bounds of `main` are.
+which only its notes bound. Every sixth is one of `c_interrupts.py`: there it is the responses of interrupts, and the
+stack with all that interrupts it, that nothing may exceed, at many phases. Prints how tight the bounds of `main` are; a
+campaign that is long enough fails if `c_interrupts.py` never made something it is for.
 """
 
 from __future__ import annotations
@@ -19,13 +21,15 @@ sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from emu.events import NEVER  # noqa: E402
-from tests.fuzz import c_notes, c_shapes  # noqa: E402
+from tests.fuzz import c_interrupts, c_notes, c_shapes  # noqa: E402
 from tests.fuzz.fuzz_compiler import NO_ROOM  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
+from tests.toolchain.bounds.responses import Watched, watched  # noqa: E402
 from tests.toolchain.c_programs import build  # noqa: E402
 from toolchain.bounds.notes import read_notes  # noqa: E402
 from toolchain.bounds.program import Program  # noqa: E402
 from toolchain.bounds.report import Analyst, Bound  # noqa: E402
+from toolchain.bounds.together import report_of  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.stack.annotations import Annotations  # noqa: E402
 
@@ -35,6 +39,14 @@ CYCLES = 400_000
 HANDLER = "__T1Interrupt"
 NOTED = 1
 """Of three seeds, the one that makes a program with notes."""
+INTERRUPTED = 3
+"""Of six seeds, the one that makes a program about interrupts."""
+PHASES, WATCHED = 24, 4_000
+"""Runs of such a program, and cycles of each."""
+ENOUGH = 40
+"""So many of them make everything they are for."""
+NESTED = 3
+"""Handlers within each other, of as many as there are."""
 
 
 @dataclass
@@ -123,15 +135,61 @@ def examine(seed: int, folder: Path) -> tuple[str, dict[str, tuple[Seen, Bound]]
     return (f"not bounded: {', '.join(sorted(open_ends))}" if open_ends else "bounded"), pairs
 
 
+@dataclass
+class Held:
+    """What programs about interrupts were, and what was seen of them."""
+
+    kinds: Counter[str]
+    programs: int = 0
+    bounded: int = 0
+    nested: int = 0
+
+    def examine(self, seed: int, folder: Path) -> str:
+        """One program at one level: what became of it. Raises `AssertionError` where something is above its bound."""
+        program, level = c_interrupts.Program(seed), LEVELS[seed // 6 % len(LEVELS)]
+        (folder / "a.c").write_text(program.text)
+        image = folder / "program.elf"
+        built = build([folder / "a.c"], image, level, "-w", "-g", "-std=gnu11")
+        assert not built.status, f"{level}: {built.first_error}"
+        names = [f"{timer}Interrupt" for timer in c_interrupts.TIMERS]
+        seen = watched(image, names, program.phases(PHASES), WATCHED)
+        executable = read_executable(image.read_bytes(), str(image))
+        report = report_of(Program(executable, Annotations(), read_notes(executable, {})), ["main"])
+        said = {one.name.removeprefix("_"): one.cycles for one in report.responses} | {"stack": report.stacks["main"]}
+        for name, most in _worst(seen).items():
+            limit = said[name]
+            assert limit is None or most <= limit, f"{level} {name}: {most}, bound {limit}"
+        self.kinds += program.kinds
+        self.programs, self.nested = self.programs + 1, max(self.nested, seen.nested)
+        self.bounded += None not in said.values()
+        return "responses" if None not in said.values() else "responses not bounded"
+
+    def missing(self) -> list[str]:
+        """What a campaign that is long enough should have done, and has not."""
+        if self.programs < ENOUGH:
+            return []
+        absent = sorted(c_interrupts.KINDS - self.kinds.keys())
+        absent += [] if self.nested >= NESTED else [f"{NESTED} handlers within each other"]
+        return absent + ([] if 2 * self.bounded > self.programs else ["bounds for most programs about interrupts"])
+
+
+def _worst(seen: Watched) -> dict[str, int]:
+    return {name: one.late for name, one in seen.handlers.items()} | {"stack": seen.stack}
+
+
 def main() -> int:
     """Command line."""
     course = Course(parser(__doc__), "programs", 300, "programs")
     course.parse()
     outcomes: Counter[str] = Counter()
     ratios: list[float] = []
+    held = Held(Counter())
     for seed in course:
         with tempfile.TemporaryDirectory(prefix="bounds-") as folder:
             try:
+                if seed % 6 == INTERRUPTED:
+                    outcomes[held.examine(seed, Path(folder))] += 1
+                    continue
                 outcome, pairs = examine(seed, Path(folder))
             except AssertionError as error:
                 return course.failed(error)
@@ -143,6 +201,10 @@ def main() -> int:
     told = ", ".join(f"{count} {what}" for what, count in outcomes.most_common())
     if ratios:
         told += f"; main: bound / measured {ratios[len(ratios) // 2]:.2f} in the middle, {ratios[-1]:.2f} at most"
+    missing = held.missing()
+    if missing:
+        print(f"never made: {', '.join(missing)}", file=sys.stderr)
+        return 1
     return course.ended(told)
 
 

@@ -285,7 +285,7 @@ class Abstract:
         if ea == SR:
             return self._status()
         if ea == DISICNT:
-            return span(0, min(COUNTS, state.blocked + 1)) if state.disi else 0
+            return span(0, min(COUNTS, state.blocked))
         if not state.loops:
             return None
         if ea == CORCON:
@@ -360,7 +360,7 @@ class Abstract:
             self._loop_register(register, value, size)
         elif register == DISICNT:
             blocked = ends(value)[1] & COUNTS if size == 2 and ends(value)[1] <= COUNTS else COUNTS
-            state.disi = state.time + blocked if blocked else 0
+            state.disi = state.time + blocked + 1 if blocked else 0
         elif register == INTCON1 and ones & NSTDIS:
             self.unnested = True
         elif register in self.world.priorities:

@@ -19,7 +19,7 @@ class State:
     mem      tracked data: word address -> word, ~byte address -> byte; what is missing may be anything
     ipl      least and greatest CPU priority; 8 more while a trap is served (IPL3)
     since    by level, the time from which an interrupt of that level has been held back; None: it has not been
-    disi     time up to which DISI blocks
+    disi     time up to which DISI blocks: an instruction boundary before it lets nothing in (isa.md §12)
     loops    open DO loops, outermost first: (start, end, remaining)
     repeat   count of the REPEAT in front of the next instruction, None without one
     stall    registers whose use as a source address costs a cycle now
@@ -74,7 +74,7 @@ class State:
 
     @property
     def blocked(self) -> int:
-        """Cycles for which DISI still blocks."""
+        """Cycles for which DISI still blocks, that of the boundary among them."""
         return max(0, self.disi - self.time)
 
     def shift(self, cycles: int) -> None:

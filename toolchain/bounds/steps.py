@@ -64,7 +64,7 @@ class Steps:
             case Sleep():
                 state.waits |= {step.pc}
             case Disi(count):
-                state.disi = max(state.disi, state.time + count)
+                state.disi = max(state.disi, state.time + count + 1)
         taken = TAKEN.get(step.flow, 0) if step.flow is not None else 0
         self.outcome.slowest = max(self.outcome.slowest, state.time - start + taken)
         if level != state.ipl or blocked or state.disi:

@@ -23,7 +23,7 @@ interrupt.  Every function is run on all its inputs at once; what cannot be boun
 annotate (bounds.h).  Cycles are of the code alone: interrupts in between count in their own rows.
 
 Names in annotations get their values by --let; for our kernel n threads, m events, b newer events in the same bucket,
-s subscriptions of one event, q queued messages, i times idle, u bytes of a stack never used, k bytes of the largest
+s subscriptions of one event, q queued messages, i times idle (with more than 0 what idles has no bound), u bytes of a stack never used, k bytes of the largest
 stack. Where they are told, bounds are closer: t subscriptions of all events together, o of one thread, h holes on a
 path of the heap's tree (10 at most, 11 in more than 4 kB)."""
 

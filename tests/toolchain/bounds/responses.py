@@ -28,10 +28,12 @@ class Watched:
 
     handlers: dict[str, Handled]
     stack: int = 0
+    nested: int = 0
+    """Handlers under way at once."""
 
     def add(self, other: Watched) -> None:
         """Keep the worst of both."""
-        self.stack = max(self.stack, other.stack)
+        self.stack, self.nested = max(self.stack, other.stack), max(self.nested, other.nested)
         for name, one in other.handlers.items():
             mine = self.handlers.setdefault(name, Handled())
             mine.late, mine.times = max(mine.late, one.late), mine.times + one.times
@@ -69,6 +71,8 @@ def _run(machine: emu.Machine, entries: dict[int, list[tuple[str, int]]], cycles
     open_: list[tuple[int, str]] = []
     while machine.cycle < limit:
         stop = machine.approach(NEVER)
+        if stop is not None and stop.reason == "halt":
+            break  # it stands still, and nothing comes any more
         assert stop is None, stop
         for name, since in entries.get(machine.pc, []):
             if len(entries[machine.pc]) > 1 and machine.peek("INTTREG") & 0x3F != _slot(name):
@@ -78,6 +82,7 @@ def _run(machine: emu.Machine, entries: dict[int, list[tuple[str, int]]], cycles
                 one = seen.handlers[name]
                 one.late, one.times = max(one.late, machine.cycle - request), one.times + 1
             open_.append((machine.w[15] - 4, name))
+            seen.nested = max(seen.nested, len(open_))
         seen.stack = max(seen.stack, machine.w[15] - base)
         stop = machine.step()
         assert stop is None, stop

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
+from tests.fuzz import c_interrupts
+from tests.fuzz.fuzz_bounds import ENOUGH, INTERRUPTED, Held
 from tests.toolchain.bounds.responses import Watched, watched
 from tests.toolchain.c_programs import build
 from toolchain.bounds.notes import read_notes
@@ -42,12 +45,15 @@ PROGRAMS = {
     "DISI on the faster of two ways": (
         "1: btss 0x106,#0\n bra 2f\n repeat #300\n nop\n disi #2\n bra 3f\n2: disi #200\n3: repeat #240\n nop\n"
         " bra 1b\n" + T1 + T2, 4, 4),
+    "IPL raised in the last cycle of DISI": (
+        "mov #0xe0,w1\n1: disi #13\n repeat #11\n nop\n mov w1,0x42\n repeat #100\n nop\n clr 0x42\n repeat #90\n nop\n"
+        " bra 1b\n" + T1 + T2, 5, 2),
     "DISI that outlasts its handler": (LOOP + T1 + "__T2Interrupt: bclr.b 0x84,#6\n disi #500\n retfie\n", 5, 2),
     "DISI that outlasts its handler, and then IPL 7": (
         "mov #0xe0,w1\n1: mov w1,0x42\n repeat #400\n nop\n clr 0x42\n repeat #290\n nop\n bra 1b\n" + T1
         + "__T2Interrupt: bclr.b 0x84,#6\n disi #300\n retfie\n", 5, 2),
     "its own DISI": (LOOP + "__T1Interrupt: bclr.b 0x84,#3\n disi #40\n retfie\n" + T2, 4, 2),
-    "a store to DISICNT": ("1: mov #500,w0\n disi #20\n mov w0,0x52\n repeat #600\n nop\n bra 1b\n" + T1 + T2, 5, 2),
+    "a store to DISICNT": ("1: mov #500,w0\n mov w0,0x52\n repeat #600\n nop\n bra 1b\n" + T1 + T2, 5, 2),
     "DISICNT put back": (
         "1: push 0x52\n disi #1000\n repeat #200\n nop\n pop 0x52\n repeat #90\n nop\n bra 1b\n" + T1 + T2, 5, 2),
     "SR put back": ("1: push 0x42\n bset 0x42,#7\n repeat #200\n nop\n pop 0x42\n bra 1b\n" + T1 + T2, 4, 2),
@@ -156,3 +162,20 @@ def test_main_counts_whatever_is_asked_for(tmp_path: Path) -> None:
     text = "1: bset 0x42,#7\n repeat #300\n nop\n bclr 0x42,#7\n bra 1b\n"
     image = images(tmp_path, text + T1 + T2, (4, 2), (4, 2))
     compare(watched(image, ["T1Interrupt", "T2Interrupt"], PHASES, CYCLES), said_of(image, "nothing"))
+
+
+@pytest.mark.parametrize("seed", [3, 15])
+def test_random_programs_answer_within_their_bounds(tmp_path: Path, seed: int) -> None:
+    """A sample of the sixth of tests/fuzz/fuzz_bounds.py that tests/fuzz/c_interrupts.py makes."""
+    held = Held(Counter())
+    assert held.examine(seed, tmp_path) == "responses"
+    assert held.nested > 1
+
+
+def test_random_programs_hold_interrupts_back_in_every_way() -> None:
+    """As many as make a campaign long enough, and none is missing; of nothing everything is."""
+    made: Counter[str] = Counter()
+    for seed in range(INTERRUPTED, 6 * ENOUGH, 6):
+        made += c_interrupts.Program(seed).kinds
+    assert made.keys() == c_interrupts.KINDS
+    assert set(Held(Counter(), ENOUGH).missing()) >= c_interrupts.KINDS
