@@ -36,6 +36,8 @@ class Outcome:
     """Functions run."""
     waits: set[int] = field(default_factory=set)
     """PWRSAV on the ways to another stack; those on the ways to its return are in `ends`."""
+    asleep: set[int] = field(default_factory=set)
+    """PWRSAV #0 on any way: it stops the clock."""
     held: dict[int, int] = field(default_factory=dict)
     """Levels held back for ever: level -> head of the endless loop."""
     slowest: int = 0
@@ -73,6 +75,7 @@ class Outcome:
         self.forever |= other.forever
         self.visited |= other.visited
         self.wild |= other.wild
+        self.asleep |= other.asleep
         self.held = other.held | self.held
         self.slowest = max(self.slowest, other.slowest)
         self.unnested |= other.unnested

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from emu.dspic30f.facts import flow_of
-from emu.dspic30f.isa.flow import Sleep
 from toolchain.bounds.builder import World
 from toolchain.bounds.explore import Explorer, TooMuch
 from toolchain.bounds.outcome import Outcome
@@ -49,6 +47,8 @@ class Bound:
     returns: bool = False
     slowest: int = 0
     """Cycles of its longest instruction."""
+    asleep: str = ""
+    """Where it stops the clock."""
     unnested: str = ""
     """Where it turns the nesting of interrupts off."""
     levels: dict[str, str] = field(default_factory=dict)
@@ -170,20 +170,16 @@ class Analyst:
         for found in contexts:
             result.open |= {place(pc): why for pc, why in found.open.items()}
             for pc in found.waits.union(*(end.waits for end in found.ends.values())):
-                result.open.setdefault(place(pc), SLEEPS if self._stops_clock(pc) else WAITS)
+                result.open.setdefault(place(pc), SLEEPS if pc in found.asleep else WAITS)
         sums = [max(times) for group in (contexts, shared) if (times := _times(group))]
         if sums and not result.open:
             result.cycles = min(sums)
-
-    def _stops_clock(self, pc: int) -> bool:
-        """Whether the PWRSAV at an address is Sleep, in which nothing but the outside goes on."""
-        insn = self.program.calls.code[pc].insn
-        return insn is not None and flow_of(insn, pc) == Sleep("sleep")
 
     def _fill(self, result: Bound, found: Outcome, on_other: bool) -> None:
         place = self.program.place
         result.held = {level: place(head) for level, head in found.held.items()}
         result.returns, result.slowest = bool(found.ends), found.slowest
+        result.asleep = next(map(place, sorted(found.asleep)), "")
         result.unnested = next(map(place, sorted(found.unnested)), "")
         result.levels = {place(pc): which for pc, which in found.levels.items()}
         result.behind = max((end.blocked for end in found.ends.values()), default=0)

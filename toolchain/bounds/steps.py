@@ -61,8 +61,10 @@ class Steps:
                 if len(state.loops) >= DO_LEVELS:
                     self.outcome.open[step.pc] = NESTED
                 state.loops = (*state.loops, (step.after, end, count))
-            case Sleep():
+            case Sleep(mode):
                 state.waits |= {step.pc}
+                if mode == "sleep":
+                    self.outcome.asleep.add(step.pc)
             case Disi(count):
                 state.disi = max(state.disi, state.time + count + 1)
         taken = TAKEN.get(step.flow, 0) if step.flow is not None else 0

@@ -12,7 +12,7 @@ from functools import partial
 
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Analyst, Bound
-from toolchain.bounds.rules import WAITS
+from toolchain.bounds.rules import SLEEPS, WAITS
 from toolchain.errors import ToolError
 from toolchain.stack.effects import CALL_BYTES
 
@@ -57,14 +57,15 @@ class Report:
     """Why no response and no stack of several entries is known: source line -> what contradicts the levels told."""
 
     @property
-    def endless(self) -> dict[str, str]:
-        """Where something is held back for ever: source line -> what."""
+    def late(self) -> dict[str, str]:
+        """Why responses have no bound: source line -> what holds interrupts back there for ever, or stops the clock."""
         rows = [row for row in self.rows if row.held and row.level < TRAP_LEVEL]
         highest: dict[str, int] = {}
         for row in rows:
             for level, place in row.held.items():
                 highest[place] = max(level, highest.get(place, 0))
-        return {
+        stopped = {row.asleep: SLEEPS for row in self.rows if row.asleep}
+        return stopped | {
             place: f"an endless loop in which levels up to {level} are held back" for place, level in highest.items()
         }
 
@@ -116,7 +117,7 @@ def _response(report: Report, one: Bound) -> Response:
     """
     level = one.level
     longest, where, more = 0, "", one.behind
-    known = not report.open
+    known = not report.open and not any(row.asleep for row in report.rows)
     unnested = any(row.unnested for row in report.rows)
     latency = max(LATENCY, ENTRY + max(row.slowest for row in report.rows))
     for other in report.rows:

@@ -23,9 +23,9 @@ interrupt.  Every function is run on all its inputs at once; what cannot be boun
 annotate (bounds.h).  Cycles are of the code alone: interrupts in between count in their own rows.
 
 Names in annotations get their values by --let; for our kernel n threads, m events, b newer events in the same bucket,
-s subscriptions of one event, q queued messages, i times idle (with more than 0 what idles has no bound), u bytes of a stack never used, k bytes of the largest
-stack. Where they are told, bounds are closer: t subscriptions of all events together, o of one thread, h holes on a
-path of the heap's tree (10 at most, 11 in more than 4 kB)."""
+s subscriptions of one event, q queued messages, i times idle (above 0 what idles has no bound), u bytes of a stack
+never used, k bytes of the largest stack. Where they are told, bounds are closer: t subscriptions of all events
+together, o of one thread, h holes on a path of the heap's tree (10 at most, 11 in more than 4 kB)."""
 
 
 def options_of() -> argparse.ArgumentParser:
@@ -82,7 +82,7 @@ def as_text(report: Report, notes: Notes) -> str:
     if report.stacks:
         lines += ["", "stack with all that interrupts it, by priority:"]
         lines += [f"  {name:{width}} {_number(size):>6}" for name, size in report.stacks.items()]
-    unknown = report.open | report.endless | {place: why for row in rows for place, why in row.open.items()}
+    unknown = report.open | report.late | {place: why for row in rows for place, why in row.open.items()}
     if unknown:
         lines += ["", "not bounded; annotate (bounds.h):"]
         lines += [f"  {place}: {why}" for place, why in sorted(unknown.items())]

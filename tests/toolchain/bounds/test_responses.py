@@ -136,6 +136,14 @@ def test_a_round_of_an_endless_loop_that_may_stay_masked(tmp_path: Path) -> None
     assert [one.cycles for one in said_of(images(tmp_path, text + T1 + T2, (4, 4), (4, 4))).responses] == [None, None]
 
 
+def test_sleep_leaves_no_response(tmp_path: Path, capsys) -> None:
+    """The oscillator takes a time to start that is not known."""
+    image = images(tmp_path, "1: pwrsav #0\n bra 1b\n" + T1 + T2, (4, 4), (4, 4))
+    assert [one.cycles for one in said_of(image).responses] == [None, None]
+    assert main(["bounds", str(image)]) == 0
+    assert "p.s:5 (_main+0x4): stops the clock (PWRSAV #0)" in capsys.readouterr().out
+
+
 def test_a_stopped_machine_holds_nothing_back(tmp_path: Path) -> None:
     """Where no interrupt is enabled none is requested."""
     text = (
