@@ -63,6 +63,11 @@ class Span:
                 return span(self.lo & other, self.hi & other, self.mask & other, self.bits & other, self.ram)
         if self.ram and isinstance(other, int) and other == WORD.hi:  # an address that was moved, in a register
             return LINK
+        if isinstance(other, int) and other > 0:
+            below = (other & -other) - 1  # bits cleared at the low end: order stays
+            top = other | below
+            if not top & (top + 1) and self.lo >= 0 and self.hi <= top:
+                return span(self.lo & other, self.hi & other, self.mask | below, self.bits & other)
         mask, bits = known(other)
         both = self.mask & mask | self.mask & ~self.bits | mask & ~bits
         result = of_bits(both, self.bits & bits & both)
@@ -83,6 +88,9 @@ class Span:
     def __xor__(self, other: Value) -> Value:
         if isinstance(other, int) and other >= 0 and not other & (other + 1) and self.lo >= 0 and self.hi <= other:
             return span(other - self.hi, other - self.lo, self.mask, (self.bits ^ other) & self.mask)
+        if isinstance(other, int) and other > 0 and not other & (other - 1) and self.mask & other:  # a bit all agree on
+            by = -other if self.bits & other else other
+            return span(self.lo + by, self.hi + by, self.mask, self.bits ^ other)
         mask, bits = known(other)
         both = self.mask & mask
         return of_bits(both, (self.bits ^ bits) & both)

@@ -42,6 +42,9 @@ PROGRAMS = {
     "a jump into its table": (
         "and w0,#1,w0\n bra w0\n bra 1f\n bra 2f\n bra 3f\n1: repeat #20\n nop\n2: return\n3: repeat #200\n nop\n"
         " return\n", 4, None),
+    "a jump into a table of seven": (
+        "cp w0,#7\n bra c,1f\n bra w0\n bra 1f\n bra 1f\n bra 1f\n bra 1f\n bra 1f\n bra 1f\n bra 2f\n1: return\n"
+        "2: repeat #20\n nop\n return\n", 8, None),
     "DCOUNT made more": (
         "clr w1\n do #3,1f\n cp0 w1\n bra nz,2f\n mov #300,w2\n mov w2,0x38\n inc w1,w1\n2: nop\n nop\n1: nop\n"
         " return\n", 1, None),
@@ -151,3 +154,15 @@ def test_a_pointer_to_the_stack_among_arguments_on_the_stack(tmp_path: Path) -> 
     assert built.status == 0, built.messages
     bound = bound_of(tmp_path / "p.elf")
     assert bound.cycles is None or bound.cycles >= worst(tmp_path / "p.elf", 1)
+
+
+@pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
+def test_the_table_of_a_switch_has_an_end_the_compiler_asks_for(tmp_path: Path, level: str) -> None:
+    """No jump into one is refused, although seven cases are no power of two."""
+    cases = " ".join(f"case {k}: out += {k * k + 1}; break;" for k in range(3, 10))
+    (tmp_path / "p.c").write_text(DATA + f"int main(void) {{ switch (in) {{ {cases} }} return 0; }}\n")
+    built = build([tmp_path / "p.c"], tmp_path / "p.elf", level, "-g", "-fno-lto")
+    assert built.status == 0, built.messages
+    bound = bound_of(tmp_path / "p.elf")
+    assert bound.cycles is not None
+    assert bound.cycles >= worst(tmp_path / "p.elf", 12)
