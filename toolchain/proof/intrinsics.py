@@ -13,7 +13,8 @@ from toolchain.proof.solver import Undecided
 from toolchain.proof.terms import Term, known, one_bit, truth, vector
 
 if TYPE_CHECKING:
-    from toolchain.proof.source import Evaluator, Path
+    from toolchain.proof.path import Path
+    from toolchain.proof.source import Evaluator
 
 Meaning = Callable[["Evaluator", "Path", Instr], Any]
 MOST_BYTES: Final = 256
@@ -28,7 +29,7 @@ def base_of(name: str) -> str:
 
 
 def _scalar(e: Evaluator, path: Path, i: Instr, n: int) -> tuple[Term, Term | None]:
-    return e._scalar(path, i.args[n])
+    return e.scalar(path, i.args[n])
 
 
 def _of_words(make: Callable[..., Term], count: int = 2) -> Meaning:

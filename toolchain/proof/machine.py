@@ -15,8 +15,8 @@ import z3
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.row import Insn
 from toolchain.proof.memory import Frame, Memory, joined, split
+from toolchain.proof.path import Event
 from toolchain.proof.solver import Refuted, Undecided, demand, feasible
-from toolchain.proof.source import Event
 from toolchain.proof.terms import (
     BITS,
     Number,
@@ -214,7 +214,7 @@ class Machine:
             if at < SFR_END:
                 raise Refuted(f"reads the register at {at:#x}, which the source does not here")
             if self.frame.is_private(at):
-                value = joined([self._own(at + k) for k in range(size)])
+                value = joined([self.own(at + k) for k in range(size)])
                 place = known(value)
                 return narrow(value) if place is None else place
         elif size == 2:
@@ -247,7 +247,8 @@ class Machine:
         found = known(ea.word)
         return ea.word if found is None else found
 
-    def _own(self, at: int) -> Term:
+    def own(self, at: int) -> Term:
+        """A byte of its own frame."""
         if at not in self.state.frame:
             self.state.frame[at] = z3.BitVec(f"stack.{at:x}", 8)
         return self.state.frame[at]

@@ -1,32 +1,24 @@
 """Optimised LLVM IR on symbolic inputs: one path after the other, with what the world sees of each.
 
-A value is a vector and the condition under which it is poison (None: never); an aggregate is a list of values. What
-would be undefined becomes an assumption of its path. The reader keeps no `nsw`, `nuw` or `exact`, so sums wrap here as
-they do in the machine: what is proved holds for more inputs than the IR promises.
+What would be undefined becomes an assumption of its path. The reader keeps no `nsw`, `nuw` or `exact`, so sums wrap
+here as they do in the machine: what is proved holds for more inputs than the IR promises.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import z3
 
 from toolchain.ir.model import (
-    Arg,
     Block,
-    ConstAgg,
-    ConstBytes,
-    ConstExpr,
     ConstInt,
-    ConstZero,
     Function,
     GlobalRef,
     InlineAsm,
     Instr,
     Type,
-    Undef,
     Value,
     size_of,
     store_size,
@@ -35,11 +27,11 @@ from toolchain.ir.model import (
 from toolchain.proof import floats
 from toolchain.proof.intrinsics import INTRINSICS, base_of
 from toolchain.proof.memory import RAM, Frame, Memory
+from toolchain.proof.operands import SUMS, Operands, Symbolic, either
+from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Undecided, feasible
-from toolchain.proof.terms import Term, known, one_bit, product, truth, vector
+from toolchain.proof.terms import Term, known, one_bit, truth, vector
 
-Symbolic: TypeAlias = tuple[Term, Term | None]
-"""A vector, and when it is poison."""
 MOST_VISITS: Final = 70
 """Rounds of a loop that are followed on one path,"""
 MOST_FORKS: Final = 4
@@ -49,10 +41,6 @@ COMPARISONS: Final[dict[str, Callable[[Term, Term], Term]]] = {
     "eq": lambda a, b: a == b, "ne": lambda a, b: a != b, "ugt": z3.UGT, "uge": z3.UGE, "ult": z3.ULT, "ule": z3.ULE,
     "sgt": lambda a, b: a > b, "sge": lambda a, b: a >= b, "slt": lambda a, b: a < b, "sle": lambda a, b: a <= b,
 }  # fmt: skip
-SUMS: Final[dict[str, Callable[[Term, Term], Term]]] = {
-    "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": product, "and": lambda a, b: a & b,
-    "or": lambda a, b: a | b, "xor": lambda a, b: a ^ b,
-}  # fmt: skip
 SHIFTS: Final[dict[str, Callable[[Term, Term], Term]]] = {
     "shl": lambda a, b: a << b, "lshr": z3.LShR, "ashr": lambda a, b: a >> b,
 }  # fmt: skip
@@ -61,65 +49,14 @@ QUOTIENTS: Final[dict[str, Callable[[Term, Term], Term]]] = {
 }  # fmt: skip
 
 
-@dataclass
-class Event:
-    """What the world sees: a volatile access, a call, an assembly statement.
-
-    `kind` read, write, call or asm. `value` is what was read or written, of a call what it gives back, by words.
-    """
-
-    kind: str
-    address: Any = None
-    """Of an access or a call through a pointer a 16-bit term; of another call its name; of assembly its text."""
-    size: int = 0
-    value: Any = None
-    arguments: list[tuple[Value, Any, dict[str, object]]] = field(default_factory=list)
-    named: int | None = None
-    memory: Memory | None = None
-    """What must have been written before: of a call, and behind a barrier."""
-    after: Any = None
-    """The array behind it, where others may have written."""
-
-
-@dataclass
-class Path:
-    """One way through the function, up to now."""
-
-    memory: Memory
-    values: dict[int, Any] = field(default_factory=dict)
-    taken: list[Term] = field(default_factory=list)
-    """Conditions of its branches."""
-    assumed: list[Term] = field(default_factory=list)
-    """What must hold for it to mean anything."""
-    preferred: list[Term] = field(default_factory=list)
-    """What would be usual for it: pointers lead into RAM. An example of an input shows more so."""
-    events: list[Event] = field(default_factory=list)
-    visits: dict[str, int] = field(default_factory=dict)
-    forks: dict[str, int] = field(default_factory=dict)
-    result: Any = None
-    ended: str = ""
-    """ret or unreachable."""
-
-    def copy(self) -> Path:
-        """An independent path."""
-        return Path(self.memory.copy(), dict(self.values), [*self.taken], [*self.assumed], [*self.preferred],
-                    [*self.events], dict(self.visits), dict(self.forks))  # fmt: skip
-
-    @property
-    def known(self) -> list[Term]:
-        """All that holds on it."""
-        return self.taken + self.assumed
-
-
-class Evaluator:
+class Evaluator(Operands):
     """Follows one function. `address` gives a global's place, `frame` says where its variables lie."""
 
     def __init__(self, function: Function, frame: Frame, address: Callable[[str], int]) -> None:
+        super().__init__(address)
         self.function: Final = function
         self.frame: Final = frame
-        self.address: Final = address
         self.blocks: Final = {b.name: b for b in function.blocks}
-        self.fresh = 0
         self._slots = {i.name: i for b in function.blocks for i in b.instrs if i.op == "alloca"}
 
     def paths(self, start: Path) -> Iterator[Path]:
@@ -203,89 +140,26 @@ class Evaluator:
         out.setdefault(i.blocks[0], []).append(rest)
         return [(z3.Or(*conditions), name) for name, conditions in out.items()]
 
-    # -- operands ----------------------------------------------------------------------------------------------------
-
-    def value(self, path: Path, v: Value) -> Any:
-        """What an operand is."""
-        match v:
-            case Instr() | Arg():
-                return path.values[id(v)]
-            case ConstInt():
-                return vector(v.value, v.type.bits), None
-            case GlobalRef():
-                return vector(self._place(v.name) + v.offset, 16), None
-            case Undef():
-                return self._of_type(v.type, lambda t: (self.unknown("undef", t.bits), z3.BoolVal(True)))
-            case ConstZero():
-                return self._of_type(v.type, lambda t: (vector(0, t.bits), None))
-            case ConstAgg():
-                return [self.value(path, e) for e in v.elems]
-            case ConstBytes():
-                return [(vector(b, 8), None) for b in v.data]
-            case ConstExpr():
-                return self._expression(path, v)
-            case _:
-                raise Undecided(f"an operand {type(v).__name__}")
-
-    def _place(self, name: str) -> int:
-        try:
-            return self.address(name)
-        except KeyError:
-            raise Undecided(f"no address of {name}") from None
-
-    def _expression(self, path: Path, v: ConstExpr) -> Symbolic:
-        parts = [self.value(path, a) for a in v.args]
-        if v.op in SUMS:
-            return SUMS[v.op](parts[0][0], parts[1][0]), None
-        return self._cast(v.op, parts[0], v.type)
-
-    def _of_type(self, t: Type, make: Callable[[Type], Any]) -> Any:
-        if t.kind in ("int", "ptr", "float"):
-            return make(t)
-        if t.kind == "struct":
-            return [self._of_type(e, make) for e in t.elems]
-        if t.kind == "array":
-            return [self._of_type(t.elems[0], make) for _ in range(t.count)]
-        raise Undecided(f"a value of type {t}")
-
-    def sure(self, path: Path, v: Value) -> Term:
-        """An operand that must not be poison."""
-        term, poison = self._scalar(path, v)
-        if poison is not None:
-            path.assumed.append(z3.Not(poison))
-        return term
-
-    def _scalar(self, path: Path, v: Value) -> Symbolic:
-        found = self.value(path, v)
-        if isinstance(found, list):
-            raise Undecided(f"an aggregate of type {v.type}")
-        return found  # type: ignore[no-any-return]
-
-    def unknown(self, name: str, bits: int) -> Term:
-        """A new free vector."""
-        self.fresh += 1
-        return z3.BitVec(f"{name}.{self.fresh}", bits)
-
     # -- instructions ------------------------------------------------------------------------------------------------
 
     def _instruction(self, path: Path, i: Instr) -> Any:
         if i.op in SUMS | SHIFTS | QUOTIENTS:
             return self._binary(path, i)
         if i.op in floats.SUMS:
-            (a, p), (b, q) = self._scalar(path, i.args[0]), self._scalar(path, i.args[1])
+            (a, p), (b, q) = self.scalar(path, i.args[0]), self.scalar(path, i.args[1])
             return floats.arithmetic(i.op, a, b), either(p, q)
         handler = _HANDLERS.get(i.op)
         if handler is None:
             if i.op in ("sitofp", "uitofp", "fptosi", "fptoui", "fpext", "fptrunc"):
-                a, p = self._scalar(path, i.args[0])
+                a, p = self.scalar(path, i.args[0])
                 return floats.converted(i.op, a, i.type.bits), p
             if i.op in ("zext", "sext", "trunc", "ptrtoint", "inttoptr", "bitcast", "addrspacecast", "ptrtoaddr"):
-                return self._cast(i.op, self._scalar(path, i.args[0]), i.type)
+                return self.cast(i.op, self.scalar(path, i.args[0]), i.type)
             raise Undecided(f"the instruction {i.op}")
         return handler(self, path, i)
 
     def _binary(self, path: Path, i: Instr) -> Symbolic:
-        (a, p), (b, q) = self._scalar(path, i.args[0]), self._scalar(path, i.args[1])
+        (a, p), (b, q) = self.scalar(path, i.args[0]), self.scalar(path, i.args[1])
         poison = either(p, q)
         if i.op in QUOTIENTS:
             b = self.sure(path, i.args[1])
@@ -303,27 +177,18 @@ class Evaluator:
             return SHIFTS[i.op](a, b), poison
         return SUMS[i.op](a, b), poison
 
-    def _cast(self, op: str, value: Symbolic, t: Type) -> Symbolic:
-        term, poison = value
-        more = t.bits - term.size()
-        if op == "sext" and more > 0:
-            return z3.SignExt(more, term), poison
-        if more > 0:
-            return z3.ZeroExt(more, term), poison
-        return (z3.Extract(t.bits - 1, 0, term) if more < 0 else term), poison
-
     def _compare(self, path: Path, i: Instr) -> Symbolic:
-        (a, p), (b, q) = self._scalar(path, i.args[0]), self._scalar(path, i.args[1])
+        (a, p), (b, q) = self.scalar(path, i.args[0]), self.scalar(path, i.args[1])
         if i.op == "fcmp":
             return floats.compared(i.pred, a, b), either(p, q)
         return one_bit(COMPARISONS[i.pred](a, b)), either(p, q)
 
     def _negated(self, path: Path, i: Instr) -> Symbolic:
-        term, poison = self._scalar(path, i.args[0])
+        term, poison = self.scalar(path, i.args[0])
         return term ^ vector(1 << i.type.bits - 1, i.type.bits), poison
 
     def _select(self, path: Path, i: Instr) -> Any:
-        c, poison = self._scalar(path, i.args[0])
+        c, poison = self.scalar(path, i.args[0])
         place = known(c)
         a, b = self.value(path, i.args[1]), self.value(path, i.args[2])
         if place is not None:
@@ -337,7 +202,7 @@ class Evaluator:
         return z3.If(truth(c), a[0], b[0]), either(poison, mixed)
 
     def _freeze(self, path: Path, i: Instr) -> Any:
-        term, poison = self._scalar(path, i.args[0])
+        term, poison = self.scalar(path, i.args[0])
         if poison is not None and feasible([*path.known, poison]):
             raise Undecided("freeze of what may be undefined")
         return term, None
@@ -349,7 +214,7 @@ class Evaluator:
 
     def _address(self, path: Path, i: Instr) -> Symbolic:
         """getelementptr: bases and strides are exact, the rest wraps."""
-        base, poison = self._scalar(path, i.args[0])
+        base, poison = self.scalar(path, i.args[0])
         t = i.extra["type"]
         assert isinstance(t, Type)
         for k, index in enumerate(i.args[1:]):
@@ -359,8 +224,8 @@ class Evaluator:
                 t = t.elems[index.value]
                 continue
             t = t.elems[0] if k else t
-            term, wrong = self._scalar(path, index)
-            place = self._cast("sext", (term, None), Type("int", 16))[0]
+            term, wrong = self.scalar(path, index)
+            place = self.cast("sext", (term, None), Type("int", 16))[0]
             base, poison = base + place * vector(size_of(t), 16), either(poison, wrong)
         number = known(base)
         return (vector(number, 16) if number is not None else base), poison
@@ -371,7 +236,7 @@ class Evaluator:
             size = store_size(i.type)
             value = self.unknown("read", 8 * size)
             path.events.append(Event("read", address, size, value, memory=self._settled(path)))
-            return self._cast("trunc", (value, None), i.type)
+            return self.cast("trunc", (value, None), i.type)
         return self._loaded(path, address, i.type)
 
     def _loaded(self, path: Path, address: Term, t: Type) -> Any:
@@ -380,14 +245,14 @@ class Evaluator:
             return [self._loaded(path, address + o, e) for o, e in zip(offsets, t.elems, strict=False)]
         if t.kind not in ("int", "ptr", "float"):
             raise Undecided(f"a value of type {t}")
-        return self._cast("trunc", (path.memory.read(address, store_size(t)), None), t)
+        return self.cast("trunc", (path.memory.read(address, store_size(t)), None), t)
 
     def _store(self, path: Path, i: Instr) -> None:
         t = i.args[0].type
         address = self._accessed(path, i.args[1], t, i)
         value = self.value(path, i.args[0])
         if i.volatile:
-            term = self._cast("zext", (self.sure(path, i.args[0]), None), Type("int", 8 * store_size(t)))[0]
+            term = self.cast("zext", (self.sure(path, i.args[0]), None), Type("int", 8 * store_size(t)))[0]
             path.events.append(Event("write", address, store_size(t), term, memory=self._settled(path)))
             return
         self._stored(path, address, t, value)
@@ -449,7 +314,7 @@ class Evaluator:
             assert isinstance(i.extra["fixed"], int)
             event.named = i.extra["fixed"]
         if i.type.kind != "void":
-            event.value = self._of_type(i.type, lambda t: (self.unknown("result", t.bits), None))
+            event.value = self.of_type(i.type, lambda t: (self.unknown("result", t.bits), None))
         return event.value
 
     def _even(self, path: Path, pointer: Term) -> Term:
@@ -490,13 +355,6 @@ class Evaluator:
 
     def _nothing(self, path: Path, i: Instr) -> None:
         """A fence: the order of accesses is compared anyway."""
-
-
-def either(a: Term | None, b: Term | None) -> Term | None:
-    """Whether one of them is poison."""
-    if a is None or b is None:
-        return b if a is None else a
-    return z3.Or(a, b)
 
 
 def _replaced(whole: list[Any], indices: list[int], part: Any) -> list[Any]:

@@ -1,0 +1,208 @@
+"""The machine code of a function, run on all inputs of one path of the source, along every way they make it take."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+import z3
+
+from emu.dspic30f.isa import flow
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.isa.text import StatementError, parse
+from toolchain.proof.contract import Contract
+from toolchain.proof.machine import Machine, State
+from toolchain.proof.memory import STACK, Frame, Memory
+from toolchain.proof.path import Path
+from toolchain.proof.solver import Refuted, Undecided, answer, feasible
+from toolchain.proof.subject import WORD_UNITS, Subject
+from toolchain.proof.terms import Term, holds, known, word
+from toolchain.target import RETURN_ADDRESS_BYTES, SP
+
+MOST_STEPS: Final = 6000
+"""Instructions on one path of the code."""
+MOST_TARGETS: Final = 64
+"""Of a computed jump."""
+
+
+class Code:
+    """A function between two program addresses. `registers` are W0-W14 at entry, `array` is memory then."""
+
+    def __init__(self, subject: Subject, start: int, end: int, frame: Frame, path: Path) -> None:
+        self.subject: Final = subject
+        self.start: Final = start
+        self.end: Final = end
+        self.frame: Final = frame
+        self.path: Final = path
+        self.machine: Final = Machine(frame, path.events, path.known)
+        self.told = -1
+        """Where the code of an assembly statement stands."""
+
+    def run(self, registers: list[Term], array: Term) -> None:
+        """Raises Refuted, Undecided."""
+        self.contract = Contract(self.subject, self.frame, registers, self.path, self.machine)
+        work = [State([*registers, STACK], Memory(array), self.start)]
+        while work:
+            state = work.pop()
+            for _ in range(MOST_STEPS):
+                following = self._sure_step(state)
+                if len(following) != 1 or following[0] is not state:
+                    work += following
+                    break
+            else:
+                raise Undecided(f"more than {MOST_STEPS} instructions on one path")
+
+    def _sure_step(self, state: State) -> list[State]:
+        """As `_step`; what is wrong on a path that no input takes does not count."""
+        try:
+            return self._step(state)
+        except Refuted as found:
+            if found.conditions is not None:
+                raise
+            conditions = [*self.path.known, *state.path]
+            possible, _ = answer(conditions)
+            if possible == z3.unsat:
+                return []
+            if possible == z3.unknown:
+                raise Undecided(f"the solver gave up: {found.what}") from None
+            raise Refuted(found.what, conditions) from None
+
+    def _step(self, state: State) -> list[State]:
+        """The state itself where there is one way on; none at the end."""
+        if self.path.ended == "unreachable" and state.event == len(self.path.events):
+            return []  # whatever it does now is right
+        insn = self.subject.insn(state.pc)
+        if insn is None or not self.start <= state.pc < self.end:
+            raise Refuted(f"runs out of the function, to {state.pc:#x}")
+        self.machine.begin(state, insn)
+        self._assembly(insn)
+        asked = insn.row.does(self.machine, insn.x)
+        here, behind = state.pc, state.pc + WORD_UNITS * insn.words
+        match asked:
+            case None:
+                state.pc = behind
+                return [state]
+            case flow.Goto():
+                return self._jump(state, asked.target)
+            case flow.Branch():
+                return self._fork(state, holds(asked.cond), asked.target, behind)
+            case flow.Skip():
+                skipped = self.subject.insn(behind)
+                if skipped is None:
+                    raise Refuted(f"skips what is no instruction at {behind:#x}")
+                return self._fork(state, holds(asked.cond), behind + WORD_UNITS * skipped.words, behind)
+            case flow.Call():
+                state.w[SP] -= RETURN_ADDRESS_BYTES
+                self.contract.call(state, asked.target)
+                state.pc = behind
+                return [state]
+            case flow.Return():
+                if asked.kind == "retfie":
+                    raise Undecided("an interrupt handler")
+                self.contract.returned(state)
+                return []
+            case flow.Repeat():
+                return self._repeat(state, asked.count, behind)
+            case flow.Disi() | flow.ClearWatchdog() | flow.Sleep() | flow.Reset():
+                if self.told != here:
+                    raise Refuted(f"{insn.row.syntax} at {here:#x}, which the source has not")
+                state.pc = behind
+                return [state]
+            case _:
+                raise Undecided(f"{insn.row.syntax}")
+
+    def _assembly(self, insn: Insn) -> None:
+        """An assembly statement of one instruction without operands, if this is it."""
+        e = self.machine.expected()
+        if e is None or e.kind != "asm":
+            return
+        wanted = assembled(str(e.address))
+        state = self.machine.state
+        if wanted == [
+            w for k in range(len(wanted)) if (w := self.subject.code.get(state.pc + WORD_UNITS * k)) is not None
+        ]:
+            if len(wanted) != insn.words:
+                raise Undecided("assembly of several instructions")
+            self.told = state.pc
+            self.contract.settle(e)
+            if e.after is not None:
+                state.memory.become(e.after, self.frame.kept())
+            self.machine.passed()
+
+    def _fork(self, state: State, taken: Term, there: int, behind: int) -> list[State]:
+        out = []
+        place = z3.simplify(taken)
+        for condition, pc in ((taken, there), (z3.Not(taken), behind)):
+            if z3.is_true(place):
+                return self._jump(state, there)
+            if z3.is_false(place):
+                return self._jump(state, behind)
+            other = state.copy()
+            other.path.append(condition)
+            if feasible([*self.path.known, *other.path]):
+                other.pc = pc
+                out.append(other)
+        if len(out) == 1:  # what is known of it is known anyway
+            return self._jump(state, out[0].pc)
+        return [landed for one in out for landed in self._jump(one, one.pc)]
+
+    def _jump(self, state: State, target: Any) -> list[State]:
+        if not isinstance(target, int):
+            return self._computed(state, word(target))
+        if self.start <= target < self.end:
+            state.pc = target
+            return [state]
+        self.contract.call(state, target)  # a call whose return is ours
+        self.contract.returned(state, popped=False)
+        return []
+
+    def _computed(self, state: State, target: Term) -> list[State]:
+        """Every place a jump by a register can lead to."""
+        place = known(target)
+        if place is not None:
+            return self._jump(state, place)
+        out: list[State] = []
+        excluded: list[Term] = []
+        while True:
+            answered, solver = answer([*self.path.known, *state.path, *excluded])
+            if answered == z3.unknown:
+                raise Undecided("the solver gave up: where a jump leads")
+            if answered == z3.unsat:
+                return out
+            value = solver.model().eval(target, model_completion=True).as_long()
+            if len(out) == MOST_TARGETS:
+                raise Undecided(f"a jump to more than {MOST_TARGETS} places")
+            other = state.copy()
+            other.path.append(target == value)
+            other.pc = int(value)
+            excluded.append(target != value)
+            if not self.start <= other.pc < self.end:
+                raise Undecided("a jump by a register out of the function")
+            out.append(other)
+
+    def _repeat(self, state: State, count: Any, pc: int) -> list[State]:
+        rounds = count if isinstance(count, int) else known(word(count))
+        insn = self.subject.insn(pc)
+        if rounds is None or insn is None:
+            raise Undecided("REPEAT by a number that is not known")
+        steps = {rounds, 0} if insn.row.syntax.startswith("DIV") else range(rounds + 1)
+        for left in sorted(steps, reverse=True):  # of a division the steps between change nothing
+            state.pc = pc
+            state.regs["RCOUNT"] = left
+            self.machine.begin(state, insn)
+            insn.row.does(self.machine, insn.x)
+        state.regs["RCOUNT"] = 0
+        state.pc = pc + WORD_UNITS * insn.words
+        return [state]
+
+
+def assembled(text: str) -> list[int]:
+    """Words of an assembly statement, none where it is not plain instructions."""
+    words: list[int] = []
+    for line in re.split(r"[;\n]", text):
+        if line.strip():
+            try:
+                words += parse(line.strip()).encode(0)
+            except StatementError as error:
+                raise Undecided(f"assembly: {error}") from None
+    return words

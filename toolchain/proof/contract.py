@@ -1,0 +1,183 @@
+"""Where code meets what others rely on: calls, returns, and memory as the source has it (abi-elf.md §2.1, §2.2).
+
+In: a state of the machine and what one path of the source says of that moment. Out: nothing, or Refuted.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import z3
+
+from toolchain.lower.abi import place_arguments
+from toolchain.lower.calls import shape_of
+from toolchain.proof.helpers import HELPERS, Helper
+from toolchain.proof.machine import Machine, State
+from toolchain.proof.memory import RAM_END, STACK, Frame, Memory, joined, split
+from toolchain.proof.path import Event, Path
+from toolchain.proof.solver import Refuted, Undecided, demand
+from toolchain.proof.subject import Subject
+from toolchain.proof.terms import Term, known, truth_number, vector, word
+from toolchain.target import CALLEE_SAVED, CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
+
+
+class Contract:
+    """What holds on one path of the source, for a machine whose registers had certain values at entry."""
+
+    def __init__(self, subject: Subject, frame: Frame, registers: list[Term], path: Path, machine: Machine) -> None:
+        self.subject: Final = subject
+        self.frame: Final = frame
+        self.registers: Final = registers
+        self.path: Final = path
+        self.machine: Final = machine
+        machine.settle = self.settle
+
+    def settle(self, e: Event) -> None:
+        """What was written before is in memory."""
+        if e.memory is not None:
+            self.same_memory(self.machine.state, e.memory, self.frame.escaped, f"memory differs at: {_said(e)}")
+
+    def call(self, state: State, target: Any) -> None:
+        """The next event is this call, with these arguments; behind it is what calls leave."""
+        e = self.machine.expected()
+        name = self.subject.functions.get(target) if isinstance(target, int) else None
+        helper = HELPERS.get(name or "")
+        if helper is not None and (e is None or e.kind != "call" or self._target(e) != target):
+            self._by_model(state, helper)
+            return
+        if e is None or e.kind != "call":
+            raise Refuted(f"calls {name or 'a pointer'}, which the source does not here")
+        wanted = self._target(e)
+        if isinstance(wanted, int) and isinstance(target, int):
+            if wanted != target:
+                raise Refuted(f"calls {name}, the source {e.address}")
+        else:
+            demand(vector(wanted, 16) == word(target) if isinstance(wanted, int) else wanted == word(target),
+                   self.machine.given, "calls another function than the source")  # fmt: skip
+        pushed = self._arguments(state, e)
+        assert e.memory is not None
+        self.same_memory(state, e.memory, self.frame.escaped, f"memory differs at the call of {name or 'a pointer'}")
+        state.memory.become(e.after, self.frame.kept())
+        self._forget(state, pushed)
+        self.machine.passed()
+        if e.value is not None:
+            for n, term in enumerate(_words_of(e.value)):
+                self._put(state, n, term)
+
+    def _put(self, state: State, register: int, term: Term) -> None:
+        if term.size() < 16:
+            term = z3.Concat(z3.FreshConst(z3.BitVecSort(16 - term.size()), "above"), term)
+        state.w[register] = term
+
+    def _target(self, e: Event) -> Any:
+        if not isinstance(e.address, str):
+            place = known(e.address)
+            return e.address if place is None else place
+        try:
+            return self.subject.address(e.address)
+        except KeyError:
+            raise Undecided(f"no address of {e.address}") from None
+
+    def _forget(self, state: State, pushed: int = 0) -> None:
+        """What a call leaves unknown: W0-W7, flags, its arguments on the stack (bytes) and what lay above."""
+        for n in CALLER_SAVED:
+            state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
+        for name in ("C", "Z", "OV", "N", "DC"):
+            state.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
+        for at in [at for at in state.frame if at >= state.w[SP] - pushed]:
+            state.frame[at] = z3.FreshConst(z3.BitVecSort(8), "stack")
+
+    def _arguments(self, state: State, e: Event) -> int:
+        """Bytes of arguments on the stack."""
+        if any(k.get("byval") is not None for _, _, k in e.arguments):
+            raise Undecided("a struct as argument")
+        places = place_arguments([shape_of(v, k) for v, _, k in e.arguments], e.named)
+        top = state.w[SP]
+        for n, ((_, value, _), place) in enumerate(zip(e.arguments, places, strict=True)):
+            if isinstance(value, list):
+                raise Undecided("an aggregate as argument")
+            if place.register is not None:
+                words = [word(self.machine.w(place.register + k)) for k in range(place.words)]
+            else:
+                low = top + RETURN_ADDRESS_BYTES - place.stack
+                words = [joined([self.machine.own(low + 2 * k + b) for b in (0, 1)]) for k in range(place.words)]
+            self._equal(value, words, f"argument {n + 1} of {e.address if isinstance(e.address, str) else 'the call'}")
+        return max([RETURN_ADDRESS_BYTES, *(p.stack for p in places)]) - RETURN_ADDRESS_BYTES
+
+    def _equal(self, value: Any, words: list[Term], what: str) -> None:
+        term, poison = value
+        whole = words[0] if len(words) == 1 else z3.Concat(*reversed(words))
+        same = term == (z3.Extract(term.size() - 1, 0, whole) if term.size() < whole.size() else whole)
+        demand(same if poison is None else z3.Or(poison, same), self.machine.given, f"{what} differs")
+
+    def _by_model(self, state: State, helper: Helper) -> None:
+        """A function of the run-time library that stands for an operation of the IR."""
+        results = helper.call([word(self.machine.w(n)) for n in CALLER_SAVED])
+        self._forget(state)
+        state.w[: len(results)] = results
+
+    def returned(self, state: State, popped: bool = True) -> None:
+        """Everything at the end. `popped`: the return address has been taken off the stack."""
+        if self.path.ended != "ret" or state.event != len(self.path.events):
+            e = self.machine.expected()
+            raise Refuted("returns where the source does not" if e is None else f"returns before: {_said(e)}")
+        wanted = STACK - RETURN_ADDRESS_BYTES if popped else STACK
+        if state.w[SP] != wanted:
+            raise Refuted(f"W15 is {state.w[SP] - wanted:+d} bytes off at the end")
+        for at in range(STACK - RETURN_ADDRESS_BYTES, STACK):
+            if at in state.frame:
+                demand(
+                    state.frame[at] == z3.BitVec(f"stack.{at:x}", 8), self.machine.given, "the return address changes"
+                )
+        for n in CALLEE_SAVED:
+            demand(word(self.machine.w(n)) == self.registers[n], self.machine.given, f"W{n} is not what it was")
+        if self.path.result is not None:
+            self._result(state)
+        self.same_memory(state, self.path.memory, set(), "memory differs at the end")
+
+    def _result(self, state: State) -> None:
+        at = 0
+        for value in _leaves(self.path.result):
+            count = max(1, (value[0].size() + 15) // 16)
+            self._equal(value, [word(self.machine.w(at + k)) for k in range(count)], "the result")
+            at += count
+
+    def same_memory(self, state: State, wanted: Memory, objects: set[str], what: str) -> None:
+        """Equal bytes everywhere but in the frame; of that, in these objects of the source."""
+        ours, theirs = state.memory.copy(), wanted.copy()
+        if ours.array.eq(theirs.array):
+            places = set(ours.written) | set(theirs.written)
+            for at in sorted(places):
+                if self._counts(at, objects):
+                    demand(ours.byte(at) == theirs.byte(at), self.machine.given, f"{what}: {at:#x}")
+            return
+        at = z3.BitVec("anywhere", 16)
+        inside = [z3.And(z3.UGE(at, self.frame.objects[n][0]), z3.ULT(at, sum(self.frame.objects[n]))) for n in objects]
+        outside = z3.Or(z3.ULT(at, self.frame.lowest), z3.UGE(at, RAM_END), *inside)
+        same = z3.Select(ours.whole(), at) == z3.Select(theirs.whole(), at)
+        demand(z3.Implies(outside, same), self.machine.given, what)
+
+    def _counts(self, at: int, objects: set[str]) -> bool:
+        if not self.frame.is_private(at) and not self.frame.is_object(at):
+            return True
+        return any(self.frame.objects[n][0] <= at < sum(self.frame.objects[n]) for n in objects)
+
+
+def _said(e: Event) -> str:
+    return f"{e.kind} {e.address if isinstance(e.address, str) else ''}".strip()
+
+
+def _leaves(value: Any) -> list[Any]:
+    return [leaf for part in value for leaf in _leaves(part)] if isinstance(value, list) else [value]
+
+
+def _words_of(value: Any) -> list[Term]:
+    """Register by register."""
+    out: list[Term] = []
+    for term, _ in _leaves(value):
+        parts = split(term)
+        if term.size() <= 16:
+            out.append(term)
+        else:
+            out += [joined(parts[k : k + 2]) for k in range(0, len(parts), 2)]
+    return out

@@ -1,0 +1,60 @@
+"""What one way through a function shows the world, and what must hold on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from toolchain.ir.model import Value
+from toolchain.proof.memory import Memory
+from toolchain.proof.terms import Term
+
+
+@dataclass
+class Event:
+    """What the world sees: a volatile access, a call, an assembly statement.
+
+    `kind` read, write, call or asm. `value` is what was read or written, of a call what it gives back, by words.
+    """
+
+    kind: str
+    address: Any = None
+    """Of an access or a call through a pointer a 16-bit term; of another call its name; of assembly its text."""
+    size: int = 0
+    value: Any = None
+    arguments: list[tuple[Value, Any, dict[str, object]]] = field(default_factory=list)
+    named: int | None = None
+    memory: Memory | None = None
+    """What must have been written before: of a call, and behind a barrier."""
+    after: Any = None
+    """The array behind it, where others may have written."""
+
+
+@dataclass
+class Path:
+    """One way through the function, up to now."""
+
+    memory: Memory
+    values: dict[int, Any] = field(default_factory=dict)
+    taken: list[Term] = field(default_factory=list)
+    """Conditions of its branches."""
+    assumed: list[Term] = field(default_factory=list)
+    """What must hold for it to mean anything."""
+    preferred: list[Term] = field(default_factory=list)
+    """What would be usual for it: pointers lead into RAM. An example of an input shows more so."""
+    events: list[Event] = field(default_factory=list)
+    visits: dict[str, int] = field(default_factory=dict)
+    forks: dict[str, int] = field(default_factory=dict)
+    result: Any = None
+    ended: str = ""
+    """ret or unreachable."""
+
+    def copy(self) -> Path:
+        """An independent path."""
+        return Path(self.memory.copy(), dict(self.values), [*self.taken], [*self.assumed], [*self.preferred],
+                    [*self.events], dict(self.visits), dict(self.forks))  # fmt: skip
+
+    @property
+    def known(self) -> list[Term]:
+        """All that holds on it."""
+        return self.taken + self.assumed
