@@ -28,12 +28,13 @@ MOST_TARGETS: Final = 64
 class Code:
     """A function between two program addresses. `registers` are W0-W14 at entry, `array` is memory then."""
 
-    def __init__(self, subject: Subject, start: int, end: int, frame: Frame, path: Path) -> None:
+    def __init__(self, subject: Subject, start: int, end: int, frame: Frame, path: Path, handler: bool = False) -> None:
         self.subject: Final = subject
         self.start: Final = start
         self.end: Final = end
         self.frame: Final = frame
         self.path: Final = path
+        self.handler: Final = handler
         self.machine: Final = Machine(frame, path.events, path.known)
         self.told = -1
         """Where the code of an assembly statement stands."""
@@ -97,9 +98,9 @@ class Code:
                 state.pc = behind
                 return [state]
             case flow.Return():
-                if asked.kind == "retfie":
-                    raise Undecided("an interrupt handler")
-                self.contract.returned(state)
+                if (asked.kind == "retfie") != self.handler:
+                    raise Refuted(f"ends with {asked.kind.upper()}")
+                (self.contract.handled if self.handler else self.contract.returned)(state)
                 return []
             case flow.Repeat():
                 return self._repeat(state, asked.count, behind)
@@ -149,12 +150,17 @@ class Code:
     def _jump(self, state: State, target: Any) -> list[State]:
         if not isinstance(target, int):
             return self._computed(state, word(target))
-        if self.start <= target < self.end:
+        if self.start <= target < self.end and not self._calls_itself(target):
             state.pc = target
             return [state]
         self.contract.call(state, target)  # a call whose return is ours
         self.contract.returned(state, popped=False)
         return []
+
+    def _calls_itself(self, target: int) -> bool:
+        """Whether a jump to the beginning is a call in the source whose return is ours."""
+        e = self.machine.expected()
+        return target == self.start and e is not None and e.kind == "call" and self.contract.target(e) == target
 
     def _computed(self, state: State, target: Term) -> list[State]:
         """Every place a jump by a register can lead to."""

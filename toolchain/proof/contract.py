@@ -12,7 +12,7 @@ import z3
 from toolchain.lower.abi import place_arguments
 from toolchain.lower.calls import shape_of
 from toolchain.proof.helpers import HELPERS, Helper
-from toolchain.proof.machine import Machine, State
+from toolchain.proof.machine import CORE, Machine, State
 from toolchain.proof.memory import RAM_END, STACK, Frame, Memory, joined, split
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Refuted, Undecided, demand
@@ -42,12 +42,12 @@ class Contract:
         e = self.machine.expected()
         name = self.subject.functions.get(target) if isinstance(target, int) else None
         helper = HELPERS.get(name or "")
-        if helper is not None and (e is None or e.kind != "call" or self._target(e) != target):
+        if helper is not None and (e is None or e.kind != "call" or self.target(e) != target):
             self._by_model(state, helper)
             return
         if e is None or e.kind != "call":
             raise Refuted(f"calls {name or 'a pointer'}, which the source does not here")
-        wanted = self._target(e)
+        wanted = self.target(e)
         if isinstance(wanted, int) and isinstance(target, int):
             if wanted != target:
                 raise Refuted(f"calls {name}, the source {e.address}")
@@ -69,7 +69,8 @@ class Contract:
             term = z3.Concat(z3.FreshConst(z3.BitVecSort(16 - term.size()), "above"), term)
         state.w[register] = term
 
-    def _target(self, e: Event) -> Any:
+    def target(self, e: Event) -> Any:
+        """Program address of a call, or a term."""
         if not isinstance(e.address, str):
             place = known(e.address)
             return e.address if place is None else place
@@ -115,6 +116,16 @@ class Contract:
         results = helper.call([word(self.machine.w(n)) for n in CALLER_SAVED])
         self._forget(state)
         state.w[: len(results)] = results
+
+    def handled(self, state: State) -> None:
+        """The end of an interrupt handler, which gives back W0-W7 and the core's registers, too."""
+        for n in CALLER_SAVED:
+            same = word(self.machine.w(n)) == self.registers[n]
+            demand(same, self.machine.given, f"W{n} is not what it was")
+        for at, name in CORE.items():
+            same = self.machine.core(at) == z3.BitVec(name, 16)
+            demand(same, self.machine.given, f"{name} is not what it was")
+        self.returned(state)
 
     def returned(self, state: State, popped: bool = True) -> None:
         """Everything at the end. `popped`: the return address has been taken off the stack."""

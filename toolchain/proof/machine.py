@@ -16,7 +16,7 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.row import Insn
 from toolchain.proof.memory import Frame, Memory, joined, split
 from toolchain.proof.path import Event
-from toolchain.proof.solver import Refuted, Undecided, demand, feasible
+from toolchain.proof.solver import Refuted, Undecided, answer, demand
 from toolchain.proof.terms import (
     BITS,
     Number,
@@ -34,6 +34,8 @@ from toolchain.proof.terms import (
 )
 
 W_END, SFR_END = 0x20, 0x800
+CORE: Final = {0x32: "TBLPAG", 0x34: "PSVPAG", 0x36: "RCOUNT"}
+"""Registers that a handler saves; what PSVPAG shows is the same for both sides."""
 SINGLE_BIT: Final = ("BSET", "BCLR", "BTG", "BTSS", "BTSC", "BTST", "BTSTS", "BSW")
 """Instructions that touch a whole register in the device whichever byte they name (isa.md §5.4)."""
 
@@ -211,6 +213,8 @@ class Machine:
                     if size == 1
                     else self.w(at // 2)
                 )
+            if at in CORE and size == 2:
+                return narrow(self.core(at))
             if at < SFR_END:
                 raise Refuted(f"reads the register at {at:#x}, which the source does not here")
             if self.frame.is_private(at):
@@ -229,6 +233,9 @@ class Machine:
             if at < W_END:
                 (self.set_w if size == 2 else self.set_wb)(at // 2, v)
                 return
+            if at in CORE and size == 2:
+                self.state.regs[CORE[at]] = narrow(value)
+                return
             if at < SFR_END:
                 raise Refuted(f"writes the register at {at:#x}, which the source does not here")
             if self.frame.is_private(at):
@@ -246,6 +253,12 @@ class Machine:
             return ea
         found = known(ea.word)
         return ea.word if found is None else found
+
+    def core(self, at: int) -> Term:
+        """A register of CORE, as a term."""
+        if CORE[at] not in self.state.regs:
+            self.state.regs[CORE[at]] = narrow(z3.BitVec(CORE[at], 16))
+        return word(self.state.regs[CORE[at]])
 
     def own(self, at: int) -> Term:
         """A byte of its own frame."""
@@ -269,18 +282,8 @@ class Machine:
         e = self.expected()
         if e is None or e.kind != kind:
             return None
-        start = e.address if isinstance(e.address, int) else known(e.address)
-        if isinstance(at, int) != (start is not None):
-            return None
-        if not isinstance(at, int):
-            distances = [k for k in range(0, e.size, size) if self._same(at, e.address + k)]
-            if not distances:
-                return None
-            distance = distances[0]
-        else:
-            assert start is not None
-            distance = at - start
-        if not 0 <= distance <= e.size - size:
+        distance = self._distance(at, e, size)
+        if distance is None:
             return None
         part = z3.Extract(8 * (distance + size) - 1, 8 * distance, e.value)
         whole = e.size == 2 and size == 1 and self.insn.row.syntax.startswith(SINGLE_BIT)
@@ -301,6 +304,15 @@ class Machine:
             self.passed()
         return z3.simplify(part)
 
+    def _distance(self, at: Any, e: Event, size: int) -> int | None:
+        """How far within the event's access this one begins; None if it is another."""
+        start = known(e.address)
+        if isinstance(at, int) and start is not None:
+            distance = at - start
+            return distance if 0 <= distance <= e.size - size else None
+        here = vector(at, 16) if isinstance(at, int) else at
+        return next((k for k in range(0, e.size, size) if self._same(here, e.address + k)), None)
+
     def _rest_as_read(self, e: Event, distance: int) -> None:
         """A single bit is set in one byte: the other is written as it was read last."""
         before = self.events[self.state.event - 1] if self.state.event else None
@@ -313,4 +325,7 @@ class Machine:
     def _same(self, a: Any, b: Any) -> bool:
         if a is b:
             return True
-        return not feasible([*self.given, a != b])
+        found, _ = answer([*self.given, a != b])
+        if found == z3.unknown:
+            raise Undecided("the solver gave up: whether two addresses are equal")
+        return bool(found == z3.unsat)

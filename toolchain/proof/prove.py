@@ -85,13 +85,16 @@ class Proof:
     def _run(self) -> None:
         if self.f.vararg:
             raise Undecided("a variable number of arguments")
+        if self.f.name in self.subject.saving:
+            raise Undecided("a handler that saves variables")
         start = Path(Memory(self.array))
         self._parameters(start)
         for path in Evaluator(self.f, self.frame, self.subject.address).paths(start):
             if feasible(path.known):
                 self.paths += 1
                 self._path = path
-                Code(self.subject, self.start, self.end, self.frame, path).run(self.registers, self.array)
+                handler = self.f.name in self.subject.handlers
+                Code(self.subject, self.start, self.end, self.frame, path, handler).run(self.registers, self.array)
         if not self.paths:
             raise Undecided("no input gets through it")
 

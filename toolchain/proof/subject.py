@@ -26,6 +26,7 @@ from toolchain.ir.model import Module, size_of
 from toolchain.ir.read import read_module
 from toolchain.link.link import link
 from toolchain.link.options import LinkOptions
+from toolchain.lower.isr import annotations_of, interrupt_kind, preserved
 from toolchain.lower.names import symbol
 from toolchain.pipeline import ModuleCompiler
 from toolchain.proof.memory import STACK
@@ -55,6 +56,10 @@ class Subject:
     """24-bit words by address in PC units."""
     placed: dict[str, dict[str, int]]
     """By function, where its variables lie in the frame (`ModuleCompiler.placed`)."""
+    handlers: set[str]
+    """Functions that serve interrupts."""
+    saving: set[str]
+    """Those that also save variables."""
     made: ObjectFile
     options: LinkOptions
 
@@ -117,7 +122,10 @@ def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]]) 
             for at in range(0, len(section.data) - step + 1, step):
                 word = int.from_bytes(section.data[at : at + step], "little")
                 code[section.address + at // OCTETS_PER_UNIT] = word & 0xFFFFFF
-    return Subject(module, symbols, ends, code, placed, made, options)
+    notes = annotations_of(module)
+    saving = {name for name, found in notes.items() if preserved(found)}
+    handlers = {name for name in module.functions if interrupt_kind(notes.get(name, set()), name)}
+    return Subject(module, symbols, ends, code, placed, handlers, saving, made, options)
 
 
 def _invented(module: Module, symbols: list[Symbol], options: LinkOptions) -> dict[str, int]:

@@ -1,0 +1,65 @@
+"""Random firmware-like C (`c_shapes.py`), proved: `python tests/fuzz/fuzz_prove.py [--files N] [--functions N]`.
+
+One file of a program at one level, a few of its functions (`--functions 0`: all). A refutation is a fault of the
+compiler, or of the proof; `toolchain prove` shows its input. No emulator and no test inputs take part, so this sees
+what `fuzz_compiler.py` runs by.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+import tempfile
+from collections import Counter
+from importlib.util import find_spec
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tests.fuzz.c_shapes import Program  # noqa: E402
+from tests.fuzz.seeds import SKIPPED, Course, parser  # noqa: E402
+
+LEVELS = ("-O0", "-O1", "-Os", "-O2")
+FILES = ("one.c", "two.c", "three.c")
+
+
+def examine(seed: int, most: int, counts: Counter[str]) -> None:
+    """Raises AssertionError naming file, level and function of a refutation."""
+    from toolchain.proof.prove import verdicts
+    from toolchain.proof.subject import subject
+
+    chance = random.Random(seed)
+    file, level = chance.choice(FILES), chance.choice(LEVELS)
+    with tempfile.TemporaryDirectory(prefix="prove-") as name:
+        for each, text in Program(seed).files.items():
+            (Path(name) / each).write_text(text)
+        made = subject([str(Path(name) / file), level, "-w", "-std=gnu11"])
+        defined = [f.name for f in made.module.functions.values() if f.blocks]
+        chosen = chance.sample(defined, min(most, len(defined))) if most else defined
+        for function in chosen:
+            for verdict in verdicts(made, function):
+                counts[verdict.kind] += 1
+                assert verdict.kind != "refuted", f"{file} {level} {function}: {verdict.why}; {verdict.witness}"
+
+
+def main() -> int:
+    course = Course(parser(__doc__), "files", 30, "files")
+    course.parser.add_argument("--functions", type=int, default=4, metavar="N", help="of each (default 4; 0: all)")
+    options = course.parse()
+    if find_spec("z3") is None:
+        print("the solver is not installed (extra: test)")
+        return SKIPPED
+    counts: Counter[str] = Counter()
+    for seed in course:
+        try:
+            examine(seed, options.functions, counts)
+        except AssertionError as error:
+            return course.failed(error)
+    if sum(counts.values()) >= 40 and counts["proved"] < sum(counts.values()) // 3:
+        return course.failed(AssertionError(f"hardly anything is proved: {dict(counts)}"))
+    return course.ended(f"{counts['proved']} functions proved, {counts['undecided']} undecided")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
