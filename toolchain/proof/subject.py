@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from emu.chips.chip import Chip
 from emu.dspic30f.isa import codec
 from emu.dspic30f.isa.row import Insn
 from emu.elffacts import OCTETS_PER_UNIT
@@ -103,12 +104,12 @@ def subject(arguments: list[str], edit: Callable[[str], str] = str) -> Subject:
     made, _ = assemble(
         text, options.inputs[0].path.name, AssemblerOptions(relax=True, compiled=True, chip=options.chip)
     )
-    return linked(read_module(ir), made, compiler.placed)
+    return linked(read_module(ir), made, compiler.placed, options.chip)
 
 
-def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]]) -> Subject:
+def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]], chip: Chip) -> Subject:
     """The object by itself, with addresses for what it only declares."""
-    options = LinkOptions(entry=ENTRY, data_init=False, isr=False)
+    options = LinkOptions(entry=ENTRY, data_init=False, isr=False, chip=chip)
     invented = _invented(module, made.symbols, options)
     options.define.update(invented)
     image = link([made], [], replace(options, define=options.define | {ENTRY: CODE - CODE_STEP})).image
