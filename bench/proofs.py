@@ -2,6 +2,7 @@
 
 `python -m bench.proofs [--part NAME] [--level -Os] [--jobs N] [--json]`. Every function of every C file of a part, each
 file compiled by itself: proved, refuted, undecided, those without loops and those with. Exits 1 if one is refuted.
+Ctrl-C ends it with the table of the files that are done.
 """
 
 from __future__ import annotations
@@ -15,9 +16,6 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
-
-from rich.console import Console
-from rich.progress import track
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -76,8 +74,15 @@ def main() -> int:
     rows: list[dict[str, Any]] = []
     with ProcessPoolExecutor(options.jobs) as pool:
         results = pool.map(partial(look, options.level), work)
-        for part, name, found in track(results, "proofs", len(work), console=Console(stderr=True)):
-            rows += [{"part": part, "file": name, **verdict} for verdict in found]
+        try:
+            for number, (part, name, found) in enumerate(results, 1):
+                rows += [{"part": part, "file": name, **verdict} for verdict in found]
+                counts = Counter(verdict["kind"] for verdict in found)
+                told = ", ".join(f"{counts[kind]} {kind}" for kind in KINDS)
+                print(f"{number} of {len(work)} files: {name}: {told}", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+            print("interrupted: what follows is of the files until then", file=sys.stderr)
     print(json.dumps(rows, indent=1) if options.json else table(rows))
     return FAULT if any(row["kind"] == "refuted" for row in rows) else DONE
 

@@ -20,6 +20,7 @@ from toolchain.errors import ToolError
 from toolchain.files import read_bytes, read_text, write_outputs
 
 if TYPE_CHECKING:
+    from toolchain.asm.state import Options as AssemblerOptions
     from toolchain.cc_link import Program
 
 FrontEnd = Callable[[CcOptions, Path], dict[Input, bytes]]
@@ -173,17 +174,22 @@ def _to_assembly(options: CcOptions, ir_text: str) -> str:
         raise ToolError(f"not supported: {error}") from error
 
 
-def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes:
-    """Object bytes. Branch shortening only for compiled code, as XC16's driver does (abi-elf.md §5 Relaxation)."""
-    from toolchain.asm.assemble import assemble
+def assembler_options(options: CcOptions, compiled: bool) -> AssemblerOptions:
+    """What the assembler gets. Branch shortening only for compiled code, as XC16's driver does (abi-elf.md §5)."""
     from toolchain.asm.state import Options
-    from toolchain.elf.write import object_bytes
 
     folders = [word[2:] for word in options.clang if word.startswith("-I") and len(word) > 2]
     folders += [b for a, b in zip(options.clang, options.clang[1:], strict=False) if a == "-I"]
-    chosen = Options(include=folders, relax=compiled, compiled=compiled, debug=options.debug, chip=options.chip,
-                     prefix_map=options.prefix_map)  # fmt: skip
-    obj, messages = assemble(text, name, chosen)
+    return Options(include=folders, relax=compiled, compiled=compiled, debug=options.debug, chip=options.chip,
+                   prefix_map=options.prefix_map)  # fmt: skip
+
+
+def _assemble(options: CcOptions, text: str, name: str, compiled: bool) -> bytes:
+    """Object bytes."""
+    from toolchain.asm.assemble import assemble
+    from toolchain.elf.write import object_bytes
+
+    obj, messages = assemble(text, name, assembler_options(options, compiled))
     for message in messages:
         print(message, file=sys.stderr)
     return object_bytes(obj)

@@ -19,7 +19,7 @@ from emu.elffacts import OCTETS_PER_UNIT
 from toolchain.asm.assemble import assemble
 from toolchain.asm.state import Options as AssemblerOptions
 from toolchain.cc_options import parse
-from toolchain.driver import front_end, optimise
+from toolchain.driver import assembler_options, front_end, optimise
 from toolchain.elf.model import Home, ObjectFile, Symbol
 from toolchain.elf.write import executable_bytes
 from toolchain.errors import ToolError
@@ -101,9 +101,7 @@ def subject(arguments: list[str], edit: Callable[[str], str] = str) -> Subject:
     ir = PRIVATE.sub(r"\1internal ", ir)  # local labels have no address in the image
     compiler = ModuleCompiler(read_module(ir), options)
     text = edit(compiler.run())
-    made, _ = assemble(
-        text, options.inputs[0].path.name, AssemblerOptions(relax=True, compiled=True, chip=options.chip)
-    )
+    made, _ = assemble(text, options.inputs[0].path.name, assembler_options(options, compiled=True))
     return linked(read_module(ir), made, compiler.placed, options.chip)
 
 
