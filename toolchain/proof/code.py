@@ -15,27 +15,34 @@ from toolchain.proof.machine import Machine, State
 from toolchain.proof.memory import STACK, Frame, Memory
 from toolchain.proof.path import Path
 from toolchain.proof.solver import Refuted, Undecided, answer, feasible
-from toolchain.proof.subject import WORD_UNITS, Subject
-from toolchain.proof.terms import Term, holds, known, word
+from toolchain.proof.subject import PAGE, WORD_UNITS, Subject
+from toolchain.proof.terms import Term, holds, known, vector, word
 from toolchain.target import RETURN_ADDRESS_BYTES, SP
 
 MOST_STEPS: Final = 6000
 """Instructions on one path of the code."""
+DIVISION: Final = 17
+"""REPEAT of a division (isa.md §6.7)."""
 MOST_TARGETS: Final = 64
 """Of a computed jump."""
 
 
 class Code:
-    """A function between two program addresses. `registers` are W0-W14 at entry, `array` is memory then."""
+    """A function between two program addresses. `registers` are W0-W14 at entry, `array` is memory then.
 
-    def __init__(self, subject: Subject, start: int, end: int, frame: Frame, path: Path, handler: bool = False) -> None:
+    `handler` is what kind of interrupt function it is (`interrupt_kind`).
+    """
+
+    def __init__(self, subject: Subject, start: int, end: int, frame: Frame, path: Path, handler: str = "") -> None:
         self.subject: Final = subject
         self.start: Final = start
         self.end: Final = end
         self.frame: Final = frame
         self.path: Final = path
         self.handler: Final = handler
-        self.machine: Final = Machine(frame, path.events, path.known)
+        page = vector(subject.symbols.get(PAGE, 0), 16)
+        entry = z3.BitVec("PSVPAG", 16) if handler == "auto_psv" else page
+        self.machine: Final = Machine(frame, path.events, path.known, page, entry)
         self.told = -1
         """Where the code of an assembly statement stands."""
 
@@ -77,6 +84,8 @@ class Code:
             raise Refuted(f"runs out of the function, to {state.pc:#x}")
         self.machine.begin(state, insn)
         self._assembly(insn)
+        if insn.row.syntax.startswith("DIV"):
+            raise Refuted(f"a division without REPEAT at {state.pc:#x}")
         asked = insn.row.does(self.machine, insn.x)
         here, behind = state.pc, state.pc + WORD_UNITS * insn.words
         match asked:
@@ -98,7 +107,7 @@ class Code:
                 state.pc = behind
                 return [state]
             case flow.Return():
-                if (asked.kind == "retfie") != self.handler:
+                if (asked.kind == "retfie") != bool(self.handler):
                     raise Refuted(f"ends with {asked.kind.upper()}")
                 (self.contract.handled if self.handler else self.contract.returned)(state)
                 return []
@@ -191,12 +200,16 @@ class Code:
         insn = self.subject.insn(pc)
         if rounds is None or insn is None:
             raise Undecided("REPEAT by a number that is not known")
-        steps = {rounds, 0} if insn.row.syntax.startswith("DIV") else range(rounds + 1)
+        division = insn.row.syntax.startswith("DIV")
+        if division and rounds != DIVISION:
+            raise Refuted(f"a division of {rounds + 1} steps")
+        steps = {rounds, 0} if division else range(rounds + 1)
         for left in sorted(steps, reverse=True):  # of a division the steps between change nothing
             state.pc = pc
             state.regs["RCOUNT"] = left
             self.machine.begin(state, insn)
-            insn.row.does(self.machine, insn.x)
+            if insn.row.does(self.machine, insn.x) is not None:
+                raise Refuted(f"REPEAT of {insn.row.syntax}")
         state.regs["RCOUNT"] = 0
         state.pc = pc + WORD_UNITS * insn.words
         return [state]

@@ -5,6 +5,7 @@ In: a state of the machine and what one path of the source says of that moment. 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Final
 
 import z3
@@ -12,12 +13,12 @@ import z3
 from toolchain.lower.abi import place_arguments
 from toolchain.lower.calls import shape_of
 from toolchain.proof.helpers import HELPERS, Helper
-from toolchain.proof.machine import CORE, Machine, State
+from toolchain.proof.machine import ACCUMULATORS, CORE, PSVPAG, Machine, State
 from toolchain.proof.memory import RAM_END, STACK, Frame, Memory, joined, split
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Refuted, Undecided, demand
 from toolchain.proof.subject import Subject
-from toolchain.proof.terms import Term, known, truth_number, vector, word
+from toolchain.proof.terms import Term, known, narrow, truth_number, vector, wide, word
 from toolchain.target import CALLEE_SAVED, CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
 
 
@@ -54,15 +55,25 @@ class Contract:
         else:
             demand(vector(wanted, 16) == word(target) if isinstance(wanted, int) else wanted == word(target),
                    self.machine.given, "calls another function than the source")  # fmt: skip
+        self._constants("a call")
         pushed = self._arguments(state, e)
         assert e.memory is not None
-        self.same_memory(state, e.memory, self.frame.escaped, f"memory differs at the call of {name or 'a pointer'}")
+        self.same_memory(
+            state,
+            e.memory,
+            set() if e.tail else self.frame.escaped,
+            f"memory differs at the call of {name or 'a pointer'}",
+        )
         state.memory.become(e.after, self.frame.kept())
         self._forget(state, pushed)
         self.machine.passed()
         if e.value is not None:
             for n, term in enumerate(_words_of(e.value)):
                 self._put(state, n, term)
+
+    def _constants(self, where: str) -> None:
+        same = self.machine.core(PSVPAG) == self.machine.page
+        demand(same, self.machine.given, f"PSVPAG is not that of constants at {where}")
 
     def _put(self, state: State, register: int, term: Term) -> None:
         if term.size() < 16:
@@ -80,9 +91,10 @@ class Contract:
             raise Undecided(f"no address of {e.address}") from None
 
     def _forget(self, state: State, pushed: int = 0) -> None:
-        """What a call leaves unknown: W0-W7, flags, its arguments on the stack (bytes) and what lay above."""
+        """What a call leaves unknown: W0-W7, RCOUNT, flags, its arguments on the stack (bytes) and what lay above."""
         for n in CALLER_SAVED:
             state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
+        state.regs["RCOUNT"] = narrow(z3.FreshConst(z3.BitVecSort(16), "RCOUNT"))
         for name in ("C", "Z", "OV", "N", "DC"):
             state.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
         for at in [at for at in state.frame if at >= state.w[SP] - pushed]:
@@ -122,10 +134,13 @@ class Contract:
         for n in CALLER_SAVED:
             same = word(self.machine.w(n)) == self.registers[n]
             demand(same, self.machine.given, f"W{n} is not what it was")
-        for at, name in CORE.items():
-            same = self.machine.core(at) == z3.BitVec(name, 16)
-            demand(same, self.machine.given, f"{name} is not what it was")
+        self._core(CORE)
         self.returned(state)
+
+    def _core(self, places: Iterable[int]) -> None:
+        for at in places:
+            same = self.machine.core(at) == self.machine.before[at]
+            demand(same, self.machine.given, f"{CORE[at]} is not what it was")
 
     def returned(self, state: State, popped: bool = True) -> None:
         """Everything at the end. `popped`: the return address has been taken off the stack."""
@@ -142,6 +157,9 @@ class Contract:
                 )
         for n in CALLEE_SAVED:
             demand(word(self.machine.w(n)) == self.registers[n], self.machine.given, f"W{n} is not what it was")
+        self._core(at for at, name in CORE.items() if name != "RCOUNT")
+        for n, before in enumerate(ACCUMULATORS):
+            demand(wide(state.accumulators[n]) == before.wide, self.machine.given, f"ACC{'AB'[n]} is not what it was")
         if self.path.result is not None:
             self._result(state)
         self.same_memory(state, self.path.memory, set(), "memory differs at the end")

@@ -151,6 +151,9 @@ def _copy(e: Evaluator, path: Path, i: Instr) -> None:
         target, source = (e.sure(path, a) for a in i.args[:2])
         e.reached(path, target, size, _is_even(i, 0))
         e.reached(path, source, size, _is_even(i, 1))
+        if "memcpy" in getattr(i.args[-1], "name", ""):  # one place, or two apart
+            apart = [z3.UGE(one, vector(size, 16)) for one in (target - source, source - target)]
+            path.assumed.append(z3.Or(target == source, z3.And(*apart)))
         path.memory.write(target, path.memory.read(source, size))
 
 

@@ -14,7 +14,7 @@ import z3
 
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.row import Insn
-from toolchain.proof.memory import Frame, Memory, joined, split
+from toolchain.proof.memory import STACK, Frame, Memory, joined, split
 from toolchain.proof.path import Event
 from toolchain.proof.solver import Refuted, Undecided, answer, demand
 from toolchain.proof.terms import (
@@ -35,7 +35,12 @@ from toolchain.proof.terms import (
 
 W_END, SFR_END = 0x20, 0x800
 CORE: Final = {0x32: "TBLPAG", 0x34: "PSVPAG", 0x36: "RCOUNT"}
-"""Registers that a handler saves; what PSVPAG shows is the same for both sides."""
+"""Registers that a handler saves, and whose pages others rely on."""
+PSVPAG: Final = 0x34
+ACCUMULATORS: Final = tuple(Number(z3.SignExt(BITS - 40, z3.BitVec(f"ACC{name}", 40))) for name in "AB")
+"""At entry."""
+PSV: Final = 0x8000
+"""Addresses from here on show the page of the program that PSVPAG says."""
 SINGLE_BIT: Final = ("BSET", "BCLR", "BTG", "BTSS", "BTSC", "BTST", "BTSTS", "BSW")
 """Instructions that touch a whole register in the device whichever byte they name (isa.md §5.4)."""
 
@@ -49,17 +54,19 @@ class State:
     pc: int
     flags: dict[str, Any] = field(default_factory=dict)
     frame: dict[int, Term] = field(default_factory=dict)
-    accumulators: list[Any] = field(default_factory=lambda: [0, 0])
+    accumulators: list[Any] = field(default_factory=lambda: list(ACCUMULATORS))
     regs: dict[str, Any] = field(default_factory=dict)
     path: list[Term] = field(default_factory=list)
     event: int = 0
     done: frozenset[int] = frozenset()
     """Bytes of the event's access that have been made."""
+    top: int = STACK
+    """W15 before the instruction."""
 
     def copy(self) -> State:
         """An independent state."""
         return State([*self.w], self.memory.copy(), self.pc, dict(self.flags), dict(self.frame),
-                     [*self.accumulators], dict(self.regs), [*self.path], self.event, self.done)  # fmt: skip
+                     [*self.accumulators], dict(self.regs), [*self.path], self.event, self.done, self.top)  # fmt: skip
 
 
 class Machine:
@@ -67,7 +74,11 @@ class Machine:
 
     context = Context()
 
-    def __init__(self, frame: Frame, events: list[Event], assumed: list[Term]) -> None:
+    def __init__(self, frame: Frame, events: list[Event], assumed: list[Term], page: Term, entry: Term) -> None:
+        self.page: Final = page
+        """What PSVPAG is for constants,"""
+        self.before: Final = {at: z3.BitVec(name, 16) for at, name in CORE.items()} | {PSVPAG: entry}
+        """and registers of CORE at entry."""
         self.frame: Final = frame
         self.events: Final = events
         self.assumed: Final = assumed
@@ -80,6 +91,19 @@ class Machine:
     def begin(self, state: State, insn: Insn) -> None:
         """Prepare for the instruction at the state's PC."""
         self.state, self.insn, self.pc = state, insn, state.pc
+        self._release(state)
+
+    def _release(self, state: State) -> None:
+        """From W15 on nothing stays: an interrupt may come before any instruction."""
+        top = state.w[15]
+        places = {at for at in state.memory.written if self.frame.is_object(at)}
+        if top < state.top:
+            places |= {at for start, size in self.frame.objects.values() for at in range(start, start + size)}
+        for bytes_there, places_there in ((state.memory.written, places), (state.frame, list(state.frame))):
+            for at in places_there:
+                if at >= top:
+                    bytes_there[at] = z3.FreshConst(z3.BitVecSort(8), "free")
+        state.top = top
 
     @property
     def given(self) -> list[Term]:
@@ -202,7 +226,7 @@ class Machine:
     # -- memory ------------------------------------------------------------------------------------------------------
 
     def load(self, ea: Any, size: int, side: str = "src", ptr: int | None = None) -> Any:
-        at = self._place(ea)
+        at = self._place(ea, size)
         seen = self._event("read", at, size)
         if seen is not None:
             return narrow(seen)
@@ -223,10 +247,11 @@ class Machine:
                 return narrow(value) if place is None else place
         elif size == 2:
             demand(z3.Extract(0, 0, at) == 0, self.given, "reads a word at an odd address")
+        self._seen_page(at)
         return narrow(self.state.memory.read(at, size))
 
     def store(self, ea: Any, v: Any, size: int, ptr: int | None = None) -> None:
-        at, value = self._place(ea), z3.Extract(8 * size - 1, 0, word(v)) if size == 1 else word(v)
+        at, value = self._place(ea, size), z3.Extract(8 * size - 1, 0, word(v)) if size == 1 else word(v)
         if self._event("write", at, size, value) is not None:
             return
         if isinstance(at, int):
@@ -248,16 +273,23 @@ class Machine:
                 demand(z3.Extract(0, 0, at) == 0, self.given, "writes a word at an odd address")
         self.state.memory.write(at, value)
 
-    def _place(self, ea: Any) -> Any:
-        if isinstance(ea, int):
-            return ea
-        found = known(ea.word)
+    def _place(self, ea: Any, size: int) -> Any:
+        found = ea if isinstance(ea, int) else known(ea.word)
+        if found is not None and found & (size - 1):
+            raise Refuted(f"a word at the odd address {found:#x}")
         return ea.word if found is None else found
+
+    def _seen_page(self, at: Any) -> None:
+        """Constants are read from their page."""
+        page = self.core(PSVPAG)
+        if not page.eq(self.page):
+            constant = z3.UGE(vector(at, 16) if isinstance(at, int) else at, vector(PSV, 16))
+            demand(z3.Or(z3.Not(constant), page == self.page), self.given, "reads a constant by another PSVPAG")
 
     def core(self, at: int) -> Term:
         """A register of CORE, as a term."""
         if CORE[at] not in self.state.regs:
-            self.state.regs[CORE[at]] = narrow(z3.BitVec(CORE[at], 16))
+            self.state.regs[CORE[at]] = narrow(self.before[at])
         return word(self.state.regs[CORE[at]])
 
     def own(self, at: int) -> Term:
@@ -285,8 +317,13 @@ class Machine:
         distance = self._distance(at, e, size)
         if distance is None:
             return None
+        if distance in self.state.done:
+            raise Refuted(f"a {kind} is done twice, which the source does once")
         part = z3.Extract(8 * (distance + size) - 1, 8 * distance, e.value)
-        whole = e.size == 2 and size == 1 and self.insn.row.syntax.startswith(SINGLE_BIT)
+        single = size == 1 and self.insn.row.syntax.startswith(SINGLE_BIT)
+        whole = e.size == 2 and single
+        if e.even and size < min(e.size, 2) and not single:
+            raise Refuted(f"a {kind} of a word is done in bytes")
         if kind == "write":
             assert value is not None
             demand(

@@ -26,6 +26,10 @@ class Event:
     named: int | None = None
     memory: Memory | None = None
     """What must have been written before: of a call, and behind a barrier."""
+    even: bool = False
+    """Of an access: words of it lie at even addresses."""
+    tail: bool = False
+    """Of a call: it does not use the caller's variables."""
     after: Any = None
     """The array behind it, where others may have written."""
 

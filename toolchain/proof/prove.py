@@ -93,7 +93,7 @@ class Proof:
             if feasible(path.known):
                 self.paths += 1
                 self._path = path
-                handler = self.f.name in self.subject.handlers
+                handler = self.subject.handlers.get(self.f.name, "")
                 Code(self.subject, self.start, self.end, self.frame, path, handler).run(self.registers, self.array)
         if not self.paths:
             raise Undecided("no input gets through it")
@@ -159,4 +159,6 @@ def _is_plain_use(i: Instr, n: int) -> bool:
     if i.op == "store":
         return n == 1
     callee: Value = i.args[-1]
-    return i.op == "call" and getattr(callee, "name", "").startswith("llvm.")
+    if i.op != "call" or not getattr(callee, "name", "").startswith("llvm."):
+        return False
+    return not getattr(callee, "name", "").startswith("llvm.mem") or isinstance(i.args[2], ConstInt)  # no library call

@@ -235,7 +235,7 @@ class Evaluator(Operands):
         if i.volatile:
             size = store_size(i.type)
             value = self.unknown("read", 8 * size)
-            path.events.append(Event("read", address, size, value, memory=self._settled(path)))
+            path.events.append(Event("read", address, size, value, memory=self._settled(path), even=_is_even(i)))
             return self.cast("trunc", (value, None), i.type)
         return self._loaded(path, address, i.type)
 
@@ -253,7 +253,9 @@ class Evaluator(Operands):
         value = self.value(path, i.args[0])
         if i.volatile:
             term = self.cast("zext", (self.sure(path, i.args[0]), None), Type("int", 8 * store_size(t)))[0]
-            path.events.append(Event("write", address, store_size(t), term, memory=self._settled(path)))
+            path.events.append(
+                Event("write", address, term.size() // 8, term, memory=self._settled(path), even=_is_even(i))
+            )
             return
         self._stored(path, address, t, value)
 
@@ -271,7 +273,7 @@ class Evaluator(Operands):
         """The address, with what may be assumed of it: nothing private lies there, words are even."""
         address = self.sure(path, pointer)
         size = store_size(t) if t.kind in ("int", "ptr", "float") else size_of(t)
-        return self.reached(path, address, size, str(i.extra.get("align", "")) != "1")
+        return self.reached(path, address, size, _is_even(i))
 
     def reached(self, path: Path, address: Term, size: int, even: bool) -> Term:
         """As `_accessed`, of bytes at an address."""
@@ -310,6 +312,7 @@ class Evaluator(Operands):
         assert isinstance(attributes, list)
         target = callee.name if isinstance(callee, GlobalRef) else self._even(path, self.sure(path, callee))
         event = self.called(path, target, i.args[:-1], attributes)
+        event.tail = i.extra.get("tail") in ("tail", "musttail")
         if i.extra.get("vararg"):
             assert isinstance(i.extra["fixed"], int)
             event.named = i.extra["fixed"]
@@ -355,6 +358,10 @@ class Evaluator(Operands):
 
     def _nothing(self, path: Path, i: Instr) -> None:
         """A fence: the order of accesses is compared anyway."""
+
+
+def _is_even(i: Instr) -> bool:
+    return str(i.extra.get("align", "")) != "1"
 
 
 def _replaced(whole: list[Any], indices: list[int], part: Any) -> list[Any]:

@@ -40,6 +40,8 @@ MOST_BYTES = 0x200
 CODE, CODE_STEP = 0x6000, 0x10
 """Where functions lie that are only declared, and how far apart."""
 WORD_UNITS = 2
+PAGE = "__const_psvpage"
+"""What PSVPAG is for constants: the linker's (abi-elf.md §1.4)."""
 ENTRY = "__entry"
 """What the reset vector leads to: nothing."""
 
@@ -57,8 +59,8 @@ class Subject:
     """24-bit words by address in PC units."""
     placed: dict[str, dict[str, int]]
     """By function, where its variables lie in the frame (`ModuleCompiler.placed`)."""
-    handlers: set[str]
-    """Functions that serve interrupts."""
+    handlers: dict[str, str]
+    """Functions that serve interrupts, and of what kind (`interrupt_kind`)."""
     saving: set[str]
     """Those that also save variables."""
     made: ObjectFile
@@ -123,7 +125,8 @@ def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]], 
                 code[section.address + at // OCTETS_PER_UNIT] = word & 0xFFFFFF
     notes = annotations_of(module)
     saving = {name for name, found in notes.items() if preserved(found)}
-    handlers = {name for name in module.functions if interrupt_kind(notes.get(name, set()), name)}
+    kinds = {name: interrupt_kind(notes.get(name, set()), name) for name in module.functions}
+    handlers = {name: kind.partition(",")[0] for name, kind in kinds.items() if kind}
     return Subject(module, symbols, ends, code, placed, handlers, saving, made, options)
 
 
@@ -135,7 +138,7 @@ def _invented(module: Module, symbols: list[Symbol], options: LinkOptions) -> di
     registers = {f"_{name}" for name in options.chip.sfrs}
     data, code, found = DATA, CODE, {}
     for name in dict.fromkeys([*undefined, *declared]):
-        if name in registers:
+        if name in registers or name == PAGE:
             continue
         if name in sizes:
             found[name] = data

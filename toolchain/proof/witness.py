@@ -13,7 +13,7 @@ from typing import Any
 import z3
 
 from toolchain.proof.memory import RAM, RAM_END, STACK
-from toolchain.proof.subject import ENTRY, Subject
+from toolchain.proof.subject import ENTRY, PAGE, Subject
 from toolchain.target import RETURN_ADDRESS_BYTES, SP
 
 
@@ -61,7 +61,7 @@ def start_text(witness: Witness) -> str:
     lines += [
         f"\tmov #{RAM_END - 0x10},w0",
         "\tmov w0,SPLIM",
-        "\tmov #__const_psvpage,w0",
+        f"\tmov #{PAGE},w0",
         "\tmov w0,PSVPAG",
         "\tbset CORCON,#2",
     ]

@@ -47,3 +47,24 @@ float scaled(float a, float b) { return a * b + 1.0f; }
 int below(float a, float b) { return a < b; }
 void guarded(void) { words[0] = 1; __asm__ volatile("" ::: "memory"); first_port = 1; words[1] = 2; }
 void barrier(void) { __asm__ volatile("disi #5"); first_port = 1; }
+unsigned long wide(void) { return wide_port; }
+extern int lend(int *);
+int lent(int a) { return lend(&a); }
+int lent_and_read(int a) { int b = a; return lend(&b) + b; }
+extern void *memcpy(void *, const void *, unsigned);
+int filled(char *from, unsigned count)
+{
+    char list[4];
+    list[0] = list[1] = list[2] = list[3] = 7;
+    memcpy(list, from, count);
+    return list[1];
+}
+struct __attribute__((packed)) packed { char first; int second; } packed_pair;
+int packed(void) { return packed_pair.second; }
+struct many { long first, second; int list[4]; };
+void copied_whole(struct many *to, struct many *from) { *to = *from; }
+const int constants[4] = {1, 2, 3, 5};
+int constant(int i) { return constants[i & 3]; }
+extern void serve(void);
+void __attribute__((interrupt)) _T1Interrupt(void) { serve(); }
+void __attribute__((interrupt)) _T2Interrupt(void) { words[0] = constants[first_port & 3]; }
