@@ -5,7 +5,7 @@ In: a state of the machine and what one path of the source says of that moment. 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 import z3
@@ -36,7 +36,9 @@ class Contract:
     def settle(self, e: Event) -> None:
         """What was written before is in memory."""
         if e.memory is not None:
-            self.same_memory(self.machine.state, e.memory, self.frame.escaped, f"memory differs at: {_said(e)}")
+            self.same_memory(
+                self.machine.state, e.memory, self.frame.escaped, f"memory differs at: {_said(e)}", e.loose
+            )
 
     def call(self, state: State, target: Any) -> None:
         """The next event is this call, with these arguments; behind it is what calls leave."""
@@ -171,25 +173,45 @@ class Contract:
             self._equal(value, [word(self.machine.w(at + k)) for k in range(count)], "the result")
             at += count
 
-    def same_memory(self, state: State, wanted: Memory, objects: set[str], what: str) -> None:
-        """Equal bytes everywhere but in the frame; of that, in these objects of the source."""
+    def same_memory(
+        self, state: State, wanted: Memory, objects: set[str], what: str, loose: Sequence[tuple[Term, Term]] = ()
+    ) -> None:
+        """Equal bytes everywhere but in the frame; of that, in these objects of the source. Where a store is `loose`
+        its value may be there already, or still."""
         ours, theirs = state.memory.copy(), wanted.copy()
+        either: dict[int, list[Term]] = {}
+        ranges = []
+        for address, value in loose:
+            place = known(address)
+            if place is None:
+                ranges.append((address, len(split(value))))
+            else:
+                for k, part in enumerate(split(value)):
+                    either.setdefault(place + k & 0xFFFF, []).append(part)
         if ours.array.eq(theirs.array):
             places = set(ours.written) | set(theirs.written)
             for at in sorted(places):
                 if self._counts(at, objects):
-                    demand(ours.byte(at) == theirs.byte(at), self.machine.given, f"{what}: {at:#x}")
+                    mine, values = ours.byte(at), [theirs.byte(at), *either.get(at, [])]
+                    same = z3.Or(*(mine == v for v in values), *(_within(vector(at, 16), r) for r in ranges))
+                    demand(same, self.machine.given, f"{what}: {at:#x}")
             return
         at = z3.BitVec("anywhere", 16)
         inside = [z3.And(z3.UGE(at, self.frame.objects[n][0]), z3.ULT(at, sum(self.frame.objects[n]))) for n in objects]
         outside = z3.Or(z3.ULT(at, self.frame.lowest), z3.UGE(at, RAM_END), *inside)
         same = z3.Select(ours.whole(), at) == z3.Select(theirs.whole(), at)
-        demand(z3.Implies(outside, same), self.machine.given, what)
+        values_there = [z3.And(at == k, z3.Select(ours.whole(), at) == v) for k, vs in either.items() for v in vs]
+        free = [*values_there, *(_within(at, r) for r in ranges)]
+        demand(z3.Implies(outside, z3.Or(same, *free)), self.machine.given, what)
 
     def _counts(self, at: int, objects: set[str]) -> bool:
         if not self.frame.is_private(at) and not self.frame.is_object(at):
             return True
         return any(self.frame.objects[n][0] <= at < sum(self.frame.objects[n]) for n in objects)
+
+
+def _within(at: Term, place: tuple[Term, int]) -> Term:
+    return z3.ULT(at - place[0], vector(place[1], 16))
 
 
 def _said(e: Event) -> str:

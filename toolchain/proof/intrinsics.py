@@ -154,7 +154,7 @@ def _copy(e: Evaluator, path: Path, i: Instr) -> None:
         if "memcpy" in getattr(i.args[-1], "name", ""):  # one place, or two apart
             apart = [z3.UGE(one, vector(size, 16)) for one in (target - source, source - target)]
             path.assumed.append(z3.Or(target == source, z3.And(*apart)))
-        path.memory.write(target, path.memory.read(source, size))
+        path.write(target, path.memory.read(source, size))
 
 
 def _fill(e: Evaluator, path: Path, i: Instr) -> None:
@@ -164,7 +164,7 @@ def _fill(e: Evaluator, path: Path, i: Instr) -> None:
     elif size:
         target, byte = (e.sure(path, a) for a in i.args[:2])
         e.reached(path, target, size, _is_even(i, 0))
-        path.memory.write(target, z3.Concat(*[byte] * size) if size > 1 else byte)
+        path.write(target, z3.Concat(*[byte] * size) if size > 1 else byte)
 
 
 def _is_even(i: Instr, n: int) -> bool:

@@ -57,15 +57,13 @@ class Frame:
 class Memory:
     """Bytes by address: a z3 array, and over it those that were written at addresses that are numbers."""
 
-    def __init__(self, array: Term, written: dict[int, Term] | None = None, settled: bool = False) -> None:
+    def __init__(self, array: Term, written: dict[int, Term] | None = None) -> None:
         self.array = array
         self.written = written if written is not None else {}
-        self.settled = settled
-        """Whether a barrier of the compiler was the last that happened to it."""
 
     def copy(self) -> Memory:
         """An independent memory."""
-        return Memory(self.array, dict(self.written), self.settled)
+        return Memory(self.array, dict(self.written))
 
     def whole(self) -> Term:
         """All of it as one array."""
@@ -94,7 +92,6 @@ class Memory:
     def write(self, address: Term | int, value: Term) -> None:
         """The bytes of a vector, the lowest first."""
         place = address if isinstance(address, int) else known(address)
-        self.settled = False
         for k, part in enumerate(split(value)):
             if place is not None:
                 self.written[(place + k) & 0xFFFF] = part

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from toolchain.ir.model import Value
@@ -25,7 +25,9 @@ class Event:
     arguments: list[tuple[Value, Any, dict[str, object]]] = field(default_factory=list)
     named: int | None = None
     memory: Memory | None = None
-    """What must have been written before: of a call, and behind a barrier."""
+    """What must have been written before: of a call, and next to a barrier of the compiler."""
+    loose: tuple[tuple[Term, Term], ...] = ()
+    """Stores, by address and value, that may stand before or behind it."""
     even: bool = False
     """Of an access: words of it lie at even addresses."""
     tail: bool = False
@@ -49,6 +51,12 @@ class Path:
     events: list[Event] = field(default_factory=list)
     visits: dict[str, int] = field(default_factory=dict)
     forks: dict[str, int] = field(default_factory=dict)
+    behind_barrier: bool = False
+    """Whether a barrier of the compiler was the last that stores may not be moved over,"""
+    stored: list[tuple[Term, Term]] = field(default_factory=list)
+    """the stores since,"""
+    passed: list[tuple[int, Memory]] = field(default_factory=list)
+    """and the events since, by number, with memory then."""
     result: Any = None
     ended: str = ""
     """ret or unreachable."""
@@ -56,7 +64,27 @@ class Path:
     def copy(self) -> Path:
         """An independent path."""
         return Path(self.memory.copy(), dict(self.values), [*self.taken], [*self.assumed], [*self.preferred],
-                    [*self.events], dict(self.visits), dict(self.forks))  # fmt: skip
+                    [*self.events], dict(self.visits), dict(self.forks),
+                    self.behind_barrier, [*self.stored], [*self.passed])  # fmt: skip
+
+    def write(self, address: Term, value: Term) -> None:
+        """A store that may be moved as far as the next barrier."""
+        self.memory.write(address, value)
+        self.stored.append((address, value))
+
+    def show(self, event: Event) -> None:
+        """An event that stores may be moved over."""
+        self.passed.append((len(self.events), self.memory.copy()))
+        self.events.append(event)
+
+    def part(self, barrier: bool) -> None:
+        """No store is moved over this place. Between two of them of which one is a barrier, what stands beyond must
+        have been written at every event, or must not."""
+        if barrier or self.behind_barrier:
+            for number, memory in self.passed:
+                self.events[number] = replace(self.events[number], memory=memory, loose=tuple(self.stored))
+        self.behind_barrier = barrier
+        self.stored, self.passed = [], []
 
     @property
     def known(self) -> list[Term]:

@@ -26,7 +26,7 @@ from toolchain.ir.model import (
 )
 from toolchain.proof import floats
 from toolchain.proof.intrinsics import INTRINSICS, base_of
-from toolchain.proof.memory import RAM, Frame, Memory
+from toolchain.proof.memory import RAM, Frame
 from toolchain.proof.operands import SUMS, Operands, Symbolic, either
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Undecided, feasible
@@ -113,6 +113,8 @@ class Evaluator(Operands):
         raise Undecided("a block without an end")
 
     def _leave(self, path: Path, i: Instr) -> list[tuple[Term, str]]:
+        if i.op in ("ret", "unreachable"):
+            path.part(barrier=False)
         if i.op == "ret":
             path.result, path.ended = (self.value(path, i.args[0]) if i.args else None), "ret"
             return []
@@ -235,7 +237,7 @@ class Evaluator(Operands):
         if i.volatile:
             size = store_size(i.type)
             value = self.unknown("read", 8 * size)
-            path.events.append(Event("read", address, size, value, memory=self._settled(path), even=_is_even(i)))
+            path.show(Event("read", address, size, value, even=_is_even(i)))
             return self.cast("trunc", (value, None), i.type)
         return self._loaded(path, address, i.type)
 
@@ -253,9 +255,7 @@ class Evaluator(Operands):
         value = self.value(path, i.args[0])
         if i.volatile:
             term = self.cast("zext", (self.sure(path, i.args[0]), None), Type("int", 8 * store_size(t)))[0]
-            path.events.append(
-                Event("write", address, term.size() // 8, term, memory=self._settled(path), even=_is_even(i))
-            )
+            path.show(Event("write", address, term.size() // 8, term, even=_is_even(i)))
             return
         self._stored(path, address, t, value)
 
@@ -267,7 +267,7 @@ class Evaluator(Operands):
         term, poison = value
         if poison is not None:
             path.assumed.append(z3.Not(poison))
-        path.memory.write(address, term)
+        path.write(address, term)
 
     def _accessed(self, path: Path, pointer: Value, t: Type, i: Instr) -> Term:
         """The address, with what may be assumed of it: nothing private lies there, words are even."""
@@ -332,6 +332,7 @@ class Evaluator(Operands):
         attributes = attributes or [{} for _ in values]
         arguments = [(v, self.value(path, v), k) for v, k in zip(values, attributes, strict=True)]
         event = Event("call", target, arguments=arguments, memory=path.memory.copy())
+        path.part(barrier=False)
         path.events.append(event)
         self._others_run(path, event)
         return event
@@ -341,23 +342,21 @@ class Evaluator(Operands):
         if (outside and outside != [""]) or i.args[:-1]:
             raise Undecided("assembly with operands")
         clobbers = "~{memory}" in code.constraints
-        path.memory.settled = clobbers
-        if code.text.strip():
-            event = Event("asm", code.text, memory=self._settled(path))
+        if clobbers:
+            path.part(barrier=True)
+        if code.text.strip() and clobbers:
+            event = Event("asm", code.text, memory=path.memory.copy())
             path.events.append(event)
-            if clobbers:
-                self._others_run(path, event)
-
-    def _settled(self, path: Path) -> Memory | None:
-        """Memory as it must be here, if a barrier stands right in front."""
-        return path.memory.copy() if path.memory.settled else None
+            self._others_run(path, event)
+        elif code.text.strip():
+            path.show(Event("asm", code.text))
 
     def _others_run(self, path: Path, event: Event) -> None:
         event.after = z3.Array(f"memory.{len(path.events)}", z3.BitVecSort(16), z3.BitVecSort(8))
         path.memory.become(event.after, self.frame.kept())
 
-    def _nothing(self, path: Path, i: Instr) -> None:
-        """A fence: the order of accesses is compared anyway."""
+    def _fence(self, path: Path, i: Instr) -> None:
+        path.part(barrier=True)
 
 
 def _is_even(i: Instr) -> bool:
@@ -374,5 +373,5 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, Path, Instr], Any]]] = {
     "icmp": Evaluator._compare, "fcmp": Evaluator._compare, "fneg": Evaluator._negated, "select": Evaluator._select,
     "freeze": Evaluator._freeze, "alloca": Evaluator._alloca, "getelementptr": Evaluator._address,
     "load": Evaluator._load, "store": Evaluator._store, "call": Evaluator._call, "extractvalue": Evaluator._extract,
-    "insertvalue": Evaluator._insert, "fence": Evaluator._nothing,
+    "insertvalue": Evaluator._insert, "fence": Evaluator._fence,
 }  # fmt: skip

@@ -68,3 +68,6 @@ int constant(int i) { return constants[i & 3]; }
 extern void serve(void);
 void __attribute__((interrupt)) _T1Interrupt(void) { serve(); }
 void __attribute__((interrupt)) _T2Interrupt(void) { words[0] = constants[first_port & 3]; }
+#define BARRIER() __asm__ volatile("" ::: "memory")
+void critical(void) { first_port = 1; BARRIER(); words[0] = 1; BARRIER(); first_port = 0; }
+void between(int *p) { BARRIER(); first_port = 1; *p = 3; words[0] = 1; second_port = 2; BARRIER(); }

@@ -63,6 +63,10 @@ PLANTED = {
     "moved over a barrier": ("guarded", "mov w7,_words\n\tmov w7,_first_port", "mov w7,_first_port\n\tmov w7,_words"),
     "assembly moved": ("barrier", "disi #5\n\tmov #1,w7\n\tmov w7,_first_port",
                        "mov #1,w7\n\tmov w7,_first_port\n\tdisi #5"),
+    "moved into a critical section": ("critical", "mov w7,_first_port\n\tmov w7,_words",
+                                      "mov w7,_words\n\tmov w7,_first_port"),
+    "moved out of a critical section": ("critical", "mov w7,_words\n\tclr _first_port",
+                                        "clr _first_port\n\tmov w7,_words"),
     "one half read twice": ("wide", "mov _wide_port,w0", "mov _wide_port,w7\n\tmov _wide_port,w0"),
     "word read in bytes": ("ports", "mov _first_port,w0",
                            "mov.b _first_port+1,WREG\n\tsl w0,#8,w7"
