@@ -53,8 +53,17 @@ def opaque(name: str, result: int) -> Meaning:
     return meaning
 
 
+def bits_set(a: Term) -> Term:
+    """How many bits of a vector are 1."""
+    total = z3.BitVecVal(0, a.size())
+    for k in range(a.size()):
+        total = total + z3.ZeroExt(a.size() - 1, z3.Extract(k, k, a))
+    return total
+
+
 def _all() -> dict[str, Helper]:
     out: dict[str, Helper] = {"___muldi3": Helper((64, 64), 64, lambda a, b: a * b)}
+    out["___popcounthi2"] = Helper((16,), 16, bits_set)
     for mode, bits in (("si", 32), ("di", 64)):
         for name, meaning in (
             ("udiv", z3.UDiv), ("umod", z3.URem), ("div", lambda a, b: a / b), ("mod", z3.SRem),

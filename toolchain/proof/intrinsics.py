@@ -9,6 +9,7 @@ import z3
 
 from toolchain.ir.model import Instr
 from toolchain.proof import floats
+from toolchain.proof.helpers import bits_set
 from toolchain.proof.solver import Undecided
 from toolchain.proof.terms import Term, known, one_bit, truth, vector
 
@@ -80,13 +81,6 @@ def _swapped(a: Term) -> Term:
 
 def _reversed(a: Term) -> Term:
     return z3.Concat(*(z3.Extract(k, k, a) for k in range(a.size())))
-
-
-def _bits_set(a: Term) -> Term:
-    total = vector(0, a.size())
-    for k in range(a.size()):
-        total = total + z3.ZeroExt(a.size() - 1, z3.Extract(k, k, a))
-    return total
 
 
 def _zeros(a: Term, from_top: bool) -> Term:
@@ -195,7 +189,7 @@ INTRINSICS: Final[dict[str, Meaning]] = {
     "umax": _of_words(lambda a, b: z3.If(z3.UGT(a, b), a, b)),
     "smin": _of_words(lambda a, b: z3.If(a < b, a, b)), "smax": _of_words(lambda a, b: z3.If(a > b, a, b)),
     "abs": _abs, "fshl": _funnel(True), "fshr": _funnel(False), "bswap": _of_words(_swapped, 1),
-    "bitreverse": _of_words(_reversed, 1), "ctpop": _of_words(_bits_set, 1), "ctlz": _count_zeros(True),
+    "bitreverse": _of_words(_reversed, 1), "ctpop": _of_words(bits_set, 1), "ctlz": _count_zeros(True),
     "cttz": _count_zeros(False), "memcpy": _copy, "memmove": _copy, "memcpy.inline": _copy, "memset": _fill,
     "fabs": _of_words(lambda a: a & vector((1 << a.size() - 1) - 1, a.size()), 1),
     "fmuladd": _of_words(lambda a, b, c: floats.arithmetic("fadd", floats.arithmetic("fmul", a, b), c), 3),
