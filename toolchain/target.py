@@ -21,3 +21,13 @@ LNK_MAX = 16382  # isa.md §5.8
 NEAR_BYTES = 64  # larger objects are addressed through pointers, so that near RAM (below 0x2000, abi-elf.md §1.4) lasts
 NEAR_END = DSPIC30F6014A.data["near"].end  # first address that file-register instructions do not reach
 RETURN_ADDRESS_BYTES = 4  # CALL pushes two words (isa.md §7.4)
+
+_DATA = DSPIC30F6014A.data
+W_END = 0x20  # W0-W15 lie at the beginning of data space (isa.md §2.1)
+SFR_END = _DATA["sfr"].end  # first address behind the special function registers
+RAM_END = _DATA["ram"].end
+
+
+def register(name: str) -> int:
+    """Address of a register of the core, which is the same in the whole family. Raises KeyError."""
+    return DSPIC30F6014A.sfrs[name].address

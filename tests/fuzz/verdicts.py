@@ -30,6 +30,8 @@ INTERRUPTED = 130
 """Exit status of a campaign that was ended by SIGINT or SIGTERM, and failed in nothing until then."""
 JUDGED = ("toolchain", "emu")
 """What verdicts are about, relative to the project."""
+APART = tuple(ROOT / "toolchain" / name for name in ("bounds", "proof"))
+"""What in it only looks at what the compiler made."""
 SUFFIXES = {".py", ".c", ".cpp", ".h", ".s", ".inc", ".csv"}
 LOOK_AGAIN = 1.0
 """Seconds between two looks whether a campaign was interrupted, or is gone."""
@@ -61,6 +63,8 @@ def judged() -> str:
     digest = hashlib.sha256()
     for folder in JUDGED:
         for path in sorted(path for path in (ROOT / folder).rglob("*") if path.suffix in SUFFIXES):
+            if any(part in APART for part in path.parents):
+                continue
             digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:20]
 

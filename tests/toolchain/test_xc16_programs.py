@@ -420,7 +420,7 @@ def test_attributes_of_place_stand_on_variables_constants_and_functions_of_one_f
     int __attribute__((near)) four = 4;
     const int __attribute__((near)) five = 5;
     int __attribute__((near, noinline)) six(int x) { return x + 6; }
-    int __attribute__((space(xmemory))) seven[2] = {7, 7};
+    int __attribute__((__space__(__xmemory__))) seven[2] = {7, 7};
     const int __attribute__((space(xmemory))) eight[2] = {8, 8};
     int __attribute__((space(ymemory))) nine[2] = {9, 9};
     const int __attribute__((space(ymemory))) ten[2] = {10, 10};

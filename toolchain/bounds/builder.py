@@ -28,23 +28,23 @@ from toolchain.bounds.values import (
     span,
     union,
 )
+from toolchain.target import SFR_END, W_END, register
 
-SR, CORCON, TBLPAG, DISICNT, INTCON1 = 0x42, 0x44, 0x32, 0x52, 0x80
-DCOUNT, DOSTARTL, DOSTARTH, DOENDL, DOENDH = LOOP_REGISTERS = range(0x38, 0x42, 2)
+SR, CORCON, TBLPAG, DISICNT, INTCON1 = map(register, ("SR", "CORCON", "TBLPAG", "DISICNT", "INTCON1"))
+LOOP_REGISTERS = tuple(map(register, ("DCOUNT", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")))
+DCOUNT, DOSTARTL, DOSTARTH, DOENDL, DOENDH = LOOP_REGISTERS
 DL = 0x0700
 """Bits of CORCON that count open DO loops (isa.md §2.4)."""
 NSTDIS = 1 << 15
 """Bit of INTCON1 with which no interrupt interrupts another (isa.md §14.1)."""
 COUNTS = 0x3FFF
 """What DCOUNT and DISICNT hold at most."""
-ENABLES = {0x46: 0xC000, 0x50: 0x8000}
+ENABLES = {register("MODCON"): 0xC000, register("XBREV"): 0x8000}
 """MODCON and XBREV: the bits that turn modulo and bit-reversed addressing on (isa.md §8)."""
 EDT = 1 << 11
 """Bit of CORCON that ends a DO loop early (isa.md §7.6)."""
-SFR_END = 0x800
 IPL3 = TRAP = 8
 """Bit of CORCON that a trap sets and code can only clear, and what it adds to the priority (isa.md §2.4)."""
-W_END = 0x20
 STACK = 15
 """W15, which leads into RAM wherever it is not known."""
 TABLE = 64
@@ -416,8 +416,8 @@ class Abstract:
             self._set_status(BYTE)
         if state.loops and low <= DOENDH + 1 and high >= DCOUNT:
             self.refused = LOOP_REGISTER
-        for register in self.world.enables:
-            state.regs.pop(f"{register:#x}", None)
+        for at in self.world.enables:
+            state.regs.pop(f"{at:#x}", None)
         self.unnested |= low <= INTCON1 + 1 and high >= INTCON1
         if low <= CORCON + 1 and high >= CORCON:
             state.ipl = state.ipl[0] & ~TRAP, state.ipl[1]

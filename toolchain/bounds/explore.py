@@ -21,6 +21,7 @@ from toolchain.bounds.rules import LAST, LONG, LOOP, MERGED, WAYS_IN, Rules
 from toolchain.bounds.state import INHERITED, NOWHERE, State, widened
 from toolchain.bounds.values import LINK, WORD, Value, ends, is_ram, span
 from toolchain.stack.effects import CALL_BYTES
+from toolchain.target import SFR_END
 
 MAX_TURNS: Final = 5_000
 HOPELESS_TURNS: Final = 6
@@ -32,7 +33,7 @@ EXPOSED: Final = 40
 """The same while the called function may reach into its caller's frame, whose contents are given up then."""
 MARGIN: Final = 64
 """Bytes that a function may look at below the beginning of its own stack."""
-SMALL: Final = 0x800
+SMALL: Final = SFR_END
 """What is less is no address of RAM: a number."""
 EPILOGUE: Final = 12
 """Most instructions of a block that returns and is run for every way there."""

@@ -74,6 +74,14 @@
 #define __dspic_s_xmemory ~, (__section__(".xmemory." __dspic_number(__COUNTER__)))
 #define __dspic_s_ymemory ~, (__section__(".ymemory." __dspic_number(__COUNTER__)))
 
+#define __dspic_s___data__ __dspic_s_data
+#define __dspic_s___auto_psv__ __dspic_s_auto_psv
+#define __dspic_s___prog__ __dspic_s_prog
+#define __dspic_s___psv__ __dspic_s_psv
+#define __dspic_s___eedata__ __dspic_s_eedata
+#define __dspic_s___xmemory__ __dspic_s_xmemory
+#define __dspic_s___ymemory__ __dspic_s_ymemory
+
 #define __dspic_a___interrupt__ __dspic_a_interrupt
 #define __dspic_a___auto_psv__ __dspic_a_auto_psv
 #define __dspic_a___no_auto_psv__ __dspic_a_no_auto_psv

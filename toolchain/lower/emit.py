@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from emu.dspic30f.isa.rows_multiply import DIVIDE_COUNT
+
 from ..target import SP
 from .call_frames import CallFrames
 from .mir import MI, File, Imm, MBlock, Mem, MFunction, Operand
@@ -169,7 +171,7 @@ class Emitter:
         self._out("retfie" if self.m.interrupt else mi.text or "return")
 
     def _divide(self, mi: MI) -> None:
-        self._out("repeat #17")
+        self._out(f"repeat #{DIVIDE_COUNT}")
         self._out(f"{mi.op} {operand_text(mi.args[0])},{operand_text(mi.args[1])}")
 
     def _repeat(self, mi: MI) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Set
 from typing import Any, Final
 
 import z3
 
 from emu.dspic30f.isa import flow
 from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.isa.rows_multiply import DIVIDE_COUNT
 from emu.dspic30f.isa.text import StatementError, parse
 from toolchain.proof.contract import Contract
 from toolchain.proof.machine import Machine, State
@@ -21,8 +23,6 @@ from toolchain.target import RETURN_ADDRESS_BYTES, SP
 
 MOST_STEPS: Final = 6000
 """Instructions on one path of the code."""
-DIVISION: Final = 17
-"""REPEAT of a division (isa.md §6.7)."""
 MOST_TARGETS: Final = 64
 """Of a computed jump."""
 
@@ -46,8 +46,9 @@ class Code:
         self.told = -1
         """Where the code of an assembly statement stands."""
 
-    def run(self, registers: list[Term], array: Term) -> None:
-        """Raises Refuted, Undecided."""
+    def run(self, registers: list[Term], array: Term, volatile: Set[int]) -> None:
+        """Raises Refuted, Undecided. `volatile`: bytes that are accessed only where the source does."""
+        self.machine.volatile = volatile
         self.contract = Contract(self.subject, self.frame, registers, self.path, self.machine)
         work = [State([*registers, STACK], Memory(array), self.start)]
         while work:
@@ -201,7 +202,7 @@ class Code:
         if rounds is None or insn is None:
             raise Undecided("REPEAT by a number that is not known")
         division = insn.row.syntax.startswith("DIV")
-        if division and rounds != DIVISION:
+        if division and rounds != DIVIDE_COUNT:
             raise Refuted(f"a division of {rounds + 1} steps")
         steps = {rounds, 0} if division else range(rounds + 1)
         for left in sorted(steps, reverse=True):  # of a division the steps between change nothing

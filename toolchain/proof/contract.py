@@ -14,12 +14,12 @@ from toolchain.lower.abi import place_arguments
 from toolchain.lower.calls import shape_of
 from toolchain.proof.helpers import HELPERS, Helper
 from toolchain.proof.machine import ACCUMULATORS, CORE, PSVPAG, Machine, State
-from toolchain.proof.memory import RAM_END, STACK, Frame, Memory, joined, split
+from toolchain.proof.memory import STACK, Frame, Memory, joined, split
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Refuted, Undecided, demand
 from toolchain.proof.subject import Subject
 from toolchain.proof.terms import Term, known, narrow, truth_number, vector, wide, word
-from toolchain.target import CALLEE_SAVED, CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
+from toolchain.target import CALLEE_SAVED, CALLER_SAVED, RAM_END, RETURN_ADDRESS_BYTES, SP
 
 
 class Contract:

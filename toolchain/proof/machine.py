@@ -6,7 +6,7 @@ assembly statements) is held against what one path of the source does (`Event`),
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -14,6 +14,7 @@ import z3
 
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.row import Insn
+from emu.elffacts import PSV_WINDOW
 from toolchain.proof.memory import STACK, Frame, Memory, joined, split
 from toolchain.proof.path import Event
 from toolchain.proof.solver import Refuted, Undecided, answer, demand
@@ -32,15 +33,13 @@ from toolchain.proof.terms import (
     wide,
     word,
 )
+from toolchain.target import SFR_END, W_END, register
 
-W_END, SFR_END = 0x20, 0x800
-CORE: Final = {0x32: "TBLPAG", 0x34: "PSVPAG", 0x36: "RCOUNT"}
+CORE: Final = {register(name): name for name in ("TBLPAG", "PSVPAG", "RCOUNT")}
 """Registers that a handler saves, and whose pages others rely on."""
-PSVPAG: Final = 0x34
+PSVPAG: Final = register("PSVPAG")
 ACCUMULATORS: Final = tuple(Number(z3.SignExt(BITS - 40, z3.BitVec(f"ACC{name}", 40))) for name in "AB")
 """At entry."""
-PSV: Final = 0x8000
-"""Addresses from here on show the page of the program that PSVPAG says."""
 SINGLE_BIT: Final = ("BSET", "BCLR", "BTG", "BTSS", "BTSC", "BTST", "BTSTS", "BSW")
 """Instructions that touch a whole register in the device whichever byte they name (isa.md §5.4)."""
 
@@ -85,6 +84,8 @@ class Machine:
         self.state: State
         self.settle: Callable[[Event], None] = lambda e: None
         """Holds memory against what an event says must have been written before."""
+        self.volatile: Set[int] = frozenset()
+        """Bytes of RAM that are accessed only where the source does."""
         self.insn: Insn
         self.pc = 0
 
@@ -239,6 +240,7 @@ class Machine:
                 )
             if at in CORE and size == 2:
                 return narrow(self.core(at))
+            self._not_volatile(at, size)
             if at < SFR_END:
                 raise Refuted(f"reads the register at {at:#x}, which the source does not here")
             if self.frame.is_private(at):
@@ -261,6 +263,7 @@ class Machine:
             if at in CORE and size == 2:
                 self.state.regs[CORE[at]] = narrow(value)
                 return
+            self._not_volatile(at, size)
             if at < SFR_END:
                 raise Refuted(f"writes the register at {at:#x}, which the source does not here")
             if self.frame.is_private(at):
@@ -273,6 +276,10 @@ class Machine:
                 demand(z3.Extract(0, 0, at) == 0, self.given, "writes a word at an odd address")
         self.state.memory.write(at, value)
 
+    def _not_volatile(self, at: int, size: int) -> None:
+        if not self.volatile.isdisjoint(range(at, at + size)):
+            raise Refuted(f"accesses what is volatile at {at:#x}, which the source does not here")
+
     def _place(self, ea: Any, size: int) -> Any:
         found = ea if isinstance(ea, int) else known(ea.word)
         if found is not None and found & (size - 1):
@@ -283,7 +290,7 @@ class Machine:
         """Constants are read from their page."""
         page = self.core(PSVPAG)
         if not page.eq(self.page):
-            constant = z3.UGE(vector(at, 16) if isinstance(at, int) else at, vector(PSV, 16))
+            constant = z3.UGE(vector(at, 16) if isinstance(at, int) else at, vector(PSV_WINDOW, 16))
             demand(z3.Or(z3.Not(constant), page == self.page), self.given, "reads a constant by another PSVPAG")
 
     def core(self, at: int) -> Term:

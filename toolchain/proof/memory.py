@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 import z3
 
 from toolchain.proof.terms import Term, known, vector
-from toolchain.target import RETURN_ADDRESS_BYTES
+from toolchain.target import RAM_END, RETURN_ADDRESS_BYTES
 
 STACK = 0x1A00
 """W15 behind the return address, at a function's first instruction."""
-RAM, RAM_END = 0x800, 0x2800
 BYTE = 8
 
 

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import z3
 
-from toolchain.ir.model import Arg, ConstInt, Function, Instr, Type, Value, size_of
+from toolchain.ir.model import Arg, ConstInt, Function, Instr, Type, size_of
 from toolchain.lower.abi import Place
 from toolchain.lower.calls import parameter_places
 from toolchain.lower.cfg import loop_depths
 from toolchain.lower.names import symbol
+from toolchain.proof.accesses import Accesses
 from toolchain.proof.code import Code
 from toolchain.proof.memory import STACK, Frame, Memory, joined
 from toolchain.proof.path import Path
@@ -94,7 +96,8 @@ class Proof:
                 self.paths += 1
                 self._path = path
                 handler = self.subject.handlers.get(self.f.name, "")
-                Code(self.subject, self.start, self.end, self.frame, path, handler).run(self.registers, self.array)
+                code = Code(self.subject, self.start, self.end, self.frame, path, handler)
+                code.run(self.registers, self.array, self._volatile)
         if not self.paths:
             raise Undecided("no input gets through it")
 
@@ -103,15 +106,26 @@ class Proof:
         placed = self.subject.placed[self.f.name]
         sizes = {i.name: _alloca_size(i) for b in self.f.blocks for i in b.instrs if i.op == "alloca"}
         for name, size in sizes.items():
-            if name in placed:
-                self.frame.objects[name] = (STACK + placed[name], size)
+            if name not in placed:
+                raise Undecided("a variable without a place in the frame")
+            self.frame.objects[name] = (STACK + placed[name], size)
+        for (start, size), (behind, _) in pairwise(sorted(self.frame.objects.values())):
+            if start + size > behind:
+                raise Undecided("variables that share a place in the frame")
         places = parameter_places(self.f)
         self.frame.lowest = STACK - max([RETURN_ADDRESS_BYTES, *(p.stack for p in places)])
         for a, place in zip(self.f.args, places, strict=True):
             if a.attrs.get("byval") is not None:
                 raise Undecided("a struct parameter")
             path.values[id(a)] = (self._parameter(a, place), None)
-        self.frame.escaped |= escaped(self.f)
+        accesses = Accesses(self.f)
+        self.frame.escaped |= accesses.escaped()
+        self._volatile = {self._address(root) + at for root, at in accesses.volatile() if at is not None}
+
+    def _address(self, root: str) -> int:
+        if root[0] == "@":
+            return self.subject.address(root[1:])
+        return self.frame.objects[root[1:]][0]
 
     def _parameter(self, a: Arg, place: Place) -> Term:
         if place.register is not None:
@@ -128,37 +142,3 @@ def _alloca_size(i: Instr) -> int:
     assert isinstance(t, Type)
     count = i.args[0].value if i.args and isinstance(i.args[0], ConstInt) else 1
     return size_of(t) * count
-
-
-def escaped(f: Function) -> set[str]:
-    """Variables whose addresses are used otherwise than to load and store."""
-    roots: dict[int, str] = {}
-    for b in f.blocks:
-        for i in b.instrs:
-            if i.op == "alloca":
-                roots[id(i)] = i.name
-    out: set[str] = set()
-    changed = True
-    while changed:
-        changed = False
-        for b in f.blocks:
-            for i in b.instrs:
-                if i.op == "getelementptr" and id(i.args[0]) in roots and id(i) not in roots:
-                    roots[id(i)], changed = roots[id(i.args[0])], True
-    for b in f.blocks:
-        for i in b.instrs:
-            for n, a in enumerate(i.args):
-                if id(a) in roots and not _is_plain_use(i, n):
-                    out.add(roots[id(a)])
-    return out
-
-
-def _is_plain_use(i: Instr, n: int) -> bool:
-    if i.op in ("load", "getelementptr"):
-        return n == 0
-    if i.op == "store":
-        return n == 1
-    callee: Value = i.args[-1]
-    if i.op != "call" or not getattr(callee, "name", "").startswith("llvm."):
-        return False
-    return not getattr(callee, "name", "").startswith("llvm.mem") or isinstance(i.args[2], ConstInt)  # no library call

@@ -26,11 +26,12 @@ from toolchain.ir.model import (
 )
 from toolchain.proof import floats
 from toolchain.proof.intrinsics import INTRINSICS, base_of
-from toolchain.proof.memory import RAM, Frame
+from toolchain.proof.memory import Frame
 from toolchain.proof.operands import SUMS, Operands, Symbolic, either
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Undecided, feasible
 from toolchain.proof.terms import Term, known, one_bit, truth, vector
+from toolchain.target import SFR_END
 
 MOST_VISITS: Final = 70
 """Rounds of a loop that are followed on one path,"""
@@ -279,7 +280,7 @@ class Evaluator(Operands):
         """As `_accessed`, of bytes at an address."""
         if known(address) is None:
             path.assumed.append(self.frame.spared(address, size))
-            path.preferred.append(z3.And(z3.UGE(address, RAM), z3.ULT(address, self.frame.lowest - size)))
+            path.preferred.append(z3.And(z3.UGE(address, SFR_END), z3.ULT(address, self.frame.lowest - size)))
             if size > 1 and even:
                 path.assumed.append(z3.Extract(0, 0, address) == 0)
         return address

@@ -12,9 +12,9 @@ from typing import Any
 
 import z3
 
-from toolchain.proof.memory import RAM, RAM_END, STACK
+from toolchain.proof.memory import STACK
 from toolchain.proof.subject import ENTRY, PAGE, Subject
-from toolchain.target import RETURN_ADDRESS_BYTES, SP
+from toolchain.target import RAM_END, RETURN_ADDRESS_BYTES, SFR_END, SP
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,8 @@ def witness_of(model: z3.ModelRef, function: str, registers: list[Any], array: A
     values = {n: int(model.eval(r).as_long()) for n, r in enumerate(registers) if str(r) in named}
     memory: dict[int, int] = {}
     if str(array) in named:
-        found = {
-            at: model.eval(z3.Select(array, z3.BitVecVal(at, 16)), model_completion=True) for at in range(RAM, RAM_END)
-        }
-        memory = {at: int(byte.as_long()) for at, byte in found.items()}
+        for at in range(SFR_END, RAM_END):
+            memory[at] = int(model.eval(z3.Select(array, z3.BitVecVal(at, 16)), model_completion=True).as_long())
         usual = max(set(memory.values()), key=list(memory.values()).count)  # the solver's "anything else"
         memory = {at: byte for at, byte in memory.items() if byte != usual}
     for name, declared in named.items():

@@ -17,6 +17,9 @@ Reading: TypeAlias = Callable[[Builder, Value], Value]
 Dividend: TypeAlias = Callable[[Builder, Operands], Value]
 
 mul = partial(Row, constraints="d!=14")
+DIVIDE_COUNT = 17
+"""Of the REPEAT in front of a divide: 18 steps (isa.md §6.7)."""
+
 div = partial(Row, constraints="s>=2")
 dvd = partial(Row, constraints="s>=2; v even; t=v+1")
 
@@ -85,7 +88,7 @@ def fraction(m: Builder, x: Operands) -> Value:
 
 
 def divide(dividend: Dividend, reading: Reading) -> Does:
-    """One of the 18 steps of a divide under REPEAT #17: the first looks for zero, the last delivers W0, W1 and flags.
+    """One of the 18 steps of a divide under REPEAT: the first looks for zero, the last delivers W0, W1 and flags.
 
     UNVERIFIED: the steps between change nothing, C ends as 0, after overflow W0 and W1 hold low bits (isa.md §6.7).
     """
@@ -95,7 +98,7 @@ def divide(dividend: Dividend, reading: Reading) -> Does:
         last = m.let(count == 0)
         old = m.w(0), m.w(1)
         n, d = m.let(dividend(m, x)), m.let(reading(m, m.w(x.s)))
-        m.trap_math((d == 0) & (count == 17))
+        m.trap_math((d == 0) & (count == DIVIDE_COUNT))
         q, r = m.let(m.div_trunc(n, d)), m.let(m.rem_trunc(n, d))
         if reading is signed:
             overflow, negative = (q < -0x8000) | (q > 0x7FFF), r < 0

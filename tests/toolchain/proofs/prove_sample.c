@@ -71,3 +71,6 @@ void __attribute__((interrupt)) _T2Interrupt(void) { words[0] = constants[first_
 #define BARRIER() __asm__ volatile("" ::: "memory")
 void critical(void) { first_port = 1; BARRIER(); words[0] = 1; BARRIER(); first_port = 0; }
 void between(int *p) { BARRIER(); first_port = 1; *p = 3; words[0] = 1; second_port = 2; BARRIER(); }
+volatile int seen;
+int watched(void) { seen = 1; return seen; }
+int watched_local(void) { volatile int own = 1; return own + own; }

@@ -58,7 +58,7 @@ def remainder(a: Term, d: int) -> Term:
 
 def word_at(address: Term) -> Term:
     """A word of memory as it is at entry."""
-    memory = start().memory
+    memory = start().memory.array
     return z3.Concat(z3.Select(memory, address + 1), z3.Select(memory, address))
 
 
@@ -68,19 +68,17 @@ def low_byte(a: Term, signed: bool) -> Term:
 
 
 def long_by_word(a: Term, b: Term) -> Term:
-    """a * b for a long and a signed word, as h * 2^16 * b + l * b for the halves of a: a law of every ring, which the
-    solver need not find again in bits. Signed words are read as the instruction table reads them."""
-    low, high = z3.ZeroExt(32, z3.Extract(15, 0, a)), z3.ZeroExt(32, z3.Extract(31, 16, a))
-    signed_b, signed_high = (z3.ZeroExt(32, b) ^ 0x8000) - 0x8000, (high ^ 0x8000) - 0x8000
-    crossed = z3.Extract(15, 0, times(signed_high, signed_b))
-    return z3.Extract(31, 0, times(low, signed_b)) + z3.Concat(crossed, z3.BitVecVal(0, 16))
+    """a * b for a long and a signed word, as h * 2^16 * b + l * b for the halves of a, whose low word is l * b: laws of
+    every ring, which the solver need not find again in bits."""
+    low, high = z3.Extract(15, 0, a), z3.Extract(31, 16, a)
+    product = z3.SignExt(16, b) * z3.ZeroExt(16, low)
+    return z3.Concat(z3.Extract(31, 16, product) + high * b, low * b)
 
 
 def high_half(a: Term, m: int, signed: bool) -> Term:
     """The upper two words of a * m from four products of words, added as `test_upper_half` proves that one may."""
     extend = z3.SignExt if signed else z3.ZeroExt
-    low, high = z3.ZeroExt(32, z3.Extract(15, 0, a)), z3.ZeroExt(32, z3.Extract(31, 16, a))
-    high = (high ^ 0x8000) - 0x8000 if signed else high
+    low, high = z3.ZeroExt(32, z3.Extract(15, 0, a)), extend(32, z3.Extract(31, 16, a))
     m_low, m_high = z3.BitVecVal(m & 0xFFFF, 48), z3.BitVecVal(m >> 16, 48)
     lowest, one = (z3.ZeroExt(16, z3.Extract(31, 0, times(low, x))) for x in (m_low, m_high))
     other, top = (extend(16, z3.Extract(31, 0, times(high, x))) for x in (m_low, m_high))

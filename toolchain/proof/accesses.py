@@ -1,0 +1,91 @@
+"""Which variables a function's IR reaches, and how: whose addresses get out of sight, and which bytes are volatile.
+
+A place is the variable, `@name` or `%name`, and the byte in it; None for the byte where an index is not a constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+from toolchain.ir.model import ConstInt, Function, GlobalRef, Instr, Type, Value, size_of, struct_offsets
+
+Place: TypeAlias = tuple[str, int | None]
+
+
+class Accesses:
+    """Of one function."""
+
+    def __init__(self, f: Function) -> None:
+        self._instrs = [i for b in f.blocks for i in b.instrs]
+        self._places: dict[int, Place] = {id(i): (f"%{i.name}", 0) for i in self._instrs if i.op == "alloca"}
+        addresses = [i for i in self._instrs if i.op == "getelementptr"]
+        found = -1
+        while found != len(self._places):  # blocks stand in any order
+            found = len(self._places)
+            for i in addresses:
+                base = self._place(i.args[0])
+                if base is not None:
+                    offset = offset_of(i)
+                    whole = None if base[1] is None or offset is None else base[1] + offset
+                    self._places[id(i)] = base[0], whole
+
+    def _place(self, v: Value) -> Place | None:
+        return (f"@{v.name}", v.offset) if isinstance(v, GlobalRef) else self._places.get(id(v))
+
+    def _uses(self) -> Iterator[tuple[Instr, int, Place]]:
+        for i in self._instrs:
+            for n, a in enumerate(i.args):
+                place = self._place(a)
+                if place is not None:
+                    yield i, n, place
+
+    def escaped(self) -> set[str]:
+        """Variables of the frame whose addresses are used otherwise than to load and store, without the `%`."""
+        return {root[1:] for i, n, (root, _) in self._uses() if root[0] == "%" and not _stays(i, n)}
+
+    def volatile(self) -> set[Place]:
+        """Bytes that the function accesses, and by no access that is not volatile."""
+        known: dict[bool, set[Place]] = {True: set(), False: set()}
+        mixed: set[str] = set()
+        for i, n, (root, at) in self._uses():
+            if (i.op == "load" and n == 0) or (i.op == "store" and n == 1):
+                t = i.type if i.op == "load" else i.args[0].type
+                if at is not None:
+                    known[i.volatile] |= {(root, at + k) for k in range(size_of(t))}
+                elif not i.volatile:
+                    mixed.add(root)
+            elif i.op in ("phi", "select") or (i.op == "call" and _name(i).startswith("llvm.mem")):
+                mixed.add(root)
+        return {place for place in known[True] - known[False] if place[0] not in mixed}
+
+
+def offset_of(i: Instr) -> int | None:
+    """Bytes that a getelementptr adds; None where an index is not a constant."""
+    t, total = i.extra["type"], 0
+    assert isinstance(t, Type)
+    for k, index in enumerate(i.args[1:]):
+        if not isinstance(index, ConstInt):
+            return None
+        if k and t.kind == "struct":
+            total += struct_offsets(t)[index.value]
+            t = t.elems[index.value]
+        else:
+            t = t.elems[0] if k else t
+            total += index.signed * size_of(t)
+    return total
+
+
+def _name(i: Instr) -> str:
+    return str(getattr(i.args[-1], "name", ""))
+
+
+def _stays(i: Instr, n: int) -> bool:
+    """Whether an operand that is an address is only loaded from, stored to or moved."""
+    if i.op in ("load", "getelementptr"):
+        return n == 0
+    if i.op == "store":
+        return n == 1
+    if i.op != "call" or not _name(i).startswith("llvm."):
+        return False
+    return not _name(i).startswith("llvm.mem") or isinstance(i.args[2], ConstInt)  # else the library is called
