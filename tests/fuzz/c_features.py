@@ -49,12 +49,12 @@ static inline u16 asm_add(u16 a, u16 b) { u16 r; __asm__("add %1,%2,%0" : "=r"(r
 static inline u32 asm_mul(u16 a, u16 b) { u32 r; __asm__("mul.uu %1,%2,%0" : "=r"(r) : "r"(a), "r"(b)); return r; }
 static inline u16 asm_swap(u16 a) { __asm__("swap %0" : "+r"(a)); return a; }
 static inline u16 asm_plus_5(u16 a) { u16 r; __asm__("add %1,#%2,%0" : "=&r"(r) : "r"(a), "i"(5)); return r; }
-static inline u16 asm_busy(u16 a, u16 b)
-{
-    u16 r;
-    __asm__("mov %1,w5\\n mov %2,w9\\n xor w5,w9,%0" : "=r"(r) : "r"(a), "r"(b) : "w5", "w9", "cc");
-    return r;
-}
+/* A macro, because the front end reads a file three times that names such registers. */
+#define asm_busy(a, b) ({ \\
+    u16 busy; \\
+    __asm__("mov %1,w5\\n mov %2,w9\\n xor w5,w9,%0" : "=r"(busy) : "r"((u16)(a)), "r"((u16)(b)) : "w5", "w9", "cc"); \\
+    busy; \\
+})
 static inline void asm_store(u16 *p, u16 a) { __asm__ volatile("mov %1,[%0]" : : "r"(p), "r"(a) : "memory"); }
 static inline u32 asm_add32(u32 a, u32 b)
 {
