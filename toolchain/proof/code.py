@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Set
 from typing import Any, Final
 
 import z3
 
 from emu.dspic30f.isa import flow
-from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.isa.rows_multiply import DIVIDE_COUNT
-from emu.dspic30f.isa.text import StatementError, parse
 from toolchain.proof.contract import Contract
 from toolchain.proof.machine import Machine, State
 from toolchain.proof.memory import STACK, Frame, Memory
@@ -43,8 +40,6 @@ class Code:
         page = vector(subject.symbols.get(PAGE, 0), 16)
         entry = z3.BitVec("PSVPAG", 16) if handler == "auto_psv" else page
         self.machine: Final = Machine(frame, path.events, path.known, page, entry)
-        self.told = -1
-        """Where the code of an assembly statement stands."""
 
     def run(self, registers: list[Term], array: Term, volatile: Set[int]) -> None:
         """Raises Refuted, Undecided. `volatile`: bytes that are accessed only where the source does."""
@@ -84,11 +79,12 @@ class Code:
         if insn is None or not self.start <= state.pc < self.end:
             raise Refuted(f"runs out of the function, to {state.pc:#x}")
         self.machine.begin(state, insn)
-        self._assembly(insn)
+        if self._stated(state):
+            return [state]
         if insn.row.syntax.startswith("DIV"):
             raise Refuted(f"a division without REPEAT at {state.pc:#x}")
         asked = insn.row.does(self.machine, insn.x)
-        here, behind = state.pc, state.pc + WORD_UNITS * insn.words
+        behind = state.pc + WORD_UNITS * insn.words
         match asked:
             case None:
                 state.pc = behind
@@ -115,30 +111,20 @@ class Code:
             case flow.Repeat():
                 return self._repeat(state, asked.count, behind)
             case flow.Disi() | flow.ClearWatchdog() | flow.Sleep() | flow.Reset():
-                if self.told != here:
-                    raise Refuted(f"{insn.row.syntax} at {here:#x}, which the source has not")
-                state.pc = behind
-                return [state]
+                raise Refuted(f"{insn.row.syntax} at {state.pc:#x}, which the source has not")
             case _:
                 raise Undecided(f"{insn.row.syntax}")
 
-    def _assembly(self, insn: Insn) -> None:
-        """An assembly statement of one instruction without operands, if this is it."""
+    def _stated(self, state: State) -> bool:
+        """Whether an assembly statement of the source stands here, which is done then."""
         e = self.machine.expected()
         if e is None or e.kind != "asm":
-            return
-        wanted = assembled(str(e.address))
-        state = self.machine.state
-        if wanted == [
-            w for k in range(len(wanted)) if (w := self.subject.code.get(state.pc + WORD_UNITS * k)) is not None
-        ]:
-            if len(wanted) != insn.words:
-                raise Undecided("assembly of several instructions")
-            self.told = state.pc
-            self.contract.settle(e)
-            if e.after is not None:
-                state.memory.become(e.after, self.frame.kept())
-            self.machine.passed()
+            return False
+        for statement in self.subject.statements.get(state.pc, ()):
+            if statement.template == e.address and self.contract.stated(state, statement, e):
+                state.pc = statement.end
+                return True
+        return False
 
     def _fork(self, state: State, taken: Term, there: int, behind: int) -> list[State]:
         out = []
@@ -214,15 +200,3 @@ class Code:
         state.regs["RCOUNT"] = 0
         state.pc = pc + WORD_UNITS * insn.words
         return [state]
-
-
-def assembled(text: str) -> list[int]:
-    """Words of an assembly statement, none where it is not plain instructions."""
-    words: list[int] = []
-    for line in re.split(r"[;\n]", text):
-        if line.strip():
-            try:
-                words += parse(line.strip()).encode(0)
-            except StatementError as error:
-                raise Undecided(f"assembly: {error}") from None
-    return words

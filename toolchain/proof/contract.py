@@ -5,6 +5,7 @@ In: a state of the machine and what one path of the source says of that moment. 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
@@ -16,10 +17,13 @@ from toolchain.proof.helpers import HELPERS, Helper
 from toolchain.proof.machine import ACCUMULATORS, CORE, PSVPAG, Machine, State
 from toolchain.proof.memory import STACK, Frame, Memory, joined, split
 from toolchain.proof.path import Event, Path
-from toolchain.proof.solver import Refuted, Undecided, demand
+from toolchain.proof.solver import Refuted, Undecided, answer, demand
+from toolchain.proof.statements import Statement
 from toolchain.proof.subject import Subject
 from toolchain.proof.terms import Term, known, narrow, truth_number, vector, wide, word
 from toolchain.target import CALLEE_SAVED, CALLER_SAVED, RAM_END, RETURN_ADDRESS_BYTES, SP
+
+NUMBER: Final = re.compile(r"(?P<name>_\w+)?(?P<plus>[+-]?\d+)?")
 
 
 class Contract:
@@ -73,6 +77,76 @@ class Contract:
             for n, term in enumerate(_words_of(e.value)):
                 self._put(state, n, term)
 
+    def stated(self, state: State, statement: Statement, e: Event) -> bool:
+        """Whether the operands of this stretch hold what they should at the source's next event, a statement that reads
+        the same. If so it is done: what it does to outputs, flags and memory is what the source says, or unknown."""
+        assert e.shape is not None
+        leaves, inputs = iter(_leaves(e.value or [])), iter(e.arguments)
+        registers: list[list[int]] = []
+        read: set[int] = set()
+        results: list[tuple[int, Term]] = []
+        for n, operand in enumerate(e.shape.operands):
+            value = next(leaves) if operand.output else next(inputs)[1]
+            if isinstance(value, list):
+                raise Undecided("an aggregate as operand of an assembly statement")
+            words = max(1, (value[0].size() + 15) // 16)
+            first = registers[operand.tied][0] if operand.tied is not None else statement.register(n, operand)
+            if first is None:
+                if operand.output or not self._is_number(statement.texts.get((n, "")), value[0]):
+                    return False
+                registers.append([])
+                continue
+            here = list(range(first, first + words))
+            registers.append(here)
+            if operand.output:
+                results += zip(here, _words_of([value]), strict=True)
+            elif self._holds(here, value):
+                read |= set() if operand.tied is not None else {*here}
+            else:
+                return False
+            if operand.allowed is not None and first not in operand.allowed:
+                raise Refuted(f"{_said(e)}: W{first} is not of the class that operand {n} asks for")
+        if any(m and (m != "d" or text != f"w{registers[n][0] + 1}") for (n, m), text in statement.texts.items()):
+            return False
+        self._apart(e, registers, read)
+        self.settle(e)
+        if e.after is not None:
+            state.memory.become(e.after, self.frame.kept())
+        for n in e.shape.clobbered:
+            state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
+        self._forget_flags(state)
+        for n, term in results:
+            self._put(state, n, term)
+        self.machine.passed()
+        return True
+
+    def _apart(self, e: Event, registers: list[list[int]], read: set[int]) -> None:
+        """Outputs and what is overwritten share no register, nor do inputs with what is overwritten early."""
+        assert e.shape is not None
+        outputs = [n for n, operand in enumerate(e.shape.operands) if operand.output]
+        written = [r for n in outputs for r in registers[n]] + [*e.shape.clobbered]
+        early = {r for n in outputs if e.shape.operands[n].early for r in registers[n]} | e.shape.clobbered
+        if len(set(written)) < len(written) or read & early:
+            raise Refuted(f"{_said(e)}: operands share a register")
+
+    def _holds(self, registers: list[int], value: Any) -> bool:
+        term, poison = value
+        words = [word(self.machine.w(n)) for n in registers]
+        whole = words[0] if len(words) == 1 else z3.Concat(*reversed(words))
+        same = term == (z3.Extract(term.size() - 1, 0, whole) if term.size() < whole.size() else whole)
+        found, _ = answer([*self.machine.given, z3.Not(same if poison is None else z3.Or(poison, same))])
+        if found == z3.unknown:
+            raise Undecided("the solver gave up: an operand of an assembly statement")
+        return bool(found == z3.unsat)
+
+    def _is_number(self, text: str | None, term: Term) -> bool:
+        """Whether the text of an operand that is no register is the number it should be."""
+        wanted, found = known(term), NUMBER.fullmatch(text or "")
+        if wanted is None or found is None:
+            return False
+        base = 0 if found["name"] is None else self.subject.symbols.get(found["name"])
+        return base is not None and (base + int(found["plus"] or 0) - wanted) % (1 << term.size()) == 0
+
     def _constants(self, where: str) -> None:
         same = self.machine.core(PSVPAG) == self.machine.page
         demand(same, self.machine.given, f"PSVPAG is not that of constants at {where}")
@@ -97,10 +171,13 @@ class Contract:
         for n in CALLER_SAVED:
             state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
         state.regs["RCOUNT"] = narrow(z3.FreshConst(z3.BitVecSort(16), "RCOUNT"))
-        for name in ("C", "Z", "OV", "N", "DC"):
-            state.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
+        self._forget_flags(state)
         for at in [at for at in state.frame if at >= state.w[SP] - pushed]:
             state.frame[at] = z3.FreshConst(z3.BitVecSort(8), "stack")
+
+    def _forget_flags(self, state: State) -> None:
+        for name in ("C", "Z", "OV", "N", "DC"):
+            state.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
 
     def _arguments(self, state: State, e: Event) -> int:
         """Bytes of arguments on the stack."""

@@ -136,6 +136,35 @@ def _saturated(op: str) -> Meaning:
     return meaning
 
 
+def _sign_of(a: Term, b: Term) -> Term:
+    sign = vector(1 << a.size() - 1, a.size())
+    return (a & ~sign) | (b & sign)
+
+
+FRACTION_BITS: Final = {32: 23, 64: 52}
+"""IEEE 754, single and double precision."""
+
+
+def _is_class(e: Evaluator, path: Path, i: Instr) -> Any:
+    """Whether a number is of one of the classes that bits of the second operand name."""
+    (a, p), wanted = _scalar(e, path, i, 0), known(e.sure(path, i.args[1]))
+    if wanted is None:
+        raise Undecided("is.fpclass of a class that is not a constant")
+    bits, fraction = a.size(), FRACTION_BITS[a.size()]
+    size, quiet = a & vector((1 << bits - 1) - 1, bits), vector(1 << fraction - 1, bits)
+    infinite = vector((1 << bits - 1) - (1 << fraction), bits)
+    least = vector(1 << fraction, bits)
+    zero, normal = size == 0, z3.And(z3.UGE(size, least), z3.ULT(size, infinite))
+    subnormal = z3.And(size != 0, z3.ULT(size, least))
+    below = z3.Extract(bits - 1, bits - 1, a) == 1
+    nan = z3.UGT(size, infinite)
+    sizes = [size == infinite, normal, subnormal, zero]
+    nans = [z3.And(nan, size & quiet == 0), z3.And(nan, size & quiet != 0)]
+    above = [z3.And(z3.Not(below), one) for one in reversed(sizes)]
+    classes = [*nans, *(z3.And(below, one) for one in sizes), *above]
+    return one_bit(z3.Or(*(one for k, one in enumerate(classes) if wanted >> k & 1))), p
+
+
 def _copy(e: Evaluator, path: Path, i: Instr) -> None:
     """memcpy and memmove: all bytes are read before one is written."""
     size = _length(e, path, i)
@@ -192,8 +221,9 @@ INTRINSICS: Final[dict[str, Meaning]] = {
     "bitreverse": _of_words(_reversed, 1), "ctpop": _of_words(bits_set, 1), "ctlz": _count_zeros(True),
     "cttz": _count_zeros(False), "memcpy": _copy, "memmove": _copy, "memcpy.inline": _copy, "memset": _fill,
     "fabs": _of_words(lambda a: a & vector((1 << a.size() - 1) - 1, a.size()), 1),
+    "copysign": _of_words(_sign_of), "is.fpclass": _is_class,
     "fmuladd": _of_words(lambda a, b, c: floats.arithmetic("fadd", floats.arithmetic("fmul", a, b), c), 3),
     **{f"{op}.with.overflow": _checked(op) for op in ("sadd", "ssub", "smul", "uadd", "usub", "umul")},
     **{f"{op}.sat": _saturated(op) for op in ("sadd", "ssub", "uadd", "usub")},
 }  # fmt: skip
-"""Meaning by name without types. Those whose result has another type than their operands are absent."""
+"""Meaning by name without types."""

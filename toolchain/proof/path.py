@@ -7,6 +7,7 @@ from typing import Any
 
 from toolchain.ir.model import Value
 from toolchain.proof.memory import Memory
+from toolchain.proof.statements import Shape
 from toolchain.proof.terms import Term
 
 
@@ -30,6 +31,8 @@ class Event:
     """Stores, by address and value, that may stand before or behind it."""
     even: bool = False
     """Of an access: words of it lie at even addresses."""
+    shape: Shape | None = None
+    """Of an assembly statement: its constraints. Its arguments are the inputs."""
     tail: bool = False
     """Of a call: it does not use the caller's variables."""
     after: Any = None

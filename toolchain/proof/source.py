@@ -30,6 +30,7 @@ from toolchain.proof.memory import Frame
 from toolchain.proof.operands import SUMS, Operands, Symbolic, either
 from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Undecided, feasible
+from toolchain.proof.statements import Shape, plain, shape_of
 from toolchain.proof.terms import Term, known, one_bit, truth, vector
 from toolchain.target import SFR_END
 
@@ -338,19 +339,32 @@ class Evaluator(Operands):
         self._others_run(path, event)
         return event
 
-    def _assembly(self, path: Path, i: Instr, code: InlineAsm) -> None:
-        outside = [word for word in code.constraints.split(",") if not word.startswith("~")]
-        if (outside and outside != [""]) or i.args[:-1]:
-            raise Undecided("assembly with operands")
-        clobbers = "~{memory}" in code.constraints
-        if clobbers:
+    def _assembly(self, path: Path, i: Instr, code: InlineAsm) -> Any:
+        shape = shape_of(code)
+        inputs = [(v, self.value(path, v)) for v in i.args[:-1]]
+        if shape.memory:
             path.part(barrier=True)
-        if code.text.strip() and clobbers:
-            event = Event("asm", code.text, memory=path.memory.copy())
+        if not code.text.strip():
+            return self._unchanged(shape, inputs)
+        event = Event("asm", plain(code.text), arguments=[(v, value, {}) for v, value in inputs], shape=shape)
+        if i.type.kind != "void":
+            event.value = self.of_type(i.type, lambda t: (self.unknown("stated", t.bits), None))
+        if shape.memory:
+            event.memory = path.memory.copy()
             path.events.append(event)
             self._others_run(path, event)
-        elif code.text.strip():
-            path.show(Event("asm", code.text))
+        else:
+            path.show(event)
+        return event.value
+
+    def _unchanged(self, shape: Shape, inputs: list[tuple[Value, Any]]) -> Any:
+        """What a statement without text gives: its outputs are the inputs tied to them."""
+        places = [o.tied for o in shape.operands if not o.output]
+        tied = {n: value for n, (_, value) in zip(places, inputs, strict=True)}
+        outputs = [n for n, o in enumerate(shape.operands) if o.output]
+        if any(n not in tied for n in outputs):
+            raise Undecided("an assembly statement without text that gives something")
+        return tied[outputs[0]] if len(outputs) == 1 else [tied[n] for n in outputs] or None
 
     def _others_run(self, path: Path, event: Event) -> None:
         event.after = z3.Array(f"memory.{len(path.events)}", z3.BitVecSort(16), z3.BitVecSort(8))

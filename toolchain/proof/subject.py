@@ -10,6 +10,7 @@ import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from emu.chips.chip import Chip
@@ -31,6 +32,7 @@ from toolchain.lower.isr import annotations_of, interrupt_kind, preserved
 from toolchain.lower.names import symbol
 from toolchain.pipeline import ModuleCompiler
 from toolchain.proof.memory import STACK
+from toolchain.proof.statements import LABEL, Statement, marked, templates
 
 PRIVATE = re.compile(r"^(@\S+ = )private ", re.MULTILINE)
 DATA, DATA_END = 0x1000, STACK - 0x100
@@ -63,12 +65,15 @@ class Subject:
     """Functions that serve interrupts, and of what kind (`interrupt_kind`)."""
     saving: set[str]
     """Those that also save variables."""
+    statements: dict[int, list[Statement]]
+    """Stretches of code that read like assembly statements, by where they begin."""
     made: ObjectFile
     options: LinkOptions
 
-    def __post_init__(self) -> None:
-        self.functions = {address: name for name, address in self.symbols.items() if name not in self._data}
+    @cached_property
+    def functions(self) -> dict[int, str]:
         """Functions by address."""
+        return {address: name for name, address in self.symbols.items() if name not in self._data}
 
     @property
     def _data(self) -> set[str]:
@@ -103,12 +108,18 @@ def subject(arguments: list[str], edit: Callable[[str], str] = str) -> Subject:
     ir = PRIVATE.sub(r"\1internal ", ir)  # local labels have no address in the image
     compiler = ModuleCompiler(read_module(ir), options)
     text = edit(compiler.run())
+    module = read_module(ir)
+    text, stretches = marked(text, templates(module))
     made, _ = assemble(text, options.inputs[0].path.name, assembler_options(options, compiled=True))
-    return linked(read_module(ir), made, compiler.placed, options.chip)
+    found = linked(module, made, compiler.placed, options.chip)
+    places = {name: found.symbols.pop(name) for name in [*found.symbols] if name.startswith(LABEL)}
+    for start, template, texts, end in stretches:
+        found.statements.setdefault(places[start], []).append(Statement(template, places[end], texts))
+    return found
 
 
 def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]], chip: Chip) -> Subject:
-    """The object by itself, with addresses for what it only declares."""
+    """The object by itself, with addresses for what it only declares, and none of its statements."""
     options = LinkOptions(entry=ENTRY, data_init=False, isr=False, chip=chip)
     invented = _invented(module, made.symbols, options)
     options.define.update(invented)
@@ -127,7 +138,7 @@ def linked(module: Module, made: ObjectFile, placed: dict[str, dict[str, int]], 
     saving = {name for name, found in notes.items() if preserved(found)}
     kinds = {name: interrupt_kind(notes.get(name, set()), name) for name in module.functions}
     handlers = {name: kind.partition(",")[0] for name, kind in kinds.items() if kind}
-    return Subject(module, symbols, ends, code, placed, handlers, saving, made, options)
+    return Subject(module, symbols, ends, code, placed, handlers, saving, {}, made, options)
 
 
 def _invented(module: Module, symbols: list[Symbol], options: LinkOptions) -> dict[str, int]:

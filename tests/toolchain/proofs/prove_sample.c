@@ -74,3 +74,17 @@ void between(int *p) { BARRIER(); first_port = 1; *p = 3; words[0] = 1; second_p
 volatile int seen;
 int watched(void) { seen = 1; return seen; }
 int watched_local(void) { volatile int own = 1; return own + own; }
+float sign_taken(float a, float b) { return __builtin_copysignf(a, b); }
+int is_subnormal(float a) { return __builtin_isfpclass(a, 0x90); }
+unsigned long added(unsigned long a, unsigned long b)
+{
+    __asm__("add %0,%1,%0\n addc %d0,%d1,%d0" : "+r"(a) : "r"(b) : "cc");
+    return a;
+}
+void put(int *p, int a) { __asm__ volatile("mov %1,[%0]" : : "r"(p), "r"(a) : "memory"); }
+int early(int a, int b)
+{
+    int r;
+    __asm__("mov %1,%0\n add %0,%2,%0\n mov #%3,w7" : "=&r"(r) : "r"(a), "r"(b), "i"(5) : "w7");
+    return r + a;
+}
