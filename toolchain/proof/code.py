@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Callable, Set
 from typing import Any, Final
 
 import z3
@@ -11,7 +11,7 @@ from emu.dspic30f.isa import flow
 from emu.dspic30f.isa.rows_multiply import DIVIDE_COUNT
 from toolchain.proof.contract import Contract
 from toolchain.proof.machine import Machine, State
-from toolchain.proof.memory import STACK, Frame, Memory
+from toolchain.proof.memory import Frame
 from toolchain.proof.path import Path
 from toolchain.proof.solver import Refuted, Undecided, answer, feasible
 from toolchain.proof.subject import PAGE, WORD_UNITS, Subject
@@ -25,7 +25,7 @@ MOST_TARGETS: Final = 64
 
 
 class Code:
-    """A function between two program addresses. `registers` are W0-W14 at entry, `array` is memory then.
+    """A function between two program addresses.
 
     `handler` is what kind of interrupt function it is (`interrupt_kind`).
     """
@@ -39,22 +39,51 @@ class Code:
         self.handler: Final = handler
         page = vector(subject.symbols.get(PAGE, 0), 16)
         entry = z3.BitVec("PSVPAG", 16) if handler == "auto_psv" else page
+        self.state: State
+        """What it is at."""
+        self.watched: Set[int] = frozenset()
+        """Addresses: where a way comes through one, its trace keeps the state."""
         self.machine: Final = Machine(frame, path.events, path.known, page, entry)
 
-    def run(self, registers: list[Term], array: Term, volatile: Set[int]) -> None:
-        """Raises Refuted, Undecided. `volatile`: bytes that are accessed only where the source does."""
+    def run(
+        self,
+        registers: list[Term],
+        state: State,
+        volatile: Set[int],
+        arrived: Callable[[State], bool] | None = None,
+        moved: bool = False,
+    ) -> list[State]:
+        """From a state on, along every way: the states at the end. Raises Refuted, Undecided.
+
+        `registers` are W0-W14 at the function's entry, `volatile` bytes that are accessed only where the source does.
+        `arrived` says whether the code has come to where the path of the source ends; it is not asked at the beginning
+        but with `moved`.
+        """
         self.machine.volatile = volatile
         self.contract = Contract(self.subject, self.frame, registers, self.path, self.machine)
-        work = [State([*registers, STACK], Memory(array), self.start)]
+        if arrived is not None and moved and self._end(state, arrived):
+            return [state]
+        work, ended = [state], []
         while work:
-            state = work.pop()
+            state = self.state = work.pop()
             for _ in range(MOST_STEPS):
+                if state.pc in self.watched:
+                    state.trace.append(state.copy())
                 following = self._sure_step(state)
+                if arrived is not None:
+                    following = [one for one in following if not self._end(one, arrived)]
+                if not following:
+                    ended.append(state)
                 if len(following) != 1 or following[0] is not state:
                     work += following
                     break
             else:
                 raise Undecided(f"more than {MOST_STEPS} instructions on one path")
+        return ended
+
+    def _end(self, state: State, arrived: Callable[[State], bool]) -> bool:
+        self.machine.state = state
+        return arrived(state)
 
     def _sure_step(self, state: State) -> list[State]:
         """As `_step`; what is wrong on a path that no input takes does not count."""

@@ -237,11 +237,21 @@ class Contract:
         for n in CALLEE_SAVED:
             demand(word(self.machine.w(n)) == self.registers[n], self.machine.given, f"W{n} is not what it was")
         self._core(at for at, name in CORE.items() if name != "RCOUNT")
-        for n, before in enumerate(ACCUMULATORS):
-            demand(wide(state.accumulators[n]) == before.wide, self.machine.given, f"ACC{'AB'[n]} is not what it was")
+        self._kept_accumulators(state)
         if self.path.result is not None:
             self._result(state)
         self.same_memory(state, self.path.memory, set(), "memory differs at the end")
+
+    def loop(self, state: State) -> None:
+        """Everything at the first block of a loop, but what registers hold: the same memory, and pages and accumulators
+        as at entry."""
+        self._core(at for at, name in CORE.items() if name != "RCOUNT")
+        self._kept_accumulators(state)
+        self.same_memory(state, self.path.memory, set(self.frame.objects), "memory differs at a loop")
+
+    def _kept_accumulators(self, state: State) -> None:
+        for n, before in enumerate(ACCUMULATORS):
+            demand(wide(state.accumulators[n]) == before.wide, self.machine.given, f"ACC{'AB'[n]} is not what it was")
 
     def _result(self, state: State) -> None:
         at = 0

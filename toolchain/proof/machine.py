@@ -61,11 +61,14 @@ class State:
     """Bytes of the event's access that have been made."""
     top: int = STACK
     """W15 before the instruction."""
+    trace: list[State] = field(default_factory=list)
+    """Earlier states at addresses that were asked for (`Code.watched`)."""
 
     def copy(self) -> State:
         """An independent state."""
         return State([*self.w], self.memory.copy(), self.pc, dict(self.flags), dict(self.frame),
-                     [*self.accumulators], dict(self.regs), [*self.path], self.event, self.done, self.top)  # fmt: skip
+                     [*self.accumulators], dict(self.regs), [*self.path], self.event, self.done, self.top,
+                     [*self.trace])  # fmt: skip
 
 
 class Machine:

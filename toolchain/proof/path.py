@@ -62,13 +62,17 @@ class Path:
     """and the events since, by number, with memory then."""
     result: Any = None
     ended: str = ""
-    """ret or unreachable."""
+    """ret, unreachable, or loop: at the first block of one,"""
+    head: str = ""
+    """which is this."""
+    heads: list[tuple[str, dict[int, Any], int]] = field(default_factory=list)
+    """First blocks of loops that it came through, with all values and the number of events then."""
 
     def copy(self) -> Path:
         """An independent path."""
         return Path(self.memory.copy(), dict(self.values), [*self.taken], [*self.assumed], [*self.preferred],
                     [*self.events], dict(self.visits), dict(self.forks),
-                    self.behind_barrier, [*self.stored], [*self.passed])  # fmt: skip
+                    self.behind_barrier, [*self.stored], [*self.passed], heads=[*self.heads])  # fmt: skip
 
     def write(self, address: Term, value: Term) -> None:
         """A store that may be moved as far as the next barrier."""

@@ -21,6 +21,8 @@ from toolchain.lower.cfg import loop_depths
 from toolchain.lower.names import symbol
 from toolchain.proof.accesses import Accesses
 from toolchain.proof.code import Code
+from toolchain.proof.loops import Induction
+from toolchain.proof.machine import State
 from toolchain.proof.memory import STACK, Frame, Memory, joined
 from toolchain.proof.path import Path
 from toolchain.proof.solver import Refuted, Undecided, budget, example, feasible
@@ -63,20 +65,22 @@ class Proof:
         self.frame: Final = Frame()
         self.registers: Final = [z3.BitVec(f"W{n}", 16) for n in range(15)]
         self.array: Final = z3.Array("memory", z3.BitVecSort(16), z3.BitVecSort(8))
+        self.loops: Final = any(loop_depths(f).values())
         self.paths = 0
 
     def verdict(self) -> Verdict:
         """Try to prove it."""
-        loops = any(loop_depths(self.f).values())
         budget.begin()
         try:
             self._run()
         except Refuted as found:
             budget.begin()
-            return Verdict(self.f.name, "refuted", found.what, loops, self.paths, self._input(found.conditions or []))
+            return Verdict(
+                self.f.name, "refuted", found.what, self.loops, self.paths, self._input(found.conditions or [])
+            )
         except Undecided as found:
-            return Verdict(self.f.name, "undecided", str(found), loops, self.paths)
-        return Verdict(self.f.name, "proved", "", loops, self.paths)
+            return Verdict(self.f.name, "undecided", str(found), self.loops, self.paths)
+        return Verdict(self.f.name, "proved", "", self.loops, self.paths)
 
     def _input(self, conditions: Sequence[Term]) -> Witness | None:
         model = example(conditions, self._path.preferred)
@@ -89,17 +93,31 @@ class Proof:
             raise Undecided("a variable number of arguments")
         if self.f.name in self.subject.saving:
             raise Undecided("a handler that saves variables")
-        start = Path(Memory(self.array))
-        self._parameters(start)
-        for path in Evaluator(self.f, self.frame, self.subject.address).paths(start):
-            if feasible(path.known):
-                self.paths += 1
-                self._path = path
-                handler = self.subject.handlers.get(self.f.name, "")
-                code = Code(self.subject, self.start, self.end, self.frame, path, handler)
-                code.run(self.registers, self.array, self._volatile)
+        start = State([*self.registers, STACK], Memory(self.array), self.start)
+        try:
+            for path in Evaluator(self.f, self.frame, self.subject.address).paths(self._begin()):
+                if feasible(path.known):
+                    self.paths += 1
+                    self._code(path).run(self.registers, start.copy(), self._volatile)
+        except Undecided as found:
+            if not self.loops:
+                raise
+            budget.begin()
+            induction = Induction(self.subject, self.f, self.frame, start, self._begin, self._code, self._volatile)
+            induction.prove(found)
+            self.paths = induction.paths
         if not self.paths:
             raise Undecided("no input gets through it")
+
+    def _code(self, path: Path) -> Code:
+        self._path = path
+        handler = self.subject.handlers.get(self.f.name, "")
+        return Code(self.subject, self.start, self.end, self.frame, path, handler)
+
+    def _begin(self) -> Path:
+        path = Path(Memory(self.array))
+        self._parameters(path)
+        return path
 
     def _parameters(self, path: Path) -> None:
         """Where variables lie, and what parameters are (abi-elf.md §2.2)."""

@@ -6,7 +6,7 @@ here as they do in the machine: what is proved holds for more inputs than the IR
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from typing import Any, Final
 
 import z3
@@ -54,21 +54,34 @@ QUOTIENTS: Final[dict[str, Callable[[Term, Term], Term]]] = {
 class Evaluator(Operands):
     """Follows one function. `address` gives a global's place, `frame` says where its variables lie."""
 
-    def __init__(self, function: Function, frame: Frame, address: Callable[[str], int]) -> None:
+    def __init__(
+        self, function: Function, frame: Frame, address: Callable[[str], int], watched: Set[str] = frozenset()
+    ) -> None:
+        """`watched`: blocks whose values paths remember (`Path.heads`)."""
         super().__init__(address)
+        self.watched: Final = watched
         self.function: Final = function
         self.frame: Final = frame
         self.blocks: Final = {b.name: b for b in function.blocks}
         self._slots = {i.name: i for b in function.blocks for i in b.instrs if i.op == "alloca"}
 
-    def paths(self, start: Path) -> Iterator[Path]:
-        """Every path that some input takes. Raises Undecided."""
-        work: list[tuple[Path, Block, str]] = [(start, self.function.blocks[0], "")]
+    def paths(self, start: Path, first: str = "", heads: Set[str] = frozenset(), most: int = 0) -> Iterator[Path]:
+        """Every path that some input takes, from the block `first`, whose phis have values, or the beginning, up to the
+        end or one of `heads`. Raises Undecided; with `most`, paths that decide more often whether to go round a loop
+        again are left out."""
+        work: list[tuple[Path, Block, str]] = [(start, self.blocks[first or self.function.blocks[0].name], "")]
         ended = 0
         while work:
             path, block, came = work.pop()
             while True:
-                following = self._block(path, block, came)
+                if came:
+                    self._enter(path, block, came)
+                    if block.name in heads:
+                        path.part(barrier=False)
+                        path.ended, path.head = "loop", block.name
+                        yield path
+                        break
+                following = self._block(path, block)
                 if not following:
                     ended += 1
                     if ended > MOST_PATHS:
@@ -83,6 +96,8 @@ class Evaluator(Operands):
                 came = block.name
                 if len(possible) > 1:
                     path.forks[came] = path.forks.get(came, 0) + 1
+                    if most and path.forks[came] > most:
+                        break
                     if path.forks[came] > MOST_FORKS:
                         raise Undecided("a loop whose rounds are not known")
                 for condition, name in possible[1:]:
@@ -96,14 +111,19 @@ class Evaluator(Operands):
 
     # -- a block -----------------------------------------------------------------------------------------------------
 
-    def _block(self, path: Path, block: Block, came: str) -> list[tuple[Term, str]]:
+    def _enter(self, path: Path, block: Block, came: str) -> None:
+        """By the edge from another block."""
+        entered = [(phi, self.value(path, phi.args[phi.blocks.index(came)])) for phi in block.phis()]
+        for phi, value in entered:
+            path.values[id(phi)] = value
+
+    def _block(self, path: Path, block: Block) -> list[tuple[Term, str]]:
         """Run it; where it goes on, by condition."""
         path.visits[block.name] = path.visits.get(block.name, 0) + 1
         if path.visits[block.name] > MOST_VISITS:
             raise Undecided("a loop whose rounds are not known")
-        entered = [(phi, self.value(path, phi.args[phi.blocks.index(came)])) for phi in block.phis()]
-        for phi, value in entered:
-            path.values[id(phi)] = value
+        if block.name in self.watched:
+            path.heads.append((block.name, dict(path.values), len(path.events)))
         for i in block.instrs:
             if i.op == "phi":
                 continue
@@ -145,6 +165,15 @@ class Evaluator(Operands):
         return [(z3.Or(*conditions), name) for name, conditions in out.items()]
 
     # -- instructions ------------------------------------------------------------------------------------------------
+
+    def again(self, path: Path, i: Instr) -> None:
+        """An instruction that ran before, on a path that begins later."""
+        if i.type.kind == "void":
+            return
+        if i.op in ("load", "call", "phi", "freeze"):
+            path.values[id(i)] = self.of_type(i.type, lambda t: (self.unknown("before", t.bits), None))
+        else:
+            path.values[id(i)] = self._instruction(path, i)
 
     def _instruction(self, path: Path, i: Instr) -> Any:
         if i.op in SUMS | SHIFTS | QUOTIENTS:

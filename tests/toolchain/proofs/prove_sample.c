@@ -88,3 +88,53 @@ int early(int a, int b)
     __asm__("mov %1,%0\n add %0,%2,%0\n mov #%3,w7" : "=&r"(r) : "r"(a), "r"(b), "i"(5) : "w7");
     return r + a;
 }
+struct item { struct item *next; int key; };
+struct item *found(struct item *p, int key)
+{
+    while (p && p->key != key) p = p->next;
+    return p;
+}
+unsigned length(const char *s)
+{
+    unsigned n = 0;
+    while (*s++) n++;
+    return n;
+}
+int pairs(int n, int (*f)(int, int))
+{
+    int total = 0;
+    for (int i = 0; i < n; i++)
+        for (int j = i; j < n; j++) total += f(i, j);
+    return total;
+}
+int place_of(int k)
+{
+    int i = 0;
+    while (i < 8 && words[i] != k) i++;
+    return i < 8 ? i : -1;
+}
+void inserted(struct item **p, struct item *x)
+{
+    while (*p && (*p)->key < x->key) p = &(*p)->next;
+    x->next = *p;
+    *p = x;
+}
+void turned(int *a, int n)
+{
+    for (int i = 0, j = n - 1; i < j; i++, j--) {
+        int t = a[i];
+        a[i] = a[j];
+        a[j] = t;
+    }
+}
+void waited(void)
+{
+    while (!(first_port & 4)) {}
+    second_port = 1;
+}
+long product_of(const int *a, const int *b, int n)
+{
+    long s = 0;
+    while (n-- > 0) s += (long)*a++ * *b++;
+    return s;
+}

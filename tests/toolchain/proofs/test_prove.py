@@ -104,13 +104,35 @@ PLANTED = {
     "accumulator changed": ("kept", "mov #3,w1", "clr A\n\tmov #3,w1"),
     "registers not saved by a handler": ("_T1Interrupt", r"mov\.d w4,\[w15\+\+\]((.*\n)*)\tmov\.d \[--w15\],w4",
                                          r"nop\1\tnop"),
+    "another member in a loop": ("found", "mov [w0+2],w7", "mov [w0+4],w7"),
+    "another way on": ("found", "mov [w0],w0", "mov [w0+2],w0"),
+    "counted from one": ("length", "clr w7", "mov #1,w7"),
+    "counted twice": ("length", "inc w7,w7", "inc2 w7,w7"),
+    "arguments exchanged in a loop": ("pairs", "mov.d w10,w0", "mov w11,w0\n\tmov w10,w1"),
+    "an inner loop that is not begun": ("pairs", "mov w10,w11", "mov w9,w11"),
+    "register not restored behind a loop": ("pairs", "mov [--w15],w12", "sub w15,#2,w15"),
+    "ends at equal": ("inserted", "bra lt,", "bra le,"),
+    "stores exchanged behind a loop": ("inserted", "mov w7,[w1]\n\tmov w1,[w0]", "mov w1,[w0]\n\tmov w7,[w1]"),
+    "a step of one byte": ("turned", "dec2 w7,w7", "dec w7,w7"),
+    "waits for the other": ("waited", "bra z,", "bra nz,"),
+    "one factor unsigned": ("product_of", "mul.ss w7,[w0++],w6", "mul.us w7,[w0++],w6"),
+    "a round too few for the input": ("product_of", "bra ge,", "bra gt,"),
 }  # fmt: skip
 """By kind of fault: the function, what its code at -Os says, and what is put there instead."""
+
+LATE = {
+    "a round too many": ("place_of", "cp w6,#8", "cp w6,#9"),
+    "another result behind a loop": ("place_of", "setm w6", "clr w6"),
+    "counted in a byte": ("length", "inc w7,w7", "inc.b w7,w7"),
+    "compared in a byte": ("pairs", "cp w11,w9", "cp.b w11,w9"),
+    "an index of a byte": ("turned", "inc w6,w6", "inc.b w6,w6"),
+}
+"""Faults that only many rounds show."""
 
 
 def planted(kind: str) -> Verdict:
     """The verdict on a function with a fault."""
-    function, right, wrong = PLANTED[kind]
+    function, right, wrong = (PLANTED | LATE)[kind]
 
     def edit(text: str) -> str:
         start = text.index(f"\n_{function}:")
@@ -135,6 +157,12 @@ def test_right_code_is_proved(level: str) -> None:
 def test_a_planted_fault_is_refuted(kind: str) -> None:
     verdict = planted(kind)
     assert verdict.kind == "refuted", verdict
+
+
+@pytest.mark.parametrize("kind", LATE)
+def test_a_fault_of_many_rounds_is_not_proved(kind: str) -> None:
+    """An induction that does not succeed refutes nothing."""
+    assert planted(kind).kind != "proved"
 
 
 def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> None:
