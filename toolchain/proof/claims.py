@@ -6,7 +6,7 @@ are. Out: claims that are true of all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -73,32 +73,43 @@ class Claim:
 
 @dataclass(frozen=True)
 class Order:
-    """Among the source's own values: that one is not above another (None: 0), signed or not."""
+    """Among the source's own values, by words, and numbers: that one is not above another, signed or not."""
 
-    low: Part | None
-    high: Part | None
-    signed: bool
+    low: Part | int
+    high: Part | int
+    signed: bool = False
 
     def holds(self, values: Mapping[Any, Any]) -> Term:
         """It, or one of them is poison."""
-        a, b = (vector(0, WORD) if part is None else part.term(values) for part in (self.low, self.high))
+        sides = (self.low, self.high)
+        a, b = (vector(one, WORD) if isinstance(one, int) else one.term(values) for one in sides)
         poison = None
-        for part in (self.low, self.high):
-            poison = poison if part is None else either(poison, values[part.key][1])
+        for one in sides:
+            poison = poison if isinstance(one, int) else either(poison, values[one.key][1])
         same = a <= b if self.signed else z3.ULE(a, b)
         return same if poison is None else z3.Or(poison, same)
 
 
-def orders(moving: Iterable[Part], others: Iterable[Part], rows: list[dict[Part, int]]) -> Iterator[Order]:
-    """Which of some values were never above, or never below, others."""
-    for a in moving:
-        for b in (None, *others):
+def orders(rows: list[dict[Part, int]], sizes: Mapping[Part, int]) -> Iterator[Order]:
+    """Which values were always the same, as branches on the way are, and which were never above others."""
+    moving = [part for part in rows[0] if len({row[part] for row in rows}) > 1]
+    for part, number in rows[0].items():
+        if part not in moving:
+            yield from (Order(part, number), Order(number, part))
+    whole = [part for part in rows[0] if sizes[part] == WORD]
+    others: list[Part | int] = [0, *whole]
+    for a in (part for part in moving if part in whole):
+        for b in others:
             for low, high in ((a, b), (b, a)):
                 for signed in (True, False):
                     flip = 0x8000 if signed else 0
-                    pairs = [((row[low] if low else 0) ^ flip, (row[high] if high else 0) ^ flip) for row in rows]
-                    if a != b and (low or signed) and all(x <= y for x, y in pairs):
+                    pairs = [(_number(low, row) ^ flip, _number(high, row) ^ flip) for row in rows]
+                    if a != b and (low != 0 or signed) and all(x <= y for x, y in pairs):
                         yield Order(low, high, signed)
+
+
+def _number(one: Part | int, row: dict[Part, int]) -> int:
+    return one if isinstance(one, int) else row[one]
 
 
 def parts_of(key: Any, value: tuple[Term, Term | None]) -> Iterator[tuple[Part, int]]:

@@ -31,7 +31,7 @@ from toolchain.proof.path import Path
 from toolchain.proof.solver import Refuted, Undecided, answer, budget, example, feasible
 from toolchain.proof.source import Evaluator
 from toolchain.proof.subject import WORD_UNITS, Subject
-from toolchain.proof.terms import WORD, Term, narrow, vector
+from toolchain.proof.terms import Term, narrow, vector
 from toolchain.target import SP
 
 WAYS: Final = 8
@@ -187,8 +187,8 @@ class Induction:
         words = [at for at in places if at % 2 == 0 and all(at in s.frame and at + 1 in s.frame for s in states)]
         sizes = {part: bits for key in self._keys(name) for part, bits in parts_of(key, met[0][1][key])}
         rows = [{part: way.number(part.term(values)) for part in sizes} for way, values, _ in met]
-        moving = [part for part in sizes if len({row[part] for row in rows}) > 1 and sizes[part] == WORD]
-        head = Head(name, pc, top, [], list(orders(moving, sizes, rows)) if ordered else [], places)
+        own = [{part: number for part, number in row.items() if part.key not in self.entry} for row in rows]
+        head = Head(name, pc, top, [], list(orders(own, sizes)) if ordered else [], places)
         for place in [*range(SP), *sorted(words)]:
             head.claims += guessed(place, [way.number(_held(state, place)) for way, _, state in met], rows, sizes)
         return head

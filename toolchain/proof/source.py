@@ -170,7 +170,9 @@ class Evaluator(Operands):
         """An instruction that ran before, on a path that begins later."""
         if i.type.kind == "void":
             return
-        if i.op in ("load", "call", "phi", "freeze"):
+        callee = i.args[-1] if i.op == "call" else None
+        computed = isinstance(callee, GlobalRef) and callee.name.startswith("llvm.")
+        if i.op in ("load", "call", "phi", "freeze") and not computed:
             path.values[id(i)] = self.of_type(i.type, lambda t: (self.unknown("before", t.bits), None))
         else:
             path.values[id(i)] = self._instruction(path, i)
