@@ -205,13 +205,16 @@ def test_nothing_of_the_kernel_is_refuted(file: str) -> None:
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "one.c"
     rounds = "int rounds(int n) { int s = 0; while (n--) s ^= s + n * n; return s; }"
-    source.write_text(f"int twice(int a) {{ return 2 * a; }}\n{rounds}\n")
+    listed = "int listed(int n, ...) { return n; }"
+    source.write_text(f"int twice(int a) {{ return 2 * a; }}\n{rounds}\n{listed}\n")
     assert main(["prove", str(source), "-Os", "--json"]) == DONE
     found = {v["function"]: v for v in json.loads(capsys.readouterr().out)}
     assert found["twice"]["kind"] == "proved"
     assert not found["twice"]["loops"]
-    assert found["rounds"]["kind"] == "undecided"
+    assert found["rounds"]["kind"] == "proved"
     assert found["rounds"]["loops"]
+    assert found["listed"]["kind"] == "undecided"
+    assert found["listed"]["why"] == "a variable number of arguments"
     assert main(["prove", str(source), "--function", "absent"]) == BAD_INPUT
     assert "no function absent" in capsys.readouterr().err
     source.write_text("int broken(")
