@@ -94,8 +94,9 @@ class Proof:
         if self.f.name in self.subject.saving:
             raise Undecided("a handler that saves variables")
         start = State([*self.registers, STACK], Memory(self.array), self.start)
+        begin = self._begin()
         try:
-            for path in Evaluator(self.f, self.frame, self.subject.address).paths(self._begin()):
+            for path in Evaluator(self.f, self.frame, self.subject.address).paths(begin):
                 if feasible(path.known):
                     self.paths += 1
                     self._code(path).run(self.registers, start.copy(), self._volatile)

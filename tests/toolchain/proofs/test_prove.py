@@ -206,7 +206,8 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "one.c"
     rounds = "int rounds(int n) { int s = 0; while (n--) s ^= s + n * n; return s; }"
     listed = "int listed(int n, ...) { return n; }"
-    source.write_text(f"int twice(int a) {{ return 2 * a; }}\n{rounds}\n{listed}\n")
+    whole = "struct many { int l[9]; }; int whole(struct many m, int n) { while (n--) m.l[n] = n; return m.l[1]; }"
+    source.write_text(f"int twice(int a) {{ return 2 * a; }}\n{rounds}\n{listed}\n{whole}\n")
     assert main(["prove", str(source), "-Os", "--json"]) == DONE
     found = {v["function"]: v for v in json.loads(capsys.readouterr().out)}
     assert found["twice"]["kind"] == "proved"
@@ -215,6 +216,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert found["rounds"]["loops"]
     assert found["listed"]["kind"] == "undecided"
     assert found["listed"]["why"] == "a variable number of arguments"
+    assert found["whole"]["why"] == "a struct parameter"
     assert main(["prove", str(source), "--function", "absent"]) == BAD_INPUT
     assert "no function absent" in capsys.readouterr().err
     source.write_text("int broken(")
