@@ -20,7 +20,7 @@ from toolchain.proof.path import Event, Path
 from toolchain.proof.solver import Refuted, Undecided, answer, demand
 from toolchain.proof.statements import Statement
 from toolchain.proof.subject import Subject
-from toolchain.proof.terms import Term, known, narrow, truth_number, vector, wide, word
+from toolchain.proof.terms import Term, known, narrow, vector, wide, word
 from toolchain.target import CALLEE_SAVED, CALLER_SAVED, RAM_END, RETURN_ADDRESS_BYTES, SP
 
 NUMBER: Final = re.compile(r"(?P<name>_\w+)?(?P<plus>[+-]?\d+)?")
@@ -114,7 +114,7 @@ class Contract:
             state.memory.become(e.after, self.frame.kept())
         for n in e.shape.clobbered:
             state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
-        self._forget_flags(state)
+        state.forget_flags()
         for n, term in results:
             self._put(state, n, term)
         self.machine.passed()
@@ -130,11 +130,8 @@ class Contract:
             raise Refuted(f"{_said(e)}: operands share a register")
 
     def _holds(self, registers: list[int], value: Any) -> bool:
-        term, poison = value
-        words = [word(self.machine.w(n)) for n in registers]
-        whole = words[0] if len(words) == 1 else z3.Concat(*reversed(words))
-        same = term == (z3.Extract(term.size() - 1, 0, whole) if term.size() < whole.size() else whole)
-        found, _ = answer([*self.machine.given, z3.Not(same if poison is None else z3.Or(poison, same))])
+        same = _is_value(value, [word(self.machine.w(n)) for n in registers])
+        found, _ = answer([*self.machine.given, z3.Not(same)])
         if found == z3.unknown:
             raise Undecided("the solver gave up: an operand of an assembly statement")
         return bool(found == z3.unsat)
@@ -171,13 +168,9 @@ class Contract:
         for n in CALLER_SAVED:
             state.w[n] = z3.FreshConst(z3.BitVecSort(16), f"W{n}")
         state.regs["RCOUNT"] = narrow(z3.FreshConst(z3.BitVecSort(16), "RCOUNT"))
-        self._forget_flags(state)
+        state.forget_flags()
         for at in [at for at in state.frame if at >= state.w[SP] - pushed]:
             state.frame[at] = z3.FreshConst(z3.BitVecSort(8), "stack")
-
-    def _forget_flags(self, state: State) -> None:
-        for name in ("C", "Z", "OV", "N", "DC"):
-            state.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
 
     def _arguments(self, state: State, e: Event) -> int:
         """Bytes of arguments on the stack."""
@@ -197,10 +190,7 @@ class Contract:
         return max([RETURN_ADDRESS_BYTES, *(p.stack for p in places)]) - RETURN_ADDRESS_BYTES
 
     def _equal(self, value: Any, words: list[Term], what: str) -> None:
-        term, poison = value
-        whole = words[0] if len(words) == 1 else z3.Concat(*reversed(words))
-        same = term == (z3.Extract(term.size() - 1, 0, whole) if term.size() < whole.size() else whole)
-        demand(same if poison is None else z3.Or(poison, same), self.machine.given, f"{what} differs")
+        demand(_is_value(value, words), self.machine.given, f"{what} differs")
 
     def _by_model(self, state: State, helper: Helper) -> None:
         """A function of the run-time library that stands for an operation of the IR."""
@@ -295,6 +285,14 @@ class Contract:
         if not self.frame.is_private(at) and not self.frame.is_object(at):
             return True
         return any(self.frame.objects[n][0] <= at < sum(self.frame.objects[n]) for n in objects)
+
+
+def _is_value(value: Any, words: list[Term]) -> Term:
+    """That registers or words of the stack hold a value, or that it is poison."""
+    term, poison = value
+    whole = words[0] if len(words) == 1 else z3.Concat(*reversed(words))
+    same = term == (z3.Extract(term.size() - 1, 0, whole) if term.size() < whole.size() else whole)
+    return same if poison is None else z3.Or(poison, same)
 
 
 def _within(at: Term, place: tuple[Term, int]) -> Term:

@@ -113,9 +113,9 @@ class Induction:
         self._places: Set[int] = frozenset()
         """Where the machine is at loops."""
 
-    def _reached(self, without: str) -> set[str]:
-        """Blocks that the first one leads to, but by way of another."""
-        seen, work = {without}, [next(iter(self.blocks))]
+    def _reached(self, first: str, without: str = "") -> set[str]:
+        """Blocks that one leads to, itself among them, but by way of another."""
+        seen, work = {without}, [first]
         while work:
             one = work.pop()
             if one not in seen:
@@ -125,7 +125,8 @@ class Induction:
 
     def _dominators(self, name: str) -> set[str]:
         """Blocks that every way to this one comes through, itself among them."""
-        return {other for other in self.blocks if name not in self._reached(other)}
+        first = next(iter(self.blocks))
+        return {other for other in self.blocks if name not in self._reached(first, other)}
 
     def _passed(self, name: str, ends: list[str]) -> list[str]:
         return [other for other in self.blocks if ends and name in self.above[other]
@@ -198,7 +199,7 @@ class Induction:
 
     def _keys(self, name: str) -> list[Any]:
         """Values that the block and those behind it use, or that these are made of, and registers at entry."""
-        behind, above = self._behind(name), self.above[name] - {name}
+        behind, above = self._reached(name), self.above[name] - {name}
         work = [a for b in self.blocks if b in behind for i in self.blocks[b].instrs for a in i.args]
         made = {id(i): i for b in self.blocks if b in above for i in self.blocks[b].instrs}
         own = {id(phi) for phi in self.blocks[name].phis()} | {id(a) for a in self.f.args} | set(made)
@@ -209,16 +210,6 @@ class Induction:
                 found[id(value)] = None
                 work += made[id(value)].args if id(value) in made else []
         return [*found, *self.entry]
-
-    def _behind(self, name: str) -> set[str]:
-        seen: set[str] = set()
-        work = [name]
-        while work:
-            one = work.pop()
-            if one not in seen:
-                seen.add(one)
-                work += self.blocks[one].succs
-        return seen
 
     # -- what does hold ----------------------------------------------------------------------------------------------
 
@@ -262,8 +253,7 @@ class Induction:
         w = [z3.FreshConst(z3.BitVecSort(16), f"W{n}") for n in range(SP)]
         state = State([*w, head.top], path.memory.copy(), head.pc, top=head.top)
         state.frame = {at: z3.FreshConst(z3.BitVecSort(BYTE), "stack") for at in head.places}
-        for name in ("C", "Z", "OV", "N", "DC"):
-            state.flags[name] = narrow(z3.FreshConst(z3.BitVecSort(1), "flag"))
+        state.forget_flags()
         state.regs["RCOUNT"] = narrow(z3.FreshConst(z3.BitVecSort(16), "RCOUNT"))
         told: set[int] = set()
         for claim in head.claims:

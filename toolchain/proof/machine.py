@@ -70,6 +70,11 @@ class State:
                      [*self.accumulators], dict(self.regs), [*self.path], self.event, self.done, self.top,
                      [*self.trace])  # fmt: skip
 
+    def forget_flags(self) -> None:
+        """They may be anything."""
+        for name in ("C", "Z", "OV", "N", "DC"):
+            self.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
+
 
 class Machine:
     """A `Builder` (emu.dspic30f.isa.builder) on terms."""
