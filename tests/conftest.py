@@ -16,7 +16,7 @@ from emu.dspic30f.jit import engine as jit
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--vectors", default=None, help="folder with encodings.csv and semantics*.jsonl.gz to run")
+    parser.addoption("--vectors", default=None, help="folder with another set of semantics*.jsonl.xz and encodings.csv")
     parser.addoption("--engine", default=None, help="run what names no engine with this one only")
     parser.addoption("--allowed-skips", default=None, type=Path, help="a file; any other skip is a failure")
 

@@ -1,4 +1,4 @@
-"""Where the recorded vectors are."""
+"""Fixture for the emulator's tests: the folder of recorded vectors."""
 
 from __future__ import annotations
 
@@ -6,16 +6,14 @@ from pathlib import Path
 
 import pytest
 
-VECTORS = Path(__file__).resolve().parents[3] / "shared" / "vectors"
+VECTORS = Path(__file__).resolve().parents[1] / "vectors"
 
 
 @pytest.fixture(scope="session")
 def vectors(request: pytest.FixtureRequest) -> Path:
-    """The folder of vectors. One named on the command line must exist; the default may be absent."""
+    """Folder of recorded vectors: ``tests/vectors``, or the one that ``--vectors`` names."""
     named = request.config.getoption("--vectors", default=None)
     folder = Path(named) if named else VECTORS
     if not folder.is_dir():
-        if named:
-            pytest.fail(f"--vectors {named}: no such folder")
-        pytest.skip(f"no vectors at {folder}; name a folder with --vectors")
+        pytest.fail(f"--vectors {named}: no such folder" if named else f"{VECTORS} is missing from this checkout")
     return folder

@@ -1,4 +1,4 @@
-"""What a vector needs of an engine, and the engines there are."""
+"""Adapters that run recorded vectors on the instruction table alone and on each engine."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MASK40 = (1 << 40) - 1
 
 
 class Engine(Protocol):
-    """Runs vectors one after the other."""
+    """Runner of vectors, one after the other."""
 
     name: str
 
@@ -94,17 +94,17 @@ class Rows:
 
 
 class NoCache(ObjectCache):
-    """Native code is made anew each time."""
+    """A cache that is always empty, so that the JIT compiles every vector."""
 
     def get(self, key: str) -> bytes | None:
         return None
 
     def put(self, key: str, code: bytes) -> None:
-        """Nothing is kept."""
+        """Discard the code."""
 
 
 class OnMachine:
-    """A whole machine with one of its engines."""
+    """A whole machine with one of its engines. Flash words that no vector sets are 0 (NOP)."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -126,14 +126,15 @@ class OnMachine:
 
     def prepare(self, vector: dict[str, Any]) -> None:
         m, state = self.machine, vector["in"]
+        program = program_of(vector)
         for address in self.used:
-            m.program.put_flash(address, [0])
+            m.program.flash[address >> 1] = 0
+        for address, word in program.items():
+            m.program.flash[address >> 1] = word
+        self.used = list(program)
+        m.program.announce_all()  # once per vector: engines discard their code at each announcement
         for part, content in zip(self.state, self.clean, strict=True):  # all but flash, which is large
             m.record.bytes[part] = content
-        program = program_of(vector)
-        for address, word in program.items():
-            m.program.put_flash(address, [word])
-        self.used = list(program)
         for n, value in enumerate(state["W"]):
             m.w[n] = value
         for name in ("SR", "CORCON"):

@@ -1,7 +1,7 @@
-"""Every recorded vector: single instructions and short programs, word by word against their outcome.
+"""Recorded vectors: single instructions and short programs, compared with their outcome word by word.
 
 ``pytest tests/emu --vectors DIR`` runs another folder of the same format, ``--engine NAME`` one engine only.
-Formats: README of the vectors. The engine "rows" is the instruction table alone, on the builder of rowmachine.py.
+Formats: ``tests/vectors/README.md``. The engine "rows" is the instruction table alone, on the builder of rowmachine.py.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import gzip
 import json
+import lzma
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -21,24 +22,31 @@ from emu.dspic30f.isa import codec, text
 
 RAM_START = 0x0800
 NATIVE_STRIDE = 199
-NOT_STARTED = 100_000  # instructions after which a program that never gets to its end is given up
+PARTS = 4  # tests per engine, which pytest-xdist can run in parallel
+STEP_LIMIT = 100_000  # instructions after which a program that does not reach its end has failed
 CALL_WN_ROWS = {159: "goto", 161: "rcall"}  # a known defect of the disassembler that wrote the vectors
 
 
-def semantics(folder: Path) -> Iterator[dict[str, Any]]:
-    for file in sorted(folder.glob("semantics*.jsonl.gz")):
-        with gzip.open(file, "rt") as lines:
-            yield from map(json.loads, lines)
+RECORDED = Path(__file__).resolve().parents[1] / "vectors"
+SEMANTIC_VECTORS, ENCODINGS, ASSEMBLED = 51_730, 8_298, 5_967  # of tests/vectors; other sets have their own numbers
+OPENERS = {".xz": lzma.open, ".gz": gzip.open}
+
+
+def semantic_lines(folder: Path) -> Iterator[str]:
+    """Lines of all files of semantic vectors, one vector each."""
+    for file in sorted(folder.glob("semantics*.jsonl.*")):
+        with OPENERS[file.suffix](file, "rt") as lines:
+            yield from lines
 
 
 def differences(engine: Engine, vector: dict[str, Any]) -> list[str]:
-    """Run one vector; what came out differently."""
+    """Run one vector and return what differs from its recorded outcome."""
     before, after = vector["in"], vector["out"]
     engine.prepare(vector)
     ram = bytearray(engine.ram())
     engine.step()
     steps = 1
-    while "until" in vector and engine.pc != vector["until"] and steps < NOT_STARTED:
+    while "until" in vector and engine.pc != vector["until"] and steps < STEP_LIMIT:
         engine.step()
         steps += 1
     for address, value in after.get("mem", {}).items():
@@ -77,19 +85,31 @@ def report(capsys: pytest.CaptureFixture[str], message: str) -> None:
         print(f"\n{message}")
 
 
+def test_the_recorded_set_is_complete() -> None:
+    """tests/vectors/README.md: the numbers of vectors and of encodings."""
+    assert sum(1 for _ in semantic_lines(RECORDED)) == SEMANTIC_VECTORS
+    rows = encodings(RECORDED)
+    assert (len(rows), sum(row["assembles"] == "yes" for row in rows)) == (ENCODINGS, ASSEMBLED)
+
+
+@pytest.mark.parametrize("part", range(PARTS))
 def test_every_semantic_vector_gives_its_recorded_state(
-    engine: Engine, vectors: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
+    engine: Engine, part: int, vectors: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Vectors README; isa.md §6-§8. None is skipped: the count is printed. Native code, which is compiled for each
-    vector, takes one in NATIVE_STRIDE unless ``--engine jit`` asks for all."""
+    """Vectors README; isa.md §6-§8. Each part takes one vector in PARTS and prints the count.
+
+    The JIT engine compiles every vector, so it runs one in NATIVE_STRIDE; ``--engine jit`` runs all of them.
+    """
     stride = NATIVE_STRIDE if engine.name == "jit" and not request.config.getoption("--engine", default=None) else 1
     count, failed = 0, []
-    for vector in islice(semantics(vectors), 0, None, stride):
+    for line in islice(semantic_lines(vectors), part * stride, None, PARTS * stride):
+        vector = json.loads(line)
         count += 1
         if found := differences(engine, vector):
             failed.append(f"{vector['t']} ({vector['f']}): {'; '.join(found)}")
-    report(capsys, f"{count - len(failed)} of {count} semantic vectors pass, engine {engine.name}")
-    assert count, f"no semantics*.jsonl.gz in {vectors}"
+    passed = f"{count - len(failed)} of {count} semantic vectors pass"
+    report(capsys, f"{passed}, engine {engine.name}, part {part + 1} of {PARTS}")
+    assert count or part, f"no semantics*.jsonl.xz in {vectors}"
     assert not failed, f"{len(failed)} of {count} differ:\n" + "\n".join(failed[:20])
 
 

@@ -15,14 +15,12 @@ from toolchain.elf.write import object_bytes
 from toolchain.link.link import Linked, link
 from toolchain.link.options import LinkOptions
 
-VECTORS = Path(__file__).resolve().parents[3] / "shared" / "vectors"
+VECTORS = Path(__file__).resolve().parents[1] / "vectors"
 
 
 @pytest.fixture(scope="session")
 def vectors() -> Path:
-    """The folder of reference vectors; tests that need it are skipped where it is absent."""
-    if not VECTORS.is_dir():
-        pytest.skip(f"no vectors at {VECTORS}")
+    """Folder of recorded vectors, a part of the repository."""
     return VECTORS
 
 
