@@ -33,7 +33,7 @@ campaigns: $(STAMP)
 
 site: $(STAMP)
 	$(PY) -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
-	$(PY) docs/site.py --out build/site
+	$(PY) docs/tools/site.py --out build/site
 
 # every package of this environment with version and licence, as CycloneDX
 sbom: $(STAMP)

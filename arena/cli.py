@@ -1,6 +1,7 @@
 """The command line: `python -m arena COMMAND`; each command is a module of `commands/`.
 
-Exit statuses are those of `emu.status`; 1 is that something happened to a robot: its firmware stopped, sits in a trap
+Exit statuses are those of `emu.host.exit_status`; 1 is that something happened to a robot: its firmware stopped, sits
+in a trap
 handler or is silent. Finished trials are kept.
 """
 
@@ -12,7 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 
 import emu
-from arena.cluster import ClusterLostError
+from arena.campaign.cluster import ClusterLostError
 from arena.commands import (
     bundle,
     channel,
@@ -29,11 +30,11 @@ from arena.commands import (
     studio,
     sweep,
 )
-from arena.record import FolderInUseError, RecordError
-from arena.scene import SceneError, load_scene, scenes
-from emu.completion import SHELLS, script
-from emu.completion import description as completion_description
-from emu.status import BAD_INPUT, CANNOT_GO_ON, DONE, INTERRUPTED, unread_is_done
+from arena.scene.loader import SceneError, load_scene, scenes
+from arena.trial.record import FolderInUseError, RecordError
+from emu.host.completion import SHELLS, script
+from emu.host.completion import description as completion_description
+from emu.host.exit_status import BAD_INPUT, CANNOT_GO_ON, DONE, INTERRUPTED, unread_is_done
 
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),

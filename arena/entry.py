@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import requires
 
-from emu.status import BAD_INPUT
+from emu.host.exit_status import BAD_INPUT
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

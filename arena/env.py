@@ -16,17 +16,17 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from arena import bodies
-from arena.brain import Brain, ScriptedBrain
-from arena.emulated import EmulatedBrain
-from arena.ether import Ether
+from arena.camera.renderer import Sight
 from arena.experiments import Experiment, Moments, experiment_of
-from arena.infrared import ambient
-from arena.optics import Optics
-from arena.scene import FCY, Scene, load_scene, scripted
-from arena.sight import Sight
-from arena.stage import Stage, Supervised
-from arena.world import World, traits_of
+from arena.experiments.supervisor import Stage, Supervised
+from arena.infrared.channel import Ether
+from arena.infrared.propagation import Optics
+from arena.infrared.ring import ambient
+from arena.robots.controller import Brain, ScriptedBrain
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene import dimensions
+from arena.scene.loader import FCY, Scene, load_scene, scripted
+from arena.world.physics import World, traits_of
 from emu.boards.epuck.analog import reflection_at
 
 SENSED: Final = 3
@@ -124,7 +124,7 @@ class ArenaEnv(ParallelEnv):  # type: ignore[misc]
         """Let every robot do as told for `decision_s`."""
         wanted = [np.clip(np.asarray(actions.get(agent, (0, 0)), dtype=float), -1, 1) for agent in self.agents]
         self._speeds = [(float(left), float(right)) for left, right in wanted]
-        wheels = [(left * bodies.WHEEL_SPEED, right * bodies.WHEEL_SPEED) for left, right in self._speeds]
+        wheels = [(left * dimensions.WHEEL_SPEED, right * dimensions.WHEEL_SPEED) for left, right in self._speeds]
         if self._image is not None:
             for brain, speeds in zip(self._brains, self._speeds, strict=True):
                 brain.tell(self._command(*speeds))

@@ -17,14 +17,14 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from arena.brain import Brain, ScriptedBrain
-from arena.campaign import Plan, brains_of
-from arena.emulated import EmulatedBrain
-from arena.firmware import image_for
-from arena.lockstep import LockStep
-from arena.scene import Scene, load_scene, scripted
-from arena.trial import run_trial
-from arena.world import World
+from arena.campaign.campaign import Plan, brains_of
+from arena.lockstep.scheduler import LockStep
+from arena.robots.controller import Brain, ScriptedBrain
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.images import image_for
+from arena.scene.loader import Scene, load_scene, scripted
+from arena.trial.trial import run_trial
+from arena.world.physics import World
 
 TRIAL_S = 900
 

@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
 from bench.structures import Structures  # noqa: E402
-from toolchain.bounds.notes import read_notes  # noqa: E402
+from toolchain.bounds.annotations.notes import read_notes  # noqa: E402
 from toolchain.bounds.program import Program  # noqa: E402
 from toolchain.bounds.report import Analyst  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402

@@ -22,8 +22,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from emu.boards.epuck.board import Epuck
 from emu.dspic30f.jit.engine import JitEngine
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 
 FIRMWARE = Path(__file__).resolve().parents[1] / "firmware"
 START = 8

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
-from toolchain import driver  # noqa: E402
+from toolchain.driver import driver  # noqa: E402
 from toolchain.elf.read import read_object  # noqa: E402
 
 SOURCES = Path(__file__).parent / "codegen_src"

@@ -17,7 +17,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from emu.dspic30f.isa.text import parse
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 START = 0x200
 

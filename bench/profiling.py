@@ -31,7 +31,7 @@ sys.path.insert(0, str(ROOT))
 import emu  # noqa: E402
 from emu.boards.epuck.board import Epuck  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.profile.shares import Profiler  # noqa: E402
+from emu.profile.cycle_shares import Profiler  # noqa: E402
 
 MIPS = 14_745_600  # design §4.2
 

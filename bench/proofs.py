@@ -20,7 +20,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from emu.status import DONE, FAULT  # noqa: E402
+from emu.host.exit_status import DONE, FAULT  # noqa: E402
 
 SYSTEM = ROOT / "firmware" / "openswarm"
 PARTS = {
@@ -49,10 +49,10 @@ def options_of(part: str, level: str) -> list[str]:
 
 def look(level: str, work: tuple[str, Path]) -> tuple[str, str, list[dict[str, Any]]]:
     """Part, file and verdicts of one file; none where it cannot be compiled by itself."""
-    from toolchain.clang import CompileError
     from toolchain.errors import ToolError
+    from toolchain.frontend.clang import CompileError
+    from toolchain.proof.problem import subject
     from toolchain.proof.prove import verdicts
-    from toolchain.proof.subject import subject
 
     part, file = work
     name = file.relative_to(ROOT).as_posix()

@@ -24,12 +24,12 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from emu.commands.footprint import _equation as memory_equation  # noqa: E402
-from emu.footprint import pieces, totals  # noqa: E402
-from emu.image import Image  # noqa: E402
-from emu.loader import load_image  # noqa: E402
-from emu.openswarm.latency import run_measures  # noqa: E402
-from emu.openswarm.meter import Meter  # noqa: E402
-from emu.openswarm.target import Target  # noqa: E402
+from emu.image.footprint import pieces, totals  # noqa: E402
+from emu.image.loader import load_image  # noqa: E402
+from emu.image.model import Image  # noqa: E402
+from emu.kernel_metrics.latency import run_measures  # noqa: E402
+from emu.kernel_metrics.meter import Meter  # noqa: E402
+from emu.kernel_metrics.target import Target  # noqa: E402
 from firmware.tools.simulated.machine import NotInstalled  # noqa: E402
 from firmware.tools.simulated.measure import measure  # noqa: E402
 

@@ -46,8 +46,8 @@ def cold(engine: str, image: Path) -> float:
 def seconds_per_call(engine: str) -> float:
     """Seconds per `run_until` one cycle on, of a machine that idles until a timer match far away."""
     sys.path.insert(0, str(ROOT))
-    from emu.loader import load_image
-    from emu.machine import Machine
+    from emu.image.loader import load_image
+    from emu.machine.machine import Machine
 
     machine = Machine(engine=engine)
     machine.load(load_image(IMAGE))

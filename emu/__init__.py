@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from emu.api import build as build
     from emu.api import load as load
     from emu.api import watch as watch
-    from emu.image import Image as Image
-    from emu.image import LoadError as LoadError
-    from emu.loader import load_image as load_image
-    from emu.machine import Machine as Machine
-    from emu.stops import Stop as Stop
+    from emu.image.loader import load_image as load_image
+    from emu.image.model import Image as Image
+    from emu.image.model import LoadError as LoadError
+    from emu.machine.machine import Machine as Machine
+    from emu.machine.stops import Stop as Stop
 
 FCY_HZ: Final = 14_745_600
 """Instruction cycles per second of an e-puck with the vendor's clock setting, XT_PLL8 (dspic30f6014a.md §3)."""
@@ -39,13 +39,13 @@ TCY_SECONDS: Final = 1 / FCY_HZ
 _HOME: Final = {
     "BuildError": "emu.api",
     "Change": "emu.api",
-    "Image": "emu.image",
-    "LoadError": "emu.image",
-    "Machine": "emu.machine",
-    "Stop": "emu.machine",
+    "Image": "emu.image.model",
+    "LoadError": "emu.image.model",
+    "Machine": "emu.machine.machine",
+    "Stop": "emu.machine.machine",
     "build": "emu.api",
     "load": "emu.api",
-    "load_image": "emu.loader",
+    "load_image": "emu.image.loader",
     "watch": "emu.api",
 }
 

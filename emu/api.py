@@ -34,10 +34,10 @@ from typing import Any
 
 from emu.boards import board_named
 from emu.chips import chip_named
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
+from emu.machine.stops import Stop
 from emu.peripherals import Peripherals
-from emu.stops import Stop
 
 
 def load(

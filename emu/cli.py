@@ -13,9 +13,9 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import Final
 
-from emu.command import CommandError, Parser
 from emu.commands import COMMANDS
-from emu.status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, unread_is_done
+from emu.host.command import CommandError, Parser
+from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, unread_is_done
 
 _USAGE: Final = """usage: emu COMMAND [options]
 
@@ -48,7 +48,7 @@ def _answer(words: list[str]) -> int:
 
 def _call(name: str, rest: list[str]) -> int:
     """Parse and run; refusals become one line on stderr."""
-    from emu.image import LoadError
+    from emu.image.model import LoadError
 
     bad_input = BAD_INPUT_AS_STATUS if "--exit-code" in rest else BAD_INPUT
     command = import_module(f"emu.commands.{name}")

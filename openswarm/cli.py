@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import Final, Protocol, cast
 
-from emu.status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
+from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
 
 COMMANDS: Final = {
     "new": "set up a project: Makefile, CMake, main.c, a test, settings for VS Code",

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from skips import Skips
 
-from emu import machine
 from emu.dspic30f.engines import NAMES, make_engine
 from emu.dspic30f.jit import engine as jit
+from emu.machine import machine
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

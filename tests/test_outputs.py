@@ -12,9 +12,9 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from arena.record import RecordError, write_bytes
+from arena.trial.record import RecordError, write_bytes
 from emu.boards.picture import write_picture
-from emu.files import is_opened, read_file, whole_file, whole_text_file
+from emu.host.files import is_opened, read_file, whole_file, whole_text_file
 from toolchain.errors import ToolError
 from toolchain.files import write_outputs
 

@@ -11,11 +11,11 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from emu.status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
+from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
 from toolchain.errors import ToolError
 
 COMMANDS: dict[str, tuple[str, str]] = {
-    "cc": ("toolchain.driver", "compile, assemble and link C and assembly, gcc-like"),
+    "cc": ("toolchain.driver.driver", "compile, assemble and link C and assembly, gcc-like"),
     "c++": ("toolchain.commands.cxx", "the same for freestanding C++17"),
     "as": ("toolchain.commands.assembler", "assemble one file (pic30-as syntax)"),
     "ld": ("toolchain.commands.linker", "link objects and libraries to ELF or Intel HEX"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from emu.files import is_opened, is_standard, part_beside, put_in_place, read_file, write_standard
+from emu.host.files import is_opened, is_standard, part_beside, put_in_place, read_file, write_standard
 from toolchain.errors import ToolError
 
 

@@ -6,9 +6,9 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from arena import bundle
+from arena.campaign import bundle
 from arena.commands.arguments import count, count_or_none
-from arena.jsontext import json_text
+from arena.trial.json_numbers import json_text
 
 DIFFERENT = 1
 

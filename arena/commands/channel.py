@@ -11,10 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from arena.commands.run import changed
-from arena.jsontext import json_text
-from arena.optics import PUBLISHED, Optics, amplitude, distance_of
-from arena.scene import Scene, load_scene
-from arena.world import Poses
+from arena.infrared.propagation import PUBLISHED, Optics, amplitude, distance_of
+from arena.scene.loader import Scene, load_scene
+from arena.trial.json_numbers import json_text
+from arena.world.physics import Poses
 
 THRESHOLDS: Final = (10.0, 2.0)
 """Counts whose reach is drawn: libIrcom detects from 10 on (swarmcom.md §3); 2 are one deviation of plausible noise."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from arena.analysis.comparison import compared
 from arena.commands.arguments import duration
-from arena.comparison import compared
-from arena.jsontext import json_text
-from arena.record import trials_in
+from arena.trial.json_numbers import json_text
+from arena.trial.record import trials_in
 
 
 def parser() -> argparse.ArgumentParser:

@@ -10,16 +10,16 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from arena.campaign import Plan, claimed, open_folder, trial_path
+from arena.campaign.campaign import Plan, claimed, open_folder, trial_path
 from arena.commands.arguments import count_or_none, port
 from arena.commands.run import add_plan, kept, planned
-from arena.debugged import GivenUpError
-from arena.debugsession import Remote, Session
-from arena.manifest import note_host_time
-from arena.record import RecordError
+from arena.debug.controlled_robot import GivenUpError
+from arena.debug.session import Remote, Session
+from arena.trial.manifest import note_host_time
+from arena.trial.record import RecordError
 from emu.dap.wire import Wire, wire_over
+from emu.host.exit_status import DONE
 from emu.prompt.reader import Prompt
-from emu.status import DONE
 
 DESCRIPTION: Final = """\
 debug one robot of a trial, the whole world stands with it

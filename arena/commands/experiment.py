@@ -9,7 +9,7 @@ from pathlib import Path
 from arena.commands import report
 from arena.commands import run as single
 from arena.commands.arguments import count, count_or_none, duration
-from arena.controllers import CONTROLLERS
+from arena.robots.reactive import CONTROLLERS
 
 EXAMPLE = "example: arena experiment clustering --document docs/experiment.md --figures docs/figures"
 

@@ -6,10 +6,11 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from arena import film, plots
+from arena.analysis import plots
+from arena.analysis.report import by_controller
 from arena.commands import run as single
-from arena.record import RecordError, Trial, trials_in
-from arena.report import by_controller
+from arena.replay import filmstrip
+from arena.trial.record import RecordError, Trial, trials_in
 
 FILM: Final = ["clustering", "--brain", "openswarm", "--controller", "A", "--trials", "1", "--minutes", "0.5", "--set",
                "clock.sample_s=0.1"]  # fmt: skip
@@ -51,8 +52,8 @@ def run(options: argparse.Namespace) -> int:
 def _film(folder: Path, path: Path) -> Path:
     single.run(single.parser().parse_args([*FILM, "--out", str(folder)]))
     trial: Trial = trials_in(folder)[0]
-    film.film(trial, FILM_ROBOT).savefig(path, dpi=100)
-    print("\n".join(film.log(trial, FILM_ROBOT)))
+    filmstrip.film(trial, FILM_ROBOT).savefig(path, dpi=100)
+    print("\n".join(filmstrip.log(trial, FILM_ROBOT)))
     return path
 
 

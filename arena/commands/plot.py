@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from arena import film, plots
+from arena.analysis import plots
 from arena.commands.arguments import count_or_none
-from arena.record import Trial, trials_in
+from arena.replay import filmstrip
+from arena.trial.record import Trial, trials_in
 
 
 def parser() -> argparse.ArgumentParser:
@@ -41,7 +42,7 @@ def _film(runs: dict[str, list[Trial]], options: argparse.Namespace) -> int:
         if not 0 <= options.film < robots:
             raise ValueError(f"--film {options.film}: {name} has robots 0 to {robots - 1}")
         path = options.out / f"{name}-film.{options.format}"
-        film.film(trials[0], options.film).savefig(path, dpi=100)
-        print("\n".join(film.log(trials[0], options.film)))
+        filmstrip.film(trials[0], options.film).savefig(path, dpi=100)
+        print("\n".join(filmstrip.log(trials[0], options.film)))
         print(path)
     return 0

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import emu
+from arena.camera.appearance import COLOURS, NOTHING, OBJECT, ROBOT
 from arena.commands.arguments import count, count_or_none
-from arena.controllers import CONTROLLERS
-from arena.firmware import image_for
-from arena.jsontext import json_text
-from arena.look import COLOURS, NOTHING, OBJECT, ROBOT
-from arena.scene import FCY
+from arena.robots.images import image_for
+from arena.robots.reactive import CONTROLLERS
+from arena.scene.loader import FCY
+from arena.trial.json_numbers import json_text
 from emu.boards.epuck.board import Epuck
 
 SPEED_WORDS: Final = {"openswarm": "stepper_left", "bare": "left.0"}

@@ -9,13 +9,13 @@ from http.server import ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
-from arena.answering import HERE, Answer
 from arena.commands.arguments import count, duration, port
-from arena.live import Follower
-from arena.movie import write_movie
-from arena.page import page
-from arena.record import RecordError, read_trial, write_text
-from emu.files import is_standard
+from arena.replay.http import HERE, Answer
+from arena.replay.live_feed import Follower
+from arena.replay.page import page
+from arena.replay.video import write_movie
+from arena.trial.record import RecordError, read_trial, write_text
+from emu.host.files import is_standard
 
 
 def parser() -> argparse.ArgumentParser:

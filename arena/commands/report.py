@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from arena import plots
+from arena.analysis import plots
+from arena.analysis.report import by_controller, report, with_results
 from arena.commands.arguments import duration
-from arena.manifest import read_manifest
-from arena.record import trials_in, write_text
-from arena.report import by_controller, report, with_results
+from arena.trial.manifest import read_manifest
+from arena.trial.record import trials_in, write_text
 
 
 def parser() -> argparse.ArgumentParser:

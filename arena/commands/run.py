@@ -10,17 +10,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arena.campaign import Done, Plan, claimed, open_folder, run_all
+from arena.campaign.campaign import Done, Plan, claimed, open_folder, run_all
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.progress import Told
-from arena.controllers import CONTROLLERS
 from arena.experiments import experiment_file
-from arena.firmware import image_for
-from arena.jsontext import json_text
-from arena.manifest import note_host_time
-from arena.record import EXPERIMENT, Trial, trials_in, write_bytes
-from arena.scene import Scene, load_scene, scripted
-from emu.places import use_cache
+from arena.robots.images import image_for
+from arena.robots.reactive import CONTROLLERS
+from arena.scene.loader import Scene, load_scene, scripted
+from arena.trial.json_numbers import json_text
+from arena.trial.manifest import note_host_time
+from arena.trial.record import EXPERIMENT, Trial, trials_in, write_bytes
+from emu.host.paths import use_cache
 
 EXAMPLE = "example: arena run clustering --brain openswarm --controller A --trials 10 --jobs 2 --out results/os-A"
 
@@ -193,7 +193,7 @@ def with_progress(
                 telling.line(f"trial {one.trial}, {seconds:.1f} s: robot {robot} {why}")
 
         if scheduler is not None and missing:
-            from arena.cluster import run_on
+            from arena.campaign.cluster import run_on
 
             run_on(scheduler, plan, folder, missing, telling.reached, done)
         else:

@@ -11,15 +11,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from arena.campaign import Plan, claimed, open_folder
+from arena.analysis.comparison import courses
+from arena.campaign.campaign import Plan, claimed, open_folder
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import changed, folder_name, with_progress
-from arena.comparison import courses
-from arena.controllers import CONTROLLERS
 from arena.experiments import experiment_file, experiment_of
-from arena.jsontext import json_text
-from arena.record import EXPERIMENT, trials_in, write_bytes, write_text
-from arena.scene import load_scene, scripted
+from arena.robots.reactive import CONTROLLERS
+from arena.scene.loader import load_scene, scripted
+from arena.trial.json_numbers import json_text
+from arena.trial.record import EXPERIMENT, trials_in, write_bytes, write_text
 
 VARIANTS: Final = {
     "as registered": [],

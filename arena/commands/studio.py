@@ -17,13 +17,13 @@ from http.server import ThreadingHTTPServer
 from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
-from arena.answering import HERE, Answer
 from arena.commands.arguments import port
 from arena.commands.run import add_plan, planned
-from arena.inhand import RefusedError
-from arena.page import page
-from arena.scene import FCY
-from arena.studio import Call, Studio
+from arena.replay.http import HERE, Answer
+from arena.replay.page import page
+from arena.scene.loader import FCY
+from arena.studio.process import Call, Studio
+from arena.studio.session import RefusedError
 
 EXAMPLE: Final = "example: arena studio clustering --controller A --seed 3"
 LIMIT: Final = 1 << 16

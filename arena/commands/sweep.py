@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from arena.analysis.comparison import courses
 from arena.commands import run as single
-from arena.comparison import courses
-from arena.jsontext import json_text
-from arena.record import trials_in
+from arena.trial.json_numbers import json_text
+from arena.trial.record import trials_in
 
 EXAMPLE = "example: arena sweep clustering --brain scripted --vary camera.range_cm=100,150,inf --vary robots.count=3,5"
 

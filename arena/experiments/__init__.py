@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.metrics import Course
-from arena.scene import Scene, SceneError
+from arena.scene.loader import Scene, SceneError
 
-FOLDER: Final = Path(__file__).parent
+FOLDER: Final = Path(__file__).parent / "builtin"
 PLAIN: Final = "plain"
 """What scenes are measured by that name no experiment."""
 Floats = NDArray[np.float64]
@@ -167,7 +167,7 @@ def experiment_file(name: str, folder: Path) -> Path | None:
 @cache
 def _of_name(name: str) -> Experiment:
     if re.fullmatch("[a-z][a-z_]*", name) and (FOLDER / f"{name}.py").is_file():
-        return _experiment(name, importlib.import_module(f"arena.experiments.{name}"), "")
+        return _experiment(name, importlib.import_module(f"arena.experiments.builtin.{name}"), "")
     for point in entry_points(group="openswarm.experiments"):
         if point.name == name:
             module = point.load()

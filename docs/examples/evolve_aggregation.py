@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.env import SENSED, ArenaEnv
-from arena.scene import load_scene
+from arena.scene.loader import load_scene
 
 ROBOT = SENSED - 1
 """Place of "a robot is ahead" in an observation."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from emu.peripherals.kit import Cell
-from emu.record import Record
+from emu.peripherals.base import Cell
+from emu.system.record import Record
 
 _ONES: Final = (1 << 64) - 1
 _SCALE_ONE: Final = 1 << 16

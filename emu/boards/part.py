@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from emu.events import Events
 from emu.peripherals import Peripherals
-from emu.peripherals.kit import Cell
+from emu.peripherals.base import Cell
 from emu.peripherals.pins import Pins
-from emu.record import Record
+from emu.system.events import Events
+from emu.system.record import Record
 
 
 class Part:

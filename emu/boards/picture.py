@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from emu.files import whole_file
+from emu.host.files import whole_file
 
 if TYPE_CHECKING:
     import numpy as np

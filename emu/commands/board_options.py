@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.boards import BOARDS, board_named
-from emu.command import CommandError
-from emu.places import use_cache
+from emu.host.command import CommandError
+from emu.host.paths import use_cache
 
 if TYPE_CHECKING:
     from emu.boards.epuck.board import Epuck
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
     from emu.peripherals import Peripherals
 
 SENSORS: Final = ("PO6030K", "PO3030K", "PO8030D", "none")
@@ -123,7 +123,7 @@ def start_watch(machine: Machine, options: argparse.Namespace) -> Callable[[], N
     """Print what is watched on standard error. Returns what to call at the end of the run."""
     if not options.watch:
         return lambda: None
-    from emu.boards.epuck.watch import Watch
+    from emu.boards.epuck.observer import Watch
 
     try:
         return Watch(machine.board, options.watch, partial(print, file=sys.stderr)).finish

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from importlib import import_module
 
-from emu.command import Parser
 from emu.commands import COMMANDS
-from emu.completion import SHELLS, description, script
-from emu.status import DONE
+from emu.host.command import Parser
+from emu.host.completion import SHELLS, description, script
+from emu.host.exit_status import DONE
 
 
 def parser() -> Parser:

@@ -9,13 +9,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
-from emu.coverage import Counts, Report, counting
-from emu.files import whole_text_file
-from emu.image import Image
-from emu.status import DONE, FAULT
+from emu.host.command import CommandError, Parser, seconds
+from emu.host.exit_status import DONE, FAULT
+from emu.host.files import whole_text_file
+from emu.image.model import Image
+from emu.instruments.coverage import Counts, Report, counting
 
 DESCRIPTION: Final = """\
 Run a firmware image and tell what of it was executed, from exact counts of the very code that a robot runs.
@@ -45,7 +45,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
     image = image_of(options)
     if not len(image.lines):

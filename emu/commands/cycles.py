@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 
-from emu.command import CommandError, Parser
-from emu.loader import load_image
-from emu.openswarm import baseline, latency
-from emu.openswarm import options as kernel_options
-from emu.openswarm.target import MeasureError
-from emu.status import DONE, FAULT
+from emu.host.command import CommandError, Parser
+from emu.host.exit_status import DONE, FAULT
+from emu.image.loader import load_image
+from emu.kernel_metrics import baseline, latency
+from emu.kernel_metrics import options as kernel_options
+from emu.kernel_metrics.target import MeasureError
 
 DESCRIPTION = """\
 Run the scenarios of the `latency` application and print how many cycles the kernel's operations take, or those of

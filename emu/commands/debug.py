@@ -9,13 +9,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.boards import BOARDS
-from emu.command import CommandError, Parser, port
 from emu.commands.board_options import add_board_options, board_of, set_up
-from emu.status import BAD_INPUT, DONE
+from emu.host.command import CommandError, Parser, port
+from emu.host.exit_status import BAD_INPUT, DONE
 
 if TYPE_CHECKING:
     from emu.dap.wire import Wire
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
 DESCRIPTION: Final = """\
 Debug firmware from an editor: a server of the Debug Adapter Protocol on standard input and output, or on a TCP port

@@ -8,12 +8,12 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from emu.command import CommandError, Parser
 from emu.commands.image_option import add_chip_option, image_of
-from emu.disassembly import Item, items
-from emu.dspic30f.state import PC_MASK
-from emu.image import Image
-from emu.status import DONE
+from emu.dspic30f.state.state import PC_MASK
+from emu.host.command import CommandError, Parser
+from emu.host.exit_status import DONE
+from emu.image.model import Image
+from emu.instruments.disassembly import Item, items
 
 
 def parser() -> Parser:

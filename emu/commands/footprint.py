@@ -9,13 +9,13 @@ from dataclasses import asdict
 from math import ceil
 from typing import Any
 
-from emu.command import CommandError, Parser, count
 from emu.commands.cycles import add_baseline_arguments, verdict
-from emu.footprint import UNKNOWN, Piece, pieces, totals
-from emu.image import Image
-from emu.loader import load_image
-from emu.openswarm.baseline import Number, save, short
-from emu.status import DONE
+from emu.host.command import CommandError, Parser, count
+from emu.host.exit_status import DONE
+from emu.image.footprint import UNKNOWN, Piece, pieces, totals
+from emu.image.loader import load_image
+from emu.image.model import Image
+from emu.kernel_metrics.baseline import Number, save, short
 
 DESCRIPTION = """\
 Print what an image costs in ROM and RAM (bytes; 3 per program word), by part, source file and symbol.
@@ -83,8 +83,8 @@ _KEPT = (
 
 def _equation(image: Image) -> dict[str, Any] | None:
     """The memory equation as plain data, None for an image that is not the measuring application."""
-    from emu.openswarm.memory import APPLICATION, measure
-    from emu.openswarm.target import MeasureError
+    from emu.kernel_metrics.memory import APPLICATION, measure
+    from emu.kernel_metrics.target import MeasureError
 
     if image.symbols.find(APPLICATION) is None:
         return None
@@ -104,8 +104,8 @@ def _equation(image: Image) -> dict[str, Any] | None:
 
 def _options(image: Image) -> dict[str, int] | None:
     """Bytes of the kernel's options, None for an image that is not the application `options`."""
-    from emu.openswarm.options import APPLICATION, sizes
-    from emu.openswarm.target import MeasureError
+    from emu.kernel_metrics.options import APPLICATION, sizes
+    from emu.kernel_metrics.target import MeasureError
 
     if image.symbols.find(APPLICATION) is None:
         return None
@@ -117,7 +117,7 @@ def _options(image: Image) -> dict[str, int] | None:
 
 def equation_text(equation: dict[str, Any]) -> str:
     """The equation beside the paper's and the original's."""
-    from emu.openswarm.memory import ORIGINAL, ORIGINAL_ROM, PAPER, PAPER_ROM
+    from emu.kernel_metrics.memory import ORIGINAL, ORIGINAL_ROM, PAPER, PAPER_ROM
 
     alone, whole = equation["sizes"]["kernel"], equation["sizes"]["devices"]
     ours = {name: equation[name] for name in "ABCDE"}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 
 from emu.chips import NAMES, chip_named
-from emu.command import CommandError
-from emu.image import Image
-from emu.loader import load_image
+from emu.host.command import CommandError
+from emu.image.loader import load_image
+from emu.image.model import Image
 
 
 def add_chip_option(parser: argparse.ArgumentParser) -> None:

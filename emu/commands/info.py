@@ -6,10 +6,10 @@ import argparse
 import json
 from typing import Any
 
-from emu.command import Parser
 from emu.commands.image_option import add_chip_option, image_of
-from emu.image import BYTES_PER_WORD, Image
-from emu.status import DONE
+from emu.host.command import Parser
+from emu.host.exit_status import DONE
+from emu.image.model import BYTES_PER_WORD, Image
 
 
 def parser() -> Parser:

@@ -14,17 +14,17 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final, TextIO
 
-from emu.command import CommandError, Parser, count
 from emu.commands.image_option import add_chip_option, image_of
-from emu.coverage import fingerprint
-from emu.files import whole_text_file
-from emu.image import Image
+from emu.host.command import CommandError, Parser, count
+from emu.host.exit_status import DONE
+from emu.host.files import whole_text_file
+from emu.host.paths import use_cache
+from emu.image.model import Image
 from emu.inject.campaign import Campaign, CampaignError, read
 from emu.inject.faults import KINDS
 from emu.inject.report import lines, summary
 from emu.inject.trial import OUTCOMES, Outcome, Trials
-from emu.places import use_cache
-from emu.status import DONE
+from emu.instruments.coverage import fingerprint
 
 DESCRIPTION: Final = """\
 Run firmware many times with one fault each, chosen at random by the campaign's seed, and tell what becomes of them:

@@ -9,16 +9,16 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
 
-from emu.command import CommandError, Parser, count, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
-from emu.files import whole_text_file
-from emu.image import Image
+from emu.host.command import CommandError, Parser, count, seconds
+from emu.host.exit_status import DONE, FAULT
+from emu.host.files import whole_text_file
+from emu.image.model import Image
 from emu.profile import callgrind
-from emu.profile.shares import Profile, Profiler
+from emu.profile.cycle_shares import Profile, Profiler
 from emu.profile.timelines import perfetto, speedscope
 from emu.profile.tracks import Tracks
-from emu.status import DONE, FAULT
 
 DESCRIPTION: Final = """\
 Run a firmware image and print what share of the CPU each function and interrupt level takes.
@@ -64,7 +64,7 @@ def _group(text: str) -> tuple[str, list[str]]:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
     image = image_of(options)
     machine = Machine(image.chip, board=board_of(options))

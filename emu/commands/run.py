@@ -12,21 +12,21 @@ from dataclasses import asdict
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.command import CommandError, Parser, cycles, seconds
 from emu.commands.board_options import add_board_options, add_watch_option, board_of, links_of, set_up, start_watch
 from emu.commands.image_option import add_chip_option, image_of
-from emu.console import SPECIFICATIONS, Port, open_port
-from emu.files import whole_text_file
-from emu.image import Image
-from emu.session import FOREVER, Session
-from emu.stamps import HEADER, Stamp, read_stamps
-from emu.status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
+from emu.host.command import CommandError, Parser, cycles, seconds
+from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
+from emu.host.files import whole_text_file
+from emu.image.model import Image
+from emu.run.console import SPECIFICATIONS, Port, open_port
+from emu.run.input_log import HEADER, Stamp, read_stamps
+from emu.run.session import FOREVER, Session
 
 if TYPE_CHECKING:
     from emu.dspic30f.isa.row import Insn
-    from emu.machine import Machine
-    from emu.stops import Stop
-    from emu.waves import Waves
+    from emu.instruments.vcd import Waves
+    from emu.machine.machine import Machine
+    from emu.machine.stops import Stop
 
 EXIT_SYMBOL: Final = "__exit_status"
 """Where start-up code leaves what main returned, before it sleeps for ever."""
@@ -131,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
         stop, host_seconds = session.run()
         end_watch()
         if stop.reason in ("halt", "limit", "interrupted") and (refused := _refused_before_start(machine, image)):
-            from emu.faults import never_started
+            from emu.machine.fault_report import never_started
 
             stop = never_started(machine, stop, refused)
         lost = {number: port.lost for number, port in ports.items() if port.lost}
@@ -166,9 +166,9 @@ def _native(machine: Machine, text: str) -> int:
 
 def _dump_native(address: int, machine: Machine, image: Image, text: str) -> None:
     """Print what native code was made for a place. Raises CommandError if none was."""
-    from emu.disassembly import instruction
     from emu.dspic30f.jit.dump import dump
     from emu.dspic30f.jit.engine import JitEngine
+    from emu.instruments.disassembly import instruction
 
     assert isinstance(machine.runner, JitEngine)  # _native has looked
 
@@ -196,7 +196,7 @@ def _refused_before_start(machine: Machine, image: Image) -> int:
 
 def _machine(options: argparse.Namespace, image: Image) -> Machine:
     """A machine with the image, breakpoints set, telling about registers nobody models."""
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
     try:
         machine = Machine(
@@ -275,13 +275,13 @@ def _limit(options: argparse.Namespace, machine: Machine) -> int:
 
 
 def _tracer(machine: Machine, image: Image, stream: TextIO) -> Any:
-    from emu.trace import Tracer
+    from emu.instruments.trace import Tracer
 
     return Tracer(machine, image, stream).advance
 
 
 def _waves(options: argparse.Namespace, machine: Machine, stream: TextIO, advance: Any) -> Waves:
-    from emu.waves import Waves
+    from emu.instruments.vcd import Waves
 
     if advance is not None and options.vcd_watch:
         raise CommandError("--vcd-watch and --trace both step the machine; give one")

@@ -8,14 +8,14 @@ import sys
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final
 
-from emu.command import CommandError, Parser, seconds
 from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
-from emu.files import is_standard
-from emu.status import DONE, FAULT
+from emu.host.command import CommandError, Parser, seconds
+from emu.host.exit_status import DONE, FAULT
+from emu.host.files import is_standard
 
 if TYPE_CHECKING:
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
 FORMATS: Final = {"rgb565": 2, "yuv": 2, "grey": 1}
 """Bytes per pixel."""
@@ -62,7 +62,7 @@ def _enlargement(text: str) -> int:
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
     from emu.boards.picture import write_picture
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
     if (options.buffer is None) != (options.size is None):
         raise CommandError("--buffer and --size belong together")
@@ -113,7 +113,7 @@ def _place(machine: Machine, options: argparse.Namespace) -> int:
 
 
 def _captured(machine: Machine, address: int, options: argparse.Namespace) -> Any:
-    from emu.boards.epuck.pixels import decode
+    from emu.boards.epuck.camera.pixels import decode
 
     width, height = options.size
     data = bytes(machine.record.bytes[address : address + width * height * FORMATS[options.format]])

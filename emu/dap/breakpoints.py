@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from emu.debug.expression import ExpressionError, evaluate, number_of
-from emu.debug.inside import Inside
-from emu.debug.locate import Unavailable
+from emu.debug.dwarf.location import Unavailable
+from emu.debug.expressions.expression import ExpressionError, evaluate, number_of
+from emu.debug.inspector import Inside
 
 HIT: Final = re.compile(r"\s*(==|>=|<=|>|<|%|=)?\s*(\d+)\s*")
 COMPARE: Final[dict[str, Callable[[int, int], bool]]] = {

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from emu.debug.inside import Frame, Inside, Value
-from emu.debug.locate import Piece
-from emu.debug.types import Type
+from emu.debug.dwarf.location import Piece
+from emu.debug.dwarf.types import Type
+from emu.debug.inspector import Frame, Inside, Value
 
 
 class Change(Protocol):

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Final
 
 from emu.dap.debuggee import Debuggee, Halt
-from emu.debug.expression import evaluate
-from emu.debug.inside import Value
-from emu.debug.locate import address_of
+from emu.debug.dwarf.location import address_of
+from emu.debug.expressions.expression import evaluate
+from emu.debug.inspector import Value
 from emu.debug.threads import Thread
 
 WORDS: Final = {

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Final
 
 from emu.dap.breakpoints import Breakpoint
 from emu.debug.history import History
-from emu.debug.inside import Frame, Inside
+from emu.debug.inspector import Frame, Inside
 from emu.debug.threads import Thread, Threads
-from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Call
-from emu.lines import Line
+from emu.image.lines import Line
 
 if TYPE_CHECKING:
-    from emu.machine import Machine
-    from emu.stops import Stop
+    from emu.machine.machine import Machine
+    from emu.machine.stops import Stop
 
 SLICE: Final = 400_000
 """Cycles between looks at what the client wants."""

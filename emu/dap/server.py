@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 from emu.dap.debuggee import Debuggee, Halt
 from emu.dap.launch import checked
-from emu.dap.looking import Refused
-from emu.dap.returning import Returning
-from emu.dap.sights import Row, Sights, Sources
+from emu.dap.rewind import Returning
+from emu.dap.state_requests import Refused
+from emu.dap.variables import Row, Sights, Sources
 from emu.dap.wire import Channel, Message
-from emu.debug.around import WokenError
-from emu.debug.expression import ExpressionError
+from emu.debug.dwarf.location import Unavailable
+from emu.debug.environment import WokenError
+from emu.debug.expressions.expression import ExpressionError
 from emu.debug.history import History
-from emu.debug.locate import Unavailable
 
 if TYPE_CHECKING:
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
 CAPABILITIES: Final = {
     f"supports{name}": True

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from typing import Any, Final
 
 from emu.chips.chip import Sfr
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 PERIPHERALS: Final = {
     0x0000: "CPU core", 0x0080: "Interrupts", 0x00C0: "Change notification", 0x0100: "Timer 1",

@@ -18,12 +18,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from emu.events import NEVER
+from emu.system.events import NEVER
 
 if TYPE_CHECKING:
-    from emu.debug.around import Around
-    from emu.machine import Machine
-    from emu.stops import Stop
+    from emu.debug.environment import Around
+    from emu.machine.machine import Machine
+    from emu.machine.stops import Stop
 
 PERIOD: Final = 1 << 20
 """Cycles between kept states: 71 ms of an e-puck, so a step back takes what running that long takes."""

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.dspic30f.isa.codec import decode_for_execution
-from emu.dspic30f.state import STACK_POINTER
+from emu.dspic30f.state.state import STACK_POINTER
 
 if TYPE_CHECKING:
-    from emu.machine import Machine
-    from emu.stops import Stop
+    from emu.machine.machine import Machine
+    from emu.machine.stops import Stop
 
 BRANCHES: Final = 20
 """Branches that are told."""

@@ -14,17 +14,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
-from emu.debug.inside import Inside
-from emu.debug.locate import Unavailable
+from emu.debug.dwarf.location import Unavailable
+from emu.debug.inspector import Inside
 from emu.debug.threads import RUNNING, Threads
-from emu.dspic30f.facts import facts_of
-from emu.dspic30f.faults import Breakpoint, Violation
+from emu.dspic30f.exceptions.faults import Breakpoint, Violation
 from emu.dspic30f.isa.builder import Side, Size
-from emu.dspic30f.state import STACK_POINTER
-from emu.record import Record
+from emu.dspic30f.isa.facts import facts_of
+from emu.dspic30f.state.state import STACK_POINTER
+from emu.system.record import Record
 
 if TYPE_CHECKING:
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
 
 def reserve(record: Record, ram_end: int) -> int:

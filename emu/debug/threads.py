@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from emu.debug.inside import REGISTERS, Frame, Inside, Value
-from emu.debug.locate import Unavailable
+from emu.debug.dwarf.location import Unavailable
+from emu.debug.inspector import REGISTERS, Frame, Inside, Value
 from emu.debug.replay import aside
-from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Return
 
 if TYPE_CHECKING:
-    from emu.machine import Machine
+    from emu.machine.machine import Machine
 
 RUNNING, RING, BLOCKED, PCB = "os_running", "os_ring", "os_blocked", "sys_pcb"
 """Variables and type of the kernel (firmware/openswarm/kernel/kernel.h)."""

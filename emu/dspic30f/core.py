@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.bus import Bus
 from emu.chips.chip import Chip
-from emu.dspic30f.data import DataSpace
-from emu.dspic30f.interp import Interpreter
-from emu.dspic30f.interrupts import Exceptions
-from emu.dspic30f.registers import CoreRegisters
-from emu.dspic30f.sequencer import Sequencer
-from emu.dspic30f.state import State
-from emu.dspic30f.traps import Traps
-from emu.events import Events
-from emu.program import ProgramMemory
-from emu.record import Record
+from emu.dspic30f.exceptions.interrupts import Exceptions
+from emu.dspic30f.exceptions.traps import Traps
+from emu.dspic30f.interpreter.plain import Interpreter
+from emu.dspic30f.interpreter.sequencer import Sequencer
+from emu.dspic30f.state.data_space import DataSpace
+from emu.dspic30f.state.registers import CoreRegisters
+from emu.dspic30f.state.state import State
+from emu.system.bus import Bus
+from emu.system.events import Events
+from emu.system.program import ProgramMemory
+from emu.system.record import Record
 
 
 class WRegisters:

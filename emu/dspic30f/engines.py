@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.native import Native, Run
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.system.native_handle import Native, Run
 
 NAMES: Final = ("plain", "interp", "jit", "auto")
 

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from emu.files import read_file
+from emu.host.files import read_file
 from emu.inject.faults import KINDS
 
 UARTS: Final = ("uart1", "uart2")

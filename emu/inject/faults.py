@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from emu.dspic30f.isa.codec import decode_for_execution
-from emu.dspic30f.state import NOT_REPEATING
+from emu.dspic30f.state.state import NOT_REPEATING
 
 if TYPE_CHECKING:
-    from emu.image import Image
-    from emu.machine import Machine
+    from emu.image.model import Image
+    from emu.machine.machine import Machine
 
 KINDS: Final = ("ram", "register", "flash", "skip", "uart", "sensor", "brownout")
 REGISTERS: Final = 16

@@ -17,18 +17,18 @@ from typing import TYPE_CHECKING, Final
 
 from emu.inject.campaign import Campaign
 from emu.inject.faults import choose, do
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 if TYPE_CHECKING:
-    from emu.image import Image
-    from emu.stops import Stop
+    from emu.image.model import Image
+    from emu.machine.stops import Stop
 
 OUTCOMES: Final = ("masked", "detected", "silent", "hang", "trap")
 STATES: Final = 64
 """States that are kept of the run without faults."""
 SHOWN: Final = 160
 KERNEL_STOPPED: Final = "the kernel stopped"
-"""How the explanation of a fault begins that the firmware's kernel found itself (emu/faults.py)."""
+"""How the explanation of a fault begins that the firmware's kernel found itself (emu/machine/fault_report.py)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,9 +20,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
-from emu.events import Events
-from emu.record import Record
-from emu.straight import Number, Place
+from emu.system.events import Events
+from emu.system.record import Record
+from emu.system.rules import Number, Place
 
 PORTS: Final = "ABCDEFG"
 RING: Final = 256
@@ -52,7 +52,7 @@ class Waveform(Protocol):
 
 
 class Described(Protocol):
-    """A waveform that also says as text for every engine (emu/straight.py) when it rises."""
+    """A waveform that also says as text for every engine (emu/system/rules.py) when it rises."""
 
     def text_of_rise(self, m: Any, mask: int, after: Number, count: Number) -> Number:
         """`Waveform.nth_rise`."""

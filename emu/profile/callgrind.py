@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 
-from emu.profile.follow import Edge
-from emu.profile.shares import Place, Profile
+from emu.profile.call_graph import Edge
+from emu.profile.cycle_shares import Place, Profile
 
 
 def lines(profile: Profile, image: str, place_of: Callable[[int], Place]) -> Iterator[str]:

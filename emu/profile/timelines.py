@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from json import dumps
 from typing import Any, Final
 
-from emu.profile.shares import Place
+from emu.profile.cycle_shares import Place
 from emu.profile.tracks import MAIN, Track, Tracks
 
 SENDS: Final = ("Sys_Send_Event", "Sys_Send_IntEvent")

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final, NamedTuple
 
-from emu.profile.follow import CLOSE, OPEN, SLEEP, SWITCH, Turn
+from emu.profile.call_graph import CLOSE, OPEN, SLEEP, SWITCH, Turn
 
 THREAD_START: Final = "_os_thread_start"
 """What calls a thread's function (firmware/openswarm/port/dspic30f/switch.S)."""

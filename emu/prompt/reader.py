@@ -6,13 +6,13 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from emu.places import history
-from emu.prompt import breaking, looking, moving  # noqa: F401  they fill the table
+from emu.host.exit_status import BAD_INPUT, DONE, FAULT
+from emu.host.paths import history
+from emu.prompt import breakpoint_commands, run_commands, state_commands  # noqa: F401  they fill the table
 from emu.prompt.client import Answering, Client, RefusedError, Row
-from emu.prompt.looking import TOPICS
 from emu.prompt.session import Session
+from emu.prompt.state_commands import TOPICS
 from emu.prompt.table import TABLE, Command, called
-from emu.status import BAD_INPUT, DONE, FAULT
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from emu.prompt import texts
+from emu.prompt import formatting
+from emu.prompt.breakpoint_list import Points
 from emu.prompt.client import Client, RefusedError, Row
-from emu.prompt.points import Points
 
 LISTED: Final = 10
 """Lines of a listing, and instructions of a disassembly."""
@@ -89,12 +89,12 @@ class Session:
         if frame is None:
             self.write(self.time())
             return
-        self.write(f"{texts.frame(frame)}, {self.time()}")
+        self.write(f"{formatting.frame(frame)}, {self.time()}")
         if frame.get("source"):
             path, line = frame["source"]["path"], int(frame["line"])
             self.listed = path, max(line - LISTED // 2, 1)
             try:
-                self.write(texts.source(path, line, line, line))
+                self.write(formatting.source(path, line, line, line))
             except RefusedError as missing:
                 self.write(f"({missing})")
 
@@ -110,7 +110,7 @@ class Session:
         found = self.evaluated(text)
         if found.get("type", "").endswith("]"):
             return int(found["memoryReference"], 16)
-        return int(texts.number(found["result"], "d"))
+        return int(formatting.number(found["result"], "d"))
 
     def scope(self, name: str) -> list[Row]:
         """Variables of a scope of the selected frame. Raises RefusedError."""

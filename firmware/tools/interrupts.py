@@ -15,8 +15,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from emu.lines import Line, Lines  # noqa: E402
-from emu.loader import load_image  # noqa: E402
+from emu.image.lines import Line, Lines  # noqa: E402
+from emu.image.loader import load_image  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.errors import ToolError  # noqa: E402
 from toolchain.files import read_bytes  # noqa: E402

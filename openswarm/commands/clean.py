@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from emu import places
-from emu.status import DONE
+from emu.host import paths
+from emu.host.exit_status import DONE
 from openswarm.commands import made_parser
 
 KINDS: Final = {
-    "native code": places.native_code,
-    "run-time libraries": places.runtime_libraries,
-    "images": places.images,
+    "native code": paths.native_code,
+    "run-time libraries": paths.runtime_libraries,
+    "images": paths.images,
 }
 DESCRIPTION: Final = """\
 Empty the cache: native code the emulator has made, the compiler's run-time library, images that `arena` has built.
@@ -37,7 +37,7 @@ def parser() -> argparse.ArgumentParser:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says. Raises OSError for what cannot be removed."""
-    root: Path = options.cache if options.cache is not None else places.cache()
+    root: Path = options.cache if options.cache is not None else paths.cache()
     told = {}
     for kind, where in KINDS.items():
         folder = root / where().name

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from emu.completion import SHELLS, description, script
-from emu.status import DONE
+from emu.host.completion import SHELLS, description, script
+from emu.host.exit_status import DONE
 from openswarm.commands import made_parser
 
 

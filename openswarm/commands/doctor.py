@@ -17,8 +17,8 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Final
 
-from emu import places
-from emu.status import DONE, FAULT
+from emu.host import paths
+from emu.host.exit_status import DONE, FAULT
 from openswarm.commands import made_parser
 
 DESCRIPTION: Final = """\
@@ -92,13 +92,13 @@ def run(options: argparse.Namespace) -> int:
         about = {
             "openswarm": version("openswarm"),
             "python": platform.python_version(),
-            "checkout": places.in_checkout(),
-            "firmware": str(places.firmware()),
+            "checkout": paths.in_checkout(),
+            "firmware": str(paths.firmware()),
             "complete": is_whole,
         }
         print(json.dumps(about | {"findings": [asdict(one) for one in findings]}, indent=1))
     else:
-        where = "a checkout" if places.in_checkout() else "an installed package"
+        where = "a checkout" if paths.in_checkout() else "an installed package"
         print(f"openswarm {version('openswarm')} from {where}, Python {platform.python_version()}")
         for one in findings:
             print(told(one))
@@ -149,7 +149,7 @@ def programs() -> Iterator[Finding]:
 
 def cache() -> Finding:
     """Whether the cache can be written; without it everything works, slower."""
-    folder = places.cache()
+    folder = paths.cache()
     there = next(one for one in (folder, *folder.parents) if one.exists())
     is_open = there.is_dir() and os.access(there, os.W_OK | os.X_OK)
     return Finding("cache", "cache", str(folder) if is_open else "", f"keeping compiled code in {folder}",

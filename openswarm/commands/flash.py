@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Final, Protocol
 
-from emu.image import Image
-from emu.loader import load_image
-from emu.status import DONE, FAULT
+from emu.host.exit_status import DONE, FAULT
+from emu.image.loader import load_image
+from emu.image.model import Image
 from openswarm.commands import made_parser
 from openswarm.flashing.loaders import BAUD, LOADERS
 from openswarm.flashing.program import Program, is_program, program_of

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
-from emu.status import DONE
+from emu.host.exit_status import DONE
 from openswarm.commands import made_parser
 
 TEMPLATE: Final = Path(__file__).resolve().parents[1] / "template"

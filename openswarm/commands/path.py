@@ -6,14 +6,14 @@ import argparse
 import sys
 from typing import Final
 
-from emu import places
-from emu.status import DONE
+from emu.host import paths
+from emu.host.exit_status import DONE
 from openswarm.commands import made_parser
 
 PLACES: Final = {
-    "firmware": (places.firmware, "the kernel, with the Makefile that builds applications"),
-    "cmake": (places.cmake, "CMake's toolchain file openswarm.cmake"),
-    "cache": (places.cache, "everything that can be made again"),
+    "firmware": (paths.firmware, "the kernel, with the Makefile that builds applications"),
+    "cmake": (paths.cmake, "CMake's toolchain file openswarm.cmake"),
+    "cache": (paths.cache, "everything that can be made again"),
     "python": (lambda: sys.executable, "the interpreter these commands run in"),
 }
 

@@ -8,11 +8,11 @@ import re
 from pathlib import Path
 from typing import Final
 
-from emu import places
-from emu.files import whole_text_file
-from emu.image import Image
-from emu.loader import load_image
-from emu.status import DONE
+from emu.host import paths
+from emu.host.exit_status import DONE
+from emu.host.files import whole_text_file
+from emu.image.loader import load_image
+from emu.image.model import Image
 from openswarm.commands import made_parser
 from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.program import LAST_VERSION, RAM, ROWS, SLOT, VERSION_SYMBOL, Program, program_of
@@ -58,12 +58,12 @@ def _version(text: str) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says. Raises ValueError or OSError for files that cannot be used."""
-    from toolchain.driver import main as cc
+    from toolchain.driver.driver import main as cc
 
     output: Path = options.output
     if output.suffix.lower() in (".hex", ".ihex"):
         raise ValueError(f"{output}: the version would be lost; expected the name of an ELF file")
-    firmware = places.firmware() / "openswarm"
+    firmware = paths.firmware() / "openswarm"
     words = [f"-O{options.level}", "-g", "-Wall", "-Wextra", "-fstack-check", "-nostartfiles"]
     words += [f"-I{folder}" for folder in options.folders] + [f"-D{name}" for name in options.definitions]
     words += [f"-I{firmware / folder}" for folder in _FOLDERS]

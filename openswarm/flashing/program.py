@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from emu.chips.chip import Region
-from emu.image import ERASED, Image
+from emu.image.model import ERASED, Image
 from openswarm.flashing.loaders import ROW_BYTES, ROW_UNITS, ROW_WORDS
 
 SLOT: Final = Region("slot of programs", 0x00F800, 0x010000)

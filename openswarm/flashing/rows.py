@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Iterator
 from typing import Final
 
-from emu.image import ERASED, Image
+from emu.image.model import ERASED, Image
 from openswarm.flashing.loaders import LOADERS, ROW_UNITS, ROW_WORDS, Loader
 
 _GOTO: Final = 0x04

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Final, TextIO
 
 from emu.debug.replay import aside
-from emu.faults import standing
-from emu.waves import Waves
+from emu.instruments.vcd import Waves
+from emu.machine.fault_report import standing
 from openswarm.testing.robot import Robot
 
 STRETCH_MS: Final = 50

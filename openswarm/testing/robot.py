@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from re import Match
 
     from emu.debug.threads import Thread
-    from emu.peripherals.expect import Pattern
-    from emu.peripherals.uart import Uart
-    from emu.profile.shares import Profile, Profiler
+    from emu.peripherals.uart.uart import Uart
+    from emu.peripherals.wait import Pattern
+    from emu.profile.cycle_shares import Profile, Profiler
 
 MILLISECONDS: Final = 1000
 
@@ -145,7 +145,7 @@ class Robot:
 
     def watched(self, work: Any) -> Any:
         """The result of `work`. Raises FirmwareFault if it ends in one."""
-        from emu.peripherals.expect import ExpectError
+        from emu.peripherals.wait import ExpectError
 
         try:
             done = work()
@@ -176,7 +176,7 @@ class Robot:
     @contextmanager
     def measured(self) -> Iterator[Measured]:
         """Count every cycle inside the block; native code runs at more than half its speed."""
-        from emu.profile.shares import Profiler
+        from emu.profile.cycle_shares import Profiler
 
         assert self.machine.image is not None
         profiler = Profiler(self.machine, self.machine.image)

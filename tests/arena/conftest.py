@@ -85,5 +85,5 @@ def unwritable(full_disk: Path, monkeypatch: pytest.MonkeyPatch) -> set[str]:
             Path(name).symlink_to(full_disk)
         return handle, name
 
-    monkeypatch.setattr("emu.files.tempfile.mkstemp", make_full)
+    monkeypatch.setattr("emu.host.files.tempfile.mkstemp", make_full)
     return names

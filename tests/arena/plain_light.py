@@ -6,8 +6,8 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from arena.ether import LINES, PAUSE_S
-from arena.scene import FCY
+from arena.infrared.channel import LINES, PAUSE_S
+from arena.scene.loader import FCY
 
 ONES = (1 << 64) - 1
 

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from arena import bundle, campaign, versions
+from arena.campaign import bundle, campaign
 from arena.cli import main
-from arena.record import RecordError
+from arena.trial import versions
+from arena.trial.record import RecordError
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from arena import plots
+from arena.analysis import plots
+from arena.analysis.report import BEGIN, END
 from arena.cli import main
-from arena.record import RecordError, read_trial, trials_in, write_trial
-from arena.report import BEGIN, END
-from arena.trial import Rows
+from arena.trial.record import RecordError, read_trial, trials_in, write_trial
+from arena.trial.trial import Rows
 
 SHORT = ["--brain", "scripted", "--minutes", "0.1", "--controller", "A"]
 

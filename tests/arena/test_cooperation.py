@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arena.brain import switched_on
 from arena.cli import main
 from arena.experiments import Moments, Said, experiment_of
-from arena.experiments._spoken import alive, apart, last_said, settled_at
+from arena.experiments.spoken import alive, apart, last_said, settled_at
 from arena.metrics import Course
-from arena.record import Trial, read_trial
-from arena.scene import FCY, load_scene
+from arena.robots.controller import switched_on
+from arena.scene.loader import FCY, load_scene
+from arena.trial.record import Trial, read_trial
 
 NAN = math.nan
 

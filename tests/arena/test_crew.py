@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from arena.brain import Brain, Lights, Line, Reading
 from arena.cli import main
-from arena.crew import Crew, packed, unpacked
-from arena.ether import Ether, Switch
-from arena.world import Poses
+from arena.infrared.channel import Ether, Switch
+from arena.lockstep.processes import Crew, packed, unpacked
+from arena.robots.controller import Brain, Lights, Line, Reading
+from arena.world.physics import Poses
 
 LENGTH = st.floats(-1e6, 1e6)
 WORD = st.integers(-(1 << 63), (1 << 63) - 1)

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from arena.campaign import Plan, run_one
+from arena.campaign.campaign import Plan, run_one
 from arena.cli import main
-from arena.debugged import Debugged
-from arena.scene import load_scene
+from arena.debug.controlled_robot import Debugged
+from arena.scene.loader import load_scene
 from tests.emu.dap.client import PATIENCE, ROOT, Client
 from tests.firmware.conftest import built_once
-from toolchain import driver
+from toolchain.driver import driver
 
 SEED = ("--seed", "3")
 

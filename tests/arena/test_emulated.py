@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 import emu
-from arena.brain import FIRST_LOOK_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedBrain, switched_on
-from arena.campaign import SELECTOR
+from arena.camera.appearance import COLOURS
+from arena.camera.reference import WINDOW_ROWS, Eye
+from arena.campaign.campaign import SELECTOR
 from arena.cli import main
 from arena.commands.reaction import OK_AT_TCY, SPEED_WORDS, Show, reaction
-from arena.emulated import EmulatedBrain
-from arena.look import COLOURS
-from arena.record import read_trial
-from arena.scene import FCY, Scene, load_scene
-from arena.trial import run_trial
-from arena.vision import WINDOW_ROWS, Eye
-from arena.world import World
+from arena.robots.controller import FIRST_LOOK_TCY, LATENCY_TCY, OK_DECODED_TCY, ScriptedBrain, switched_on
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene.loader import FCY, Scene, load_scene
+from arena.trial.record import read_trial
+from arena.trial.trial import run_trial
+from arena.world.physics import World
 from emu.boards.epuck.board import Epuck
 
 AT_ONCE = 8

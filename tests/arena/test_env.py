@@ -17,9 +17,9 @@ pytest.importorskip("pettingzoo", reason="PettingZoo is not installed (extra: le
 
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
+from arena.camera.appearance import OBJECT, ROBOT
 from arena.env import SENSED, SIZE, ArenaEnv, serial_command
-from arena.look import OBJECT, ROBOT
-from arena.scene import load_scene
+from arena.scene.loader import load_scene
 from tests.arena.images import ECHO
 
 ROOT = Path(__file__).resolve().parents[2]

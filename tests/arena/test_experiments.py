@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arena.brain import ScriptedBrain
 from arena.cli import main
 from arena.experiments import Moments, experiment_of
-from arena.experiments.foraging import init, step
-from arena.record import read_trial
-from arena.scene import Scene, SceneError, load_scene, scripted
-from arena.stage import Stage
-from arena.trial import run_trial
-from arena.world import World
+from arena.experiments.builtin.foraging import init, step
+from arena.experiments.supervisor import Stage
+from arena.robots.controller import ScriptedBrain
+from arena.scene.loader import Scene, SceneError, load_scene, scripted
+from arena.trial.record import read_trial
+from arena.trial.trial import run_trial
+from arena.world.physics import World
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = """name = "mine"

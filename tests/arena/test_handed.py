@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from arena.campaign import Plan, brains_of
-from arena.inhand import RefusedError
-from arena.studio import Studio
-from arena.trial import run_trial
+from arena.campaign.campaign import Plan, brains_of
+from arena.studio.process import Studio
+from arena.studio.session import RefusedError
+from arena.trial.trial import run_trial
 from tests.arena.browser import needs_browser
 from tests.arena.test_studio import browsed, do, scene_of, scripted_plan, serving, settled, studio_of
 from tests.emu.dap.client import Client

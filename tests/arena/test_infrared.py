@@ -16,20 +16,20 @@ from pathlib import Path
 
 import pytest
 
-from arena import bodies, geometry
 from arena.cli import main
-from arena.emulated import EmulatedBrain, volts_after
-from arena.ether import Ether, light_code
-from arena.infrared import Ring, ambient
-from arena.optics import PUBLISHED, Optics, amplitude, beam, brightest, distance_of
-from arena.scene import FCY, Scene, SceneError, load_scene
-from arena.world import Poses, World
+from arena.infrared.channel import Ether, light_code
+from arena.infrared.propagation import PUBLISHED, Optics, amplitude, beam, brightest, distance_of
+from arena.infrared.ring import Ring, ambient
+from arena.robots.firmware_controller import EmulatedBrain, volts_after
+from arena.scene import dimensions, geometry
+from arena.scene.loader import FCY, Scene, SceneError, load_scene
+from arena.world.physics import Poses, World
 from emu.boards.epuck.analog import Infrared, reflection_at
 from emu.boards.epuck.board import Epuck
 from emu.boards.noise import Noise
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.machine import Machine
-from emu.record import Record
+from emu.machine.machine import Machine
+from emu.system.record import Record
 from tests.arena import plain_light
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -226,7 +226,7 @@ def meeting(x: float, y: float, east: float, north: float, side: geometry.Side) 
 def plain_signals(scene: Scene, poses: Poses, robot: int) -> list[tuple[int, float, list[float]]]:
     """(robot, all its counts on a sensor that faces it, shares of the sensors), as optics.py says it."""
     x, y, heading = poses.robots[robot]
-    discs = [(*place[:2], bodies.ROBOT_RADIUS) for place in poses.robots]
+    discs = [(*place[:2], dimensions.ROBOT_RADIUS) for place in poses.robots]
     discs += [(*place, scene.kind_of(number).radius_cm) for number, place in enumerate(poses.objects)]
     discs += [(one.x_cm, one.y_cm, one.radius_cm) for one in scene.obstacles if one.radius_cm]
     shapes = [scene.arena.polygon, *(one.polygon for one in scene.obstacles)]
@@ -256,10 +256,10 @@ def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, 
     kinds = map(scene.kind_of, range(len(poses.objects)))
     discs = [(*place, one.radius_cm, one.share) for place, one in zip(poses.objects, kinds, strict=True)]
     discs += [(one.x_cm, one.y_cm, one.radius_cm, one.share) for one in scene.obstacles if one.radius_cm]
-    discs += [(*one[:2], bodies.ROBOT_RADIUS, scene.infrared.robot_share)
+    discs += [(*one[:2], dimensions.ROBOT_RADIUS, scene.infrared.robot_share)
               for i, one in enumerate(poses.robots) if i != robot]  # fmt: skip
     found = []
-    for bearing in bodies.IR_BEARINGS_DEG:
+    for bearing in dimensions.IR_BEARINGS_DEG:
         east, north = math.cos(heading - math.radians(bearing)), math.sin(heading - math.radians(bearing))
         met = []
         for side, share in sides:
@@ -273,8 +273,8 @@ def plain_surfaces(scene: Scene, poses: Poses, robot: int) -> list[tuple[float, 
                 half = math.sqrt(radius * radius - aside * aside)
                 met.append((along - half, share * half / radius))
         distance, share = min(met)
-        gap = max(distance - bodies.ROBOT_RADIUS, 0.0)
-        found.append((10 * gap, share) if gap <= bodies.IR_RANGE else (math.inf, 0.0))
+        gap = max(distance - dimensions.ROBOT_RADIUS, 0.0)
+        found.append((10 * gap, share) if gap <= dimensions.IR_RANGE else (math.inf, 0.0))
     return found
 
 

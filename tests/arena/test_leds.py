@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arena import bodies
-from arena.campaign import SELECTOR
+from arena.camera.appearance import LED_COLOURS, ROBOT, colours_of, led_kinds
+from arena.camera.reference import Eye
+from arena.camera.renderer import Sight
+from arena.campaign.campaign import SELECTOR
 from arena.cli import main
-from arena.emulated import EmulatedBrain
-from arena.ether import LINES, Ether
-from arena.look import LED_COLOURS, ROBOT, colours_of, led_kinds
-from arena.record import read_trial
-from arena.scene import Scene, load_scene
-from arena.sight import Sight
-from arena.vision import Eye
-from arena.world import Poses
+from arena.infrared.channel import LINES, Ether
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene import dimensions
+from arena.scene.loader import Scene, load_scene
+from arena.trial.record import read_trial
+from arena.world.physics import Poses
 from tests.arena.test_emulated import AT_ONCE
 
 BLINKER = """
@@ -37,7 +37,7 @@ _main:  bclr    TRISA, #6
         bra     1b
 """
 CAMERA = (20.0, 150.0, 0.0)
-LENS_X = CAMERA[0] + bodies.CAMERA_AHEAD
+LENS_X = CAMERA[0] + dimensions.CAMERA_AHEAD
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def scene() -> Scene:
 
 def facing(centimetres: float, turned_deg: float = 0.0) -> Poses:
     """A camera, and a robot so far before its lens that shows its front to it, turned to its left from there."""
-    there = LENS_X + centimetres + bodies.ROBOT_RADIUS
+    there = LENS_X + centimetres + dimensions.ROBOT_RADIUS
     return Poses([CAMERA, (there, 150.0, math.pi + math.radians(turned_deg))], [])
 
 
@@ -60,12 +60,13 @@ def test_a_led_of_the_ring_shines_at_its_bearing_and_height(scene: Scene, led: i
     lens_to_edge = 20.0
     eye = Eye(scene, facing(lens_to_edge, 45.0 * led), 0, leds=(0, 1 << led))
     rows = tuple(range(480))
-    lit = [240 + (bodies.CAMERA_HEIGHT - z) / lens_to_edge * bodies.FOCAL_PIXELS for z in bodies.RING_HEIGHTS]
+    per_cm = dimensions.FOCAL_PIXELS / lens_to_edge
+    lit = [240 + (dimensions.CAMERA_HEIGHT - z) * per_cm for z in dimensions.RING_HEIGHTS]
     found = [row for row, kind in zip(rows, eye.column(320, rows), strict=True) if kind == red]
     assert (found[0], found[-1]) == (pytest.approx(lit[1], abs=1), pytest.approx(lit[0], abs=1))
     middle = round((lit[0] + lit[1]) / 2)
     columns = [u for u in range(640) if eye.column(u, (middle,)) == [red]]
-    assert len(columns) == pytest.approx(bodies.FOCAL_PIXELS / lens_to_edge, abs=2)
+    assert len(columns) == pytest.approx(dimensions.FOCAL_PIXELS / lens_to_edge, abs=2)
     assert np.mean(columns) == pytest.approx(320, abs=1)
 
 
@@ -129,7 +130,7 @@ def test_firmware_turns_to_another_robot_whose_red_led_is_lit(
         blinks = EmulatedBrain(one, 1, 1, blinker, 0, ether)
         left = []
         for tick in range(until):
-            left.append(sees_it.think(tick, poses)[0] / bodies.WHEEL_SPEED)
+            left.append(sees_it.think(tick, poses)[0] / dimensions.WHEEL_SPEED)
             blinks.think(tick, poses)
         blinks.reading()
         assert [change.leds for change in blinks.lights()] == ([1, 0, 1] if sees else [1, 0])

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from arena.emulated import EmulatedBrain
-from arena.lockstep import LockStep
-from arena.scene import load_scene
-from arena.world import World
+from arena.lockstep.scheduler import LockStep
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene.loader import load_scene
+from arena.world.physics import World
 from tests.arena.images import BEGIN
 
 LOOKING = f"""{BEGIN}

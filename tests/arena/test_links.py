@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from arena.cli import main
-from arena.page import head_of, samples_of
-from arena.record import Trial, kind_of, read_trial
-from arena.scene import FCY, SceneError, load_scene
+from arena.replay.page import head_of, samples_of
+from arena.scene.loader import FCY, SceneError, load_scene
+from arena.trial.record import Trial, kind_of, read_trial
 from tests.arena.images import ECHO
 
 SCENE = """name = "pair"

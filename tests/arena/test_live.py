@@ -17,15 +17,15 @@ from typing import Any
 
 import pytest
 
-from arena.brain import ScriptedBrain
-from arena.campaign import Plan, run_one, trial_path
+from arena.campaign.campaign import Plan, run_one, trial_path
 from arena.cli import main
 from arena.commands.replay import server
-from arena.live import Follower, LiveFile, live_path
-from arena.page import samples_of
-from arena.record import RecordError, read_trial, write_trial
-from arena.scene import load_scene, scripted
-from arena.trial import Rows, run_trial
+from arena.replay.live_feed import Follower, LiveFile, live_path
+from arena.replay.page import samples_of
+from arena.robots.controller import ScriptedBrain
+from arena.scene.loader import load_scene, scripted
+from arena.trial.record import RecordError, read_trial, write_trial
+from arena.trial.trial import Rows, run_trial
 from tests.arena.browser import BROWSER, needs_browser
 
 PROBE = """<pre id="result"></pre><script>

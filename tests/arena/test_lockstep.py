@@ -13,14 +13,14 @@ from typing import Any
 import pytest
 
 import arena
-from arena.brain import Brain, Lights, Line, Reading
-from arena.emulated import EmulatedBrain
-from arena.ether import Ether
-from arena.lockstep import LockStep
-from arena.scene import Scene, load_scene
-from arena.trial import run_trial
-from arena.world import Poses, World
-from emu.boards.epuck.scan import LINE_PIXELS
+from arena.infrared.channel import Ether
+from arena.lockstep.scheduler import LockStep
+from arena.robots.controller import Brain, Lights, Line, Reading
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene.loader import Scene, load_scene
+from arena.trial.trial import run_trial
+from arena.world.physics import Poses, World
+from emu.boards.epuck.camera.scan import LINE_PIXELS
 from emu.dspic30f.jit.engine import JitEngine
 from tests.arena.images import BEGIN
 
@@ -165,7 +165,7 @@ def test_threads_end_with_their_swarm(clustering_image: Path) -> None:
 @pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
 def test_rounds_have_no_race(sanitizer: str, tmp_path: Path) -> None:
     """Threads that come late, fall asleep, and are dismissed."""
-    source, program = Path(arena.__path__[0]) / "lockstep.c", tmp_path / "race"
+    source, program = Path(arena.__path__[0]) / "lockstep" / "lockstep.c", tmp_path / "race"
     command = ["gcc", "-g", "-O1", "-std=c11", "-Wall", "-Wextra", "-Werror", f"-fsanitize={sanitizer}", "-include"]
     command += [str(source), str(Path(__file__).with_name("race.c")), "-o", str(program), "-lpthread"]
     subprocess.run(command, check=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from arena.analysis.statistics import _typical, bootstrap_band, equivalence, exact, pairs_needed, remark, signed_rank_p
 from arena.experiments import Moments, experiment_of
 from arena.metrics import (
     SMALL,
@@ -20,8 +21,7 @@ from arena.metrics import (
     reach_of,
     time_to,
 )
-from arena.scene import load_scene
-from arena.statistics import _typical, bootstrap_band, equivalence, exact, pairs_needed, remark, signed_rank_p
+from arena.scene.loader import load_scene
 
 R = 5.0
 
@@ -166,7 +166,7 @@ METER = """
 import resource, sys
 import numpy as np
 from arena.experiments import Moments, experiment_of
-from arena.scene import load_scene
+from arena.scene.loader import load_scene
 objects, samples = map(int, sys.argv[1:])
 rng = np.random.default_rng(1)
 places = rng.uniform(0, 1000, (1, objects, 2)) + rng.normal(0, 5, (samples, objects, 2)).cumsum(axis=0) / 30

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from arena import movie
 from arena.cli import main
-from arena.movie import SCALE, frames
-from arena.record import read_trial
+from arena.replay import video
+from arena.replay.video import SCALE, frames
+from arena.trial.record import read_trial
 
 
 @pytest.fixture(scope="module")
@@ -70,17 +70,17 @@ def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> Non
         met = record.columns[f"o0_{axis}"] + away
         met[0] = record.columns[f"o1_{axis}"][0]
         record.columns[f"o1_{axis}"] = met
-    movie.write_movie(record, tmp_path / "met.gif", 4.0)
+    video.write_movie(record, tmp_path / "met.gif", 4.0)
     with Image.open(tmp_path / "met.gif") as film:
         film.seek(film.n_frames - 1)
         x, y = record.objects[-1][1]
         shown = film.convert("RGB").getpixel((x * SCALE, 300 * SCALE - y * SCALE))
-    assert shown in movie._CLUSTERS
+    assert shown in video._CLUSTERS
 
 
 def test_an_mp4_plays_the_same_frames(trial: Path, tmp_path: Path) -> None:
     """Decoded again by the same ffmpeg: as many frames, the same size."""
-    encoder = movie._ffmpeg()  # `make test` installs one (extra: film)
+    encoder = video._ffmpeg()  # `make test` installs one (extra: film)
     out = tmp_path / "trial.mp4"
     assert main(["replay", str(trial), "--export", str(out), "--speed", "4", "--seconds", "4"]) == 0
     command = [encoder, "-i", str(out), "-f", "rawvideo", "-pix_fmt", "rgb24", "-loglevel", "error", "-"]
@@ -93,8 +93,8 @@ def test_without_ffmpeg_an_mp4_is_refused_with_what_to_install(
     trial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit status 2; a GIF needs nothing."""
-    monkeypatch.setattr(movie.shutil, "which", lambda _name: None)
-    monkeypatch.setitem(movie.__dict__, "importlib", _NothingInstalled())
+    monkeypatch.setattr(video.shutil, "which", lambda _name: None)
+    monkeypatch.setitem(video.__dict__, "importlib", _NothingInstalled())
     assert main(["replay", str(trial), "--export", str(tmp_path / "a.mp4")]) == 2
     assert "an .mp4 needs ffmpeg" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

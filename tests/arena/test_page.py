@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from arena.cli import main
-from arena.page import page
-from arena.record import read_trial
+from arena.replay.page import page
+from arena.trial.record import read_trial
 from tests.arena.browser import BROWSER, needs_browser
 
 SAMPLE = 7

@@ -14,12 +14,14 @@ from typing import Any
 
 import pytest
 
-from arena import debugserver, debugsession, moments
-from arena.campaign import Plan, trial_path
+from arena.campaign.campaign import Plan, trial_path
 from arena.cli import main
-from arena.debugged import OVER
-from arena.debugsession import Remote, Session
-from arena.live import live_path
+from arena.debug import server
+from arena.debug import session as debugsession
+from arena.debug.controlled_robot import OVER
+from arena.debug.session import Remote, Session
+from arena.replay.live_feed import live_path
+from arena.trial import checkpoints
 from emu.dap.wire import Message
 from emu.prompt.client import Client
 from tests.emu.dap.node import mocha, node_modules
@@ -27,7 +29,7 @@ from tests.firmware.conftest import built_once
 from tests.fuzz.fuzz_rewind import SWARMS, Swarm, plan_of, walk
 
 FEW = Swarm("clustering", 1.0, (), (), {"robots__count": 2, "objects__count": 2, "start__selector": 8})
-needs_copies = pytest.mark.skipif(not moments.CAN_COPY, reason="moments are kept on Linux only")
+needs_copies = pytest.mark.skipif(not checkpoints.CAN_COPY, reason="moments are kept on Linux only")
 
 
 @pytest.fixture
@@ -115,7 +117,7 @@ def test_without_its_moments_a_trial_begins_again(tmp_path: Path, image_of: Call
     """Not more are kept than so many; the same worlds from the seed when they are lost."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.03) as (session, debugger):
         seen = {cycle: debugger.to(cycle) for cycle in (3_000_000, 6_000_000, 9_000_000)}
-        assert session.kept == moments.KEPT
+        assert session.kept == checkpoints.KEPT
         assert debugger.to(6_000_000) == seen[6_000_000]
         assert not [text for kind, text in debugger.events if kind == "said" and "run again" in text]
         session._moments.forget(-1)
@@ -178,7 +180,7 @@ def test_where_no_moments_are_kept_the_world_follows_who_looks(
     tmp_path: Path, image_of: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The robot goes back alone; the trial is run again when the world is looked at, or the past changed."""
-    monkeypatch.setattr(debugserver, "CAN_COPY", False)
+    monkeypatch.setattr(server, "CAN_COPY", False)
     monkeypatch.setattr(debugsession, "context", partial(multiprocessing.get_context, "fork"))
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (session, debugger):
         first = debugger.to(3_000_000)

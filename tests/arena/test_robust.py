@@ -14,14 +14,15 @@ import pyarrow
 import pytest
 from pyarrow import parquet
 
-from arena import campaign, cluster, versions
-from arena.campaign import Plan
+from arena.campaign import campaign, cluster
+from arena.campaign.campaign import Plan
 from arena.cli import main
-from arena.jsontext import misfit
-from arena.live import Follower, LiveFile, live_path
-from arena.page import page
-from arena.record import RecordError, read_trial
-from arena.scene import load_scene, scripted
+from arena.replay.live_feed import Follower, LiveFile, live_path
+from arena.replay.page import page
+from arena.scene.loader import load_scene, scripted
+from arena.trial import versions
+from arena.trial.json_numbers import misfit
+from arena.trial.record import RecordError, read_trial
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = ["run", "clustering", "--brain", "scripted", "--minutes", "0.05", "--trials", "1", "--jobs", "1"]
@@ -152,7 +153,7 @@ def test_a_file_where_the_folder_should_be(tmp_path: Path, capsys: pytest.Captur
 WRITER = """
 import os, sys, time
 from pathlib import Path
-from arena.live import LiveFile
+from arena.replay.live_feed import LiveFile
 about = {"scene": {}, "brain": "scripted", "controller": "A", "seed": 1, "faults": []}
 live = LiveFile(Path(sys.argv[1]), about)
 live.write({"t": 0.0})
@@ -228,14 +229,15 @@ def test_the_hash_of_sources_sees_code_and_not_where_it_lies(tmp_path: Path, mon
         return versions.sources_hash("arena")
 
     for root in ("one", "two/deeper"):
-        (tmp_path / root / "arena" / "commands").mkdir(parents=True)
-        (tmp_path / root / "arena" / "world.py").write_text("x = 1\n")
-        (tmp_path / root / "arena" / "page.py").write_text("y = 1\n")
+        for part in ("world", "replay"):
+            (tmp_path / root / "arena" / part).mkdir(parents=True)
+        (tmp_path / root / "arena" / "world" / "physics.py").write_text("x = 1\n")
+        (tmp_path / root / "arena" / "replay" / "page.py").write_text("y = 1\n")
     before = hashed(tmp_path / "one")
     assert before == hashed(tmp_path / "two/deeper")
-    (tmp_path / "one" / "arena" / "page.py").write_text("y = 2\n")
+    (tmp_path / "one" / "arena" / "replay" / "page.py").write_text("y = 2\n")
     assert before == hashed(tmp_path / "one")
-    (tmp_path / "one" / "arena" / "world.py").write_text("x = 2\n")
+    (tmp_path / "one" / "arena" / "world" / "physics.py").write_text("x = 2\n")
     assert before != hashed(tmp_path / "one")
     versions.sources_hash.cache_clear()
 

@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arena import bodies, geometry
-from arena.brain import ScriptedBrain
-from arena.campaign import Plan
+from arena.camera.appearance import FLOOR, OBJECT, WALL, colours_of, look_of
+from arena.camera.reference import Eye, sensor_of
+from arena.camera.renderer import Sight
+from arena.campaign.campaign import Plan
 from arena.cli import main
-from arena.infrared import ambient
-from arena.look import FLOOR, OBJECT, WALL, colours_of, look_of
-from arena.optics import Optics
-from arena.record import read_trial
-from arena.scene import FCY, Scene, SceneError, load_scene, scene_of
-from arena.scenery import NAMED
-from arena.sight import Sight
-from arena.vision import Eye, sensor_of
-from arena.world import Poses, World, traits_of
+from arena.infrared.propagation import Optics
+from arena.infrared.ring import ambient
+from arena.robots.controller import ScriptedBrain
+from arena.scene import dimensions, geometry
+from arena.scene.loader import FCY, Scene, SceneError, load_scene, scene_of
+from arena.scene.schema import NAMED
+from arena.trial.record import read_trial
+from arena.world.physics import Poses, World, traits_of
 from tests.arena.images import BEGIN, REPEATING
 
 FULL = """name = "yard"
@@ -137,7 +137,7 @@ def test_everything_stands_where_it_may(yard: Scene) -> None:
         assert poses.robots == World(yard, seed).poses.robots
         assert poses.robots[3] == pytest.approx((40, 200, math.pi / 2))
         assert poses.objects[4:] == [(100, 200), (130, 200)]
-        discs = [(x, y, bodies.ROBOT_RADIUS) for x, y, _ in poses.robots]
+        discs = [(x, y, dimensions.ROBOT_RADIUS) for x, y, _ in poses.robots]
         discs += [(x, y, yard.kind_of(number).radius_cm) for number, (x, y) in enumerate(poses.objects)]
         outline = geometry.sides(yard.arena.polygon) + geometry.sides(yard.obstacles[0].polygon)
         for number, (x, y, radius) in enumerate(discs):
@@ -191,7 +191,7 @@ def test_what_stands_fast_stops_a_robot(yard: Scene) -> None:
         for _ in range(20_000):
             world.step([(12.8, 12.8), *[(0.0, 0.0)] * 3])
         x, y, _ = world.poses.robots[0]
-        assert math.hypot(x - end[0], y - end[1]) == pytest.approx(bodies.ROBOT_RADIUS, abs=0.1)
+        assert math.hypot(x - end[0], y - end[1]) == pytest.approx(dimensions.ROBOT_RADIUS, abs=0.1)
 
 
 def test_infrared_feels_what_stands_fast_and_all_lamps(yard: Scene) -> None:

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from arena.cli import main
-from arena.emulated import EmulatedBrain
-from arena.record import Trial, read_trial
-from arena.scene import FCY, load_scene
-from arena.world import World
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene.loader import FCY, load_scene
+from arena.trial.record import Trial, read_trial
+from arena.world.physics import World
 from tests.arena.images import BEGIN, ECHO
 
 ROOT = Path(__file__).resolve().parents[2]

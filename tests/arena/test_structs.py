@@ -11,26 +11,33 @@ import pytest
 
 import arena
 import emu.boards.epuck
-from arena import ahead, ether, infrared, optics, sight, swarm, wheels, world
-from emu.boards.epuck import analog, lent, motors
-from emu.hostcode import INT, functions
-from emu.native import Native
+from arena.camera import renderer
+from arena.infrared import channel, propagation, ring
+from arena.lockstep import threads
+from arena.robots import native_robot
+from arena.world import physics, wheels
+from emu.boards.epuck import analog, motors
+from emu.boards.epuck.camera import native_camera
+from emu.native_library import INT, functions
+from emu.system.native_handle import Native
 
 ARENA, BOARD = Path(arena.__path__[0]), Path(emu.boards.epuck.__path__[0])
 
 TWINS: dict[Path, dict[str, type[Structure]]] = {
-    ARENA / "lockstep.c": {"native": Native, "code": ahead._Code, "robot": ahead.Ahead,
-                           "ground": world.Ground, "helper": swarm._Helper, "swarm": swarm._Swarm},
-    ARENA / "sight.c": {"disc": sight._Disc, "lamp": sight._Lamp, "side": sight._Side, "patch": sight._Patch,
-                        "view": sight._View, "rays": sight._Rays},
-    ARENA / "wheels.c": {"drive": wheels._Drive},
-    ARENA / "world.c": {"chipmunk": world._Chipmunk, "disc": world._Disc, "robot": world._Robot,
-                        "world": world._World},
-    ARENA / "optics.c": {"disc": optics._Disc, "side": optics._Side, "optics": optics._Optics,
-                         "poses": optics._Poses},
-    ARENA / "light.c": {"track": ether._Track, "receivers": ether.Receivers, "heard": infrared._Heard,
-                        "moment": infrared._Moment, "light": infrared._Light},
-    BOARD / "line.c": {"camera": lent.LentCamera},
+    ARENA / "lockstep/lockstep.c": {"native": Native, "code": native_robot._Code, "robot": native_robot.Ahead,
+                           "ground": physics.Ground, "helper": threads._Helper, "swarm": threads._Swarm},
+    ARENA / "camera/renderer.c": {"disc": renderer._Disc, "lamp": renderer._Lamp, "side": renderer._Side,
+                        "patch": renderer._Patch,
+                        "view": renderer._View, "rays": renderer._Rays},
+    ARENA / "world/wheels.c": {"drive": wheels._Drive},
+    ARENA / "world/physics.c": {"chipmunk": physics._Chipmunk, "disc": physics._Disc, "robot": physics._Robot,
+                        "world": physics._World},
+    ARENA / "infrared/propagation.c": {"disc": propagation._Disc, "side": propagation._Side,
+                         "optics": propagation._Optics,
+                         "poses": propagation._Poses},
+    ARENA / "infrared/light.c": {"track": channel._Track, "receivers": channel.Receivers, "heard": ring._Heard,
+                        "moment": ring._Moment, "light": ring._Light},
+    BOARD / "camera/line.c": {"camera": native_camera.LentCamera},
     BOARD / "motors.c": {"history": motors._History, "motor": motors._Motor, "pair": motors._Pair},
     BOARD / "ring.c": {"ring": analog._Ring},
 }  # fmt: skip
@@ -71,9 +78,9 @@ def test_a_struct_has_the_offsets_and_the_size_of_its_twin(source: Path, tmp_pat
 
 def test_every_struct_that_is_shared_is_looked_at() -> None:
     """A new one gets a line above, unless it is the compiled code's own."""
-    own = {("sight.c", "pixel"), ("sight.c", "hit"), ("world.c", "vect"),
+    own = {("renderer.c", "pixel"), ("renderer.c", "hit"), ("physics.c", "vect"),
            ("line.c", "scan"), ("motors.c", "state")}  # fmt: skip
-    found = {(path.name, name) for folder in (ARENA, BOARD) for path in folder.glob("*.c")
+    found = {(path.name, name) for folder in (ARENA, BOARD) for path in folder.rglob("*.c")
              for name in re.findall(r"^struct (\w+) \{$", path.read_text(), re.M)}  # fmt: skip
     assert found - own == {(path.name, name) for path, twins in TWINS.items() for name in twins}
     assert own <= found

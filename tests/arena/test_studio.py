@@ -20,15 +20,15 @@ from typing import Any
 
 import pytest
 
-from arena import moments
-from arena.brain import ScriptedBrain
-from arena.campaign import Plan, brains_of
+from arena.campaign.campaign import Plan, brains_of
 from arena.commands import studio as command
 from arena.commands.studio import HEADER, Serving, server
-from arena.inhand import RefusedError
-from arena.scene import Scene, load_scene, scripted
-from arena.studio import Call, Studio
-from arena.trial import run_trial
+from arena.robots.controller import ScriptedBrain
+from arena.scene.loader import Scene, load_scene, scripted
+from arena.studio.process import Call, Studio
+from arena.studio.session import RefusedError
+from arena.trial import checkpoints
+from arena.trial.trial import run_trial
 from tests.arena.browser import BROWSER, needs_browser
 from tests.arena.images import ECHO
 
@@ -145,22 +145,22 @@ def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
         assert studio.ask("digest") == last, "what was done later is forgotten"
 
 
-@pytest.mark.skipif(not moments.CAN_COPY, reason="moments are kept on Linux only")
+@pytest.mark.skipif(not checkpoints.CAN_COPY, reason="moments are kept on Linux only")
 def test_kept_moments_lead_to_the_first_pass_to_the_byte(
     clustering_image: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A thing moved after each moment that is kept: from there on as from the seed. What is gone back behind is no
     longer kept, what was moved then is not moved again, breakpoints stay, nobody is left at the end."""
-    ended, close = [], moments.Line.close
-    monkeypatch.setattr(moments.Line, "close", lambda line: ended.append(close(line)))
-    monkeypatch.setattr(moments, "EVERY_S", 1e9)
+    ended, close = [], checkpoints.Line.close
+    monkeypatch.setattr(checkpoints.Line, "close", lambda line: ended.append(close(line)))
+    monkeypatch.setattr(checkpoints, "EVERY_S", 1e9)
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with studio_of(plan) as studio:
         seen = {}
         for quanta in (900, 100, 100, 100):
             tick = do(studio, "step", quanta)["tick"]
             with monkeypatch.context() as now:
-                now.setattr(moments, "EVERY_S", 0.0)
+                now.setattr(checkpoints, "EVERY_S", 0.0)
                 studio.ask("now")
             studio.ask("move", "object", 1, 100.0 + tick / 50, 120.0)
             seen[tick] = studio.ask("digest"), studio.ask("trial").columns
@@ -186,16 +186,16 @@ def test_kept_moments_lead_to_the_first_pass_to_the_byte(
 
 def test_moments_are_kept_more_coarsely_the_older_they_are() -> None:
     """At most so many; those that go are closed."""
-    kept, lines = moments.Moments(), []
+    kept, lines = checkpoints.Moments(), []
     for ten in range(1, 61):
         assert kept.is_due(10.0 * ten)
         assert not kept.is_due(10.0 * ten - 1)
-        here, there = moments.line()
+        here, there = checkpoints.line()
         there.drop()
         lines.append(here)
-        kept.add(moments.Moment(ten * 1000, 10.0 * ten, here))
-    assert len(kept) == moments.KEPT
-    assert sum(line.fileno() >= 0 for line in lines) == moments.KEPT
+        kept.add(checkpoints.Moment(ten * 1000, 10.0 * ten, here))
+    assert len(kept) == checkpoints.KEPT
+    assert sum(line.fileno() >= 0 for line in lines) == checkpoints.KEPT
     times = [moment.seconds for moment in (kept.before(tick) for tick in range(0, 60001, 500)) if moment is not None]
     ages = sorted({600.0 - one for one in times})
     assert ages[:3] == [0.0, 10.0, 20.0]

@@ -6,16 +6,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from arena import bodies
-from arena.lens import Lens
-from arena.look import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL
-from arena.scene import Scene, load_scene
-from arena.sight import Sight
-from arena.vision import Eye, sensor_of
-from arena.world import Poses, World
+from arena.camera.appearance import ABOVE, FLOOR, NOTHING, OBJECT, ROBOT, WALL
+from arena.camera.lens import Lens
+from arena.camera.reference import Eye, sensor_of
+from arena.camera.renderer import Sight
+from arena.scene import dimensions
+from arena.scene.loader import Scene, load_scene
+from arena.world.physics import Poses, World
 
 ROBOT_AT = (20.0, 150.0, 0.0)
-LENS_X = ROBOT_AT[0] + bodies.CAMERA_AHEAD
+LENS_X = ROBOT_AT[0] + dimensions.CAMERA_AHEAD
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def scene() -> Scene:
 
 def one_object(distance_cm: float, bearing: float = 0.0) -> Poses:
     """An object whose surface is `distance_cm` from the lens."""
-    centre = distance_cm + bodies.OBJECT_RADIUS
+    centre = distance_cm + dimensions.OBJECT_RADIUS
     return Poses([ROBOT_AT], [(LENS_X + centre * math.cos(bearing), 150 + centre * math.sin(bearing))])
 
 
@@ -41,7 +41,7 @@ def test_rows_show_heights_by_the_pinhole_formula(scene: Scene) -> None:
 def test_columns_show_bearings_by_the_pinhole_formula(scene: Scene) -> None:
     """u = 320 - 602 tan a, left positive: the edges of an object are where its tangents are."""
     eye = Eye(scene, one_object(95.0), 0)
-    half = math.asin(bodies.OBJECT_RADIUS / 100.0)
+    half = math.asin(dimensions.OBJECT_RADIUS / 100.0)
     edge = 602 * math.tan(half)
     assert [eye.column(320 + du, (240,))[0] for du in (-edge - 1, -edge + 1, edge - 1, edge + 1)] == [
         WALL, OBJECT, OBJECT, WALL]  # fmt: skip
@@ -70,7 +70,7 @@ def test_a_barrel_shows_the_same_angle_nearer_to_the_axis(scene: Scene) -> None:
     bearing = 0.3
     eye = Eye(scene.with_values(camera__distortion=0.2), one_object(95.0, bearing), 0)
     columns = [u for u in range(640) if eye.column(u, (240,))[0] == OBJECT]
-    half = math.asin(bodies.OBJECT_RADIUS / 100.0)
+    half = math.asin(dimensions.OBJECT_RADIUS / 100.0)
     for u, angle in ((columns[0], bearing + half), (columns[-1], bearing - half)):
         r = (320 - u) / 602
         assert r * (1 + 0.2 * r * r) == pytest.approx(math.tan(angle), abs=1.5 / 602)
@@ -138,7 +138,7 @@ def test_robots_are_detected_nearer_than_objects(scene: Scene) -> None:
     shares = []
     for distance in (60.0, 100.0, 140.0, 200.0):
         angles = rng.uniform(-1, 1, 200) * math.pi / 180
-        centre = distance + bodies.ROBOT_RADIUS
+        centre = distance + dimensions.ROBOT_RADIUS
         places = [(LENS_X + centre * math.cos(a), 150 + centre * math.sin(a), 0.0) for a in angles]
         seen = [sensor_of(Eye(scene, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]
         shares.append(float(np.mean(seen)))
@@ -158,7 +158,7 @@ def test_pitch_decides_how_far_robots_are_seen(
     """docs/experiment.md §3: two rows of the window to 105 cm, to 135 cm four rows lower, to 150 cm at a degree."""
     rng = np.random.default_rng(1)
     pitched = scene.with_values(camera__pitch_deg=pitch_deg)
-    centre = distance + bodies.ROBOT_RADIUS
+    centre = distance + dimensions.ROBOT_RADIUS
     angles = rng.uniform(-1, 1, 200) * math.pi / 180
     places = [(LENS_X + centre * math.cos(a), 150 + centre * math.sin(a), 0.0) for a in angles]
     seen = [sensor_of(Eye(pitched, Poses([ROBOT_AT, place], []), 0)) == ROBOT for place in places]

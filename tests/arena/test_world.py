@@ -11,15 +11,15 @@ from ctypes import addressof, c_void_p
 import numpy as np
 import pytest
 
-from arena import bodies
-from arena.brain import ScriptedBrain
-from arena.controllers import steps_per_second
-from arena.look import NOTHING, OBJECT, ROBOT
-from arena.scene import Scene, SceneError, load_scene
-from arena.sight import Sight
-from arena.trial import run_trial
-from arena.wheels import ROOM, Wheels
-from arena.world import Poses, World
+from arena.camera.appearance import NOTHING, OBJECT, ROBOT
+from arena.camera.renderer import Sight
+from arena.robots.controller import ScriptedBrain
+from arena.robots.reactive import steps_per_second
+from arena.scene import dimensions
+from arena.scene.loader import Scene, SceneError, load_scene
+from arena.trial.trial import run_trial
+from arena.world.physics import Poses, World
+from arena.world.wheels import ROOM, Wheels
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_full_speed_covers_128_mm_in_a_second(empty: Scene) -> None:
 @pytest.mark.parametrize("seen", [NOTHING, OBJECT, ROBOT])
 def test_circles_have_the_radius_of_the_kinematics(empty: Scene, controller: str, seen: int) -> None:
     """epuck.md §8: R = axle/2 (vl + vr)/(vr - vl); A and nothing: 7.57 cm with whole mm/s."""
-    left, right = (steps * bodies.CM_PER_STEP for steps in steps_per_second(controller, seen))
+    left, right = (steps * dimensions.CM_PER_STEP for steps in steps_per_second(controller, seen))
     world = World.of(empty, 1, [(200, 150, 0.0)], [])
     places = []
     for _ in range(800):
@@ -83,14 +83,14 @@ def test_a_pushed_object_slides_as_friction_allows(empty: Scene, quantum_ms: flo
     before = world.poses.objects[0][0]
     drive(world, (0.0, 0.0), 1)
     slid = world.poses.objects[0][0] - before
-    assert slid == pytest.approx(12.8**2 / (2 * bodies.FLOOR_FRICTION * bodies.GRAVITY) + half_a_step, abs=0.02)
+    assert slid == pytest.approx(12.8**2 / (2 * dimensions.FLOOR_FRICTION * dimensions.GRAVITY) + half_a_step, abs=0.02)
 
 
 def test_walls_hold_a_pushing_robot(empty: Scene) -> None:
     """A robot at a wall stays inside, its wheels slip."""
     world = World.of(empty, 1, [(390, 150, 0.0)], [])
     drive(world, (12.8, 12.8), 3)
-    assert world.poses.robots[0][0] == pytest.approx(400 - bodies.ROBOT_RADIUS, abs=0.05)
+    assert world.poses.robots[0][0] == pytest.approx(400 - dimensions.ROBOT_RADIUS, abs=0.05)
 
 
 def test_without_slip_limit_the_drive_is_enkis(empty: Scene) -> None:
@@ -230,7 +230,7 @@ def test_speeds_are_those_of_the_last_quanta_together() -> None:
         wheels.turned(tick, array("q", [count for pair in new for count in pair]))
         for left, right in new:
             counts.append((left, right))
-            rate = bodies.CM_PER_STEP * 14_745_600 / (quantum * (len(counts) - 1))
+            rate = dimensions.CM_PER_STEP * 14_745_600 / (quantum * (len(counts) - 1))
             assert wheels.speed(tick) == ((left - counts[0][0]) * rate, (right - counts[0][1]) * rate)
             tick += 1
     wheels.rested(tick)

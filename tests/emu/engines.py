@@ -12,8 +12,8 @@ from emu.dspic30f.engines import NAMES
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.compiler import Compiler
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.machine.machine import Machine
 
 RAM_START, RAM_END = 0x0800, 0x2800
 CORE = ("TBLPAG", "MODCON", "XMODSRT", "XMODEND", "YMODSRT", "YMODEND", "XBREV")

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from emu import Machine
-from emu.events import NEVER
+from emu.system.events import NEVER
 from tests.firmware.test_on_target import load, place, run_to, thread_list, words
 
 T1IF, T2IF, T3IF, INT1IF, INT2IF = 1 << 3, 1 << 6, 1 << 7, 1 << 0, 1 << 7

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from emu import Machine
 from emu.boards.epuck.board import Epuck
-from emu.loader import load_image
+from emu.image.loader import load_image
 from tests.firmware.test_on_target import place, thread_list
 
 INT1IF, T2IF = 1 << 0, 1 << 6

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import emu
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 SLICE = 4_000
 """Tcy between looks at the line."""

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from emu.boards.epuck.board import Epuck
-from emu.boards.epuck.pixels import decode
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.boards.epuck.camera.pixels import decode
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 
 FCY = 14_745_600
 AHEAD = 12

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from emu.machine import Machine
-from emu.peripherals.serialline import FRAMING_ERROR
+from emu.machine.machine import Machine
+from emu.peripherals.uart.rx_line import FRAMING_ERROR
 from tests.firmware.conftest import Build
 from tests.firmware.test_drivers_on_target import FCY, robot, steps
 

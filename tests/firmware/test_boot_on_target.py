@@ -12,9 +12,9 @@ import tty
 import pytest
 
 import emu
-from emu.image import Image
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.image.model import Image
+from emu.machine.machine import Machine
 from openswarm.cli import main
 from openswarm.flashing.loaders import LOADERS, ROW_UNITS, block
 from openswarm.flashing.rows import goto, rows

@@ -9,7 +9,7 @@ import pytest
 
 from emu.boards.picture import write_picture
 from emu.cli import main
-from emu.machine import Machine
+from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.sights import capture_at, expected_line, start, sweep
 from tests.firmware.test_drivers_on_target import FCY, PROGRAMS, SCENES, START, TABLES, plain, robot

@@ -12,7 +12,7 @@ import emu
 from bench.bounds import IMAGES, rows_of
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.contracts import HEADERS
-from toolchain.bounds.notes import read_notes
+from toolchain.bounds.annotations.notes import read_notes
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Analyst
 from toolchain.cli import main

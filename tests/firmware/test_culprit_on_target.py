@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import emu
-from emu.debug.inside import Inside
+from emu.debug.inspector import Inside
 from emu.debug.threads import Threads
 from tests.firmware.conftest import TARGET_APPS, Build
 

@@ -12,9 +12,9 @@ import pytest
 
 from emu.boards.epuck.analog import RESPONSE, reflection_at
 from emu.boards.epuck.board import Epuck
-from emu.boards.epuck.pixels import decode
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.boards.epuck.camera.pixels import decode
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 from tests.firmware.conftest import Build
 
 FCY = 14_745_600

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from emu.boards.epuck.stimulus import parse
-from emu.machine import Machine
-from emu.peripherals.serialline import BREAK, FRAMING_ERROR
+from emu.machine.machine import Machine
+from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR
 from tests.firmware.conftest import Build
 from tests.firmware.test_drivers_on_target import FCY, SCENES, START, captured, noise, plain, robot, steps, window
 

@@ -7,11 +7,11 @@ import struct
 
 import numpy as np
 
-from arena.emulated import EmulatedBrain
-from arena.ether import Ether
-from arena.scene import FCY, load_scene
-from arena.world import Poses
-from emu.machine import Machine
+from arena.infrared.channel import Ether
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene.loader import FCY, load_scene
+from arena.world.physics import Poses
+from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_drivers_on_target import captured, noise, robot, window
 

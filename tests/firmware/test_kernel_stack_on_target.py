@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from emu.machine import Machine
+from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_on_target import FCY, load, place, run_to
 

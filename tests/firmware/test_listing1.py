@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from arena.emulated import EmulatedBrain
-from arena.scene import load_scene
-from arena.world import World
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene.loader import load_scene
+from arena.world.physics import World
 from tests.firmware.conftest import Build
 from tests.firmware.test_drivers_on_target import SCENES, plain, robot
 from tests.firmware.test_on_target import load, place

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from emu.cli import main
-from emu.loader import load_image
+from emu.image.loader import load_image
 
 HERE = Path(__file__).parent
 BASELINES = HERE.parents[1] / "firmware" / "baseline"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emu.machine import Machine
+from emu.machine.machine import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_drivers_on_target import FCY, SCENES, plain, robot, steps
 

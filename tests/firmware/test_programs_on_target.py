@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import emu
-from emu.loader import load_image
-from emu.status import BAD_INPUT, FAULT
+from emu.host.exit_status import BAD_INPUT, FAULT
+from emu.image.loader import load_image
 from openswarm.cli import main
 from openswarm.flashing.program import RAM, SLOT, is_program, program_of
 

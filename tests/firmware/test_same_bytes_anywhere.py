@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from emu.cli import main
-from toolchain import driver
+from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("emu", "toolchain", "firmware")

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 import emu
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 from openswarm.cli import main
 from openswarm.flashing.messages import framed, unframed
 from openswarm.flashing.program import SLOT, Program, program_of

@@ -9,7 +9,7 @@ import pytest
 
 import emu
 from emu import Machine
-from emu.device import flag_since
+from emu.system.device import flag_since
 from tests.firmware.conftest import TARGET_APPS, Build
 from tests.firmware.test_on_target import FCY, INT1IF, T2IF, T3IF, load, place, run_to
 

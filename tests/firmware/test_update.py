@@ -14,7 +14,7 @@ import pytest
 
 import emu
 from emu.dspic30f.isa.text import parse
-from emu.machine import Machine
+from emu.machine.machine import Machine
 from openswarm.flashing.loaders import ROW_BYTES
 from openswarm.flashing.messages import MESSAGE, PARTS, Advertisement, Request, framed, identity, read, unframed
 from openswarm.flashing.messages import data as part_of

@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 
 from emu.boards.epuck.board import Epuck
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 
 FCY = 14_745_600
 FASTEST = 129

@@ -31,7 +31,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from emu.status import BAD_INPUT  # noqa: E402
+from emu.host.exit_status import BAD_INPUT  # noqa: E402
 from tests.fuzz.seeds import SKIPPED, Course, parser  # noqa: E402
 from tests.fuzz.verdicts import Book, LogError, Verdict, run_all  # noqa: E402
 from tests.toolchain.c_programs import FrontEndOnce, build, run  # noqa: E402

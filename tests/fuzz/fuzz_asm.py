@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 from toolchain.asm.assemble import assemble  # noqa: E402
-from toolchain.asm.directives import DIRECTIVES  # noqa: E402
+from toolchain.asm.directives.table import DIRECTIVES  # noqa: E402
 from toolchain.asm.state import Options  # noqa: E402
 from toolchain.elf.read import read_executable, read_object  # noqa: E402
 from toolchain.elf.write import executable_bytes, object_bytes  # noqa: E402

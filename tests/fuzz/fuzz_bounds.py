@@ -20,16 +20,16 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
-from emu.events import NEVER  # noqa: E402
+from emu.system.events import NEVER  # noqa: E402
 from tests.fuzz import c_interrupts, c_notes, c_shapes  # noqa: E402
 from tests.fuzz.fuzz_compiler import NO_ROOM  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 from tests.toolchain.bounds.responses import Watched, watched  # noqa: E402
 from tests.toolchain.c_programs import build  # noqa: E402
-from toolchain.bounds.notes import read_notes  # noqa: E402
+from toolchain.bounds.annotations.notes import read_notes  # noqa: E402
+from toolchain.bounds.interference import report_of  # noqa: E402
 from toolchain.bounds.program import Program  # noqa: E402
 from toolchain.bounds.report import Analyst, Bound  # noqa: E402
-from toolchain.bounds.together import report_of  # noqa: E402
 from toolchain.elf.read import read_executable  # noqa: E402
 from toolchain.stack.annotations import Annotations  # noqa: E402
 

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
-from emu.status import BAD_INPUT  # noqa: E402
+from emu.host.exit_status import BAD_INPUT  # noqa: E402
 from tests.fuzz.c_shapes import Program  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 from tests.fuzz.verdicts import Book, LogError, Verdict, run_all  # noqa: E402

@@ -39,7 +39,7 @@ import toolchain.cli  # noqa: E402
 from emu.commands.debug import machine_of  # noqa: E402
 from emu.dap.server import Server  # noqa: E402
 from emu.dap.wire import Wire  # noqa: E402
-from emu.status import BAD_INPUT, MEANING  # noqa: E402
+from emu.host.exit_status import BAD_INPUT, MEANING  # noqa: E402
 from tests.fuzz.fuzz_loader import mutate  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 

@@ -20,10 +20,10 @@ from dwarf_samples import debug_sections  # noqa: E402
 from elf_samples import words, xc16_like  # noqa: E402
 
 from emu.commands.info import describe  # noqa: E402
-from emu.disassembly import items  # noqa: E402
-from emu.footprint import pieces  # noqa: E402
-from emu.image import LoadError  # noqa: E402
-from emu.loader import parse_image  # noqa: E402
+from emu.image.footprint import pieces  # noqa: E402
+from emu.image.loader import parse_image  # noqa: E402
+from emu.image.model import LoadError  # noqa: E402
+from emu.instruments.disassembly import items  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 INTERESTING = (0, 1, 2, 3, 4, 7, 8, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x17FFE, 0x18000, 0x7FF000)

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import emu  # noqa: E402
-from emu.debug.locate import Unavailable  # noqa: E402
+from emu.debug.dwarf.location import Unavailable  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 FUNCTIONS = 10

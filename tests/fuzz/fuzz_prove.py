@@ -26,8 +26,8 @@ FILES = ("one.c", "two.c", "three.c")
 
 def examine(seed: int, most: int, counts: Counter[str]) -> None:
     """Raises AssertionError naming file, level and function of a refutation."""
+    from toolchain.proof.problem import subject
     from toolchain.proof.prove import verdicts
-    from toolchain.proof.subject import subject
 
     chance = random.Random(seed)
     file, level = chance.choice(FILES), chance.choice(LEVELS)

@@ -26,8 +26,8 @@ sys.path.insert(0, str(ROOT))
 import emu  # noqa: E402
 from emu.boards.epuck.board import Epuck  # noqa: E402
 from emu.debug.history import History  # noqa: E402
-from emu.image import Image  # noqa: E402
-from emu.loader import load_image  # noqa: E402
+from emu.image.loader import load_image  # noqa: E402
+from emu.image.model import Image  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 APPS = {"clustering": 8, "listing1": 0}

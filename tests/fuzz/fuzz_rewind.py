@@ -22,10 +22,10 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from arena.campaign import Plan, run_one, trial_path  # noqa: E402
+from arena.campaign.campaign import Plan, run_one, trial_path  # noqa: E402
 from arena.commands.run import image_for  # noqa: E402
-from arena.debugsession import Remote, Session  # noqa: E402
-from arena.scene import load_scene  # noqa: E402
+from arena.debug.session import Remote, Session  # noqa: E402
+from arena.scene.loader import load_scene  # noqa: E402
 from emu.prompt.client import Client  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 

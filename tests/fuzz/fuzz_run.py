@@ -20,9 +20,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "emu" / "loader"), str(ROOT / "t
 from elf_samples import ElfSample, Part, words  # noqa: E402
 from programs import ECHO, HELLO, SPIN, assembled  # noqa: E402
 
-from emu.loader import parse_image  # noqa: E402
-from emu.machine import Machine  # noqa: E402
-from emu.stops import REASONS  # noqa: E402
+from emu.image.loader import parse_image  # noqa: E402
+from emu.machine.machine import Machine  # noqa: E402
+from emu.machine.stops import REASONS  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 CYCLES = 3_000

@@ -21,11 +21,11 @@ from typing import Any, Final
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from arena.emulated import EmulatedBrain  # noqa: E402
-from arena.ether import Ether  # noqa: E402
-from arena.lockstep import LockStep  # noqa: E402
-from arena.scene import Scene, load_scene  # noqa: E402
-from arena.world import World  # noqa: E402
+from arena.infrared.channel import Ether  # noqa: E402
+from arena.lockstep.scheduler import LockStep  # noqa: E402
+from arena.robots.firmware_controller import EmulatedBrain  # noqa: E402
+from arena.scene.loader import Scene, load_scene  # noqa: E402
+from arena.world.physics import World  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 from tests.arena.random_robots import program  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402

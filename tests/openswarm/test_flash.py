@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from emu.chips import chip_named
-from emu.image import Block, Image
-from emu.loader import load_image
-from emu.status import BAD_INPUT, FAULT
+from emu.host.exit_status import BAD_INPUT, FAULT
+from emu.image.loader import load_image
+from emu.image.model import Block, Image
 from openswarm.cli import main
 from openswarm.flashing.loaders import LOADERS, Loader
 from openswarm.flashing.rows import goto, rows

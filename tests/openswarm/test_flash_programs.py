@@ -17,9 +17,9 @@ from typing import Any
 import pytest
 
 from emu.chips import chip_named
-from emu.image import Block, Image
-from emu.status import BAD_INPUT, FAULT, INTERRUPTED
-from emu.symbols import Symbol
+from emu.host.exit_status import BAD_INPUT, FAULT, INTERRUPTED
+from emu.image.model import Block, Image
+from emu.image.symbols import Symbol
 from openswarm.cli import main
 from openswarm.flashing.loaders import ROW_BYTES, ROW_UNITS
 from openswarm.flashing.messages import (

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from arena.scene import load_scene
-from emu import status
+from arena.scene.loader import load_scene
+from emu.host import exit_status as status
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
@@ -73,8 +73,9 @@ def test_the_version_stands_in_one_place():
         assert f'"{version}"' not in (ROOT / name).read_text(encoding="utf-8"), name
 
 
-@pytest.mark.parametrize(("fact", "home"), [("XDG_CACHE_HOME", "emu/places.py"), ("platformdirs", "emu/places.py")])
-def test_the_cache_s_place_is_named_once(fact, home):
+@pytest.mark.parametrize("fact", ["XDG_CACHE_HOME", "platformdirs"])
+def test_the_cache_s_place_is_named_once(fact):
+    home = "emu/host/paths.py"
     parts = ("emu", "toolchain", "arena", "openswarm")
     code = [path for part in parts for path in (ROOT / part).rglob("*.py") if "commands" not in path.parts]
     assert [path.relative_to(ROOT).as_posix() for path in code if fact in path.read_text(encoding="utf-8")] == [home]

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from emu import places, status
+from emu.host import exit_status, paths
 from openswarm.cli import COMMANDS, command, main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,7 +31,7 @@ def test_every_program_tells_its_version_and_helps_with_an_example(program):
     assert ran(program, "--version").stdout == f"{program} {version('openswarm')}\n"
     told = ran(program, "--help")
     assert (told.returncode, "example: " in told.stdout) == (0, True)
-    assert ran(program, "no-such-command").returncode == status.BAD_INPUT
+    assert ran(program, "no-such-command").returncode == exit_status.BAD_INPUT
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
@@ -61,10 +61,10 @@ def test_a_reader_that_goes_away_is_no_failure():
 
 def test_the_cache_is_where_the_environment_says(monkeypatch, tmp_path):
     monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path / "own"))
-    assert places.native_code() == tmp_path / "own" / "jit"
+    assert paths.native_code() == tmp_path / "own" / "jit"
     monkeypatch.delenv("OPENSWARM_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert places.cache() == tmp_path / "xdg" / "openswarm"
+    assert paths.cache() == tmp_path / "xdg" / "openswarm"
 
 
 def test_a_command_may_have_a_cache_of_its_own(monkeypatch, tmp_path):
@@ -73,19 +73,19 @@ def test_a_command_may_have_a_cache_of_its_own(monkeypatch, tmp_path):
     for number, module in enumerate(("emu.commands.run", "emu.commands.profile", "arena.commands.run")):
         folder = tmp_path / str(number)
         options = import_module(module).parser().parse_args(["x", "--cache", str(folder)])
-        assert options.cache == places.cache() == folder
+        assert options.cache == paths.cache() == folder
         assert os.environ["OPENSWARM_CACHE"] == str(folder)
 
 
 def test_clean_takes_what_is_ours_and_nothing_else(monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("OPENSWARM_CACHE", str(tmp_path))
-    for folder, size in ((places.native_code() / "ab", 10), (places.images() / "hello", 20), (tmp_path / "mine", 5)):
+    for folder, size in ((paths.native_code() / "ab", 10), (paths.images() / "hello", 20), (tmp_path / "mine", 5)):
         folder.mkdir(parents=True)
         (folder / "file").write_bytes(bytes(size))
     assert main(["clean", "--dry-run", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["kinds"]["native code"] == {"files": 1, "bytes": 10}
-    assert places.native_code().exists()
+    assert paths.native_code().exists()
     assert main(["clean"]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
     assert main(["clean", "--cache", str(tmp_path / "nowhere")]) == 0
@@ -95,7 +95,7 @@ def test_doctor_names_what_a_missing_program_disables(tmp_path):
     """With an empty PATH every program is missing; only make is needed."""
     done = ran("openswarm", "doctor", "--json", PATH=str(tmp_path))
     told = json.loads(done.stdout)
-    assert done.returncode == status.FAULT
+    assert done.returncode == exit_status.FAULT
     lacking = {one["name"]: one for one in told["findings"] if not one["found"]}
     assert lacking["make"]["is_needed"]
     assert lacking["cmake"]["remedy"] == "Debian package cmake"
@@ -118,7 +118,7 @@ def test_the_arena_without_its_extra_names_it(tmp_path):
         (tmp_path / package).mkdir()
         (tmp_path / package / f"{package}.py").write_text(f"raise ModuleNotFoundError(name={package!r})\n")
         done = ran("arena", "compare", "x", "y", PYTHONPATH=str(tmp_path / package))
-        assert done.returncode == status.BAD_INPUT
+        assert done.returncode == exit_status.BAD_INPUT
         assert done.stderr == f"arena: {package} is not installed: pip install 'openswarm[arena]'\n"
 
 

@@ -29,4 +29,4 @@ def test_the_site_builds_without_a_warning(tmp_path):
         place = re.sub(r"(README|index)$", "", page.removesuffix(".md")).rstrip("/")
         assert (tmp_path / "site" / place / "index.html").is_file(), page
     python = (tmp_path / "site" / "reference" / "python" / "index.html").read_text(encoding="utf-8")
-    assert "emu.machine.Machine.run" in python
+    assert "emu.machine.machine.Machine.run" in python

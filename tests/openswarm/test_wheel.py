@@ -43,7 +43,7 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
         "arena/scenes/clustering.toml",
         "toolchain/include/xc.h",
         "toolchain/runtime/crt0.s",
-        "arena/page.html",
+        "arena/replay/page.html",
     } <= names
     assert {"openswarm/cmake/openswarm.cmake", "openswarm/template/src/main.c", "openswarm/template/gitignore"} <= names
     assert any(name.endswith("licenses/LICENSE") for name in names)

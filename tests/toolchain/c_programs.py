@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import emu
-from toolchain import driver
-from toolchain.cc_options import CcOptions, Input
+from toolchain.driver import driver
+from toolchain.frontend.options import CcOptions, Input
 
 INTCON1_TRAPS = {1: "oscillator", 2: "stack error", 3: "address error", 4: "math error"}
 """Trap flags of INTCON1 by bit (isa.md §14.4)."""

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tests.toolchain.c_programs import build, run
-from toolchain import driver
-from toolchain.asm_constraints import CLASSES
+from toolchain.driver import driver
+from toolchain.frontend.asm_constraints import CLASSES
 
 ONE = """
 volatile int in = 7;

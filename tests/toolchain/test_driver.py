@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from tests.toolchain.c_programs import run
-from toolchain import driver
-from toolchain.cc_options import parse
-from toolchain.clang import clang_program
+from toolchain.driver import driver
 from toolchain.elf.read import is_object, read_executable
 from toolchain.errors import ToolError
+from toolchain.frontend.clang import clang_program
+from toolchain.frontend.options import parse
 
 
 def cc(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str]:
@@ -426,7 +426,7 @@ def test_messages_need_none_of_the_heavy_parts() -> None:
 
 def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """-L and -l, members pulled by symbol; .S files see the preprocessor and the device header."""
-    from toolchain.link.archive import Member, archive_bytes
+    from toolchain.elf.archive import Member, archive_bytes
 
     f = write(tmp_path, "f.c", "int f(int x) { return x + 2; }\n")
     g = write(tmp_path, "g.S", "#include <dspic30f6014a.h>\n#define V 40\n\t.section .text,code\n\t.global _g\n"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from toolchain import driver
+from toolchain.driver import driver
 
 OPTIONS = [(), ("-Os",), ("-g",), ("-Os", "-fno-lto"), ("-O2", "-g", "-fno-lto")]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.toolchain.c_programs import FrontEndOnce, build
-from toolchain import driver
+from toolchain.driver import driver
 
 ONE = "int other(int x);\nint values[3] = {1, 2, 3};\nint main(void) { return other(values[1]); }\n"
 TWO = "extern int values[3];\nint other(int x) { return x * values[2] + ADDED; }\n"

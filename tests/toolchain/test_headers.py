@@ -108,7 +108,7 @@ def test_configuration_words_reach_the_image(tmp_path: Path) -> None:
     )
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os")
     assert built.status == 0, built.messages
-    from emu.loader import load_image
+    from emu.image.loader import load_image
 
     words = {block.base: block.words for block in load_image(tmp_path / "a.elf").blocks if block.base >= 0xF80000}
     flat = {base + 2 * i: word & 0xFFFF for base, part in words.items() for i, word in enumerate(part)}

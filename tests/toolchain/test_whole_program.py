@@ -82,7 +82,7 @@ def test_loops_like_library_functions_link_and_work(level: str, alone: str, tmp_
 
 def test_an_unknown_library_function_is_not_made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The driver asks the library, not a list: with an empty list the program links all the same."""
-    from toolchain import clang
+    from toolchain.frontend import clang
 
     monkeypatch.setattr(clang, "ABSENT_FUNCTIONS", [])
     assert status(IDIOMS, tmp_path, "-O2", "-std=gnu11", "-w", "-Wl,--heap=64") == 7

@@ -10,9 +10,10 @@ import pytest
 import emu
 from emu.chips import NAMES as CHIPS
 from emu.chips import chip_named
-from emu.loader import load_image
+from emu.image.loader import load_image
 from tests.toolchain.c_programs import run
-from toolchain import config_pragma, driver
+from toolchain.driver import driver
+from toolchain.frontend import config_pragma
 
 LEVELS = ("-O0", "-O1", "-O2", "-Os")
 

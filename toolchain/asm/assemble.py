@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from toolchain.asm.conditionals import CONDITIONALS
-from toolchain.asm.directives import DIRECTIVES, rejection, set_symbol
+from toolchain.asm.directives.table import DIRECTIVES, rejection, set_symbol
 from toolchain.asm.encode import StatementError, assemble_instruction
 from toolchain.asm.expr import ExprError
 from toolchain.asm.finish import finish

@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 from itertools import groupby
 
-from emu.elffacts import RELOCATION_BY_NAME
-from toolchain.asm.data import leb128
+from emu.image.elf_facts import RELOCATION_BY_NAME
+from toolchain.asm.directives.data import leb128
 from toolchain.asm.sections import AsmSection
 from toolchain.asm.state import Assembler
 from toolchain.asm.symbols import Label

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from emu.dspic30f.isa.text import Parsed, Slot, StatementError, parse
-from emu.elffacts import RELOCATION_BY_NAME, RelocationType
+from emu.image.elf_facts import RELOCATION_BY_NAME, RelocationType
 from toolchain.asm import expr
-from toolchain.asm.data import operator_of
+from toolchain.asm.directives.data import operator_of
 from toolchain.asm.expr import ExprError, Known, Value, combine
 from toolchain.asm.sections import Fixup, Relaxable
 from toolchain.asm.state import Assembler

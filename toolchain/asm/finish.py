@@ -6,7 +6,7 @@ not depend on the link; everything that names a symbol is a relocation, local br
 
 from __future__ import annotations
 
-from emu.elffacts import RELOCATION_BY_NAME, Formula, RelocationType
+from emu.image.elf_facts import RELOCATION_BY_NAME, Formula, RelocationType
 from toolchain.asm.debug import debug_sections
 from toolchain.asm.expr import ExprError, Known, Pending, Value, settle
 from toolchain.asm.relax import relax

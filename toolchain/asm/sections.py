@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from emu.elffacts import OCTETS_PER_WORD, ExtendedAttribute, RelocationType, SectionFlag
+from emu.image.elf_facts import OCTETS_PER_WORD, ExtendedAttribute, RelocationType, SectionFlag
 from toolchain.asm.expr import ExprError, Known
 from toolchain.asm.symbols import AsmSymbol, Frag, Label
 from toolchain.elf import constants as c

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from emu.chips import chip_named
 from emu.chips.chip import Chip
-from emu.elffacts import SectionFlag
+from emu.image.elf_facts import SectionFlag
 from toolchain.asm import expr
 from toolchain.asm.conditionals import Conditionals
 from toolchain.asm.expr import ExprError, Known, Value

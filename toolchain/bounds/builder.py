@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from emu.dspic30f.isa.builder import Context, Side, Size
-from toolchain.bounds.rules import ADDRESSING, EARLY, LOOP_REGISTER, STACK_POINTER
-from toolchain.bounds.state import NOWHERE, Area, State, hides
-from toolchain.bounds.values import (
+from toolchain.abi.target import SFR_END, W_END, register
+from toolchain.bounds.abstract.state import NOWHERE, Area, State, hides
+from toolchain.bounds.abstract.values import (
     ACCUMULATOR,
     BYTE,
     EITHER,
@@ -28,7 +28,7 @@ from toolchain.bounds.values import (
     span,
     union,
 )
-from toolchain.target import SFR_END, W_END, register
+from toolchain.bounds.annotations.rules import ADDRESSING, EARLY, LOOP_REGISTER, STACK_POINTER
 
 SR, CORCON, TBLPAG, DISICNT, INTCON1 = map(register, ("SR", "CORCON", "TBLPAG", "DISICNT", "INTCON1"))
 LOOP_REGISTERS = tuple(map(register, ("DCOUNT", "DOSTARTL", "DOSTARTH", "DOENDL", "DOENDH")))

@@ -6,13 +6,13 @@ from abc import abstractmethod
 from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Skip
+from toolchain.bounds.abstract.state import INHERITED, NOWHERE, State
+from toolchain.bounds.abstract.values import Value, ends
+from toolchain.bounds.annotations.rules import DEEP, ELSEWHERE, JUMP, TABLE
 from toolchain.bounds.builder import TRAP, exact, levels_in
 from toolchain.bounds.graph import Block, Step
-from toolchain.bounds.outcome import Outcome
-from toolchain.bounds.rules import DEEP, ELSEWHERE, JUMP, TABLE
-from toolchain.bounds.state import INHERITED, NOWHERE, State
+from toolchain.bounds.result import Outcome
 from toolchain.bounds.steps import Steps
-from toolchain.bounds.values import Value, ends
 
 MAX_DEPTH: Final = 60
 MOST_CALLS: Final = 8 * MAX_DEPTH

@@ -12,16 +12,16 @@ from collections import Counter
 from typing import Final
 
 from emu.dspic30f.isa.flow import Branch, Call, Flow, Goto, Reset, Return, Skip
+from toolchain.abi.target import SFR_END
+from toolchain.bounds.abstract.conditions import Result, refined, tested
+from toolchain.bounds.abstract.state import INHERITED, NOWHERE, State, widened
+from toolchain.bounds.abstract.values import LINK, WORD, Value, ends, is_ram, span
+from toolchain.bounds.annotations.rules import LAST, LONG, LOOP, MERGED, WAYS_IN, Rules
 from toolchain.bounds.builder import Abstract, World, exact
 from toolchain.bounds.calls import Calls
-from toolchain.bounds.compare import Result, refined, tested
 from toolchain.bounds.graph import Block, Builder, Code, Loop, Order, Step, joined
-from toolchain.bounds.outcome import Outcome, Scope
-from toolchain.bounds.rules import LAST, LONG, LOOP, MERGED, WAYS_IN, Rules
-from toolchain.bounds.state import INHERITED, NOWHERE, State, widened
-from toolchain.bounds.values import LINK, WORD, Value, ends, is_ram, span
+from toolchain.bounds.result import Outcome, Scope
 from toolchain.stack.effects import CALL_BYTES
-from toolchain.target import SFR_END
 
 MAX_TURNS: Final = 5_000
 HOPELESS_TURNS: Final = 6

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from emu.dspic30f.facts import facts_of, flow_of
+from emu.dspic30f.isa.facts import facts_of, flow_of
 from emu.dspic30f.isa.flow import Branch, Call, Do, Flow, Goto, Reset, Return, Skip
 from emu.dspic30f.isa.row import Insn
 from toolchain.elf.disassemble import Item
@@ -21,7 +21,7 @@ class Step:
     after: int
     cycles: int
     pointers: int
-    """Registers it forms source addresses from (emu.dspic30f.facts)."""
+    """Registers it forms source addresses from (emu.dspic30f.isa.facts)."""
     writes: int
     window: int
     """Cycles a read of the PSV window adds (isa.md §13.3)."""

@@ -7,15 +7,15 @@ from collections.abc import Iterable
 from typing import Final
 
 from emu.chips import chip_named, chip_of
-from emu.elffacts import PROCESSOR_MASK
-from toolchain.bounds.bindings import Bindings
+from emu.image.elf_facts import PROCESSOR_MASK
+from toolchain.bounds.abstract.state import State
+from toolchain.bounds.abstract.values import WINDOW
+from toolchain.bounds.annotations.bindings import Bindings
+from toolchain.bounds.annotations.names import Names
+from toolchain.bounds.annotations.notes import Note, Notes
+from toolchain.bounds.annotations.sources import Sources
 from toolchain.bounds.graph import Builder
-from toolchain.bounds.names import Names
-from toolchain.bounds.notes import Note, Notes
 from toolchain.bounds.signatures import Signatures
-from toolchain.bounds.sources import Sources
-from toolchain.bounds.state import State
-from toolchain.bounds.values import WINDOW
 from toolchain.elf.disassemble import items
 from toolchain.elf.model import Executable
 from toolchain.errors import ToolError

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from toolchain.bounds.abstract.state import LEVELS, Area, State
+from toolchain.bounds.abstract.values import Value, span
+from toolchain.bounds.annotations.rules import CUT, FOLLOWED, SLEEPS, WAITS, Rules
 from toolchain.bounds.builder import World
 from toolchain.bounds.explore import Explorer, TooMuch
-from toolchain.bounds.outcome import Outcome
 from toolchain.bounds.program import Program
-from toolchain.bounds.rules import CUT, FOLLOWED, SLEEPS, WAITS, Rules
-from toolchain.bounds.state import LEVELS, Area, State
-from toolchain.bounds.values import Value, span
+from toolchain.bounds.result import Outcome
 from toolchain.stack.effects import CALL_BYTES
 
 RAM = (0x0800, 0x2800)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from emu.dspic30f.isa.flow import Branch, Disi, Do, Flow, Repeat, Return, Skip, Sleep
+from toolchain.bounds.abstract.state import INHERITED, LEVELS, State, widened
+from toolchain.bounds.abstract.values import ends
+from toolchain.bounds.annotations.rules import MOVED, NESTED
 from toolchain.bounds.builder import exact
 from toolchain.bounds.graph import Code, Step
-from toolchain.bounds.outcome import Outcome
-from toolchain.bounds.rules import MOVED, NESTED
-from toolchain.bounds.state import INHERITED, LEVELS, State, widened
-from toolchain.bounds.values import ends
+from toolchain.bounds.result import Outcome
 
 if TYPE_CHECKING:
     from toolchain.bounds.explore import Explorer

@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 
 from toolchain.commands.parser import parser
+from toolchain.elf.archive import Member, archive_bytes, read_members
 from toolchain.errors import ToolError
 from toolchain.files import read_bytes, write_outputs
-from toolchain.link.archive import Member, archive_bytes, read_members
 
 
 def options_of() -> argparse.ArgumentParser:

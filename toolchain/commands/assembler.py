@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from emu.files import is_standard
+from emu.host.files import is_standard
 from toolchain.arguments import definition
 from toolchain.asm.assemble import assemble
 from toolchain.asm.state import Options

@@ -6,10 +6,10 @@ import argparse
 import json
 from dataclasses import asdict
 
-from toolchain.bounds.notes import Notes, read_notes
+from toolchain.bounds.annotations.notes import Notes, read_notes
+from toolchain.bounds.interference import Report, report_of
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Bound
-from toolchain.bounds.together import Report, report_of
 from toolchain.commands.parser import parser
 from toolchain.elf.read import read_executable
 from toolchain.errors import ToolError

@@ -6,7 +6,7 @@ import argparse
 import re
 from importlib import import_module
 
-from emu.completion import SHELLS, description, script
+from emu.host.completion import SHELLS, description, script
 from toolchain.commands.parser import parser
 
 
@@ -31,7 +31,7 @@ def main(arguments: list[str]) -> int:
 
 def _compiler() -> argparse.ArgumentParser:
     """The compiler's options by name, as its help has them: it parses them itself, in gcc's manner."""
-    from toolchain.cc_options import HELP
+    from toolchain.frontend.options import HELP
 
     made = argparse.ArgumentParser(add_help=False)
     for line in HELP.splitlines():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from toolchain import driver
+from toolchain.driver import driver
 
 
 def main(arguments: list[str]) -> int:

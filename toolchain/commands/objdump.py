@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from emu.elffacts import RELOCATIONS, SectionFlag
+from emu.image.elf_facts import RELOCATIONS, SectionFlag
 from toolchain.commands.names import letter
 from toolchain.commands.parser import parser
 from toolchain.elf import constants as c

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from emu.status import DONE, FAULT
+from emu.host.exit_status import DONE, FAULT
 from toolchain.commands.parser import parser
 from toolchain.errors import ToolError
 from toolchain.files import write_outputs
@@ -44,9 +44,9 @@ def main(arguments: list[str]) -> int:
     options, rest = options_of().parse_known_args(arguments)
     if find_spec("z3") is None:
         raise ToolError("prove needs z3: python -m pip install z3-solver")
-    from toolchain.clang import CompileError
+    from toolchain.frontend.clang import CompileError
+    from toolchain.proof.problem import subject
     from toolchain.proof.prove import verdicts
-    from toolchain.proof.subject import subject
 
     try:
         made = subject([options.file, *rest])
@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
             print(_line(verdict), flush=True)
     counts = Counter(verdict.kind for verdict in found)
     if options.keep is not None:
-        from toolchain.proof.witness import image
+        from toolchain.proof.counterexample import image
 
         kept = [(v.function, image(made, v.witness)) for v in found if v.witness is not None]
         write_outputs([(Path(options.keep) / f"{name}.elf", content) for name, content in kept])

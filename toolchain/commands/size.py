@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from emu.elffacts import SectionFlag
+from emu.image.elf_facts import SectionFlag
 from toolchain.commands.parser import parser
 from toolchain.elf import constants as c
 from toolchain.elf.model import Section

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-from emu.status import DONE, FAULT
+from emu.host.exit_status import DONE, FAULT
 from toolchain.commands.parser import parser
 from toolchain.elf.read import read_executable
 from toolchain.errors import ToolError

@@ -1,8 +1,8 @@
-"""Generic ELF32 numbers (System V ABI, chapter 4) that the dsPIC30F facts of `emu.elffacts` build upon."""
+"""Generic ELF32 numbers (System V ABI, chapter 4) that the dsPIC30F facts of `emu.image.elf_facts` build upon."""
 
 from __future__ import annotations
 
-from emu.elffacts import EM_DSPIC30F
+from emu.image.elf_facts import EM_DSPIC30F
 
 __all__ = ["EM_DSPIC30F"]
 

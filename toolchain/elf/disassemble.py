@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from emu.dspic30f.isa import codec, text
 from emu.dspic30f.isa.row import Insn
-from emu.elffacts import OCTETS_PER_WORD, UNITS_PER_WORD
+from emu.image.elf_facts import OCTETS_PER_WORD, UNITS_PER_WORD
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Home, Section, Symbol
 from toolchain.elf.symbols import is_named

@@ -1,10 +1,10 @@
-"""Source lines of an executable, for `objdump -S`; the DWARF reader (phantom octets, pyelftools) is `emu.lines`."""
+"""Source lines of an executable, for `objdump -S`; the DWARF reader is `emu.image.lines`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from emu.lines import Line, Lines
+from emu.image.lines import Line, Lines
 from toolchain.elf.model import Executable
 
 __all__ = ["Line", "Lines", "SourceText", "lines_of"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from emu.elffacts import OCTETS_PER_WORD, Formula, Place, RelocationType
+from emu.image.elf_facts import OCTETS_PER_WORD, Formula, Place, RelocationType
 
 
 class FieldError(Exception):

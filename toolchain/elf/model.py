@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from emu.elffacts import OCTETS_PER_UNIT, ExtendedAttribute, SectionFlag
+from emu.image.elf_facts import OCTETS_PER_UNIT, ExtendedAttribute, SectionFlag
 from toolchain.elf import constants as c
 
 NO_ATTRIBUTES = ExtendedAttribute(0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from emu.elffacts import EM_DSPIC30F, EXT_ATTR_PREFIX, OCTETS_PER_UNIT, ExtendedAttribute, SectionFlag
+from emu.image.elf_facts import EM_DSPIC30F, EXT_ATTR_PREFIX, OCTETS_PER_UNIT, ExtendedAttribute, SectionFlag
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Reloc, Section, Symbol
 from toolchain.errors import ToolError

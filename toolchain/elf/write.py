@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from emu.elffacts import EXT_ATTR_PREFIX, OCTETS_PER_UNIT, SectionFlag
+from emu.image.elf_facts import EXT_ATTR_PREFIX, OCTETS_PER_UNIT, SectionFlag
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Section, Symbol
 from toolchain.errors import ToolError

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* XC16's attributes (abi-elf.md §1.4, §2.5) in clang's words. Inside `__attribute__((...))` only, so that a program may
  * use `space` or `interrupt` as names: each attribute is looked up as a macro __dspic_a_NAME; those that have none stay as
- * they are. What only a definition says becomes an annotation; what declarations repeat, a section. toolchain/lower/data.py and
+ * they are. What only a definition says becomes an annotation; what declarations repeat, a section. toolchain/emit/data.py and
  * isr.py read them. Constants, variables and functions cannot share a section, hence the counters. */
 #ifndef DSPIC_ATTRIBUTES_H
 #define DSPIC_ATTRIBUTES_H

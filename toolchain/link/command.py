@@ -11,10 +11,10 @@ from typing import NoReturn
 from emu.chips.chip import Chip, Region
 from toolchain.arguments import definition, integer
 from toolchain.device import DEFAULT, DEVICES, device
+from toolchain.elf.archive import MAGIC, Archive, open_archive
 from toolchain.elf.read import read_object
 from toolchain.elf.write import executable_bytes
 from toolchain.errors import ToolError
-from toolchain.link.archive import MAGIC, Archive, open_archive
 from toolchain.link.hexfile import hex_text
 from toolchain.link.link import Linked, link
 from toolchain.link.mapfile import map_text, memory_summary

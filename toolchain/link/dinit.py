@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from emu.elffacts import OCTETS_PER_WORD, ExtendedAttribute, SectionFlag
+from emu.image.elf_facts import OCTETS_PER_WORD, ExtendedAttribute, SectionFlag
 from toolchain.elf import constants as c
 from toolchain.elf.model import Section
 from toolchain.link.place import Layout

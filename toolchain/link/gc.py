@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from emu.chips.family import SLOTS
-from emu.elffacts import SectionFlag
+from emu.image.elf_facts import SectionFlag
 from toolchain.asm.finish import KEEP_PREFIX
 from toolchain.elf.model import Home, Section
 from toolchain.link.memory import CONFIG_SECTIONS

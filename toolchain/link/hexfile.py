@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from emu.elffacts import OCTETS_PER_UNIT, SectionFlag
+from emu.image.elf_facts import OCTETS_PER_UNIT, SectionFlag
 from toolchain.elf import constants as c
 from toolchain.elf.model import Executable, Section
 

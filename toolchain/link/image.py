@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from emu.elffacts import OCTETS_PER_WORD, Content, SectionFlag, content_kind
+from emu.image.elf_facts import OCTETS_PER_WORD, Content, SectionFlag, content_kind
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Executable, Home, Section, Symbol
 from toolchain.elf.symbols import is_named

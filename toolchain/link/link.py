@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from emu.chips.chip import Chip
-from emu.elffacts import (
+from emu.image.elf_facts import (
     GENERIC_PROCESSORS,
     OCTETS_PER_UNIT,
     PROCESSOR_MASK,
@@ -17,10 +17,10 @@ from emu.elffacts import (
     SectionFlag,
 )
 from toolchain.elf import constants as c
+from toolchain.elf.archive import Archive
 from toolchain.elf.model import Bind, Executable, Home, ObjectFile, Section, Symbol
 from toolchain.errors import ToolError
 from toolchain.link import dinit, part, synthesize
-from toolchain.link.archive import Archive
 from toolchain.link.gc import SECTION_LIMIT, live_sections, vector_names
 from toolchain.link.image import Output, build_executable, build_outputs
 from toolchain.link.memory import HANDLE_LIMIT, Memory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from emu.elffacts import OCTETS_PER_UNIT
+from emu.image.elf_facts import OCTETS_PER_UNIT
 from toolchain.elf.model import Section, Symbol
 from toolchain.elf.symbols import symbol_sizes
 from toolchain.link.link import Linked, memory_use

@@ -11,7 +11,7 @@ from typing import Final
 from emu.chips import NAMES, chip_named
 from emu.chips.chip import Chip, Region
 from emu.chips.family import UNIT_ID
-from emu.elffacts import UNITS_PER_WORD
+from emu.image.elf_facts import UNITS_PER_WORD
 from toolchain.link.options import Part
 
 HANDLE_LIMIT = 0x10000  # abi-elf.md §1.5: a function pointer is 16 bits

@@ -5,7 +5,7 @@ Before: the resolution of any program. After `adapt`: its constants are initiali
 
 from __future__ import annotations
 
-from emu.elffacts import SectionFlag
+from emu.image.elf_facts import SectionFlag
 from toolchain.elf.model import Section
 from toolchain.errors import ToolError
 from toolchain.link.gc import vector_names

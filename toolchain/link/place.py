@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from emu.elffacts import PSV_PAGE_UNITS, PSV_WINDOW, ExtendedAttribute, SectionFlag
+from emu.image.elf_facts import PSV_PAGE_UNITS, PSV_WINDOW, ExtendedAttribute, SectionFlag
 from toolchain.elf.model import Section
 from toolchain.elf.symbols import symbol_sizes
 from toolchain.errors import ToolError

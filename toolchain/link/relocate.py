@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from emu.elffacts import PSV_WINDOW, RELOCATIONS, UNSUPPORTED_RELOCATIONS, Formula, RelocationType
+from emu.image.elf_facts import PSV_WINDOW, RELOCATIONS, UNSUPPORTED_RELOCATIONS, Formula, RelocationType
 from toolchain.elf import fields
 from toolchain.elf.fields import FieldError
 from toolchain.elf.model import Bind, Home, Reloc, Section, Symbol

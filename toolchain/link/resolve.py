@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from toolchain.elf.archive import Archive, Member
 from toolchain.elf.model import Bind, Home, ObjectFile, Section, Symbol
 from toolchain.elf.read import read_object
 from toolchain.elf.symbols import is_named
 from toolchain.errors import ToolError
-from toolchain.link.archive import Archive, Member
 from toolchain.link.smartio import plain_name
 
 MAX_REFERENCES = 4  # places shown per undefined symbol

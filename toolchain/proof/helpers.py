@@ -12,7 +12,7 @@ from typing import Final
 
 import z3
 
-from toolchain.lower.abi import Shape, place_arguments
+from toolchain.abi.arguments import Shape, place_arguments
 from toolchain.proof.terms import Term
 
 Meaning = Callable[..., Term]

@@ -21,18 +21,18 @@ from typing import Any, Final
 
 import z3
 
+from toolchain.abi.target import SP
+from toolchain.ir.cfg import predecessors, reverse_postorder
 from toolchain.ir.model import Function
-from toolchain.lower.cfg import predecessors, reverse_postorder
-from toolchain.proof.claims import Claim, Order, guessed, orders, parts_of
-from toolchain.proof.code import Code
-from toolchain.proof.machine import State
+from toolchain.proof.code.code import Code
+from toolchain.proof.code.machine import State
+from toolchain.proof.invariants import Claim, Order, guessed, orders, parts_of
+from toolchain.proof.ir.source import Evaluator
 from toolchain.proof.memory import BYTE, Frame, Memory, joined, split
 from toolchain.proof.path import Path
+from toolchain.proof.problem import WORD_UNITS, Subject
 from toolchain.proof.solver import Refuted, Undecided, answer, budget, example, feasible
-from toolchain.proof.source import Evaluator
-from toolchain.proof.subject import WORD_UNITS, Subject
 from toolchain.proof.terms import Term, narrow, vector
-from toolchain.target import SP
 
 WAYS: Final = 8
 """Ways through the function that claims are guessed from,"""

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import z3
 
+from toolchain.abi.target import RAM_END, RETURN_ADDRESS_BYTES
 from toolchain.proof.terms import Term, known, vector
-from toolchain.target import RAM_END, RETURN_ADDRESS_BYTES
 
 STACK = 0x1A00
 """W15 behind the return address, at a function's first instruction."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from toolchain.ir.model import Value
+from toolchain.proof.asm_statements import Shape
 from toolchain.proof.memory import Memory
-from toolchain.proof.statements import Shape
 from toolchain.proof.terms import Term
 
 

@@ -14,23 +14,23 @@ from typing import Final
 
 import z3
 
+from toolchain.abi.arguments import Place
+from toolchain.abi.names import symbol
+from toolchain.abi.target import RETURN_ADDRESS_BYTES
+from toolchain.ir.cfg import loop_depths
 from toolchain.ir.model import Arg, ConstInt, Function, Instr, Type, size_of
-from toolchain.lower.abi import Place
-from toolchain.lower.calls import parameter_places
-from toolchain.lower.cfg import loop_depths
-from toolchain.lower.names import symbol
-from toolchain.proof.accesses import Accesses
-from toolchain.proof.code import Code
+from toolchain.proof.code.code import Code
+from toolchain.proof.code.machine import State
+from toolchain.proof.counterexample import Witness, witness_of
+from toolchain.proof.ir.accesses import Accesses
+from toolchain.proof.ir.source import Evaluator
 from toolchain.proof.loops import Induction
-from toolchain.proof.machine import State
 from toolchain.proof.memory import STACK, Frame, Memory, joined
 from toolchain.proof.path import Path
+from toolchain.proof.problem import Subject
 from toolchain.proof.solver import Refuted, Undecided, budget, example, feasible
-from toolchain.proof.source import Evaluator
-from toolchain.proof.subject import Subject
 from toolchain.proof.terms import Term
-from toolchain.proof.witness import Witness, witness_of
-from toolchain.target import RETURN_ADDRESS_BYTES
+from toolchain.select.calls import parameter_places
 
 
 @dataclass(frozen=True)

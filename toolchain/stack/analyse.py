@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from emu.chips import chip_named, chip_of
 from emu.chips.family import AIVT, SLOTS
-from emu.elffacts import PROCESSOR_MASK
+from emu.image.elf_facts import PROCESSOR_MASK
 from toolchain.elf import constants as c
 from toolchain.elf.disassemble import NO_INSTRUCTIONS, Item, Names, items
 from toolchain.elf.model import Bind, Executable

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from emu.dspic30f.facts import facts_of
+from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
 from toolchain.elf.disassemble import Item
 from toolchain.stack.effects import SP, Effect, Flow, Pointer, effect_of

@@ -14,7 +14,7 @@ from typing import Final
 
 from emu.boards.noise import Noise
 from emu.boards.part import Part
-from emu.hostcode import ADDRESS, DOUBLE, INT, address_of, functions
+from emu.native_library import ADDRESS, DOUBLE, INT, address_of, functions
 from emu.peripherals import Peripherals
 
 SENSORS: Final = 8

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.analog import Accelerometer, Infrared, Microphones
-from emu.boards.epuck.camera import Camera
+from emu.boards.epuck.camera.camera import Camera
 from emu.boards.epuck.config import CHIP, CONFIG, CRYSTAL_HZ
 from emu.boards.epuck.motors import Motors
 from emu.boards.epuck.remote import Remote

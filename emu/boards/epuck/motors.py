@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from emu.boards.part import Part
-from emu.hostcode import ADDRESS, INT, address_of, functions
+from emu.native_library import ADDRESS, INT, address_of, functions
 from emu.peripherals import Peripherals
 
 PORT: Final = 3

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from emu.boards.part import Part
-from emu.events import NEVER
 from emu.peripherals import Peripherals
+from emu.system.events import NEVER
 
 PIN: Final = "RF6"
 HALF_BIT_SECONDS: Final = 0.889e-3

@@ -7,9 +7,9 @@ from functools import partial
 from typing import Final
 
 from emu.boards.part import Part
-from emu.listeners import Listeners
 from emu.peripherals import Peripherals
 from emu.peripherals.pins import parse_pin
+from emu.system.observers import Listeners
 
 _ONES: Final = (1 << 64) - 1
 

@@ -37,9 +37,9 @@ from emu.boards.epuck.remote import KEYS
 from emu.boards.epuck.waveform import WaveformError, moment, read_csv, read_vcd
 from emu.boards.part import Part
 from emu.boards.picture import read_picture
-from emu.files import read_file
+from emu.host.files import read_file
 from emu.peripherals.pins import parse_pin
-from emu.peripherals.serialline import BREAK, FRAMING_ERROR, PARITY_ERROR
+from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR
 
 if TYPE_CHECKING:
     from emu.boards.epuck.board import Epuck

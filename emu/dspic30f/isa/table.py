@@ -5,33 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from . import (
-    rows_bit,
-    rows_compare,
-    rows_control,
-    rows_dsp,
-    rows_flow,
-    rows_logic,
-    rows_math,
-    rows_move,
-    rows_multiply,
-    rows_shift,
-    rows_stack,
-)
+from emu.dspic30f.isa.rows import bit, compare, control, dsp, flow, logic, math, move, multiply, shift, stack
+
 from .row import Row
 
 GROUPS = (
-    rows_move,
-    rows_math,
-    rows_multiply,
-    rows_logic,
-    rows_shift,
-    rows_bit,
-    rows_compare,
-    rows_flow,
-    rows_stack,
-    rows_control,
-    rows_dsp,
+    move,
+    math,
+    multiply,
+    logic,
+    shift,
+    bit,
+    compare,
+    flow,
+    stack,
+    control,
+    dsp,
 )
 
 ROWS: Final[tuple[Row, ...]] = tuple(sorted((row for group in GROUPS for row in group.ROWS), key=lambda row: row.id))

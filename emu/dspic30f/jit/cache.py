@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from emu.places import native_code
+from emu.host.paths import native_code
 
 CHECKSUM_BYTES: Final = 32
 SHELVES: Final = 256
@@ -31,11 +31,9 @@ def sources_hash() -> bytes:
     """Hash of every module whose text decides what is generated: table, translator, device descriptions."""
     root = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256()
-    for part in ("dspic30f", "peripherals", "boards", "chips"):
+    for part in ("dspic30f", "peripherals", "boards", "chips", "system"):
         for path in sorted((root / part).rglob("*.py")):
             digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    for name in ("record.py", "events.py", "bus.py", "device.py", "straight.py"):
-        digest.update((root / name).read_bytes())
     return digest.digest()
 
 

@@ -27,7 +27,7 @@ from weakref import WeakSet, WeakValueDictionary
 
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.worker import REFUSED, REPLY, REQUEST, Backend
-from emu.places import native_code
+from emu.host.paths import native_code
 
 
 @dataclass(slots=True)

@@ -16,14 +16,26 @@ from typing import Any, Final, Protocol
 from weakref import WeakValueDictionary
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.facts import facts_of
+from emu.dspic30f.cycle_accounting import STRETCH, Ledger
 from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.jit.compiler import Loaded, shared_compiler
-from emu.dspic30f.jit.counting import LEDGER, BoundaryCounting, Counting, RowOf
-from emu.dspic30f.jit.pointed import POINTED, pointed_text
-from emu.dspic30f.jit.region import Region, discover
+from emu.dspic30f.jit.exit_reasons import (
+    DEADLINE,
+    ENTERS,
+    HOOK,
+    INTERPRET,
+    MISS,
+    RETFIE,
+    SERVICE,
+    Surroundings,
+    identity_of,
+    offsets,
+    surroundings_of,
+    wiring_of,
+)
 from emu.dspic30f.jit.runtime import (
     BLOCKS,
     BOUNDARY,
@@ -39,26 +51,14 @@ from emu.dspic30f.jit.runtime import (
     STEPS,
     dispatch_text,
 )
-from emu.dspic30f.jit.surroundings import (
-    DEADLINE,
-    ENTERS,
-    HOOK,
-    INTERPRET,
-    MISS,
-    RETFIE,
-    SERVICE,
-    Surroundings,
-    identity_of,
-    offsets,
-    surroundings_of,
-    wiring_of,
-)
-from emu.dspic30f.jit.translate import NOWHERE, RESUME, Translator
-from emu.dspic30f.ledger import STRETCH, Ledger
-from emu.dspic30f.modes import Key, Modes
-from emu.dspic30f.state import IPL3, NOT_REPEATING, RUN
-from emu.native import FRESH_ROOM, Native, Run
-from emu.straight import Rule
+from emu.dspic30f.jit.translate.cycle_counters import LEDGER, BoundaryCounting, Counting, RowOf
+from emu.dspic30f.jit.translate.function import NOWHERE, RESUME, Translator
+from emu.dspic30f.jit.translate.indirect_sfr import POINTED, pointed_text
+from emu.dspic30f.jit.translate.region import Region, discover
+from emu.dspic30f.state.modes import Key, Modes
+from emu.dspic30f.state.state import IPL3, NOT_REPEATING, RUN
+from emu.system.native_handle import FRESH_ROOM, Native, Run
+from emu.system.rules import Rule
 
 BLOCK_LEVEL, STEP_LEVEL = 2, 0
 """LLVM effort for blocks and for single-step code."""

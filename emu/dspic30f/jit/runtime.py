@@ -8,13 +8,13 @@ from __future__ import annotations
 from typing import Final
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.jit.counting import BoundaryCount
-from emu.dspic30f.jit.pointed import POINTED
-from emu.dspic30f.jit.service import DONE, HALFWAY, service_text
-from emu.dspic30f.jit.surroundings import ARRIVE, DEADLINE, ENTERS, INTERPRET, MISS, NEXT, RETFIE, SERVICE
-from emu.dspic30f.jit.translate import ARRIVED
-from emu.events import NEVER
-from emu.native import FRESH_ROOM
+from emu.dspic30f.jit.exit_reasons import ARRIVE, DEADLINE, ENTERS, INTERPRET, MISS, NEXT, RETFIE, SERVICE
+from emu.dspic30f.jit.translate.boundary import DONE, HALFWAY, service_text
+from emu.dspic30f.jit.translate.cycle_counters import BoundaryCount
+from emu.dspic30f.jit.translate.function import ARRIVED
+from emu.dspic30f.jit.translate.indirect_sfr import POINTED
+from emu.system.events import NEVER
+from emu.system.native_handle import FRESH_ROOM
 
 LIMIT, BLOCKS, STEPS, ENTERED, BOUNDARY = range(5)
 """Words of the environment: cycle to stop at; tables of code addresses by program word: blocks, single

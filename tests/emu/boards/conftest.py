@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from emu.boards.epuck.board import Epuck
-from emu.machine import Machine
-from toolchain.driver import main as compile_program
+from emu.machine.machine import Machine
+from toolchain.driver.driver import main as compile_program
 
 PROGRAMS = Path(__file__).with_name("programs")
 

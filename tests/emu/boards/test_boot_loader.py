@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from emu.boards.epuck.board import Epuck
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 
 ROW = 0x8000
 RETURN = 0x060000

@@ -8,10 +8,10 @@ import random
 import numpy as np
 import pytest
 
-from emu.boards.epuck.pixels import Gains, decode, encode
-from emu.boards.epuck.scan import HREF, PCLK, VSYNC, per_frame
-from emu.boards.epuck.sensors import SENSORS
-from emu.peripherals.timerrules import switch
+from emu.boards.epuck.camera.pixels import Gains, decode, encode
+from emu.boards.epuck.camera.scan import HREF, PCLK, VSYNC, per_frame
+from emu.boards.epuck.camera.sensors import SENSORS
+from emu.peripherals.timers.rules import switch
 
 from .conftest import Robot
 

@@ -8,8 +8,8 @@ from functools import partial
 import pytest
 
 from emu.boards.epuck.board import Epuck
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 
 SETTLED = 3_000
 """Tcy until the program has read its variables."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from emu.boards.epuck.camera import Camera
-from emu.boards.epuck.pixels import line_code
+from emu.boards.epuck.camera.camera import Camera
+from emu.boards.epuck.camera.pixels import line_code
 
 from .conftest import Robot
 from .test_camera import po3030, po6030, scene

@@ -8,9 +8,9 @@ from emu.boards import BOARDS, board_named
 from emu.boards.epuck.board import Epuck
 from emu.boards.part import Part
 from emu.chips import chip_named
-from emu.image import Image
-from emu.loader import parse_image
-from emu.machine import Machine
+from emu.image.loader import parse_image
+from emu.image.model import Image
+from emu.machine.machine import Machine
 from emu.peripherals import Peripherals
 
 LOOP_HEX = b":020000040000FA\n:04000000FFFF3700C7\n:00000001FF\n"

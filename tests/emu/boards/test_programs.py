@@ -11,10 +11,10 @@ import pytest
 
 from emu.boards.epuck.analog import RESPONSE
 from emu.boards.epuck.board import Epuck
-from emu.boards.epuck.pixels import decode
+from emu.boards.epuck.camera.pixels import decode
 from emu.boards.epuck.stimulus import parse
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 
 FCY = 14_745_600
 

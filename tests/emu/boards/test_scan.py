@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from emu.boards.epuck.scan import HREF, PCLK, VSYNC, Course, Scan
-from emu.boards.epuck.sensors import SENSORS
-from emu.record import Record
+from emu.boards.epuck.camera.scan import HREF, PCLK, VSYNC, Course, Scan
+from emu.boards.epuck.camera.sensors import SENSORS
+from emu.system.record import Record
 
 from .conftest import Robot
 

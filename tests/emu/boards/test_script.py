@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from emu.boards.epuck.observer import Watch
 from emu.boards.epuck.stimulus import StimulusError, parse
-from emu.boards.epuck.watch import Watch
 
 FCY = 14_745_600
 

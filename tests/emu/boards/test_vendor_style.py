@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from emu.boards.epuck.board import Epuck
-from emu.loader import load_image
-from emu.machine import Machine
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
 
 FCY = 14_745_600
 

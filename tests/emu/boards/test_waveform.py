@@ -7,7 +7,7 @@ import pytest
 from emu.boards.epuck.stimulus import StimulusError, waveform
 from emu.cli import main
 from tests.vcd_reader import VCDVCD
-from toolchain.driver import main as compile_program
+from toolchain.driver.driver import main as compile_program
 
 PULSES = """
 #include <p30F6014A.h>

@@ -20,8 +20,8 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402
 from emu.dspic30f.engines import NAMES  # noqa: E402
 from emu.dspic30f.isa.table import ROWS  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.dspic30f.specialised import SpecialisedEngine  # noqa: E402
-from emu.machine import Machine  # noqa: E402
+from emu.dspic30f.specialised.engine import SpecialisedEngine  # noqa: E402
+from emu.machine.machine import Machine  # noqa: E402
 
 ENGINES = [name for name in NAMES if name != "auto"]
 NO_WATCHDOG = 0x7FFF

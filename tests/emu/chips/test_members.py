@@ -6,7 +6,7 @@ import pytest
 
 from emu.chips import NAMES, chip_named, chip_of
 from emu.chips.chip import Chip
-from emu.machine import Machine
+from emu.machine.machine import Machine
 from emu.peripherals.pins import parse_pin
 
 CHIPS = [chip_named(name) for name in NAMES]

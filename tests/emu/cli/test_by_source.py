@@ -8,11 +8,11 @@ import re
 import pytest
 
 import emu
-from emu.debug.calls import CallError
+from emu.debug.dwarf.location import Unavailable
+from emu.debug.function_call import CallError
 from emu.debug.history import History
-from emu.debug.locate import Unavailable
-from emu.peripherals.expect import ExpectError
-from toolchain import driver
+from emu.peripherals.wait import ExpectError
+from toolchain.driver import driver
 
 PROGRAM = """
 #include <stdint.h>

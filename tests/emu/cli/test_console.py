@@ -8,8 +8,8 @@ import threading
 
 import pytest
 
-from emu.console import open_port, wait_for_input
-from emu.stamps import HEADER, Stamp, read_stamps
+from emu.run.console import open_port, wait_for_input
+from emu.run.input_log import HEADER, Stamp, read_stamps
 
 
 def test_a_file_gets_every_byte_and_gives_none(tmp_path):

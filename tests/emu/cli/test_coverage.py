@@ -14,8 +14,8 @@ import pytest
 
 import emu
 from emu.cli import main
-from emu.coverage import Counts, counting
-from toolchain import driver
+from emu.instruments.coverage import Counts, counting
+from toolchain.driver import driver
 
 SOURCE = """\
 #include <stdio.h>

@@ -49,7 +49,7 @@ work:
 
 def test_what_is_nowhere_is_said_before_the_run(spin: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which has no end here."""
-    monkeypatch.setattr("emu.session.Session.run", lambda _session: pytest.fail("it ran"))
+    monkeypatch.setattr("emu.run.session.Session.run", lambda _session: pytest.fail("it ran"))
     assert main(["run", spin, "--dump-native", "_nobody"]) == 2
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import emu
 from emu.cli import main
-from toolchain import driver
+from toolchain.driver import driver
 
 RECURSION = """
 int depth(int n) { volatile char pad[20]; pad[0] = n; return depth(n + 1) + pad[0]; }

@@ -15,8 +15,8 @@ from elf_samples import Name, xc16_like
 
 from emu.cli import main
 from emu.commands.info import describe
-from emu.footprint import UNKNOWN, pieces, totals
-from emu.loader import parse_image
+from emu.image.footprint import UNKNOWN, pieces, totals
+from emu.image.loader import parse_image
 
 
 @pytest.fixture

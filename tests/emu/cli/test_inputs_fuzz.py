@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from arena.record import Columns, RecordError
-from emu.coverage import Counts
-from emu.loader import load_image
+from arena.trial.record import Columns, RecordError
+from emu.image.loader import load_image
+from emu.instruments.coverage import Counts
 from tests.fuzz.fuzz_inputs import call, campaign, converse
 
 HELLO = Path(__file__).with_name("hello.hex")
@@ -83,7 +83,7 @@ def test_a_record_without_a_column_is_named(tmp_path: Path) -> None:
 
 
 def test_counts_that_are_no_numbers_are_refused() -> None:
-    from emu.coverage import fingerprint
+    from emu.instruments.coverage import fingerprint
 
     image = load_image(HELLO)
     with pytest.raises(ValueError, match="expected counts of an earlier run"):

@@ -11,10 +11,10 @@ from collections import Counter, defaultdict
 import pytest
 
 from emu.cli import main
-from emu.loader import load_image
-from emu.machine import Machine
-from emu.profile.shares import Profiler
-from toolchain.driver import main as compile_program
+from emu.image.loader import load_image
+from emu.machine.machine import Machine
+from emu.profile.cycle_shares import Profiler
+from toolchain.driver.driver import main as compile_program
 
 SOURCE = """
 #include <p30F6014A.h>

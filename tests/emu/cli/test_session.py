@@ -12,11 +12,11 @@ from programs import ECHO, SPIN, executable
 
 import emu
 import emu.api
-from emu import session as sessions
-from emu.console import Port
-from emu.loader import parse_image
-from emu.session import Session
-from emu.stamps import Stamp
+from emu.image.loader import parse_image
+from emu.run import session as sessions
+from emu.run.console import Port
+from emu.run.input_log import Stamp
+from emu.run.session import Session
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -108,6 +108,9 @@ def test_the_documented_example_runs(monkeypatch):
 
 def test_names_load_lazily():
     """Design §2: tools that need only the table or the chip's data pay for nothing else."""
-    code = "import sys, emu.chips.dspic30f6014a, emu.elffacts; print({'emu.machine', 'numpy'} & set(sys.modules))"
+    code = (
+        "import sys, emu.chips.dspic30f6014a, emu.image.elf_facts\n"
+        "print({'emu.machine.machine', 'numpy'} & set(sys.modules))"
+    )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"

@@ -6,7 +6,7 @@ import pytest
 
 import emu
 from emu.cli import main
-from toolchain import driver
+from toolchain.driver import driver
 
 MISTAKES = {
     "int *volatile p; int main(void) { *p = 5; return 0; }": "null pointer: writing 2 bytes at 0x0000",

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from emu.device import Irq
 from emu.dspic30f.isa.text import parse
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine
-from emu.stops import Stop
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.machine.machine import Machine
+from emu.machine.stops import Stop
+from emu.system.device import Irq
 
 START = 0x200
 RAM = 0x1000

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa.codec import EncodeError, decode, encode
+from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Branch, Call, Do, Goto, Repeat, Reset, Return, Skip, Sleep
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine
-from emu.stops import Stop
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.machine.machine import Machine
+from emu.machine.stops import Stop
 
 PC = 0x4000
 INTERESTING = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFE, 0xFFFF)

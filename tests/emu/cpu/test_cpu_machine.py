@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from cpu_rig import RAM, START, Rig
 
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 
 def test_an_unknown_engine_is_refused() -> None:

@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from cpu_rig import Rig
 
-from emu.dspic30f import flowrules
+from emu.dspic30f.interpreter import flow_rules
+from emu.dspic30f.interpreter.rule_paths import function_of
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.state import NOT_REPEATING, RA, State
-from emu.dspic30f.ways import function_of
-from emu.machine import Machine
-from emu.straight import NUMBERS, Place
+from emu.dspic30f.state.state import NOT_REPEATING, RA, State
+from emu.machine.machine import Machine
+from emu.system.rules import NUMBERS, Place
 
 
 class OnNumbers:
@@ -43,13 +43,13 @@ class OnNumbers:
 
 
 RULES = {
-    "repeat": (flowrules.repeat, ("count",)),
-    "repeated": (flowrules.repeated, ("counting",)),
-    "repeating": (flowrules.repeating, ("count", "left")),
-    "do": (flowrules.do, ("count", "start", "end")),
-    "loop_again": (flowrules.loop_again, ()),
-    "resume": (flowrules.resume, ("srl", "ipl3")),
-    "disi": (flowrules.disi, ("count", "after")),
+    "repeat": (flow_rules.repeat, ("count",)),
+    "repeated": (flow_rules.repeated, ("counting",)),
+    "repeating": (flow_rules.repeating, ("count", "left")),
+    "do": (flow_rules.do, ("count", "start", "end")),
+    "loop_again": (flow_rules.loop_again, ()),
+    "resume": (flow_rules.resume, ("srl", "ipl3")),
+    "disi": (flow_rules.disi, ("count", "after")),
 }
 
 
@@ -58,7 +58,7 @@ def test_generated_python_does_what_the_rule_says(name: str) -> None:
     rule, parameters = RULES[name]
     generator = random.Random(name)
     one, other = (Machine(engine="plain").state for _ in range(2))
-    places = flowrules.places_of(one)
+    places = flow_rules.places_of(one)
     run = function_of(other.record, rule, places, *parameters)
     results = set()
     for _ in range(100):
@@ -80,13 +80,13 @@ def test_generated_python_does_what_the_rule_says(name: str) -> None:
 @pytest.mark.parametrize("count", range(1, 6))
 def test_a_repeat_that_is_counted_elsewhere_leaves_the_same_state(count: int) -> None:
     state, closed = (Machine(engine="plain").state for _ in range(2))
-    places = flowrules.places_of(state)
+    places = flow_rules.places_of(state)
     stepped, jumped = OnNumbers(state), OnNumbers(closed)
-    assert stepped.run(flowrules.repeat, places, count)
+    assert stepped.run(flow_rules.repeat, places, count)
     for left in range(count, -1, -1):
-        jumped.run(flowrules.repeating, places, count, left)
+        jumped.run(flow_rules.repeating, places, count, left)
         assert (state.rcount, state.repeat, state.sr) == (closed.rcount, closed.repeat, closed.sr)
-        assert stepped.run(flowrules.repeated, places, state.sr & RA) == (left != 0)
+        assert stepped.run(flow_rules.repeated, places, state.sr & RA) == (left != 0)
     assert state.repeat == NOT_REPEATING
 
 

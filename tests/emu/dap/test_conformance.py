@@ -12,7 +12,7 @@ import pytest
 
 from tests.emu.dap.node import ROOT, mocha, node_modules
 from tests.emu.dap.test_dap import SOURCE, line_of
-from toolchain import driver
+from toolchain.driver import driver
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from tests.emu.dap.client import ROOT, Client
-from toolchain import driver
+from toolchain.driver import driver
 
 SOURCE = Path(__file__).parent / "program.c"
 

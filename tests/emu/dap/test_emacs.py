@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.emu.dap.test_dap import SOURCE, line_of
-from toolchain import driver
+from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]
 SITE = Path("/usr/share/emacs/site-lisp/elpa-src")

@@ -11,13 +11,13 @@ from types import SimpleNamespace
 import pytest
 
 from emu.cli import main
+from emu.image.loader import load_image
 from emu.inject.campaign import CampaignError, read
 from emu.inject.faults import KINDS, Fault, choose, do
 from emu.inject.report import summary
 from emu.inject.trial import OUTCOMES, Trials
-from emu.loader import load_image
-from emu.machine import Machine
-from toolchain.driver import main as compile_program
+from emu.machine.machine import Machine
+from toolchain.driver.driver import main as compile_program
 
 SOURCE = """
 #include <p30F6014A.h>

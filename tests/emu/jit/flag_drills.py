@@ -26,8 +26,8 @@ from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.machine.machine import Machine
 
 ENGINES: Final = ("plain", "interp", "jit")
 FLAGS: Final = ("C", "Z", "OV", "N", "DC")

@@ -18,11 +18,11 @@ from twins import NO_WATCHDOG, Difference, QuickCompiler, Tally, advance
 from emu.dspic30f.jit import engine as jit_engine
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.runtime import ENV_WORDS
-from emu.dspic30f.jit.translate import Translator
-from emu.dspic30f.jit.values import Number
-from emu.dspic30f.pysource import Source
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine
+from emu.dspic30f.jit.translate.function import Translator
+from emu.dspic30f.jit.translate.values import Number
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.dspic30f.specialised.source import Source
+from emu.machine.machine import Machine
 
 EXECUTED: Final = ENV_WORDS - 1
 """Word of the native environment in which instructions are counted."""

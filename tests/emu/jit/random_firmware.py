@@ -13,7 +13,7 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.isa import codec, table
 from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Row
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 CODE, ISR, HANDLER, LEAF = 0x200, 0x1000, 0x1100, 0x1180
 """Program addresses of the body, the interrupt handlers, the trap handler and a callee."""

@@ -22,8 +22,8 @@ from random_firmware import (
 )
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.facts import facts_of
 from emu.dspic30f.isa import codec, table
+from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Row
 

@@ -16,7 +16,7 @@ from straight_body import Shape
 from straight_firmware import straight_firmware
 from twins import Difference, Tally, Watch, advance, check_straight, check_wild, twins
 
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 SHORT = Shape(instructions=250)
 

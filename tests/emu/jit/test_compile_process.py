@@ -21,7 +21,7 @@ from emu.dspic30f.jit import compiler as compiler_module
 from emu.dspic30f.jit.cache import SHELVES, ObjectCache
 from emu.dspic30f.jit.compiler import PATIENCE, Compiler, Loaded
 from emu.dspic30f.jit.engine import JitEngine
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 IR = "define i64 @entry(ptr %rec, ptr %env) {{\n  ret i64 {}\n}}\n"
 
@@ -188,7 +188,7 @@ def test_code_arrives_while_no_address_is_missed(compiler: Compiler) -> None:
 FRAGMENTED = """
 import ctypes, mmap
 from pathlib import Path
-from emu.hostcode import DOUBLE, INT, functions
+from emu.native_library import DOUBLE, INT, functions
 
 c = ctypes.CDLL(None)
 c.mmap.restype = ctypes.c_void_p

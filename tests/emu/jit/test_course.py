@@ -14,11 +14,11 @@ from random_firmware import Firmware, difference, literal, to_sfr, words_of
 from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
+from emu.dspic30f.cycle_accounting import Ledger
 from emu.dspic30f.isa.codec import decode_for_execution
-from emu.dspic30f.jit.course import ARM, ARMS, course
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.jit.region import Region, discover
-from emu.dspic30f.ledger import Ledger
+from emu.dspic30f.jit.translate.region import Region, discover
+from emu.dspic30f.jit.translate.trace_block import ARM, ARMS, course
 
 IFS0 = DSPIC30F6014A.sfrs["IFS0"].address
 START = 0x200

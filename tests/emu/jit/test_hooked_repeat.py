@@ -10,8 +10,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 from random_firmware import Firmware, difference, literal, load, to_sfr, words_of
 from twins import twins
 
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.machine.machine import Machine
 
 
 def test_a_hooked_repeat_that_never_fits_before_the_next_event_goes_on() -> None:

@@ -15,7 +15,7 @@ from random_firmware import Firmware, difference, literal, load, random_firmware
 
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.engine import JitEngine
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 
 @pytest.fixture(autouse=True)

@@ -16,7 +16,7 @@ from test_native_code import eager, own_cache  # noqa: F401  (the fixture)
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 AT = {name: f"{sfr.address:#x}" for name, sfr in DSPIC30F6014A.sfrs.items()}
 

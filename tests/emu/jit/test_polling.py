@@ -15,11 +15,11 @@ from test_native_code import own_cache, pair  # noqa: F401  (the fixture)
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.row import Insn
-from emu.dspic30f.jit.polling import empty_loops
-from emu.dspic30f.jit.region import discover
-from emu.dspic30f.jit.surroundings import offsets, surroundings_of
-from emu.dspic30f.modes import Modes
-from emu.machine import Machine
+from emu.dspic30f.jit.exit_reasons import offsets, surroundings_of
+from emu.dspic30f.jit.translate.polling import empty_loops
+from emu.dspic30f.jit.translate.region import discover
+from emu.dspic30f.state.modes import Modes
+from emu.machine.machine import Machine
 
 IFS0, TMR1 = (DSPIC30F6014A.sfrs[name].address for name in ("IFS0", "TMR1"))
 FLAG = 0x900

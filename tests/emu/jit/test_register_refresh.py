@@ -10,7 +10,7 @@ from random_firmware import difference
 
 from emu.boards.epuck.board import Epuck
 from emu.dspic30f.isa.text import parse
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 LOOP = 0x200
 CYCLES = 400_000

@@ -15,7 +15,7 @@ from random_firmware import difference, load, random_firmware
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 
 def machine(engine: str, seed: int) -> Machine:

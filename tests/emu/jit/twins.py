@@ -21,13 +21,13 @@ from straight_firmware import straight_firmware
 
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.dspic30f.faults import Breakpoint, IllegalOpcode
+from emu.dspic30f.exceptions.faults import Breakpoint, IllegalOpcode
 from emu.dspic30f.isa.flow import Branch, Return, Skip, Sleep
 from emu.dspic30f.jit.compiler import Compiler, Loaded
 from emu.dspic30f.jit.engine import JitEngine
 from emu.dspic30f.jit.worker import Backend
-from emu.dspic30f.state import DA, NOT_REPEATING, RA
-from emu.machine import Machine
+from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
+from emu.machine.machine import Machine
 
 MODE_BITS = 0x10F7
 """CORCON bits that are processor modes (isa.md §2.4)."""

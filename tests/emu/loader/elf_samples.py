@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass, field
 
-from emu.elffacts import EM_DSPIC30F, SectionFlag
+from emu.image.elf_facts import EM_DSPIC30F, SectionFlag
 
 CODE = int(SectionFlag.ALLOC | SectionFlag.EXECINSTR)
 PSV = int(SectionFlag.ALLOC | SectionFlag.PSV)

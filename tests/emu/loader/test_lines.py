@@ -8,8 +8,8 @@ import pytest
 from dwarf_samples import debug_sections
 from elf_samples import doubled, xc16_like
 
-from emu.lines import undoubled
-from emu.loader import parse_image
+from emu.image.lines import undoubled
+from emu.image.loader import parse_image
 
 
 def image_with(parts):

@@ -7,8 +7,8 @@ import struct
 import pytest
 from elf_samples import CODE, DATA_COPY, PSV, ElfSample, Name, Part, words, xc16_like
 
-from emu.image import LoadError
-from emu.loader import load_image, parse_image
+from emu.image.loader import load_image, parse_image
+from emu.image.model import LoadError
 
 
 def parsed(sample: ElfSample):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from elf_samples import words, xc16_like
 
-from emu.image import LoadError
-from emu.loader import load_image, parse_image
+from emu.image.loader import load_image, parse_image
+from emu.image.model import LoadError
 
 
 def record(address: int, data: bytes, kind: int = 0) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emu.openswarm.baseline import Number, Row, Sources, compare, load, save, short, table
+from emu.kernel_metrics.baseline import Number, Row, Sources, compare, load, save, short, table
 
 
 def test_a_baseline_comes_back_as_it_was_written(tmp_path):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from typing import Final
 
-from emu.dspic30f.state import DA, NOT_REPEATING, RA
-from emu.machine import Machine
+from emu.dspic30f.state.state import DA, NOT_REPEATING, RA
+from emu.machine.machine import Machine
 
 WAYS: Final = ("address", "pointer", "REPEAT", "DO", "handler", "event")
 """Bit n of a key's last part: by address, by pointer, under REPEAT, in DO, with IPL above 0 in a handler, in the very

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import pytest
 
-from emu.bus import Bus
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.events import Events
 from emu.peripherals import Peripherals, Wires, build
-from emu.program import ProgramMemory
-from emu.record import Record
+from emu.system.bus import Bus
+from emu.system.events import Events
+from emu.system.program import ProgramMemory
+from emu.system.record import Record
 
 XT_PLL8 = 0xFFE6
 """FOSC of the e-puck (§2): Fcy = 14.7456 MHz."""

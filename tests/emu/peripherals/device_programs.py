@@ -30,11 +30,11 @@ from emu.boards.epuck.board import Epuck
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.machine import Machine
-from emu.peripherals.i2cbus import I2cDevice
-from emu.peripherals.i2cslave import OutsideMaster
-from emu.stops import Stop
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.machine.machine import Machine
+from emu.machine.stops import Stop
+from emu.peripherals.i2c.bus import I2cDevice
+from emu.peripherals.i2c.slave import OutsideMaster
 
 from .device_scenes import SCENES
 

@@ -27,10 +27,10 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.isa import text
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised import SpecialisedEngine
-from emu.dspic30f.state import PSV
-from emu.machine import Machine
-from emu.stops import Stop
+from emu.dspic30f.specialised.engine import SpecialisedEngine
+from emu.dspic30f.state.state import PSV
+from emu.machine.machine import Machine
+from emu.machine.stops import Stop
 
 from .access_census import Census
 from .device_drills import CONTROL, DRILLS, MODES, Image, image_of, registers_of

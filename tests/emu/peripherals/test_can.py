@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emu.peripherals.canframe import CanFrame, _crc
+from emu.peripherals.can.frame import CanFrame, _crc
 
 NORMAL, LOOPBACK = 0, 2
 

@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from emu.machine import Machine
+from emu.machine.machine import Machine
 
 from .access_census import WAYS, ways_of
 from .device_drills import registers_of

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import pytest
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.machine import Machine
-from emu.peripherals.i2cslave import OutsideMaster
+from emu.machine.machine import Machine
+from emu.peripherals.i2c.slave import OutsideMaster
 from tests.emu.peripherals.conftest import Rig
 from tests.emu.peripherals.test_can import configure, load
 

@@ -7,8 +7,8 @@ import random
 import pytest
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A, SFRS
-from emu.events import NEVER
 from emu.peripherals.pins import PORTS, parse_pin
+from emu.system.events import NEVER
 
 from .conftest import Rig
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from emu.peripherals.i2cbus import I2cDevice
-from emu.peripherals.i2cslave import OutsideMaster
+from emu.peripherals.i2c.bus import I2cDevice
+from emu.peripherals.i2c.slave import OutsideMaster
 
 I2CEN, SCLREL = 0x8000, 0x1000
 SEN, RSEN, PEN, RCEN, ACKEN, ACKDT = 1, 2, 4, 8, 0x10, 0x20

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from emu.machine import Machine
-from emu.peripherals.plain import PLAIN, report
+from emu.machine.machine import Machine
+from emu.peripherals.system.plain_registers import PLAIN, report
 
 LIST = Path(__file__).parents[3] / "docs" / "plain-registers.md"
 

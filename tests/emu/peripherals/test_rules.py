@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from emu.straight import Integers, Place, Rule
+from emu.system.rules import Integers, Place, Rule
 
 from .conftest import Rig
 from .test_fuzz import WORDS, act

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from emu.machine import Machine
-from emu.peripherals.i2cbus import I2cDevice
-from emu.peripherals.i2cslave import OutsideMaster
+from emu.machine.machine import Machine
+from emu.peripherals.i2c.bus import I2cDevice
+from emu.peripherals.i2c.slave import OutsideMaster
 
 from .conftest import Rig
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from emu.peripherals.counting import advance, counts_until
+from emu.peripherals.timers.arithmetic import advance, counts_until
 
 TON, TSIDL, TGATE, TCS, T32 = 0x8000, 0x2000, 0x40, 0x02, 0x08
 

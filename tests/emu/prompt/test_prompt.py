@@ -19,11 +19,11 @@ import emu
 from emu.cli import main
 from emu.dap.server import Server
 from emu.debug.history import History
-from emu.prompt.looking import TOPICS
 from emu.prompt.reader import Prompt, candidates, carry_out
+from emu.prompt.state_commands import TOPICS
 from emu.prompt.table import TABLE
 from tests.emu.dap.test_dap import SOURCE, line_of
-from toolchain import driver
+from toolchain.driver import driver
 
 ROOT = Path(__file__).resolve().parents[3]
 PATIENCE = 60

@@ -2,7 +2,7 @@
 
 import pytest
 
-from emu.elffacts import ExtendedAttribute
+from emu.image.elf_facts import ExtendedAttribute
 from toolchain.asm.assemble import assemble
 from toolchain.elf import constants as c
 from toolchain.elf.model import Bind, Home

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import emu
 from emu.chips import chip_named
-from emu.device import flag_since
-from emu.events import NEVER
+from emu.system.device import flag_since
+from emu.system.events import NEVER
 
 CHIP = chip_named()
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from emu.loader import load_image
+from emu.image.loader import load_image
 from tests.fuzz.fuzz_bounds import examine, measure
 from tests.toolchain.c_programs import build
-from toolchain.bounds.notes import read_notes
+from toolchain.bounds.annotations.notes import read_notes
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Analyst
 from toolchain.cli import main

@@ -11,9 +11,9 @@ from tests.fuzz import c_interrupts
 from tests.fuzz.fuzz_bounds import ENOUGH, INTERRUPTED, Held
 from tests.toolchain.bounds.responses import Watched, watched
 from tests.toolchain.c_programs import build
-from toolchain.bounds.notes import read_notes
+from toolchain.bounds.annotations.notes import read_notes
+from toolchain.bounds.interference import Report, report_of
 from toolchain.bounds.program import Program
-from toolchain.bounds.together import Report, report_of
 from toolchain.cli import main
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations

@@ -8,10 +8,20 @@ import pytest
 
 import emu
 from tests.toolchain.c_programs import build
-from toolchain.bounds.notes import read_notes
+from toolchain.bounds.annotations.notes import read_notes
+from toolchain.bounds.annotations.rules import (
+    ADDRESSING,
+    JUMP,
+    LAST,
+    LOOP_REGISTER,
+    NESTED,
+    STACK_POINTER,
+    TABLE,
+    WAITS,
+    WAYS_IN,
+)
 from toolchain.bounds.program import Program
 from toolchain.bounds.report import Analyst, Bound
-from toolchain.bounds.rules import ADDRESSING, JUMP, LAST, LOOP_REGISTER, NESTED, STACK_POINTER, TABLE, WAITS, WAYS_IN
 from toolchain.elf.read import read_executable
 from toolchain.stack.annotations import Annotations
 

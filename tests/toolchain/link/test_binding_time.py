@@ -2,7 +2,7 @@
 
 import pytest
 
-from emu.elffacts import RELOCATIONS
+from emu.image.elf_facts import RELOCATIONS
 from toolchain.asm.assemble import assemble
 from toolchain.elf.read import read_object
 from toolchain.elf.write import object_bytes

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from emu.elffacts import SectionFlag
+from emu.image.elf_facts import SectionFlag
 from toolchain.asm.assemble import assemble
 from toolchain.errors import ToolError
 from toolchain.link.link import link

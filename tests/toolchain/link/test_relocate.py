@@ -2,7 +2,7 @@
 
 import pytest
 
-from emu.elffacts import RELOCATION_BY_NAME, RELOCATIONS, UNSUPPORTED_RELOCATIONS
+from emu.image.elf_facts import RELOCATION_BY_NAME, RELOCATIONS, UNSUPPORTED_RELOCATIONS
 from toolchain.elf.model import Bind, Home, ObjectFile, Reloc, Section, Symbol
 from toolchain.errors import ToolError
 from toolchain.link.link import link

@@ -6,10 +6,10 @@ import subprocess
 import pytest
 
 from toolchain.asm.assemble import assemble
+from toolchain.elf.archive import Member, archive_bytes, open_archive, read_members
 from toolchain.elf.read import read_object
 from toolchain.elf.write import object_bytes
 from toolchain.errors import ToolError
-from toolchain.link.archive import Member, archive_bytes, open_archive, read_members
 from toolchain.link.link import link
 from toolchain.link.options import LinkOptions
 

@@ -7,9 +7,9 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from toolchain.cc_options import CcOptions
-from toolchain.clang import clang_program, front_end_flags
-from toolchain.pipeline import Options, compile_module
+from toolchain.driver.pipeline import Options, compile_module
+from toolchain.frontend.clang import clang_program, front_end_flags
+from toolchain.frontend.options import CcOptions
 
 TWO_WORDS = re.compile(r"\t(call|goto) [^w]")
 

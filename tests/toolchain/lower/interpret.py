@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from toolchain.ir.build import compare, const, evaluate
 from toolchain.ir.model import Arg, ConstInt, Function, GlobalRef, Instr, Undef, Value
-from toolchain.lower.build import compare, const, evaluate
 
 MEMORY_TOP = 0x8000
 FUEL = 200_000

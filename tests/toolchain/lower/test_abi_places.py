@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from toolchain.abi.arguments import Shape, place_arguments, scalar_shape, struct_shape
 from toolchain.ir.model import I8, I16, I32, I64, Type
-from toolchain.lower.abi import Shape, place_arguments, scalar_shape, struct_shape
 
 
 def scalar(bits: int) -> Shape:

@@ -12,9 +12,9 @@ import pytest
 from elftools.dwarf.callframe import FDE, CFARule
 
 import emu
-from emu.debug.locate import pieces_of
+from emu.debug.dwarf.location import pieces_of
 from emu.dspic30f.isa.codec import decode_for_execution
-from emu.machine import Machine
+from emu.machine.machine import Machine
 from tests.toolchain.c_programs import build
 from tests.toolchain.lower.test_debug import dwarf_of
 from tests.toolchain.test_exec import FOLDER, cases_of

@@ -10,7 +10,7 @@ import pytest
 from elftools.elf.elffile import ELFFile
 
 import emu
-from emu.debug.dwarf import debug_of
+from emu.debug.dwarf.units import debug_of
 from tests.toolchain.c_programs import build
 
 COMPLAINTS = ("arning", "rror", "orrupt", "overlap", "There is a hole", "nknown")

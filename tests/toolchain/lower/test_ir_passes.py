@@ -10,9 +10,12 @@ import pytest
 
 from tests.toolchain.lower.compiled import llvm
 from tests.toolchain.lower.interpret import Interpreter
+from toolchain.ir import cfg
 from toolchain.ir.model import Function, Instr
 from toolchain.ir.read import read_module
-from toolchain.lower import cfg, combine, induction, legalize, magic, single_bits, switch
+from toolchain.legalize import legalize, magic
+from toolchain.optimise import combine, induction, single_bits
+from toolchain.select import switch
 
 SOURCE = """
 int walk(int *a, int n) { int s = 0; n &= 15;
@@ -113,7 +116,7 @@ def test_a_pass_keeps_the_meaning_of_every_function(name: str, level: str) -> No
 
 @pytest.mark.parametrize("level", ["s", "2"])
 def test_all_passes_in_order_keep_the_meaning(level: str) -> None:
-    """The order of toolchain/pipeline.py."""
+    """The order of toolchain/driver/pipeline.py."""
     for seed, (plain, f) in enumerate(zip(functions(level), functions(level), strict=True)):
         for name, step in PASSES.items():
             if name != "switches for speed":
@@ -132,7 +135,7 @@ def test_an_array_walk_becomes_a_pointer_walk() -> None:
 
 def test_multiplication_divides_exactly() -> None:
     """Every dividend for small divisors, a sample for the rest (`magic`)."""
-    from toolchain.lower.magic import signed_factor, unsigned_factor
+    from toolchain.legalize.magic import signed_factor, unsigned_factor
 
     for d in [*range(3, 16), 100, 641, 1000, *range(17, 32768, 977), 32765, 32767]:
         if d & (d - 1) == 0:

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from toolchain.lower import branches, layout, peephole, returns, schedule, tails
-from toolchain.lower.mir import MI, SKIPS, File, Imm, MBlock, Mem, MFunction, Operand
+from toolchain.mir.mir import MI, SKIPS, File, Imm, MBlock, Mem, MFunction, Operand
+from toolchain.optimise import block_layout, branches, peephole, returns, schedule, tail_merging
 
 WORD = 0xFFFF
 DATA = 0x1000
@@ -251,8 +251,8 @@ def generate(seed: int) -> MFunction:
 PASSES: dict[str, Callable[[MFunction], None]] = {
     "peephole": peephole.run,
     "schedule": schedule.run,
-    "tails": tails.run,
-    "layout": layout.run,
+    "tails": tail_merging.run,
+    "layout": block_layout.run,
     "branches": lambda m: branches.run(m, True),
     "returns": returns.run,
 }
@@ -274,7 +274,7 @@ def test_a_clean_up_pass_keeps_behaviour(name: str) -> None:
 
 
 def test_all_clean_up_passes_in_order_keep_behaviour() -> None:
-    """In the order of toolchain/pipeline.py."""
+    """In the order of toolchain/driver/pipeline.py."""
     for seed in range(300, 700):
         m = reachable(generate(seed))
         for name, step in PASSES.items():

@@ -5,10 +5,13 @@ from __future__ import annotations
 import pytest
 
 from tests.toolchain.lower.compiled import llvm
+from toolchain.driver.pipeline import FUNCTION_PASSES, Options, Pass, check_order, compile_module
+from toolchain.ir import cfg
 from toolchain.ir.read import read_module
 from toolchain.ir.spec import check
-from toolchain.lower import cfg, combine, legalize, switch
-from toolchain.pipeline import FUNCTION_PASSES, Options, Pass, check_order, compile_module
+from toolchain.legalize import legalize
+from toolchain.optimise import combine
+from toolchain.select import switch
 
 SOURCE = """
 struct bits { unsigned a:3; int b:5; long long q:40; } s;

@@ -6,9 +6,9 @@ import random
 
 import pytest
 
-from toolchain.lower.mir import FIRST_VIRTUAL, MI, File, Imm, MBlock, MFunction, Slot
-from toolchain.lower.regalloc import allocate
-from toolchain.target import ALLOCATABLE, CALLER_SAVED
+from toolchain.abi.target import ALLOCATABLE, CALLER_SAVED
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, File, Imm, MBlock, MFunction, Slot
+from toolchain.regalloc.colouring import allocate
 
 WORD = 0xFFFF
 BINARY = {"add": lambda a, b: a + b, "sub": lambda a, b: a - b, "xor": lambda a, b: a ^ b, "ior": lambda a, b: a | b}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from toolchain.lower.rules import IMMEDIATE, ImmRule, immediate_rule
-from toolchain.target import LIT5_MAX, LIT10_BYTE_MAX, LIT10_MAX
+from toolchain.abi.target import LIT5_MAX, LIT10_BYTE_MAX, LIT10_MAX
+from toolchain.select.rules import IMMEDIATE, ImmRule, immediate_rule
 
 MEANING = {"add": lambda a, k: a + k, "and": lambda a, k: a & k, "or": lambda a, k: a | k, "xor": lambda a, k: a ^ k}
 

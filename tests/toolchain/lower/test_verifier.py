@@ -8,13 +8,13 @@ from collections.abc import Callable
 import pytest
 
 from tests.toolchain.lower.compiled import llvm
-from toolchain import pipeline
+from toolchain.driver import pipeline
 from toolchain.ir.read import read_module
-from toolchain.lower import regalloc
-from toolchain.lower.liveness import summary
-from toolchain.lower.mir import MI, File, Imm, MBlock, Mem, MFunction
-from toolchain.lower.verify import MachineError
-from toolchain.lower.verify.registers import undefined_at_entry
+from toolchain.mir.liveness import summary
+from toolchain.mir.mir import MI, File, Imm, MBlock, Mem, MFunction
+from toolchain.regalloc import colouring
+from toolchain.verify import MachineError
+from toolchain.verify.registers import undefined_at_entry
 
 SOURCE = """
 extern volatile unsigned A, B; extern volatile unsigned long L; int g(int); int near; long out;
@@ -243,9 +243,9 @@ def test_a_planted_bug_is_caught_behind_its_pass(after: str, plant: Plant, monke
 
 def test_a_wrong_colour_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     """Allocation: two values that live at once in one register."""
-    choose = regalloc.Colouring.run
+    choose = colouring.Colouring.run
 
-    def confuse(self: regalloc.Colouring, order: list[int]) -> None:
+    def confuse(self: colouring.Colouring, order: list[int]) -> None:
         choose(self, order)
         for n, mask in self.g.adjacent.items():
             if n >= 16 and n in self.colour and n not in self.m.pairs:
@@ -254,6 +254,6 @@ def test_a_wrong_colour_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
                         self.colour[n] = self.colour[t]
                         return
 
-    monkeypatch.setattr(regalloc.Colouring, "run", confuse)
+    monkeypatch.setattr(colouring.Colouring, "run", confuse)
     with pytest.raises(MachineError, match="does not hold"):
         compile_with(None, "", monkeypatch, "s")

@@ -12,7 +12,7 @@ from typing import Any
 import z3
 
 from emu.dspic30f.isa import codec, flow
-from toolchain.proof.machine import Machine, State
+from toolchain.proof.code.machine import Machine, State
 from toolchain.proof.memory import STACK, Frame, Memory
 from toolchain.proof.solver import feasible
 from toolchain.proof.terms import BITS, Number, holds, narrow, vector, wide

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 import emu
-from toolchain import driver
-from toolchain.lower.magic import signed_factor, unsigned_factor
+from toolchain.driver import driver
+from toolchain.legalize.magic import signed_factor, unsigned_factor
 
 z3 = pytest.importorskip("z3", reason="the solver is not installed (extra: test)")
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 import emu
-from emu.status import BAD_INPUT, DONE, FAULT
+from emu.host.exit_status import BAD_INPUT, DONE, FAULT
 from toolchain.cli import main
 
 pytest.importorskip("z3", reason="the solver is not installed (extra: test)")
 
+from toolchain.proof.counterexample import image
+from toolchain.proof.problem import subject
 from toolchain.proof.prove import Verdict, verdicts
-from toolchain.proof.subject import subject
-from toolchain.proof.witness import image
 
 SAMPLE = Path(__file__).with_name("prove_sample.c")
 SYSTEM = Path(__file__).resolve().parents[3] / "firmware" / "openswarm"

@@ -1,0 +1,1 @@
+"""Many trials: worker processes, a Dask cluster, and bundles that others can verify."""

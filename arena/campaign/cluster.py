@@ -1,0 +1,102 @@
+"""Trials on the workers of a Dask cluster (optional extra `cluster`). What enters: a plan; what leaves: the same files.
+
+Workers need this package but no shared disk: the image travels with the plan, the finished file comes back as bytes.
+"""
+
+from __future__ import annotations
+
+import logging
+import platform
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from arena.campaign.campaign import Done, Plan, Report, run_one, trial_path
+from arena.trial.record import EXPERIMENT, write_bytes
+from arena.trial.versions import versions
+
+
+class ClusterLostError(Exception):
+    """Scheduler or workers went away; the text says which."""
+
+
+def run_on(
+    scheduler: str, plan: Plan, folder: Path, numbers: list[int], report: Report, done: Callable[[Done], None]
+) -> None:
+    """As `campaign.run_all`, on the workers of the scheduler at an address such as tcp://host:8786. Progress is told
+    per trial. Raises ValueError without Dask or for workers of another version, OSError if nobody answers there,
+    ClusterLostError if scheduler or workers go away meanwhile, and what a trial raises."""
+    try:
+        from distributed import CancelledError, Client, KilledWorker, as_completed
+        from distributed.comm.core import CommClosedError
+    except ImportError:
+        raise ValueError("--scheduler needs Dask: pip install 'openswarm[arena,cluster]'") from None
+    sent = replace(plan, image=None, experiment=None, images=())
+    files = Files(_bytes(plan.image), _bytes(plan.experiment), [(name, _bytes(path)) for name, path in plan.images])
+    lost = (CancelledError, KilledWorker, CommClosedError)
+    with _quiet(), Client(scheduler, timeout=10) as client:
+        futures = [client.submit(trial_elsewhere, sent, files, number, versions(), pure=False) for number in numbers]
+        try:
+            for future in as_completed(futures):
+                one, data = future.result()
+                write_bytes(trial_path(folder, one.trial), data)
+                report(one.trial, plan.seconds)
+                done(one)
+        except lost as error:
+            raise ClusterLostError(f"{scheduler}: lost while trials ran ({type(error).__name__})") from None
+        except BaseException:
+            client.cancel(futures)
+            raise
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Dask logs at length, with tracebacks, what is told here in one line."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    logs = [(logging.getLogger(name), logging.getLogger(name).level) for name in names]
+    for log, _ in logs:
+        log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for log, level in logs:
+            log.setLevel(level)
+
+
+class Files(NamedTuple):
+    """What travels with a plan: firmware of the run, the experiment's file, firmware of groups by name."""
+
+    image: bytes | None
+    experiment: bytes | None
+    images: list[tuple[str, bytes | None]]
+
+
+def _bytes(path: Path | None) -> bytes | None:
+    return path.read_bytes() if path is not None else None
+
+
+def trial_elsewhere(plan: Plan, files: Files, number: int, wanted: dict[str, str]) -> tuple[Done, bytes]:
+    """One trial in a folder of its own: what it was, and its file. Raises ValueError if this worker is of another
+    version: its records could differ from those of the others."""
+    own = versions()
+    other = [f"{name} {own.get(name)} instead of {wanted[name]}" for name in wanted if own.get(name) != wanted[name]]
+    if other:
+        raise ValueError(f"worker on {platform.node()} has {', '.join(other)}")
+    with tempfile.TemporaryDirectory(prefix="arena-") as name:
+        folder = Path(name)
+
+        def kept(label: str, data: bytes | None) -> Path | None:
+            if data is None:
+                return None
+            path = folder / label  # the loader tells ELF from HEX by content
+            path.write_bytes(data)
+            return path
+
+        images = [(group, kept(f"firmware-{place}", data)) for place, (group, data) in enumerate(files.images)]
+        plan = replace(plan, image=kept("firmware", files.image), experiment=kept(EXPERIMENT, files.experiment),
+                       images=tuple(images))  # fmt: skip
+        one = run_one(plan, number, folder)
+        return one, trial_path(folder, number).read_bytes()

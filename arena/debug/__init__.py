@@ -1,0 +1,1 @@
+"""A debugger on one robot of a trial: server, session, attachment and the controlled robot."""

@@ -1,0 +1,107 @@
+"""One robot's way through a trial as a strip of pictures, and as a log: what its camera shows, how its wheels turn.
+
+What enters: a recorded trial; what leaves: a figure and lines of text. `arena plot --film` writes both.
+"""
+
+from __future__ import annotations
+
+import base64
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from arena.camera.appearance import COLOURS, NAMES, OBJECT, ROBOT, WALL
+from arena.camera.reference import WINDOW_COLUMNS
+from arena.replay.page import samples_of
+from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
+from arena.scene import dimensions
+from arena.trial.record import Trial
+
+PICTURES: Final = 6
+LINES: Final = 20
+VIEW_CM: Final = 60.0
+"""Half of a picture's side."""
+CHANGE_CM_S: Final = 2.0
+"""Wheels that differ by more have another command: one step more or less in the 10 ms they are counted over is 1.28."""
+_FACES: Final = {OBJECT: "tab:red", ROBOT: "tab:green"}
+
+
+def changes(trial: Trial, robot: int) -> list[int]:
+    """Samples at which the wheels have begun to turn differently, by the smoothed command of both wheels."""
+    speeds = wheels(trial, robot)
+    found = [0]
+    for sample in range(1, len(speeds)):
+        if np.abs(speeds[sample] - speeds[found[-1]]).max() > CHANGE_CM_S:
+            found.append(sample)
+    return found
+
+
+def wheels(trial: Trial, robot: int) -> NDArray[np.float64]:
+    """Commanded speeds, samples x (left, right), cm/s."""
+    return np.column_stack([trial.columns[f"r{robot}_left"], trial.columns[f"r{robot}_right"]])
+
+
+def shown(strip: bytes) -> str:
+    """What a camera strip shows where the firmware's sensor looks: the first of object, robot, wall that any of its
+    columns is nearest to in colour."""
+    if not strip:
+        return "nothing yet"
+    pixels = np.frombuffer(strip, np.uint8).reshape(-1, 3).astype(int)
+    every = len(STRIP_COLUMNS) // STRIP_PIXELS
+    places = [(column - STRIP_COLUMNS.start) // every for column in WINDOW_COLUMNS]
+    kinds = (OBJECT, ROBOT, WALL)
+    seen = {min(kinds, key=lambda kind: int(np.abs(pixels[place] - COLOURS[kind].astype(int)).sum()))
+            for place in places if place < len(pixels)}  # fmt: skip
+    return next((NAMES[kind] for kind in kinds if kind in seen), "nothing yet")
+
+
+def log(trial: Trial, robot: int) -> list[str]:
+    """A line per change, at most LINES: time, what the camera's line shows, wheel speeds in mm/s, front LED."""
+    speeds = wheels(trial, robot)
+    lines = []
+    for sample in changes(trial, robot)[:LINES]:
+        left, right = 10 * speeds[sample]
+        leds = int(trial.columns[f"r{robot}_leds"][sample])
+        lines.append(f"{trial.times[sample]:7.2f} s  camera {shown(trial.columns[f'r{robot}_strip'][sample]):11}  "
+                     f"wheels {left:4.0f} {right:4.0f} mm/s  front LED {'on' if leds >> 8 & 1 else 'off'}")  # fmt: skip
+    return lines
+
+
+def film(trial: Trial, robot: int) -> Figure:
+    """Pictures from above around the robot at its first changes, with the line its camera sent below each."""
+    chosen = changes(trial, robot)[:PICTURES]
+    data = samples_of(trial)
+    figure = Figure(figsize=(2.2 * PICTURES, 3.0), layout="constrained")
+    grid = figure.subplots(2, PICTURES, squeeze=False, height_ratios=(6, 1))
+    for column in range(PICTURES):
+        above, below = grid[:, column]
+        for axis in (above, below):
+            axis.set(xticks=[], yticks=[])
+        if column >= len(chosen):
+            above.axis("off")
+            below.axis("off")
+            continue
+        sample = chosen[column]
+        _from_above(above, trial, data, robot, sample)
+        left, right = 10 * wheels(trial, robot)[sample]
+        above.set_title(f"{trial.times[sample]:.1f} s: {left:.0f}, {right:.0f} mm/s", fontsize=8)
+        strip = np.frombuffer(base64.b64decode(data["robots"][robot]["strip"][sample]), np.uint8)
+        below.imshow(strip.reshape(1, -1, 3) if strip.size else np.zeros((1, STRIP_PIXELS, 3), np.uint8), aspect="auto")
+    return figure
+
+
+def _from_above(axis: Any, trial: Trial, data: dict[str, Any], robot: int, sample: int) -> None:
+    x, y = trial.robots[sample][robot]
+    heading = data["robots"][robot]["heading"][sample]
+    path = trial.robots[: sample + 1, robot]
+    axis.plot(path[:, 0], path[:, 1], color="0.6", linewidth=0.8)
+    for thing, (ox, oy) in enumerate(trial.objects[sample]):
+        radius = trial.scene.kind_of(thing).radius_cm
+        axis.add_patch(Circle((ox, oy), radius, facecolor=_FACES[OBJECT], edgecolor="k"))
+    for rx, ry in trial.robots[sample]:
+        axis.add_patch(Circle((rx, ry), dimensions.ROBOT_RADIUS, facecolor=_FACES[ROBOT], edgecolor="k"))
+    axis.plot([x, x + 150 * np.cos(heading)], [y, y + 150 * np.sin(heading)], "k:", linewidth=0.8)
+    axis.set(xlim=(x - VIEW_CM, x + VIEW_CM), ylim=(y - VIEW_CM, y + VIEW_CM), aspect="equal")

@@ -1,0 +1,132 @@
+"""A trial as one HTML page that opens from disk: top view, play, scrub, speed, LEDs, camera strips, clusters, log.
+
+The page's data is a JSON block (`id="trial"`) of the very values of the record; `page.html` draws it. A page that
+follows a running trial asks its server (`live.py`) for more of the same.
+"""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from arena.camera.appearance import colours_of
+from arena.camera.renderer import Sight
+from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
+from arena.scene import dimensions
+from arena.scene.loader import Scene
+from arena.scene.schema import NAMED, Obstacle, Patch
+from arena.trial.json_numbers import json_text
+from arena.trial.record import Trial
+from arena.world.physics import Poses, traits_of
+
+TEMPLATE: Final = Path(__file__).with_name("page.html")
+PLACE: Final = "/*TRIAL*/null"
+_MIDDLE_ROW: Final = 240
+_STRIP: Final = np.arange(STRIP_PIXELS) * len(STRIP_COLUMNS) // STRIP_PIXELS + STRIP_COLUMNS.start
+
+
+def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None) -> str:
+    """The page's text; `live`: it asks where it came from for more; `studio`: what it needs to take the trial in hand
+    there (commands/studio.py)."""
+    data = head_of(trial) | samples_of(trial) | {"live": live, "studio": studio}
+    text = json_text(data, separators=(",", ":")).replace("</", "<\\/")
+    return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, text)
+
+
+def head_of(trial: Trial) -> dict[str, Any]:
+    """What does not change during a trial."""
+    about = trial.about
+    return {
+        "title": f"{trial.scene.name}, {about['brain']}, controller {about['controller']}, seed {about['seed']}",
+        "width": trial.scene.arena.width_cm,
+        "height": trial.scene.arena.height_cm,
+        "polygon": trial.scene.arena.polygon,
+        "kinds": [
+            {"name": one.name, "radius": one.radius_cm, "colour": _css(one.colour) if trial.scene.kinds else "#ddd"}
+            for one in map(trial.scene.kind_of, range(trial.scene.objects.count))
+        ],
+        "grouped": trial.experiment.has_groups,
+        "obstacles": [_shape(one) for one in trial.scene.obstacles],
+        "patches": [_shape(one) for one in trial.scene.patches],
+        "lamps": _lamps(trial.scene),
+        "links": trial.scene.bluetooth.links,
+        "names": [
+            f" ({one.name} {trial.scene.id_of(robot)})" if one.name else ""
+            for robot, one in enumerate(map(trial.scene.group_of, range(trial.scene.robots.count)))
+        ],
+        "robotRadius": dimensions.ROBOT_RADIUS,
+        "metrics": [
+            {"name": one.name, "label": one.label, "unit": one.unit, "scale": one.scale, "best": one.best}
+            for one in trial.experiment.curves
+        ],
+    }
+
+
+def _css(colour: str) -> str:
+    """A colour as a camera shows it is dark: brightened for the eye."""
+    red, green, blue = NAMED.get(colour) or tuple(bytes.fromhex(colour[1:]))
+    brightest = max(red, green, blue, 1)
+    gain = min(230 / brightest, 2.2) if colour in NAMED else 1.0
+    return "#" + "".join(f"{round(min(gain * one, 255)):02x}" for one in (red, green, blue))
+
+
+def _shape(one: Obstacle | Patch) -> dict[str, Any]:
+    return {"name": one.name, "polygon": one.polygon, "x": one.x_cm, "y": one.y_cm, "radius": one.radius_cm,
+            "colour": _css(one.colour)}  # fmt: skip
+
+
+def _lamps(scene: Scene) -> list[dict[str, float]]:
+    lamps = [{"x": one.x_cm, "y": one.y_cm} for one in scene.lamps]
+    return lamps + ([{"x": scene.light.lamp_x_cm, "y": scene.light.lamp_y_cm}] if scene.light.lamp_counts else [])
+
+
+def samples_of(trial: Trial) -> dict[str, Any]:
+    """What there is per sample, as arrays over the samples, and the faults so far."""
+    columns, objects = trial.columns, trial.objects
+    done = trial.course
+    robots = []
+    for robot, (seen, strips) in enumerate(_views(trial)):
+        keys = ("x", "y", "heading", "left", "right", "leds", "load")
+        robots.append({key: np.asarray(columns[f"r{robot}_{key}"]).tolist() for key in keys})
+        robots[-1] |= {"seen": seen, "strip": [base64.b64encode(strip).decode() for strip in strips]}
+    return {
+        "t": trial.times.tolist(),
+        "robots": robots,
+        "objects": objects.tolist(),
+        "clusters": [trial.experiment.groups(trial.scene, places) for places in objects],
+        "curves": {name: values.tolist() for name, values in done.curves.items()},
+        "log": columns["log"],
+        "lights": columns["lights"],
+        "messages": columns["messages"] if trial.scene.bluetooth.links else [[] for _ in trial.times],
+        "faults": trial.about["faults"],
+    }
+
+
+def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
+    """Per robot: what its sensor's window shows, and the camera's strips. A brain that keeps its sensor to itself is
+    shown what stands before it at that moment; a script, which has no camera, gets a strip in perfect colours."""
+    scene = trial.scene
+    colours = colours_of(scene)
+    seed = trial.about["seed"]
+    count = scene.robots.count
+    views: list[tuple[list[int], list[bytes]]] = []
+    headings = [trial.columns[f"r{robot}_heading"] for robot in range(count)]
+    robots, objects = trial.robots.tolist(), trial.objects.tolist()
+    for robot in range(count):
+        seen, strips = list(map(int, trial.columns[f"r{robot}_seen"])), list(trial.columns[f"r{robot}_strip"])
+        is_script = not any(strips)
+        sight = Sight(scene, robot, traits_of(scene, seed, robot))
+        for sample, (places, things) in enumerate(zip(robots, objects, strict=True)):
+            if seen[sample] >= 0 and not is_script:
+                continue
+            poses = Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(places)], things)
+            sight.look(poses)
+            if seen[sample] < 0:
+                seen[sample] = sight.sensor()
+            if is_script:
+                strips[sample] = colours[sight.classes(_MIDDLE_ROW, _STRIP)].tobytes()
+        views.append((seen, strips))
+    return views

@@ -1,0 +1,156 @@
+"""A trial as a film: GIF by Pillow alone, MP4 by an ffmpeg that is installed or came with `imageio-ffmpeg`."""
+
+from __future__ import annotations
+
+import base64
+import importlib
+import math
+import shutil
+import subprocess
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from PIL import Image, ImageDraw
+
+from arena.camera.appearance import COLOURS
+from arena.replay.page import samples_of
+from arena.robots.controller import STRIP_PIXELS
+from arena.scene import dimensions
+from arena.scene.loader import Scene
+from arena.trial.record import RecordError, Trial, reason_of
+from emu.host.files import whole_file
+
+SCALE: Final = 1.6
+"""Pixels per cm."""
+FRAMES_PER_S: Final = 12.5
+"""Of the film: GIF counts in hundredths of a second, 8 per frame."""
+LIMIT: Final = 20_000
+"""Frames; more is a mistake in --speed."""
+_LINE: Final = 14
+_PIXEL: Final = 6
+_INK, _PAPER, _PALE = (34, 34, 34), (255, 255, 255), (221, 221, 221)
+_SEEN: Final = ((187, 187, 187), (204, 0, 0), (0, 136, 0))
+_CLUSTERS: Final = ((230, 140, 60), (110, 170, 230), (190, 130, 220), (240, 210, 80), (120, 200, 150), (230, 130, 160))
+
+
+def write_movie(trial: Trial, path: Path, speed: float, seconds: float | None = None) -> None:
+    """Write the film. Raises ValueError for a name that is neither .gif nor .mp4, no speed, or no ffmpeg; RecordError
+    if it cannot be written. No half of a film is left."""
+    kind = path.suffix.lower()
+    if kind not in (".gif", ".mp4"):
+        raise ValueError(f"--export {path}: a film is a .gif or a .mp4")
+    end = float(trial.times[-1]) if seconds is None else min(seconds, float(trial.times[-1]))
+    if not speed > 0 or not end >= 0:
+        raise ValueError("--speed must be positive, --seconds not negative")
+    count = int(end / speed * FRAMES_PER_S) + 1
+    if count > LIMIT:
+        raise ValueError(f"--speed {speed:g} makes {count} frames of {end:g} s; the limit is {LIMIT}")
+    pictures = frames(trial, [frame / FRAMES_PER_S * speed for frame in range(count)])
+    try:
+        with whole_file(path) as part:
+            if kind == ".gif":
+                _gif(pictures, part)
+            else:
+                _mp4(pictures, part)
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be written: {reason_of(error)}") from None
+
+
+def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
+    """A picture for each time in s: arena from above, the robots' camera strips below, time and share."""
+    data = samples_of(trial)
+    metrics = trial.experiment.curves[:2]
+    sample = 0
+    for time in times:
+        while sample + 1 < len(data["t"]) and data["t"][sample + 1] <= time + 1e-3:
+            sample += 1
+        said = "   ".join(f"{one.label} {one.shown(data['curves'][one.name][sample])}" for one in metrics)
+        yield _frame(trial.scene, data, sample, said)
+
+
+def _frame(scene: Scene, data: dict[str, Any], sample: int, said: str) -> Image.Image:
+    width, height = round(scene.arena.width_cm * SCALE), round(scene.arena.height_cm * SCALE)
+    rows = len(data["robots"])
+    total = height + _LINE * (rows + 1) + 4
+    image = Image.new("RGB", (width + width % 2, total + total % 2), _PAPER)
+    draw = ImageDraw.Draw(image)
+    draw.rectangle((0, 0, width - 1, height - 1), outline=_INK)
+
+    def disc(x: float, y: float, radius: float, fill: tuple[int, int, int]) -> None:
+        left, low, r = x * SCALE, height - y * SCALE, radius * SCALE
+        draw.ellipse((left - r, low - r, left + r, low + r), fill=fill, outline=_INK)
+
+    labels = data["clusters"][sample]
+    for thing, ((x, y), label) in enumerate(zip(data["objects"][sample], labels, strict=True)):
+        disc(x, y, scene.kind_of(thing).radius_cm,
+             _CLUSTERS[label % len(_CLUSTERS)] if labels.count(label) > 1 else _PALE)  # fmt: skip
+    for number, robot in enumerate(data["robots"]):
+        x, y, heading = robot["x"][sample], robot["y"][sample], robot["heading"][sample]
+        disc(x, y, dimensions.ROBOT_RADIUS, _SEEN[robot["seen"][sample]])
+        tip = (x + 9 * math.cos(heading)) * SCALE, height - (y + 9 * math.sin(heading)) * SCALE
+        draw.line((x * SCALE, height - y * SCALE, *tip), fill=_INK, width=2)
+        draw.text((x * SCALE + 8, height - y * SCALE - 14), str(number), fill=_INK)
+    draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   {said}", fill=_INK)
+    for number in range(rows):
+        _strip(draw, number, data["robots"][number], sample, height + _LINE * (number + 1) + 2)
+    return image
+
+
+def _strip(draw: ImageDraw.ImageDraw, number: int, robot: dict[str, Any], sample: int, y: int) -> None:
+    """What the robot's camera sent, left to right, and which LEDs are on."""
+    strip = base64.b64decode(robot["strip"][sample])
+    draw.text((4, y), str(number), fill=_INK)
+    for place in range(len(strip) // 3):
+        red, green, blue = strip[3 * place : 3 * place + 3]
+        draw.rectangle((20 + _PIXEL * place, y + 1, 19 + _PIXEL * (place + 1), y + _LINE - 3), fill=(red, green, blue))
+    names = [*map(str, range(8)), "front", "body"]
+    lit = [name for bit, name in enumerate(names) if robot["leds"][sample] >> bit & 1]
+    draw.text((30 + STRIP_PIXELS * _PIXEL, y), " ".join(lit), fill=_INK)
+
+
+def _palette() -> list[tuple[int, int, int]]:
+    """Every colour that is drawn, those that the things in the arena have for a camera, and ramps between them for
+    noise and smoothed edges: all frames have the same colours."""
+    drawn = [_INK, _PAPER, _PALE, *_SEEN, *_CLUSTERS, *(tuple(map(int, colour)) for colour in COLOURS)]
+    ramps = [(grey, grey, grey) for grey in range(0, 256, 8)]
+    ramps += [(level, level // 6, level // 6) for level in range(8, 256, 8)]
+    ramps += [(level // 5, level, level // 4) for level in range(8, 160, 8)]
+    return [(red, green, blue) for red, green, blue in (*drawn, *ramps)]
+
+
+def _gif(pictures: Iterator[Image.Image], part: Path) -> None:
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([value for colour in _palette() for value in colour])
+    coloured = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
+    first = next(coloured)
+    first.save(part, "GIF", save_all=True, append_images=coloured, duration=round(1000 / FRAMES_PER_S), loop=0)
+
+
+def _mp4(pictures: Iterator[Image.Image], part: Path) -> None:
+    first = next(pictures)
+    size = f"{first.width}x{first.height}"
+    command = [_ffmpeg(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r",
+               str(FRAMES_PER_S), "-i", "-", "-pix_fmt", "yuv420p", "-f", "mp4", str(part)]  # fmt: skip
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as encoder:
+        assert encoder.stdin is not None
+        assert encoder.stderr is not None
+        with suppress(BrokenPipeError):
+            encoder.stdin.write(first.tobytes())
+            for picture in pictures:
+                encoder.stdin.write(picture.tobytes())
+            encoder.stdin.close()
+        said = encoder.stderr.read().decode(errors="replace").strip()
+    if encoder.returncode:
+        raise RecordError(f"{part}: ffmpeg failed: {said}")
+
+
+def _ffmpeg() -> str:
+    found = shutil.which("ffmpeg")
+    if found is None:
+        with suppress(ImportError):
+            found = str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    if found is None:
+        raise ValueError("an .mp4 needs ffmpeg (Debian package ffmpeg, or pip install imageio-ffmpeg); .gif does not")
+    return found

@@ -1,0 +1,415 @@
+"""Scenes: TOML files to checked values. What enters: a name or a path. What leaves: a `Scene`, which knows no physics.
+
+A new scene is a new TOML file; keys that are left out take the values of `clustering.toml`'s comments, unknown keys are
+errors. `scenery.py` has the tables and what each value can be.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from arena.scene import geometry
+from arena.scene.schema import (
+    FCY,
+    INHERIT,
+    LIMITS,
+    LISTS,
+    NAMED,
+    PLACES,
+    TABLES,
+    Arena,
+    BatterySetting,
+    Bluetooth,
+    CameraSetting,
+    Clock,
+    InfraredSetting,
+    Lamp,
+    Light,
+    Marks,
+    ObjectKind,
+    Objects,
+    Obstacle,
+    Patch,
+    RobotGroup,
+    Robots,
+    Start,
+)
+from emu.boards.epuck.remote import KEYS
+from emu.host.files import is_standard, read_file
+
+__all__ = ["FCY", "BatterySetting", "CameraSetting", "Scene", "SceneError", "Start", "load_scene", "scene_of", "scenes",
+           "scripted"]  # fmt: skip
+FOLDER: Final = Path(__file__).parents[1] / "scenes"
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}")
+COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
+
+
+class SceneError(ValueError):
+    """A scene cannot be read or built; the text names file and key, and the line if there is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything about a world that is not chance."""
+
+    name: str
+    description: str = ""
+    experiment: str = "plain"
+    """What is measured: an experiment's name, or the path of a Python file, from the scene's file on."""
+    arena: Arena = field(default_factory=Arena)
+    marks: Marks = field(default_factory=Marks)
+    robots: Robots = field(default_factory=Robots)
+    objects: Objects = field(default_factory=Objects)
+    camera: CameraSetting = field(default_factory=CameraSetting)
+    infrared: InfraredSetting = field(default_factory=InfraredSetting)
+    light: Light = field(default_factory=Light)
+    battery: BatterySetting = field(default_factory=BatterySetting)
+    start: Start = field(default_factory=Start)
+    bluetooth: Bluetooth = field(default_factory=Bluetooth)
+    clock: Clock = field(default_factory=Clock)
+    groups: tuple[RobotGroup, ...] = ()
+    """Empty: `robots.count` robots of one kind on marks."""
+    kinds: tuple[ObjectKind, ...] = ()
+    """Empty: `objects.count` objects of one kind on marks."""
+    obstacles: tuple[Obstacle, ...] = ()
+    patches: tuple[Patch, ...] = ()
+    lamps: tuple[Lamp, ...] = ()
+
+    @property
+    def is_furnished(self) -> bool:
+        """Whether there is more to see or to bump into than four walls and objects of one kind."""
+        return bool(self.kinds or self.obstacles or self.patches or self.arena.polygon)
+
+    def group_of(self, robot: int) -> RobotGroup:
+        """What kind of robot one is."""
+        return _nth(self.groups, robot) if self.groups else RobotGroup()
+
+    def id_of(self, robot: int) -> int:
+        """A robot's number within the swarm: its place in its group, counted from the group's first."""
+        first = 0
+        for group in self.groups:
+            if robot < first + group.count:
+                return group.id_first + robot - first
+            first += group.count
+        return robot
+
+    def start_of(self, robot: int) -> Start:
+        """How a robot comes to life."""
+        group = self.group_of(robot)
+        stimulus = self.start.stimulus if group.stimulus == INHERIT else group.stimulus
+        return replace(
+            self.start,
+            selector=self.start.selector if group.selector < 0 else group.selector,
+            remote=self.start.remote if group.remote == INHERIT else group.remote,
+            stimulus=stimulus.replace("{id}", str(self.id_of(robot))),
+        )
+
+    def off_tick(self, robot: int) -> int:
+        """Quanta after which a robot's battery is taken out; beyond every trial if it is not."""
+        for one, seconds in self.start.off:
+            if one == robot:
+                return round(seconds * FCY / self.clock.quantum_tcy)
+        return 1 << 62
+
+    def kind_of(self, number: int) -> ObjectKind:
+        """What kind of object one is."""
+        if self.kinds:
+            return _nth(self.kinds, number)
+        one = self.objects
+        return ObjectKind(radius_cm=one.radius_cm, mass_kg=one.mass_kg, floor_friction=one.floor_friction,
+                          share=self.infrared.object_share)  # fmt: skip
+
+    def with_values(self, **values: Any) -> Scene:
+        """A copy with `section__key=value` replaced, checked. Raises SceneError."""
+        scene = self
+        for place, value in values.items():
+            section, _, key = place.partition("__")
+            if section not in TABLES or key not in {one.name for one in fields(TABLES[section])}:
+                raise SceneError(f"there is no scene value {section}.{key}")
+            if (section, key) in (("robots", "count"), ("objects", "count")) and getattr(self, _LIST_OF[section]):
+                raise SceneError(f"{self.name}: {section}.{key} is the sum of the file's [[{section}]]")
+            table = _table(_Errors(self.name), section, TABLES[section], {key: value}, getattr(scene, section))
+            scene = replace(scene, **{section: table})
+        return _checked(scene, _Errors(self.name))
+
+
+_LIST_OF: Final = {"robots": "groups", "objects": "kinds"}
+T = TypeVar("T")
+K = TypeVar("K", RobotGroup, ObjectKind)
+
+
+def _nth(kinds: tuple[K, ...], number: int) -> K:
+    for kind in kinds:
+        if number < kind.count:
+            return kind
+        number -= kind.count
+    raise IndexError(number)
+
+
+def scripted(scene: Scene) -> Scene:
+    """The scene as scripted brains live in it: with their own, longer quantum."""
+    return scene.with_values(clock__quantum_ms=scene.clock.scripted_quantum_ms)
+
+
+def scenes() -> list[str]:
+    """Names of the scenes that come along."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load_scene(name: str) -> Scene:
+    """A scene by name, or from the TOML file at a path. Raises SceneError."""
+    path = Path(name) if name.endswith(".toml") or is_standard(name) else FOLDER / f"{name}.toml"
+    try:
+        text = read_file(path).decode()
+        data = tomllib.loads(text.replace("\r\n", "\n"))
+    except FileNotFoundError:
+        raise SceneError(f"there is no scene {name!r}; known: {', '.join(scenes())}, or a path to a .toml") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path}:{error.object[: error.start].count(10) + 1}: is no UTF-8 text") from None
+    except tomllib.TOMLDecodeError as error:
+        line = re.search(r"at line (\d+)", str(error))
+        at = int(line[1]) if line else text.count("\n") + 1
+        raise SceneError(f"{path}:{at}: {error}") from None
+    except (OSError, RecursionError, ValueError) as error:
+        raise SceneError(f"{path}: {error}") from None
+    errors = _Errors(str(path), text)
+    return _checked(_scene(errors, data), errors)
+
+
+def scene_of(values: dict[str, Any]) -> Scene:
+    """The scene a record was made in, from its metadata. Raises SceneError for one this version cannot build."""
+    errors = _Errors("the record")
+    return _checked(_scene(errors, values), errors)
+
+
+class _Errors:
+    """Makes errors that name the file's line, found again by table and key: the parser does not tell it."""
+
+    def __init__(self, path: str, text: str = "") -> None:
+        self._path = path
+        self._lines = text.splitlines()
+
+    def at(self, table: str, key: str, words: str, number: int | None = None) -> SceneError:
+        """About a key of a table, of the `number`th table of that name, or (key empty) the table itself."""
+        line = self._find(table, key, number) if self._lines else None
+        return SceneError(f"{self._path}{f':{line}' if line else ''}: {words}")
+
+    def _find(self, table: str, key: str, number: int | None) -> int | None:
+        here, seen, start = "", -1, None
+        for place, line in enumerate(self._lines, start=1):
+            head = re.match(r"\s*\[\[?\s*([A-Za-z0-9_.\"'-]+)\s*\]?\]", line)
+            if head:
+                here = head[1].strip("\"'")
+                if here == table:
+                    seen += 1
+                    if start is None or seen == number:
+                        start = place
+            elif not key and here:
+                continue
+            elif here == table and (number is None or seen == number):
+                if re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]", line):
+                    return place
+            elif not here and table and re.match(rf"\s*[\"']?{re.escape(table)}[\"']?\s*[=.]", line):
+                start = place
+        return start
+
+
+def _scene(errors: _Errors, data: dict[str, Any]) -> Scene:
+    values: dict[str, Any] = {}
+    for key, value in data.items():
+        is_list = isinstance(value, list) and all(isinstance(one, dict) for one in value)
+        name = _LIST_OF.get(key, key)
+        if key in ("name", "description", "experiment") and isinstance(value, str):
+            values[key] = value
+        elif key == "chassis" and isinstance(value, dict):
+            if "count" in value:
+                raise errors.at("chassis", "count", "chassis.count: robots are counted by their groups")
+            values["robots"] = _table(errors, "chassis", Robots, value, values.get("robots", Robots()))
+        elif key in TABLES and isinstance(value, dict):
+            values[key] = _table(errors, key, TABLES[key], value, TABLES[key]())
+        elif name in LISTS and is_list:
+            kind = LISTS[name]
+            values[name] = tuple(_table(errors, key, kind, one, kind(), n) for n, one in enumerate(value))
+        else:
+            known = ", ".join(
+                ("name", "description", "experiment", "chassis", *TABLES, "obstacles", "patches", "lamps")
+            )
+            raise errors.at(key, "", f"unexpected {key!r}; expected {known}")
+    if "name" not in values:
+        raise errors.at("", "name", "a scene needs a name")
+    if values.get("groups") and "objects" not in values and "kinds" not in values:
+        values["objects"] = Objects(count=0)  # who writes down every kind of robot does so with objects
+    return _counted(Scene(**values))
+
+
+def _numbered(one: K) -> K:
+    return replace(one, count=len(one.poses)) if one.place == "poses" else one
+
+
+def _counted(scene: Scene) -> Scene:
+    """Numbers of robots and objects as the sums of their kinds; places of robots that are all written down."""
+    groups, kinds = tuple(map(_numbered, scene.groups)), tuple(map(_numbered, scene.kinds))
+    scene = replace(scene, groups=groups, kinds=kinds)
+    if groups:
+        scene = replace(scene, robots=replace(scene.robots, count=sum(one.count for one in groups)))
+    if kinds:
+        scene = replace(scene, objects=replace(scene.objects, count=sum(one.count for one in kinds)))
+    if scene.arena.polygon and all(len(point) == 2 for point in scene.arena.polygon):
+        width, height = (max(point[axis] for point in scene.arena.polygon) for axis in (0, 1))
+        scene = replace(scene, arena=replace(scene.arena, width_cm=width, height_cm=height))
+    return scene
+
+
+def _table(errors: _Errors, name: str, kind: type[T], values: dict[str, Any], base: T, number: int | None = None) -> T:
+    known = {one.name: type(getattr(base, one.name)) for one in fields(kind)}  # type: ignore[arg-type]
+    taken: dict[str, Any] = {}
+    for key, value in values.items():
+        if key not in known:
+            raise errors.at(name, key, f"unknown key {name}.{key}; expected {', '.join(known)}", number)
+        want = known[key]
+        if want is float and value == "inf":
+            value = math.inf
+        if want is float and value is None:  # a record's JSON has no nan
+            value = math.nan
+        if want is float and type(value) is int:
+            value = float(value)
+        if want is tuple:
+            wrong = _wrong_points(value)
+            if wrong:
+                raise errors.at(name, key, f"{name}.{key}: {wrong}", number)
+            value = tuple(tuple(map(float, one)) for one in value)
+        if type(value) is not want:
+            raise errors.at(name, key, f"{name}.{key} is {value!r}; expected {want.__name__}", number)
+        taken[key] = value
+    return replace(base, **taken)  # type: ignore[type-var]
+
+
+def _wrong_points(value: Any) -> str:
+    """What is wrong with a list of points; empty if nothing is."""
+    if not isinstance(value, (list, tuple)) or not all(isinstance(one, (list, tuple)) for one in value):
+        return "expected a list of points, [[x, y], ...]"
+    for one in value:
+        if len(one) not in (2, 3) or not all(type(number) in (int, float) and abs(number) < 1e6 for number in one):
+            return f"{list(one)} is no point [x, y] in cm, or pose [x, y, degrees]"
+    return ""
+
+
+def _checked(scene: Scene, errors: _Errors) -> Scene:
+    """Raises SceneError for values no world can have."""
+    if not NAME.fullmatch(scene.name):
+        raise errors.at("", "name", f"name is {scene.name!r}; expected up to 64 letters, digits, blanks and -_., "
+                        "a letter or digit first: results go into a folder of this name")  # fmt: skip
+    _check_key(errors, "start", scene.start.remote)
+    for name in LISTS:
+        table = {"groups": "robots", "kinds": "objects"}.get(name, name)
+        for number, one in enumerate(getattr(scene, name)):
+            _check_limits(errors, table, one, number)
+            _CHECKS.get(name, _check_shape)(errors, table, one, number)
+    for name in TABLES:
+        _check_limits(errors, name, getattr(scene, name))
+    if not 0 <= scene.robots.count <= 1000 or not 0 <= scene.objects.count <= 10_000:
+        words = f"{scene.robots.count} robots and {scene.objects.count} objects; expected at most 1000 and 10000"
+        raise errors.at("robots", "count", words)
+    _check_links(errors, scene)
+    _check_off(errors, scene)
+    if scene.arena.polygon:
+        _check_polygon(errors, "arena", scene.arena.polygon, None)
+        if min(value for point in scene.arena.polygon for value in point) < 0:
+            raise errors.at("arena", "polygon", "arena.polygon: corners are 0 or more cm from the lower left")
+    return scene
+
+
+def _check_links(errors: _Errors, scene: Scene) -> None:
+    taken: set[frozenset[float]] = set()
+    for link in scene.bluetooth.links:
+        ends = frozenset(link)
+        words = ""
+        if len(link) != 2 or len(ends) != 2 or not all(end in range(scene.robots.count) for end in ends):
+            words = f"expected two different robots of 0 to {scene.robots.count - 1}"
+        elif ends in taken:
+            words = "is there twice"
+        if words:
+            raise errors.at("bluetooth", "links", f"bluetooth.links: {[f'{end:g}' for end in link]}: {words}")
+        taken.add(ends)
+
+
+def _check_off(errors: _Errors, scene: Scene) -> None:
+    taken: set[float] = set()
+    for one in scene.start.off:
+        if len(one) != 2 or one[0] not in range(scene.robots.count) or one[1] < 0 or one[0] in taken:
+            words = f"expected a robot of 0 to {scene.robots.count - 1}, once, and a second of the trial"
+            raise errors.at("start", "off", f"start.off: {[f'{value:g}' for value in one]}: {words}")
+        taken.add(one[0])
+
+
+def _check_limits(errors: _Errors, name: str, table: Any, number: int | None = None) -> None:
+    for key, (low, high) in LIMITS[type(table)].items():
+        value = getattr(table, key)
+        if not low <= value <= high:
+            raise errors.at(name, key, f"{name}.{key} is {value}; expected {low} to {high}", number)
+
+
+def _check_key(errors: _Errors, table: str, key: str, number: int | None = None) -> None:
+    if key not in ("", INHERIT, *KEYS, *map(str, range(64))):
+        words = f"{table}.remote is {key!r}; expected {', '.join(KEYS)}, 0 to 63, or empty"
+        raise errors.at(table, "remote", words, number)
+
+
+def _check_placed(errors: _Errors, table: str, one: Any, number: int) -> None:
+    if one.place not in PLACES:
+        words = f"{table}.place is {one.place!r}; expected {', '.join(PLACES)}"
+        raise errors.at(table, "place", words, number)
+    if (one.place == "poses") != bool(one.poses):
+        words = f'{table}.poses goes with place = "poses", and only with it'
+        raise errors.at(table, "poses" if one.poses else "place", words, number)
+
+
+def _check_group(errors: _Errors, table: str, one: RobotGroup, number: int) -> None:
+    _check_placed(errors, table, one, number)
+    _check_key(errors, table, one.remote, number)
+    if abs(one.heading_deg) > 1e6:
+        words = f"{table}.heading_deg is {one.heading_deg}; expected -1e6 to 1e6, or nan for any"
+        raise errors.at(table, "heading_deg", words, number)
+    if one.controller not in ("", "A", "B"):
+        raise errors.at(table, "controller", f"{table}.controller is {one.controller!r}; expected A or B", number)
+
+
+def _check_kind(errors: _Errors, table: str, one: ObjectKind, number: int) -> None:
+    _check_placed(errors, table, one, number)
+    _check_colour(errors, table, one, number)
+    if any(len(pose) != 2 for pose in one.poses):
+        raise errors.at(table, "poses", f"{table}.poses: objects are discs: [x, y]", number)
+
+
+def _check_colour(errors: _Errors, table: str, one: Any, number: int) -> None:
+    if one.colour not in NAMED and not COLOUR.fullmatch(one.colour):
+        words = f"{table}.colour is {one.colour!r}; expected {', '.join(NAMED)} or #rrggbb"
+        raise errors.at(table, "colour", words, number)
+
+
+def _check_shape(errors: _Errors, table: str, one: Any, number: int) -> None:
+    _check_colour(errors, table, one, number)
+    if bool(one.polygon) == bool(one.radius_cm):
+        raise errors.at(table, "polygon", f"{table}: expected either a polygon or a radius_cm", number)
+    if one.polygon:
+        _check_polygon(errors, table, one.polygon, number)
+
+
+def _check_polygon(errors: _Errors, table: str, points: tuple[tuple[float, ...], ...], number: int | None) -> None:
+    if len(points) < 3 or any(len(point) != 2 for point in points):
+        raise errors.at(table, "polygon", f"{table}.polygon: expected three or more corners [x, y]", number)
+    if not geometry.is_simple(points):
+        raise errors.at(table, "polygon", f"{table}.polygon: its sides cross, or it has no area", number)
+
+
+_CHECKS: Final[Mapping[str, Callable[[_Errors, str, Any, int], None]]] = {
+    "groups": _check_group,
+    "kinds": _check_kind,
+    "lamps": lambda _errors, _table, _one, _number: None,
+}

@@ -1,0 +1,144 @@
+"""Start positions: robots and objects on marks of a grid, where the scene says, or drawn by the trial's generator
+(epuck.md §8, experiment)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from arena.scene import dimensions, geometry
+from arena.scene.loader import Scene, SceneError
+from arena.scene.schema import Placed, RobotGroup
+
+Place = tuple[float, float]
+TRIES: Final = 2000
+"""Of a random place, before the scene counts as full."""
+
+
+def marks_of(scene: Scene) -> list[Place]:
+    """Marks in cm from the lower left corner, row by row; those outside the walls are left out."""
+    grid, arena = scene.marks, scene.arena
+    left = (arena.width_cm - (grid.columns - 1) * grid.spacing_cm) / 2
+    low = (arena.height_cm - (grid.rows - 1) * grid.spacing_cm) / 2
+    places = ((left + c * grid.spacing_cm, low + r * grid.spacing_cm) for r in range(grid.rows)
+              for c in range(grid.columns))  # fmt: skip
+    return [(x, y) for x, y in places if 0 < x < arena.width_cm and 0 < y < arena.height_cm]
+
+
+def place_all(scene: Scene, rng: np.random.Generator) -> tuple[list[tuple[float, float, float]], list[Place]]:
+    """Poses of the robots (x, y in cm, heading in rad) and places of the objects, no two touching.
+
+    Raises SceneError if there is no room: too few marks, or marks too near each other or to a wall.
+    """
+    if scene.groups or scene.kinds or scene.is_furnished:
+        return _Floor(scene, rng).filled()
+    radii = [dimensions.ROBOT_RADIUS] * scene.robots.count + [scene.objects.radius_cm] * scene.objects.count
+    marks = marks_of(scene)
+    if len(radii) > len(marks):
+        raise SceneError(f"{scene.name}: no room: {len(radii)} robots and objects on {len(marks)} marks")
+    chosen = [marks[index] for index in rng.permutation(len(marks))[: len(radii)]]
+    for index, ((x, y), radius) in enumerate(zip(chosen, radii, strict=True)):
+        nearest = min(x, y, scene.arena.width_cm - x, scene.arena.height_cm - y)
+        if nearest < radius:
+            where = f"the mark at ({x:g}, {y:g}) cm is nearer to a wall than {radius:g} cm"
+            raise SceneError(f"{scene.name}: no room: {where}")
+        for (other_x, other_y), other in zip(chosen[:index], radii[:index], strict=True):
+            if math.hypot(x - other_x, y - other_y) < radius + other:
+                raise SceneError(f"{scene.name}: no room: marks are {scene.marks.spacing_cm:g} cm apart")
+    headings = rng.uniform(-math.pi, math.pi, scene.robots.count).tolist()
+    robots = [(x, y, angle) for (x, y), angle in zip(chosen, headings, strict=False)]
+    return robots, chosen[scene.robots.count :]
+
+
+class _Floor:
+    """Places given away one after the other: first those written down, then the others, group by group."""
+
+    def __init__(self, scene: Scene, rng: np.random.Generator) -> None:
+        self._scene = scene
+        self._rng = rng
+        self._taken: list[tuple[float, float, float]] = []
+        self._marks: Iterator[Place] = iter([])
+        room = [scene.arena.polygon] if scene.arena.polygon else []
+        self._sides = [side for shape in (*room, *(one.polygon for one in scene.obstacles)) if shape
+                       for side in geometry.sides(shape)]  # fmt: skip
+
+    def filled(self) -> tuple[list[tuple[float, float, float]], list[Place]]:
+        """Everything of the scene at its place."""
+        scene = self._scene
+        groups = scene.groups or (RobotGroup(count=scene.robots.count),)
+        kinds = scene.kinds or (replace(scene.kind_of(0), count=scene.objects.count),)
+        marks = marks_of(scene)
+        self._marks = iter([marks[index] for index in self._rng.permutation(len(marks))])
+        wanted: list[tuple[Placed, str, float]] = [(one, "robot", dimensions.ROBOT_RADIUS) for one in groups]
+        wanted += [(one, "object", one.radius_cm) for one in kinds]
+        found: dict[int, list[tuple[float, ...]]] = {}
+        for number in sorted(range(len(wanted)), key=lambda number: wanted[number][0].place != "poses"):
+            found[number] = [self._put(*wanted[number], index) for index in range(wanted[number][0].count)]
+        robots: list[tuple[float, float, float]] = []
+        for number, group in enumerate(groups):
+            for place in found[number]:
+                heading = place[2] if len(place) == 3 else group.heading_deg
+                drawn = float(self._rng.uniform(-math.pi, math.pi))
+                robots.append((place[0], place[1], drawn if math.isnan(heading) else math.radians(heading)))
+        return robots, [(x, y) for number in range(len(groups), len(wanted)) for x, y in found[number]]
+
+    def _put(self, one: Placed, what: str, radius: float, index: int) -> tuple[float, ...]:
+        if one.place == "poses":
+            pose = one.poses[index]
+            why = self._obstructed(pose[0], pose[1], radius)
+            if why:
+                raise SceneError(f"{self._scene.name}: no room: {what} {one.name or index} at "
+                                 f"({pose[0]:g}, {pose[1]:g}) cm {why}")  # fmt: skip
+            self._taken.append((pose[0], pose[1], radius))
+            return pose
+        why = ""
+        for x, y in self._candidates(one, index):
+            why = self._obstructed(x, y, radius)
+            if not why:
+                self._taken.append((x, y, radius))
+                return x, y
+        tried = "marks left" if one.place == "marks" else f"place found in {TRIES} tries"
+        raise SceneError(f"{self._scene.name}: no room: no {tried} for {what} {one.name or index}"
+                         f"{f'; the last one {why}' if why else ''}")  # fmt: skip
+
+    def _candidates(self, one: Placed, index: int) -> Iterator[Place]:
+        arena = self._scene.arena
+        x = arena.width_cm / 2 if math.isnan(one.x_cm) else one.x_cm
+        y = arena.height_cm / 2 if math.isnan(one.y_cm) else one.y_cm
+        if one.place == "marks":
+            yield from self._marks
+            return
+        if one.place == "circle":
+            angle = 2 * math.pi * index / max(one.count, 1)
+            yield x + one.circle_cm * math.cos(angle), y + one.circle_cm * math.sin(angle)
+            return
+        wide, deep = one.width_cm or arena.width_cm, one.depth_cm or arena.height_cm
+        for _ in range(TRIES):
+            if one.place == "normal":
+                dx, dy = self._rng.normal(0.0, one.sd_cm, 2).tolist()
+            else:
+                dx, dy = (self._rng.uniform(-0.5, 0.5, 2) * (wide, deep)).tolist()
+            yield x + dx, y + dy
+
+    def _obstructed(self, x: float, y: float, radius: float) -> str:
+        """What is in the way of a disc at a place; empty if nothing is."""
+        arena = self._scene.arena
+        if min(x, y, arena.width_cm - x, arena.height_cm - y) < radius:
+            return "is in a wall"
+        if arena.polygon and not geometry.contains(arena.polygon, x, y):
+            return "is outside the walls"
+        if any(geometry.distance_to(x, y, side) < radius for side in self._sides):
+            return "touches a wall or an obstacle"
+        for one in self._scene.obstacles:
+            if one.polygon and geometry.contains(one.polygon, x, y):
+                return f"is inside obstacle {one.name}".rstrip()
+            if one.radius_cm and math.hypot(x - one.x_cm, y - one.y_cm) < radius + one.radius_cm:
+                return f"touches obstacle {one.name}".rstrip()
+        for other_x, other_y, other in self._taken:
+            if math.hypot(x - other_x, y - other_y) < radius + other:
+                return f"touches what is at ({other_x:g}, {other_y:g}) cm"
+        return ""

@@ -1,0 +1,41 @@
+"""The manifest beside the trials of a run: what the run depends on, who made it, and what each trial took."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from arena.trial.json_numbers import misfit
+from arena.trial.record import FAULT, RecordError, write_json
+
+MANIFEST: Final = "manifest.json"
+_SHAPE: Final = {
+    "key": {"scene": dict, "brain": str, "controller": str, "seconds": float, "seed": int, "image_sha256?": str,
+            "images_sha256?": dict, "experiment_sha256?": str, "versions": dict},
+    "host": [{"trial": int, "host_s": float, "faults": [FAULT]}],
+}  # fmt: skip
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a run. Raises RecordError if there is none, or something in it is missing or of another kind."""
+    path = folder / MANIFEST
+    try:
+        value: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise RecordError(f"{path}: {error}") from None
+    if wrong := misfit(value, _SHAPE):
+        raise RecordError(f"{path}: is no manifest of a run: {wrong}")
+    return value
+
+
+def write_manifest(folder: Path, value: dict[str, Any]) -> None:
+    """Write it whole or not at all. Raises RecordError."""
+    write_json(folder / MANIFEST, value)
+
+
+def note_host_time(folder: Path, trial: int, host_s: float, faults: object) -> None:
+    """Keep how long a trial took, and its faults: a trial's bytes must not depend on host time. Raises RecordError."""
+    value = read_manifest(folder)
+    value["host"].append({"trial": trial, "host_s": round(host_s, 2), "faults": faults})
+    write_manifest(folder, value)

@@ -1,0 +1,58 @@
+"""What a result depends on beside scene, firmware and seed: the emulator, this package, the libraries, the machine.
+
+The project's version number stands still between releases, so emulator and arena are named by a hash of their sources.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import subprocess
+import sys
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+LIBRARIES: Final = ("pymunk", "numpy", "pyarrow", "llvmlite")
+"""Physics, noise, the file's bytes, native code."""
+SHOWING: Final = ("commands/", "cli.py", "analysis/", "replay/", "studio/process.py", "campaign/bundle.py", "env.py",
+                  "README.md", "scenes/")  # fmt: skip
+"""Of the arena: what only looks at records. A scene is in the key by its values."""
+_KINDS: Final = {".py", ".c", ".csv", ".toml"}
+
+
+@cache
+def sources_hash(package: str) -> str:
+    """SHA-256 of a package's sources with their names, the first 16 digits. Line ends and folders do not count."""
+    digest = hashlib.sha256()
+    folder = ROOT / package
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        if path.suffix not in _KINDS or (package == "arena" and name.startswith(SHOWING)):
+            continue
+        digest.update(f"{name}\0".encode() + path.read_bytes().replace(b"\r\n", b"\n") + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def versions() -> dict[str, str]:
+    """Of everything the bytes of a record can depend on."""
+    found = {"emulator": sources_hash("emu"), "arena": sources_hash("arena"), "machine": platform.machine()}
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+def host() -> dict[str, str]:
+    """Where a run was made, for people: nothing of it shows in a record."""
+    found = {"python": platform.python_version(), "system": sys.platform, "openswarm": version("openswarm")}
+    try:
+        said = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--abbrev=40"],
+                              capture_output=True, text=True, timeout=10, check=False)  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired):
+        return found
+    return found | ({"commit": said.stdout.strip()} if said.returncode == 0 else {})

@@ -1,0 +1,417 @@
+"""The world seen from above: walls, discs that rub on the floor, e-pucks with force-limited wheels (epuck.md §4).
+
+Lengths cm, masses kg, time s. One `step` is one quantum, always of the same length; what acts on the bodies between two
+steps is only the wheel speeds given to it. The same calls give the same numbers, to the bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from ctypes import POINTER, Structure, addressof, c_double, c_int64, c_void_p
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import pymunk
+from numpy.typing import NDArray
+from pymunk._chipmunk_cffi import ffi, lib
+
+from arena.scene import dimensions, geometry
+from arena.scene.loader import Scene
+from arena.scene.placement import place_all
+from arena.scene.schema import ObjectKind
+from emu.native_library import ADDRESS, INT, address_of, functions
+
+ITERATIONS: Final = 20
+"""Of the constraint solver (epuck.md §4)."""
+ROWS: Final = 256
+"""Poses that lie in one piece of memory."""
+WALL_THICKNESS: Final = 20.0
+"""Half thickness of the walls' segments in cm: nothing tunnels through."""
+STREAM_WORLD, STREAM_WHEELS, STREAM_SENSORS, STREAM_START, STREAM_TRAITS, STREAM_EXPERIMENT, STREAM_INFRARED = range(7)
+"""Independent generators of a trial: `generator(seed, stream, robot)`."""
+
+
+def generator(seed: int, stream: int, robot: int = 0) -> np.random.Generator:
+    """The generator of one purpose and robot, independent of all others."""
+    return np.random.default_rng([seed, stream, robot])
+
+
+class Traits(NamedTuple):
+    """How one robot differs from the others: its camera turned to the left and up, in rad and degrees; how much faster
+    its wheels (left, right) are than commanded, as factors."""
+
+    yaw: float = 0.0
+    pitch_deg: float = 0.0
+    bias: tuple[float, float] = (1.0, 1.0)
+
+
+def traits_of(scene: Scene, seed: int, robot: int) -> Traits:
+    """What is drawn once for a robot of a trial. Without spread nothing differs, to the bit."""
+    spread = scene.robots
+    yaw, pitch, left, right = generator(seed, STREAM_TRAITS, robot).normal(0.0, 1.0, 4).tolist()
+    bias = (1.0 + spread.wheel_bias_sd * left, 1.0 + spread.wheel_bias_sd * right)
+    return Traits(math.radians(spread.camera_yaw_sd_deg * yaw), spread.camera_pitch_sd_deg * pitch, bias)
+
+
+class Poses:
+    """Where everything is, never changed. Robots: x, y, heading; objects: x, y. cm and rad."""
+
+    __slots__ = ("_objects", "_robots", "address", "counts", "values")
+
+    def __init__(self, robots: Sequence[tuple[float, float, float]], objects: Sequence[tuple[float, float]]) -> None:
+        numbers = [value for place in (*robots, *objects) for value in place]
+        values = np.array(numbers, dtype=np.float64)
+        self._begin(values, len(robots), values.ctypes.data)
+
+    def _begin(self, values: NDArray[np.float64], robots: int, address: int) -> None:
+        self.values = values
+        """Robots, then objects, number after number."""
+        self.counts = robots, (len(values) - 3 * robots) // 2
+        self.address = address
+        """Where they are in the host's memory."""
+        self._robots: list[tuple[float, float, float]] | None = None
+        self._objects: list[tuple[float, float]] | None = None
+
+    @classmethod
+    def of(cls, values: NDArray[np.float64], robots: int, address: int | None = None) -> Poses:
+        """What is in `values`, which is not copied, of so many robots. Who knows its address saves asking."""
+        poses = cls.__new__(cls)
+        poses._begin(values, robots, values.ctypes.data if address is None else address)
+        return poses
+
+    def __reduce__(self) -> tuple[Callable[..., Poses], tuple[NDArray[np.float64], int]]:
+        """Copies and other processes have the numbers elsewhere in memory."""
+        return Poses.of, (self.values, self.counts[0])
+
+    @property
+    def robots(self) -> list[tuple[float, float, float]]:
+        """Poses of the robots."""
+        if self._robots is None:
+            count = 3 * self.counts[0]
+            numbers = self.values[:count].tolist()
+            self._robots = list(zip(numbers[::3], numbers[1::3], numbers[2::3], strict=True))
+        return self._robots
+
+    @property
+    def objects(self) -> list[tuple[float, float]]:
+        """Places of the objects."""
+        if self._objects is None:
+            numbers = self.values[3 * self.counts[0] :].tolist()
+            self._objects = list(zip(numbers[::2], numbers[1::2], strict=True))
+        return self._objects
+
+
+class Stretch(NamedTuple):
+    """Quanta in a row whose poses are in memory one after the other."""
+
+    first: int
+    last: int
+    """How many quanta were over at the end of the first and last of them."""
+    sheet: NDArray[np.float64]
+    row: int
+    """Where in the sheet those of the first are."""
+    address: int
+
+
+class _Chipmunk(Structure):
+    """The physics library's functions that `world.c` calls, by their names there."""
+
+    NAMES: Final = ("cpSpaceStep", "cpBodySetVelocity", "cpBodySetAngularVelocity", "cpBodyGetPosition",
+                    "cpBodyGetAngle", "cpConstraintSetMaxForce", "cpBodyGetVelocity", "cpBodyGetAngularVelocity",
+                    "cpConstraintGetImpulse", "cpSpaceAddConstraint", "cpSpaceRemoveConstraint", "cpBodyEachArbiter",
+                    "cpArbiterTotalImpulse")  # fmt: skip
+    _fields_ = [(name, c_void_p) for name in NAMES]
+
+
+class _Robot(Structure):
+    _fields_ = [
+        *((name, c_void_p) for name in ("body", "moved", "push", "turn")),
+        ("bias", c_double * 2), ("noise", c_double * 2), ("rests", c_int64),
+    ]  # fmt: skip
+
+
+class _Disc(Structure):
+    _fields_ = [
+        *((name, c_void_p) for name in ("body", "grip", "hold")), ("radius", c_double), ("seen", c_double * 2),
+        *((name, c_int64) for name in ("is_known", "rests", "may_rest")),
+    ]  # fmt: skip
+
+
+class _World(Structure):
+    _fields_ = [
+        ("chipmunk", _Chipmunk), ("space", c_void_p),
+        *((name, c_double) for name in ("dt", "axle", "thrust", "thrust_turning", "brake", "brake_turning")),
+        ("robot_count", c_int64), ("object_count", c_int64),
+        ("robots", POINTER(_Robot)), ("discs", POINTER(_Disc)), ("steps", c_int64),
+    ]  # fmt: skip
+
+
+class Ground(Structure):
+    """For compiled code that makes quanta itself: `struct ground` of lockstep.c."""
+
+    _fields_ = [
+        *((name, c_void_p) for name in ("quanta", "world", "wheels")), ("numbers", c_int64),
+        ("ticks", c_int64),  # quanta that are over
+        ("until", c_int64),  # how far it may go
+        *((name, c_void_p) for name in ("row", "now", "before")),  # poses: room for the next, the present, those before
+    ]  # fmt: skip
+
+
+@cache
+def _code() -> dict[str, Callable[..., Any]]:
+    return functions(Path(__file__).with_name("physics.c"), {
+        "quantum": (None, (ADDRESS, ADDRESS)), "poses": (None, (ADDRESS, ADDRESS)),
+        "quanta": (None, (ADDRESS, ADDRESS, INT, INT, INT, ADDRESS, ADDRESS, INT)),
+    })  # fmt: skip
+
+
+def _address(thing: Any) -> int:
+    """Where an object or a function of the physics library is."""
+    return int(ffi.cast("intptr_t", thing))
+
+
+class World:
+    """One arena with everything in it, placed by `seed`. Raises SceneError if there is no room."""
+
+    def __init__(self, scene: Scene, seed: int) -> None:
+        robots, objects = place_all(scene, generator(seed, STREAM_WORLD))
+        self._build(scene, seed, robots, objects)
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        seed: int,
+        robots: Sequence[tuple[float, float, float]],
+        objects: Sequence[tuple[float, float]],
+    ) -> World:
+        """A world with everything at given places (cm, rad): for calibrations and tests."""
+        world = cls.__new__(cls)
+        world._build(scene, seed, robots, objects)
+        return world
+
+    def _build(
+        self,
+        scene: Scene,
+        seed: int,
+        robots: Sequence[tuple[float, float, float]],
+        objects: Sequence[tuple[float, float]],
+    ) -> None:
+        self.scene = scene
+        self.dt = scene.clock.quantum_tcy / 14_745_600
+        self.ticks = 0
+        """Steps made so far."""
+        self.space = pymunk.Space()
+        self.space.iterations = ITERATIONS
+        self.space.collision_slop = 0.01
+        self._add_walls()
+        self._add_obstacles()
+        self.robots = [self._add_robot(*pose) for pose in robots]
+        self._joints: list[tuple[pymunk.PivotJoint, pymunk.GearJoint] | None] = []
+        drives = [self._add_drive(body) for body in self.robots]
+        self._floor: list[tuple[pymunk.PivotJoint, pymunk.GearJoint]] = []
+        self.objects = [self._add_object(scene.kind_of(number), x, y) for number, (x, y) in enumerate(objects)]
+        self._wheel_rng = [generator(seed, STREAM_WHEELS, robot) for robot in range(len(robots))]
+        self._noise_ticks = max(round(scene.robots.noise_period_s / self.dt), 1)
+        self._hand_over(seed, drives)
+        self.poses = self._read()
+
+    def _hand_over(self, seed: int, drives: Sequence[pymunk.Body | None]) -> None:
+        """Tell `world.c` what it moves. The bodies stay as long as the world does."""
+        code = _code()
+        self._quantum, self._quanta, self._tell_poses = code["quantum"], code["quanta"], code["poses"]
+        self._robots = (_Robot * len(self.robots))()
+        parts = zip(self._robots, self.robots, drives, self._joints, strict=True)
+        for number, (robot, body, drive, joints) in enumerate(parts):
+            robot.body, robot.moved = _address(body._body), _address((drive or body)._body)
+            if joints is not None:
+                robot.push, robot.turn = (_address(joint._constraint) for joint in joints)
+            robot.bias[:] = traits_of(self.scene, seed, number).bias
+            robot.noise[:] = 1.0, 1.0
+        setting = self.scene.robots
+        forces = [force for newtons in (setting.thrust_n, setting.brake_n) for force in self._grip(newtons)]
+        discs = [_Disc(robot.body, None, None, dimensions.ROBOT_RADIUS) for robot in self._robots]
+        for number, (body, joints) in enumerate(zip(self.objects, self._floor, strict=True)):
+            held = (_address(joint._constraint) for joint in joints)
+            discs.append(_Disc(_address(body._body), *held, self.scene.kind_of(number).radius_cm))
+        self._discs = (_Disc * len(discs))(*discs)
+        self._world = _World(
+            _Chipmunk(*(_address(ffi.addressof(lib, name)) for name in _Chipmunk.NAMES)), _address(self.space._space),
+            self.dt, setting.axle_cm, *forces, len(self._robots), len(self.objects), self._robots, self._discs,
+        )  # fmt: skip
+        self._at = addressof(self._world)
+        self._wheels = np.zeros((len(self.robots), 2))
+        self._wheels_at = self._wheels.ctypes.data
+        self._numbers = 3 * len(self.robots) + 2 * len(self.objects)
+        self._sheet, self._sheet_at, self._row = np.empty((0, self._numbers)), 0, 0
+        self._row_bytes = self._sheet.itemsize * self._numbers
+        self.ground = Ground(address_of(self._quanta), self._at, self._wheels_at, self._numbers)
+        """What `lend` leaves."""
+
+    # -- building ----------------------------------------------------------------------------------------------------
+
+    def _add_walls(self) -> None:
+        width, height, half = self.scene.arena.width_cm, self.scene.arena.height_cm, WALL_THICKNESS
+        corners = [(-half, -half), (width + half, -half), (width + half, height + half), (-half, height + half)]
+        for one, other in zip(corners, corners[1:] + corners[:1], strict=True):
+            wall = pymunk.Segment(self.space.static_body, one, other, half)
+            wall.friction = dimensions.CONTACT_FRICTION
+            self.space.add(wall)
+
+    def _add_obstacles(self) -> None:
+        """The room's own shape and what stands fast in it: outlines as thin walls, and discs."""
+        fixed, shapes = self.space.static_body, [self.scene.arena.polygon]
+        shapes += [one.polygon for one in self.scene.obstacles]
+        outlines = [side for shape in shapes if shape for side in geometry.sides(shape)]
+        found: list[pymunk.Shape] = [pymunk.Segment(fixed, side[:2], side[2:], 0.0) for side in outlines]
+        found += [pymunk.Circle(fixed, one.radius_cm, (one.x_cm, one.y_cm))
+                  for one in self.scene.obstacles if one.radius_cm]  # fmt: skip
+        for shape in found:
+            shape.friction = dimensions.CONTACT_FRICTION
+            self.space.add(shape)
+
+    def _disc(self, mass: float, radius: float, x: float, y: float) -> pymunk.Body:
+        body = pymunk.Body(mass, dimensions.disc_moment(mass, radius))
+        body.position = x, y
+        shape = pymunk.Circle(body, radius)
+        shape.friction = math.sqrt(dimensions.CONTACT_FRICTION)  # pymunk multiplies the two
+        self.space.add(body, shape)
+        return body
+
+    def _add_robot(self, x: float, y: float, heading: float) -> pymunk.Body:
+        body = self._disc(dimensions.ROBOT_MASS, dimensions.ROBOT_RADIUS, x, y)
+        body.angle = heading
+        return body
+
+    def _add_drive(self, robot: pymunk.Body) -> pymunk.Body | None:
+        """The wheels: a body that moves as commanded and pulls the robot along with at most the tyres' grip."""
+        if math.isinf(self.scene.robots.thrust_n):
+            self._joints.append(None)
+            return None
+        wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        push = pymunk.PivotJoint(wheels, robot, (0, 0), (0, 0))
+        turn = pymunk.GearJoint(wheels, robot, 0.0, 1.0)
+        self._joints.append((push, turn))
+        push.max_force, turn.max_force = self._grip(self.scene.robots.thrust_n)
+        for joint in (push, turn):
+            joint.max_bias = 0.0
+            self.space.add(joint)
+        self.space.add(wheels)
+        return wheels
+
+    def _grip(self, force_n: float) -> tuple[float, float]:
+        """Greatest force and torque with which wheels pull or hold a robot."""
+        return dimensions.newton(force_n), dimensions.newton(force_n) * self.scene.robots.axle_cm / 2
+
+    def _add_object(self, setting: ObjectKind, x: float, y: float) -> pymunk.Body:
+        """Its friction on the floor is two joints of limited force that want it to stand still."""
+        body = self._disc(setting.mass_kg, setting.radius_cm, x, y)
+        grip = pymunk.PivotJoint(self.space.static_body, body, (0, 0), (0, 0))
+        hold = pymunk.GearJoint(self.space.static_body, body, 0.0, 1.0)
+        mu = setting.floor_friction
+        grip.max_force = dimensions.floor_force(setting.mass_kg, mu)
+        hold.max_force = dimensions.floor_torque(setting.mass_kg, setting.radius_cm, mu)
+        for joint in (grip, hold):
+            joint.max_bias = 0.0
+            self.space.add(joint)
+        self._floor.append((grip, hold))
+        return body
+
+    # -- one quantum -------------------------------------------------------------------------------------------------
+
+    def step(self, wheels: Sequence[tuple[float, float]]) -> None:
+        """Act and physics: wheel speeds (left, right) in cm/s as commanded, for one quantum."""
+        self._draw_noise()
+        self._wheels[:] = np.reshape(wheels, (-1, 2))
+        self._quantum(self._at, self._wheels_at)
+        self.ticks += 1
+        self.poses = self._read()
+
+    def go(self, speeds: int, room: int, count: int) -> list[Stretch]:
+        """So many quanta at wheel speeds that lie where `Wheels` keeps them, `room` per robot: `speeds` is the address
+        of a table of addresses. Where poses at the end of each are."""
+        made = []
+        while count:
+            self._draw_noise()
+            row = self._room()
+            more = min(count, self._noise_ticks - self.ticks % self._noise_ticks, ROWS - row)
+            at = self._sheet_at + row * self._row_bytes
+            self._quanta(self._at, speeds, room, self.ticks, more, self._wheels_at, at, self._numbers)
+            made.append(Stretch(self.ticks + 1, self.ticks + more, self._sheet, row, at))
+            self._row += more
+            self.ticks += more
+            count -= more
+        if made:
+            self.poses = self.at(made[-1], self.ticks)
+        return made
+
+    def lend(self, now: Poses, before: Poses, is_lent: bool = True) -> None:
+        """Let compiled code make quanta by `ground` up to where noise is drawn, or poses need another sheet, or none;
+        `before` are the poses a quantum before those of now."""
+        ground, row = self.ground, self._room()
+        noisy = self.ticks % self._noise_ticks
+        may = is_lent and (noisy or not self.scene.robots.wheel_noise)
+        more = min(self._noise_ticks - noisy, ROWS - row) if may else 0
+        ground.ticks, ground.until = self.ticks, self.ticks + more
+        ground.row, ground.now, ground.before = self._sheet_at + row * self._row_bytes, now.address, before.address
+
+    def take(self) -> list[Stretch]:
+        """What has been made by `ground` since."""
+        ticks, count = self.ground.ticks, self.ground.ticks - self.ticks
+        if not count:
+            return []
+        made = Stretch(self.ticks + 1, ticks, self._sheet, self._row, self._sheet_at + self._row * self._row_bytes)
+        self._row += count
+        self.ticks = ticks
+        self.poses = self.at(made, ticks)
+        return [made]
+
+    def at(self, stretch: Stretch, tick: int) -> Poses:
+        """Poses at the end of so many quanta, which are in that stretch."""
+        row = tick - stretch.first
+        return Poses.of(stretch.sheet[stretch.row + row], len(self.robots), stretch.address + row * self._row_bytes)
+
+    def _room(self) -> int:
+        """A free row for poses. Sheets are never written twice: poses stay what they were."""
+        if self._row == len(self._sheet):
+            self._sheet, self._row = np.empty((ROWS, self._numbers)), 0
+            self._sheet_at = self._sheet.ctypes.data
+        return self._row
+
+    def move(self, body: pymunk.Body, x: float, y: float, heading: float | None = None) -> None:
+        """Put a robot or object somewhere else, at rest; cm, rad."""
+        body.position, body.velocity, body.angular_velocity = (x, y), (0.0, 0.0), 0.0
+        if heading is not None:
+            body.angle = heading
+        self.space.reindex_shapes_for_body(body)
+        self.poses = self._read()
+
+    def _draw_noise(self) -> None:
+        share = self.scene.robots.wheel_noise
+        if not share or self.ticks % self._noise_ticks:
+            return
+        for robot, rng in zip(self._robots, self._wheel_rng, strict=True):
+            robot.noise[:] = rng.uniform(1 - share, 1 + share, 2).tolist()
+
+    def _read(self) -> Poses:
+        row = self._room()
+        self._row += 1
+        at = self._sheet_at + row * self._row_bytes
+        self._tell_poses(self._at, at)
+        return Poses.of(self._sheet[row], len(self.robots), at)
+
+    @property
+    def seconds(self) -> float:
+        """Time since the start."""
+        return self.seconds_at(self.ticks)
+
+    def seconds_at(self, tick: int) -> float:
+        """Time of the beginning of a quantum."""
+        return tick * self.scene.clock.quantum_tcy / 14_745_600
+
+    def object_places(self) -> NDArray[np.float64]:
+        """Objects' centres, n x 2, cm."""
+        return np.array(self.poses.objects, dtype=float).reshape(-1, 2)

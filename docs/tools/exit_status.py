@@ -1,0 +1,23 @@
+"""Writes docs/exit-status.md from the one place in the code: `python docs/tools/exit_status.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from emu.host.exit_status import table
+
+PAGE = Path(__file__).parents[1] / "exit-status.md"
+TEXT = f"""# Exit statuses
+
+Of `emu`, `toolchain`, `dspic-*`, `arena` and `openswarm`; written by `python docs/tools/exit_status.py` from `emu/host/exit_status.py`.
+
+{table()}
+
+With `emu run --exit-code` every other status is the firmware's own: the low eight bits of what `main` returned.
+
+`-` is standard input where a file is read as a whole, and standard output where one is written. Exceptions: files that
+a command reads *and* writes (`--state`, `--update`, `--document`) and films, whose kind is in their name.
+"""
+
+if __name__ == "__main__":
+    PAGE.write_text(TEXT, encoding="utf-8")

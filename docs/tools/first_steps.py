@@ -1,0 +1,133 @@
+"""Plays the sessions of docs/first-steps.md as a newcomer would: from the wheel, in an empty folder and HOME.
+
+`python docs/tools/first_steps.py` puts the present output behind the commands; `--check` writes nothing and ends with status 1
+and the difference if they say something else now. Numbers do not count there: they belong to kernel and compiler, and
+others watch over them. `--keep FOLDER` works there.
+
+The wheel goes into an environment of its own that shares only the dependencies with the present one, so nothing is
+downloaded. Afterwards nothing may have been written beside the project and the cache.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "first-steps.md"
+NUMBERS = re.compile(r"0x[0-9a-f]+|\d[\d,.e+-]*| {2,}")
+EPOCH = "1767225600"
+"""2026-01-01, the date of all files in a wheel: the same sources give the same bytes whenever they are built."""
+
+
+def built_wheel(folder: Path) -> Path:
+    """The wheel made from the sdist of the files git knows, outside the checkout."""
+    source = folder / "source"
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in filter(None, listed.split("\0")):
+        if (ROOT / name).is_file():
+            (source / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, source / name)
+    words = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder), str(source)]
+    done = subprocess.run(
+        words, env=os.environ | {"SOURCE_DATE_EPOCH": EPOCH}, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        sys.exit(done.stdout + done.stderr)
+    return next(folder.glob("*.whl"))
+
+
+def installed(wheel: Path, folder: Path) -> dict[str, str]:
+    """The surroundings of a shell in which the wheel is installed and nothing else of this project."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
+    python = folder / "bin" / "python"
+    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}  # it may have this package
+    subprocess.run([sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index",
+                    "--no-compile", "--disable-pip-version-check", wheel], check=True, env=alone)  # fmt: skip
+    packages = next((folder / "lib").glob("python*")) / "site-packages"
+    (packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    home = folder.parent / "home"
+    home.mkdir()
+    return {
+        "HOME": str(home),
+        "PATH": f"{folder / 'bin'}:/usr/bin:/bin",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "LANG": "C.UTF-8",
+    }
+
+
+def played(text: str, where: Path, environment: dict[str, str]) -> str:
+    """The page with the present output behind each command. Raises SystemExit for one that fails."""
+
+    def session(found: re.Match[str]) -> str:
+        nonlocal where
+        lines = []
+        for command in (line[2:] for line in found[1].splitlines() if line.startswith("$ ")):
+            lines.append(f"$ {command}")
+            if command.startswith("cd "):
+                where /= command[3:]
+                continue
+            done = subprocess.run(
+                ["bash", "-c", command], cwd=where, env=environment, stdin=subprocess.DEVNULL, text=True,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+            )  # fmt: skip
+            if done.returncode:
+                sys.exit(f"{command}: status {done.returncode}\n{done.stdout}")
+            said = done.stdout
+            for place in (f"{where}/", f"{folder_of(environment)}/"):
+                said = said.replace(place, "")
+            lines += [line.rstrip() for line in said.splitlines()]
+        return "\n".join(lines) + "\n"
+
+    return re.sub(r"(?<=```\n)(\$ .*?)(?=```)", session, text, flags=re.DOTALL)
+
+
+def folder_of(environment: dict[str, str]) -> str:
+    """Where the environment's programs are."""
+    return environment["PATH"].partition(":")[0]
+
+
+def listing(folder: Path) -> set[str]:
+    """Every file below a folder."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--check", action="store_true")
+    options.add_argument("--keep", type=Path, metavar="FOLDER")
+    wanted = options.parse_args()
+    with tempfile.TemporaryDirectory(prefix="newcomer-") as scratch:
+        folder = (wanted.keep or Path(scratch)).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        environment = installed(built_wheel(folder), folder / "venv")
+        before = listing(folder / "venv")
+        (folder / "work").mkdir()
+        old = PAGE.read_text(encoding="utf-8")
+        new = played(old, folder / "work", environment)
+        strange = listing(folder / "venv") - before
+        strange |= {
+            name for name in listing(folder / "home") if not name.startswith((".cache/openswarm/", ".cache/matplotlib"))
+        }
+    if strange:
+        sys.exit(f"written where nothing belongs: {sorted(strange)}")
+    if not wanted.check:
+        PAGE.write_text(new, encoding="utf-8")
+        return 0
+    told = [NUMBERS.sub("", text).splitlines() for text in (old, new)]
+    difference = list(difflib.unified_diff(*told, "docs/first-steps.md", "now", lineterm="", n=1))
+    for line in difference:
+        print(line)
+    return 1 if difference else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

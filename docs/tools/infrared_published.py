@@ -1,0 +1,167 @@
+"""Draws our link by infra-red beside what SwarmCom and libIrcom have published, for docs/swarm.md.
+
+    python docs/tools/infrared_published.py [--figure docs/figures/infrared-link.png]
+
+What enters: docs/results/infrared-link.csv, which infrared_link.py measures, and docs/results/infrared-published.csv,
+every published number with its source. Their curves could not be had: of the article only the abstract was read, and
+libIrcom has published rates and a range, no errors. So numbers are drawn as numbers, dashed where UNVERIFIED.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from pathlib import Path
+from typing import Any
+
+from infrared_link import CODE, WORDS, Found, Job, expected
+
+HERE = Path(__file__).parents[1]
+MESSAGE_BITS = 64
+SCARCE = 3.0
+"""Errors in so many bits that were expected and not seen: their rate is below that with 95 %."""
+RANGE_SHARE = 0.5
+"""Our range: where so many frames of a robot that is alone still arrive."""
+GAPS_DEG = (116, 180, 244)
+"""Bearings between a robot's sensors, clockwise (swarmcom.md 4); UNVERIFIED by measurement."""
+OURS, THEIRS, OTHERS = "tab:blue", "tab:red", "tab:green"
+UNSURE = (0, (4, 2))
+
+
+def measured(path: Path) -> list[tuple[Job, Found]]:
+    """The runs of a data file of infrared_link.py."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            (
+                Job(int(one["senders"]), float(one["cm"]), float(one["turned_deg"]), float(one["seconds"]),
+                    float(one["noise_counts"])),
+                Found(int(one["sent"]), int(one["arrived"]), int(one["damaged"]), int(one["repaired_bits"])),
+            )
+            for one in csv.DictReader(file)
+        ]  # fmt: skip
+
+
+def published(path: Path, system: str, what: str) -> list[float]:
+    """The values that a system has published of something."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [float(one["value"]) for one in csv.DictReader(file) if (one["system"], one["what"]) == (system, what)]
+
+
+def by_distance(runs: list[tuple[Job, Found]], senders: int) -> list[tuple[float, Job, Found]]:
+    """The first run of each distance with so many senders, which face each other."""
+    found = dict[float, tuple[float, Job, Found]]()
+    for job, one in runs:
+        if job.senders == senders and not job.turned:
+            found.setdefault(job.distance, (job.distance, job, one))
+    return [found[distance] for distance in sorted(found)]
+
+
+def throughput(job: Job, one: Found) -> float:
+    """Payload that arrived, bit/s."""
+    return one.arrived * MESSAGE_BITS / job.seconds
+
+
+def our_range(runs: list[tuple[Job, Found]]) -> float:
+    """cm, on the line between the last distance at which RANGE_SHARE arrives and the next one."""
+    alone = by_distance(runs, 1)
+    last = max(number for number, (_, _, one) in enumerate(alone) if one.share >= RANGE_SHARE)
+    (near, _, here), (far, _, there) = alone[last], alone[last + 1]
+    return near + (far - near) * (here.share - RANGE_SHARE) / (here.share - there.share)
+
+
+def draw_errors(axes: Any, runs: list[tuple[Job, Found]], reach: float, factor: float) -> None:
+    alone = [(cm, one) for cm, _, one in by_distance(runs, 1) if one.arrived]
+    noise = runs[0][0].noise
+    seen = [(cm, one.bit_errors) for cm, one in alone if one.repaired]
+    unseen = [(cm, SCARCE / (one.arrived * WORDS * CODE)) for cm, one in alone if not one.repaired]
+    fine = [12 + step / 10 for step in range(581)]
+    axes.semilogy(fine, [expected(one, noise)[0] for one in fine], "k:", lw=1, label="expected of three scans")
+    axes.semilogy(*zip(*seen, strict=True), "s-", color=OURS, label="ours, in frames that arrived")
+    axes.semilogy(*zip(*unseen, strict=True), "v", color=OURS, mfc="none", label="ours: none seen, less than this")
+    axes.axvline(reach, color=OTHERS, ls=UNSURE, lw=1.2, label="libIrcom: nominal range")
+    axes.axvline(reach * factor, color=THEIRS, ls=UNSURE, lw=1.2, label="SwarmCom: up to 3 times that")
+    axes.set(xlabel="cm between the middles", ylabel="bit error rate", xlim=(10, 70), ylim=(1e-5, 0.5))
+    axes.set_title("Bit errors over distance")
+
+
+def draw_throughput(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach: float) -> None:
+    for senders, mark, name in ((1, "o-", "ours, one sends"), (2, "o:", "ours, both send, sum")):
+        found = [(cm, throughput(job, one)) for cm, job, one in by_distance(runs, senders)]
+        axes.plot(*zip(*found, strict=True), mark, color=OURS, mfc="none" if senders == 2 else OURS, label=name)
+    for rate, name in zip(published(data, "SwarmCom", "payload rate"), ("fast", "slow"), strict=True):
+        axes.axhline(rate, color=THEIRS, lw=1)
+        axes.text(69, rate + 12, f"SwarmCom, {name}: {rate:g}", color=THEIRS, ha="right", fontsize=8)
+    for rate in published(data, "libIrcom", "payload rate"):
+        axes.plot([10, reach], [rate, rate], color=OTHERS, lw=1.4)
+        axes.plot([reach], [rate], "|", color=OTHERS, ms=9)
+        axes.text(reach + 5, rate - 8, f"libIrcom: {rate:g}", color=OTHERS, fontsize=8)
+    axes.set(xlabel="cm between the middles", ylabel="payload that arrives, bit/s", xlim=(10, 70), ylim=(0, 720))
+    axes.set_title("Throughput; theirs: as the protocol gives, any range")
+
+
+def draw_angle(axes: Any, runs: list[tuple[Job, Found]]) -> None:
+    """By the bearing from which light comes: a robot that looks away by 90 degrees hears on its left."""
+    cm = next(job.distance for job, _ in runs if job.turned)
+    alone = [(job.turned, one.share) for job, one in runs if (job.senders, job.distance) == (1, cm)]
+    found = sorted(((270 + turned) % 360, share) for turned, share in alone)
+    for gap in GAPS_DEG:
+        axes.axvline(gap, color="0.5", ls=UNSURE, lw=1, label="gap between two sensors" if gap == 116 else None)
+    axes.plot(*zip(*found, strict=True), "o-", color=OURS, label=f"ours at {cm:g} cm")
+    axes.set(xlabel="bearing of the sender, degrees clockwise", ylabel="frames that arrive", ylim=(-0.05, 1.1))
+    axes.set(xticks=range(0, 361, 60), title="By angle; SwarmCom, libIrcom: none published")
+
+
+def draw_ratios(axes: Any, runs: list[tuple[Job, Found]], data: Path, reach: float) -> None:
+    best = max(throughput(job, one) for _, job, one in by_distance(runs, 1))
+    rates = published(data, "libIrcom", "payload rate")
+    errors = published(data, "SwarmCom", "bit error rate over libIrcom's")
+    (far,), (fast,) = (published(data, "SwarmCom", f"{one} over libIrcom's") for one in ("range", "throughput"))
+    axes.barh([2.18, 1.18], [far, fast], 0.34, color="none", edgecolor=THEIRS, ls=UNSURE, label="SwarmCom, up to")
+    axes.barh([0], [errors[1] - errors[0]], 0.34, left=errors[0], color="none", edgecolor=THEIRS, ls=UNSURE)
+    axes.barh([1.82], [our_range(runs) / reach], 0.34, color=OURS, label="ours, over its nominal values")
+    axes.barh([0.82], [best / max(rates)], 0.34, color=OURS)
+    axes.axvline(1, color=OTHERS, lw=1.2, label="libIrcom")
+    axes.text(1.15, -0.08, "ours: none, libIrcom's is not published", fontsize=8, color=OURS)
+    axes.set(yticks=[2, 1, 0], xlabel="times libIrcom's", xlim=(0, 8.6), ylim=(-0.6, 2.6))
+    axes.set_yticklabels(["range", "throughput", "bit errors"])
+    axes.set_title("Against libIrcom, as published")
+
+
+def draw(path: Path, runs: list[tuple[Job, Found]], data: Path) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    (reach,), (factor,) = published(data, "libIrcom", "range"), published(data, "SwarmCom", "range over libIrcom's")
+    figure, ((errors, speed), (angle, ratios)) = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
+    draw_errors(errors, runs, reach, factor)
+    draw_throughput(speed, runs, data, reach)
+    draw_angle(angle, runs)
+    draw_ratios(ratios, runs, data, reach)
+    errors.legend(fontsize=8, loc="lower right", bbox_to_anchor=(0.94, 0.02))
+    speed.legend(fontsize=8, loc="lower right")
+    angle.legend(fontsize=8, loc="lower right")
+    ratios.legend(fontsize=8, loc="upper right")
+    figure.supxlabel("dashed, red or green or grey: UNVERIFIED", fontsize=9, x=0.99, ha="right")
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--measured", type=Path, default=HERE / "results" / "infrared-link.csv")
+    parser.add_argument("--published", type=Path, default=HERE / "results" / "infrared-published.csv")
+    parser.add_argument("--figure", type=Path, default=HERE / "figures" / "infrared-link.png")
+    chosen = parser.parse_args()
+    runs = measured(chosen.measured)
+    draw(chosen.figure, runs, chosen.published)
+    (reach,) = published(chosen.published, "libIrcom", "range")
+    best = max(throughput(job, one) for _, job, one in by_distance(runs, 1))
+    print(f"range {our_range(runs):.1f} cm, {our_range(runs) / reach:.2f} times libIrcom's nominal one")
+    print(f"{best:.0f} bit/s of payload at most", *(
+        f"{best / rate:.2f} times the {rate:g} of libIrcom's protocol"
+        for rate in published(chosen.published, "libIrcom", "payload rate")), sep=", ")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""Measures messages by infra-red among 2, 10 and 30 robots, on the real firmware in the arena, for docs/swarm.md.
+
+    python docs/tools/infrared_swarm.py [--seconds 5] [--noise 2] [--jobs 2]
+
+They stand on a triangular grid, 11 cm from one to the next, turned anyhow, and each sends a message of eight bytes
+every 0.75 to 2.25 s. Every run is made twice and ends with status 1 if both are not the same to the byte.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import math
+import struct
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+
+from arena.infrared.channel import Ether
+from arena.infrared.propagation import Optics
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.images import image_for
+from arena.scene.loader import FCY, load_scene
+from arena.world.physics import Poses
+from emu.machine.machine import Machine
+
+SWARMS = (2, 10, 30)
+SPACING_CM = 11.0
+ROW = 6
+"""Robots beside each other, at most."""
+REACH_COUNTS = 8.0
+"""Who gets so much of another's light on a sensor is in its reach: some 27 cm where sensor and emitter face each other,
+where of two robots alone most frames still arrive (docs/tools/infrared_link.py)."""
+SELECTOR = 6
+"""Of apps/chatter: a message every 0.75 to 2.25 s."""
+SENDERS, ENTRY = 30, "<5Hih"
+"""Of apps/chatter."""
+COLUMNS = ("robots", "in reach of each", "sent", "could arrive", "share delivered", "lost", "from beyond reach",
+           "twice", "ms, mean", "most")  # fmt: skip
+WARM_S = 0.5
+"""Before they begin to talk."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Of a swarm: messages sent, how many could have arrived and have, of those in reach and of others; arrivals twice,
+    ms from queueing to the handler on average and at most, and a hash of all that the robots have counted."""
+
+    robots: int
+    reached: float
+    sent: int
+    possible: int
+    arrived: int
+    beyond: int
+    twice: int
+    ms: float
+    most_ms: int
+    everything: str
+
+
+def grid(robots: int) -> Poses:
+    """Rows as long as each other, the next one shifted by half a place."""
+    columns = min(robots, ROW if robots > ROW * 2 else math.ceil(robots / 3) if robots > 2 else robots)
+    places = [(number % columns, number // columns) for number in range(robots)]
+    return Poses(
+        [
+            (100 + SPACING_CM * (column + row % 2 / 2), 100 + SPACING_CM * row * math.sqrt(3) / 2, 1.7 * number)
+            for number, (column, row) in enumerate(places)
+        ],
+        [],
+    )
+
+
+def measure(robots: int, seconds: float, noise: float) -> Found:
+    poses = grid(robots)
+    values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise}
+    scene = load_scene("clustering").with_values(**values)
+    ether = Ether.of(scene)
+    image = image_for("chatter")
+    assert image is not None
+    brains = [EmulatedBrain(scene, 1, number, image, SELECTOR, ether) for number in range(robots)]
+    for tick in range(math.ceil((WARM_S + seconds) * FCY / scene.clock.quantum_tcy)):
+        for brain in brains:
+            brain.think(tick, poses)
+    machines = [brain.machine for brain in brains]
+    clocks, numbers = ([word(one, name) for one in machines] for name in ("now_ms", "infrared_number"))
+    sent = [word(one, "mine") - _bytes(one, "queue_length", 1)[0] for one in machines]
+    optics = Optics(scene)
+    digest = hashlib.sha256()
+    possible = arrived = beyond = twice = total = most = pairs = 0
+    for me, machine in enumerate(machines):
+        signals = optics.signals(poses, me, [other for other in range(robots) if other != me])
+        near = {one.robot for one in signals if sum(one.counts) * max(one.shares) >= REACH_COUNTS}
+        pairs += len(near)
+        possible += sum(sent[other] for other in near)
+        entries = _bytes(machine, "senders", SENDERS * struct.calcsize(ENTRY))
+        digest.update(entries + _bytes(machine, "infrared_statistics", 2))
+        for source, received, again, _, _, ms, longest in struct.iter_unpack(ENTRY, entries):
+            if source not in numbers:
+                continue
+            other = numbers.index(source)
+            late = (clocks[me] - clocks[other] + 0x8000) % 0x10000 - 0x8000  # how far its clock is behind
+            new = received - again
+            arrived, beyond = (arrived + new, beyond) if other in near else (arrived, beyond + new)
+            twice, total, most = twice + again, total + ms - received * late, max(most, longest - late)
+    return Found(
+        robots, pairs / robots, sum(sent), possible, arrived, beyond, twice, total / max(arrived + beyond + twice, 1),
+        most, digest.hexdigest(),
+    )  # fmt: skip
+
+
+def word(machine: Machine, name: str) -> int:
+    """A variable of 16 bits, or the first of a structure."""
+    (value,) = struct.unpack("<H", _bytes(machine, name, 2))
+    return int(value)
+
+
+def _bytes(machine: Machine, name: str, size: int) -> bytes:
+    at = machine.address_of(name)
+    return bytes(machine.record.bytes[at : at + size])
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--noise", type=float, default=2.0, metavar="COUNTS")
+    parser.add_argument("--jobs", type=int, default=2)
+    chosen = parser.parse_args()
+    image_for("chatter")  # built once
+    with ProcessPoolExecutor(chosen.jobs) as pool:
+        runs = [pool.submit(measure, robots, chosen.seconds, chosen.noise) for robots in SWARMS for _ in range(2)]
+    found = [one.result() for one in runs]
+    print("| " + " | ".join(COLUMNS) + " |")
+    print("|---" * len(COLUMNS) + "|")
+    for one in found[::2]:
+        shares = f"{one.arrived / max(one.possible, 1):.2f} | {one.possible - one.arrived}"
+        print(
+            f"| {one.robots} | {one.reached:.1f} | {one.sent} | {one.possible} | {shares} | {one.beyond} |"
+            f" {one.twice} | {one.ms:.0f} | {one.most_ms} |"
+        )
+    if found[::2] != found[1::2]:
+        print("the second run of each differs from the first", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

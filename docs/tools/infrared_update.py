@@ -1,0 +1,118 @@
+"""Measures how a swarm reprograms itself by infra-red, on the real firmware in the arena, for docs/swarm.md.
+
+    python docs/tools/infrared_update.py [--robots 10] [--rows 1] [--lost 0] [--most 120] [--noise 2]
+
+Robots of apps/spreading stand on the grid of infrared_swarm.py; the first has a program of so many rows. Printed is
+when each has it whole, and when it has restarted and calls it. Exit status 1 if one does not within `--most` seconds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from infrared_swarm import grid, word
+
+from arena.infrared.channel import Ether
+from arena.robots.firmware_controller import EmulatedBrain
+from arena.scene.loader import FCY, load_scene
+from emu.host import paths
+from emu.image.loader import load_image
+from emu.image.model import ERASED
+from emu.machine.machine import Machine
+from openswarm.flashing.loaders import ROW_WORDS
+from openswarm.flashing.program import ROWS, SLOT, program_of
+
+APP = "spreading"
+VERSION = 2
+"""The selector of the first robot, which is the version of its program."""
+LOOK_TICKS = 100
+FILLING = """\
+    .section .filling, code, keep       ; words of which none is like another
+    .set n, 0
+    .rept {words}
+    mov     #n, w0
+    .set n, n + 1
+    .endr
+"""
+
+
+def built(folder: Path, rows: int) -> Path:
+    """The application's image, whose lamp has so many rows."""
+    app, out = folder / APP, folder / "build"
+    shutil.copytree(paths.firmware() / "apps" / APP, app)
+    if rows > 1:
+        (app / "lamp" / "filling.S").write_text(FILLING.format(words=(rows - 1) * ROW_WORDS))
+    command = [
+        "make",
+        "-C",
+        paths.firmware(),
+        f"APPS={folder}",
+        f"APP={APP}",
+        f"OUT={out}",
+        f"PYTHON={sys.executable}",
+    ]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    made = program_of(load_image(str(out / "lamp.elf")))
+    if len(made.rows) != rows:
+        raise ValueError(f"the program has {len(made.rows)} rows, not {rows}")
+    return out / "firmware.elf"
+
+
+def calls_it(machine: Machine) -> bool:
+    """Whether the program was put where it is called."""
+    return machine.program.word(SLOT.start) != ERASED
+
+
+def measure(image: Path, robots: int, lost: float, most: float, noise: float) -> tuple[list[float], list[float]]:
+    """Seconds after which each robot has the program, and calls it; in no order, less than all if some do not."""
+    poses = grid(robots)
+    values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise,
+              "infrared__lost_share": lost}  # fmt: skip
+    scene = load_scene("clustering").with_values(**values)
+    ether = Ether.of(scene)
+    brains = [EmulatedBrain(scene, 1, one, image, 0 if one else VERSION, ether) for one in range(robots)]
+    has, calls = dict[int, float](), dict[int, float]()
+    for tick in itertools.count(1):
+        for brain in brains:
+            brain.think(tick - 1, poses)
+        if tick % LOOK_TICKS:
+            continue
+        seconds = tick * scene.clock.quantum_tcy / FCY
+        for one, brain in enumerate(brains):
+            if word(brain.machine, "have") == VERSION:
+                has.setdefault(one, seconds)
+            if one in has and calls_it(brain.machine):
+                calls.setdefault(one, seconds)
+        if len(calls) == robots or seconds >= most:
+            break
+    return list(has.values()), list(calls.values())
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robots", type=int, default=10)
+    parser.add_argument("--rows", type=int, default=1, choices=range(1, ROWS + 1), metavar="N")
+    parser.add_argument("--lost", type=float, default=0.0, metavar="SHARE", help="of messages, beside the light's own")
+    parser.add_argument("--most", type=float, default=120.0, metavar="SECONDS")
+    parser.add_argument("--noise", type=float, default=2.0, metavar="COUNTS")
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        image = built(Path(folder), chosen.rows)
+        has, calls = measure(image, chosen.robots, chosen.lost, chosen.most, chosen.noise)
+    for what, seconds in (("have it whole", has), ("restarted and call it", calls)):
+        known = seconds or [math.nan]
+        times = f"median {statistics.median(known):.1f} s, last {max(known):.1f} s"
+        print(f"{len(seconds)} of {chosen.robots} {what}: {times}")
+    return 0 if len(calls) == chosen.robots else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,133 @@
+"""Builds the documentation site: `python docs/tools/site.py [--out build/site]`, with the extra `docs`.
+
+The site is every Markdown file of the repository at its own place, so that links work on GitHub and here alike, and
+pages made now: what `--help` says, the Python interfaces by their docstrings, the kernel's headers. MkDocs builds it
+strictly: a warning is a failure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
+MODULES = (
+    "emu",
+    "emu.machine.machine",
+    "emu.machine.fault_report",
+    "emu.boards.epuck.board",
+    "emu.boards.epuck.exchange",
+    "emu.debug.history",
+    "emu.host.paths",
+    "emu.host.exit_status",
+    "arena.env",
+    "arena.scene.schema",
+    "arena.experiments",
+    "arena.metrics",
+    "arena.trial.record",
+)
+"""What people import."""
+LINK = re.compile(r"(\]\()([^)\s]+)(\))")
+
+
+def tracked() -> list[str]:
+    """Every file git knows."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return [name for name in listed.split("\0") if name and (ROOT / name).is_file()]
+
+
+def copied(source: Path) -> None:
+    """The repository's pages and what they point to, at their own places below `source`."""
+    for name in tracked():
+        path = ROOT / name
+        if path.suffix != ".md" or name.startswith("openswarm/template"):
+            continue
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        text = path.read_text(encoding="utf-8")
+        for _, target, _ in LINK.findall(text):
+            place = (path.parent / target.partition("#")[0]).resolve()
+            if ":" not in target and place.is_file() and place.suffix != ".md" and place.is_relative_to(ROOT):
+                beside = source / place.relative_to(ROOT)
+                beside.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(place, beside)
+        (source / name).write_text(with_pages(text, path), encoding="utf-8")
+
+
+def with_pages(text: str, page: Path) -> str:
+    """The text of a page with links to folders as links to their READMEs."""
+    return LINK.sub(lambda found: found[1] + to_page(page, found[2]) + found[3], text)
+
+
+def to_page(page: Path, target: str) -> str:
+    """A link to a folder as one to its README."""
+    place, hash_, anchor = target.partition("#")
+    is_folder = place and ":" not in place and (page.parent / place).is_dir()
+    return f"{place.rstrip('/')}/README.md{hash_}{anchor}" if is_folder else target
+
+
+def help_of(program: str) -> str:
+    """A page with what a program and each of its commands say about themselves."""
+
+    def said(*words: str) -> str:
+        done = subprocess.run(
+            [sys.executable, "-m", program, *words, "--help"], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        return done.stdout.replace("python -m ", "")
+
+    whole = said()
+    names = re.findall(r"^ {2,4}([a-z]+) {2,}\S", whole, re.MULTILINE)
+    parts = [f"# {program}\n\n```text\n{whole}```\n"]
+    parts += [f"## {program} {name}\n\n```text\n{said(name)}```\n" for name in names]
+    return "\n".join(parts)
+
+
+def reference(source: Path) -> None:
+    """The pages that are made."""
+    folder = source / "reference"
+    folder.mkdir()
+    for program in PROGRAMS:
+        (folder / f"{program}.md").write_text(help_of(program), encoding="utf-8")
+    options = "    options:\n      heading_level: 3\n      show_root_heading: false\n"
+    python = "".join(f"## {name}\n\n::: {name}\n{options}\n" for name in MODULES)
+    (folder / "python.md").write_text(f"# Python interfaces\n\n{python}", encoding="utf-8")
+    headers = ["# Headers of the kernel\n\nEach function has its contract in the line above it.\n"]
+    for path in sorted((ROOT / "firmware/openswarm/include").glob("*.h")):
+        headers.append(f"## {path.name}\n\n```c\n{path.read_text(encoding='utf-8')}```\n")
+    (folder / "kernel.md").write_text("\n".join(headers), encoding="utf-8")
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--out", type=Path, default=ROOT / "build" / "site", metavar="FOLDER")
+    wanted = options.parse_args()
+    with tempfile.TemporaryDirectory(prefix="site-") as scratch:
+        source = Path(scratch) / "pages"
+        source.mkdir()
+        copied(source)
+        reference(source)
+        settings = Path(scratch) / "mkdocs.yml"
+        settings.write_text(f"INHERIT: {ROOT / 'docs' / 'mkdocs.yml'}\ndocs_dir: {source}\n", encoding="utf-8")
+        words = [
+            "-m",
+            "mkdocs",
+            "build",
+            "--strict",
+            "--quiet",
+            "--config-file",
+            settings,
+            "--site-dir",
+            wanted.out.resolve(),
+        ]
+        surroundings = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
+        return subprocess.run([sys.executable, *map(str, words)], cwd=ROOT, env=surroundings, check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,331 @@
+"""The camera: register file on I2C, sync lines and pixel bus as functions of the cycle (epuck.md §7).
+
+Nothing ticks. HREF, VSYNC and PCLK are closed forms of the cycle (`scan.py`), so the timers that count them post one
+event per match. Pixels of a line are rendered when the first of them is read, and lie in the record until the line is
+over. The port reads a line that is on the bus from the record.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+from emu.boards.epuck.camera.exposure import Exposure
+from emu.boards.epuck.camera.native_camera import LentCamera
+from emu.boards.epuck.camera.scan import HREF, LINE_PIXELS, PCLK, VSYNC, Scan, course_of
+from emu.boards.epuck.camera.sensors import SENSORS, Picture, Timing
+from emu.boards.part import Part
+from emu.peripherals import Peripherals
+from emu.peripherals.i2c.bus import I2cDevice
+from emu.peripherals.ports.rules import Stretch
+from emu.system.events import NEVER
+from emu.system.rules import place_of
+
+if TYPE_CHECKING:  # loaded when the first picture is: most runs start faster without
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from emu.boards.epuck.camera.pixels import Pixels, PixelSource, Readout, Still
+
+ADDRESS: Final = 0x6E
+"""7-bit I2C address: 0xDC to write, 0xDD to read (epuck.md §7.1)."""
+DATA_PORT: Final = 3
+DATA_MASK: Final = 0xFF00
+SYNC_PORT: Final = 2
+RESET_PIN: Final = "RC13"
+
+RowSource = Callable[[int, int], "Pixels"]
+"""rows(y, cycle): line y (0 = top) of the upright scene, 640 x 3 values, as seen in `cycle`."""
+
+
+class Camera(Part, I2cDevice):
+    """One image sensor on its connector. Raises ValueError for a sensor that is not in SENSORS."""
+
+    def __init__(self, chip: Peripherals, sensor: str = "PO6030K", plugged: bool = True) -> None:
+        super().__init__("camera", chip)
+        if sensor not in SENSORS:
+            raise ValueError(f"there is no sensor {sensor!r}; expected one of {', '.join(SENSORS)}")
+        self.sensor: Final = SENSORS[sensor]
+        self.scan: Final = Scan(self.record)
+        self._exposure: Final = Exposure(self.record)
+        self._registers: Final = self.array("registers", "B", 256 * self.sensor.banks)
+        self._bank: Final = self.cell("bank", "B")
+        self._pointer: Final = self.cell("pointer", "B")
+        self._pointer_next: Final = self.cell("pointer_next", "B")
+        self._plugged: Final = self.cell("plugged", "B")
+        self.pins.describe(SYNC_PORT, HREF | VSYNC | PCLK, self.scan, self._plugged.place)
+        self._line: Final = self.array("line", "B", 2 * LINE_PIXELS)
+        self._line_at: Final = self.record.address + self.record.fields["camera.line"].offset
+        self._u64: Final = self.record.u64
+        self._line_from: Final = self.cell("line_from", "Q")
+        self._line_to: Final = self.cell("line_to", "Q")
+        self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
+        places = (place_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
+        chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places), self._refresh)
+        self.lent: Final = LentCamera.of(self.record)
+        """For compiled code that paints what `sample` was given."""
+        self._lent_at: Final = ctypes.addressof(self.lent)
+        self._is_lent, self._settings = False, 0
+        self._pixels: PixelSource | None = None
+        self._still: Still | None = None
+        self._href: Final = ctypes.c_int64()
+        self._href_at: Final = ctypes.addressof(self._href)
+        self._timing: Timing
+        self._picture: Picture
+        self._readout: Readout | None
+        self._load_defaults()
+        self._interpret()
+        self.scan.begin(course_of(self._timing), self.now, running=True)
+        self.pins.set(RESET_PIN, 1)  # UNVERIFIED: pulled up while nobody drives it
+        self.pins.watch(RESET_PIN, self._reset_moved)
+        if plugged:
+            self.plug()
+
+    # -- scene -------------------------------------------------------------------------------------------------------
+
+    def show(self, image: NDArray[np.uint8], turned: int = 0) -> None:
+        """Let the camera see a still picture: grey or RGB, any size (scaled to 640 x 480 by nearest pixel).
+
+        `turned` = 90, 180 or 270 turns it counter-clockwise before a sensor that is mounted turned (§7.1).
+        Raises ValueError for something that is no picture.
+        """
+        from emu.boards.epuck.camera.pixels import Still, as_vga
+
+        still = Still(as_vga(image, turned))
+        self.sample(still, is_lent=True)
+        self._still = still
+
+    def look(self, rows: RowSource) -> None:
+        """Let the camera see what `rows(y, cycle)` returns for each line when it is read out."""
+        self.sample(lambda y, columns, cycle: rows(y, cycle)[columns])
+
+    def sample(self, pixels: PixelSource, is_lent: bool = False) -> None:
+        """Let the camera see what `pixels(y, columns, cycle)` returns for each line when it is read out.
+
+        It is called with the cycle in which the line's HREF rises, only for lines that somebody reads, once per line.
+        `is_lent`: there is compiled code that paints the same, by `lent`, whoever of the two is asked.
+        """
+        self._pixels, self._is_lent, self._still = pixels, is_lent, None
+        self.lent.setting = 0
+        self._line_to.value = 0
+
+    @property
+    def sampled(self) -> PixelSource | None:
+        """What `sample` was given last."""
+        return self._pixels
+
+    @property
+    def lamp(self) -> float:
+        """Brightness of the scene's light, 1 = as the picture says; automatic exposure follows a change."""
+        return self._exposure.lamp
+
+    @lamp.setter
+    def lamp(self, brightness: float) -> None:
+        self._exposure.set_lamp(brightness, self.now, self.scan.course.frame_tcy)
+        self._line_to.value = 0
+
+    def frame(self, cycle: int | None = None) -> Pixels:
+        """The picture the sensor would send of the scene in `cycle` (default: now): lines x pixels x 3, through its
+        present window, format and exposure."""
+        import numpy as np
+
+        from emu.boards.epuck.camera.pixels import decode_line
+
+        at = self.now if cycle is None else cycle
+        room = (ctypes.c_uint8 * (2 * LINE_PIXELS))()
+        lines = []
+        for line in range(self.scan.course.lines):
+            count = self._sent(line, at, ctypes.addressof(room))
+            lines.append(decode_line(bytes(room[:count]), self._picture.form))
+        return np.stack(lines) if lines else np.zeros((0, 0, 3), np.uint8)
+
+    def _sent(self, line: int, cycle: int, address: int) -> int:
+        """Put the bytes of a line read out in `cycle` to an address of the host; how many there are."""
+        if self._readout is None:
+            from emu.boards.epuck.camera.pixels import Readout
+
+            self._readout = Readout(self._timing, self._picture, self.scan.course.lines)
+        if self._is_lent and not self.lent.setting:
+            self._settings += 1
+            self._readout.tell(self.lent, self._settings, self._picture)
+        brightness = self._exposure.brightness(self._picture.exposure, cycle, self.scan.course.frame_tcy)
+        return self._readout.put(self._pixels, line, cycle, brightness, address)
+
+    # -- connector ---------------------------------------------------------------------------------------------------
+
+    @property
+    def is_plugged(self) -> bool:
+        """Whether the camera is on its connector."""
+        return bool(self._plugged.value)
+
+    def plug(self) -> None:
+        """Connect the camera."""
+        self._set_plugged(True)
+
+    def unplug(self) -> None:
+        """Take the camera off its connector: no answers, no edges."""
+        self._set_plugged(False)
+
+    def _set_plugged(self, plugged: bool) -> None:
+        self._plugged.value = plugged
+        self._line_to.value = 0
+        self.pins.change_waveform(self.now, self._connect)
+
+    def _connect(self) -> None:
+        """Pins and I2C address follow the connector."""
+        for port, mask, wave in ((DATA_PORT, DATA_MASK, self), (SYNC_PORT, HREF | VSYNC | PCLK, self.scan)):
+            if self.is_plugged:
+                self.pins.attach(port, mask, wave)
+            else:
+                self.pins.detach(port, wave)
+        assert self.chip.i2c is not None
+        wire = self.chip.i2c.wire
+        wire.devices.pop(ADDRESS, None)
+        if self.is_plugged:
+            wire.attach(ADDRESS, self)
+
+    @property
+    def frames_per_second(self) -> float:
+        """Frame rate at the present clock and setting."""
+        return self.chip.fcy / self.scan.course.frame_tcy
+
+    def align(self, cycle: int, line: int = 0) -> None:
+        """Shift the sensor's phase so that HREF of a line (0 = first of the frame) rises in `cycle`, which is to come:
+        for tests that put an edge on a chosen instruction. On a robot the phase is chance."""
+        course = self.scan.course
+        start = cycle - course.first_href - line * course.line_tcy
+        start -= max(-(-(start - self.now) // course.frame_tcy), 0) * course.frame_tcy
+        self._line_to.value = 0
+        self.pins.change_waveform(self.now, partial(self.scan.begin, course, start, self.scan.running))
+
+    # -- pixel bus ---------------------------------------------------------------------------------------------------
+
+    def bits(self, cycle: int) -> int:
+        """The byte on RD8..RD15 in `cycle`, 0 between lines."""
+        u64, first = self._u64, self._line_from.index
+        if not u64[first] <= cycle < u64[self._line_to.index] and not self._render(cycle):
+            return 0
+        return self._line[(cycle - u64[first]) // u64[self._byte.index]] << 8
+
+    def stands_until(self, cycle: int) -> int:
+        """Between lines the next one; the bytes of a line are in the record."""
+        u64 = self._u64
+        is_on = u64[self._line_from.index] <= cycle < u64[self._line_to.index]
+        return cycle if is_on else self.scan.next_line(cycle)
+
+    def rises(self, mask: int, after: int, until: int) -> int:
+        """The data lines clock nothing inside the chip."""
+        return 0
+
+    def nth_rise(self, mask: int, after: int, count: int) -> int:
+        """The data lines clock nothing inside the chip."""
+        return NEVER
+
+    def _refresh(self, cycle: int) -> bool:
+        """What `bits` does with a new line, for native code that reads its bytes from the record."""
+        u64 = self._u64
+        if not self._plugged.value or u64[self._line_from.index] <= cycle < u64[self._line_to.index]:
+            return False
+        return (self._still is not None and self._sent_at_once(self._still, cycle)) or self._render(cycle)
+
+    def _sent_at_once(self, still: Still, cycle: int) -> bool:
+        """A line of a still picture put into the record by compiled code, if that would do what `_render` does and the
+        row has been looked at before."""
+        row = still.asked(self._lent_at, self.lent.setting, cycle, self._href_at)
+        pixels = still.place(row)
+        if pixels:
+            still.send(self._lent_at, self._href.value, pixels)
+        return bool(pixels)
+
+    def _render(self, cycle: int) -> bool:
+        """Put the line that is on the bus in `cycle` into the record. False between lines."""
+        found = self.scan.line_at(cycle)
+        if found is None:
+            return False
+        line, href = found
+        tcy = self.scan.course.byte_tcy
+        count = self._sent(line, href, self._line_at)
+        self._line_from.value = begin = href - tcy // 2
+        self._line_to.value = begin + count * tcy
+        self._byte.value = tcy
+        return True
+
+    # -- registers on I2C --------------------------------------------------------------------------------------------
+
+    def register(self, bank: int, number: int) -> int:
+        """A register, 0..255."""
+        return self._registers[256 * bank + number]
+
+    def start(self, read: bool, cycle: int) -> bool:
+        """In reset the sensor does not answer."""
+        self._pointer_next.value = not read
+        return self.scan.running
+
+    def write(self, byte: int, cycle: int) -> bool:
+        """First the register number, then its value."""
+        if self._pointer_next.value:
+            self._pointer.value = byte
+            self._pointer_next.value = 0
+        elif self._pointer.value == self.sensor.bank_register:
+            self._bank.value = byte % self.sensor.banks
+        else:
+            self._registers[256 * self._bank.value + self._pointer.value] = byte
+            self._reconsider(cycle)
+        return True
+
+    def read(self, cycle: int) -> int:
+        """Registers 0 and 1 tell the type; the bank register reads back."""
+        number = self._pointer.value
+        if number < len(self.sensor.identity):
+            return self.sensor.identity[number]
+        if number == self.sensor.bank_register:
+            return self._bank.value
+        return self.register(self._bank.value, number)
+
+    def _reconsider(self, cycle: int) -> None:
+        """A register changed. UNVERIFIED: a new timing begins with a new frame at once."""
+        before = self._picture.exposure
+        self._interpret()
+        if (before is None) != (self._picture.exposure is None):
+            self._exposure.hold(cycle, self.scan.course.frame_tcy)
+        course = course_of(self._timing)
+        if course != self.scan.course:
+            self._exposure.hold(cycle, self.scan.course.frame_tcy)
+            self.pins.change_waveform(cycle, partial(self.scan.begin, course, cycle, self.scan.running))
+
+    def _interpret(self) -> None:
+        """What the registers mean; a line already rendered is out of date."""
+        self._timing = self.sensor.timing(self.register)
+        self._picture = self.sensor.picture(self.register)
+        self._readout = None
+        self.lent.setting = 0
+        self._line_to.value = 0
+
+    # -- reset -------------------------------------------------------------------------------------------------------
+
+    def _reset_moved(self, cycle: int, changed: int, levels: int) -> None:
+        """RC13 low holds the sensor in reset (§2)."""
+        self.pins.change_waveform(cycle, partial(self._set_running, bool(changed & levels), cycle))
+
+    def _set_running(self, running: bool, cycle: int) -> None:
+        self._load_defaults()
+        self._interpret()
+        self._exposure.restart(cycle)
+        self.scan.begin(course_of(self._timing), cycle, running)
+
+    def _load_defaults(self) -> None:
+        self._bank.value = 0
+        for index in range(len(self._registers)):
+            self._registers[index] = 0
+        for (bank, number), value in self.sensor.defaults.items():
+            self._registers[256 * bank + number] = value
+
+    def restored(self) -> None:
+        """The record was replaced: take over what follows from it. A rendered line stays valid."""
+        line_to = self._line_to.value
+        self._interpret()
+        self._line_to.value = line_to
+        self.scan.restored()
+        self._connect()

@@ -1,0 +1,28 @@
+"""`LentCamera`: a camera for compiled code that paints its lines instead of Python: `struct camera` of line.c.
+
+What it answers by itself is what `Camera` would; wherever it does not, Python is to be asked.
+"""
+
+from __future__ import annotations
+
+from ctypes import Structure, c_double, c_int64, c_uint64, c_void_p
+
+from emu.boards.epuck.camera.exposure import ONE
+from emu.system.record import Record
+
+
+class LentCamera(Structure):
+    """Where things are in the record, and what `Readout` knows; `setting` is 0 until it has told."""
+
+    _fields_ = [
+        *((name, c_void_p) for name in ("scan", "plugged", "lamp", "exposure", "begin", "end", "byte_tcy", "line")),
+        ("setting", c_int64), ("row", c_void_p), ("count", c_int64), ("form", c_int64), ("gains", c_double * 3),
+        ("manual", c_double), ("one", c_uint64),
+    ]  # fmt: skip
+    setting: int
+
+    @classmethod
+    def of(cls, record: Record) -> LentCamera:
+        """That of the camera in a record."""
+        cells = ("frame_tcy", "plugged", "lamp", "exposure", "line_from", "line_to", "line_byte_tcy", "line")
+        return cls(*(record.address + record.fields[f"camera.{cell}"].offset for cell in cells), one=ONE)

@@ -1,0 +1,134 @@
+"""Requests that say where a run is to end: breakpoints at lines, functions, instructions, data and faults."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from emu.dap.breakpoints import Breakpoint, bad_hit_condition
+from emu.dap.debuggee import STACK_POINTER
+from emu.dap.state_requests import Looking
+from emu.dap.variables import Row
+from emu.debug.expressions.expression import evaluate
+from emu.debug.inspector import Value
+
+ACCESSES: Final = ("read", "write", "readWrite")
+"""What a data breakpoint may wait for."""
+
+
+class Stopping(Looking):
+    """Answers by `_do_` and the request's name, as `Looking` does."""
+
+    _last_id = 0
+    """Of the breakpoint that was made last."""
+
+    def _breakpoint(self, wanted: Row, kind: str, places: tuple[int, ...], **more: Any) -> Breakpoint:
+        self._last_id += 1
+        hit = str(wanted.get("hitCondition") or "")
+        made = Breakpoint(
+            self._last_id, kind, places, str(wanted.get("condition") or ""), hit,
+            str(wanted.get("logMessage") or ""), more.pop("size", 0), more.pop("access", "write"),
+        )  # fmt: skip
+        missing = more.pop("problem", "there is no code")
+        problem = bad_hit_condition(hit) or ("" if places else missing)
+        if problem:
+            made.places = ()
+        made.facts = {"id": made.id, "verified": not problem} | ({"message": problem} if problem else {}) | more
+        return made
+
+    def _set(self, key: str, made: list[Breakpoint]) -> Row:
+        self._debuggee.set_breakpoints(key, made)
+        return {"breakpoints": [one.facts for one in made]}
+
+    def _do_setBreakpoints(self, arguments: Row) -> Row:
+        path = str(arguments["source"].get("path", arguments["source"].get("name", "")))
+        wanted = arguments.get("breakpoints") or [{"line": line} for line in arguments.get("lines", [])]
+        made = []
+        for one in wanted:
+            line, places = self._sources.places(path, int(one["line"]))
+            more: Row = {"line": line or one["line"], "source": {"path": path}}
+            if places:
+                more["instructionReference"] = f"{places[0]:#08x}"
+            problem = "no code of this program comes from here"
+            made.append(self._breakpoint(one, "source", places, problem=problem, **more))
+        return self._set(f"source {path}", made)
+
+    def _do_setFunctionBreakpoints(self, arguments: Row) -> Row:
+        made = []
+        for one in arguments["breakpoints"]:
+            try:
+                start = self._debuggee.machine.program_address(one["name"])
+                places: tuple[int, ...] = (self._debuggee.inside.body_of(start),)
+            except KeyError:
+                places = ()
+            made.append(self._breakpoint(one, "function", places, problem=f"there is no function {one['name']}"))
+        return self._set("function", made)
+
+    def _do_setInstructionBreakpoints(self, arguments: Row) -> Row:
+        made = []
+        for one in arguments["breakpoints"]:
+            address = int(one["instructionReference"], 0) + int(one.get("offset", 0))
+            code = self._debuggee.inside.is_code(address) and not address & 1
+            made.append(self._breakpoint(one, "instruction", (address,) if code else ()))
+        return self._set("instruction", made)
+
+    def _do_setExceptionBreakpoints(self, arguments: Row) -> Row:
+        options = [one["filterId"] for one in arguments.get("filterOptions", [])]
+        self._debuggee.stops_at_faults = "fault" in [*arguments.get("filters", []), *options]
+        return {}
+
+    def _do_dataBreakpointInfo(self, arguments: Row) -> Row:
+        size = int(arguments.get("bytes") or 0)
+        if arguments.get("asAddress"):
+            address: int | None = int(str(arguments["name"]), 0)
+            size = size or 2
+        else:
+            value = self._named(arguments)
+            address = value.address if isinstance(value, Value) else None
+            size = size or (value.type.bytes if isinstance(value, Value) else 0)
+        if address is None:
+            return {"dataId": None, "description": "it is not in memory"}
+        if problem := self._not_in_memory(address, size):
+            return {"dataId": None, "description": problem}
+        entries = [one.raw.entry for one in self._debuggee.frames() if one.raw.entry is not None]
+        stays = not entries or not min(entries) <= address < self._debuggee.machine.w[STACK_POINTER]
+        text = f"{arguments['name']} ({size} bytes at {address:#06x})"
+        return {
+            "dataId": f"{address:04x}/{size}",
+            "description": text,
+            "accessTypes": list(ACCESSES),
+            "canPersist": stays,
+        }
+
+    def _not_in_memory(self, address: int, size: int) -> str:
+        """What is wrong with a stretch of data space, empty if nothing is."""
+        try:
+            self._debuggee.machine.peek_bytes(address, size)
+        except ValueError as error:
+            return str(error)
+        return ""
+
+    def _named(self, arguments: Row) -> Any:
+        reference = arguments.get("variablesReference")
+        if reference:
+            return self._sights.find(int(reference), str(arguments["name"]))
+        frame = self._sights.frame(arguments.get("frameId"))
+        return evaluate(self._debuggee.inside, str(arguments["name"]), frame)
+
+    def _do_setDataBreakpoints(self, arguments: Row) -> Row:
+        made = []
+        for one in arguments["breakpoints"]:
+            address, _, size = str(one["dataId"]).partition("/")
+            access = one.get("accessType") or "write"
+            problem = self._not_in_memory(int(address, 16), int(size))
+            if access not in ACCESSES:
+                problem = f"{access!r} is none of {', '.join(ACCESSES)}"
+            places = () if problem else (int(address, 16),)
+            made.append(self._breakpoint(one, "data", places, size=int(size), access=access, problem=problem))
+        return self._set("data", made)
+
+    def _do_breakpointLocations(self, arguments: Row) -> Row:
+        first = int(arguments["line"])
+        last = int(arguments.get("endLine", first))
+        rows = self._sources.lines(str(arguments["source"].get("path", "")))
+        lines = sorted({row.line for row in rows if first <= row.line <= last})
+        return {"breakpoints": [{"line": line} for line in lines]}

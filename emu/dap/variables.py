@@ -1,0 +1,269 @@
+"""What a stopped machine shows: scopes, variables, registers, sources, disassembly, in the protocol's words.
+
+References to variables and frames hold until the machine goes on; their numbers are never used again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import unquote
+
+from emu.debug.dwarf.location import Piece, Unavailable
+from emu.debug.dwarf.types import UNSIGNED, parts_of
+from emu.debug.inspector import Frame, Inside, Value
+from emu.image.lines import Line
+from emu.instruments.disassembly import instruction
+
+REGISTERS: Final = 16
+FLAGS: Final = ("C", "Z", "OV", "N", "RA", "DC", "DA", "SAB", "OAB", "SB", "SA", "OB", "OA")
+POSTFIX: Final = re.compile(r"[\w$][\w$.\[\]>-]*|\(\*\(.*\)\)[\w.\[\]]*")
+"""Expressions whose parts can be named without brackets around them."""
+Row = dict[str, Any]
+
+
+class Sights:
+    """References handed out since the machine stopped last. `world` tells what is around the machine, if anything."""
+
+    def __init__(
+        self, inside: Inside, sources: Sources, world: Callable[[], list[tuple[str, str]]] | None = None
+    ) -> None:
+        self.inside = inside
+        """Of the machine that is looked into; references hold as well for another that stands where it did."""
+        self._sources: Final = sources
+        self._world: Final = world
+        self.last = 0
+        """The last number that was handed out."""
+        self._frames: dict[int, Frame] = {}
+        self._lists: dict[int, Callable[[], Iterator[tuple[str, Value | None, str]]]] = {}
+
+    def forget(self) -> None:
+        """The machine goes on."""
+        self._frames.clear()
+        self._lists.clear()
+
+    def frame(self, number: int | None) -> Frame | None:
+        """The frame of a reference; without one, the innermost. Raises ValueError for one that was never handed out, or
+        before the machine went on."""
+        if number is not None:
+            if number not in self._frames:
+                raise ValueError(f"frame {number} is none of where the machine stands")
+            return self._frames[number]
+        frames = self.inside.frames()
+        return frames[0] if frames else None
+
+    def stack(self, frames: list[Frame]) -> list[Row]:
+        """Stack frames of the protocol."""
+        rows = []
+        for frame in frames:
+            self.last += 1
+            self._frames[self.last] = frame
+            row: Row = {
+                "id": self.last, "name": frame.function + (" <interrupt>" if frame.kind == "interrupt" else ""),
+                "line": 0, "column": 0, "instructionPointerReference": f"{frame.pc:#08x}",
+            }  # fmt: skip
+            if frame.line is not None and frame.line.line:
+                row |= {"line": frame.line.line, "column": 1, "source": self._sources.row(frame.line.file)}
+            else:
+                row["presentationHint"] = "subtle"
+            rows.append(row)
+        return rows
+
+    def scopes(self, frame: Frame) -> list[Row]:
+        """Locals, statics and globals of the file, registers, SFRs, the world around the machine."""
+        unit = frame.scopes[0].unit if frame.scopes else -1
+
+        def of_variables(names: list[Any]) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
+            def rows() -> Iterator[tuple[str, Value | None, str]]:
+                for one in names:
+                    try:
+                        yield one.name, self.inside.value(one, frame), one.name
+                    except Unavailable as why:
+                        yield one.name, None, f"<{why}>"
+
+            return rows
+
+        mine = of_variables(self.inside.variables(frame))
+        statics = of_variables(list(self.inside.debug.statics.get(unit, {}).values()))
+        everything = [("Locals", mine, "locals", False), ("Statics", statics, "", False),
+                      ("Registers", lambda: self._registers(frame), "registers", False),
+                      ("SFRs", self._sfrs, "registers", True)]  # fmt: skip
+        if self._world is not None:
+            everything.append(("World", self._around, "", True))
+        return [
+            {"name": name, "variablesReference": self._keep(rows), "expensive": slow}
+            | ({"presentationHint": hint} if hint else {})
+            for name, rows, hint, slow in everything
+        ]
+
+    def _around(self) -> Iterator[tuple[str, Value | None, str]]:
+        for name, text in self._world() if self._world is not None else ():
+            yield name, None, text
+
+    def _registers(self, frame: Frame) -> Iterator[tuple[str, Value | None, str]]:
+        view = self.inside.view(frame)
+        for number in range(REGISTERS):
+            known = view.register(number) is not None
+            value = Value(UNSIGNED[2], (Piece("register", number),), view, f"W{number}")
+            yield f"W{number}", value if known else None, f"W{number}" if known else "<not known in this frame>"
+        yield "PC", None, f"{frame.pc:#08x}"
+        yield "SR", self._sfr("SR"), "SR"
+        yield "cycle", None, f"{self.inside.machine.cycle:,}"
+
+    def _sfr(self, name: str) -> Value:
+        sfr = self.inside.image.chip.sfrs[name]
+        return Value(UNSIGNED[sfr.size], (Piece("memory", sfr.address),), self.inside.view(), name)
+
+    def _sfrs(self) -> Iterator[tuple[str, Value | None, str]]:
+        for name in sorted(self.inside.image.chip.sfrs):
+            yield name, self._sfr(name), name
+
+    def _fields(self, value: Value) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
+        fields = self.inside.image.chip.sfrs[value.name].fields
+
+        def rows() -> Iterator[tuple[str, Value | None, str]]:
+            for name, (lsb, width) in fields.items():
+                part = Value(value.type, value.pieces, self.inside.view(), name, (width, lsb))
+                yield name, part, f"{value.name}.{name}"
+
+        return rows
+
+    def _keep(self, rows: Callable[[], Iterator[tuple[str, Value | None, str]]]) -> int:
+        self.last += 1
+        self._lists[self.last] = rows
+        return self.last
+
+    def variables(self, reference: int, start: int = 0, count: int = 0) -> list[Row]:
+        """Members of a list; `count` 0 means all."""
+        rows = self._list(reference)
+        found = []
+        for index, (name, value, path) in enumerate(rows()):
+            if index < start or (count and index >= start + count):
+                continue
+            found.append({"name": name, "value": path, "variablesReference": 0} if value is None
+                         else {"name": name, **self.shown(value, path)})  # fmt: skip
+        return found
+
+    def find(self, reference: int, name: str) -> Value | None:
+        """The member called `name` of a list."""
+        return next((value for one, value, _ in self._list(reference)() if one == name), None)
+
+    def _list(self, reference: int) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
+        """Raises ValueError for a reference as `frame` does."""
+        if reference not in self._lists:
+            raise ValueError(f"reference {reference} is none of where the machine stands")
+        return self._lists[reference]
+
+    def shown(self, value: Value, path: str) -> Row:
+        """Text, type and references of a value; `path` is the expression that names it."""
+        row: Row = {"value": value.text(), "type": str(value.type), "variablesReference": 0, "evaluateName": path}
+        if value.address is not None:
+            row["memoryReference"] = f"{value.address:#06x}"
+        sfr = self.inside.image.chip.sfrs.get(value.name)
+        if sfr is not None and sfr.fields and value.bits is None and value.address == sfr.address:
+            row["value"] = f"{value.get():#06x}"
+            row["variablesReference"] = self._keep(self._fields(value))
+            row["namedVariables"] = len(sfr.fields)
+        elif not value.text().startswith("<"):
+            self._add_parts(row, value, path)
+        return row
+
+    def _add_parts(self, row: Row, value: Value, path: str) -> None:
+        bare = value.type.bare
+        members = list(parts_of(value.type))
+        pointed = bare.kind == "pointer" and bare.target is not None and bare.target.bytes and value.get()
+        if not members and not pointed:
+            return
+
+        whole = path if POSTFIX.fullmatch(path) else f"({path})"
+
+        def rows() -> Iterator[tuple[str, Value | None, str]]:
+            for part in value.parts():
+                if bare.kind == "pointer":
+                    yield f"*{value.name}", part, f"(*({path}))"
+                elif bare.kind == "array":
+                    yield part.name, part, f"{whole}{part.name}"
+                else:
+                    yield part.name, part, f"{whole}.{part.name}"
+
+        row["variablesReference"] = self._keep(rows)
+        row["indexedVariables" if bare.kind == "array" else "namedVariables"] = len(members) or 1
+
+
+class Sources:
+    """Files of the line table and where they are on this machine."""
+
+    def __init__(self, inside: Inside, roots: list[Path]) -> None:
+        self._inside: Final = inside
+        self._roots: Final = roots
+        self._paths: Final[dict[str, Path]] = {}
+
+    def path(self, file: str) -> Path:
+        """Where `file` is: as it is written, or below one of the roots."""
+        if file not in self._paths:
+            places = [Path(file), *(root / file for root in self._roots)]
+            found = next((place for place in places if place.exists()), places[0])
+            self._paths[file] = found.resolve() if found.exists() else found
+        return self._paths[file]
+
+    def row(self, file: str) -> Row:
+        """A source of the protocol."""
+        return {"name": Path(file).name, "path": str(self.path(file))}
+
+    def all(self) -> list[Row]:
+        """Every file that code comes from."""
+        return [self.row(file) for file in sorted({row.file for row in self._inside.image.lines.rows})]
+
+    def lines(self, path: str) -> list[Line]:
+        """Rows of the line table that come from the file a client calls `path`."""
+        _, is_uri, rest = path.partition("://")
+        wanted = Path("/" + unquote(rest.partition("/")[2]) if is_uri else path)
+        wanted = wanted.resolve() if wanted.exists() else wanted
+        files = {row.file for row in self._inside.image.lines.rows}
+        mine = {file for file in files if self.path(file) == wanted}
+        mine = mine or {file for file in files if Path(file).name == wanted.name}
+        return [row for row in self._inside.image.lines.rows if row.file in mine]
+
+    def places(self, path: str, line: int) -> tuple[int, tuple[int, ...]]:
+        """The first line at or behind `line` that has code, and where in each function it begins; 0 if none has."""
+        rows = self.lines(path)
+        behind = sorted({row.line for row in rows if row.line >= line})
+        if not behind:
+            return 0, ()
+        found: dict[int | None, int] = {}
+        for row in rows:
+            if row.line == behind[0]:
+                start = self._inside.start_of(row.start)
+                place = row.start if row.start != start else self._inside.body_of(start)
+                found[start] = min(found.get(start, place), place)
+        return behind[0], tuple(sorted(found.values()))
+
+
+def disassembled(inside: Inside, sources: Sources, address: int, count: int, symbols: bool) -> list[Row]:
+    """Exactly `count` rows of one word from `address`, with source lines where they begin."""
+    rows: list[Row] = []
+    program, end = inside.machine.program, inside.image.chip.program["flash"].end
+    second = address >= 2 and _words(inside, address - 2) == 2
+    for at in range(address, address + 2 * count, 2):
+        if not 0 <= at < end:
+            rows.append({"address": f"{max(at, 0):#08x}", "instruction": "", "presentationHint": "invalid"})
+            continue
+        item = None if second else instruction(inside.image, at, program.word(at), program.word(at + 2))
+        row: Row = {"address": f"{at:#08x}", "instructionBytes": f"{program.word(at):06x}",
+                    "instruction": item.text if item is not None else "" if second else ".pword"}  # fmt: skip
+        line = inside.image.lines.find(at)
+        if line is not None and line.start == at:
+            row |= {"location": sources.row(line.file), "line": line.line}
+        if symbols and inside.start_of(at) == at:
+            row["symbol"] = inside.name_of(at)
+        rows.append(row)
+        second = not second and _words(inside, at) == 2
+    return rows
+
+
+def _words(inside: Inside, at: int) -> int:
+    program = inside.machine.program
+    item = instruction(inside.image, at, program.word(at), program.word(at + 2))
+    return len(item.words) if item is not None else 1

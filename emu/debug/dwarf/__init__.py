@@ -1,0 +1,1 @@
+"""DWARF readers: compile units, locations of variables, C types."""

@@ -1,0 +1,382 @@
+"""Functions, variables and types of an image, from DWARF 2 to 5 (abi-elf.md §6.7).
+
+What enters: an image with debug sections. What leaves: `DebugInfo`. Damaged entries are left out: what cannot be read
+is not there, and nothing here fails a run. Addresses: PC units for code, bytes for data.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+from weakref import WeakKeyDictionary
+
+from emu.debug.dwarf.types import TAGGED, VOID, Member, Type
+from emu.image.lines import dwarf_of, file_names, undoubled
+from emu.image.model import Image
+
+Ranges = tuple[tuple[int, int], ...]
+"""Half-open stretches of program addresses."""
+ENCODINGS: Final = {2: "bool", 4: "float", 5: "signed", 6: "char", 7: "unsigned", 8: "char"}
+"""Base types by DW_ATE code (DWARF 2 §7.8)."""
+SIGNED: Final = (5, 6)
+TYPE_KINDS: Final = {
+    "DW_TAG_structure_type": "struct",
+    "DW_TAG_union_type": "union",
+    "DW_TAG_enumeration_type": "enum",
+    "DW_TAG_pointer_type": "pointer",
+    "DW_TAG_array_type": "array",
+    "DW_TAG_typedef": "typedef",
+    "DW_TAG_const_type": "const",
+    "DW_TAG_volatile_type": "volatile",
+    "DW_TAG_subroutine_type": "function",
+    "DW_TAG_base_type": "unsigned",
+    "DW_TAG_unspecified_type": "void",
+}
+ADDRESS: Final = 4
+"""Bytes of an address in debug sections (abi-elf.md §6.7)."""
+BASE_SELECTION: Final = 0xFFFFFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """Where a variable is: DWARF expressions, each for a stretch of program addresses or for all."""
+
+    entries: tuple[tuple[int | None, int, bytes], ...]
+    """(start or None, end, expression)."""
+
+    def at(self, pc: int) -> bytes | None:
+        """The expression that holds at `pc`, None where the variable has no place ("optimised out")."""
+        return next((code for start, end, code in self.entries if start is None or start <= pc < end), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A variable or parameter. `constant` is its value if it has no place but a value."""
+
+    name: str
+    type: Type
+    location: Location | None
+    constant: int | bytes | None = None
+    is_parameter: bool = False
+    file: str = ""
+    line: int = 0
+
+
+@dataclass(eq=False, slots=True)
+class Scope:
+    """A function, a block in it, or a function inlined into it."""
+
+    kind: str
+    """"function", "block" or "inlined"."""
+    name: str
+    ranges: Ranges
+    variables: list[Variable] = field(default_factory=list)
+    inner: list[Scope] = field(default_factory=list)
+    frame_base: Location | None = None
+    file: str = ""
+    line: int = 0
+    call_file: str = ""
+    call_line: int = 0
+    """Of an inlined function: where it is called."""
+    unit: int = 0
+    returns: Type | None = None
+    """Type of a function's result, None for void."""
+
+    def holds(self, pc: int) -> bool:
+        """Whether the instruction at `pc` belongs to it."""
+        return any(start <= pc < end for start, end in self.ranges)
+
+    def chain(self, pc: int) -> list[Scope]:
+        """This scope and those inside it that hold `pc`, outermost first."""
+        found = [self]
+        while True:
+            deeper = next((scope for scope in found[-1].inner if scope.holds(pc)), None)
+            if deeper is None:
+                return found
+            found.append(deeper)
+
+
+class DebugInfo:
+    """What the debug sections of one image say."""
+
+    def __init__(self, image: Image) -> None:
+        self.functions: Final[list[Scope]] = []
+        """Those with code, by address."""
+        self.globals: Final[dict[str, list[Variable]]] = {}
+        """Variables outside functions by name; several files may have one of the same name."""
+        self.statics: Final[dict[int, dict[str, Variable]]] = {}
+        """The same by unit and name."""
+        self.types: Final[dict[str, dict[int, Type]]] = {}
+        """Base types and typedefs by name, tags as `struct node`, by unit; the complete ones."""
+        self.constants: Final[dict[str, int]] = {}
+        """Enumerators by name."""
+        sections = undoubled({s.name: s.octets for s in image.sections if s.name.startswith(".debug_")})
+        if sections.get(".debug_info") and sections.get(".debug_abbrev"):
+            _Reader(self, sections).read()
+        self.functions.sort(key=lambda one: one.ranges[0])
+        self._starts: Final = [one.ranges[0][0] for one in self.functions]
+
+    def type(self, name: str, unit: int = -1) -> Type | None:
+        """What `name` names (`node`, `struct node`): in that unit, else in any."""
+        known = self.types.get(name, {})
+        return known.get(unit) or next(iter(known.values()), None)
+
+    def function(self, pc: int) -> Scope | None:
+        """The function whose code `pc` is in."""
+        index = bisect_right(self._starts, pc) - 1
+        if index >= 0 and self.functions[index].holds(pc):
+            return self.functions[index]
+        return next((one for one in self.functions if one.holds(pc)), None)
+
+
+_KNOWN: Final[WeakKeyDictionary[Image, DebugInfo]] = WeakKeyDictionary()
+
+
+def debug_of(image: Image) -> DebugInfo:
+    """What the debug sections of `image` say, read when first asked for."""
+    found = _KNOWN.get(image)
+    if found is None:
+        found = _KNOWN[image] = DebugInfo(image)
+    return found
+
+
+class _Reader:
+    """One pass over all units. Damaged input makes pyelftools raise many kinds of exception; each unit stands alone."""
+
+    def __init__(self, info: DebugInfo, sections: dict[str, bytes]) -> None:
+        self.info: Final = info
+        self.dwarf: Final = dwarf_of(sections)
+        self.loc: Final = sections.get(".debug_loc", b"")
+        self.range: Final = sections.get(".debug_ranges", b"")
+        self.types: Final[dict[int, Type]] = {}
+        self.files: list[str] = []
+        self.unit_base = 0
+        self.unit = 0
+
+    def read(self) -> None:
+        units = self._units()
+        for number, unit in enumerate(units):
+            try:
+                program = self.dwarf.line_program_for_CU(unit)
+                self.files = file_names(program.header) if program is not None else []
+                top = unit.get_top_DIE()
+                self.unit, self.unit_base = number, _number(top, "DW_AT_low_pc") or 0
+                for die in top.iter_children():
+                    self._entry(die)
+            except Exception:
+                continue
+
+    def _units(self) -> Iterator[Any]:
+        units = self.dwarf.iter_CUs()
+        while True:
+            try:
+                unit = next(units, None)
+            except Exception:
+                return
+            if unit is None:
+                return
+            yield unit
+
+    def _entry(self, die: Any) -> None:
+        if die.tag == "DW_TAG_variable":
+            one = self._variable(die)
+            if one is not None and (one.location is not None or one.constant is not None):
+                self.info.globals.setdefault(one.name, []).append(one)
+                self.info.statics.setdefault(self.unit, {})[one.name] = one
+        elif die.tag == "DW_TAG_subprogram":
+            ranges = self._ranges(die)
+            if ranges:
+                self.info.functions.append(self._scope(die, "function", ranges))
+        elif die.tag in TYPE_KINDS:
+            self._named(die)
+
+    def _named(self, die: Any, is_local: bool = False) -> None:
+        """A type that may have a name. One of a function hides none of a file."""
+        made = self._type(die)
+        if made.name and (made.bytes or made.members):
+            known = self.info.types.setdefault(f"{made.kind} {made.name}" if made.kind in TAGGED else made.name, {})
+            known[self.unit] = known.get(self.unit, made) if is_local else made
+        if made.kind == "enum":
+            names = {name: value for value, name in made.names.items()}
+            self.info.constants.update(names | self.info.constants if is_local else names)
+
+    # Scopes and variables
+
+    def _scope(self, die: Any, kind: str, ranges: Ranges) -> Scope:
+        base = self._location(die, "DW_AT_frame_base")
+        origin = _origin(die)
+        scope = Scope(
+            kind, _text(origin, "DW_AT_name"), ranges, frame_base=base,
+            file=self._file(origin, "DW_AT_decl_file"), line=_number(origin, "DW_AT_decl_line") or 0,
+            call_file=self._file(die, "DW_AT_call_file"), call_line=_number(die, "DW_AT_call_line") or 0,
+            unit=self.unit, returns=self._type_of(origin) if "DW_AT_type" in origin.attributes else None,
+        )  # fmt: skip
+        for child in die.iter_children():
+            if child.tag in ("DW_TAG_variable", "DW_TAG_formal_parameter"):
+                one = self._variable(child)
+                if one is not None:
+                    scope.variables.append(one)
+            elif child.tag in ("DW_TAG_lexical_block", "DW_TAG_inlined_subroutine"):
+                inside = self._ranges(child) or ranges
+                scope.inner.append(self._scope(child, "block" if "lexical" in child.tag else "inlined", inside))
+            elif child.tag in TYPE_KINDS:
+                self._named(child, is_local=True)
+        return scope
+
+    def _variable(self, die: Any) -> Variable | None:
+        origin = _origin(die)
+        name = _text(origin, "DW_AT_name")
+        if not name or "DW_AT_declaration" in die.attributes:
+            return None
+        constant = die.attributes.get("DW_AT_const_value")
+        value = constant.value if constant is not None else None
+        return Variable(
+            name, self._type_of(origin), self._location(die, "DW_AT_location"),
+            bytes(value) if isinstance(value, list) else value, die.tag == "DW_TAG_formal_parameter",
+            self._file(origin, "DW_AT_decl_file"), _number(origin, "DW_AT_decl_line") or 0,
+        )  # fmt: skip
+
+    def _file(self, die: Any, attribute: str) -> str:
+        number = _number(die, attribute)
+        return self.files[number] if number is not None and 0 <= number < len(self.files) else ""
+
+    def _location(self, die: Any, attribute: str) -> Location | None:
+        found = die.attributes.get(attribute)
+        if found is None:
+            return None
+        if isinstance(found.value, list):
+            return Location(((None, 0, bytes(found.value)),))
+        return Location(tuple(self._location_list(found.value)))
+
+    def _location_list(self, offset: int) -> Iterator[tuple[int, int, bytes]]:
+        """DWARF 2 §2.4.6: start and end relative to the unit's base, length, expression."""
+        for start, end, place in self._pairs(self.loc, offset):
+            size = int.from_bytes(self.loc[place : place + 2], "little")
+            yield start, end, self.loc[place + 2 : place + 2 + size]
+
+    def _pairs(self, section: bytes, offset: int) -> Iterator[tuple[int, int, int]]:
+        """(start, end, offset behind) of list entries up to the end mark; entries of a location list carry more."""
+        base = self.unit_base
+        carries_more = section is self.loc
+        while offset + 2 * ADDRESS <= len(section):
+            start = int.from_bytes(section[offset : offset + ADDRESS], "little")
+            end = int.from_bytes(section[offset + ADDRESS : offset + 2 * ADDRESS], "little")
+            offset += 2 * ADDRESS
+            if start == end == 0:
+                return
+            if start == BASE_SELECTION:
+                base = end
+                continue
+            yield base + start, base + end, offset
+            if carries_more:
+                offset += 2 + int.from_bytes(section[offset : offset + 2], "little")
+
+    def _ranges(self, die: Any) -> Ranges:
+        low, high = die.attributes.get("DW_AT_low_pc"), die.attributes.get("DW_AT_high_pc")
+        if low is not None and high is not None:
+            end = high.value if high.form == "DW_FORM_addr" else low.value + high.value
+            return ((low.value, end),) if end > low.value else ()
+        listed = _number(die, "DW_AT_ranges")
+        if listed is None:
+            return ()
+        return tuple((start, end) for start, end, _ in self._pairs(self.range, listed) if end > start)
+
+    # Types
+
+    def _type_of(self, die: Any) -> Type:
+        if "DW_AT_type" not in die.attributes:
+            return VOID
+        return self._type(die.get_DIE_from_attribute("DW_AT_type"))
+
+    def _type(self, die: Any) -> Type:
+        found = self.types.get(die.offset)
+        if found is not None:
+            return found
+        kind = TYPE_KINDS.get(die.tag, "void")
+        made = self.types[die.offset] = Type(kind, _text(die, "DW_AT_name"), _number(die, "DW_AT_byte_size") or 0)
+        if die.tag == "DW_TAG_base_type":
+            code = _number(die, "DW_AT_encoding") or 7
+            made.kind, made.is_signed = ENCODINGS.get(code, "unsigned"), code in SIGNED
+        elif kind in ("struct", "union"):
+            made.members = tuple(self._members(die))
+        elif kind == "enum":
+            made.names = {
+                _number(child, "DW_AT_const_value") or 0: _text(child, "DW_AT_name") for child in die.iter_children()
+            }
+            made.is_signed = min(made.names, default=0) < 0
+        elif kind == "array":
+            self._array(die, made)
+        elif kind != "void":
+            made.target = self._type_of(die) if "DW_AT_type" in die.attributes else None
+            if kind in ("typedef", "const", "volatile") and made.target is None:
+                made.target = VOID
+        return made
+
+    def _array(self, die: Any, made: Type) -> None:
+        counts = [_count(child) for child in die.iter_children() if child.tag == "DW_TAG_subrange_type"] or [0]
+        inner = self._type_of(die)
+        for count in reversed(counts[1:]):
+            inner = Type("array", target=inner, count=count)
+        made.target, made.count = inner, counts[0]
+
+    def _members(self, die: Any) -> Iterator[Member]:
+        for child in die.iter_children():
+            if child.tag != "DW_TAG_member":
+                continue
+            kind = self._type_of(child)
+            offset = _member_offset(child)
+            bits = _number(child, "DW_AT_bit_size") or 0
+            lsb = 0
+            if bits and "DW_AT_data_bit_offset" in child.attributes:
+                first = _number(child, "DW_AT_data_bit_offset") or 0
+                offset, lsb = first // 8, first % 8
+            elif bits:  # counted from the most significant bit of the storage unit (DWARF 2 §5.5.4)
+                storage = _number(child, "DW_AT_byte_size") or kind.bytes
+                lsb = 8 * storage - bits - (_number(child, "DW_AT_bit_offset") or 0)
+            yield Member(_text(child, "DW_AT_name"), kind, offset, bits, lsb)
+
+
+def _origin(die: Any) -> Any:
+    """The entry that has the name: of an inlined or specialised one, the abstract one."""
+    while "DW_AT_name" not in die.attributes and "DW_AT_type" not in die.attributes:
+        if "DW_AT_abstract_origin" in die.attributes:
+            die = die.get_DIE_from_attribute("DW_AT_abstract_origin")
+        elif "DW_AT_specification" in die.attributes:
+            die = die.get_DIE_from_attribute("DW_AT_specification")
+        else:
+            break
+    return die
+
+
+def _text(die: Any, attribute: str) -> str:
+    found = die.attributes.get(attribute)
+    return found.value.decode("utf-8", "replace") if found is not None else ""
+
+
+def _number(die: Any, attribute: str) -> int | None:
+    found = die.attributes.get(attribute)
+    return found.value if found is not None and isinstance(found.value, int) else None
+
+
+def _count(die: Any) -> int:
+    count = _number(die, "DW_AT_count")
+    if count is not None:
+        return count
+    bound = _number(die, "DW_AT_upper_bound")
+    return 0 if bound is None else bound + 1
+
+
+def _member_offset(die: Any) -> int:
+    """A number, or the expression `plus_uconst N` of DWARF 2."""
+    found = die.attributes.get("DW_AT_data_member_location")
+    if found is None:
+        return 0
+    if isinstance(found.value, int):
+        return found.value
+    offset = shift = 0
+    for byte in found.value[1:]:
+        offset |= (byte & 0x7F) << shift
+        shift += 7
+    return offset

@@ -1,0 +1,1 @@
+"""C expressions on a paused machine: parser and evaluator, arithmetic, type names."""

@@ -1,0 +1,412 @@
+"""One program in one machine, seen from its source: frames of the call stack, what is in scope, values by name.
+
+What enters: a machine that stands between two instructions. What leaves: `Frame`s and `Value`s. Nothing is changed
+unless a value is set.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final
+
+from emu.debug.dwarf import location
+from emu.debug.dwarf.types import UNSIGNED, Type, decode, decode_member, encode, parts_of, text_of
+from emu.debug.dwarf.units import DebugInfo, Scope, Variable, debug_of
+from emu.debug.unwind import Code, Raw, Unwinder
+from emu.image.lines import Line
+from emu.image.model import Image
+
+if TYPE_CHECKING:
+    from emu.machine.machine import Machine
+
+REGISTERS: Final = 16
+STACK_POINTER: Final = 15
+FRAME_BASED: Final = bytes([location.FBREG])
+"""What the location of a variable in a frame begins with."""
+ABSENT: Final = bytes(location.ADDR_0)
+"""Where the linker puts what it leaves out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One entry of a call stack, innermost first in lists. Inlined functions have entries of their own."""
+
+    pc: int
+    """Next instruction of the frame; of a caller, where it goes on."""
+    function: str
+    """Its name in C or assembly; the bare address if it has none."""
+    line: Line | None
+    kind: str
+    """"call", "interrupt" (entered by an exception) or "inlined"."""
+    scopes: tuple[Scope, ...]
+    """Blocks and functions around `pc` that belong to this entry, outermost first; empty without debug information."""
+    raw: Raw
+    at: int
+    """Where its variables are looked up: `pc`, but inside the call for a frame that waits for one."""
+
+    def __str__(self) -> str:
+        where = f" ({self.line})" if self.line is not None else ""
+        return f"{self.function}{where} at {self.pc:#08x}" + (f" [{self.kind}]" if self.kind != "call" else "")
+
+
+class Inside:
+    """Looks into `machine` as its loaded image's debug information tells. Raises ValueError if none is loaded."""
+
+    def __init__(self, machine: Machine) -> None:
+        if machine.image is None:
+            raise ValueError("nothing is loaded")
+        self.machine: Final = machine
+        self.image: Final[Image] = machine.image
+        self._starts: Final = [block.base for block in self.image.blocks if block.is_code]
+        self._bodies: Final[dict[int, int]] = {}
+        self._ends: Final = [block.end for block in self.image.blocks if block.is_code]
+
+    @cached_property
+    def debug(self) -> DebugInfo:
+        """Functions, variables and types."""
+        return debug_of(self.image)
+
+    @cached_property
+    def unwinder(self) -> Unwinder:
+        """Call stacks of this image."""
+        return Unwinder(Code(self.machine.program.word, self.is_code), self.start_of, self._handlers)
+
+    @cached_property
+    def _handlers(self) -> frozenset[int]:
+        """Where the vectors lead."""
+        vectors = self.image.chip.vectors
+        targets = {self.image.word(table) for vector in vectors for table in (vector.ivt, vector.aivt)}
+        return frozenset(target for target in targets if target is not None)
+
+    def is_code(self, pc: int) -> bool:
+        """Whether the image defines an instruction at `pc`."""
+        index = bisect_right(self._starts, pc) - 1
+        return index >= 0 and pc < self._ends[index]
+
+    def start_of(self, pc: int) -> int | None:
+        """First instruction of the function around `pc`."""
+        if not self.is_code(pc):
+            return None
+        function = self.debug.function(pc)
+        if function is not None:
+            return next(start for start, end in function.ranges if start <= pc < end)
+        symbol = self.image.symbols.code(pc)
+        return symbol[0].address if symbol is not None else None
+
+    def body_of(self, start: int) -> int:
+        """Where the function that begins at `start` has its frame, parameters stored; `start` if it needs none.
+
+        What makes a frame is a row of its own in the line table, that of the function's opening line."""
+        if start not in self._bodies:
+            self._bodies[start] = self._behind_frame(start)
+        return self._bodies[start]
+
+    def _behind_frame(self, start: int) -> int:
+        function, first = self.debug.function(start), self.image.lines.find(start)
+        if function is None or first is None or first.start != start or not has_frame(function):
+            return start
+        return first.end if (start, first.end) not in function.ranges else start
+
+    def is_handler(self, start: int | None) -> bool:
+        """Whether exceptions enter at `start`."""
+        return start is not None and start in self._handlers
+
+    def name_of(self, pc: int) -> str:
+        """The function around `pc` by its name in C."""
+        function = self.debug.function(pc)
+        if function is not None and function.name:
+            return function.name
+        symbol = self.image.symbols.code(pc) if self.is_code(pc) else None
+        return symbol[0].name.removeprefix("_") if symbol is not None else f"{pc:#08x}"
+
+    def where(self, pc: int) -> str:
+        """`0x000124 (worker+0x4, main.c:12)`."""
+        start = self.start_of(pc)
+        if start is None:
+            return f"{pc:#08x}"
+        distance = f"+{pc - start:#x}" if pc != start else ""
+        line = self.image.lines.find(pc)
+        return f"{pc:#08x} ({self.name_of(pc)}{distance}{f', {line}' if line is not None else ''})"
+
+    # Call stacks
+
+    def registers(self) -> tuple[int | None, ...]:
+        """W0 to W15 now."""
+        return tuple(self.machine.record.u16[:REGISTERS])
+
+    def frames(self, pc: int | None = None, registers: tuple[int | None, ...] | None = None) -> list[Frame]:
+        """The call stack from `pc` with `registers`, by default where the machine stands."""
+        if pc is None:
+            pc = self.machine.pc
+        raws = self.unwinder.frames(pc, registers or self.registers(), self._word)
+        found: list[Frame] = []
+        for number, raw in enumerate(raws):
+            exact = number == 0 or raws[number - 1].is_handler
+            found += self._entries(raw, raw.pc if exact else raw.pc - 2)
+        return found
+
+    def _word(self, address: int) -> int | None:
+        ram = self.image.chip.data["ram"]
+        return self.machine.record.u16[address >> 1] if ram.start <= address < ram.end else None
+
+    def _entries(self, raw: Raw, at: int) -> Iterator[Frame]:
+        """The entries of one real frame: functions inlined at `at`, then the function itself."""
+        line = self.image.lines.find(at)
+        function = self.debug.function(at)
+        kind = "interrupt" if raw.is_handler else "call"
+        if function is None:
+            yield Frame(raw.pc, self.name_of(at), line, kind, (), raw, at)
+            return
+        scopes = function.chain(at)
+        while True:
+            first = max((n for n, scope in enumerate(scopes) if scope.kind != "block"), default=0)
+            own = scopes[first]
+            inlined = own.kind == "inlined"
+            name = own.name or self.name_of(at)
+            yield Frame(raw.pc, name, line, "inlined" if inlined else kind, tuple(scopes[first:]), raw, at)
+            if not inlined:
+                return
+            line = Line(at, at + 2, own.call_file, own.call_line) if own.call_line else line
+            scopes = scopes[:first]
+
+    # Variables
+
+    def view(self, frame: Frame | None = None) -> FrameView:
+        """Registers and memory as `frame` has them; by default those of the machine."""
+        return FrameView(self, frame)
+
+    def variables(self, frame: Frame) -> list[Variable]:
+        """Parameters and locals in scope, inner ones hiding outer ones of the same name, in order of declaration."""
+        found: dict[str, Variable] = {}
+        for scope in frame.scopes:
+            for one in scope.variables:
+                found.pop(one.name, None)
+                found[one.name] = one
+        return list(found.values())
+
+    def variable(self, name: str, frame: Frame | None = None) -> Variable | None:
+        """What `name` means in `frame`: its own, its file's, then any global."""
+        if frame is not None:
+            for scope in reversed(frame.scopes):
+                for one in scope.variables:
+                    if one.name == name:
+                        return one
+            if frame.scopes:
+                mine = self.debug.statics.get(frame.scopes[0].unit, {}).get(name)
+                if mine is not None:
+                    return mine
+        everywhere = self.debug.globals.get(name)
+        return everywhere[0] if everywhere else None
+
+    def value(self, variable: Variable, frame: Frame | None = None) -> Value:
+        """Where `variable` is and what it holds. Raises locate.Unavailable ("optimised out", ...)."""
+        view = self.view(frame)
+        if variable.location is None:
+            if variable.constant is None:
+                raise location.Unavailable("optimised out")
+            data = variable.constant
+            if isinstance(data, int):
+                data = (data & (1 << 64) - 1).to_bytes(8, "little")
+            return Value(variable.type, (location.Piece("value", 0, data=data),), view, variable.name)
+        code = variable.location.at(view.pc)
+        if code is None:
+            raise location.Unavailable("optimised out")
+        if code == ABSENT:
+            raise location.Unavailable("not in the program: nothing uses it")
+        if lives_in_frame(variable) and (start := self.start_of(view.pc)) is not None and view.pc < self.body_of(start):
+            raise location.Unavailable("not set yet: the function is being entered")
+        pieces = location.pieces_of(code, view, lambda: self._frame_base(frame))
+        return Value(variable.type, pieces, view, variable.name)
+
+    def _frame_base(self, frame: Frame | None) -> int:
+        if frame is None or not frame.scopes:
+            raise location.Unavailable("its frame is not known")
+        if frame.raw.entry is not None and frame.kind != "inlined":
+            return frame.raw.entry
+        function = self.debug.function(self.view(frame).pc)
+        code = function.frame_base.at(self.view(frame).pc) if function and function.frame_base else None
+        if code is None:
+            raise location.Unavailable("its frame is not known")
+        found = location.address_of(location.pieces_of(code, self.view(frame), lambda: 0))
+        if found is None:
+            raise location.Unavailable("its frame is not known")
+        return found
+
+    def symbol(self, name: str) -> Value | None:
+        """A variable that only the symbol table knows, as an unsigned number of its size."""
+        found = self.image.symbols.find(name)
+        if found is None or found.space not in ("data", "psv", "absolute"):
+            return None
+        kind = UNSIGNED.get(found.size)
+        if kind is None:
+            kind = Type("array", target=UNSIGNED[1], count=found.size) if found.size else UNSIGNED[2]
+        return Value(kind, (location.Piece("memory", found.address),), self.view(), name)
+
+
+def lives_in_frame(variable: Variable) -> bool:
+    """Whether its place is one of the function's frame, all the time."""
+    entries = variable.location.entries if variable.location is not None else ()
+    return len(entries) == 1 and entries[0][0] is None and entries[0][2][:1] == FRAME_BASED
+
+
+def has_frame(scope: Scope) -> bool:
+    """Whether some variable of a function lives in its frame."""
+    return any(map(lives_in_frame, scope.variables)) or any(map(has_frame, scope.inner))
+
+
+class FrameView:
+    """`locate.View` of one frame: registers as it left them, memory as it is."""
+
+    def __init__(self, inside: Inside, frame: Frame | None) -> None:
+        self._machine: Final = inside.machine
+        self.frame: Final = frame
+        self._is_innermost: Final = frame is None or (
+            frame.raw.pc == self._machine.pc and frame.raw.registers[STACK_POINTER] == self._machine.w[STACK_POINTER]
+        )
+
+    @property
+    def pc(self) -> int:
+        """Where variables are looked up: inside the call of a frame that waits for one."""
+        return self._machine.pc if self.frame is None else self.frame.at
+
+    def register(self, number: int) -> int | None:
+        """Wn, None if it is not known in this frame."""
+        if number >= REGISTERS:
+            return None
+        if self.frame is None or self._is_innermost:
+            return self._machine.w[number]
+        return self.frame.raw.registers[number]
+
+    def set_register(self, number: int, value: int) -> None:
+        """Change Wn of the innermost frame. Raises ValueError for another."""
+        if not self._is_innermost:
+            raise ValueError("only registers of the innermost frame can be changed")
+        self._machine.w[number] = value
+
+    def memory(self, address: int, size: int) -> bytes:
+        """Bytes of data space. Raises ValueError."""
+        return self._machine.peek_bytes(address, size)
+
+    def set_memory(self, address: int, data: bytes) -> None:
+        """Change bytes of data space, registers as an instruction would. Raises ValueError."""
+        value = int.from_bytes(data, "little")
+        if address < self._machine.bus.end and len(data) <= 2:
+            self._machine.write(address, value, len(data))
+        else:
+            self._machine.poke(address, value, len(data))
+
+
+class Value:
+    """A typed value at its place."""
+
+    def __init__(
+        self,
+        kind: Type,
+        pieces: tuple[location.Piece, ...],
+        view: location.View,
+        name: str = "",
+        bits: tuple[int, int] | None = None,
+    ) -> None:
+        self.type: Final = kind
+        self.pieces: Final = pieces
+        self.name: Final = name
+        self._view: Final = view
+        self.bits: Final = bits
+        """Of a bit field: number of bits and the lowest one."""
+
+    @property
+    def address(self) -> int | None:
+        """Data address, None if it is not in memory as a whole."""
+        return location.address_of(self.pieces)
+
+    @property
+    def data(self) -> bytes:
+        """Its bytes. Raises locate.Unavailable."""
+        return location.read(self.pieces, max(self.type.bytes, 1), self._view)
+
+    def get(self) -> Any:
+        """As Python has it: int, float, bool, dict of members, list of elements. Raises locate.Unavailable."""
+        if self.bits is not None:
+            from emu.debug.dwarf.types import Member
+
+            return decode_member(Member("", self.type, 0, *self.bits), self.data)
+        return decode(self.type, self.data)
+
+    def set(self, value: Any) -> None:
+        """Change it. Raises locate.Unavailable, ValueError for what does not fit, TypeError for aggregates."""
+        if self.bits is not None:
+            count, lsb = self.bits
+            number, mask = int(value), (1 << count) - 1 << lsb
+            if not -(1 << count - 1) <= number < 1 << count:
+                raise ValueError(f"{number} does not fit into the {count} bits of {self.name}")
+            word = int.from_bytes(self.data, "little") & ~mask | number << lsb & mask
+            location.write(self.pieces, word.to_bytes(self.type.bytes, "little"), self._view)
+            return
+        location.write(self.pieces, encode(self.type, value), self._view)
+
+    @property
+    def frame(self) -> Frame | None:
+        """The frame it is looked up in; none if that is the machine as it stands."""
+        return self._view.frame if isinstance(self._view, FrameView) else None
+
+    def within(self, inside: Inside) -> Value:
+        """The same place in another machine that stands where this one does."""
+        return Value(self.type, self.pieces, inside.view(self.frame), self.name, self.bits)
+
+    def text(self) -> str:
+        """For people, in one line; the reason if there is no value."""
+        try:
+            return text_of(self.type, self.get())
+        except location.Unavailable as why:
+            return f"<{why}>"
+
+    def __getitem__(self, part: str | int) -> Value:
+        """A member by name, an element by number, or what a pointer points to (0). Raises KeyError, TypeError."""
+        bare = self.type.bare
+        if isinstance(part, str):
+            member = self.type.member(part)
+            if member is None:
+                raise KeyError(f"{self.type} has no member {part!r}")
+            bits = (member.bits, member.lsb) if member.bits else None
+            return Value(member.type, self._inside(member.offset, member.type.bytes), self._view, part, bits)
+        target = bare.target
+        if bare.kind not in ("array", "pointer") or target is None:
+            raise TypeError(f"{self.type} has no elements")
+        if bare.kind == "pointer":
+            place = location.Piece("memory", self.get() + part * max(target.bytes, 1) & 0xFFFF)
+            return Value(target, (place,), self._view, f"{self.name}[{part}]")
+        if not 0 <= part < bare.count:
+            raise KeyError(f"{self.name or 'the array'} has elements 0 to {bare.count - 1}, not {part}")
+        return Value(target, self._inside(part * target.bytes, target.bytes), self._view, f"{self.name}[{part}]")
+
+    def parts(self) -> Iterator[Value]:
+        """Members or elements; what a pointer points to."""
+        bare = self.type.bare
+        if bare.kind == "pointer" and bare.target is not None and bare.target.bare.kind not in ("void", "function"):
+            yield self[0]
+        for member in parts_of(self.type):
+            bits = (member.bits, member.lsb) if member.bits else None
+            yield Value(member.type, self._inside(member.offset, member.type.bytes), self._view, member.name, bits)
+
+    def _inside(self, offset: int, size: int) -> tuple[location.Piece, ...]:
+        """The pieces `size` bytes from `offset` lie in."""
+        found = []
+        begin = 0
+        for piece in self.pieces:
+            length = piece.size or self.type.bytes - begin
+            first, last = max(offset, begin), min(offset + size, begin + length)
+            if first < last:
+                skip = first - begin
+                if piece.kind == "register":
+                    found.append(location.Piece("register", piece.at + skip // 2, last - first, skip=skip % 2))
+                elif piece.kind == "memory":
+                    found.append(location.Piece("memory", piece.at + skip, last - first))
+                else:
+                    found.append(location.Piece(piece.kind, 0, last - first, piece.data[skip:]))
+            begin += length
+        if len(found) == 1 and found[0].kind == "memory":
+            return (location.Piece("memory", found[0].at),)
+        return tuple(found)

@@ -1,0 +1,1 @@
+"""Interrupts, traps, core faults, Idle and Sleep: what changes the flow between two instructions."""

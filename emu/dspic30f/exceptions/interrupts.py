@@ -1,0 +1,209 @@
+"""Interrupts and traps: what changes which of them is accepted, and the machine side of exceptions.py.
+
+What the writing instruction itself changes (IPL, IEC, IPC, DISICNT) counts at the boundary right after it; with
+`ipl_slip` = 1 that boundary still accepts by the IPL and IEC from before the write. UNVERIFIED which silicon does
+(isa.md §14.3). A flag set by software in cycle e is first 1 in e + 1, so one more instruction executes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+from emu.chips.chip import Chip, Vector
+from emu.dspic30f.exceptions.exceptions import (
+    NOBODY,
+    UNMASKABLE,
+    accepted,
+    enter,
+    ipl,
+    places_of,
+    requested,
+    rise,
+    waking,
+)
+from emu.dspic30f.exceptions.traps import Traps
+from emu.dspic30f.state.data_space import DataSpace
+from emu.dspic30f.state.state import STACK_POINTER, State
+from emu.system.bus import Bus, WriteHook
+from emu.system.device import FLAG_WORDS
+from emu.system.events import Events
+from emu.system.program import ProgramMemory
+from emu.system.rules import Integers, Rule
+
+
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """An exception that wins at a boundary: the CPU priority it brings, its vector and c of isa.md §14.3."""
+
+    level: int
+    vector: Vector
+    since: int
+
+
+class Exceptions(Integers):
+    """Acceptance and entry. One event slot makes the engine look again when time alone can change the answer."""
+
+    def __init__(
+        self, state: State, events: Events, bus: Bus, data: DataSpace, program: ProgramMemory, traps: Traps, chip: Chip
+    ) -> None:
+        super().__init__(state.record, events)
+        self._state: Final = state
+        self._data: Final = data
+        self._program: Final = program
+        self.traps: Final = traps
+        self._u16: Final = state.u16
+        self._u64: Final = state.record.u64
+        self._ram_start: Final = chip.data["ram"].start
+        self._inttreg: Final = state.at["INTTREG"]
+        self._names: Final = [vector.name for vector in chip.vectors]
+        self._look: Final = events.slot("cpu.look", lambda _due: None)
+        self.on_trap: Callable[[Vector], None] | None = None
+        """Called before a trap is entered: the machine stands where it happened."""
+        self.ipl_slip = 0
+        self._slip_cycle: Final = state.record.reserve("cpu.slip_cycle", "Q").index
+        self._slip_words: Final = state.record.reserve("cpu.slip_words", "H", 1 + FLAG_WORDS).index
+        self.places: Final = places_of(state, chip, self._look)
+        self._words: Final = [(flags.index, enables.index) for flags, enables in self.places.words]
+        self._vectors: Final = {vector.slot: vector for vector in chip.vectors}
+        self._hook(bus)
+        events.ruled(self._look, Rule(self.places.look, fires=lambda m, look: m.put(look.deadline, 0)), self.fire)
+
+    def _hook(self, bus: Bus) -> None:
+        """Hear of every write that can change the answer of `acceptable`."""
+        rises, priorities = iter(self.places.since), iter(self.places.priority)
+        for flags, enables in self._words:
+            bus.modelled[flags] = bus.modelled[enables] = True
+            bus.on_write[flags] = partial(self._flags_written, [next(rises) for _ in range(16)])
+            bus.on_write[enables] = partial(self._enables_written, enables)
+        for priority in priorities:
+            if priority:
+                bus.modelled[priority] = True
+                bus.on_write[priority] = self._priorities_written
+        at = self._state.at
+        for name in ("INTCON1", "INTCON2", "INTTREG"):
+            bus.modelled[at[name]] = True
+        bus.on_write[at["INTCON1"]] = self._intcon1_written
+        bus.compute[at["INTCON2"]] = self._read_intcon2
+        bus.on_write[at["SR"]] = partial(self._status_written, bus.on_write[at["SR"]])
+
+    def _status_written(self, rest: WriteHook | None, old: int, new: int, lanes: int) -> None:
+        self._remember(self._state.at["SR"], old)
+        if rest is not None:
+            rest(old, new, lanes)
+
+    def _enables_written(self, word: int, old: int, _new: int, _lanes: int) -> None:
+        self._remember(word, old)
+
+    def _priorities_written(self, _old: int, _new: int, _lanes: int) -> None:
+        self._events.kick()
+
+    def _intcon1_written(self, old: int, new: int, _lanes: int) -> None:
+        self.traps.written(old, new)
+
+    def _read_intcon2(self) -> int:
+        """INTCON2<14> reads 1 while DISICNT is not 0 (isa.md §12)."""
+        stored = self._state.intcon2 & ~0x4000
+        return stored | 0x4000 if self._state.disi_end > self._events.now else stored
+
+    def _flags_written(self, rises: list[int], old: int, new: int, _lanes: int) -> None:
+        """Flags set by software are first 1 in the next cycle."""
+        set_now = new & ~old
+        for bit, place in enumerate(rises):
+            if set_now >> bit & 1:
+                self._u64[self.places.first_rise.index + place] = self._events.now + 1
+        self._events.kick()
+
+    def _remember(self, word: int, old: int) -> None:
+        """For `ipl_slip`: SR and the enables as they were before the first write of this cycle."""
+        if self.ipl_slip:
+            now = self._events.now
+            if self._u64[self._slip_cycle] != now + 1:
+                self._u64[self._slip_cycle] = now + 1
+                for number, index in enumerate([self._state.at["SR"], *(enables for _, enables in self._words)]):
+                    self._u16[self._slip_words + number] = old if index == word else self._u16[index]
+        self._events.kick()
+
+    def forget(self) -> None:
+        """Nothing is awaited any more: after a reset, or because the engine looks at the next boundary anyway."""
+        self._events.cancel(self._look)
+
+    def acceptable(self, last: int) -> Accepted | None:
+        """The exception to enter at the boundary after cycle `last`, None if there is none.
+
+        Requests that time alone makes acceptable later are noted: the engine will look again then.
+        """
+        pending = self._state.intcon1 & self.traps.flags
+        slip = last + 1 if self.ipl_slip else None
+        if pending:
+            level = ipl(self, self.places, slip)
+            for trap in self.traps.all:
+                if pending & trap.flag and trap.vector.level > level and self._visible(trap.since, last):
+                    return Accepted(trap.vector.level, trap.vector, self._u64[trap.since])
+        u16 = self._u16
+        if slip is None and not any(u16[flags] & u16[enables] for flags, enables in self._words):
+            return None  # most often, and told more quickly
+        bits = requested(self, self.places, slip)
+        number, level = accepted(self, self.places, bits, last, slip)
+        if number == NOBODY:
+            return None
+        return Accepted(level, self._vectors[self.places.slot[number]], rise(self, self.places, number))
+
+    def _visible(self, since: int, last: int) -> bool:
+        if self._u64[since] <= last:
+            return True
+        if self._u64[since] < self._events.due(self._look):
+            self._events.set(self._look, self._u64[since])
+        return False
+
+    def waking(self) -> int | None:
+        """Cycle of a request that ends Idle or Sleep, None if there is none: a trap, or an enabled interrupt of
+        priority 1 or more, whatever the CPU priority (isa.md §11)."""
+        for trap in self.traps.all:
+            if self._state.intcon1 & trap.flag:
+                return self._u64[trap.since]
+        number = waking(self, self.places, requested(self, self.places))
+        return None if number == NOBODY else rise(self, self.places, number)
+
+    def armed(self) -> bool:
+        """Whether any interrupt of priority 1 or more is enabled."""
+        bits = sum(self.get(enables) << 16 * number for number, (_flags, enables) in enumerate(self.places.words))
+        return bool(waking(self, self.places, bits & self.places.implemented) != NOBODY)
+
+    def enter(self, chosen: Accepted, last: int) -> None:
+        """Continue at the handler."""
+        vector = chosen.vector
+        if chosen.level > UNMASKABLE and self.on_trap is not None:
+            self.on_trap(vector)
+        enter(self, self.places, chosen.level, chosen.since, last, (vector.ivt, vector.aivt, vector.slot))
+
+    def latest(self) -> str:
+        """The exception entered last, as INTTREG and the stack tell it, for messages; empty if there was none."""
+        slot, top = self._u16[self._inttreg] & 0x3F, self._u16[STACK_POINTER]
+        if not slot or slot >= len(self._names) or self._data.faulty(top - 4 & 0xFFFF, 2):
+            return ""
+        low, high = self._u16[top - 4 >> 1], self._u16[top - 2 >> 1]
+        return f"{self._names[slot]} at {(high & 0x7F) << 16 | low:06X}"
+
+    def push(self, low: int, high: int, cycle: int) -> None:
+        """Two words at [W15++], in `cycle` and the next, with the checks of every stack access (isa.md §10)."""
+        for later, value in enumerate((low, high)):
+            ea = self._u16[STACK_POINTER]
+            self._events.arrive(cycle + later)
+            if self.beyond_stack(ea):
+                self.traps.request(self.traps.stack, cycle + later + 1)
+            if self._data.faulty(ea, 2):
+                self.traps.request(self.traps.address, cycle + later)
+            else:
+                self._data.write(ea, value, 2)
+            self._state.set_w(STACK_POINTER, ea + 2)
+
+    def handler(self, vector: int) -> int:
+        """The program word of a vector."""
+        return self._program.word(vector)
+
+    def beyond_stack(self, ea: int) -> bool:
+        """Whether a W15 address is out of bounds (isa.md §10.1, §10.2)."""
+        return ea < self._ram_start or (bool(self._state.limit_armed) and ea > self._state.splim)

@@ -1,0 +1,103 @@
+"""Idle and Sleep: how time passes while the CPU stands, and what ends that (isa.md §11)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Final
+
+from emu.dspic30f.exceptions.interrupts import Exceptions
+from emu.dspic30f.state.state import RUN, SLEEP, State
+from emu.system.events import NEVER, Events
+from emu.system.rules import Rule
+
+NOTHING: Final = Rule(None)
+STIR: Final = 1_000_000
+"""Tcy for which devices still run when the CPU sleeps with nothing enabled that could wake it: transmitters drain."""
+
+
+class Sleeping(Enum):
+    """How letting time pass has ended: the CPU runs, the limit was reached, or nothing will ever wake the CPU."""
+
+    ENDED = auto()
+    GOES_ON = auto()
+    FOR_EVER = auto()
+
+
+@dataclass(slots=True)
+class Wires:
+    """Lines from the core to whoever wired it."""
+
+    clear_watchdog: Callable[[], None] = lambda: None
+    power: Callable[[int, int], None] = lambda mode, cycle: None
+    """power(mode, cycle): the CPU stops (IDLE, SLEEP) or runs again (RUN) from `cycle`."""
+    idling: Rule = NOTHING
+    clearing: Rule = NOTHING
+    """What PWRSAV #1 and CLRWDT do in the common case, as text for every engine."""
+    can_wake: Callable[[], bool] = lambda: False
+    """Whether something other than an interrupt or trap can wake a sleeping CPU (the watchdog)."""
+    restart: Callable[[], int] = lambda: 0
+    """Tcy the oscillator needs to start after Sleep."""
+    interrupted: Callable[[], bool] = lambda: False
+    """Somebody wants the run to end now, even if the CPU sleeps."""
+
+
+class PowerSaving:
+    """PWRSAV and what follows."""
+
+    def __init__(self, state: State, events: Events, exceptions: Exceptions) -> None:
+        self._state: Final = state
+        self._events: Final = events
+        self._exceptions: Final = exceptions
+        self._slept: Final = state.record.reserve("cpu.slept", "Q").index
+        self.wires: Final = Wires()
+
+    def stop(self, mode: int, cycle: int) -> None:
+        """PWRSAV executed in `cycle`; `mode` is IDLE or SLEEP."""
+        self._events.arrive(cycle)
+        self._state.mode = mode
+        self._state.record.u64[self._slept] = cycle
+        self.wires.power(mode, cycle + 1)
+        self._events.kick()
+
+    def wake(self) -> None:
+        """Leave Idle, or Sleep once the oscillator runs: execution goes on."""
+        if self._state.mode != RUN:
+            if self._state.mode == SLEEP:
+                self._state.cycle += self.wires.restart()
+            self._state.mode = RUN
+            self.wires.power(RUN, self._state.cycle)
+            self._events.kick()
+
+    def pass_time(self, limit: int) -> Sleeping:
+        """Let time pass until something wakes the CPU, at most to `limit`.
+
+        The cycle in which the waking flag is first 1 counts as that of an instruction: UNVERIFIED.
+        """
+        state, events = self._state, self._events
+        while True:
+            if events.deadline <= state.cycle:
+                events.settle(state.cycle)
+                since = self._exceptions.waking()
+                if since is not None:
+                    state.cycle = max(state.cycle, since + 1)
+                    self.wake()
+                if state.mode == RUN:
+                    return Sleeping.ENDED
+            if self.wires.interrupted():
+                return Sleeping.GOES_ON
+            due = events.deadline
+            if due < limit:
+                due = events.next_due()
+            if limit <= due < NEVER:
+                state.cycle = max(state.cycle, limit)
+                return Sleeping.GOES_ON
+            if due == NEVER or (due > state.record.u64[self._slept] + STIR and self._is_final()):
+                events.settle(state.cycle)
+                return Sleeping.FOR_EVER
+            state.cycle = max(state.cycle, due)
+
+    def _is_final(self) -> bool:
+        """Nothing is enabled that could wake the CPU, whatever the devices still do."""
+        return not self._exceptions.armed() and not self.wires.can_wake()

@@ -1,0 +1,282 @@
+"""The rules of order and time of the dsPIC30F core, once. Every engine behaves as this module says.
+
+Time. An instruction that starts in cycle s occupies s..e: a RAW stall first (isa.md §13.2), then its base cycles
+(§13.1), then PSV cycles (§13.3); a taken branch or a skip adds cycles behind its data access. Data accesses fall in e
+(of two, the first in e - 1); devices are brought up to the cycle of an access before it is made, and a write in cycle t
+affects them from t + 1 (design §4.2; UNVERIFIED on silicon).
+
+Boundaries. Between two instructions, after last cycle e, the engine looks if something is due by e or somebody kicked
+(`Events.deadline` <= e): events fire, then an acceptable exception is entered, handler first in max(c + 4, e + 3)
+(isa.md §14.3, interrupts.py). Entering one is itself followed by a boundary, so a higher one can win at once.
+RETURN, RETLW and RETFIE look one cycle early: they take 2 cycles instead of 3 if an exception is acceptable then.
+
+Within REPEAT the target stays at PC; every iteration is followed by a boundary. RA is 0 during the last iteration
+(isa.md §7.5, UNVERIFIED). At the end of the instruction at DOEND, if it falls through, the loop goes on or ends (§7.6).
+What REPEAT, DO, RETFIE and DISI do to registers, and what skips and stalls cost, is the text of flowrules.py. A flow
+change out of a REPEAT target or out of the last instruction of a DO loop simply happens (undefined on silicon).
+
+Faults. An address error inhibits the stores of its instruction, which otherwise completes; stack and math errors are
+visible from e + 1, hard traps from e. An illegal opcode, an uninitialised pointer and a trap conflict reset the device.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from emu.dspic30f.exceptions.faults import Breakpoint, DeviceReset, IllegalOpcode, TrapConflict
+from emu.dspic30f.exceptions.interrupts import Exceptions
+from emu.dspic30f.exceptions.power import PowerSaving, Sleeping
+from emu.dspic30f.interpreter import flow_rules
+from emu.dspic30f.interpreter.plain import Interpreter
+from emu.dspic30f.interpreter.rule_paths import function_of
+from emu.dspic30f.isa.codec import decode_for_execution
+from emu.dspic30f.isa.debug import is_debug_word
+from emu.dspic30f.isa.facts import Facts, facts_of
+from emu.dspic30f.isa.flow import (
+    Branch,
+    Call,
+    ClearWatchdog,
+    Disi,
+    Do,
+    Flow,
+    Goto,
+    Repeat,
+    Reset,
+    Return,
+    Skip,
+    Sleep,
+)
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.state.state import DA, IDLE, MIDDLE, NOT_REPEATING, PC_MASK, RA, RUN, SLEEP, State
+from emu.system.events import Events
+from emu.system.program import ProgramMemory
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """An instruction as the sequencer needs it, by address."""
+
+    insn: Insn
+    facts: Facts
+    next_pc: int
+
+
+class Sequencer:
+    """Fetches, decodes and runs instructions one at a time; the plain engine, and the last resort of the others."""
+
+    def __init__(
+        self,
+        state: State,
+        events: Events,
+        program: ProgramMemory,
+        exceptions: Exceptions,
+        builder: Interpreter,
+    ) -> None:
+        self.state: Final = state
+        self.events: Final = events
+        self.program: Final = program
+        self.exceptions: Final = exceptions
+        self.builder: Final = builder
+        self.power: Final = PowerSaving(state, events, exceptions)
+        self._hold: Final = state.record.reserve("cpu.hold", "Q").index
+        self._steps: Final[dict[int, Step]] = {}
+        program.changed.append(self._forget)
+        places, record = flow_rules.places_of(state), state.record
+        self._repeat: Final = function_of(record, flow_rules.repeat, places, "count")
+        self._repeated: Final = function_of(record, flow_rules.repeated, places, "counting")
+        self._do: Final = function_of(record, flow_rules.do, places, "count", "start", "end")
+        self._loop_again: Final = function_of(record, flow_rules.loop_again, places)
+        self._resume: Final = function_of(record, flow_rules.resume, places, "srl", "ipl3")
+        self._disi: Final = function_of(record, flow_rules.disi, places, "count", "after")
+
+    def _forget(self, start: int, end: int) -> None:
+        """Flash words in [start, end) changed."""
+        for pc in [pc for pc in self._steps if start - 2 <= pc < end]:
+            del self._steps[pc]
+
+    def hold_until(self, cycle: int) -> None:
+        """Let no instruction start before `cycle`: flash is being programmed (dspic30f6014a.md §16)."""
+        self.state.record.u64[self._hold] = cycle
+        self.events.kick()
+
+    # Boundaries
+
+    def boundary(self, limit: int) -> bool:
+        """Do what is to be done between two instructions. False: the CPU sleeps and nothing will ever wake it.
+
+        While the CPU sleeps, time passes up to `limit`.
+        """
+        state, events = self.state, self.events
+        hold = state.record.u64[self._hold]
+        if hold:
+            state.cycle = max(state.cycle, hold)
+            state.record.u64[self._hold] = 0
+        while True:
+            if state.mode != RUN:
+                sleeping = self.power.pass_time(limit)
+                if sleeping is not Sleeping.ENDED:
+                    return sleeping is Sleeping.GOES_ON
+            last = state.cycle - 1
+            if events.deadline > last >= 0:
+                return True
+            events.settle(last)
+            accepted = self.exceptions.acceptable(last)
+            if accepted is None:
+                return True
+            self.exceptions.enter(accepted, last)
+            events.kick()
+
+    # Instructions
+
+    def fetch(self, pc: int) -> Step:
+        """The instruction at `pc`. Raises IllegalOpcode, or Breakpoint if it is a debugger word."""
+        step = self._steps.get(pc)
+        if step is None:
+            word1 = self.program.word(pc)
+            insn = decode_for_execution(word1, self.program.word(pc + 2 & PC_MASK))
+            if insn is None:
+                if is_debug_word(word1):
+                    raise Breakpoint(f"debugger word {word1:06X}")
+                raise IllegalOpcode(word1)
+            step = self._steps[pc] = Step(insn, facts_of(insn), pc + 2 * insn.words & PC_MASK)
+        return step
+
+    def execute(self) -> None:
+        """Run the instruction at PC, from its stall to its last cycle.
+
+        Raises DeviceReset (PC still at the culprit) and Breakpoint (PC and cycle behind the word).
+        """
+        state = self.state
+        pc = state.pc
+        if not self.program.executable(pc):
+            self._fetch_error()
+            return
+        try:
+            step = self.fetch(pc)
+        except Breakpoint:
+            state.pc = pc + 2
+            state.cycle += 1
+            state.stall = 0
+            raise
+        facts, builder = step.facts, self.builder
+        start = state.cycle + flow_rules.stall(state.stall, facts.source_pointers)
+        repeat = state.repeat
+        extra = facts.window_cycles if repeat == NOT_REPEATING else 0 if repeat == MIDDLE else 2
+        builder.begin(pc, start + facts.access, facts.loads, extra)
+        try:
+            state.pc = step.next_pc
+            flow = step.insn.row.does(builder, step.insn.x)
+            builder.commit()
+        except DeviceReset:
+            state.pc = pc
+            raise
+        last = builder.last if flow is None else self._follow(flow, pc, builder.last)
+        if builder.math or builder.stack_error:
+            builder.request_soft_traps(last)
+        if state.sr & RA or repeat != NOT_REPEATING:
+            last = self._after_target(step, flow, pc, last)
+        if state.sr & DA and pc == state.pair("DOENDL") and state.pc == step.next_pc and self._loop_again():
+            state.pc = state.pair("DOSTARTL")
+        if state.edt and state.edt < flow_rules.EDT_MATURE:
+            state.edt += 1
+        state.cycle = last + 1
+
+    def _fetch_error(self) -> None:
+        """PC points where no instruction may be fetched: a hard trap at this boundary (isa.md §14.4, causes 4, 5).
+
+        UNVERIFIED: with an equal or higher trap in progress the device resets, as it could not go on. No boundary comes
+        before cycle 0: a fetch that fails there takes it.
+        """
+        state = self.state
+        state.cycle = max(state.cycle, 1)
+        traps = self.exceptions.traps
+        if state.ipl >= traps.address.vector.level:
+            entered = self.exceptions.latest()
+            origin = f", after {entered}" if entered else ""
+            raise TrapConflict(f"no instruction can be fetched at {state.pc:06X}{origin}")
+        traps.request(traps.address, state.cycle - 1)
+
+    # Flow
+
+    def _follow(self, flow: Flow, pc: int, last: int) -> int:
+        """Change PC and the loop registers as a row asks; returns the last cycle of the instruction."""
+        state = self.state
+        match flow:
+            case Branch(cond, target):
+                if cond:
+                    state.pc = target
+                    last += flow_rules.TAKEN
+            case Skip(cond):
+                if cond:
+                    last += self._skip()
+            case Goto(target) | Call(target):
+                state.pc = target
+            case Return():
+                return self._return(flow, last)
+            case Repeat(count):
+                self._repeat(count)
+            case Do(count, end):
+                self._do(count, state.pc, end)
+            case Disi(count):
+                self._disi(count, last + 1)
+                self.events.kick()
+            case ClearWatchdog():
+                self.events.arrive(last)
+                self.power.wires.clear_watchdog()
+            case Sleep(mode):
+                self.power.stop(IDLE if mode == "idle" else SLEEP, last)
+            case Reset():
+                state.cycle = last + 1
+                state.pc = pc
+                raise DeviceReset("SWR", "RESET instruction", fault=False)
+        return last
+
+    def _skip(self) -> int:
+        """Step over the next instruction."""
+        pc = self.state.pc
+        insn = decode_for_execution(self.program.word(pc), self.program.word(pc + 2 & PC_MASK))
+        words = flow_rules.words_skipped(insn)
+        self.state.pc = pc + 2 * words & PC_MASK
+        return words
+
+    def _return(self, flow: Return, second: int) -> int:
+        """RETURN, RETLW, RETFIE, whose second cycle is `second`: ends there if an exception can be entered."""
+        if flow.kind == "retfie":
+            return self.finish_retfie(flow.target, flow.srl, flow.ipl3, second)
+        self.state.pc = flow.target
+        return second if self._exception_at(second) else second + 1
+
+    def finish_retfie(self, target: int, srl: int, ipl3: int, second: int) -> int:
+        """Continue at `target` with the popped SR<7:0> and IPL3; returns the last cycle."""
+        self.state.pc = target
+        self._resume(srl, ipl3)
+        self.events.kick()
+        return second if self._exception_at(second) else second + 1
+
+    def after_retfie(self) -> None:
+        """A RETFIE was run elsewhere up to its second cycle: add the third unless an exception is entered instead."""
+        if not self._exception_at(self.state.cycle - 1):
+            self.state.cycle += 1
+
+    def _exception_at(self, last: int) -> bool:
+        """Whether an exception could be entered after cycle `last`; if so the boundary there will look."""
+        if self.events.deadline > last:
+            return False
+        self.events.settle(last)
+        if self.exceptions.acceptable(last) is None:
+            return False
+        self.events.kick()
+        return True
+
+    def _after_target(self, step: Step, flow: Flow, pc: int, last: int) -> int:
+        """Count an iteration of a REPEAT target; returns its last cycle, which PSV may move (isa.md §13.3)."""
+        state = self.state
+        if isinstance(flow, Repeat | Return) or state.pc != step.next_pc:
+            return last
+        middle, counting = state.repeat == MIDDLE, state.sr & RA
+        if self._repeated(counting):
+            state.pc = pc
+        if counting and self.builder.window and middle and self._exception_at(last):
+            last += 2
+        return last

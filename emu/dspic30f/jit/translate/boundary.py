@@ -1,0 +1,230 @@
+"""Native work at an instruction boundary: events that have rules, interrupts, and the time spent in Idle.
+
+What happens is the text of the devices' rules and of exceptions.py; the order is that of `Sequencer.boundary`. What has
+no rule, or needs more than its rule says, and traps are left to them: the function then returns with what was due
+before done, and Python does the rest of the boundary.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.dspic30f.core import Core
+from emu.dspic30f.exceptions import exceptions
+from emu.dspic30f.exceptions.power import STIR
+from emu.dspic30f.jit.translate.cycle_counters import BoundaryCount
+from emu.dspic30f.jit.translate.rule_emitter import BoundaryReader
+from emu.dspic30f.jit.translate.values import Emitter, Value, truth, wide
+from emu.dspic30f.state.state import IDLE, RUN, STACK_POINTER
+from emu.system.events import NEVER
+from emu.system.rules import Number, Place, place_of, slot_of
+
+DONE, PYTHON, HALFWAY = 0, 1, 2
+"""Results: the boundary has no work left; Python must do it; or go on with it, as somebody was accepted already: a
+limit that has been reached since does not count before it ends."""
+
+LANES: Final = 8
+"""Due cycles in the widest vector register."""
+
+DECLARED: Final = f"""declare i64 @llvm.vector.reduce.umin.v{LANES}i64(<{LANES} x i64>)
+declare <{LANES} x i64> @llvm.umin.v{LANES}i64(<{LANES} x i64>, <{LANES} x i64>)
+declare i128 @llvm.cttz.i128(i128, i1)
+declare i64 @llvm.umin.i64(i64, i64)"""
+
+PLACES: Final = {"cycle": "cpu.cycle", "deadline": "events.deadline", "hold": "cpu.hold", "due": "events.due",
+                 "mode": "cpu.mode", "slept": "cpu.slept", "power": "wdt.mode",
+                 "stopped": "power.stopped"}  # fmt: skip
+"""Fields of the record that have names here."""
+
+
+def service_text(core: Core, counts: BoundaryCount) -> str:
+    """IR of `i64 @service(ptr %rec, i64 %limit, ptr %entered)`."""
+    fired, accepted = Emitter(), Emitter()
+    events = BoundaryReader(core, fired, Value(fired, "%least1", False), "python")
+    _fire(core, events)
+    entering = BoundaryReader(core, accepted, Value(accepted, "%first.due", False), "python", events.tables)
+    _accept(core, entering, counts)
+    fire = "\n".join([_events(core), fired.text(), "}"])
+    service = "\n".join([_head(core, counts), _SETTLE, accepted.text(), "}"])
+    return "\n".join([DECLARED, events.constants(), fire, service])
+
+
+_SETTLE: Final = """fire:
+  %first.due = call i64 @fire(ptr %rec, i64 %last)
+  %refused.one = icmp eq i64 %first.due, 0
+  br i1 %refused.one, label %python, label %settled
+settled:
+  store i64 %first.due, ptr %p.deadline
+  br label %accept"""
+"""What is due at the boundary, before somebody is accepted."""
+
+
+def _head(core: Core, counts: BoundaryCount) -> str:
+    """From the call to an event that is due (`fire`), through the time spent in Idle."""
+    offsets = {name: core.record.fields[field].offset for name, field in PLACES.items()}
+    return "\n".join(
+        [
+            "define internal i64 @service(ptr noalias %rec, i64 %limit, ptr %entered) {",
+            "first:",
+            *(f"  %p.{name} = getelementptr i8, ptr %rec, i64 {offset}" for name, offset in offsets.items()),
+            f"""  %left = alloca i64
+  store i64 {PYTHON}, ptr %left
+  %hold = load i64, ptr %p.hold
+  %waits = icmp ne i64 %hold, 0
+  br i1 %waits, label %python, label %again
+python:
+  store i64 0, ptr %p.deadline
+  %why = load i64, ptr %left
+  ret i64 %why
+done:
+  ret i64 {DONE}
+stop:
+  ret i64 {PYTHON}
+again:
+  %within = phi i1 [ false, %first ], [ false, %jump ], [ false, %asleep ], [ true, %rouse ], [ true, %entered.one ]
+  %half = select i1 %within, i64 {HALFWAY}, i64 {PYTHON}
+  store i64 %half, ptr %left
+  %cycle = load i64, ptr %p.cycle
+  %before = sub i64 %cycle, 1
+  %deadline = load i64, ptr %p.deadline
+  %mode = load i16, ptr %p.mode
+  %awake = icmp eq i16 %mode, {RUN}
+  %last = select i1 %awake, i64 %before, i64 %cycle
+  %early = icmp ugt i64 %deadline, %last
+  br i1 %awake, label %running, label %resting
+running:
+  %reached = icmp uge i64 %cycle, %limit
+  %over = select i1 %within, i1 false, i1 %reached
+  br i1 %over, label %stop, label %due
+due:
+  br i1 %early, label %done, label %fire
+resting:
+  %idle = icmp eq i16 %mode, {IDLE}
+  %halted = load i8, ptr %p.stopped
+  %clocked = icmp eq i8 %halted, 0
+  %simple = and i1 %idle, %clocked
+  br i1 %simple, label %idling, label %python
+idling:
+  br i1 %early, label %sleep, label %fire
+sleep:
+  %slept = load i64, ptr %p.slept
+  %stir = add i64 %slept, {STIR}
+  %long = icmp ugt i64 %deadline, %stir
+  br i1 %long, label %python, label %nap
+nap:
+  %far = icmp uge i64 %deadline, %limit
+  br i1 %far, label %doze, label %jump
+doze:
+  %until = call i64 @llvm.umax.i64(i64 %cycle, i64 %limit)
+  store i64 %until, ptr %p.cycle
+{counts.idle("doze", "%until")}
+  ret i64 {PYTHON}
+jump:
+  store i64 %deadline, ptr %p.cycle
+{counts.idle("jump", "%deadline")}
+  br label %again""",
+        ]
+    )
+
+
+def _events(core: Core) -> str:
+    """IR of `i64 @fire(ptr %rec, i64 %last)`: the events due up to cycle `%last`, in order of (due, slot). The earliest
+    due cycle behind it, or 0 if Python must go on; the deadline is the caller's."""
+    due = core.record.fields[PLACES["due"]].offset
+    lanes, groups = f"<{LANES} x i64>", range(-(-len(core.events.names) // LANES))
+    looked, hits, least = [], [], "%dues0"
+    for g in groups:  # slots behind the last one are never due
+        looked += [
+            f"  %p.group{g} = getelementptr i64, ptr %p.due, i64 {LANES * g}",
+            f"  %dues{g} = load {lanes}, ptr %p.group{g}, align 8",
+        ]
+        if g:
+            looked.append(f"  %min{g} = call {lanes} @llvm.umin.v{LANES}i64({lanes} {least}, {lanes} %dues{g})")
+            least = f"%min{g}"
+        hits += [
+            f"  %equal{g} = icmp eq {lanes} %dues{g}, %least.all",
+            f"  %bits{g} = bitcast <{LANES} x i1> %equal{g} to i{LANES}",
+            f"  %wide{g} = zext i{LANES} %bits{g} to i128",
+            f"  %placed{g} = shl i128 %wide{g}, {LANES * g}",
+            f"  %hits{g} = or i128 %placed{g}, {f'%hits{g - 1}' if g else 0}",
+        ]
+    newline = "\n"
+    return f"""define internal i64 @fire(ptr noalias %rec, i64 %last) {{
+first:
+  %p.due = getelementptr i8, ptr %rec, i64 {due}
+  br label %fire
+python:
+  ret i64 0
+fire:
+{newline.join(looked)}
+  %least1 = call i64 @llvm.vector.reduce.umin.v{LANES}i64({lanes} {least})
+  %later = icmp ugt i64 %least1, %last
+  br i1 %later, label %settled, label %choose
+settled:
+  ret i64 %least1
+choose:
+  %least.0 = insertelement {lanes} poison, i64 %least1, i64 0
+  %least.all = shufflevector {lanes} %least.0, {lanes} poison, <{LANES} x i32> zeroinitializer
+{newline.join(hits)}
+  %hit = call i128 @llvm.cttz.i128(i128 %hits{groups[-1]}, i1 true)
+  %who = trunc i128 %hit to i64
+  switch i64 %who, label %python [ {" ".join(f"i64 {slot}, label %t{slot}" for slot in core.events.rules)} ]"""
+
+
+def _fire(core: Core, m: BoundaryReader) -> None:
+    """The events that have rules."""
+    for number, rule in core.events.rules.items():
+        slot = slot_of(core.record, number)
+        m.e.start(f"t{number}")
+        rule.fires(m, rule.places)
+        if slot not in m.posted:
+            m.put(slot.due, NEVER)
+        m.e.end("br label %fire")
+
+
+def _accept(core: Core, m: BoundaryReader, counts: BoundaryCount) -> None:
+    """Which interrupt is accepted behind `%last`, or wakes the CPU, if one does."""
+    e, p = m.e, core.exceptions.places
+    cycle, last = (Value(e, name, False) for name in ("%cycle", "%last"))
+    e.start("accept")
+    m.need((m.get(p.intcon1) & core.traps.flags) == 0)
+    e.end("br i1 %awake, label %running.on, label %wake")
+    e.start("wake")
+    bits = exceptions.requested(m, p)
+    e.end(f"br i1 {truth(bits)}, label %seek, label %asleep")
+    e.start("asleep")
+    e.end("br label %again")
+    e.start("seek")
+    found = exceptions.waking(m, p, bits)
+    e.end(f"br i1 {truth(found == exceptions.NOBODY)}, label %asleep, label %rouse")
+    e.start("rouse")
+    risen = exceptions.rise(m, p, found) + 1
+    until = e.select(cycle < risen, risen, cycle)
+    for name, value in (("cycle", until), ("mode", RUN), ("power", RUN), ("deadline", 0)):
+        m.put(place_of(core.record, PLACES[name]), value)
+    e.line(counts.idle("rouse", wide(until)))
+    e.end("br label %again")
+    e.start("running.on")
+    slip = cycle if core.exceptions.ipl_slip else None
+    bits = exceptions.requested(m, p, slip)
+    e.end(f"br i1 {truth(bits)}, label %pick, label %done")
+    e.start("pick")
+    winner, level = exceptions.accepted(m, p, bits, last, slip)
+    e.end(f"br i1 {truth(winner == exceptions.NOBODY)}, label %done, label %enter")
+    _enter(core, m, counts, winner, level)
+
+
+def _enter(core: Core, m: BoundaryReader, counts: BoundaryCount, winner: Number, level: Number) -> None:
+    """The interrupt with that number, counted."""
+    e, p = m.e, core.exceptions.places
+    e.start("enter")
+    vectors = tuple(m.table(column, winner) for column in (p.ivt, p.aivt, p.slot))
+    since, site, place = exceptions.rise(m, p, winner), m.get(p.pc), m.get(Place(2 * STACK_POINTER, 16))
+    exceptions.enter(m, p, level, since, Value(e, "%last", False), vectors)
+    e.line(counts.entered(*map(wide, (m.get(p.cycle), m.get(p.pc), site, place, level, since))))
+    e.end("br label %entered.one")
+    e.start("entered.one")
+    e.line("%count = load i64, ptr %entered")
+    e.line("%count1 = add i64 %count, 1")
+    e.line("store i64 %count1, ptr %entered")
+    e.end("br label %again")

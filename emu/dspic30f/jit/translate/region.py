@@ -1,0 +1,95 @@
+"""Which instructions are translated together: the part of a program reachable from one address without leaving.
+
+A region is found by following static successors; calls, returns and computed jumps lead out of it. Its leaders are the
+addresses at which native code can be entered; a block runs from a leader to the next one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container
+from dataclasses import dataclass, field
+from typing import Final
+
+from emu.dspic30f.interpreter.flow_rules import words_skipped
+from emu.dspic30f.isa.facts import Facts, facts_of, flow_of
+from emu.dspic30f.isa.flow import Branch, Call, ClearWatchdog, Disi, Do, Goto, Repeat, Reset, Return, Skip, Sleep
+from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.state.state import PC_MASK
+
+LIMIT: Final = 150
+"""Instructions in a region: compile time per instruction grows behind that (design §4.3, measured)."""
+
+Fetch = Callable[[int], Insn | None]
+"""Decoded instruction at a program address; None where nothing legal stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One instruction of a region: where it is, what it is, and the addresses that may follow inside the region."""
+
+    pc: int
+    insn: Insn
+    facts: Facts
+    next_pc: int
+    target: int | None
+    """Static target of a branch or jump; address behind the skipped instruction of a skip."""
+
+
+@dataclass
+class Region:
+    """Steps by address, in address order, and the leaders among them."""
+
+    start: int
+    steps: dict[int, Step] = field(default_factory=dict)
+    leaders: set[int] = field(default_factory=set)
+
+    def words(self) -> list[tuple[int, int, int]]:
+        """(address, word1, word2) of everything translated: what the code depends on."""
+        return [(pc, step.insn.word1, step.insn.word2) for pc, step in sorted(self.steps.items())]
+
+
+def static_target(pc: int, insn: Insn, fetch: Fetch) -> int | None:
+    """Target of a branch or jump that the instruction itself names, or where a skip leads; None if computed."""
+    flow = flow_of(insn, pc)
+    if isinstance(flow, Skip):
+        skipped = fetch((pc + 2) & PC_MASK)
+        return None if skipped is None else (pc + 2 + 2 * words_skipped(skipped)) & PC_MASK
+    if isinstance(flow, (Branch, Goto)) and isinstance(flow.target, int):
+        return flow.target & PC_MASK
+    return None
+
+
+ENDS: Final = (Goto, Call, Return, Reset, Sleep)
+"""Flows behind which the next word is not reached by falling through."""
+
+
+def discover(start: int, fetch: Fetch, known: Container[int] = (), hooks: Container[int] = ()) -> Region:
+    """The region entered at `start`; it ends where `known` code can be entered. At `hooks` Python goes in and out."""
+    region = Region(start)
+    work = [start]
+    region.leaders.add(start)
+    while work and len(region.steps) < LIMIT:
+        pc = work.pop(0)
+        while pc not in region.steps and len(region.steps) < LIMIT and (pc == start or pc not in known):
+            insn = fetch(pc)
+            if insn is None:
+                break
+            facts = facts_of(insn)
+            next_pc = (pc + 2 * insn.words) & PC_MASK
+            target = static_target(pc, insn, fetch)
+            region.steps[pc] = Step(pc, insn, facts, next_pc, target)
+            if pc in hooks:
+                region.leaders.add(pc)
+            if target is not None:
+                region.leaders.add(target)
+                work.append(target)
+            if facts.flow in (Branch, Skip, Call, Sleep, Disi, ClearWatchdog, Do):
+                region.leaders.add(next_pc)
+                work.append(next_pc)
+            if facts.flow in ENDS or facts.flow in (Branch, Skip):
+                break
+            if facts.flow is Repeat:
+                region.leaders.add(next_pc)
+            pc = next_pc
+    region.leaders &= set(region.steps)
+    return region

@@ -1,0 +1,200 @@
+"""Registers and flags of the machine while translated code runs: SSA variables, in the record only at its edges.
+
+Each is an `alloca` that LLVM turns into registers. The prologue loads those a region uses from the record, the exit
+stores back those it writes; SR is put together there and nowhere else. Arithmetic flags are carried by words
+(`carried.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from emu.dspic30f.jit.translate.lazy_flags import PLACES, carried, told
+from emu.dspic30f.jit.translate.values import Emitter, Number, Value, truth, wide
+from emu.dspic30f.state.state import FLAGS, OAB, SAB
+
+ACCUMULATOR_FLAGS: Final = ("OA", "OB", "SA", "SB")
+BITS: Final = FLAGS | {"OAB": OAB.bit_length() - 1, "SAB": SAB.bit_length() - 1}
+"""SR bits that are variables: what rows name, and the two sums that follow."""
+
+
+class Variables:
+    """The machine's registers as variables of one function. `offset` gives byte offsets in the record by name."""
+
+    def __init__(self, emitter: Emitter, offset: Mapping[str, int]) -> None:
+        self._emitter: Final = emitter
+        self._offset: Final = offset
+        self._used: dict[str, None] = {}
+        self._written: set[str] = set()
+        self._known: dict[str, Value] = {}
+
+    def new_block(self) -> None:
+        """Forget which SSA values the variables hold: control may come from elsewhere."""
+        self._known.clear()
+
+    def touch(self, *names: str) -> None:
+        """Have variables loaded and stored back whether or not an instruction names them."""
+        for name in names:
+            self._used.setdefault(name)
+            self._written.add(name)
+
+    def get(self, name: str) -> Value:
+        """Current value: "W0".."W15", a flag of `state.FLAGS`, "A0"/"A1" (accumulators), "cycle", "stall", "pc"."""
+        self._used.setdefault(name)
+        if name not in self._known:
+            self._known[name] = self._loaded(self._emitter, name)
+        return self._known[name]
+
+    @staticmethod
+    def _loaded(emitter: Emitter, name: str) -> Value:
+        bit = name in BITS and name not in PLACES
+        found = emitter.let(f"load {'i1' if bit else 'i64'}, ptr %x.{name}", bit)
+        return told(name, found) if name in PLACES else found
+
+    def set(self, name: str, value: Number) -> None:
+        """Assign."""
+        self._used.setdefault(name)
+        self._written.add(name)
+        if name in PLACES:
+            self._emitter.line(f"store i64 {carried(self._emitter, name, value)}, ptr %x.{name}")
+            self._known[name] = Value(self._emitter, truth(value), True)
+            return
+        bit = name in BITS
+        text = truth(value) if bit else wide(value)
+        self._emitter.line(f"store {'i1' if bit else 'i64'} {text}, ptr %x.{name}")
+        self._known[name] = Value(self._emitter, text, bit)
+
+    def leave(self, pc: Number, reason: int) -> None:
+        """Set where and why the function is left, and leave; ends the block."""
+        self._emitter.line(f"store i64 {wide(pc)}, ptr %x.pc")
+        self._emitter.line(f"store i64 {reason}, ptr %x.reason")
+        self._emitter.end("br label %exit")
+
+    def set_flags(self, flags: Mapping[str, Number]) -> None:
+        """Assign several flags."""
+        for name, value in flags.items():
+            self.set(name, value)
+        if any(name in ACCUMULATOR_FLAGS for name in flags):
+            self.set("OAB", self.get("OA") | self.get("OB"))
+            self.set("SAB", self.get("SA") | self.get("SB"))
+
+    def prologue(self, emitter: Emitter) -> None:
+        """Declare and load everything used; goes into the function's first block, written last."""
+        for name in self._used:
+            emitter.line(f"%x.{name} = alloca {'i1' if name in BITS and name not in PLACES else 'i64'}")
+        sr = emitter.load(pointer(emitter, self._offset["SR"]), 16) if any(n in BITS for n in self._used) else None
+        for name in self._used:
+            if name in BITS:
+                assert sr is not None
+                bit = sr & (1 << BITS[name])
+                if name in PLACES:
+                    emitter.line(f"store i64 {carried(emitter, name, bit)}, ptr %x.{name}")
+                else:
+                    emitter.line(f"store i1 {truth(bit)}, ptr %x.{name}")
+            elif name[0] == "A":
+                value = accumulator(emitter, self._offset["ACCBL" if name == "A1" else "ACCAL"])
+                emitter.line(f"store i64 {value.text}, ptr %x.{name}")
+            else:
+                offset, bits = self._home(name)
+                emitter.line(f"store i64 {emitter.load(pointer(emitter, offset), bits).text}, ptr %x.{name}")
+
+    def write_back(self, emitter: Emitter) -> None:
+        """Store everything written to the record; goes into the function's one exit block."""
+        flags = [name for name in BITS if name in self._written]
+        if flags:
+            self._write_sr(emitter, flags)
+        for name in sorted(self._written - set(flags)):
+            value = emitter.let(f"load i64, ptr %x.{name}")
+            if name[0] == "A":
+                base = self._offset["ACCBL" if name == "A1" else "ACCAL"]
+                emitter.store(pointer(emitter, base), value, 32)
+                emitter.store(pointer(emitter, base + 4), (value >> 32) & 0xFF, 16)
+            else:
+                offset, bits = self._home(name)
+                emitter.store(pointer(emitter, offset), value, bits)
+
+    def _write_sr(self, emitter: Emitter, flags: list[str]) -> None:
+        place = pointer(emitter, self._offset["SR"])
+        mask = sum(1 << BITS[name] for name in flags)
+        word: Number = emitter.load(place, 16) & (0xFFFF & ~mask)
+        for name in flags:
+            word = word | (self._loaded(emitter, name) << BITS[name])
+        emitter.store(place, word, 16)
+
+    def _home(self, name: str) -> tuple[int, int]:
+        if name[0] == "W":
+            return 2 * int(name[1:]), 16
+        return {
+            "cycle": (self._offset["cpu.cycle"], 64),
+            "stall": (self._offset["cpu.stall"], 16),
+            "pc": (self._offset["cpu.pc"], 32),
+        }[name]
+
+
+class MemoryVariables(Variables):
+    """The same, but kept in the record all the time: for code that may leave after every instruction."""
+
+    def get(self, name: str) -> Value:
+        """Load."""
+        emitter = self._emitter
+        if name in FLAGS:
+            word = emitter.load(pointer(emitter, self._offset["SR"]), 16)
+            return Value(emitter, truth(word & (1 << FLAGS[name])), True)
+        if name[0] == "A":
+            return accumulator(emitter, self._offset["ACCBL" if name == "A1" else "ACCAL"])
+        offset, bits = self._home(name)
+        return emitter.load(pointer(emitter, offset), bits)
+
+    def set(self, name: str, value: Number) -> None:
+        """Store."""
+        emitter = self._emitter
+        if name in FLAGS:
+            self.set_flags({name: value})
+        elif name[0] == "A":
+            base = self._offset["ACCBL" if name == "A1" else "ACCAL"]
+            emitter.store(pointer(emitter, base), value, 32)
+            emitter.store(pointer(emitter, base + 4), (value >> 32) & 0xFF, 16)
+        else:
+            offset, bits = self._home(name)
+            emitter.store(pointer(emitter, offset), value, bits)
+
+    def set_flags(self, flags: Mapping[str, Number]) -> None:
+        """Change several SR bits by one read and one write."""
+        emitter = self._emitter
+        place = pointer(emitter, self._offset["SR"])
+        word: Number = emitter.load(place, 16) & (0xFFFF & ~sum(1 << FLAGS[name] for name in flags))
+        for name, value in flags.items():
+            word = word | (Value(emitter, truth(value), True) << FLAGS[name])
+        if any(name in ACCUMULATOR_FLAGS for name in flags):
+            word = _with_sums(emitter, word & (0xFFFF & ~(OAB | SAB)))
+        emitter.store(place, word, 16)
+
+    def leave(self, pc: Number, reason: int) -> None:
+        """Set PC, return why; ends the block."""
+        self.set("pc", pc)
+        self._emitter.end(f"ret i64 {reason}")
+
+    def write_back(self, emitter: Emitter) -> None:
+        """Nothing is kept back."""
+
+
+def _with_sums(emitter: Emitter, word: Number) -> Number:
+    """SR with OAB = OA | OB and SAB = SA | SB."""
+    overflow = Value(emitter, truth(word & (1 << FLAGS["OA"] | 1 << FLAGS["OB"])), True)
+    sticky = Value(emitter, truth(word & (1 << FLAGS["SA"] | 1 << FLAGS["SB"])), True)
+    return word | (overflow << OAB.bit_length() - 1) | (sticky << SAB.bit_length() - 1)
+
+
+def pointer(emitter: Emitter, offset: Number) -> str:
+    """Pointer to a byte offset in the record."""
+    name = emitter.name()
+    emitter.line(f"{name} = getelementptr i8, ptr %rec, i64 {wide(offset)}")
+    return name
+
+
+def accumulator(emitter: Emitter, offset: int) -> Value:
+    """The 40 bits of an accumulator at its data addresses, sign-extended."""
+    low = emitter.load(pointer(emitter, offset), 32)
+    high = emitter.load(pointer(emitter, offset + 4), 8)
+    return ((low | (high << 32)) ^ (1 << 39)) - (1 << 39)

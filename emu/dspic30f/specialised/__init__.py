@@ -1,0 +1,1 @@
+"""The specialised interpreter: Python source generated per stretch of program."""

@@ -1,0 +1,72 @@
+"""What every command of `python -m emu` is made with: its parser, its units, its way to refuse."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import re
+import sys
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Final, NoReturn
+
+from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS
+
+TEN_YEARS: Final = 10 * 366 * 24 * 3600
+"""Longest simulated time a command accepts, in seconds."""
+
+
+class CommandError(Exception):
+    """A mistake of the caller, told in one line."""
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse that keeps descriptions as written and ends with status 126 when `--exit-code` is wanted."""
+
+    def __init__(self, command: str, description: str, example: str) -> None:
+        super().__init__(
+            prog=f"emu {command}",
+            description=description,
+            epilog=f"example: {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        self.arguments: Sequence[str] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Print what is wrong in one line and leave."""
+        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        sys.exit(BAD_INPUT_AS_STATUS if "--exit-code" in self.arguments else BAD_INPUT)
+
+
+def seconds(text: str) -> Fraction:
+    """A time above 0 s and up to ten years, like `5`, `0.25` or `1/3`, exactly. Raises argparse's error otherwise."""
+    if re.fullmatch(r"\d{1,12}(\.\d{0,12})?|\.\d{1,12}|\d{1,12}/\d{1,12}", text):
+        with contextlib.suppress(ZeroDivisionError):
+            value = Fraction(text)
+            if 0 < value <= TEN_YEARS:
+                return value
+    raise argparse.ArgumentTypeError(f"expected seconds above 0, like 5 or 0.25, not {text!r}")
+
+
+def count(text: str) -> int:
+    """A number of things, 0 or more. Raises argparse's error otherwise."""
+    if re.fullmatch(r"\d{1,9}", text, re.ASCII):
+        return int(text)
+    raise argparse.ArgumentTypeError(f"expected a number, 0 or more, not {text!r}")
+
+
+def port(text: str) -> int:
+    """A TCP port of this machine. Raises argparse's error for anything else."""
+    if re.fullmatch(r"\d{1,5}", text, re.ASCII) and int(text) < 1 << 16:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"expected a port from 0 to 65535, not {text!r}")
+
+
+def cycles(text: str) -> int:
+    """A number of instruction cycles above 0, decimal or 0x. Raises argparse's error otherwise."""
+    if re.fullmatch(r"\d{1,18}|0x[0-9a-fA-F]{1,15}", text):
+        value = int(text, 16 if text.startswith("0x") else 10)
+        if value:
+            return value
+    raise argparse.ArgumentTypeError(f"expected a number of cycles above 0, not {text!r}")

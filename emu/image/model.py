@@ -1,0 +1,161 @@
+"""A firmware image in memory: program words by address, sections, symbols and lines, whatever file it came from.
+
+What enters: blocks and sections found by a reader (`emu.image.elf`, `emu.image.hex`).
+What leaves: words for the machine's
+program memory, names and source lines for people. Nothing here knows how a machine works.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
+
+from emu.chips.chip import Chip, Region
+
+if TYPE_CHECKING:
+    from emu.image.lines import Lines
+    from emu.image.symbols import Symbol, Symbols
+
+BYTES_PER_WORD: Final = 3
+"""Flash bytes of one program word, as data sheets count them."""
+
+ERASED: Final = 0xFFFFFF
+"""What a program word that no file defines reads (abi-elf.md §6.8 step 6)."""
+
+LOADABLE: Final = ("flash", "eedata", "unitid", "config")
+"""Regions of program space an image may define (abi-elf.md §6.8 step 4)."""
+
+
+class LoadError(ValueError):
+    """The file cannot be used. The text says what was found, where, and what was expected; the path comes first."""
+
+    def __init__(self, path: str, message: str) -> None:
+        super().__init__(f"{path}: {message}")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Consecutive 24-bit program words from the even address `base` (PC units)."""
+
+    base: int
+    words: array[int]
+    origin: str
+    """Where they came from, for messages: a section or a line."""
+    is_code: bool = True
+    """False for constants and tables; the loader cannot tell in a HEX file."""
+
+    @property
+    def end(self) -> int:
+        """First address behind the block."""
+        return self.base + 2 * len(self.words)
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One section of an ELF file. Addresses and size are in address units: PC units, or bytes of data."""
+
+    name: str
+    kind: str
+    """"code", "psv", "eedata", "data", "bss" or "info"."""
+    address: int
+    size: int
+    flags: int
+    load_address: int | None
+    """Program address of the words, None for sections that are not loaded."""
+    octets: bytes
+    """Raw file content (empty for bss)."""
+
+    @property
+    def program_words(self) -> int:
+        """Program words the section occupies, 0 if it is not loaded."""
+        return 0 if self.load_address is None else -(-self.size // 2)
+
+
+@dataclass(eq=False)
+class Image:
+    """Result of `emu.image.loader.load_image`: `blocks` are sorted and disjoint, each inside one loadable region."""
+
+    path: str
+    kind: str
+    """"elf" or "hex"."""
+    chip: Chip
+    blocks: tuple[Block, ...]
+    sections: tuple[Section, ...] = ()
+    raw_symbols: tuple[Symbol, ...] = ()
+    entry: int | None = None
+    """e_entry of an ELF file (PC units). The chip itself always starts at 0."""
+    warnings: tuple[str, ...] = field(default=())
+
+    def words(self, region: Region | None = None) -> Iterator[tuple[int, int]]:
+        """(address, word) of every defined program word in address order, of one region or of all."""
+        for block in self.blocks:
+            if region is None or block.base in region:
+                yield from zip(range(block.base, block.end, 2), block.words, strict=True)
+
+    def flash(self) -> array[int]:
+        """All of flash, one element per program word, erased where the image says nothing."""
+        region = self.chip.program["flash"]
+        words = array("I", [ERASED]) * (region.size // 2)
+        for block in self.blocks:
+            if block.base in region:
+                first = (block.base - region.start) // 2
+                words[first : first + len(block.words)] = block.words
+        return words
+
+    def used(self, region: Region) -> int:
+        """Number of program words the image defines in `region`."""
+        return sum(len(block.words) for block in self.blocks if block.base in region)
+
+    def word(self, address: int) -> int | None:
+        """The program word at an even address, None where the image defines nothing."""
+        for block in self.blocks:
+            if block.base <= address < block.end:
+                return block.words[(address - block.base) // 2]
+        return None
+
+    @cached_property
+    def register_names(self) -> dict[int, str]:
+        """Names of the bytes of all special function registers by data address."""
+        names = {}
+        for sfr in self.chip.sfrs.values():
+            names[sfr.address] = sfr.name
+            if sfr.size == 2:
+                names[sfr.address + 1] = f"{sfr.name}+1"
+        return names
+
+    @cached_property
+    def symbols(self) -> Symbols:
+        """Symbols by name and by address; empty for HEX files."""
+        from emu.image.symbols import Symbols
+
+        return Symbols(self.raw_symbols)
+
+    @cached_property
+    def lines(self) -> Lines:
+        """Source lines by program address; empty when the image has no DWARF or it cannot be read."""
+        from emu.image.lines import Lines
+
+        return Lines({section.name: section.octets for section in self.sections if section.kind == "info"})
+
+
+def checked(path: str, chip: Chip, blocks: list[Block]) -> tuple[Block, ...]:
+    """Sort blocks; raise LoadError if two overlap or one leaves the chip's program memory."""
+    regions = [chip.program[name] for name in LOADABLE]
+    blocks = sorted(blocks, key=lambda block: block.base)
+    for block in blocks:
+        home = next((region for region in regions if block.base in region), None)
+        if home is None or block.end > home.end:
+            outside = block.base if home is None else home.end
+            raise LoadError(
+                path,
+                f"{block.origin} puts words at {outside:#08x}, where the {chip.name} has no program memory"
+                f" (flash ends at {chip.program['flash'].end:#x})",
+            )
+    for first, second in pairwise(blocks):
+        if second.base < first.end:
+            raise LoadError(path, f"{first.origin} and {second.origin} overlap at {second.base:#08x}")
+    return tuple(blocks)

@@ -1,0 +1,1 @@
+"""Instruments that observe a run: instruction trace, VCD waveforms, coverage, disassembly."""

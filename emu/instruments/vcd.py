@@ -1,0 +1,201 @@
+"""Waveforms of a run as a VCD file, for GTKWave and its like, written by pyvcd.
+
+What enters: a machine, a stream, names to watch. What leaves: changes of pins, bytes of UARTs and, if watched, the
+CPU's priority, sleep, the running OpenSwarm thread and variables. Pins and bytes cost little; watching makes the
+machine step. Times are those of the cycles at the clock the run begins with, rounded to 1 ps and never added up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, TextIO
+
+from emu.debug.threads import RUNNING
+from emu.peripherals.pins import PORTS, parse_pin
+
+if TYPE_CHECKING:
+    from emu.machine.machine import Machine
+    from emu.machine.stops import Stop
+
+PICOSECONDS: Final = 10**12
+LOOK_CYCLES: Final = 1_000_000
+"""Longest stretch between two looks at what has changed."""
+CPU: Final = ("ipl", "asleep", "thread")
+"""What can be watched beside variables."""
+
+
+class Waves:
+    """Records `machine` while it is run by `advance`. `watch`: names of CPU, or expressions that name a variable.
+
+    With `again` it also sees what is run again aside, which nobody else is told. Raises ValueError for what cannot be
+    watched.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        stream: TextIO,
+        watch: Sequence[str] = (),
+        advance: Callable[[int], Stop | None] | None = None,
+        again: bool = False,
+    ) -> None:
+        from vcd import VCDWriter
+
+        self._machine: Final = machine
+        self._advance: Final = advance or machine.advance
+        self._hz: Final = machine.hz
+        self._writer: Final[Any] = VCDWriter(
+            stream, timescale="1 ps", date="", version="emu", init_timestamp=self._time(machine.cycle)
+        )
+        pins = machine.pins
+        self._edges: list[tuple[int, int, int]] = []
+        self._frames: list[tuple[int, int, int, int, int, int]] = []
+        self._pending: list[tuple[int, Any, Any]] = []
+        """Changes by cycle that are still to be written: a frame is known before its last bit."""
+        self._transmit: Final = [0] * len(PORTS)
+        for uart in machine.uart.values():
+            port, mask = parse_pin(uart.site.tx_pin)
+            self._transmit[port] |= mask
+        self._levels: Final = pins.level.tolist()
+        self._pins: Final = self._register_pins()
+        self._bytes: Final[dict[int, list[Any]]] = {}
+        self._removals: Final[list[Callable[[], None]]] = []
+        for number, uart in machine.uart.items():
+            scope = f"uart{number}"
+            data = self._writer.register_var(scope, "tx", "reg", size=8, init=0)
+            count = self._writer.register_var(scope, "tx_count", "integer", size=32, init=0)
+            self._bytes[number] = [data, count, 0]
+            self._removals.append(uart.listen(partial(self._sent, number), part=again))
+        self._watched: Final = [self._watch(name) for name in watch]
+        self._seen: Final = [get() for _, get in self._watched]
+        for (variable, _), value in zip(self._watched, self._seen, strict=True):
+            self._writer.change(variable, self._time(machine.cycle), value)
+        pins.edges, pins.frames = self._edges, self._frames
+
+    def _time(self, cycle: int) -> int:
+        return round(Fraction(cycle * PICOSECONDS) / self._hz)
+
+    def _register_pins(self) -> dict[tuple[int, int], Any]:
+        machine, found = self._machine, {}
+        names = _board_names(machine)
+        for port, letter in enumerate(PORTS):
+            sfr = machine.chip.sfrs.get(f"LAT{letter}")
+            for bit in range(16):
+                if sfr is not None and sfr.mask >> bit & 1:
+                    name = f"R{letter}{bit}"
+                    level = 1 if self._transmit[port] >> bit & 1 else self._levels[port] >> bit & 1
+                    full = f"{name}_{names[name]}" if name in names else name
+                    found[port, bit] = self._writer.register_var("pins", full, "wire", size=1, init=level)
+        return found
+
+    def _watch(self, name: str) -> tuple[Any, Callable[[], Any]]:
+        """The variable in the file, and how to get its value."""
+        machine, state = self._machine, self._machine.state
+        if name == "ipl":
+            return self._writer.register_var("cpu", name, "reg", size=4, init=0), lambda: state.ipl
+        if name == "asleep":
+            return self._writer.register_var("cpu", name, "wire", size=1, init=0), lambda: int(machine.is_asleep)
+        if name == "thread":
+            return self._writer.register_var("cpu", name, "integer", size=16, init=0), self._thread()
+        value = machine.value(name)
+        address, size = value.address, value.type.bytes
+        if address is None or not value.type.is_number or value.bits is not None:
+            raise ValueError(f"{name!r} is no variable in memory that holds one number")
+        variable = self._writer.register_var("variables", name.replace(" ", ""), "reg", size=8 * size, init=0)
+        return variable, lambda: machine.peek(address, size)
+
+    def _thread(self) -> Callable[[], int]:
+        """The PID of the running thread."""
+        inside = self._machine.inside
+        running = inside.variable(RUNNING)
+        pcb = running.type.target if running is not None else None
+        pid = pcb.member("pid") if pcb is not None else None
+        if running is None or pid is None:
+            raise ValueError("'thread' can be watched in an OpenSwarm firmware only")
+        place = inside.value(running).address or 0
+
+        def number() -> int:
+            block = self._machine.peek(place)
+            return self._machine.peek(block + pid.offset) if block else 0
+
+        return number
+
+    def _sent(self, number: int, byte: int, _start: int) -> None:
+        data, count, sent = self._bytes[number]
+        now = self._machine.events.now
+        self._bytes[number][2] = sent + 1
+        self._pending += [(now, data, byte & 0xFF), (now, count, sent + 1)]
+
+    # Running
+
+    def advance(self, cycle: int) -> Stop | None:
+        """As `Machine.advance`, and what changes is written."""
+        machine, stop = self._machine, None
+        while stop is None and machine.cycle < cycle:
+            stop = self._step(cycle) if self._watched else self._advance(min(cycle, machine.cycle + LOOK_CYCLES))
+            if not self._watched or len(self._edges) + len(self._pending) > 1000 or machine.cycle >= cycle or stop:
+                machine.pins.flush()
+                self._write(machine.cycle)
+        return stop
+
+    def _step(self, limit: int) -> Stop | None:
+        """What is due before the next instruction, then that, with a look after each."""
+        stop = self._machine.approach(limit)
+        self._look()
+        if stop is None and self._machine.cycle < limit:
+            stop = self._machine.step()
+            self._look()
+        return stop
+
+    def _look(self) -> None:
+        now = self._machine.cycle
+        for index, (variable, get) in enumerate(self._watched):
+            value = get()
+            if value != self._seen[index]:
+                self._seen[index] = value
+                self._pending.append((now, variable, value))
+
+    def _write(self, until: int) -> None:
+        """Write everything up to cycle `until` in order."""
+        for cycle, port, levels in self._edges:
+            changed = (levels ^ self._levels[port]) & ~self._transmit[port]
+            self._levels[port] = levels
+            for bit in range(16):
+                if changed >> bit & 1 and (port, bit) in self._pins:
+                    self._pending.append((cycle, self._pins[port, bit], levels >> bit & 1))
+        for start, port, mask, bits, length, width in self._frames:
+            variable = self._pins.get((port, mask.bit_length() - 1))
+            for index in range(length if variable is not None else 0):
+                self._pending.append((start + index * width, variable, bits >> index & 1))
+        self._edges.clear()
+        self._frames.clear()
+        self._pending.sort(key=lambda change: change[0])
+        ready = 0
+        for cycle, variable, value in self._pending:
+            if cycle > until:
+                break
+            self._writer.change(variable, self._time(cycle), value)
+            ready += 1
+        del self._pending[:ready]
+
+    def close(self) -> None:
+        """Write what is left and end the file."""
+        machine = self._machine
+        machine.pins.flush()
+        self._write(machine.cycle)
+        machine.pins.edges = machine.pins.frames = None
+        for remove in self._removals:
+            remove()
+        self._writer.close(self._time(machine.cycle))
+
+
+def _board_names(machine: Machine) -> dict[str, str]:
+    """What the robot has on its pins."""
+    if machine.board is None:
+        return {}
+    from emu.boards.epuck.simple import LED_PINS
+
+    coils = {f"RD{bit}": f"{side}_coil{bit % 4}" for bit in range(8) for side in [("left", "right")[bit // 4]]}
+    return {pin: name for name, pin in LED_PINS.items()} | coils

@@ -1,0 +1,136 @@
+"""Exact numbers kept in the repository: written by --update, compared by --check. Any increase is a regression.
+
+What enters: numbers by name, each with the places they were spent on. What leaves: `Row`s of a table, and a JSON file
+that names places by file and text of the line, so that lines may move without being taken for changes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from emu.host.files import read_file, whole_text_file
+
+GREW_SHOWN: Final = 4
+"""Places shown for a number that grew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A measured value and what it consists of."""
+
+    value: int
+    where: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of a comparison; `old` is None for what the baseline does not know, `new` for what is gone."""
+
+    name: str
+    old: int | None
+    new: int | None
+    grew: tuple[tuple[str, int], ...] = ()
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether this fails a check: a number grew, or is no longer measured."""
+        return self.new is None or (self.old is not None and self.new > self.old)
+
+
+class Sources:
+    """Names places for the baseline: file below `firmware/`, and the text of the line where the file can be read."""
+
+    def __init__(self, image_path: str) -> None:
+        self._roots: Final = [Path(), Path("firmware"), *Path(image_path).resolve().parents[:4]]
+        self._files: Final[dict[str, list[str]]] = {}
+
+    def name(self, place: str) -> str:
+        """`kernel/event.c: return m;` for `/somewhere/firmware/openswarm/kernel/event.c:93`."""
+        file, _, line = place.rpartition(":")
+        if not file or not line.isdecimal():
+            return place
+        lines = self._lines(file)
+        number = int(line)
+        text = " ".join(lines[number - 1].split()) if 0 < number <= len(lines) else f"line {number}"
+        return f"{short(file)}: {text}"
+
+    def names(self, where: Mapping[str, int]) -> dict[str, int]:
+        """The same cycles by lasting names."""
+        named: Counter[str] = Counter()
+        for place, count in where.items():
+            named[self.name(place)] += count
+        return dict(sorted(named.items()))
+
+    def _lines(self, file: str) -> list[str]:
+        if file not in self._files:
+            self._files[file] = []
+            for root in self._roots:
+                try:
+                    text = (root / file).read_text(encoding="utf-8", errors="replace")
+                except OSError:
+                    continue
+                self._files[file] = text.splitlines()
+                break
+        return self._files[file]
+
+
+def short(file: str) -> str:
+    """A path without the folders that differ from checkout to checkout."""
+    for folder in ("/openswarm/", "/apps/", "/runtime/"):
+        _, found, rest = f"/{file}".rpartition(folder)
+        if found:
+            return rest if folder == "/openswarm/" else folder[1:] + rest
+    return Path(file).name
+
+
+def save(path: str, numbers: Mapping[str, Number]) -> None:
+    """Write a baseline, whole or not at all."""
+    table = {name: {"value": number.value, "where": number.where} for name, number in numbers.items()}
+    with whole_text_file(path) as stream:
+        json.dump(table, stream, indent=1)
+        stream.write("\n")
+
+
+def load(path: str) -> dict[str, Number]:
+    """Read a baseline. Raises ValueError if it is not one, OSError if it cannot be read."""
+    try:
+        table: dict[str, Any] = json.loads(read_file(path))
+        return {
+            name: Number(int(row["value"]), {str(k): int(v) for k, v in row["where"].items()})
+            for name, row in table.items()
+        }
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        raise ValueError(f"{path}: is not a baseline written by --update") from None
+
+
+def compare(old: Mapping[str, Number], new: Mapping[str, Number]) -> list[Row]:
+    """One row per name of either, in the order of the new ones."""
+    rows = []
+    for name, number in new.items():
+        before = old.get(name)
+        grew: tuple[tuple[str, int], ...] = ()
+        if before is not None and number.value > before.value:
+            more = {place: count - before.where.get(place, 0) for place, count in number.where.items()}
+            ranked = sorted(more.items(), key=lambda item: (-item[1], item[0]))
+            grew = tuple((place, count) for place, count in ranked[:GREW_SHOWN] if count > 0)
+        rows.append(Row(name, before.value if before else None, number.value, grew))
+    return rows + [Row(name, number.value, None) for name, number in old.items() if name not in new]
+
+
+def table(rows: list[Row], unit: str) -> str:
+    """The comparison for people."""
+    lines = [f"{'':58} {'baseline':>9} {'now':>9}"]
+    for row in rows:
+        old = "-" if row.old is None else f"{row.old:,}"
+        new = "gone" if row.new is None else f"{row.new:,}"
+        change = ""
+        if row.old is not None and row.new is not None and row.old != row.new:
+            change = f"  {row.new - row.old:+,} {unit}"
+        lines.append(f"{row.name:58} {old:>9} {new:>9}{change}{'  WORSE' if row.is_worse else ''}")
+        lines += [f"    {count:+6} {place}" for place, count in row.grew]
+    return "\n".join(lines)

@@ -1,0 +1,235 @@
+"""The memory equation, measured: RAM = A + B n + C m + D s + sum over pending messages of (E + d).
+
+The `footprint` application makes a load of n threads, m events, s subscriptions and messages of d bytes; what it takes
+is seen from outside, as the heap's capacity less its reserve and its tree of holes (kernel/memory.c).
+The allocator's own count must say the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+from emu.image.footprint import pieces
+from emu.image.model import Image
+from emu.kernel_metrics.shares import DEVICES, KERNEL, shares
+from emu.kernel_metrics.target import WORD, MeasureError, Target
+
+APPLICATION: Final = "footprint_wanted"
+"""Symbol by which the application is told."""
+
+PAPER: Final = {"A": 1142, "B": 146, "C": 6}
+"""Eq. (1) of the paper (Trenkwalder et al., IROS 2016); it has no term for subscriptions."""
+ORIGINAL: Final = {"B": 228, "C": 12, "D": 24, "E": 26}
+"""What the original's allocator really takes: 28 bytes per pending message of 2 (openswarm-original.md §4.6)."""
+
+PAPER_ROM: Final = 12 * 1024
+"""With motors, UART and remote control (openswarm-original.md §1)."""
+ORIGINAL_ROM: Final = {"kernel": 9072, "devices": 12288}
+"""Decoded from the authors' own image (openswarm-original.md §1)."""
+
+_APPLICATION: Final = ("_footprint_wanted", "_footprint_now", "_pids", "_any")
+"""Variables of the application itself, which are no cost of the kernel."""
+OF_DEVICES: Final = ("device", "UART")
+"""Words by which parts of A are told that the kernel alone would not have."""
+KERNEL_EVENTS: Final = (0x01, 0x07)
+"""Events Sys_Init_Kernel registers for itself: termination and 1 ms (openswarm.h)."""
+EVENT: Final = 6
+"""Bytes of a registered event (kernel.h)."""
+_PIECES: Final = (("low", "high"), ("run", "run_end"))
+"""Variables that hold the ends of free pieces that are no holes: the reserve, and what is given back in this moment."""
+_SIZE: Final = 4
+"""Offset of the size in a hole (kernel/memory.c)."""
+_RESULT_WORDS: Final = 6
+_LONGEST_LIST: Final = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What the application is asked to build."""
+
+    threads: int = 0
+    events: int = 0
+    subscriptions: int = 0
+    messages: int = 0
+    payload: int = 0
+
+    @property
+    def payload_bytes(self) -> int:
+        """Payload of all messages as stored: memory is handed out in words."""
+        return self.messages * (self.payload + self.payload % WORD)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A load and the bytes it took, as seen from outside and as the allocator counts."""
+
+    load: Load
+    taken: int
+    counted: int
+    left: int
+    """Bytes still taken after everything was given back, less those of the empty kernel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """Coefficients in bytes, with the largest difference between equation and measurement."""
+
+    coefficients: dict[str, Fraction]
+    constant: dict[str, int]
+    """What A consists of, in bytes."""
+    sizes: dict[str, dict[str, int]]
+    """ROM and A of the kernel alone and of the kernel with its devices, in bytes."""
+    heap: int
+    """Capacity of the heap, which is no part of A."""
+    residual: Fraction
+    cases: list[Case]
+
+
+class Heap:
+    """The kernel's heap read from memory."""
+
+    def __init__(self, target: Target) -> None:
+        self._target: Final = target
+        self.capacity: Final = self.free() + target.words("os_statistics", 1)[0]
+        """Bytes of the whole heap: what is free plus what the kernel had taken for itself when first looked at."""
+
+    def free(self) -> int:
+        """Bytes of the reserve and of all holes."""
+        target = self._target
+        free = sum(target.word(target.address(end)) - target.word(target.address(begin)) for begin, end in _PIECES)
+        return free + sum(target.word(hole + _SIZE) for hole in self._holes())
+
+    def _holes(self) -> Iterator[int]:
+        """Addresses of the holes. Raises MeasureError if a side leads to a larger hole, or for ever."""
+        found = [self._target.word(self._target.address("holes"))]
+        no_hole = self._target.address("no_hole")
+        seen = 0
+        while found:
+            hole = found.pop()
+            if hole == no_hole:
+                continue
+            seen += 1
+            sides = [self._target.word(hole + WORD * side) for side in range(2)]
+            size = self._target.word(hole + _SIZE)
+            if seen > _LONGEST_LIST or any(self._target.word(side + _SIZE) > size for side in sides):
+                raise MeasureError("the holes of the kernel's heap are not a heap on their sizes")
+            found += sides
+            yield hole
+
+    def taken(self) -> int:
+        """Bytes handed out."""
+        return self.capacity - self.free()
+
+    def events(self) -> Iterator[int]:
+        """Identifiers of all registered events."""
+        target = self._target
+        for bucket in range(target.address("events"), target.address("events") + target.size("events"), WORD):
+            for event in self._list(target.word(bucket), WORD):
+                yield target.word(event)
+
+    def _list(self, block: int, link: int = 0) -> Iterator[int]:
+        """Addresses along a list whose elements are linked at offset `link`."""
+        for _ in range(_LONGEST_LIST):
+            if not block:
+                return
+            yield block
+            block = self._target.word(block + link)
+        raise MeasureError("a list of the kernel does not end")
+
+
+def measure(image: Image, engine: str = "interp") -> Equation:
+    """Run all loads and fit the equation. Raises MeasureError if the application or the counts do not agree."""
+    target = Target(image, "footprint_begin", engine)
+    heap = Heap(target)
+    target.run_to("footprint_empty")
+    empty = heap.taken()
+    cases = [_case(target, heap, load, empty) for load in loads()]
+    for case in cases:
+        if case.taken != case.counted or case.left:
+            raise MeasureError(f"{case}: memory seen, counted by the allocator and given back do not agree")
+    own = EVENT * sum(1 for number in heap.events() if number in KERNEL_EVENTS)
+    return _fit(cases, _constant(target, heap, empty, own), _roms(image), heap.capacity)
+
+
+def loads() -> Iterator[Load]:
+    """n = 0..8, m = 0..16, s = 0..16, messages of several sizes, and everything together."""
+    yield from (Load(threads=n) for n in range(9))
+    yield from (Load(events=m) for m in range(1, 17))
+    yield from (Load(events=8, subscriptions=s) for s in range(1, 17))
+    for payload in (0, 1, 2, 3, 4, 8, 24, 63, 64):
+        yield from (Load(events=1, subscriptions=1, messages=count, payload=payload) for count in (1, 2, 5))
+    yield Load(8, 16, 16, 4, 24)
+    yield Load(3, 5, 7, 2, 10)
+
+
+def _case(target: Target, heap: Heap, load: Load, empty: int) -> Case:
+    target.restart()
+    request = (load.threads, load.events, load.subscriptions, load.messages, load.payload)
+    target.set_words("footprint_wanted", request)
+    target.run_to("footprint_built")
+    result = target.words("footprint_now", _RESULT_WORDS)
+    if tuple(result[:4]) != request[:4]:
+        raise MeasureError(f"asked for {request[:4]} threads, events, subscriptions, messages; got {tuple(result[:4])}")
+    taken, counted = heap.taken() - empty, result[4] - empty
+    target.run_to("footprint_undone")
+    return Case(load, taken, counted, heap.taken() - empty)
+
+
+def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int]:
+    """The parts of A: RAM that is there before the first thread, heap capacity and the application's own left out."""
+    parts = {
+        "kernel stack": target.size("os_memory") - heap.capacity,
+        "kernel events": own,
+        "device events and subscriptions": empty - own,
+    }
+    for piece in pieces(target.image):
+        if piece.name in ("_os_memory", *_APPLICATION) or "apps/" in piece.module:
+            continue
+        part = "UART state" if piece.name == "_channels" else _part_of(piece.module)
+        parts[part] = parts.get(part, 0) + piece.ram
+    return {name: size for name, size in parts.items() if size}
+
+
+def _roms(image: Image) -> dict[str, int]:
+    """ROM of the kernel alone and with its devices."""
+    owned = shares(image)
+    return {KERNEL: owned[KERNEL].rom, DEVICES: owned[KERNEL].rom + owned[DEVICES].rom}
+
+
+def _part_of(module: str) -> str:
+    """Whose variables those of a source file are."""
+    folders = {"/kernel/": "kernel variables", "/port/": "kernel variables", "/io/": "device variables",
+               "/board/": "device variables"}  # fmt: skip
+    return next((part for folder, part in folders.items() if folder in f"/{module}"), "library variables, padding")
+
+
+def _fit(cases: list[Case], parts: dict[str, int], roms: dict[str, int], capacity: int) -> Equation:
+    """Slopes from single-parameter loads; the residual is taken over all of them."""
+    by_load = {case.load: case.taken for case in cases}
+
+    def slope(many: Load, few: Load, difference: int) -> Fraction:
+        return Fraction(by_load[many] - by_load[few], difference)
+
+    b = slope(Load(threads=8), Load(), 8)
+    c = slope(Load(events=16), Load(), 16)
+    d = slope(Load(events=8, subscriptions=16), Load(events=8, subscriptions=1), 15)
+    e = slope(Load(0, 1, 1, 5, 2), Load(0, 1, 1, 1, 2), 4) - 2
+    constant = Fraction(by_load[Load()])
+    residual = max(
+        abs(
+            case.taken
+            - (constant + b * case.load.threads + c * case.load.events + d * case.load.subscriptions)
+            - (e * case.load.messages + case.load.payload_bytes)
+        )
+        for case in cases
+    )
+    coefficients = {"A": sum(parts.values()) + constant, "B": b, "C": c, "D": d, "E": e}
+    alone = sum(size for name, size in parts.items() if not any(word in name for word in OF_DEVICES)) + int(constant)
+    sizes = {
+        KERNEL: {"rom": roms[KERNEL], "A": alone},
+        DEVICES: {"rom": roms[DEVICES], "A": int(coefficients["A"])},
+    }
+    return Equation(coefficients, parts, sizes, capacity, residual, cases)

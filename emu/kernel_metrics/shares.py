@@ -1,0 +1,79 @@
+"""Whose memory it is: kernel, devices or application, by the folder of the source file it comes from.
+
+What enters: an image built with -g. What leaves: bytes of ROM and RAM by owner. Start-up code and vectors have none:
+they are there without a kernel too. Code of headers belongs to whoever it was inlined into; a slot of `.handle`
+(function pointers, abi-elf.md §1.5) to whoever's function it leads to; library code and strings to the kernel.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Final
+
+from emu.image.footprint import START_UP, START_UP_SECTIONS, UNKNOWN, Piece, pieces
+from emu.image.model import BYTES_PER_WORD, Image
+from emu.instruments.disassembly import items
+
+KERNEL: Final = "kernel"
+DEVICES: Final = "devices"
+APPLICATION: Final = "application"
+
+_FOLDERS: Final = {
+    "/kernel/": KERNEL, "/port/": KERNEL, "/hal/": KERNEL, "/include/": KERNEL, "/runtime/": KERNEL,
+    "/io/": DEVICES, "/board/": DEVICES,
+}  # fmt: skip
+_WITHOUT_OWNER: Final = START_UP | START_UP_SECTIONS | {".ivt", ".aivt"}
+_HANDLES: Final = ".handle"
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Bytes of one owner."""
+
+    rom: int
+    ram: int
+
+
+def shares(image: Image) -> dict[str, Share]:
+    """Bytes by owner; those of variables include the array that heap and kernel stack are cut from."""
+    found = [piece for piece in pieces(image) if piece.name not in _WITHOUT_OWNER]
+    homes = _homes(found)
+    rom: Counter[str] = Counter()
+    ram: Counter[str] = Counter()
+    for piece in found:
+        if piece.name != _HANDLES:
+            owner = _owner(piece.module) if not piece.module.endswith(".h") else homes.get(piece.name, KERNEL)
+            rom[owner] += piece.rom
+            ram[owner] += piece.ram
+    for file, size in handles(image):
+        rom[_owner(file)] += size
+    return {owner: Share(rom[owner], ram[owner]) for owner in (KERNEL, DEVICES, APPLICATION)}
+
+
+def _owner(module: str) -> str:
+    if module == UNKNOWN:
+        return KERNEL
+    return next((owner for folder, owner in _FOLDERS.items() if folder in f"/{module}"), APPLICATION)
+
+
+def _homes(found: list[Piece]) -> dict[str, str]:
+    """By symbol: whose source files most of its code comes from, headers apart."""
+    sizes: dict[str, Counter[str]] = {}
+    for piece in found:
+        if piece.module != UNKNOWN and not piece.module.endswith(".h"):
+            sizes.setdefault(piece.name, Counter())[_owner(piece.module)] += piece.rom
+    return {name: count.most_common(1)[0][0] for name, count in sizes.items()}
+
+
+def handles(image: Image) -> list[tuple[str, int]]:
+    """(source file of its target, bytes) of every slot of `.handle`."""
+    symbol = image.symbols.find(_HANDLES)
+    section = next((s for s in image.sections if s.name == _HANDLES), None)
+    start, size = (section.address, section.size) if section else (symbol.address, symbol.size) if symbol else (0, 0)
+    slots = []
+    for item in items(image, start, start + size):
+        target = image.symbols.find(item.text.split()[-1].partition("+")[0])
+        line = image.lines.find(target.address) if target else None
+        slots.append((line.file if line else UNKNOWN, BYTES_PER_WORD * len(item.words)))
+    return slots

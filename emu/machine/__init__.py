@@ -1,0 +1,1 @@
+"""One microcontroller: record, bus, CPU and devices wired together, its main loop, and fault reports."""

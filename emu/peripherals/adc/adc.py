@@ -1,0 +1,406 @@
+"""12-bit ADC (§13): sampling, conversion in TAD, scan, alternating inputs, SMPI, buffer halves, triggers.
+
+Times are kept in half Tcy, because TAD is (ADCS + 1) half Tcy. Conversions between two interrupts are not events: they
+are caught up when a register is read, an input is about to change, or the interrupt falls due. Analog levels are
+ratiometric: 0..65535 of AVDD, so a level of `code << 4` converts to `code`.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Final
+
+from emu.chips.chip import AdcSite
+from emu.peripherals.adc.rules import (
+    CHANNELS,
+    CONVERTING,
+    OFF,
+    SAMPLING,
+    WAITING,
+    AdcPlaces,
+    Standing,
+    fire_round,
+    read_standing,
+    write_con1,
+    write_scan,
+)
+from emu.peripherals.adc.schedule import FOREVER, Course, Inputs, Published
+from emu.peripherals.base import SLEEP, Kit, Peripheral
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.pins import parse_pin
+from emu.peripherals.timers.timers import Timer
+from emu.system.device import Register
+from emu.system.events import NEVER
+from emu.system.rules import Rule, place_of, slot_of
+
+FULL_SCALE: Final = 0x10000
+"""AVDD in units of analog level."""
+_COURSES: Final = 64
+"""Register settings remembered; firmware has a handful."""
+_RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
+
+_MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
+"""SSRC: what ends sampling (§13)."""
+
+
+class Adc(Peripheral):
+    """One sample-and-hold behind two input multiplexers."""
+
+    def __init__(self, site: AdcSite, kit: Kit, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
+        super().__init__("adc", kit)
+        self.site: Final = site
+        self._line: Final = interrupts.line(site.irq)
+        self._timers: Final = timers
+        self.con1, self.con2, self.con3 = (self.register(f"ADCON{number}") for number in (1, 2, 3))
+        self.chs: Final = self.register("ADCHS")
+        self.pcfg: Final = self.register("ADPCFG")
+        self.cssl: Final = self.register("ADCSSL")
+        self.idle_bit = (self.con1, "ADSIDL")
+        self._buffers: Final = [self.register(f"ADCBUF{index:X}") for index in range(16)]
+        for register in (*self._buffers, self.con1, self.con2):
+            register.computed(partial(self._read, register))
+        word = self.con1.address >> 1
+        self._clear_only: Final = self.bus.clear_only[word]
+        self.bus.writable[word] |= self._clear_only  # whether DONE is set is known once time is caught up
+        self.bus.clear_only[word] = 0
+        self.con1.written_by(self._con1_written)
+        for register in (self.con2, self.con3, self.chs, self.cssl):
+            register.written_by(partial(self._setting_written, register))
+        self.pcfg.written_by(lambda _old, _new, _lanes: self._route(self.now + 1))
+        self._port: Final = parse_pin(site.pins[0])[0]
+        self.source: Final = Inputs(self, CHANNELS)
+        """By channel a function of the cycle that replaces its level; call `catch_up` before it changes its course."""
+        self.input: Final = self.source.level
+        """Analog level of each channel; change it through `set_input`."""
+        self._published: Final = Published(self, CHANNELS)
+        self._vref_high: Final = self.cell("vref_high", "I", FULL_SCALE)
+        self._vref_low: Final = self.cell("vref_low", "I", 0)
+        self._state: Final = self.cell("state", "B")
+        self._mark: Final = self.moment("mark")
+        """Cycle the present state began at or before (plus `half` half Tcy)."""
+        self._half: Final = self.cell("half", "B")
+        self._held: Final = self.cell("held", "H")
+        self._scan: Final = self.cell("scan", "B")
+        self._use_b: Final = self.cell("use_b", "B")
+        self._next: Final = self.cell("next", "B")
+        self._count: Final = self.cell("count", "B")
+        self._stands: Final = self.moment("stands_until", FOREVER)
+        """First cycle in which ADCBUFx, ADCON1 and ADCON2 may differ from what is stored."""
+        self._step: Final = self.slot("step", self._due)
+        self._settings: Final = tuple(
+            (register.address >> 1, ~sum(1 << kit.chip.sfrs[register.name].fields[bit][0] for bit in owned) & 0xFFFF)
+            for register, owned in (
+                (self.con1, ("SAMP", "DONE")), (self.con2, ("BUFS",)), (self.con3, ()), (self.chs, ()), (self.cssl, ()))
+        )  # fmt: skip
+        """Record words and bits the course depends on."""
+        self._courses: Final[dict[tuple[int, ...], Course]] = {}
+        for register in (*self._buffers, self.con2):
+            register.ruled(Rule(Standing(register.place, self._stands.place), read_standing))
+        places = self._places()
+        self.con1.ruled(Rule(places, read_standing, write_con1))
+        self.cssl.ruled(Rule(places, None, write_scan))
+        self.ruled(self._step, Rule(places, fires=fire_round))
+
+    def _places(self) -> AdcPlaces:
+        sfrs, record = self.kit.chip.sfrs, self.record
+        adon, samp, done = (1 << sfrs["ADCON1"].fields[name][0] for name in ("ADON", "SAMP", "DONE"))
+        cells = ("native", "frozen", "sampling", "conversion", "results", "halves", "length", "state", "mark", "half",
+                 "scan", "use_b", "next", "count", "held", "channels", "level_from")  # fmt: skip
+        return AdcPlaces(
+            register=self.con1.place,
+            until=self._stands.place,
+            con2=self.con2.place,
+            writable=sfrs["ADCON1"].writable,
+            clear_only=sfrs["ADCON1"].clear_only,
+            adon=adon,
+            samp=samp,
+            bufs=1 << sfrs["ADCON2"].fields["BUFS"][0],
+            cssl=self.cssl.place,
+            scannable=sfrs["ADCSSL"].writable,
+            cscna=1 << sfrs["ADCON2"].fields["CSCNA"][0],
+            done=done,
+            buffer=self._buffers[0].place,
+            level=place_of(record, "adc.input"),
+            step=slot_of(record, self._step),
+            asked=self.source.asked,
+            line=self._line.line,
+            **{name: place_of(record, f"adc.{name}") for name in cells},
+        )
+
+    # -- inputs ------------------------------------------------------------------------------------------------------
+
+    def set_input(self, channel: int, level: int) -> None:
+        """Apply an analog level (0..65535 of AVDD) to a channel from the next cycle on."""
+        self.catch_up(self.now)
+        self.input[channel] = level
+
+    @property
+    def samples_from(self) -> int | None:
+        """No conversion that was not carried out samples before this cycle; None: none is under way."""
+        return self._mark.value if self._state.value > WAITING and not self.is_frozen else None
+
+    def set_references(self, low: int, high: int) -> None:
+        """Levels on VREF- and VREF+ (0..65536 of AVDD), used when VCFG selects them."""
+        self.catch_up(self.now)
+        self._vref_low.value, self._vref_high.value = low, high
+
+    def _course(self) -> Course:
+        """The present course, remembered by the contents of the registers."""
+        u16 = self.record.u16
+        key = tuple([u16[word] & bits for word, bits in self._settings])
+        course = self._courses.get(key)
+        if course is None:
+            if len(self._courses) >= _COURSES:
+                self._courses.clear()
+            course = self._courses[key] = self._read_course()
+        return course if not self.con3["ADRC"] else self._read_course()  # Fcy is no register
+
+    def _read_course(self) -> Course:
+        tad = max(round(2 * _RC_TAD_SECONDS * self.kit.fcy()), 1) if self.con3["ADRC"] else self.con3["ADCS"] + 1
+        con2, chs = self.con2, self.chs
+        return Course(
+            tad=tad,
+            sampling=self.con3["SAMC"] * tad if self.con1["SSRC"] == _AUTO else NEVER,
+            again=bool(self.con1["ASAM"]),
+            scanned=tuple(number for number in range(16) if con2["CSCNA"] and self.cssl.value >> number & 1),
+            inputs=((chs["CH0SA"], chs["CH0NA"]), (chs["CH0SB"], chs["CH0NB"])),
+            alternates=bool(con2["ALTS"]),
+            results=con2["SMPI"] + 1,
+            in_halves=bool(con2["BUFM"]),
+            form=self.con1["FORM"],
+            references=con2["VCFG"],
+        )
+
+    def _references(self, vcfg: int) -> tuple[int, int]:
+        """VCFG (§13): bit 0 selects VREF+, bit 1 VREF-; 1xx are the supplies."""
+        if vcfg & 4:
+            return 0, FULL_SCALE
+        return self._vref_low.value if vcfg & 2 else 0, self._vref_high.value if vcfg & 1 else FULL_SCALE
+
+    def _sampled(self, course: Course, channel: int, negative: int, cycle: int) -> int:
+        """Code of an input, 0..4095."""
+        low, high = self._references(course.references)
+        zero = self.source.at(1, cycle) if negative else low
+        return min(max((self.source.at(channel, cycle) - zero) * 4096 // max(high - low, 1), 0), 4095)
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def _duration(self, course: Course, state: int) -> int:
+        """Half Tcy after which a state ends by itself, or NEVER."""
+        if state == CONVERTING:
+            return course.conversion
+        return course.sampling if state == SAMPLING else NEVER
+
+    def _enter(self, state: int, halves: int) -> None:
+        self._state.value = state
+        self._mark.value = halves >> 1
+        self._half.value = halves & 1
+        self.con1["SAMP"] = state == SAMPLING
+        if state == CONVERTING:
+            self.con1["DONE"] = 0
+            course = self._course()
+            channel, negative, self._scan.value, self._use_b.value = course.turn(self._scan.value, self._use_b.value)
+            self._held.value = self._sampled(course, channel, negative, halves + 1 >> 1)
+
+    def catch_up(self, cycle: int) -> None:
+        """Carry out every conversion that ends at or before `cycle`, but for the one that raises the interrupt: that is
+        its event's, which has not happened yet if it is due now. Nothing ends while the converter's clock stands."""
+        if not self.is_frozen:
+            self._convert_by(min(cycle, self.events.due(self._step) - 1))
+
+    def _convert_by(self, cycle: int) -> bool:
+        """Carry out every conversion that ends at or before `cycle`. True if one of them raised the interrupt."""
+        state = self._state.value
+        if state <= WAITING:
+            return False
+        course = self._course()
+        begun = 2 * self._mark.value + self._half.value
+        interrupted, moved = False, False
+        held, done = self._held.value, 0
+        scan, use_b = self._scan.value, self._use_b.value
+        while True:
+            duration = self._duration(course, state)
+            if duration == NEVER or begun + duration + 1 >> 1 > cycle:
+                break
+            begun += duration
+            moved = True
+            if state == SAMPLING:
+                state, done = CONVERTING, 0
+                channel, negative, scan, use_b = course.turn(scan, use_b)
+                held = self._sampled(course, channel, negative, begun + 1 >> 1)
+            else:
+                if self._store(course, held):
+                    interrupted, scan = True, 0  # the scan starts again behind every interrupt (§13)
+                state, done = (SAMPLING if course.again else WAITING), 1
+        if moved:
+            self._state.value, self._held.value = state, held
+            self._scan.value, self._use_b.value = scan, use_b
+            self._mark.value, self._half.value = begun >> 1, begun & 1
+            self.con1["SAMP"] = state == SAMPLING
+            self.con1["DONE"] = done
+            self._stands.value = FOREVER if duration == NEVER else begun + duration + 1 >> 1
+        return interrupted
+
+    def _store(self, course: Course, code: int) -> bool:
+        """A conversion is complete: buffer, pointer, halves; True at every SMPI + 1 results."""
+        value = code - 2048 if course.form & 1 else code
+        place = self._next.value
+        self._buffers[place].value = value << 4 if course.form & 2 else value
+        count = self._count.value + 1
+        if count < course.results:
+            self._count.value = count
+            self._next.value = (place + 1) % 16
+            return False
+        self._count.value = 0
+        if course.in_halves:
+            self.con2["BUFS"] = 1 - self.con2["BUFS"]
+            self._next.value = 8 * self.con2["BUFS"]
+        else:
+            self._next.value = 0
+        return True
+
+    def _plan(self) -> None:
+        """Post the next interrupt, or the end of the state if what follows depends on somebody else."""
+        course, state = self._course(), self._state.value
+        self._published.tell(course, changes_by_itself=bool(self.con3["ADRC"]))
+        duration = self._duration(course, state)
+        if duration == NEVER:
+            self.events.cancel(self._step)
+            self._stands.value = FOREVER
+            return
+        end = 2 * self._mark.value + self._half.value + duration
+        if end + 1 >> 1 <= self.now:  # a shorter setting: the state has been long enough, and ends with the next cycle
+            end = 2 * (self.now + 1)
+            self._mark.value, self._half.value = end - duration >> 1, end - duration & 1
+        self._stands.value = end + 1 >> 1
+        if state == SAMPLING:
+            end += course.conversion
+        if course.again and course.sampling != NEVER:
+            missing = max(course.results - 1 - self._count.value, 0)
+            end += missing * (course.sampling + course.conversion)
+        self.events.set(self._step, end + 1 >> 1)
+
+    def _due(self, due: int) -> None:
+        if self._convert_by(due):
+            self._line.request()
+        self._plan()
+
+    def _read(self, register: Register) -> int:
+        self._catch_up_now()
+        return register.value
+
+    def _catch_up_now(self) -> None:
+        """Bring the registers to the current cycle; an interrupt cannot fall due here before its event."""
+        if self._state.value > WAITING:
+            self.catch_up(self.now)
+
+    # -- control -----------------------------------------------------------------------------------------------------
+
+    def _con1_written(self, old: int, new: int, lanes: int) -> None:
+        left = self._settle(self.con1, old, new, lanes)
+        new = self.con1.value = self.con1.value & (left | ~self._clear_only)
+        fields = self.kit.chip.sfrs["ADCON1"].fields
+        adon, samp = (1 << fields[name][0] for name in ("ADON", "SAMP"))
+        start = 2 * (self.now + 1)
+        if not new & adon:
+            self._switch_off()
+        elif not old & adon:
+            self._scan.value = self._use_b.value = self._next.value = self._count.value = 0
+            self.con2["BUFS"] = 0
+            self._enter(SAMPLING if new & samp or self.con1["ASAM"] else WAITING, start)
+        elif self._state.value == WAITING and (new & samp or self.con1["ASAM"]):
+            self._enter(SAMPLING, start)
+        elif self._state.value == SAMPLING and not new & samp:
+            self._sampling_ended_by_software(start)
+        elif self._state.value == CONVERTING:
+            self.con1["SAMP"] = 0  # UNVERIFIED: SAMP = 1 while converting is ignored (§13)
+        self.restored()
+        self._plan()
+
+    def _sampling_ended_by_software(self, start: int) -> None:
+        """SAMP = 0 starts the conversion if nothing else does. UNVERIFIED: otherwise it only ends sampling (§13)."""
+        if self.con1["SSRC"] == _MANUAL:
+            self._enter(CONVERTING, start)
+        elif self.con1["ASAM"]:
+            self.con1["SAMP"] = 1
+        else:
+            self._enter(WAITING, start)
+
+    def _switch_off(self) -> None:
+        """ADON = 0 aborts without a result; ADCBUF stays (§13)."""
+        self._state.value = OFF
+        self.con1["SAMP"] = 0
+        self.events.cancel(self._step)
+
+    def _setting_written(self, register: Register, old: int, new: int, lanes: int) -> None:
+        self._settle(register, old, new, lanes)
+        self._plan()
+
+    def _settle(self, register: Register, old: int, new: int, lanes: int) -> int:
+        """What happened before this write happened under the old setting. Returns what the register held in the end,
+        which is what it keeps outside `lanes`."""
+        register.value = old
+        self._catch_up_now()
+        left, hardware = register.value, self.con2["BUFS"]
+        register.value = left & ~lanes | new & lanes
+        self.con2["BUFS"] = hardware
+        return left
+
+    def int0(self, due: int) -> None:
+        """INT0 rose in cycle `due`."""
+        if self.con1["SSRC"] == _INT0:
+            self._triggered(due)
+
+    def _timer_matched(self, due: int) -> None:
+        if self.con1["SSRC"] == _TIMER3:
+            self._triggered(due)
+
+    def _wide_timer_matched(self, due: int) -> None:
+        if self._timers[2].is_wide:
+            self._timer_matched(due)
+
+    def _triggered(self, cycle: int) -> None:
+        """Sampling ends, conversion begins (SSRC = 1, 2)."""
+        if self._state.value == SAMPLING and not self.is_frozen:
+            self._enter(CONVERTING, 2 * cycle)
+            self._plan()
+
+    def clock_changes(self) -> None:
+        """Carry out what ends at the present clock; a reset has cleared ADON, and nothing ends."""
+        if self.con1["ADON"]:
+            self.catch_up(self.now)
+
+    def clock_changed(self) -> None:
+        """The internal RC oscillator has another number of Tcy to a TAD."""
+        if self.con1["ADON"] and self.con3["ADRC"] and not self.is_frozen:
+            self._plan()
+
+    def _route(self, cycle: int) -> None:
+        """ADPCFG = 0 makes a pin analog: its digital input reads 0 (§6)."""
+        self.kit.pins.analog[self._port] = ~self.pcfg.value & 0xFFFF
+        self.kit.pins.apply(self._port, cycle)
+
+    # -- power and reset ---------------------------------------------------------------------------------------------
+
+    def reset(self, power_on: bool) -> None:
+        """Off; all channels analog."""
+        self._state.value = OFF
+        self._stands.value = FOREVER
+        self._route(self.now)
+        self.restored()
+        self._plan()
+
+    def stops_in(self, mode: int) -> bool:
+        """With its own RC oscillator it runs in Sleep."""
+        return not self.con3["ADRC"] if mode == SLEEP else super().stops_in(mode)
+
+    def freeze(self, cycle: int, mode: int) -> None:
+        """What was converted before counts."""
+        self.catch_up(cycle)
+        super().freeze(cycle, mode)
+
+    def restored(self) -> None:
+        """Listen to timer 3 only while it triggers, so that its matches stay simple otherwise."""
+        wanted = self.con1["SSRC"] == _TIMER3 and bool(self.con1["ADON"])
+        self._timers[3].listen(self._timer_matched, wanted)
+        self._timers[2].listen(self._wide_timer_matched, wanted)

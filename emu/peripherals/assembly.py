@@ -1,0 +1,225 @@
+"""All peripherals of a chip, wired to each other: what the machine builds, resets, and puts to sleep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from emu.chips.chip import Chip
+from emu.peripherals.adc.adc import Adc
+from emu.peripherals.base import IDLE, SLEEP, Cell, Kit, Peripheral, Wires
+from emu.peripherals.can.can import Can
+from emu.peripherals.i2c.i2c import I2c
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.pins import PORTS, Pins
+from emu.peripherals.ports.ports import ChangeNotice, ExternalInterrupts, Port
+from emu.peripherals.spi.dci import Dci
+from emu.peripherals.spi.spi import Spi
+from emu.peripherals.system.low_voltage import LowVoltageDetect
+from emu.peripherals.system.module_disable import ModuleDisable
+from emu.peripherals.system.nvm import Nvm
+from emu.peripherals.system.oscillator import Oscillator
+from emu.peripherals.system.resets import Resets, Watchdog
+from emu.peripherals.timers.input_capture import Capture
+from emu.peripherals.timers.output_compare import Compare
+from emu.peripherals.timers.timers import timers
+from emu.peripherals.uart.uart import Uart
+from emu.system.bus import Bus
+from emu.system.program import ProgramMemory
+
+CRYSTAL_HZ: Final = 7_372_800
+"""Crystal of a bare chip, in Hz, unless somebody fits another one: UARTs make exact rates of it."""
+CONFIG: Final[Mapping[str, int]] = MappingProxyType({"FWDT": 0x7FFF})
+"""Configuration words of a bare chip for images without: watchdog off. An erased word has it on, and a program that
+sleeps would never come to an end."""
+
+_CHANGE_NOTICE_IRQ: Final = "CN"
+
+
+class Peripherals:
+    """The devices by role. Order of construction is the priority of events that fall due in the same cycle."""
+
+    def __init__(self, kit: Kit) -> None:
+        self.kit: Final = kit
+        chip = kit.chip
+        numbers = {source.name: irq for irq, source in chip.interrupts.items()}
+        self.pins: Final = kit.pins
+        self.interrupts: Final = Interrupts(kit)
+        self.oscillator: Final = Oscillator(kit)
+        self.resets: Final = Resets(kit)
+        self.watchdog: Final = Watchdog(kit, self.resets)
+        self.lvd: Final = (
+            LowVoltageDetect(kit, self.interrupts, self.resets.rcon, chip.lvd_irq) if chip.lvd_irq is not None else None
+        )
+        self.nvm: Final = Nvm(kit, self.interrupts)
+        self.ports: Final = {PORTS.index(letter): Port(letter, kit) for letter in chip.ports}
+        self.change_notice: Final = ChangeNotice(kit, numbers[_CHANGE_NOTICE_IRQ])
+        self.external: Final = ExternalInterrupts(kit, self.interrupts)
+        self.timer: Final = timers(kit)
+        self.uart: Final = {site.number: Uart(site, kit, self.interrupts, self.ports) for site in chip.uarts}
+        self.adc: Final = Adc(chip.adc, kit, self.interrupts, self.timer)
+        self.external.on_int0 = self.adc.int0
+        self.oscillator.before_change.append(self.adc.clock_changes)
+        self.oscillator.on_change.extend((self.adc.clock_changed, self.nvm.clock_changed))
+        self.spi: Final = {site.number: Spi(site, kit, self.interrupts, self.ports) for site in chip.spis}
+        self.capture: Final = {site.number: Capture(site, kit, self.interrupts, self.timer) for site in chip.captures}
+        self.compare: Final = {
+            site.number: Compare(site, kit, self.interrupts, self.timer, self.ports) for site in chip.compares
+        }
+        self.i2c: Final = I2c(chip.i2c, kit, self.interrupts, self.ports) if chip.i2c is not None else None
+        self.dci: Final = Dci(chip.dci, kit, self.interrupts, self.ports) if chip.dci is not None else None
+        self.can: Final = {site.number: Can(site, kit, self.interrupts, self.ports) for site in chip.cans}
+        for uart in self.uart.values():
+            if uart.site.autobaud_capture in self.capture:
+                uart.connect_capture(self.capture[uart.site.autobaud_capture])
+        self.pmd: Final = ModuleDisable(kit, self._modules())
+        parts: tuple[Peripheral | None, ...] = (
+            self.oscillator,
+            self.resets,
+            self.watchdog,
+            self.lvd,
+            self.nvm,
+            *self.ports.values(),
+            self.change_notice,
+            self.external,
+            *self.timer.values(),
+            *self.uart.values(),
+            self.adc,
+            *self.spi.values(),
+            *self.capture.values(),
+            *self.compare.values(),
+            self.i2c,
+            self.dci,
+            *self.can.values(),
+            self.pmd,
+        )
+        self.all: Final[tuple[Peripheral, ...]] = tuple(part for part in parts if part is not None)
+        self._stopped: Final = Cell(kit.bus.record, "power.stopped", "B")
+        self.config: Mapping[int, int] = {}
+        """Configuration words that the chip keeps when an image brings none, by program address."""
+        self.fit(crystal=kit.crystal)
+        self.on_restored: Final[list[Callable[[], None]]] = []
+        """Parts of a board that keep something derived from the record."""
+        self.on_settle: Final[list[Callable[[], None]]] = []
+        """Parts of a board that find out late, when somebody looks, what has happened."""
+
+    def _modules(self) -> dict[str, Peripheral]:
+        """Peripherals by the name their PMD bit carries."""
+        modules: dict[str, Peripheral] = {"ADC": self.adc}
+        modules |= {name: device for name, device in (("DCI", self.dci), ("I2C", self.i2c)) if device is not None}
+        modules |= {f"T{number}": timer for number, timer in self.timer.items()}
+        modules |= {f"SPI{number}": spi for number, spi in self.spi.items()}
+        modules |= {f"C{number}": can for number, can in self.can.items()}
+        modules |= {f"IC{number}": capture for number, capture in self.capture.items()}
+        modules |= {f"OC{number}": compare for number, compare in self.compare.items()}
+        modules |= {f"U{number}": uart for number, uart in self.uart.items()}
+        return modules
+
+    def fit(self, *, crystal: int, config: Mapping[str, int] = CONFIG) -> None:
+        """A board's part of the chip: the frequency at OSC1 in Hz, and configuration words by name for images without.
+
+        To be called before the first reset. Raises KeyError for a word that the chip does not have.
+        """
+        self.kit.crystal = crystal
+        self.config = {self.kit.chip.config[name].address: word for name, word in config.items()}
+
+    def reset(self, cause: str) -> None:
+        """Every peripheral register to its reset value, every device to its reset state; RCON tells the cause.
+
+        `cause` is an RCON bit name: POR, BOR, EXTR, SWR, WDTO, TRAPR or IOPUWR (§4). The CPU resets its own registers
+        (below INTCON1). Raises ValueError for another cause.
+        """
+        bus = self.kit.bus
+        first = self.kit.chip.sfrs["INTCON1"].address >> 1
+        kept = self.resets.rcon.value
+        osccon = self.oscillator.con.value
+        for word in range(first, len(bus.reset_value)):
+            bus.record.u16[word] = bus.reset_value[word]
+        self.resets.record_cause(cause, kept)
+        if cause not in ("POR", "BOR"):  # the clock selection survives (§4)
+            self.oscillator.con.value = osccon
+        self._stopped.value = 0
+        for device in self.all:
+            device.power_up(power_on=cause == "POR")
+        if cause == "BOR":
+            self.oscillator.reselect()
+
+    def sleep(self, mode: int, cycle: int) -> None:
+        """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""
+        if mode == IDLE and self.kit.bus.integers.fire(self.watchdog.idling):
+            return
+        self.watchdog.clear(cycle)
+        self.watchdog.power_mode(mode)
+        if mode == IDLE and not self.watchdog.stops_devices:
+            return
+        self._stopped.value = 1
+        if mode == SLEEP:
+            self.oscillator.abandon_switch()
+        for device in self.all:
+            if device.stops_in(mode):
+                device.freeze(cycle, mode)
+
+    def wake(self, cycle: int) -> None:
+        """The CPU runs again; `cycle` is the first in which the stopped clocks tick."""
+        self.watchdog.power_mode(0)
+        if not self._stopped.value:
+            return
+        self._stopped.value = 0
+        for device in self.all:
+            if device.is_frozen:
+                device.thaw(cycle)
+
+    def clear_watchdog(self, cycle: int) -> None:
+        """CLRWDT in `cycle`."""
+        self.watchdog.clear(cycle)
+
+    def tell(self) -> None:
+        """Tell who listens to UARTs what native code has sent."""
+        for uart in self.uart.values():
+            uart.tell()
+
+    def settle(self) -> None:
+        """Have found out what would be found out late, so that the record does not depend on who has looked."""
+        for listener in self.on_settle:
+            listener()
+
+    def restored(self) -> None:
+        """Call after the record was replaced by a snapshot."""
+        for device in self.all:
+            device.restored()
+        for listener in self.on_restored:
+            listener()
+
+    def seconds(self, cycle: int) -> float:
+        """Seconds since power-on at `cycle`."""
+        return self.oscillator.seconds(cycle)
+
+    @property
+    def fcy(self) -> float:
+        """Instruction cycles per second at present."""
+        return self.oscillator.fcy()
+
+
+def wire_bus(chip: Chip, bus: Bus) -> None:
+    """Tell the bus which bits exist, which of them software can change, and what a reset makes of them."""
+    for sfr in chip.sfrs.values():
+        if sfr.size != 2:
+            continue
+        word = sfr.address >> 1
+        bus.name[word] = sfr.name
+        bus.writable[word] = sfr.writable
+        bus.clear_only[word] = sfr.clear_only
+        bus.reset_value[word] = sfr.reset
+
+
+def build(
+    chip: Chip, bus: Bus, program: ProgramMemory, wires: Wires | None = None, crystal: int = CRYSTAL_HZ
+) -> Peripherals:
+    """Fill in the bus from the chip's data and put every device on it. `crystal` in Hz.
+
+    The caller keeps `wires` and may fill in its callbacks later. Call `reset("POR")` once before the first cycle.
+    """
+    wire_bus(chip, bus)
+    pins = Pins(bus.record, bus.events)
+    return Peripherals(Kit(chip, bus, pins, program, wires or Wires(), crystal))

@@ -1,0 +1,27 @@
+"""The request lines of a chip's interrupt controller (§5).
+
+The flags are plain storage OR-ed with hardware sets; who is accepted, and every other register of the controller, is
+the CPU's business. A line requested by a register write becomes visible one cycle later (see `emu.system.device.Irq`).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.peripherals.base import Kit
+from emu.system.device import Irq
+
+
+class Interrupts:
+    """One line per implemented source."""
+
+    def __init__(self, kit: Kit) -> None:
+        sfrs = kit.chip.sfrs
+        self._lines: Final = {
+            number: Irq(kit.bus.record, kit.bus.events, sfrs[source.flag[0]].address, source.flag[1])
+            for number, source in kit.chip.interrupts.items()
+        }
+
+    def line(self, number: int) -> Irq:
+        """The request line of interrupt `number` (natural order). Raises KeyError for a reserved number."""
+        return self._lines[number]

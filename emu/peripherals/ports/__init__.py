@@ -1,0 +1,1 @@
+"""I/O ports, change notification and external interrupt pins."""

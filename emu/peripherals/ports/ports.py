@@ -1,0 +1,194 @@
+"""I/O ports, change notification and the external interrupt pins (§6, §5.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.pins import PORTS, parse_pin
+from emu.peripherals.ports.rules import PortPlaces, Stretch, read_port, write_latch, write_port
+from emu.system.events import NEVER
+from emu.system.rules import Rule, place_of
+
+
+class Port(Peripheral):
+    """One port: TRIS, PORT and LAT, and the pins that other peripherals have taken over."""
+
+    def __init__(self, letter: str, kit: Kit) -> None:
+        super().__init__("port" + letter, kit)
+        self.index: Final = PORTS.index(letter)
+        self.mask: Final = kit.chip.sfrs["TRIS" + letter].mask
+        kit.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins the package does not have read 0
+        self.tris: Final = self.register("TRIS" + letter)
+        self.port: Final = self.register("PORT" + letter)
+        self.lat: Final = self.register("LAT" + letter)
+        self.tris.written_by(self._changed)
+        self.lat.written_by(self._changed)
+        self.port.written_by(self._port_written)
+        self.port.computed(lambda: self.kit.pins.read_port(self.index, self.now))
+        self._owned: Final = self.cell("owned", "H")
+        self._own_drive: Final = self.cell("own_drive", "H")
+        self._own_level: Final = self.cell("own_level", "H")
+        self._rule()
+
+    def _rule(self, stretch: Stretch | None = None) -> None:
+        """The common case of accesses to PORT and LAT; `stretch`: bytes that something shows on the pins."""
+        record = self.record
+        arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waving", "standing", "stands_until",
+                  "changed")  # fmt: skip
+        places = PortPlaces(
+            number=self.index,
+            implemented=self.kit.chip.sfrs[self.lat.name].writable,
+            lat=self.lat.place,
+            port=self.port.place,
+            owned=self._owned.place,
+            ring=place_of(record, "pins.ring"),
+            ring_size=record.fields["pins.ring"].count,
+            ring_count=place_of(record, "pins.ring_count"),
+            stretch=stretch,
+            **{name: place_of(record, f"pins.{name}", self.index) for name in arrays},
+        )
+        self.lat.ruled(Rule(places, None, write_latch))
+        self.port.ruled(Rule(places, read_port, write_port))
+
+    def show(self, stretch: Stretch, refresh: Callable[[int], bool]) -> None:
+        """Something outside shows bytes of the record on pins it drives as a waveform; `refresh` is that of `Bus`."""
+        self._rule(stretch)
+        self.bus.refresh[self.port.address >> 1] = refresh
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: latches hold and pins are watched in every power mode."""
+        return False
+
+    def reset(self, power_on: bool) -> None:
+        """All pins are inputs (TRIS was reset to ones); no peripheral owns one. LAT is unaffected but undefined."""
+        self._owned.value = 0
+        self._own_drive.value = 0
+        self._own_level.value = 0
+        self._drive(self.now)
+
+    def own(self, mask: int, drive: bool, level: int) -> None:
+        """A peripheral takes pins: it drives them with `level`, or lets them go (input or open drain)."""
+        self._owned.value |= mask
+        self._own_drive.value = self._own_drive.value & ~mask | (mask if drive else 0)
+        self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
+        self._drive(self.now + 1)
+
+    def release(self, mask: int) -> None:
+        """As `disown`, by an event of the current cycle."""
+        self._owned.value &= ~mask
+        self._drive(self.now)
+
+    def own_now(self, mask: int, drive: bool, level: int) -> None:
+        """As `own`, by an event of the current cycle: the pins change in this cycle."""
+        self._owned.value |= mask
+        self._own_drive.value = self._own_drive.value & ~mask | (mask if drive else 0)
+        self._own_level.value = self._own_level.value & ~mask | (mask if level else 0)
+        self._drive(self.now)
+
+    def disown(self, mask: int) -> None:
+        """Give pins back to LAT and TRIS."""
+        self._owned.value &= ~mask
+        self._drive(self.now + 1)
+
+    def _port_written(self, _old: int, new: int, lanes: int) -> None:
+        """Writing PORT writes the latch; read-modify-write instructions therefore copy pins to latches (§6)."""
+        self.lat.value = (self.lat.value & ~lanes | new & lanes) & self.mask
+        self._drive(self.now + 1)
+
+    def _changed(self, _old: int, _new: int, _lanes: int) -> None:
+        self._drive(self.now + 1)
+
+    def _drive(self, cycle: int) -> None:
+        owned = self._owned.value
+        pins = self.kit.pins
+        pins.drive[self.index] = (self._own_drive.value & owned | ~self.tris.value & ~owned) & self.mask
+        pins.output[self.index] = (self._own_level.value & owned | self.lat.value & ~owned) & self.mask
+        pins.apply(self.index, cycle, by_chip=True)
+
+
+class ChangeNotice(Peripheral):
+    """CN0-CN23: CNIF rises one cycle after any enabled input pin changes (§6.2); pull-ups for open pins."""
+
+    def __init__(self, kit: Kit, irq: int) -> None:
+        super().__init__("cn", kit)
+        self._enables: Final = [self.register(name) for name in ("CNEN1", "CNEN2")]
+        self._pullups: Final = [self.register(name) for name in ("CNPU1", "CNPU2")]
+        for register in self._pullups:
+            register.written_by(self._pull)
+        self._line: Final = self.irq(irq)
+        self._flag: Final = self.slot("flag", lambda _due: self._line.request())
+        self._pins: Final = [(number, *parse_pin(name)) for number, name in enumerate(kit.chip.change_pins) if name]
+        self._tris: Final = {port: kit.chip.sfrs["TRIS" + PORTS[port]].address >> 1 for _, port, _ in self._pins}
+        for port in self._tris:
+            mask = sum(bit for _, pin_port, bit in self._pins if pin_port == port)
+            kit.pins.watch_port(port, mask, partial(self._edge, port), inputs_only=True)
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: change notification wakes from Sleep."""
+        return False
+
+    def reset(self, power_on: bool) -> None:
+        """Pull-ups are off."""
+        self._pull(0, 0, 0)
+
+    def _edge(self, port: int, cycle: int, changed: int, _levels: int) -> None:
+        """UNVERIFIED: silicon compares with the level at the last PORT read; here with the level one Tcy earlier."""
+        inputs = changed & self.record.u16[self._tris[port]]
+        enabled = self._enables[0].value | self._enables[1].value << 16
+        for number, pin_port, bit in self._pins:
+            if pin_port == port and inputs & bit and enabled >> number & 1:
+                if self.events.due(self._flag) == NEVER:
+                    self.events.set(self._flag, cycle + 1)
+                return
+
+    def _pull(self, _old: int, _new: int, _lanes: int) -> None:
+        pulled = self._pullups[0].value | self._pullups[1].value << 16
+        for port in self._tris:
+            self.kit.pins.pullup[port] = sum(
+                bit for number, pin_port, bit in self._pins if pin_port == port and pulled >> number & 1
+            )
+            self.kit.pins.apply(port, self.now + 1)
+
+
+class ExternalInterrupts(Peripheral):
+    """INT0-INT4: the flag rises one cycle after the chosen edge on the pin, whoever drives it (§5.5)."""
+
+    def __init__(self, kit: Kit, interrupts: Interrupts) -> None:
+        super().__init__("int", kit)
+        self._interrupts: Final = interrupts
+        self._control: Final = kit.chip.sfrs["INTCON2"].address >> 1
+        self._waiting: Final = self.cell("waiting", "B")
+        self._flag: Final = self.slot("flag", self._raise)
+        self._irqs: Final = [irq for _, irq in kit.chip.external_pins]
+        self.on_int0: Callable[[int], None] | None = None
+        """Called with the cycle the INT0 flag rises: an ADC trigger (§13)."""
+        for number, (pin, _) in enumerate(kit.chip.external_pins):
+            kit.pins.watch(pin, partial(self._edge, number))
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: external interrupts wake from Sleep."""
+        return False
+
+    def reset(self, power_on: bool) -> None:
+        """No edge is on its way."""
+        self._waiting.value = 0
+
+    def _edge(self, number: int, cycle: int, changed: int, levels: int) -> None:
+        falling_edge_chosen = self.record.u16[self._control] >> number & 1
+        if bool(levels & changed) != bool(falling_edge_chosen):
+            self._waiting.value |= 1 << number
+            if self.events.due(self._flag) == NEVER:
+                self.events.set(self._flag, cycle + 1)
+
+    def _raise(self, due: int) -> None:
+        waiting = self._waiting.value
+        self._waiting.value = 0
+        for number, irq in enumerate(self._irqs):
+            if waiting >> number & 1:
+                self._interrupts.line(irq).request()
+        if waiting & 1 and self.on_int0 is not None:
+            self.on_int0(due)

@@ -1,0 +1,235 @@
+"""SPI1/2 (§12): master and slave, 8 and 16 bits, double-buffered.
+
+The outside is words: as master, `exchange(word, bits)` is asked for the answer at the end of each transfer; as slave,
+the outside calls `clock_word(word, bit_tcy)`. SCK and SDO levels are functions of the cycle. What happens inside is
+the text of `spirules.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.chips.chip import SpiSite
+from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.pins import parse_pin
+from emu.peripherals.ports.ports import Port
+from emu.peripherals.spi.rules import (
+    SpiPlaces,
+    begin,
+    bit_time,
+    finish,
+    fire,
+    open_end,
+    push,
+    take,
+    waits_to_begin,
+    word_bits,
+)
+from emu.system.events import NEVER
+from emu.system.rules import Rule, place_of, slot_of
+
+
+class Spi(Peripheral):
+    """One SPI module."""
+
+    def __init__(self, site: SpiSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__(f"spi{site.number}", kit)
+        self._line: Final = interrupts.line(site.irq)
+        prefix = f"SPI{site.number}"
+        self.stat: Final = self.register(prefix + "STAT")
+        self.con: Final = self.register(prefix + "CON")
+        self.buf: Final = self.register(prefix + "BUF")
+        self.idle_bit = (self.stat, "SPISIDL")
+        self.stat.written_by(self._stat_written)
+        self.con.written_by(self._con_written)
+        self.buf.computed(lambda: self._received.value)
+        self._exchange: Callable[[int, int], int] | None = None
+        self._answered: Final = self.cell("answered", "B")
+        self.on_slave_word: Callable[[int, int], None] | None = None
+        """on_slave_word(word, cycle): what an outside master has clocked out of this module."""
+        self._pins: Final = {role: parse_pin(getattr(site, f"{role}_pin")) for role in ("sck", "sdi", "sdo", "ss")}
+        self._ports: Final = ports
+        self._waiting: Final = self.cell("waiting", "H")
+        self._shift: Final = self.cell("shift", "H")
+        self._reply: Final = self.cell("reply", "H")
+        self._received: Final = self.cell("received", "H")
+        self._busy: Final = self.cell("busy", "B")
+        self._start: Final = self.moment("start", NEVER)
+        self._bit: Final = self.cell("bit", "I")
+        self._step: Final = self.slot("step", self._due)
+        self._places: Final = self._registers()
+        integers, places = self.bus.integers, self._places
+        self.buf.ruled(Rule(places, writes=push, takes=take))
+        self.buf.read_by(lambda: take(integers, places))
+        self.buf.written_by(self._push)
+        self.ruled(self._step, Rule(places, fires=fire))
+
+    def _registers(self) -> SpiPlaces:
+        sfrs, (port, pin) = self.kit.chip.sfrs, self._pins["sdi"]
+        fields = {**sfrs[self.stat.name].fields, **sfrs[self.con.name].fields}
+        cells = {name: name for name in ("waiting", "shift", "received", "busy", "start", "answered")}
+        return SpiPlaces(
+            stat=self.stat.place,
+            con=self.con.place,
+            buf=self.buf.place,
+            bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
+            spre=fields["SPRE"][0],
+            level=place_of(self.record, "pins.level", port),
+            sdi=pin,
+            step=slot_of(self.record, self._step),
+            line=self._line.line,
+            **{
+                cell: place_of(self.record, f"{self.name}.{name}")
+                for cell, name in (cells | {"bit_tcy": "bit"}).items()
+            },
+        )
+
+    @property
+    def exchange(self) -> Callable[[int, int], int] | None:
+        """exchange(word, bits) -> word: the device at the other end, when this module is master."""
+        return self._exchange
+
+    @exchange.setter
+    def exchange(self, device: Callable[[int, int], int] | None) -> None:
+        self._exchange = device
+        self._answered.value = device is not None
+
+    @property
+    def word_bits(self) -> int:
+        """8 or 16 (MODE16)."""
+        return int(word_bits(self.bus.integers, self._places))
+
+    @property
+    def bit_time(self) -> int:
+        """Length of a bit as master in Tcy."""
+        return int(bit_time(self.bus.integers, self._places))
+
+    # -- transfers ---------------------------------------------------------------------------------------------------
+
+    def _push(self, _old: int, new: int, lanes: int) -> None:
+        push(self.bus.integers, self._places, new, lanes)
+
+    def _due(self, due: int) -> None:
+        text, places = self.bus.integers, self._places
+        if self._busy.value:
+            out = self._shift.value
+            if not self.con["MSTEN"]:
+                word = self._reply.value
+                if self.on_slave_word is not None:
+                    self.on_slave_word(out, due)
+            else:
+                word = int(open_end(text, places)) if self.exchange is None else self.exchange(out, self.word_bits)
+            finish(text, places, word)
+        if waits_to_begin(text, places):
+            begin(text, places, due, self.bit_time)
+
+    def clock_word(self, word: int, bit_tcy: int = 16) -> bool:
+        """An outside master clocks one word through this module, starting now. False if it is not listening."""
+        port, pin = self._pins["ss"]
+        selected = not self.con["SSEN"] or not self.kit.pins.level[port] & pin
+        if not self.stat["SPIEN"] or self.con["MSTEN"] or self._busy.value or self.is_frozen or not selected:
+            return False
+        self._reply.value = word
+        begin(self.bus.integers, self._places, self.now + 1, bit_tcy)
+        return True
+
+    # -- pins --------------------------------------------------------------------------------------------------------
+
+    def _take_pins(self) -> None:
+        """SPIEN takes SCK, SDI and (unless DISSDO) SDO (§12)."""
+        if not self.stat["SPIEN"]:
+            for port, pin in self._pins.values():
+                self._ports[port].disown(pin)
+        else:
+            roles = {"sck": bool(self.con["MSTEN"]), "sdi": False, "sdo": not self.con["DISSDO"]}
+            for role, drive in roles.items():
+                port, pin = self._pins[role]
+                if role == "sdo" and not drive:
+                    self._ports[port].disown(pin)
+                else:
+                    self._ports[port].own(pin, drive, self.con["CKP"] if role == "sck" else 0)
+        self.restored()
+
+    def bits(self, cycle: int) -> int:
+        """Levels of SCK and SDO (§12: CKP idle level, CKE 1 = data changes on the edge from active to idle)."""
+        idle = self.con["CKP"]
+        clock, data = idle, 0
+        if self._busy.value and cycle >= self._start.value:
+            index, phase = divmod(cycle - self._start.value, max(self._bit.value, 1))
+            active_first = not self.con["CKE"]
+            clock = idle ^ (2 * phase < self._bit.value) ^ (not active_first)
+            data = self._shift.value >> max(self.word_bits - 1 - index, 0) & 1
+        return (self._pins["sck"][1] if clock else 0) | (self._pins["sdo"][1] if data else 0)
+
+    def rises(self, mask: int, after: int, until: int) -> int:
+        """SCK clocks nothing else inside the chip."""
+        return 0
+
+    def nth_rise(self, mask: int, after: int, count: int) -> int:
+        """SCK clocks nothing else inside the chip."""
+        return NEVER
+
+    def stands_until(self, cycle: int) -> int:
+        """Nothing is promised: idle levels follow control bits that are plain storage."""
+        return cycle
+
+    def restored(self) -> None:
+        """SCK (as master) and SDO carry the waveform while the module is on."""
+        self._answered.value = self._exchange is not None
+        port = self._pins["sck"][0]
+        self.kit.pins.detach(port, self)
+        mask = self._pins["sck"][1] if self.con["MSTEN"] else 0
+        mask |= 0 if self.con["DISSDO"] else self._pins["sdo"][1]
+        if self.stat["SPIEN"] and mask:
+            self.kit.pins.attach(port, mask, self)
+
+    # -- control -----------------------------------------------------------------------------------------------------
+
+    def _con_written(self, _old: int, _new: int, _lanes: int) -> None:
+        if self.con["FRMEN"]:
+            self.bus.lacks(f"{self.con.name}.FRMEN, frame sync pulses are neither made nor awaited")
+        self._take_pins()
+
+    def _stat_written(self, old: int, new: int, _lanes: int) -> None:
+        enable = 1 << self.kit.chip.sfrs[self.stat.name].fields["SPIEN"][0]
+        if (old ^ new) & enable:
+            if not new & enable:
+                self._clear()
+            self._take_pins()
+
+    def _clear(self) -> None:
+        """SPIEN = 0 clears buffers and flags (§12)."""
+        for flag in ("SPITBF", "SPIRBF", "SPIROV"):
+            self.stat[flag] = 0
+        self._busy.value = 0
+        self._start.value = NEVER
+        self.events.cancel(self._step)
+
+    def give_back(self) -> None:
+        """All pins: SPIEN is 0."""
+        self._take_pins()
+
+    def stops_in(self, mode: int) -> bool:
+        """A slave lives by the outside's clock and goes on. UNVERIFIED: §12 says nothing of Sleep."""
+        return bool(self.con["MSTEN"]) and super().stops_in(mode)
+
+    def freeze(self, cycle: int, mode: int) -> None:
+        """A word under way is cut off for good; the one in TXB waits. UNVERIFIED as above."""
+        self._busy.value = 0
+        self._start.value = NEVER
+        self.events.cancel(self._step)
+        super().freeze(cycle, mode)
+
+    def thaw(self, cycle: int) -> None:
+        """The word that waited is sent."""
+        super().thaw(cycle)
+        if self.stat["SPITBF"]:
+            self.events.set(self._step, cycle + 1)
+
+    def reset(self, power_on: bool) -> None:
+        """Off and empty."""
+        self._clear()
+        self._received.value = 0
+        self.restored()

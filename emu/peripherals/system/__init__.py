@@ -1,0 +1,1 @@
+"""System functions: oscillator, resets and watchdog, NVM, low-voltage detect, module disable."""

@@ -1,0 +1,77 @@
+"""Low-voltage detect (§17) and the band-gap flag of RCON (§4)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.system.device import Register
+from emu.system.events import NEVER
+
+THRESHOLD_MV: Final = (  # UNVERIFIED: §17 gives only the order of the codes
+    1800, 2000, 2200, 2400, 2600, 2800, 2900, 3100, 3400, 3600, 3700, 3900, 4100, 4300, 4600, 1200,
+)  # fmt: skip
+"""Trip points for LVDL = 0..14 in mV of supply; code 15 compares the LVDIN pin with the band gap."""
+_BAND_GAP_SECONDS: Final = 20e-6
+"""The band gap is stable 20 us after LVDEN (§4)."""
+
+
+class LowVoltageDetect(Peripheral):
+    """LVDIF rises when the supply falls below the chosen threshold; LVDEN and LVDL live in RCON."""
+
+    def __init__(self, kit: Kit, interrupts: Interrupts, rcon: Register, irq: int) -> None:
+        super().__init__("lvd", kit)
+        self._line: Final = interrupts.line(irq)
+        self._rcon: Final = rcon
+        self._supply: Final = self.cell("supply", "H", 5000)
+        self._stable: Final = self.slot("stable", self._band_gap_stable, in_seconds=True)
+        self._below: Final = self.cell("below", "B")
+        """The supply was below the threshold when somebody last looked."""
+        before = kit.bus.on_write[rcon.address >> 1]
+
+        def written(old: int, new: int, lanes: int) -> None:
+            if before is not None:
+                before(old, new, lanes)
+            self._enable_changed()
+
+        rcon.written_by(written)
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: it watches the supply in every power mode."""
+        return False
+
+    def set_supply(self, millivolts: int) -> None:
+        """The supply voltage changes now (0..65535 mV; LVDIN when LVDL = 15)."""
+        self._supply.value = millivolts
+        self._look()
+
+    def _look(self) -> None:
+        """Supply, threshold or band gap have changed: LVDIF rises when the supply comes to be too low."""
+        low = self._is_low
+        if low and not self._below.value:
+            self._line.request()
+        self._below.value = low
+
+    @property
+    def _is_low(self) -> bool:
+        return (
+            bool(self._rcon["LVDEN"] and self._rcon["BGST"]) and self._supply.value < THRESHOLD_MV[self._rcon["LVDL"]]
+        )
+
+    def _enable_changed(self) -> None:
+        if not self._rcon["LVDEN"]:
+            self._rcon["BGST"] = 0
+            self.events.cancel(self._stable)
+        elif not self._rcon["BGST"] and self.events.due(self._stable) == NEVER:
+            self.events.set(self._stable, self.now + 1 + round(_BAND_GAP_SECONDS * self.kit.fcy()))
+        self._look()
+
+    def _band_gap_stable(self, _due: int) -> None:
+        self._rcon["BGST"] = 1
+        self._look()
+
+    def reset(self, power_on: bool) -> None:
+        """A band gap that was on stays on, RCON is kept by every reset but power-on."""
+        self._below.value = self._is_low
+        self._enable_changed()

@@ -1,0 +1,103 @@
+"""Peripheral module disable (§17): a module switched off reads 0, ignores writes and forgets its state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.peripherals.base import Kit, Peripheral
+from emu.system.bus import Access
+
+_PREFIXES: Final = {
+    "ADC": ("ADCBUF", "ADCON", "ADCHS", "ADCSSL"),
+    "DCI": ("DCI", "TSCON", "RSCON", "RXBUF", "TXBUF"),
+}
+"""Modules whose registers do not start with the module's own name."""
+
+
+def _zero() -> int:
+    return 0
+
+
+_OFF: Final = Access(0, 0, _zero, None, None, None)
+
+
+class ModuleDisable(Peripheral):
+    """PMD1 and PMD2. What is off follows from the registers, so a restored record needs no more than `restored`."""
+
+    def __init__(self, kit: Kit, modules: dict[str, Peripheral]) -> None:
+        super().__init__("pmd", kit)
+        self._modules: Final = modules
+        self._off: Final[dict[int, Access]] = {}
+        self._bits: Final[list[tuple[Callable[[], int], str]]] = []
+        self._words: Final[dict[str, list[int]]] = {}
+        """Word indices of each module's registers."""
+        for name in ("PMD1", "PMD2"):
+            register = self.register(name)
+            register.written_by(lambda _old, _new, _lanes: self._written())
+            for field in register_fields(kit, name):
+                self._bits.append((lambda register=register, field=field: register[field], field[:-2]))  # type: ignore[misc]
+                self._words[field[:-2]] = self._words_of(field[:-2])
+        if "PMD3" in kit.chip.sfrs:
+            self.register("PMD3")
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: these are switches."""
+        return False
+
+    def _words_of(self, module: str) -> list[int]:
+        timer = module[1:] if module[0] == "T" else None
+        prefixes = _PREFIXES.get(module, (module,))
+        return sorted(
+            {
+                sfr.address >> 1
+                for name, sfr in self.kit.chip.sfrs.items()
+                if (name in (f"TMR{timer}", f"PR{timer}", f"T{timer}CON") if timer else name.startswith(prefixes))
+            }
+        )
+
+    def _written(self) -> None:
+        for is_off, module in self._bits:
+            first = self._words[module][0]
+            if is_off() and first not in self._off:
+                self._clear(module)
+        self.restored()
+
+    def _clear(self, module: str) -> None:
+        """The module loses its state, as by a reset of its own."""
+        device = self._modules.get(module)
+        if device is not None:
+            device.switched_off()
+        for word in self._words[module]:
+            self.record.u16[word] = self.bus.reset_value[word]
+        if device is not None:
+            device.restart()
+
+    def restored(self) -> None:
+        """Wire the registers of each module as its bit says."""
+        for is_off, module in self._bits:
+            off = bool(is_off())
+            for word in self._words[module]:
+                if off and word not in self._off:
+                    self._cut(word)
+                elif not off and word in self._off:
+                    self._mend(word)
+
+    def reset(self, power_on: bool) -> None:
+        """All modules on."""
+        self.restored()
+
+    def _cut(self, word: int) -> None:
+        self._off[word] = self.bus.access(word)
+        self.bus.rewire(word, _OFF)
+        self.bus.off |= {word}
+
+    def _mend(self, word: int) -> None:
+        self.bus.off -= {word}
+        self.bus.rewire(word, self._off.pop(word))
+
+
+def register_fields(kit: Kit, name: str) -> list[str]:
+    """Field names of a register, least significant first."""
+    fields = kit.chip.sfrs[name].fields
+    return sorted(fields, key=lambda field: fields[field][0])

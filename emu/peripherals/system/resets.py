@@ -1,0 +1,115 @@
+"""RCON and the watchdog (§4)."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.peripherals.base import IDLE, SLEEP, Kit, Peripheral
+from emu.peripherals.system.power_rules import any_bit, clear_watchdog, idle, places_of
+from emu.system.events import NEVER
+from emu.system.rules import Rule
+
+WDT_HZ: Final = 128_000
+"""The LPRC divided by 4 clocks the watchdog's 8-bit counter (§4)."""
+_COUNTER: Final = 256
+_PRESCALE_A: Final = (1, 8, 64, 512)
+
+CAUSES: Final = ("TRAPR", "IOPUWR", "EXTR", "SWR", "WDTO", "BOR", "POR")
+"""RCON bits that name a reset (§4)."""
+
+
+class Resets(Peripheral):
+    """RCON: why the chip was reset, and what it slept through. Bits stay until software clears them."""
+
+    def __init__(self, kit: Kit) -> None:
+        super().__init__("rcon", kit)
+        self.rcon: Final = self.register("RCON")
+
+    def stops_in(self, mode: int) -> bool:
+        """Never."""
+        return False
+
+    def record_cause(self, cause: str, kept: int) -> None:
+        """RCON after a reset by `cause`; `kept` is its value before. A power-on clears everything else (§4)."""
+        if cause not in CAUSES:
+            raise ValueError(f"{cause!r} is no reset cause; expected one of {', '.join(CAUSES)}")
+        if cause == "POR":  # POR and BOR set, LVDL = 0101
+            self.rcon.value = self.kit.chip.sfrs["RCON"].reset
+            return
+        self.rcon.value = kept
+        self.rcon["SWDTEN"] = 0  # the watchdog that software switched on ends with every reset
+        self.rcon[cause] = 1
+
+
+class Watchdog(Peripheral):
+    """Free-running from the LPRC: resets the running chip, wakes the sleeping one."""
+
+    def __init__(self, kit: Kit, resets: Resets) -> None:
+        super().__init__("wdt", kit)
+        self._resets: Final = resets
+        self._mode: Final = self.cell("mode", "B")
+        self._timeout: Final = self.slot("timeout", self._expired, in_seconds=True)
+        resets.rcon.written_by(self._rcon_written)
+        kit.power_mode = lambda: self._mode.value
+        fields = kit.chip.sfrs["RCON"].fields
+        self._swdten, self._sleep = (1 << fields[name][0] for name in ("SWDTEN", "SLEEP"))
+        self._places: Final = places_of(self.bus.record, kit.chip, self._timeout, self._mode.place)
+        self.clearing: Final = Rule(self._places, fires=clear_watchdog)
+        self.idling: Final = Rule(self._places, fires=idle)
+
+    def stops_in(self, mode: int) -> bool:
+        """Never: the LPRC runs in every power mode."""
+        return False
+
+    @property
+    def is_enabled(self) -> bool:
+        """FWDTEN in the configuration word, or SWDTEN."""
+        return bool(any_bit(self.bus.integers, self._places.enables))
+
+    @property
+    def stops_devices(self) -> bool:
+        """Whether some device would stop in Idle."""
+        return bool(any_bit(self.bus.integers, self._places.stops))
+
+    @property
+    def period(self) -> int:
+        """Time-out in Tcy, at least 1: 2 ms x A x B (§4), where a Tcy may take 8 ms."""
+        word = self.kit.chip.config["FWDT"]
+        stored = self.kit.program.setting("FWDT")
+        counts = _COUNTER * _PRESCALE_A[word.field(stored, "FWPSA")] * (word.field(stored, "FWPSB") + 1)
+        return max(round(counts / WDT_HZ * self.kit.fcy()), 1)
+
+    def clear(self, cycle: int) -> None:
+        """CLRWDT or PWRSAV in `cycle`: counter and prescalers restart, WDTO falls (§4)."""
+        if not self.bus.integers.fire(self.clearing):
+            self._resets.rcon.value &= ~self._places.wdto
+            self._arm(cycle)
+
+    def _arm(self, cycle: int) -> None:
+        if self.is_enabled:
+            self.events.set(self._timeout, cycle + self.period)
+        else:
+            self.events.cancel(self._timeout)
+
+    def _rcon_written(self, old: int, new: int, _lanes: int) -> None:
+        if (old ^ new) & self._swdten and (not self.is_enabled or self.events.due(self._timeout) == NEVER):
+            self._arm(self.now)
+
+    def power_mode(self, mode: int) -> None:
+        """The CPU goes to sleep (IDLE or SLEEP) or runs again (0)."""
+        self._mode.value = mode
+        if mode:
+            self._resets.rcon.value |= self._sleep if mode == SLEEP else self._places.idle
+
+    def _expired(self, due: int) -> None:
+        if self._mode.value in (IDLE, SLEEP):
+            self._resets.rcon["WDTO"] = 1
+            self._arm(due)
+            self.kit.wires.wake()
+        else:
+            self.kit.wires.reset("WDTO")
+
+    def reset(self, power_on: bool) -> None:
+        """Any reset clears the counter and both prescalers (§4)."""
+        self._mode.value = 0
+        self._arm(self.now)

@@ -1,0 +1,1 @@
+"""Timers 1-5, input capture and output compare."""

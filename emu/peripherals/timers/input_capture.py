@@ -1,0 +1,113 @@
+"""Input capture 1-8 (§8): the count of timer 2 or 3 at edges of a pin, four values deep."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.chips.chip import CaptureSite
+from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.timers.timers import Timer
+from emu.system.events import NEVER
+
+_FIFO: Final = 4
+_LATENCY: Final = 2  # UNVERIFIED: Tcy from the edge to the capture (§8)
+
+_OFF, _EVERY_EDGE, _FALLING, _RISING, _FOURTH, _SIXTEENTH, _UNUSED, _WAKE = range(8)
+"""ICM (§8)."""
+_DIVIDE: Final = {_FOURTH: 4, _SIXTEENTH: 16}
+
+
+class Capture(Peripheral):
+    """One capture channel."""
+
+    def __init__(self, site: CaptureSite, kit: Kit, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
+        super().__init__(f"ic{site.number}", kit)
+        self._line: Final = interrupts.line(site.irq)
+        self._timers: Final = timers
+        self.buf: Final = self.register(f"IC{site.number}BUF")
+        self.con: Final = self.register(f"IC{site.number}CON")
+        self.idle_bit = (self.con, "ICSIDL")
+        self.buf.read_by(self._read)
+        self.buf.computed(lambda: self._fifo[0])
+        self.con.written_by(self._con_written)
+        self._fifo: Final = self.array("fifo", "H", _FIFO)
+        self._count: Final = self.cell("count", "B")
+        self._edges: Final = self.cell("edges", "B")
+        """Rising edges seen by the prescaler."""
+        self._captures: Final = self.cell("captures", "B")
+        """Captures since the last interrupt."""
+        self._second: Final = self.moment("second", NEVER)
+        """Cycle of a second capture while the first is on its way."""
+        self._capture: Final = self.slot("capture", self._due)
+        self.autobaud = False
+        """The UART's receive pin is connected instead of the channel's own."""
+        kit.pins.watch(site.pin, lambda cycle, changed, levels: self._own_edge(cycle, bool(levels & changed)))
+
+    def _own_edge(self, cycle: int, rising: bool) -> None:
+        if not self.autobaud:
+            self.edge(cycle, rising)
+
+    def edge(self, cycle: int, rising: bool) -> None:
+        """The pin changes in `cycle`."""
+        mode = self.con["ICM"]
+        if mode == _WAKE and rising and self.kit.power_mode():
+            self._line.request()
+        if self.is_frozen or not self._wants(mode, rising):
+            return
+        if self.events.due(self._capture) == NEVER:
+            self.events.set(self._capture, cycle + _LATENCY)
+        else:
+            self._second.value = cycle + _LATENCY
+
+    def _wants(self, mode: int, rising: bool) -> bool:
+        if mode in _DIVIDE and rising:
+            self._edges.value = (self._edges.value + 1) % _DIVIDE[mode]
+            return self._edges.value == 0
+        return mode == _EVERY_EDGE or (mode == _RISING and rising) or (mode == _FALLING and not rising)
+
+    def _due(self, due: int) -> None:
+        if self._second.value != NEVER:
+            self.events.set(self._capture, self._second.value)
+            self._second.value = NEVER
+        if self.con["ICOV"]:
+            return  # nothing is captured before the FIFO has been read out (§8)
+        every = self.con["ICM"] == _EVERY_EDGE
+        if self._count.value == _FIFO:
+            if not every:  # UNVERIFIED: in mode 1 a value that finds the FIFO full is lost without a flag
+                self.con["ICOV"] = 1
+                return
+        else:
+            timer = self._timers[2 if self.con["ICTMR"] else 3]
+            self._fifo[self._count.value] = timer.count(due) & 0xFFFF
+            self._count.value += 1
+            self.con["ICBNE"] = 1
+        self._captures.value += 1
+        if every or self._captures.value > self.con["ICI"]:
+            self._captures.value = 0
+            self._line.request()
+
+    def _read(self) -> int:
+        """Reading pops; an empty FIFO returns the last value again. UNVERIFIED."""
+        value = self._fifo[0]
+        count = self._count.value
+        if count:
+            for index in range(count - 1):
+                self._fifo[index] = self._fifo[index + 1]
+            self._count.value = count - 1
+            if count == 1:
+                self.con["ICBNE"] = self.con["ICOV"] = 0
+        return value
+
+    def _con_written(self, old: int, new: int, _lanes: int) -> None:
+        mode = (1 << self.kit.chip.sfrs[self.con.name].fields["ICM"][1]) - 1
+        if new & mode == _OFF:
+            self.power_up(power_on=False)
+            self.con["ICBNE"] = self.con["ICOV"] = 0
+        elif (old ^ new) & mode:
+            self._edges.value = 0
+
+    def reset(self, power_on: bool) -> None:
+        """Empty."""
+        self._count.value = self._edges.value = self._captures.value = 0
+        self._second.value = NEVER

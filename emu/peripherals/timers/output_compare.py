@@ -1,0 +1,182 @@
+"""Output compare and PWM 1-8 (§9): a pin that changes when timer 2 or 3 reaches OCxR or OCxRS."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from emu.chips.chip import CompareSite
+from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.pins import parse_pin
+from emu.peripherals.ports.ports import Port
+from emu.peripherals.timers.timers import Timer
+from emu.system.events import NEVER
+
+_OFF, _SET_ONCE, _CLEAR_ONCE, _TOGGLE, _ONE_PULSE, _PULSES, _PWM, _PWM_FAULT = range(8)
+"""OCM (§9)."""
+_FLAG_DELAY: Final = 2
+"""OCxIF follows the pin by two Tcy (§9)."""
+
+_RISE, _FALL, _DONE = range(3)
+"""What the pulse modes and PWM wait for."""
+
+
+class Compare(Peripheral):
+    """One output compare channel."""
+
+    def __init__(
+        self,
+        site: CompareSite,
+        kit: Kit,
+        interrupts: Interrupts,
+        timers: dict[int, Timer],
+        ports: dict[int, Port],
+    ) -> None:
+        super().__init__(f"oc{site.number}", kit)
+        self._line: Final = interrupts.line(site.irq)
+        self._timers: Final = timers
+        self.r: Final = self.register(f"OC{site.number}R")
+        self.rs: Final = self.register(f"OC{site.number}RS")
+        self.con: Final = self.register(f"OC{site.number}CON")
+        self.idle_bit = (self.con, "OCSIDL")
+        self.con.written_by(self._con_written)
+        self.r.written_by(self._r_written)
+        self.rs.written_by(lambda _old, _new, _lanes: self._plan())
+        port, self._pin = parse_pin(site.pin)
+        self._port: Final = ports[port]
+        self._fault_port, self._fault_pin = parse_pin(site.fault_pin)
+        self._level: Final = self.cell("level", "B")
+        self._phase: Final = self.cell("phase", "B")
+        self._pin_event: Final = self.slot("pin", self._pin_due)
+        self._flag_event: Final = self.slot("flag", lambda _due: self._line.request())
+        kit.pins.watch(site.fault_pin, self._fault_edge)
+
+    @property
+    def _timer(self) -> Timer:
+        return self._timers[3 if self.con["OCTSEL"] else 2]
+
+    @property
+    def _is_pwm(self) -> bool:
+        return self.con["OCM"] in (_PWM, _PWM_FAULT)
+
+    # -- course ------------------------------------------------------------------------------------------------------
+
+    def _plan(self) -> None:
+        """Post the next change of the pin from what the timer will do."""
+        if self.con["OCM"] == _OFF or self.is_frozen:
+            return
+        if self.events.due(self._pin_event) == self.now + 1 and not (self._is_pwm and self._timer.is_frozen):
+            return  # decided in the current cycle
+        cycle = self._next_change(self.now)
+        self.events.set(self._pin_event, cycle) if cycle != NEVER else self.events.cancel(self._pin_event)
+
+    def _next_change(self, after: int) -> int:
+        """Cycle of the next change for a match behind cycle `after`."""
+        timer, phase = self._timer, self._phase.value
+        if phase == _DONE:
+            return NEVER
+        if self._is_pwm:  # the pin rises with TMR = 0 and falls with TMR = OCxR
+            wrap = timer.next_cycle_at(0, after)
+            return wrap if phase == _RISE else min(wrap, timer.next_cycle_at(self.r.value, after))
+        target = self.rs.value if phase == _FALL else self.r.value
+        match = timer.next_cycle_at(target, after)
+        return NEVER if match == NEVER else match + 1
+
+    def _pin_due(self, due: int) -> None:
+        mode = self.con["OCM"]
+        if self._is_pwm:
+            self._pwm_step(due)
+        elif mode in (_SET_ONCE, _CLEAR_ONCE):
+            self._drive(mode == _SET_ONCE)
+            self._phase.value = _DONE
+            self.events.set(self._flag_event, due + _FLAG_DELAY)
+        elif mode == _TOGGLE:
+            self._drive(not self._level.value)
+            self.events.set(self._flag_event, due + _FLAG_DELAY)
+        elif self._phase.value == _RISE:
+            self._drive(True)
+            self._phase.value = _FALL
+        else:
+            self._drive(False)
+            self._phase.value = _DONE if mode == _ONE_PULSE else _RISE
+            self.events.set(self._flag_event, due + _FLAG_DELAY)
+        cycle = self._next_change(due if self._is_pwm else due - 1)
+        if cycle != NEVER:
+            self.events.set(self._pin_event, cycle)
+
+    def _pwm_step(self, due: int) -> None:
+        """A new period loads the duty from OCxRS; OCxRS = 0 keeps the pin low, above PR keeps it high (§9)."""
+        if self._timer.count(due) == 0:
+            self.r.value = self.rs.value
+            self._drive(self.r.value != 0)
+            self._phase.value = _FALL if self.r.value else _RISE
+        else:
+            self._drive(False)
+            self._phase.value = _RISE
+
+    def _drive(self, level: bool) -> None:
+        self._level.value = level
+        self._port.own_now(self._pin, drive=True, level=level)
+
+    # -- control -----------------------------------------------------------------------------------------------------
+
+    def _r_written(self, old: int, _new: int, _lanes: int) -> None:
+        if self._is_pwm:
+            self.r.value = old  # read-only: it holds the duty in force (§9)
+        self._plan()
+
+    def _con_written(self, _old: int, _new: int, _lanes: int) -> None:
+        """Any write restarts the module; the pin takes its first level (§9)."""
+        for event in (self._pin_event, self._flag_event):
+            self.events.cancel(event)
+        mode = self.con["OCM"]
+        self.con["OCFLT"] = 0
+        self.restored()
+        if mode == _OFF:
+            self._port.disown(self._pin)
+            return
+        preset = mode == _TOGGLE and bool(self._port.lat.value & self._pin)  # UNVERIFIED (§9)
+        self._level.value = mode == _CLEAR_ONCE or preset
+        self._phase.value = _RISE
+        self._port.own(self._pin, drive=True, level=self._level.value)
+        if mode == _PWM_FAULT and not self.kit.pins.level[self._fault_port] & self._fault_pin:
+            self._fault()
+        else:
+            self._plan()
+
+    def _fault_edge(self, _cycle: int, _changed: int, levels: int) -> None:
+        if self.con["OCM"] == _PWM_FAULT and not levels & self._fault_pin and not self.con["OCFLT"]:
+            self._fault()
+
+    def _fault(self) -> None:
+        """The fault pin is low: the output floats until it is high and OCM has been written again (§9)."""
+        self.con["OCFLT"] = 1
+        self._phase.value = _DONE
+        self.events.cancel(self._pin_event)
+        self._port.own(self._pin, drive=False, level=0)
+        self._line.request()
+
+    def reset(self, power_on: bool) -> None:
+        """Off; the pins were given back by the ports."""
+        self._level.value = 0
+        self._phase.value = _RISE
+        self.restored()
+
+    def thaw(self, cycle: int) -> None:
+        """The time base may have gone on alone. A change decided when the clock stopped still happens (§9): with PWM
+        the pin moves in the cycle of the match, else in the next."""
+        waiting = self.held_since(self._pin_event)
+        super().thaw(cycle)
+        if waiting > (not self._is_pwm):
+            self._plan()
+
+    def give_back(self) -> None:
+        """The channel's pin."""
+        self._port.disown(self._pin)
+
+    def restored(self) -> None:
+        """Follow the time base only while the channel is on."""
+        on, chosen = self.con["OCM"] != _OFF, self._timer
+        for number in (2, 3):
+            timer = self._timers[number]
+            timer.tell_changes(self._plan, on and timer is chosen)

@@ -1,0 +1,403 @@
+"""Timers 1-5 (§7): timer, gated and counter modes, 32-bit pairs. TMR is computed on read, never ticked.
+
+`counter.py` has the count, `timerrules.py` what instructions do to a timer that runs plainly; here is everything else
+that changes its course, and the match. A match posts one event, whose due date is the cycle the interrupt flag first
+reads 1: one Tcy after TMR became equal to PR (§7 rule 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from emu.chips.chip import TimerSite
+from emu.peripherals.base import IDLE, SLEEP, Kit
+from emu.peripherals.timers.arithmetic import PRESCALE, advance
+from emu.peripherals.timers.counter import Counter
+from emu.peripherals.timers.rules import (
+    PIN,
+    STOPPED,
+    TCY,
+    WAVE,
+    ClockPin,
+    MatchPlaces,
+    TimerPlaces,
+    fire_match,
+    next_edges,
+    read_count,
+    switch,
+    write_count,
+    write_period,
+)
+from emu.system.device import Register
+from emu.system.events import NEVER
+from emu.system.rules import Rule, place_of, slot_of
+
+
+class Timer(Counter):
+    """One 16-bit timer, or, with T32 set, a 32-bit timer that owns its partner's registers too."""
+
+    def __init__(self, site: TimerSite, kit: Kit) -> None:
+        super().__init__(site, kit)
+        self.line: Final = self.irq(site.irq)
+        self.low: Timer | None = None
+        """For a type C timer: the type B timer that takes it over with T32."""
+        self.high: Timer | None = None
+        self._hold: Register | None = None
+        self.period: Final = self.cell("period", "Q")
+        """Tcy from one match to the next; 0 if the event is not simply periodic."""
+        self.clear_from: Final = self.moment("clear_from")
+        self.clear_until: Final = self.moment("clear_until")
+        self.clear_due: Final = self.moment("clear_due", NEVER)
+        """On a described clock: when the match comes if TMR is cleared in clear_from <= cycle < clear_until."""
+        self.closed: Final = self.moment("closed", NEVER)
+        """When the flag of the gate's last falling edge is due."""
+        self._match: Final = self.slot("match", self._fire)
+        self._on_match: Final[list[Callable[[int], None]]] = []
+        self._on_change: Final[list[Callable[[], None]]] = []
+        self._listeners: Final = self.cell("listeners", "B")
+        """Those in both."""
+        places = self._registers()
+        self.tmr.ruled(Rule(places, read_count, write_count))
+        self.pr.ruled(Rule(places, None, write_period))
+        self._places: Final = self._match_places(places)
+        self.con.ruled(Rule(self._places, None, switch))
+        self.ruled(self._match, Rule(self._places, fires=fire_match))
+        self.tmr.computed(self.read)
+        self.tmr.written_by(self._tmr_written)
+        self.pr.written_by(self._course_written)
+        self.con.written_by(self._con_written)
+        if site.clock_pin:
+            kit.pins.watch(site.clock_pin, self._edge)
+        kit.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
+
+    def _registers(self) -> TimerPlaces:
+        cells = ("base", "tick", "period", "before", "phase", "clear_from", "clear_until", "clear_due", "listeners",
+                 "frozen")  # fmt: skip
+        places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
+        match, line = slot_of(self.record, self._match), self.line.line
+        pair = self.con if self.site.kind != "C" else self.register(f"T{self.site.partner}CON")
+        return TimerPlaces(
+            tmr=self.tmr.place,
+            pr=self.pr.place,
+            source=self._source.place,
+            pair=pair.place,
+            t32=1 << self.kit.chip.sfrs[pair.name].fields["T32"][0] if self.site.kind != "A" else 0,
+            match=match,
+            line=line,
+            **places,
+        )
+
+    def _match_places(self, places: TimerPlaces) -> MatchPlaces:
+        con = self.kit.chip.sfrs[self.con.name]
+        ton, tcs = (1 << con.fields[name][0] for name in ("TON", "TCS"))
+        return MatchPlaces(
+            timer=places,
+            con=self.con.place,
+            writable=con.writable,
+            ton=ton,
+            tcs=tcs,
+            tckps=con.fields["TCKPS"][0],
+            clock=ClockPin(self.kit.pins.described, (self._port, self._pin)),
+            pin=self._pin,
+        )
+
+    def pair(self, high: Timer) -> None:
+        """Join with the type C partner (T2 with T3, T4 with T5)."""
+        self.high, high.low = high, self
+        self.upper, high.lower = high, self
+        self._hold = self.register(f"TMR{high.site.number}HLD")
+        self.tmr.read_by(self._read_and_latch)
+
+    # -- changes of course -------------------------------------------------------------------------------------------
+
+    def _plan(self, rewritten: bool = False) -> None:
+        """Publish tick and period, and post the next match behind the current cycle."""
+        self.clear_until.value = 0
+        source = self._source.value
+        simple = source == TCY and not self.is_taken
+        if simple:
+            self._empty_prescaler()
+        narrow = simple and not self.is_wide  # a wide timer reads and interrupts through its partner
+        self.tick.value = self._prescale if narrow else 0
+        periodic = narrow and self.limit != 0 and not self._is_gated and not self._on_match
+        self.period.value = (self.limit + 1) * self._prescale if periodic else 0
+        if self._match_stands(rewritten):
+            self.period.value = 0  # the one behind it is not a period away: let Python plan it
+        else:
+            self._post(self.now)
+        self._tell()
+
+    def _empty_prescaler(self) -> None:
+        """What is in it counts as Tcy since an earlier base: rules compute the count from base and tick alone."""
+        self.base.value -= self._phase.value
+        self._phase.value = 0
+
+    def _tell(self) -> None:
+        for listener in self._on_change:
+            listener()
+
+    def _match_stands(self, rewritten: bool) -> bool:
+        """Whether the posted match happens in the current cycle, or in the next whatever was just written."""
+        due = self.events.due(self._match)
+        if due in (self.now + 1, self.closed.value) and due != NEVER:
+            return True
+        running = self._source.value in (TCY, WAVE)
+        return due == self.now + 2 and running and not rewritten and self.count(self.now + 1) == self.limit
+
+    def _post(self, after: int) -> None:
+        if self._is_gated or self.is_frozen:
+            self.events.cancel(self._match)
+            return
+        match = self.next_cycle_at(self.limit, after)
+        self.events.set(self._match, match + 1) if match != NEVER else self.events.cancel(self._match)
+
+    @property
+    def _is_gated(self) -> bool:
+        return bool(self.con["TGATE"]) and not self.con["TCS"]
+
+    def _choose_source(self) -> int:
+        if self.is_taken or not self.con["TON"]:
+            return STOPPED
+        if self.con["TCS"]:
+            return WAVE if self.kit.pins.waveform(self._port, self._pin) is not None else PIN
+        if self.con["TGATE"] and not self.kit.pins.level[self._port] & self._pin:
+            return STOPPED
+        return TCY
+
+    def _tmr_written(self, _old: int, new: int, lanes: int) -> None:
+        """The written count stands from the next cycle; the prescaler restarts (§7 rules 6, 8)."""
+        if self.is_taken:
+            assert self.low is not None
+            self.low.high_written(new, lanes)
+            return
+        count = self.count(self.now)  # the stored word was replaced, but only in the written lanes
+        written = count & ~lanes & 0xFFFF | new & lanes
+        if self.is_wide:
+            assert self.high is not None
+            assert self._hold is not None
+            self.high.tmr.value = self._hold.value
+        self.tmr.value = written
+        self._before.value = written
+        self._phase.value = 0
+        self.base.value = self.now + 1
+        self._plan(rewritten=True)
+
+    def _post_edges(self, due: int) -> None:
+        """After a match on a described clock that not every engine can read."""
+        self.clear_until.value = 0
+        waveform, pin = self.kit.pins.waveform(self._port, self._pin), self._pin
+        if waveform is None or self.is_wide or not self.limit or self._on_change:
+            self._post(due - 1)
+            return
+        following, *foretold = next_edges(
+            self.bus.integers, self._places, lambda after, count: waveform.nth_rise(pin, after, count))  # fmt: skip
+        self.events.set(self._match, following)
+        for cell, value in zip((self.clear_from, self.clear_until, self.clear_due), foretold, strict=True):
+            cell.value = value
+
+    def high_written(self, new: int, lanes: int) -> None:
+        """A direct write to the upper half of a 32-bit timer, which the manual does not use (§7)."""
+        assert self.high is not None
+        self._fold(self.now + 1, self._prescale, self.limit)
+        self.high.tmr.value = self.high.tmr.value & ~lanes | new & lanes
+        self._plan()
+
+    def _course_written(self, old: int, new: int, _lanes: int) -> None:
+        """PR changed: what was counted until the next cycle was counted with the old PR."""
+        owner = self.low if self.is_taken and self.low is not None else self
+        shift = 0 if owner is self else 16
+        previous = owner.limit & ~(0xFFFF << shift) | old << shift
+        if old != new:
+            owner.recourse(previous)
+
+    def recourse(self, previous_limit: int) -> None:
+        """Count up to the next cycle with `previous_limit`, then plan with the present registers."""
+        self._fold(self.now + 1, self._prescale, previous_limit)
+        self._plan()
+
+    def _con_written(self, old: int, new: int, _lanes: int) -> None:
+        if old == new:
+            return
+        if self.high is not None and (old ^ new) & self._t32:
+            self._join_changed(old, new)
+            return
+        self._switch(old)
+
+    @property
+    def _t32(self) -> int:
+        return 1 << self.kit.chip.sfrs[self.con.name].fields["T32"][0] if self.high is not None else 0
+
+    def _join_changed(self, old: int, new: int) -> None:
+        """T32 was set or cleared: both halves freeze their counts under the old arrangement, then start anew."""
+        assert self.high is not None
+        cycle = self.now + 1
+        self.con.value = old
+        halves = (self, self.high)
+        counts = [half.count(cycle) & 0xFFFF for half in halves]
+        self.con.value = new
+        for half, value in zip(halves, counts, strict=True):
+            half.tmr.value = value
+            half._phase.value = 0
+            half.base.value = cycle
+            half._before.value = value
+            half._source.value = half._choose_source()
+        for half in halves:
+            half._plan()
+
+    def _switch(self, old_con: int) -> None:
+        """TxCON changed. The prescaler empties when TON falls or the clock is chosen anew (§7 rule 6).
+
+        UNVERIFIED: the data sheet lists any write to TxCON as clearing it; here only those that change the clock.
+        """
+        present = self.con.value
+        lsb, width = self.kit.chip.sfrs[self.con.name].fields["TCKPS"]
+        old_prescale = PRESCALE[old_con >> lsb & (1 << width) - 1]
+        self._fold(self.now + 1, old_prescale, self.limit)
+        clock_bits = sum(((1 << w) - 1) << b for b, w in map(self._field, ("TON", "TCKPS", "TCS", "TGATE")))
+        if (present ^ old_con) & clock_bits:
+            self._phase.value = 0
+        self._before.value = self._start
+        self._source.value = self._choose_source()
+        self._plan()
+
+    def _field(self, name: str) -> tuple[int, int]:
+        return self.kit.chip.sfrs[self.con.name].fields[name]
+
+    # -- outside clock and gate --------------------------------------------------------------------------------------
+
+    def _edge(self, cycle: int, _changed: int, levels: int) -> None:
+        if self.is_frozen or self.is_taken or not self.con["TON"]:
+            return
+        rising = bool(levels & self._pin)
+        if self.con["TCS"]:
+            if rising and self._source.value == PIN:
+                self._count_edge(cycle)
+        elif self.con["TGATE"]:
+            self._gate(cycle, rising)
+
+    def _count_edge(self, cycle: int) -> None:
+        """One rising edge in `cycle` is counted in the cycle behind it (§7 rule 9)."""
+        self._before.value = self.count(cycle)
+        self.base.value = cycle + 1
+        phase = self._phase.value + 1
+        if phase < self._prescale:
+            self._phase.value = phase
+            return
+        self._phase.value = 0
+        start = self._start
+        self._start = count = advance(start, 1, self.limit, self.top)
+        if count == self.limit and count != 0:
+            self.events.set(self._match, cycle + 2)
+        self._tell()
+
+    def _gate(self, cycle: int, opened: bool) -> None:
+        """The gate is synchronised for one Tcy; its falling edge raises the flag (§7)."""
+        self._fold(cycle + 1, self._prescale, self.limit)
+        self._source.value = TCY if opened else STOPPED
+        self._plan()
+        if not opened:
+            self.closed.value = cycle + 2
+            self.events.set(self._match, cycle + 2)
+
+    def _waveform_changes(self, cycle: int) -> None:
+        """A described clock is about to change: count what came before, then look at the pins again."""
+        if self._source.value in (WAVE, PIN) and not self.is_frozen:
+            self._fold(cycle, self._prescale, self.limit)
+
+    def _waveform_changed(self) -> None:
+        """A described clock has changed its future."""
+        if self._source.value in (WAVE, PIN):
+            self._source.value = self._choose_source()
+            self._plan()
+
+    def listen(self, on_match: Callable[[int], None], wanted: bool) -> None:
+        """Call `on_match(due)` at each match from now on, or no longer (ADC trigger, §13)."""
+        if wanted != (on_match in self._on_match):
+            self._on_match.append(on_match) if wanted else self._on_match.remove(on_match)
+            self._listeners.value = len(self._on_change) + len(self._on_match)
+            self._plan()
+
+    def tell_changes(self, on_change: Callable[[], None], wanted: bool) -> None:
+        """Call `on_change()` whenever the course of the count has changed, or no longer (output compare, §9)."""
+        if wanted != (on_change in self._on_change):
+            self._on_change.append(on_change) if wanted else self._on_change.remove(on_change)
+            self._listeners.value = len(self._on_change) + len(self._on_match)
+
+    # -- match -------------------------------------------------------------------------------------------------------
+
+    def _fire(self, due: int) -> None:
+        (self.high or self).line.request() if self.is_wide else self.line.request()
+        for listener in self._on_match:
+            listener(due)
+        source = self._source.value
+        if source == TCY:
+            self._post(due - 1)
+        elif source == WAVE:
+            self._post_edges(due)
+        if self.tick.value and self.limit and not self._is_gated and not self._on_match:
+            self.period.value = (self.limit + 1) * self.tick.value
+
+    # -- power and reset ---------------------------------------------------------------------------------------------
+
+    def reset(self, power_on: bool) -> None:
+        """Stopped; the count survives every reset but power-on in silicon, and reads 0 here."""
+        for cell in (self.base, self.tick, self.period, self._source, self._phase, self._before):
+            cell.value = 0
+        self.closed.value = NEVER
+
+    def stops_in(self, mode: int) -> bool:
+        """Only timer 1 as asynchronous counter runs in Sleep (§7)."""
+        if mode == SLEEP:
+            return not (self.site.kind == "A" and self.con["TCS"] and not self.con["TSYNC"])
+        owner = self.low if self.is_taken and self.low is not None else self
+        return mode == IDLE and bool(owner.con["TSIDL"])
+
+    def freeze(self, cycle: int, mode: int) -> None:
+        """Count what came before, so that only the remainder waits."""
+        self.clear_until.value = 0
+        self._fold(max(cycle, self.base.value), self._prescale, self.limit)
+        super().freeze(cycle, mode)
+        self._tell()
+
+    def thaw(self, cycle: int) -> None:
+        """Gate and described clocks did not wait: what they are now decides how it goes on. A match that had been
+        counted when the clock stopped still raises its flag."""
+        waiting = self.held_since(self._match)
+        super().thaw(cycle)
+        if not self.is_taken and self.con["TON"] and (self.con["TCS"] or self.con["TGATE"]):
+            self._source.value = self._choose_source()
+            self.tick.value = self._prescale if self._source.value == TCY and not self.is_wide else 0
+            if self.con["TCS"] and (waiting == NEVER or waiting > 1):
+                self._post(self.now)
+        if self._source.value == TCY:
+            self._empty_prescaler()
+        self._tell()
+
+    def switched_off(self) -> None:
+        """The upper half of a pair is a timer of its own without the lower one."""
+        if self.is_wide:
+            joined = self.con.value
+            self.con.value = joined & ~self._t32
+            self._join_changed(joined, self.con.value)
+
+    def restart(self) -> None:
+        """Nobody can plan by a timer that is off."""
+        super().restart()
+        self._tell()
+
+    def _read_and_latch(self) -> int:
+        """Reading the lower half latches the upper half, in 32-bit mode (§7)."""
+        count = self.count(self.clock)
+        if self._hold is not None and self.is_wide:
+            self._hold.value = count >> 16
+        return count & 0xFFFF
+
+
+def timers(kit: Kit) -> dict[int, Timer]:
+    """The timers of a chip by number, paired."""
+    by_number = {site.number: Timer(site, kit) for site in kit.chip.timers}
+    for site in kit.chip.timers:
+        if site.kind == "B":
+            by_number[site.number].pair(by_number[site.partner])
+    return by_number

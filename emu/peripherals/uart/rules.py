@@ -1,0 +1,227 @@
+"""What a UART does (§10): text for every engine.
+
+The rules at the end are its common case; around the same text `uart.py` adds what needs Python: listeners that must
+hear at once, loopback, autobaud, senders at another rate, a log of edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+from emu.peripherals.uart.frame import FRAMING_MARK, PARITY_MARK, data_of, first_stop, is_nine, judge, length, pack
+from emu.peripherals.uart.rx_line import CAPACITY, ERRORS, LinePlaces
+from emu.system.events import NEVER
+from emu.system.rules import Line, Number, Place, Reader, Slot, request
+
+FIFO: Final = 4
+"""Depth of the transmit and receive FIFOs (§10.1, §10.2)."""
+SENT: Final = 64
+"""Characters that have left and need not be told at once."""
+QUIET, COMING, SAMPLING = range(3)
+"""Receiver states: no frame, start bit posted (loopback), inside a frame."""
+_FILL: Final = (0, 0, 3, 4)
+"""By URXISEL: characters in the FIFO that request an interrupt; 0: each does."""
+CHARACTER: Final = 0x1FF
+"""Data bits of an element of the receive FIFO."""
+
+
+@dataclass(frozen=True, slots=True)
+class UartPlaces:
+    """Registers and cells of one UART."""
+
+    mode: Place
+    sta: Place
+    brg: Place
+    txreg: Place
+    bit: Mapping[str, int]
+    """Masks of the fields of UxMODE and UxSTA, which have different names."""
+    urxisel: int
+    """Its lowest bit."""
+    writable: int
+    """Bits of UxTXREG."""
+    clock: Place
+    tx: Place
+    tx_count: Place
+    shifting: Place
+    frame: Place
+    wave: Place
+    start: Place
+    end: Place
+    bit_began: Place
+    rx: Place
+    rx_count: Place
+    held: Place
+    receiving: Place
+    incoming: Place
+    done: Place
+    rx_wave: Place
+    rx_start: Place
+    rx_bit: Place
+    line_free: Place
+    frozen: Place
+    at_once: Place
+    """Whether somebody must hear of a character in the cycle in which it has left."""
+    sent: Place
+    sent_count: Place
+    watched: Place
+    """Pins of TX's port whose edges somebody wants to see, TX among them while edges are logged."""
+    tx_pin: int
+    line: LinePlaces
+    send_slot: Slot
+    receive_slot: Slot
+    line_slot: Slot
+    send_line: Line
+    receive_line: Line
+
+
+# -- transmit --------------------------------------------------------------------------------------------------------
+def push(m: Reader, u: UartPlaces, value: Number, lanes: int) -> bool:
+    """TXREG written: the low byte pushes; a full FIFO drops the character (§10.1)."""
+    mode, status, count, due = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.send_slot.due)
+    free = u.writable & lanes
+    word = (m.get(u.txreg) & (0xFFFF & ~free)) | (value & free)
+    taken = ((mode & u.bit["UARTEN"]) != 0) & (count < FIFO) & int(bool(lanes & 0xFF))
+    starts = taken & ((status & u.bit["UTXEN"]) != 0) & (m.get(u.shifting) == 0)
+    place = m.select(taken, count, 0)
+    filled = (status & (0xFFFF & ~u.bit["TRMT"])) | m.select(count + 1 == FIFO, u.bit["UTXBF"], 0)
+    m.put(u.tx, m.select(taken, data_of(mode, word), m.get(u.tx, place)), place)
+    m.put(u.txreg, word)
+    m.put(u.tx_count, m.select(taken, count + 1, count))
+    m.put(u.sta, m.select(taken, filled, status))
+    m.post(u.send_slot, m.select(starts, m.now + 1, due))
+    return True
+
+
+def bit_time(m: Reader, u: UartPlaces) -> Number:
+    """Length of a bit in Tcy: 16 (BRG + 1)."""
+    return (m.get(u.brg) + 1) << 4
+
+
+def edge(m: Reader, u: UartPlaces, cycle: Number, step: Number) -> Number:
+    """The first edge of the free-running baud clock, divided to `step` Tcy, that is not before `cycle`."""
+    clock = m.get(u.clock)
+    return clock + m.div(cycle - clock + step - 1, step) * step
+
+
+def send_next(m: Reader, u: UartPlaces, cycle: Number) -> None:
+    """FIFO to TSR: the start bit begins at the next edge of the bit clock (§10.1). An empty FIFO: TRMT rises."""
+    mode, status, count, ended = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.end)
+    waits, data, bit = count != 0, m.get(u.tx), bit_time(m, u)
+    free = m.select(ended == cycle, cycle, edge(m, u, cycle, bit))
+    start = m.select(free == m.get(u.clock), free + bit, free)
+    end = start + length(mode) * bit
+    for place in range(FIFO - 1):
+        m.put(u.tx, m.select(waits, m.get(u.tx, place + 1), m.get(u.tx, place)), place)
+    m.put(u.tx_count, m.select(waits, count - 1, 0))
+    m.put(u.sta, m.select(waits, status & (0xFFFF & ~u.bit["UTXBF"]), status | u.bit["TRMT"]))
+    m.put(u.frame, m.select(waits, data, m.get(u.frame)))
+    m.put(u.wave, m.select(waits, pack(mode, data), m.get(u.wave)))
+    m.put(u.bit_began, m.select(waits, start, m.get(u.bit_began)))
+    m.put(u.start, m.select(waits, start, NEVER))
+    m.put(u.end, m.select(waits, end, NEVER))
+    m.put(u.shifting, waits)
+    m.post(u.send_slot, m.select(waits, end, NEVER))
+    request(m, u.send_line, cycle, waits & (((status & u.bit["UTXISEL"]) == 0) | (count == 1)))
+
+
+# -- receive ---------------------------------------------------------------------------------------------------------
+def arrive(m: Reader, u: UartPlaces, start: Number, wave: Number, sampled: Number, bit_q8: Number) -> None:
+    """A frame's start bit falls in cycle `start`; `wave` is what is on the line, `sampled` what will be seen of it,
+    `bit_q8` the sender's bit time in Tcy/256."""
+    mode, tick = m.get(u.mode), m.get(u.brg) + 1
+    middle = edge(m, u, start, tick) + ((first_stop(mode) << 4) + 8) * tick  # of the first stop bit (§10.2)
+    m.put(u.incoming, judge(mode, sampled))
+    m.put(u.rx_bit, bit_q8)
+    m.put(u.done, middle)
+    m.put(u.rx_wave, (wave | 0xFFFF << length(mode)) & 0xFFFF)  # behind the frame the line is high
+    m.put(u.rx_start, start)
+
+
+def begin(m: Reader, u: UartPlaces) -> None:
+    """The start bit has begun."""
+    m.put(u.receiving, SAMPLING)
+    m.put(u.sta, m.get(u.sta) & (0xFFFF & ~u.bit["RIDLE"]))
+    m.post(u.receive_slot, m.get(u.done))
+
+
+def shown(u: UartPlaces, status: Number, count: Number, top: Number) -> Number:
+    """`status` with URXDA, PERR and FERR, which belong to the character at the top of the FIFO (§10.2)."""
+    bit, some = u.bit, count != 0
+    others = status & (0xFFFF & ~(bit["URXDA"] | bit["PERR"] | bit["FERR"]))
+    wrong = some & ((top & PARITY_MARK) != 0)
+    broken = some & ((top & FRAMING_MARK) != 0)
+    return others | some * bit["URXDA"] | wrong * bit["PERR"] | broken * bit["FERR"]
+
+
+def receive(m: Reader, u: UartPlaces) -> None:
+    """A character is complete: FIFO, or the shift register when the FIFO is full (§10.2)."""
+    bit, mode, count, character = u.bit, m.get(u.mode), m.get(u.rx_count), m.get(u.incoming)
+    status = m.get(u.sta) | bit["RIDLE"]
+    unaddressed = ((status & bit["ADDEN"]) != 0) & is_nine(mode) & ((character & 0x100) == 0)
+    kept = (((m.get(u.held) != 0) | ((status & bit["OERR"]) != 0) | unaddressed) == 0) & (count <= FIFO)
+    full, after = count == FIFO, count + 1
+    wanted = m.table(_FILL, status >> u.urxisel & 3)
+    top = m.select(count == 0, character, m.get(u.rx))
+    last = m.get(u.rx, count)
+    m.put(u.receiving, QUIET)
+    m.put(u.rx, m.select(kept, character, last), count)
+    m.put(u.held, m.select(kept & full, 1, m.get(u.held)))
+    taken = kept & (full == 0)
+    m.put(u.rx_count, m.select(taken, after, count))
+    status = m.select(taken, shown(u, status, after, top), status)
+    m.put(u.sta, status | m.select(kept & full, bit["OERR"], 0))
+    request(m, u.receive_line, m.now, taken & ((wanted == 0) | (wanted == after)))
+
+
+def pop(m: Reader, u: UartPlaces) -> Number:
+    """RXREG read: the top of the FIFO, which goes; an empty one shows the last character again."""
+    count, data, before = m.get(u.rx_count), m.get(u.rx), m.get(u.sta)
+    left = m.select(count == 0, 0, count - 1)
+    elements = [m.get(u.rx, place) for place in range(FIFO)]
+    status = shown(u, before, left, elements[1])
+    for place, (element, following) in enumerate(pairwise(elements)):
+        m.put(u.rx, m.select(left > place, following, element), place)
+    m.put(u.rx_count, left)
+    m.put(u.sta, m.select(count == 0, before, status))
+    return data & CHARACTER
+
+
+# -- rules -----------------------------------------------------------------------------------------------------------
+def fire_send(m: Reader, u: UartPlaces) -> None:
+    """A frame has ended, or a character waits for the idle shift register."""
+    mode, count, told = m.get(u.mode), m.get(u.tx_count), m.get(u.sent_count)
+    sent = m.get(u.shifting) != 0
+    m.need((sent == 0) | ((m.get(u.end) <= m.now) & (m.get(u.at_once) == 0) & (told < SENT)))
+    m.need((((mode & u.bit["LPBACK"]) == 0) & ((m.get(u.watched) & u.tx_pin) == 0)) | (count == 0))
+    place = m.select(sent, told, 0)
+    character = m.select((m.get(u.sta) & u.bit["UTXBRK"]) == 0, m.get(u.frame), 0)
+    m.put(u.sent, m.select(sent, m.get(u.start) << 16 | character, m.get(u.sent, place)), place)
+    m.put(u.sent_count, m.select(sent, told + 1, told))
+    send_next(m, u, m.now)
+
+
+def fire_receive(m: Reader, u: UartPlaces) -> None:
+    """The middle of the stop bit."""
+    m.need(m.get(u.receiving) == SAMPLING)
+    receive(m, u)
+
+
+def fire_line(m: Reader, u: UartPlaces) -> None:
+    """A start bit falls on RX: a frame without errors, at the receiver's own rate."""
+    line, mode, count, head = u.line, m.get(u.mode), m.get(u.line.count), m.get(u.line.head)
+    data, following = m.get(line.data, head), m.select(head + 1 == CAPACITY, 0, head + 1)
+    plain = (mode & (u.bit["UARTEN"] | u.bit["LPBACK"] | u.bit["ABAUD"])) == u.bit["UARTEN"]
+    m.need(plain & (m.get(u.frozen) == NEVER) & (m.get(u.receiving) == QUIET) & (count != 0))
+    m.need((m.get(line.bit, head) == 0) & ((data & ERRORS) == 0) & ((m.get(line.more) == 0) | (count > CAPACITY // 2)))
+    bits, bit = length(mode), bit_time(m, u)
+    wave, free = pack(mode, data), m.now + bits * bit
+    earliest = m.get(line.earliest, following)
+    m.put(line.head, following)
+    m.put(line.count, count - 1)
+    m.put(u.line_free, free)
+    arrive(m, u, m.now, wave, wave, bit << 8)
+    begin(m, u)
+    m.post(u.line_slot, m.select(count == 1, NEVER, m.select(m.below(earliest, free), free, earliest)))

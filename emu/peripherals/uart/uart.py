@@ -1,0 +1,479 @@
+"""UART1/2 (§10): FIFOs, bit-exact line timing, error flags, interrupt modes, loopback, break, autobaud.
+
+The outside is bytes with cycles: `on_byte(byte, start_cycle)` when a frame has left the pin, `feed(bytes)` for frames
+that arrive at line rate. The level of the TX pin is a function of the cycle. What happens inside is the text of
+`uartrules.py`; here is what surrounds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from re import Match
+from typing import Final
+
+from emu.chips.chip import UartSite
+from emu.peripherals.base import SLEEP, Kit, Peripheral
+from emu.peripherals.interrupt_lines import Interrupts
+from emu.peripherals.pins import parse_pin
+from emu.peripherals.ports.ports import Port
+from emu.peripherals.timers.input_capture import Capture
+from emu.peripherals.uart.frame import first_stop, has_parity, length, pack, sample, stops
+from emu.peripherals.uart.rules import (
+    CHARACTER,
+    COMING,
+    FIFO,
+    QUIET,
+    SENT,
+    UartPlaces,
+    arrive,
+    begin,
+    bit_time,
+    edge,
+    fire_line,
+    fire_receive,
+    fire_send,
+    pop,
+    push,
+    receive,
+    send_next,
+    shown,
+)
+from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR, PATIENT, Frame, SerialLine
+from emu.peripherals.uart.tx_pin import TxPin
+from emu.peripherals.wait import Ear, Pattern
+from emu.system.events import NEVER
+from emu.system.observers import Listeners
+from emu.system.rules import Rule, place_of, slot_of
+
+_NO_SENT: Final = memoryview(bytes(8 * SENT)).cast("Q")
+
+
+class Uart(Peripheral):
+    """One UART. Bit time is 16 (BRG + 1) Tcy (§10)."""
+
+    def __init__(self, site: UartSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__(f"u{site.number}", kit)
+        self.site: Final = site
+        self._interrupts: Final = interrupts
+        prefix = f"U{site.number}"
+        self.mode: Final = self.register(prefix + "MODE")
+        self.sta: Final = self.register(prefix + "STA")
+        self.txreg: Final = self.register(prefix + "TXREG")
+        self.rxreg: Final = self.register(prefix + "RXREG")
+        self.brg: Final = self.register(prefix + "BRG")
+        self.idle_bit = (self.mode, "USIDL")
+        self.mode.written_by(self._mode_written)
+        self.sta.written_by(self._sta_written)
+        self.txreg.computed(lambda: 0)
+        self.rxreg.computed(lambda: self._rx[0] & CHARACTER)
+        self.brg.written_by(self._brg_written)
+        self._ear: Ear | None = None
+        self._at_once: Final = self.cell("at_once", "B")
+        """Whether somebody must hear of a character in the cycle in which it has left."""
+        self._sent: Final = self.array("sent", "Q", SENT)
+        """Characters that nobody has been told of: first cycle of the start bit << 16 | character."""
+        self._sent_count: Final = self.cell("sent_count", "B")
+        self._sent_to: Final[Listeners[[int, int]]] = Listeners(self.events, self._at_once.set)
+        self._capture: Capture | None = None
+        self._uarten: Final = 1 << kit.chip.sfrs[prefix + "MODE"].fields["UARTEN"][0]
+        tx_port, self._tx_pin = parse_pin(site.tx_pin)
+        rx_port, self._rx_pin = parse_pin(site.rx_pin)
+        self._tx_port: Final = ports[tx_port]
+        self._rx_port: Final = ports[rx_port]
+
+        self._clock: Final = self.moment("clock")
+        """Cycle the baud generator last started from 0."""
+        self._tx: Final = self.array("tx", "H", FIFO)
+        self._tx_count: Final = self.cell("tx_count", "B")
+        self._shifting: Final = self.cell("shifting", "B")
+        self._frame: Final = self.cell("frame", "H")
+        self._wave: Final = self.cell("wave", "H")
+        self._start: Final = self.moment("start", NEVER)
+        """Cycle the start bit in TSR began or begins."""
+        self._end: Final = self.moment("end", NEVER)
+        self._bit_began: Final = self.moment("bit_began", NEVER)
+        """Cycle the bit in bit 0 of the wave begins in: the start bit, or the one in which BRG was written."""
+        self._tx_event: Final = self.slot("tx", self._tx_due)
+        self._pin: Final = TxPin(kit.pins, tx_port, self._tx_pin, self._tx_level)
+
+        self._rx: Final = self.array("rx", "H", FIFO + 1)
+        """FIFO; data in bits 8:0, errors above. The last element is the character in the shift register."""
+        self._rx_count: Final = self.cell("rx_count", "B")
+        self._held: Final = self.cell("held", "B")
+        """The shift register holds a character that found the FIFO full."""
+        self._receiving: Final = self.cell("receiving", "B")
+        self._incoming: Final = self.cell("incoming", "H")
+        self._done: Final = self.moment("done", NEVER)
+        self._rx_event: Final = self.slot("rx", self._rx_due)
+        self._rx_wave: Final = self.cell("rx_wave", "H")
+        self._rx_start: Final = self.moment("rx_start", NEVER)
+        self._rx_bit: Final = self.cell("rx_bit", "I")
+        """Bit time of the sender in Tcy/256."""
+        self._edge_bit: Final = self.cell("edge_bit", "B")
+        self._edge_event: Final = self.slot("edge", self._edge_due)
+
+        self.line: Final = SerialLine(self.record, self.name)
+        self._line_free: Final = self.cell("line_free", "Q")
+        """First cycle the line is free for the next frame."""
+        self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
+        self._places: Final = self._registers()
+        self._ruled(self._places)
+
+    def _registers(self) -> UartPlaces:
+        sfrs = self.kit.chip.sfrs
+        cells = ("clock", "tx", "tx_count", "shifting", "frame", "wave", "start", "end", "bit_began", "rx", "rx_count",
+                 "held", "receiving", "incoming", "done", "rx_wave", "rx_start", "rx_bit", "line_free", "frozen",
+                 "at_once", "sent", "sent_count")  # fmt: skip
+        fields = {**sfrs[self.mode.name].fields, **sfrs[self.sta.name].fields}
+        return UartPlaces(
+            mode=self.mode.place,
+            sta=self.sta.place,
+            brg=self.brg.place,
+            txreg=self.txreg.place,
+            bit={name: ((1 << width) - 1) << lsb for name, (lsb, width) in fields.items()},
+            urxisel=fields["URXISEL"][0],
+            writable=sfrs[self.txreg.name].writable,
+            watched=place_of(self.record, "pins.eager", self._tx_port.index),
+            tx_pin=self._tx_pin,
+            line=self.line.places,
+            send_slot=slot_of(self.record, self._tx_event),
+            receive_slot=slot_of(self.record, self._rx_event),
+            line_slot=slot_of(self.record, self._line_event),
+            send_line=self._interrupts.line(self.site.tx_irq).line,
+            receive_line=self._interrupts.line(self.site.rx_irq).line,
+            **{name: place_of(self.record, f"{self.name}.{name}") for name in cells},
+        )
+
+    def _ruled(self, places: UartPlaces) -> None:
+        """What has rules; hooks for who has taken the rules off the bus run the same text."""
+        integers = self.bus.integers
+        self.txreg.ruled(Rule(places, writes=push))
+        self.txreg.written_by(lambda _old, new, lanes: self._push(new, lanes))
+        self.rxreg.ruled(Rule(places, takes=pop))
+        self.rxreg.read_by(lambda: pop(integers, places))
+        self.ruled(self._tx_event, Rule(places, fires=fire_send))
+        self.ruled(self._rx_event, Rule(places, fires=fire_receive))
+        self.ruled(self._line_event, Rule(places, fires=fire_line))
+
+    def listen(
+        self, listener: Callable[[int, int], object], *, part: bool = False, lazy: bool = False
+    ) -> Callable[[], None]:
+        """Call listener(byte, start_cycle) for every frame that has left TX; its start bit began in start_cycle. Any
+        number may listen. Returns how to remove this one. `part`: a part of the board, whose state depends on it.
+        `lazy`: it need not hear in that very cycle, but before the run ends; a machine runs faster if all are."""
+        return self._sent_to.add(listener, part=part, lazy=lazy)
+
+    def tell(self) -> None:
+        """Tell who listens what has been sent. The record keeps no trace of it."""
+        count = self._sent_count.value
+        if count:
+            entries = self._sent[:count].tolist()
+            self._sent_count.value = 0
+            self._sent[:count] = _NO_SENT[:count]
+            for entry in entries:
+                self._sent_to(entry & 0xFFFF, entry >> 16)
+
+    @property
+    def on_byte(self) -> Callable[[int, int], object] | None:
+        """One listener that an assignment replaces; those of `listen` hear as well."""
+        return self._sent_to.assigned
+
+    @on_byte.setter
+    def on_byte(self, listener: Callable[[int, int], object] | None) -> None:
+        self._sent_to.assigned = listener
+
+    def expect(self, pattern: Pattern, *, within: float) -> Match[bytes]:
+        """Run the machine until `pattern` has been sent, for at most `within` ms of simulated time.
+
+        A text or bytes mean themselves, a compiled pattern of bytes is searched. The search goes on behind the last
+        match; the first use begins to listen. The machine stops at the cycle the match's last byte has left the pin in.
+        Raises ExpectError (an AssertionError) with what was said instead, and with the fault if there was one.
+        """
+        if self._ear is None:
+            self._ear = Ear(self.name.upper().replace("U", "UART", 1), self.kit.wires, self.kit.fcy, lambda: self.now)
+            self.listen(self._ear.hear, lazy=True)
+        no_longer = self.listen(lambda _byte, _start: None)  # what ends a run must be heard at once
+        try:
+            return self._ear.expect(pattern, within, self.drain)
+        finally:
+            no_longer()
+
+    def connect_capture(self, capture: Capture) -> None:
+        """The capture channel that ABAUD connects to the receive pin."""
+        self._capture = capture
+
+    # -- settings ----------------------------------------------------------------------------------------------------
+
+    @property
+    def bit_time(self) -> int:
+        """Length of a bit in Tcy: 16 (BRG + 1)."""
+        return int(bit_time(self.bus.integers, self._places))
+
+    @property
+    def is_enabled(self) -> bool:
+        """UARTEN."""
+        return bool(self.mode.value & self._uarten)
+
+    @property
+    def is_sending_enabled(self) -> bool:
+        """UARTEN and UTXEN."""
+        return self.is_enabled and bool(self.sta["UTXEN"])
+
+    # -- transmit ----------------------------------------------------------------------------------------------------
+
+    def _push(self, value: int, lanes: int) -> None:
+        push(self.bus.integers, self._places, value, lanes)
+
+    def _tx_due(self, due: int) -> None:
+        """A frame has ended, or a character waits for the idle shift register."""
+        if self._shifting.value and due < self._end.value:
+            return
+        if self._shifting.value:
+            self._shifting.value = 0
+            self.tell()  # loopback cuts off the receive pin only: the frame has left TX (§10)
+            self._sent_to(0 if self.sta["UTXBRK"] else self._frame.value, self._start.value)
+        waits = self._tx_count.value > 0
+        send_next(self.bus.integers, self._places, due)
+        if waits:
+            start, mode = self._start.value, self.mode.value
+            self._pin.log_frame(start, self._wave.value, length(mode), self.bit_time)
+            if self.mode["LPBACK"]:
+                self._arrive(start, self._frame.value | (BREAK if self.sta["UTXBRK"] else 0), 0)
+
+    def _tx_level(self, cycle: int) -> int:
+        """Level of TX in `cycle`, 1 = idle."""
+        if self.sta["UTXBRK"]:
+            return 0
+        if not self._shifting.value or cycle < self._start.value:
+            return 1
+        return self._wave.value >> (cycle - self._bit_began.value) // self.bit_time & 1
+
+    def drain(self) -> None:
+        """Deliver what is still in the transmitter as a robot would: the pins outlive a stopped program."""
+        self.tell()
+        while self._shifting.value or (self._tx_count.value and self.is_sending_enabled):
+            self.events.cancel(self._tx_event)
+            self._tx_due(self._end.value if self._shifting.value else self.now + 1)
+
+    # -- receive -----------------------------------------------------------------------------------------------------
+
+    def feed(self, data: bytes | Iterable[int], cycle: int | None = None, *, errors: int = 0, baud: float = 0) -> None:
+        """Let frames arrive back to back on RX, at this UART's own bit time or at `baud` bits per second.
+
+        With `cycle` the first start bit is not before that cycle and a closed receiver loses the frames; without it
+        the sender waits until the receiver is enabled. `errors` may combine FRAMING_ERROR, PARITY_ERROR and BREAK.
+        """
+        bit = round(self.kit.fcy() * 256 / baud) if baud else 0
+        marks = errors | (PATIENT if cycle is None else 0)
+        self.line.put(Frame(cycle or 0, byte & 0x1FF | marks, bit) for byte in data)
+        self._plan_line()
+
+    def _plan_line(self) -> None:
+        """Post the start bit of the frame at the head of the line."""
+        frame = self.line.head()
+        if frame is None or (frame.data & PATIENT and not self._is_listening):
+            self.events.cancel(self._line_event)
+            return
+        self.events.set(self._line_event, max(frame.earliest, self._line_free.value, self.now + 1))
+
+    @property
+    def _is_listening(self) -> bool:
+        return self.is_enabled and (not self.is_frozen or bool(self.mode["WAKE"]))
+
+    def lose(self) -> bool:
+        """The next frame that is on its way to RX never comes; whether there was one."""
+        if self.line.head() is None:
+            return False
+        self.line.drop()
+        self._plan_line()
+        return True
+
+    def _line_due(self, due: int) -> None:
+        """A start bit falls on the RX pin."""
+        frame = self.line.head()
+        if frame is None:
+            return
+        self.line.drop()
+        bits = length(self.mode.value)
+        self._line_free.value = due + (bits * frame.bit + 255 >> 8 if frame.bit else bits * self.bit_time)
+        if self.mode["WAKE"] and self.is_frozen:
+            self._interrupts.line(self.site.rx_irq).request()
+            self.mode["WAKE"] = 0
+        elif self.is_enabled and not self.is_frozen and not self.mode["LPBACK"] and self._receiving.value == QUIET:
+            self._arrive(due, frame.data, frame.bit)
+        self._plan_line()
+
+    def _arrive(self, start: int, data: int, bit_q8: int) -> None:
+        """Sample a frame whose start bit falls in cycle `start`; `bit_q8` is the sender's bit time in Tcy/256."""
+        mode, text, places = self.mode.value, self.bus.integers, self._places
+        wave, bits, stop = pack(mode, data), length(mode), first_stop(mode)
+        if data & PARITY_ERROR and has_parity(mode):
+            wave ^= 1 << stop - 1
+        if data & (FRAMING_ERROR | BREAK):
+            wave &= 0 if data & BREAK else (1 << stop) - 1
+        tick = self.brg.value + 1
+        sampled = wave if not bit_q8 else sample(wave, bits, edge(text, places, start, tick) - start, tick, bit_q8)
+        arrive(text, places, start, wave, sampled, bit_q8 or self.bit_time << 8)
+        self._receiving.value = COMING
+        if start > self.now:
+            self.events.set(self._rx_event, start)
+        else:
+            self._rx_due(start)
+
+    def _rx_due(self, due: int) -> None:
+        text = self.bus.integers
+        if self._receiving.value != COMING:
+            receive(text, self._places)
+            return
+        begin(text, self._places)
+        if self.mode["ABAUD"]:
+            self._edge_bit.value = 0
+            self.events.set(self._edge_event, due)
+
+    def _show_top(self) -> None:
+        """URXDA, PERR and FERR belong to the character at the top of the FIFO (§10.2)."""
+        self.sta.value = int(shown(self._places, self.sta.value, self._rx_count.value, self._rx[0]))
+
+    def _edge_due(self, due: int) -> None:
+        """Autobaud: pass the edges of the RX pin to the capture module, starting with the start bit."""
+        bit = self._edge_bit.value
+        wave = self._rx_wave.value
+        if self._capture is not None:
+            self._capture.edge(due, bool(wave >> bit & 1))
+        for index in range(bit + 1, 16):
+            if wave >> index & 1 != wave >> bit & 1:
+                self._edge_bit.value = index
+                edge = self._rx_start.value + (index * self._rx_bit.value + 128 >> 8)
+                self.events.set(self._edge_event, max(edge, due + 1))
+                return
+
+    # -- control -----------------------------------------------------------------------------------------------------
+
+    def _mode_written(self, old: int, new: int, _lanes: int) -> None:
+        enable = 1 << self.kit.chip.sfrs[self.mode.name].fields["UARTEN"][0]
+        if (old ^ new) & enable:
+            if new & enable:
+                self._clock.value = self.now + 1
+                self._rx_port.own(self._rx_pin, drive=False, level=0)
+                self._sender_switched(self.is_sending_enabled)
+            else:
+                self._abort()
+        if "ALTIO" in self.kit.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
+            self.bus.lacks(f"{self.mode.name}.ALTIO, the UART keeps the pins it has")  # UNVERIFIED (§10)
+        self.restored()
+        self._plan_line()
+
+    def _sta_written(self, old: int, new: int, _lanes: int) -> None:
+        fields = self.kit.chip.sfrs[self.sta.name].fields
+        utxen, oerr = (1 << fields[name][0] for name in ("UTXEN", "OERR"))
+        if (old ^ new) & utxen and self.is_enabled:
+            self._sender_switched(bool(new & utxen))
+        if old & oerr and not new & oerr:  # only 1 -> 0 flushes (§10.2)
+            self._rx_count.value = 0
+            self._held.value = 0
+            self._show_top()
+
+    def _sender_switched(self, on: bool) -> None:
+        """UTXEN and UARTEN became both 1, or no longer are (§10.1)."""
+        self.restored()
+        if on:
+            self._tx_port.own(self._tx_pin, drive=True, level=1)
+            self._interrupts.line(self.site.tx_irq).request()
+            if self._tx_count.value:
+                self._clock.value = self.now + 1
+                self.events.set(self._tx_event, self.now + 1)
+            return
+        self._tx_port.disown(self._tx_pin)
+        self._tx_count.value = 0
+        self._shifting.value = 0
+        self._start.value = self._end.value = NEVER
+        self.events.cancel(self._tx_event)
+        self.sta["UTXBF"] = 0
+        self.sta["TRMT"] = 1
+
+    def _abort(self) -> None:
+        """UARTEN fell: FIFOs, flags and the baud counter are cleared, MODE and BRG are kept (§10.1)."""
+        self._sender_switched(False)
+        self._rx_port.disown(self._rx_pin)
+        self._rx_count.value = 0
+        self._held.value = 0
+        self._stop_receiving()
+        for flag in ("URXDA", "OERR", "FERR", "PERR", "UTXEN", "UTXBRK"):
+            self.sta[flag] = 0
+
+    def _stop_receiving(self) -> None:
+        """A character on its way is lost."""
+        self._receiving.value = QUIET
+        for slot in (self._rx_event, self._edge_event):
+            self.events.cancel(slot)
+        self.sta["RIDLE"] = 1
+
+    def give_back(self) -> None:
+        """TX and RX."""
+        self._tx_port.disown(self._tx_pin)
+        self._rx_port.disown(self._rx_pin)
+
+    def _brg_written(self, old: int, _new: int, _lanes: int) -> None:
+        """Writing BRG restarts the baud counter (§10), so the bit on the line lasts one bit time more.
+
+        UNVERIFIED: a character that arrives goes on at the rate it began with.
+        """
+        following, before, bit = self.now + 1, 16 * (old + 1), self.bit_time
+        self._clock.value = following
+        if not self._shifting.value or following >= self._end.value:
+            return
+        heard = bool(self.mode["LPBACK"]) and self._receiving.value and self._rx_start.value == self._start.value
+        began = self._bit_began.value
+        passed = max(following - began, 0) // before
+        bits = (self._end.value - began) // before - passed
+        if following > began:
+            self._wave.value >>= passed
+            self._bit_began.value = following
+        else:  # the start bit has not begun
+            self._start.value = self._bit_began.value = following + bit
+        self._end.value = self._bit_began.value + bits * bit
+        self.events.set(self._tx_event, self._end.value)
+        if heard:  # in loopback the receiver follows
+            self._rx_start.value = self._start.value
+            self._done.value = self._end.value - stops(self.mode.value) * bit + bit // 2
+            is_coming = self._receiving.value == COMING
+            self.events.set(self._rx_event, self._start.value if is_coming else self._done.value)
+
+    # -- power and reset ---------------------------------------------------------------------------------------------
+
+    def reset(self, power_on: bool) -> None:
+        """Disabled and empty. Frames on the line are the outside's affair and stay."""
+        self.restored()
+        self._tx_count.value = self._shifting.value = 0
+        self._rx_count.value = self._held.value = self._receiving.value = 0
+        self._start.value = self._end.value = NEVER
+        self._clock.value = 0
+        self._plan_line()
+
+    def freeze(self, cycle: int, mode: int) -> None:
+        """In Idle with USIDL everything waits; Sleep cuts off what is under way, TX rests high. UNVERIFIED: §10 does
+        not say what becomes of a reception."""
+        if mode == SLEEP and (self._shifting.value or self._tx_count.value):
+            self.events.cancel(self._tx_event)
+            self._tx_count.value = self._shifting.value = 0
+            self._start.value = self._end.value = NEVER
+            self.sta["UTXBF"] = 0
+            self.sta["TRMT"] = 1
+        if mode == SLEEP:
+            self._stop_receiving()
+        super().freeze(cycle, mode)
+
+    def restored(self) -> None:
+        """The TX pin carries the waveform while the sender is enabled."""
+        if self.is_sending_enabled:
+            self.kit.pins.attach(self._tx_port.index, self._tx_pin, self._pin)
+        else:
+            self.kit.pins.detach(self._tx_port.index, self._pin)
+        self._at_once.set(self._sent_to.urgent)
+        if self._capture is not None:
+            self._capture.autobaud = bool(self.mode["ABAUD"])
+
+    def thaw(self, cycle: int) -> None:
+        """Frames that waited for the receiver may come."""
+        super().thaw(cycle)
+        self._plan_line()

@@ -1,0 +1,215 @@
+/* Who called whom, followed from the notes of emu/dspic30f/cycle_accounting.py: stacks of frames, one for each stack of the
+   firmware, and for every place of a call how often it called what and how long that took.
+
+   A return belongs to the call whose return address lay where it takes its own from. So a return into another stack is a
+   switch of threads, and what is left above is gone. Time asleep, in interrupts and in other threads is nobody's time. */
+typedef unsigned char u8;
+typedef unsigned short u16;
+typedef unsigned int u32;
+typedef unsigned long long u64;
+
+enum { STACKS = 128, DEPTH = 2048, EDGES = 1 << 16, TOP = 0xFFFFFFu };
+enum { CALLED = 1, RETURNED, ENTERED, SLEPT, RESET };
+enum { OPEN = 1, CLOSE, SWITCH, SLEEP };
+
+typedef struct { u64 start, stolen; u32 site, entry, place, level, edge; } Frame;
+typedef struct { u64 left; u32 depth; Frame frame[DEPTH]; } Stack;
+typedef struct { u64 key, calls, cycles, most, least; } Edge;
+typedef struct { u64 cycle, since; u32 what, stack, level, entry, site, length; } Turn;
+typedef struct {
+    u64 now;
+    u32 current, lost, edges, spare;
+    Turn *turn;
+    u64 turns;
+    Edge edge[EDGES];
+    Stack stack[STACKS];
+} Tree;
+
+static u32 edge_of(Tree *t, u32 site, u32 entry) {
+    u64 key = ((u64)site << 32 | entry) + 1;
+    u32 at = (u32)(key * 0x9E3779B97F4A7C15ull >> 48) & (EDGES - 1);
+    while (t->edge[at].key && t->edge[at].key != key) at = (at + 1) & (EDGES - 1);
+    if (!t->edge[at].key) {
+        if (t->edges >= EDGES - 1) {
+            t->lost++;
+            return at;
+        }
+        t->edge[at].key = key;
+        t->edges++;
+    }
+    return at;
+}
+
+static void tell(Tree *t, u32 what, const Frame *f, u64 since, u32 length) {
+    if (!t->turn) return;
+    Turn *turn = &t->turn[t->turns++];
+    turn->cycle = t->now;
+    turn->since = since;
+    turn->what = what;
+    turn->stack = t->current;
+    turn->level = f ? f->level : 0;
+    turn->entry = f ? f->entry : 0;
+    turn->site = f ? f->site : 0;
+    turn->length = length;
+}
+
+static void push(Tree *t, u64 start, u32 site, u32 entry, u32 place, u32 level, u64 since) {
+    Stack *s = &t->stack[t->current];
+    if (s->depth == DEPTH) {
+        t->lost++;
+        return;
+    }
+    Frame *f = &s->frame[s->depth++];
+    *f = (Frame){start, 0, site, entry, place, level, edge_of(t, level ? TOP : site, entry)};
+    t->edge[f->edge].calls++;
+    u64 now = t->now;
+    t->now = start;
+    tell(t, OPEN, f, since, 0);
+    t->now = now;
+}
+
+/* The top frame of the present stack ends. Inclusive time of recursion counts for the outermost call. */
+static void pop(Tree *t) {
+    Stack *s = &t->stack[t->current];
+    Frame *f = &s->frame[--s->depth];
+    u64 all = t->now - f->start;
+    int outermost = 1;
+    if (!f->level)
+        for (u32 i = s->depth; i-- > 0;) {
+            if (s->frame[i].edge == f->edge) outermost = 0;
+            if (s->frame[i].level) break;
+        }
+    if (outermost) {
+        Edge *e = &t->edge[f->edge];
+        u64 own = all - f->stolen;
+        e->cycles += own;
+        if (own > e->most) e->most = own;
+        if (!e->least || own < e->least) e->least = own;
+    }
+    if (s->depth) s->frame[s->depth - 1].stolen += f->level ? all : f->stolen;
+    tell(t, CLOSE, f, 0, 0);
+}
+
+static void to_stack(Tree *t, u32 other) {
+    Stack *s = &t->stack[other];
+    t->stack[t->current].left = t->now;
+    t->current = other;
+    if (s->depth) s->frame[s->depth - 1].stolen += t->now - s->left;
+    tell(t, SWITCH, 0, 0, 0);
+}
+
+static int find(const Stack *s, u32 place) {
+    for (u32 i = s->depth; i-- > 0;)
+        if (s->frame[i].place == place) return (int)i;
+    return -1;
+}
+
+/* An unused stack, else the one that was left first. */
+static u32 fresh(Tree *t) {
+    u32 best = t->current ? 0 : 1;
+    for (u32 i = 0; i < STACKS; i++) {
+        if (i == t->current) continue;
+        if (!t->stack[i].depth) return i;
+        if (t->stack[i].left < t->stack[best].left) best = i;
+    }
+    t->stack[best].depth = 0;
+    return best;
+}
+
+static void returned(Tree *t, u32 site, u32 place, u32 target) {
+    int at = find(&t->stack[t->current], place);
+    if (at < 0) {
+        u32 other = STACKS;
+        for (u32 i = 0; i < STACKS && at < 0; i++)
+            if (i != t->current && (at = find(&t->stack[i], place)) >= 0) other = i;
+        if (other == STACKS) {
+            to_stack(t, fresh(t));
+            push(t, t->now, site, target, ~0u, 0, 0);
+            return;
+        }
+        to_stack(t, other);
+    }
+    while (t->stack[t->current].depth > (u32)at) pop(t);
+}
+
+static void close_all(Tree *t) {
+    for (u32 i = 0; i < STACKS; i++) {
+        if (!t->stack[i].depth) continue;
+        if (i != t->current) to_stack(t, i);
+        while (t->stack[i].depth) pop(t);
+    }
+}
+
+u64 tree_size(void) { return sizeof(Tree); }
+
+/* The program is at `entry` in cycle `now`. */
+void tree_begin(Tree *t, u64 now, u64 entry) {
+    t->now = now;
+    push(t, now, TOP, (u32)entry, ~0u, 0, 0);
+}
+
+/* Forget what has been counted; who is where stays. */
+void tree_clear(Tree *t, u64 now) {
+    for (u32 i = 0; i < EDGES; i++) t->edge[i].calls = t->edge[i].cycles = t->edge[i].most = t->edge[i].least = 0;
+    for (u32 i = 0; i < STACKS; i++) {
+        Stack *s = &t->stack[i];
+        if (i != t->current) s->left = now;
+        for (u32 k = 0; k < s->depth; k++) s->frame[k].start = now, s->frame[k].stolen = 0;
+    }
+    t->now = now;
+}
+
+void tree_end(Tree *t, u64 now) {
+    t->now = now;
+    close_all(t);
+}
+
+/* Frames that are open, in all stacks. */
+u64 tree_open(const Tree *t) {
+    u64 sum = 0;
+    for (u32 i = 0; i < STACKS; i++) sum += t->stack[i].depth;
+    return sum;
+}
+
+/* Follow `count` notes; `turn` gets what happened, at most 2 * count turns and one for every open frame and stack. */
+u64 tree_follow(Tree *t, const u64 *note, u64 count, Turn *turn) {
+    t->turn = turn;
+    t->turns = 0;
+    for (; count; count--, note += 4) {
+        u32 kind = note[1] & 0xFF, level = note[1] >> 8 & 0xFF, place = note[1] >> 16 & 0xFFFF;
+        u32 site = (u32)(note[1] >> 32), target = (u32)note[2], cycles = (u32)(note[2] >> 32);
+        t->now = note[0];
+        if (kind == CALLED)
+            push(t, t->now, site, target, place, 0, 0);
+        else if (kind == RETURNED)
+            returned(t, site, place, target);
+        else if (kind == ENTERED)
+            push(t, t->now - cycles, site, target, place, level + 1, note[3]);
+        else if (kind == SLEPT) {
+            Stack *s = &t->stack[t->current];
+            if (s->depth) s->frame[s->depth - 1].stolen += cycles;
+            tell(t, SLEEP, 0, 0, cycles);
+        } else if (kind == RESET) {
+            close_all(t);
+            push(t, t->now, TOP, 0, ~0u, 0, 0);
+        }
+    }
+    t->turn = 0;
+    return t->turns;
+}
+
+/* The edges in use: call site or 0xFFFFFF, entry, calls, cycles, those of the longest and the shortest call. */
+u64 tree_edges(const Tree *t, u64 *out) {
+    u64 n = 0;
+    for (u32 i = 0; i < EDGES; i++)
+        if (t->edge[i].key && (t->edge[i].calls || t->edge[i].cycles)) {
+            u64 key = t->edge[i].key - 1;
+            const Edge *e = &t->edge[i];
+            u64 row[] = {key >> 32, (u32)key, e->calls, e->cycles, e->most, e->least};
+            for (u32 k = 0; k < 6; k++) out[6 * n + k] = row[k];
+            n++;
+        }
+    return n;
+}
+
+u64 tree_lost(const Tree *t) { return t->lost; }

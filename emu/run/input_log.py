@@ -1,0 +1,45 @@
+"""Input stamped with the cycle of its arrival: what a live session records and a replay gives back.
+
+The file is text, one line per arrival, `CYCLE UART HEX`, in order of time; lines that start with # are remarks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, TextIO
+
+from emu.host.files import read_file
+
+HEADER: Final = "# input stamps: cycle, UART, bytes in hex"
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """`data` began to arrive at UART number `uart` at `cycle` (Tcy since power-on)."""
+
+    cycle: int
+    uart: int
+    data: bytes
+
+    def write(self, stream: TextIO) -> None:
+        """Append the stamp to a record file."""
+        stream.write(f"{self.cycle} {self.uart} {self.data.hex()}\n")
+
+
+def read_stamps(path: str, uarts: tuple[int, ...]) -> list[Stamp]:
+    """The stamps of a record file. Raises ValueError with the line of the first mistake, OSError if unreadable."""
+    stamps: list[Stamp] = []
+    for number, line in enumerate(read_file(path).decode("ascii", "replace").splitlines(), start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        try:
+            cycle, uart, data = line.split()
+            stamp = Stamp(int(cycle), int(uart), bytes.fromhex(data))
+        except ValueError:
+            raise ValueError(f"{path}: line {number}: expected `CYCLE UART HEX`, found {line[:40]!r}") from None
+        if stamp.uart not in uarts:
+            raise ValueError(f"{path}: line {number}: there is no UART{stamp.uart}")
+        if stamp.cycle < (stamps[-1].cycle if stamps else 0):
+            raise ValueError(f"{path}: line {number}: cycle {stamp.cycle} lies before the line above it")
+        stamps.append(stamp)
+    return stamps

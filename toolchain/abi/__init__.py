@@ -1,0 +1,1 @@
+"""ABI facts: registers, argument placement, assembler names, interrupt names, struct alignment."""

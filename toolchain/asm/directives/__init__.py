@@ -1,0 +1,1 @@
+"""Assembler directives: sections, data, symbols, macros, repeats and include files."""

@@ -1,0 +1,195 @@
+"""What a conditional branch says about the registers compared in front of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from toolchain.bounds.abstract.state import State
+from toolchain.bounds.abstract.values import Span, Value, ends, span
+from toolchain.bounds.graph import Step
+
+_SIGN = 0x8000
+_OPPOSITE = {"LTU": "GEU", "LEU": "GTU", "LT": "GE", "LE": "GT", "Z": "NZ", "N": "NN"}
+_OPPOSITE |= {b: a for a, b in _OPPOSITE.items()}
+_NAMES = {"C": "GEU", "NC": "LTU"}
+
+
+_WIDTH = 0x10000
+_WAYS = {
+    "Z": [(0, 0)],
+    "NZ": [(-_WIDTH, -1), (1, _WIDTH)],
+    "N": [(-_SIGN, -1), (_SIGN, _WIDTH - 1)],
+    "NN": [(-_WIDTH, -_SIGN - 1), (0, _SIGN - 1)],
+    "GEU": [(0, _WIDTH)],
+    "GTU": [(1, _WIDTH)],
+    "LTU": [(-_WIDTH, -1)],
+    "LEU": [(-_WIDTH, 0)],
+}
+"""Where a difference lies for a condition; those that take OV are left alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What an instruction has written to a register and its flags tell of: one of lo..hi, modulo 2**16.
+
+    borrows  whether it is a difference, below zero where C is clear
+    """
+
+    register: int
+    lo: int
+    hi: int
+    borrows: bool
+
+    @classmethod
+    def of(cls, step: Step, before: list[Value], after: list[Value]) -> Result:
+        """The result of a step that `tested` found, from the registers on both sides of it."""
+        row, x = step.insn.row, step.insn.x
+        less = _LESS.get(row.mnemonic)
+        source = x.s if less is not None else 0
+        if row.mnemonic == "SUB" and "k" in row.fields:
+            less, source = x.k, x.w if "w" in row.fields else x.d
+        if less is None or ("p" in row.fields and x.p):
+            return cls(x.d, *ends(after[x.d]), False)
+        lo, hi = ends(before[source])
+        return cls(x.d, lo - less, hi - less, True)
+
+    def where(self, condition: str, now: Value) -> Value | None:
+        """The members of `now`, the register, for which a condition can hold; None: there are none."""
+        if condition not in _WAYS or (condition.endswith("U") and not self.borrows):
+            return now
+        parts = [(max(self.lo, a), min(self.hi, b)) for a, b in _WAYS[condition]]
+        parts = [(a, b) for a, b in parts if a <= b]
+        if not parts:
+            return None
+        if any(a // _WIDTH != b // _WIDTH for a, b in parts):
+            return now  # on both sides of zero
+        low, high = ends(now)
+        least = max(low, min(a % _WIDTH for a, _ in parts))
+        most = min(high, max(b % _WIDTH for _, b in parts))
+        return _cut(now, least, most) if least <= most else now
+
+
+_RESULTS = {"ADD", "SUB", "INC", "INC2", "DEC", "DEC2", "AND", "IOR", "XOR", "LSR", "ASR", "SL", "NEG", "COM"}
+"""Instructions whose Z and N tell of what they write."""
+_LESS = {"DEC": 1, "DEC2": 2}
+
+
+def tested(steps: list[Step]) -> int | None:
+    """Which of the steps leaves in a register, until the end, the result that its flags tell of."""
+    written = 0
+    for index in range(len(steps) - 1, -1, -1):
+        row, x = steps[index].insn.row, steps[index].insn.x
+        if row.flags:
+            if row.mnemonic not in _RESULTS or "d" not in row.fields:
+                return None
+            if ("B" in row.fields and x.B) or ("q" in row.fields and x.q):
+                return None
+            return None if written >> x.d & 1 else index
+        written |= steps[index].writes
+    return None
+
+
+def refined(steps: list[Step], state: State, taken: bool, result: Result | None = None) -> bool:
+    """Narrow registers in `state`, which went one way behind the branch that ends `steps`; False: none can go there.
+
+    result  what the instruction that set the flags wrote, where that still stands
+    """
+    condition = steps[-1].insn.row.syntax.partition(" ")[2].partition(",")[0]
+    condition = _NAMES.get(condition, condition)
+    if condition not in _OPPOSITE:
+        return True
+    if not taken:
+        condition = _OPPOSITE[condition]
+    if result is not None:
+        left_over = result.where(condition, state.w[result.register])
+        if left_over is None:
+            return False
+        state.w[result.register] = left_over
+    compared = _compared(steps)
+    if compared is None:
+        return True
+    left, right = compared
+    a = state.w[left]
+    b: Value = state.w[right[1]] if isinstance(right, tuple) else right
+    narrow = _narrowed(condition, a, b)
+    if narrow is None:
+        return False
+    state.w[left] = narrow[0]
+    if isinstance(right, tuple):
+        state.w[right[1]] = narrow[1]
+    return True
+
+
+def _compared(steps: list[Step]) -> tuple[int, tuple[str, int] | int] | None:
+    """Left register, and right register or number, of a word comparison whose operands still stand."""
+    written = 0
+    for index in range(len(steps) - 2, -1, -1):
+        step = steps[index]
+        row, x = step.insn.row, step.insn.x
+        if row.flags:
+            if row.mnemonic == "SUB" and "k" in row.fields and not x.B:
+                return _subtracted(steps, index, written)
+            if row.mnemonic not in ("CP", "CP0") or ("B" in row.fields and x.B) or "f" in row.fields:
+                return None
+            if "p" in row.fields and x.p:
+                return None
+            left = x.w if row.mnemonic == "CP" else x.s
+            right: tuple[str, int] | int = 0
+            if row.mnemonic == "CP":
+                right = x.k if "k" in row.fields else ("w", x.s)
+            masks = 1 << left | (1 << right[1] if isinstance(right, tuple) else 0)
+            return None if written & masks else (left, right)
+        written |= step.writes
+    return None
+
+
+def _subtracted(steps: list[Step], index: int, written: int) -> tuple[int, int] | None:
+    """The register a literal was subtracted from, where its value still stands, or its copy made just before."""
+    insn = steps[index].insn
+    x, fields = insn.x, insn.row.fields
+    if "w" in fields:  # Wd <- Wb - lit5
+        kept = x.q == 0 and x.d != x.w and not written >> x.w & 1
+        return (x.w, x.k) if kept else None
+    if index == 0 or "f" in fields:
+        return None
+    copy = steps[index - 1].insn
+    if copy.row.mnemonic != "MOV" or "g" not in copy.row.fields or copy.x.B or copy.x.g or copy.x.h:
+        return None
+    other = copy.x.d if copy.x.s == x.d else copy.x.s if copy.x.d == x.d else x.d
+    return (other, x.k) if other != x.d and not written >> other & 1 else None
+
+
+def _narrowed(condition: str, a: Value, b: Value) -> tuple[Value, Value] | None:
+    """The members of a and b for which the condition can hold, None if there are none."""
+    if condition in ("LT", "LE", "GT", "GE", "N", "NN"):
+        low, high = ends(a), ends(b)
+        if any(lo < _SIGN <= hi for lo, hi in (low, high)) or (low[0] < _SIGN) != (high[0] < _SIGN):
+            return a, b  # signs differ, or are not known
+        if condition in ("N", "NN"):
+            condition = "LT" if condition == "N" else "GE"
+        condition += "U"
+    (al, ah), (bl, bh) = ends(a), ends(b)
+    match condition:
+        case "Z":
+            al, ah = max(al, bl), min(ah, bh)
+            bl, bh = al, ah
+        case "NZ":
+            if bl == bh:
+                al, ah = al + (al == bl), ah - (ah == bl)
+            elif al == ah:
+                bl, bh = bl + (bl == al), bh - (bh == al)
+        case "LTU":
+            ah, bl = min(ah, bh - 1), max(bl, al + 1)
+        case "LEU":
+            ah, bl = min(ah, bh), max(bl, al)
+        case "GTU":
+            al, bh = max(al, bl + 1), min(bh, ah - 1)
+        case "GEU":
+            al, bh = max(al, bl), min(bh, ah)
+    if al > ah or bl > bh:
+        return None
+    return _cut(a, al, ah), _cut(b, bl, bh)
+
+
+def _cut(value: Value, lo: int, hi: int) -> Value:
+    return span(lo, hi, value.mask, value.bits, value.ram) if isinstance(value, Span) else value

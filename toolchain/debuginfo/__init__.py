@@ -1,0 +1,1 @@
+"""DWARF output: scopes, variables, locations, types and call frames."""

@@ -1,0 +1,93 @@
+"""Readable view of !DI metadata: fields of nodes and source positions."""
+
+from __future__ import annotations
+
+import os
+import re
+
+from toolchain.ir.model import Module
+
+FIELD = re.compile(r'(\w+): ("(?:[^"\\]|\\.)*"|!DIExpression\([^)]*\)|[^,()]+)')
+LIST = re.compile(r"!\d+|null")
+MAX_DEPTH = 64
+
+
+class DebugInfo:
+    """Parsed metadata nodes of one module, each read once."""
+
+    def __init__(self, module: Module) -> None:
+        self.module = module
+        self._nodes: dict[str, dict[str, str]] = {}
+        self._files: dict[str, tuple[str, str]] = {}
+
+    def node(self, ref: str) -> dict[str, str]:
+        """Fields of node "!n"; "kind" is the class name, such as DISubprogram."""
+        found = self._nodes.get(ref)
+        if found is None:
+            body = self.module.metadata.get(ref[1:], "")
+            found = {k: v.strip('"') for k, v in FIELD.findall(body)}
+            kind = re.match(r"(?:distinct )?!(\w+)\(", body)
+            found["kind"] = kind[1] if kind else ""
+            self._nodes[ref] = found
+        return found
+
+    def items(self, ref: str) -> list[str]:
+        """Elements of a tuple node, "null" included."""
+        return LIST.findall(self.module.metadata.get(ref[1:], "")) if ref.startswith("!") else []
+
+    def number(self, ref: str, key: str, default: int = 0) -> int:
+        """Integer field."""
+        text = self.node(ref).get(key, "").strip()
+        return int(text) if re.fullmatch(r"-?\d+", text) else default
+
+    def bits(self, ref: str) -> int:
+        """Size of a type in bits, through typedefs and qualifiers; 0 when it has none."""
+        for _ in range(MAX_DEPTH):
+            if not ref.startswith("!"):
+                return 0
+            if size := self.number(ref, "size"):
+                return size
+            ref = self.node(ref).get("baseType", "")
+        return 0
+
+    def file(self, ref: str) -> tuple[str, str]:
+        """(directory, name) of the DIFile a node or one of its scopes names."""
+        if ref not in self._files:
+            at = ref
+            for _ in range(MAX_DEPTH):
+                node = self.node(at)
+                if node["kind"] == "DIFile":
+                    break
+                at = node.get("file") or node.get("scope") or ""
+                if not at.startswith("!"):
+                    break
+            node = self.node(at) if at.startswith("!") else {}
+            self._files[ref] = (node.get("directory", ""), node.get("filename", "?"))
+        return self._files[ref]
+
+    def position(self, ref: str | None) -> tuple[str, int] | None:
+        """(file name, line) of a DILocation or DISubprogram; None without one. The name leads there from the present
+        folder: clang takes what a file's path shares with that folder's off the name."""
+        if ref is None or not (line := self.number(ref, "line")):
+            return None
+        directory, name = self.file(ref)
+        elsewhere = os.path.isabs(directory) and directory != os.getcwd()
+        return (os.path.join(directory, name) if elsewhere else name), line
+
+    def declared(self, ref: str | None) -> tuple[str, int] | None:
+        """(file name, line) of a DISubprogram, or of the variable a DIGlobalVariableExpression is of."""
+        return self.position(self.node(ref).get("var", ref) if ref is not None else None)
+
+    def marker(self, ref: str | None) -> list[str]:
+        """Assembly that says of what follows where in the source it is from: of a DISubprogram or of a variable."""
+        place = self.declared(ref)
+        return [f'# {place[1]} "{place[0]}"'] if place is not None else []
+
+    def subprogram(self, ref: str) -> str:
+        """The DISubprogram a scope lies in."""
+        for _ in range(MAX_DEPTH):
+            node = self.node(ref)
+            if node["kind"] == "DISubprogram" or "scope" not in node:
+                return ref
+            ref = node["scope"]
+        return ref

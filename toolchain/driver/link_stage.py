@@ -1,0 +1,101 @@
+"""The link stage of the compiler driver: native objects and archives in; ELF or HEX, and a map, out."""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from toolchain.elf.archive import open_archive
+from toolchain.elf.model import ObjectFile
+from toolchain.elf.read import read_object
+from toolchain.errors import ToolError
+from toolchain.files import read_bytes, write_outputs
+from toolchain.frontend.options import CcOptions
+from toolchain.link.command import link_options as link_settings
+from toolchain.link.command import output_files, parse_link_words
+from toolchain.link.link import link
+from toolchain.link.mapfile import memory_report
+from toolchain.link.options import LinkOptions
+from toolchain.link.smartio import plain_name
+
+RUNTIME_NAME = "run-time library"
+BUILT_IN_LIBRARIES = {"c", "m", "gcc", "pic30", "dsp"}
+"""Names other toolchains use for what our run-time library holds; linking them is a no-op here."""
+
+# Conversions whose code is linked only when a format string mentions them (runtime/format.h, runtime/scan.h).
+_FLAGS = rb"%[-+ #0]*(?:\d+|\*)?(?:\.(?:\d+|\*)?)?"
+_WIDTH = rb"%\*?\d*"
+FORMAT_PARTS = {
+    re.compile(r"_v?(?:f|s|sn)?printf"): {
+        "___format_double": re.compile(_FLAGS + rb"L?[fFeEgG]"),
+        "___format_wide": re.compile(_FLAGS + rb"(?:ll|j)[diouxX]"),
+    },
+    re.compile(r"_v?[fs]?scanf"): {
+        "___scan_double": re.compile(_WIDTH + rb"[lL]?[aAeEfFgG]"),
+        "___scan_wide": re.compile(_WIDTH + rb"(?:ll|j)[diouxX]"),
+    },
+}
+
+
+@dataclass
+class Program:
+    """What the compile stages hand to the linker: the library's bytes, native objects in order, archives."""
+
+    runtime: bytes
+    objects: list[tuple[str, bytes]] = field(default_factory=list)
+    archives: list[tuple[str, bytes]] = field(default_factory=list)
+
+
+def output_path(options: CcOptions) -> Path:
+    """Where the linked image goes."""
+    return options.output or Path("a.elf")
+
+
+def find_library(options: CcOptions, name: str) -> tuple[str, bytes] | None:
+    """Archive named by -l, or None for one whose content is part of the run-time library."""
+    for folder in options.library_dirs:
+        path = folder / f"lib{name}.a"
+        if path.is_file():
+            return str(path), read_bytes(path)
+    if name in BUILT_IN_LIBRARIES:
+        return None
+    searched = ", ".join(map(str, options.library_dirs)) or "no -L folder given"
+    raise ToolError(f"cannot find lib{name}.a ({searched})")
+
+
+def link_program(options: CcOptions, program: Program) -> None:
+    """Link and write the outputs, all or none. Raises ToolError listing everything that is wrong."""
+    objects = [read_object(content, name) for name, content in program.objects]
+    archives = [open_archive(content, name) for name, content in program.archives]
+    if program.runtime:
+        archives.append(open_archive(program.runtime, RUNTIME_NAME))
+    linked = link(objects, archives, link_options(options, objects))
+    for message in linked.messages:
+        print(message, file=sys.stderr)
+    words = parse_link_words(options.linker)
+    if words.report_mem:
+        print(memory_report(linked))
+    write_outputs(output_files(linked, output_path(options), options.map_file, None, words.memorysummary))
+
+
+def link_options(options: CcOptions, objects: list[ObjectFile]) -> LinkOptions:
+    """Linker settings from -Wl and -Xlinker words, which are those of `ld`; unused sections are left out by default."""
+    result = link_settings(parse_link_words(["--gc-sections", *options.linker]))
+    result.undefined += format_parts(objects)
+    result.chip = options.chip
+    return result
+
+
+def format_parts(objects: list[ObjectFile]) -> list[str]:
+    """Symbols of the parts of printf and scanf that the program's constant strings ask for."""
+    names = {plain_name(symbol.name, obj.name) for obj in objects for symbol in obj.symbols}
+    strings = b"\0".join(bytes(s.data[::2]) for obj in objects for s in obj.sections if s.is_psv or s.is_ram)
+    return [
+        part
+        for functions, parts in FORMAT_PARTS.items()
+        if any(functions.fullmatch(name) for name in names)
+        for part, pattern in parts.items()
+        if pattern.search(strings)
+    ]

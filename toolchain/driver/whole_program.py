@@ -1,0 +1,128 @@
+"""Merge LLVM modules and make internal every symbol that nothing outside the merged module can name.
+
+Enters: IR (text or bitcode) per C file and the set of assembler names used by native objects. Leaves: one module.
+IR travels as text: writing bitcode makes clang assemble file-scope asm, which it would read as MSP430 code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import llvmlite.binding as llvm
+
+from toolchain.abi.isr_names import VECTOR_FUNCTIONS
+from toolchain.errors import ToolError
+
+VISIBLE_LINKAGES = {llvm.Linkage.external, llvm.Linkage.weak_any, llvm.Linkage.weak_odr, llvm.Linkage.linkonce_any,
+                    llvm.Linkage.linkonce_odr, llvm.Linkage.common}  # fmt: skip
+BITCODE_MAGIC = b"BC\xc0\xde"
+DECLARED = re.compile(r"^declare [^@\n]*@([\w$.]+)\(", re.MULTILINE)
+ATTRIBUTES = re.compile(rb"^attributes #\d+ = \{", re.MULTILINE)
+OF_ASSEMBLY = re.compile(r' asm | c"preprologue:| c"save:')
+USED_TABLES = ("llvm.used", "llvm.compiler.used")
+GLOBAL_NAME = re.compile(r"ptr @([\w$.]+)")
+C_NAME = re.compile(r"\b([A-Za-z_]\w*)")
+ASSEMBLER_NAME = re.compile(r"\b_([A-Za-z_]\w*)")
+
+
+def read_module(source: Path, content: bytes) -> llvm.ModuleRef:
+    """Parse IR text or bitcode. Raises ToolError naming `source`."""
+    try:
+        if is_bitcode(content):
+            return llvm.parse_bitcode(content)
+        return llvm.parse_assembly(content.decode())
+    except (RuntimeError, UnicodeDecodeError) as error:
+        raise ToolError(f"{source}: not readable as LLVM IR: {str(error).strip()}") from error
+
+
+def is_bitcode(content: bytes) -> bool:
+    """True for LLVM bitcode, which is what `-flto -c` writes."""
+    return content.startswith(BITCODE_MAGIC)
+
+
+def functions_declared(text: str) -> set[str]:
+    """Functions a module's text declares and does not define, without LLVM's own."""
+    return {name for name in DECLARED.findall(text) if not name.startswith("llvm.")}
+
+
+def without_builtins(ir: bytes, names: Iterable[str]) -> bytes:
+    """IR text in which no function knows the library functions `names` by what they do."""
+    if is_bitcode(ir):
+        ir = str(llvm.parse_bitcode(ir)).encode()
+    words = " ".join(f'"no-builtin-{name}"' for name in sorted(names)).encode()
+    return ATTRIBUTES.sub(rb"\g<0> " + words, ir)
+
+
+def merge(modules: list[tuple[Path, llvm.ModuleRef]]) -> llvm.ModuleRef:
+    """Link modules in order; the first one receives the others. Raises ToolError listing every clashing definition."""
+    clashes = _duplicate_definitions(modules)
+    if clashes:
+        raise ToolError.of(clashes)
+    merged = modules[0][1]
+    for source, module in modules[1:]:
+        try:
+            merged.link_in(module)
+        except RuntimeError as error:
+            raise ToolError(f"{source}: {str(error).strip()}") from error
+    return merged
+
+
+def names_used(objects: Iterable[tuple[str, bytes]]) -> set[str]:
+    """Names that native objects, given as (name, content), want from elsewhere or define themselves.
+
+    A definition on both sides must reach the linker, which reports it.
+    """
+    from toolchain.elf.model import Bind
+    from toolchain.elf.read import is_object, read_object
+
+    names: set[str] = set()
+    for name, content in objects:
+        if is_object(content):
+            names.update(s.name for s in read_object(content, name).symbols if s.bind is not Bind.LOCAL)
+    return names
+
+
+def names_in_inline_assembly(text: str) -> set[str]:
+    """C names that inline assembly anywhere in the module's text, or a `preprologue`, refers to as `_name`, and those
+    that `save` lists."""
+    names: set[str] = set()
+    for line in text.splitlines():
+        found = OF_ASSEMBLY.search(line)
+        if found:
+            quoted = re.sub(r"\\[0-9A-Fa-f]{2}", " ", line[found.start() :])
+            names.update((C_NAME if found[0].endswith("save:") else ASSEMBLER_NAME).findall(quoted))
+    return names
+
+
+def internalise(module: llvm.ModuleRef, assembler_names: Iterable[str]) -> None:
+    """Give `internal` linkage to every definition except `main`, vectors, `used` ones and the names given.
+
+    `assembler_names` are object-file names, with the leading underscore of C names (abi-elf.md §2.6). They include what
+    the run-time library defines: generated code may call its functions without any call in the IR.
+    """
+    keep = {name[1:] for name in assembler_names if name.startswith("_")} | {"main"}
+    keep |= names_in_inline_assembly(str(module))
+    keep |= {name for v in module.global_variables if v.name in USED_TABLES for name in GLOBAL_NAME.findall(str(v))}
+    for value in [*module.functions, *module.global_variables]:
+        if value.is_declaration or value.linkage not in VISIBLE_LINKAGES:
+            continue
+        name = value.name
+        if name in keep or name.startswith("llvm.") or name in VECTOR_FUNCTIONS:
+            continue
+        value.linkage = llvm.Linkage.internal
+
+
+def _duplicate_definitions(modules: list[tuple[Path, llvm.ModuleRef]]) -> list[str]:
+    """One line per strong symbol that more than one module defines, naming all of them."""
+    owners: dict[str, list[Path]] = {}
+    for source, module in modules:
+        for value in [*module.functions, *module.global_variables]:
+            if not value.is_declaration and value.linkage is llvm.Linkage.external:
+                owners.setdefault(value.name, []).append(source)
+    return [
+        f"error: duplicate symbol '{name}': defined in {', '.join(map(str, files))}"
+        for name, files in owners.items()
+        if len(files) > 1
+    ]

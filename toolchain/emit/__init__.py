@@ -1,0 +1,1 @@
+"""Machine form and data to assembly text."""

@@ -1,0 +1,289 @@
+"""Machine form -> assembly text of one function (pic30-as syntax, abi-elf.md §4)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from emu.dspic30f.isa.rows.multiply import DIVIDE_COUNT
+from toolchain.abi.names import block_label
+from toolchain.abi.target import SP
+from toolchain.debuginfo.call_frames import CallFrames
+from toolchain.debuginfo.variables import Ranges, proved
+from toolchain.mir.mir import MI, File, Imm, MBlock, Mem, MFunction, Operand
+
+MEM_TEXT = {"ind": "[w{}]", "++": "[w{}++]", "--": "[w{}--]", "+": "[++w{}]", "-": "[--w{}]"}
+RENAMED = {
+    "sl1": "sl",
+    "lsr1": "lsr",
+    "asr1": "asr",
+    "movd": "mov.d",
+    "btst": "btst",
+    "btstv": "btst.z",
+    "btstc": "btst.c",
+}
+FILE_OPS = {n + "f": n for n in ("inc", "dec", "inc2", "dec2", "neg", "com", "clr", "setm", "sl", "lsr", "asr", "bset",
+                                 "bclr", "btg", "btst", "btsc", "btss", "cp0", "add", "sub", "addc", "subb", "and",
+                                 "ior", "xor",
+                                 "cp")}  # fmt: skip
+TIED_OPS = {n + "l": n for n in ("add", "sub", "addc", "subb", "and", "ior", "xor")}
+BIT_OPS = {"bset", "bclr", "btg", "btst", "btsc", "btss"}
+WREG_OPS = {n + "w": n for n in ("and", "ior", "xor")}
+CONDITION_TEXT = {"c": "geu", "nc": "ltu"}
+ASM_OPERAND = re.compile("\x00(\\d+):(\\w?)\x00|\x00uid\x00")
+HOLD_CYCLES = 4  # from the comparison with DISICNT to the first instruction of the sequence
+SHIFT_FIRST = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
+
+
+def operand_text(a: Operand) -> str:
+    """One operand in assembler syntax."""
+    match a:
+        case int():
+            return f"w{a}"
+        case Imm():
+            return f"#{a.value}"
+        case Mem(mode="off"):
+            return f"[w{a.base}{a.off:+d}]"
+        case Mem(mode="idx"):
+            return f"[w{a.base}+w{a.off}]"
+        case Mem():
+            return MEM_TEXT[a.mode].format(a.base)
+        case File():
+            return a.expr
+        case _:
+            return str(a)
+
+
+class Emitter:
+    """Text of one function."""
+
+    def __init__(
+        self, m: MFunction, prefix: str, large_code: bool, position: Callable[[str | None], tuple[str, int] | None]
+    ) -> None:
+        self.m = m
+        self.position = position  # source file and line of a !dbg reference
+        self.prefix = prefix  # makes local labels unique in the file
+        self.large_code = large_code
+        self.serial = 0
+        self.lines: list[str] = []
+        self.numbers = {b.name: k for k, b in enumerate(m.blocks)}
+        self.targets = {a for b in m.blocks for mi in b.insts for a in mi.args if mi.op in ("bra", "jump")}
+        self.targets |= {t for _, table in m.tables for t in table}
+
+    def label(self, block: str) -> str:
+        """Local label of a block."""
+        return f".L{self.prefix}_{self.numbers[block]}"
+
+    def fresh(self) -> str:
+        """Local label inside a block."""
+        self.serial += 1
+        return f".L{self.prefix}_i{self.serial}"
+
+    def text(self, location: Callable[[str | None], str], ranges: Ranges, frames: CallFrames | None) -> list[str]:
+        """All lines. `location` gives the line-table label text for a !dbg reference, or ""."""
+        self.frames = frames
+        self.variables = proved(self.m) if self.m.bindings else {}
+        for block in self.m.blocks:
+            self._block(block, location, ranges)
+        return self.lines
+
+    def _block(self, block: MBlock, location: Callable[[str | None], str], ranges: Ranges) -> None:
+        if block.name in self.targets:
+            self.lines.append(f"{self.label(block.name)}:")
+        if block.address_taken:
+            self.lines.append(f"{block_label(self.m.name, block.name)}:")
+        label = ""  # behind what a skip covers
+        for mi in block.insts:
+            frame = self.frames.at(mi) if self.frames is not None else ""
+            marks = (ranges.at(self.variables.get(id(mi), ())), location(mi.line), frame)
+            self.lines += [mark for mark in marks if mark]
+            if label and not mi.pred:
+                self.lines.append(f"{label}:")
+                label = ""
+            if mi.op == "skip":
+                label = self.fresh()
+                self._out(f"bra {CONDITION_TEXT.get(mi.cc, mi.cc)},{label}")
+            else:
+                self._instruction(mi)
+        if label:
+            self.lines.append(f"{label}:")
+
+    def _out(self, text: str) -> None:
+        self.lines.append("\t" + text)
+
+    def _instruction(self, mi: MI) -> None:
+        handler = SPECIAL.get(mi.op)
+        if handler is not None:
+            handler(self, mi)
+            return
+        op, args = mi.op, [operand_text(a) for a in mi.args]
+        if op in WREG_OPS:
+            self._out(f"{WREG_OPS[op]}{'.b' if mi.byte else ''} {args[0]},WREG")
+            return
+        if op in FILE_OPS:
+            self._file(mi, FILE_OPS[op], args)
+            return
+        if op == "mov" and mi.byte:
+            args = self._byte_move(mi, args)
+            op = "mov.b"
+        else:
+            op = TIED_OPS.get(op) or RENAMED.get(op, op)
+            op += ".b" if mi.byte else ""
+        self._out(f"{op} {','.join(args)}")
+
+    def _byte_move(self, mi: MI, args: list[str]) -> list[str]:
+        if isinstance(mi.args[0], File):
+            return [args[0], "WREG"]
+        if isinstance(mi.args[1], File):
+            return ["WREG", args[1]]
+        return args
+
+    def _file(self, mi: MI, op: str, args: list[str]) -> None:
+        self._out(f"{op}{'.b' if mi.byte else ''} {args[0]}" + (f",{args[1]}" if op in BIT_OPS else ""))
+
+    # -- special instructions -----------------------------------------------------------------------------------------
+
+    def _bra(self, mi: MI) -> None:
+        self._out(f"bra {CONDITION_TEXT.get(mi.cc, mi.cc)},{self.label(str(mi.args[0]))}")
+
+    def _jump(self, mi: MI) -> None:
+        self._out(f"bra {self.label(str(mi.args[0]))}")
+
+    def _jumpr(self, mi: MI) -> None:
+        self._out(f"goto {operand_text(mi.args[0])}")
+
+    def _brtable(self, mi: MI) -> None:
+        self._out(f"bra {operand_text(mi.args[0])}")
+        for target in self.m.tables[int(str(mi.args[1]))][1]:
+            self._out(f"bra {self.label(target)}")
+
+    def _call(self, mi: MI) -> None:
+        self._out(f"{'call' if self.large_code else 'rcall'} {mi.args[0]}")
+
+    def _callr(self, mi: MI) -> None:
+        self._out(f"call {operand_text(mi.args[0])}")
+
+    def _tailcall(self, mi: MI) -> None:
+        self._out(f"{'goto' if self.large_code else 'bra'} {mi.args[0]}")
+
+    def _ret(self, mi: MI) -> None:
+        self._out("retfie" if self.m.interrupt else mi.text or "return")
+
+    def _divide(self, mi: MI) -> None:
+        self._out(f"repeat #{DIVIDE_COUNT}")
+        self._out(f"{mi.op} {operand_text(mi.args[0])},{operand_text(mi.args[1])}")
+
+    def _repeat(self, mi: MI) -> None:
+        suffix = ".b" if mi.byte else ""
+        self._out(f"repeat {operand_text(mi.args[0])}")
+        if mi.op == "repmov":
+            count = mi.args[0]
+            if self.frames is not None and mi.args[2] == SP and isinstance(count, Imm) and count.value:
+                self.lines.append(self.frames.repeated(int(count.value)))
+            self._out(f"mov{suffix} [w{mi.args[1]}++],[w{mi.args[2]}++]")
+        elif mi.op == "repclr":
+            self._out(f"clr{suffix} [w{mi.args[1]}++]")
+        else:
+            self._out(f"mov{suffix} w{mi.args[2]},[w{mi.args[1]}++]")
+
+    def _shiftloop(self, mi: MI) -> None:
+        """DEC count; leave when negative; shift by one through the carry; again (abi-elf.md §8.1)."""
+        kind, count, *words = mi.args
+        top, end = self.fresh(), self.fresh()
+        self.lines.append(f"{top}:")
+        self._out(f"dec w{count},w{count}")
+        self._out(f"bra n,{end}")
+        order = words if kind == "shl" else list(reversed(words))
+        for k, w in enumerate(order):
+            op = SHIFT_FIRST[str(kind)] if k == 0 else "rlc" if kind == "shl" else "rrc"
+            self._out(f"{op} w{w},w{w}")
+        self._out(f"bra {top}")
+        self.lines.append(f"{end}:")
+
+    def _asm(self, mi: MI) -> None:
+        self.serial += 1
+        uid = str(self.serial)
+
+        def replace(m: re.Match[str]) -> str:
+            if m[1] is None:
+                return self.prefix + uid
+            a = mi.args[int(m[1])]
+            modifier = m[2]
+            if isinstance(a, int) and modifier == "d":
+                return f"w{a + 1}"
+            if isinstance(a, Imm):  # bare: XC16 sources write the sign themselves, "disi #%0"
+                return str(-int(a.value)) if modifier == "n" else str(a.value)
+            return operand_text(a)
+
+        place = self.position(mi.line)
+        if place is not None:  # what the assembler has to say is about the source
+            self.lines.append(f'# {place[1]} "{place[0]}"')
+        for line in ASM_OPERAND.sub(replace, mi.text).split("\n"):
+            if line.strip():
+                self._out(line.strip())
+                if self.frames is not None and (mark := self.frames.inside(line)):
+                    self.lines.append(mark)
+        if place is not None:  # no more
+            self.lines.append(f'# 0 "{place[0]}"')
+
+    def _hold(self, mi: MI) -> None:
+        """DISI for the sequence behind it, unless a longer one is under way (`holds`)."""
+        cycles, end = mi.args[0], self.fresh()
+        assert isinstance(cycles, Imm)
+        assert isinstance(cycles.value, int)
+        self._out(f"mov #{cycles.value + HOLD_CYCLES},w0")
+        self._out("cp _DISICNT")
+        self._out(f"bra geu,{end}")
+        self._out(f"disi #{cycles.value}")
+        self.lines.append(f"{end}:")
+
+    def _release(self, mi: MI) -> None:
+        """Nothing."""
+
+    def _clear_pair(self, mi: MI) -> None:
+        """The product of anything and 0; no flags change (isa.md §6.5)."""
+        self._out(f"mul.uu w{mi.args[0]},#0,w{mi.args[0]}")
+
+    def _borrow(self, mi: MI) -> None:
+        """-1 after a borrow, else 0."""
+        r = operand_text(mi.args[0])
+        self._out(f"subb {r},{r},{r}")
+
+    def _low_move(self, mi: MI) -> None:
+        self._out(f"mov.b {operand_text(mi.args[0])},{operand_text(mi.args[1])}")
+
+    def _low_logic(self, mi: MI) -> None:
+        r, source = map(operand_text, mi.args)
+        self._out(f"{mi.op.removesuffix('low')}.b {r},{source},{r}")
+
+    def _plain_text(self, mi: MI) -> None:
+        self._out(str(mi.args[0]))
+
+
+SPECIAL: dict[str, Callable[[Emitter, MI], None]] = {
+    "bra": Emitter._bra,
+    "jump": Emitter._jump,
+    "jumpr": Emitter._jumpr,
+    "brtable": Emitter._brtable,
+    "call": Emitter._call,
+    "callr": Emitter._callr,
+    "tailcall": Emitter._tailcall,
+    "ret": Emitter._ret,
+    "div.s": Emitter._divide,
+    "div.u": Emitter._divide,
+    "div.sd": Emitter._divide,
+    "div.ud": Emitter._divide,
+    "repmov": Emitter._repeat,
+    "repclr": Emitter._repeat,
+    "repfill": Emitter._repeat,
+    "shiftloop": Emitter._shiftloop,
+    "asm": Emitter._asm,
+    "borrow": Emitter._borrow,
+    "clrd": Emitter._clear_pair,
+    "hold": Emitter._hold,
+    "release": Emitter._release,
+    "text": Emitter._plain_text,
+    "movlow": Emitter._low_move,
+    "iorlow": Emitter._low_logic,
+    "xorlow": Emitter._low_logic,
+}

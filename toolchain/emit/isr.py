@@ -1,0 +1,116 @@
+"""Interrupt functions, addresses and other roles given by __attribute__((annotate("...")))."""
+
+from __future__ import annotations
+
+import re
+
+from toolchain.abi.isr_names import IRQ_PREFIX, irq_name
+from toolchain.ir.model import (
+    ConstAgg,
+    ConstBytes,
+    ConstZero,
+    Function,
+    GlobalRef,
+    InlineAsm,
+    Module,
+    UnsupportedError,
+    Value,
+)
+
+PREFIX = "os_isr:"
+WORDS = {"interrupt", "auto_psv", "no_auto_psv", "shadow"}
+
+
+def annotations_of(module: Module) -> dict[str, set[str]]:
+    """Name of a function or variable -> its annotation strings."""
+    table = module.globals.get("llvm.global.annotations")
+    out: dict[str, set[str]] = {}
+    if table is None or not isinstance(table.init, ConstAgg):
+        return out
+    for row in table.init.elems:
+        if isinstance(row, ConstAgg) and isinstance(row.elems[0], GlobalRef):
+            out.setdefault(row.elems[0].name, set()).add(_text(module, row.elems[1]))
+    return out
+
+
+def _text(module: Module, v: Value) -> str:
+    if not isinstance(v, GlobalRef):
+        return ""
+    init = module.globals[v.name].init
+    if isinstance(init, ConstZero):
+        return ""
+    return init.data.rstrip(b"\0").decode() if isinstance(init, ConstBytes) else ""
+
+
+def interrupt_kind(notes: set[str], place: str) -> str:
+    """ "" for ordinary functions, else "no_auto_psv" or "auto_psv", with ",shadow" appended (abi-elf.md §2.5).
+
+    Raises UnsupportedError at `place` for both at once.
+    """
+    words = {w for n in notes for w in n.removeprefix(PREFIX).split(",")} & WORDS
+    if not any(n.startswith(PREFIX) for n in notes) and "interrupt" not in words:
+        return ""
+    if {"auto_psv", "no_auto_psv"} <= words:
+        raise UnsupportedError("both auto_psv and no_auto_psv", place)
+    kind = "no_auto_psv" if "no_auto_psv" in words else "auto_psv"
+    return kind + (",shadow" if "shadow" in words else "")
+
+
+def preserved(notes: set[str]) -> tuple[str, ...]:
+    """Assembler names of the variables that `save(...)` lists: pushed at entry, popped at the end."""
+    lists = [note.removeprefix("save:") for note in sorted(notes) if note.startswith("save:")]
+    return tuple("_" + name.strip() for names in lists for name in names.split(",") if name.strip())
+
+
+_ACCUMULATOR = re.compile(
+    r"\b(?:mac|msc|mpy|mpy\.n|movsac|clr|lac|sac|sac\.r|sftac|add|sub|neg|ed|edac)\s(?:[^\n;]*,)?\s*([AB])\b",
+    re.IGNORECASE,
+)
+
+
+def accumulators(f: Function) -> tuple[str, ...]:
+    """Registers of the accumulators that inline assembly of an interrupt function names: saved like `save(...)`."""
+    texts = [str(a.text) for b in f.blocks for i in b.instrs if isinstance(a := i.extra.get("asm"), InlineAsm)]
+    named = sorted({found.upper() for text in texts for found in _ACCUMULATOR.findall(text)})
+    return tuple(f"_ACC{name}{part}" for name in named for part in "LHU")
+
+
+def preprologue(notes: set[str]) -> tuple[str, ...]:
+    """Lines of assembly that run before anything is saved."""
+    texts = [note.removeprefix("preprologue:") for note in sorted(notes) if note.startswith("preprologue:")]
+    return tuple(line.strip() for text in texts for line in re.split(r"[\n;]", text) if line.strip())
+
+
+def vector_symbols(notes: set[str]) -> tuple[str, ...]:
+    """Assembler names under which the linker finds the handlers of `irq(N)` and `altirq(N)`."""
+    wanted = [(kind, int(number, 0)) for note in sorted(notes)
+              for kind, _, number in [note.partition(":")] if kind in IRQ_PREFIX]  # fmt: skip
+    return tuple(f"__{IRQ_PREFIX[kind]}{irq_name(number)}" for kind, number in wanted)
+
+
+def wants_probe(notes: set[str], default: bool) -> bool:
+    """Whether a function's frame is probed against SPLIM: -fstack-check, overruled by "os_probe" or "os_no_probe"."""
+    if "os_no_probe" in notes:
+        return False
+    return default or "os_probe" in notes
+
+
+def section_modifiers(name: str, notes: set[str]) -> str:
+    """`,address(0x1000)`, `,noload`, `,reverse(64)` for a `.section` line (abi-elf.md §4.3)."""
+    out = ",noload" if "noload" in notes else ""
+    return out + "".join(f",{what}(0x{number:X})" for what, number in numbers(name, notes))
+
+
+def numbers(place: str, notes: set[str]) -> list[tuple[str, int]]:
+    """("address" or "reverse", N) of the notes of one object, which `place` names in the UnsupportedError that is
+    raised for what is no number."""
+    out = []
+    for note in sorted(notes):
+        found = re.fullmatch(r"(address|reverse)\((.*)\)", note)
+        if found is None:
+            continue
+        try:
+            out.append((found[1], int(found[2].strip("() ").rstrip("uUlL"), 0)))
+        except ValueError:
+            raise UnsupportedError(f"attribute {note}: the argument must be a number", place) from None
+    return out

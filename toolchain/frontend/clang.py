@@ -1,0 +1,265 @@
+"""The C front end: runs the clang inside the `ziglang` wheel. C in; LLVM IR text, preprocessed text, dependencies out.
+
+The MSP430 target is borrowed for its data layout, which is XC16's (abi-elf.md §1.1); nothing of its code generator is
+used. This is the only module that starts clang.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import reduce
+from pathlib import Path
+
+from emu.chips import chip_named
+from emu.chips.chip import Chip
+from toolchain.abi.struct_alignment import LAYOUT_FLAGS
+from toolchain.errors import ToolError
+from toolchain.frontend import accumulators, asm_constraints, config_pragma, header_case
+from toolchain.frontend.asm_registers import REFUSED, respell
+from toolchain.frontend.options import CcOptions, Input
+
+INCLUDE_DIR = Path(__file__).parents[1] / "include"
+
+TARGET_FLAGS = [
+    "--target=msp430",
+    "-fno-unwind-tables",
+    "-fno-asynchronous-unwind-tables",
+    "-fno-stack-protector",
+    "-fno-finite-loops",  # a loop that only waits is not deleted; XC16's programs have such loops
+    "-fno-vectorize",
+    "-fno-slp-vectorize",
+]
+# Plain char is signed (abi-elf.md §1.1; MSP430 says unsigned), wchar_t is unsigned short.
+# A pragma that nobody understands must not pass in silence; the warning also tells that there is a `#pragma config`.
+# `space(ymemory), far` are two section names to clang; it keeps the first. Notes about our macros are of no use.
+LANGUAGE_FLAGS = ["-nostdinc", "-fsigned-char", "-fshort-wchar", "-fno-ident", "-Wunknown-pragmas", "-Wno-section",
+                  "-Wno-atomic-alignment",
+                  "-fmacro-backtrace-limit=1"]  # fmt: skip
+# What GCC 4, and so XC16, warns of in every dialect of C, and clang refuses: calls of what nothing declares, `main()`,
+# pointers of another kind, `return` with or without a value. -Werror makes errors of them there, too.
+WARNINGS_OF_C = ["implicit-function-declaration", "implicit-int", "int-conversion", "incompatible-pointer-types",
+                 "incompatible-function-pointer-types", "return-mismatch"]  # fmt: skip
+# Library functions that clang knows and may introduce by itself, but which the run-time library does not have.
+ABSENT_FUNCTIONS = ["stpcpy", "stpncpy", "bcmp", "exp10", "ldexp",
+                    "ldexpf", "memccpy", "strndup", "cabs", "iprintf", "siprintf", "wcslen"]  # fmt: skip
+# abi-elf.md §2.9 predefined macros; __XC16__ and __C30__ stay undefined, they select Microchip's attribute spellings.
+PREDEFINED = ["__dsPIC30F__", "__dsPIC30__", "__HAS_DSP__", "__HAS_EEDATA__", "__HAS_5VOLTS__"]  # beside the part's own
+# Freestanding C++: no exceptions, no run-time types, no threads that could meet in a guard, nothing to do at the end.
+CXX_FLAGS = ["-fno-exceptions", "-fno-rtti", "-fno-threadsafe-statics", "-fno-c++-static-destructors", "-nostdinc++"]
+# libc++ is told by macros what there is.
+LIBCXX_SETTINGS = {"ABI_VERSION": "1", "ABI_NAMESPACE": "__1", "HARDENING_MODE_DEFAULT": "_LIBCPP_HARDENING_MODE_NONE",
+                   "ASSERTION_SEMANTIC_DEFAULT": "_LIBCPP_ASSERTION_SEMANTIC_IGNORE",
+                   "DISABLE_VISIBILITY_ANNOTATIONS": "1", "PSTL_BACKEND_SERIAL": "1", **dict.fromkeys(
+    ("HAS_THREADS", "HAS_MONOTONIC_CLOCK", "HAS_TERMINAL", "HAS_FILESYSTEM", "HAS_RANDOM_DEVICE", "HAS_LOCALIZATION",
+     "HAS_UNICODE", "HAS_WIDE_CHARACTERS", "HAS_TIME_ZONE_DATABASE", "HAS_VENDOR_AVAILABILITY_ANNOTATIONS",
+     "HAS_MUSL_LIBC"), "0")}  # fmt: skip
+CXX_FLAGS += [f"-D_LIBCPP_{name}={value}" for name, value in LIBCXX_SETTINGS.items()]
+C_ONLY = {"-fgnu89-inline", "-fno-gnu89-inline"}
+FOREIGN_MACROS = ["MSP430", "__MSP430__"]
+CLANG_LEVEL = {"0": "-O0", "1": "-O1", "2": "-O2", "s": "-Oz"}
+
+
+class CompileError(Exception):
+    """clang reported errors, which are already on stderr; the driver exits with status 1."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One clang run: `arguments` without the program, and the input it is about."""
+
+    arguments: list[str]
+    source: Path
+    printed: Path | None = None  # file for what it says on stdout
+    chip: Chip = field(default_factory=chip_named)
+
+
+def clang_program() -> list[str]:
+    """Command prefix that runs clang. Raises ToolError when the `ziglang` package is missing."""
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or spec.origin is None:
+        raise ToolError("the C front end is missing: install the Python package 'ziglang' (pip install ziglang)")
+    zig = Path(spec.origin).parent / ("zig.exe" if os.name == "nt" else "zig")
+    return [str(zig), "clang"]
+
+
+def builtin_include_dir() -> Path:
+    """clang's own headers (stdatomic.h, iso646.h, ...), searched after ours."""
+    return Path(clang_program()[0]).parent / "lib" / "include"
+
+
+def library_include_dir() -> Path:
+    """libc++'s headers, of which C++ sources can use what needs no library behind it."""
+    return Path(clang_program()[0]).parent / "lib" / "libcxx" / "include"
+
+
+def front_end_flags(options: CcOptions, language: str = "c") -> list[str]:
+    """Flags that give C or C++ source the meaning it has on this target, followed by the user's own."""
+    flags = [*TARGET_FLAGS, *LANGUAGE_FLAGS, CLANG_LEVEL[options.level]]
+    flags += [f"-U{name}" for name in FOREIGN_MACROS]
+    guard = ["__HAS_CODEGUARD__"] if "FBS" in options.chip.config else []
+    flags += [f"-D{name}=1" for name in (f"__{options.chip.name}__", *PREDEFINED, *guard)]
+    flags += [f"-fno-builtin-{name}" for name in ABSENT_FUNCTIONS]
+    flags += ["-include", str(INCLUDE_DIR / "dspic_builtins.h")]
+    if options.single_constants:
+        flags += ["-Xclang", "-cl-single-precision-constant"]
+    if options.debug:
+        # Where this package and clang are installed is nothing an image should depend on.
+        own = ((INCLUDE_DIR, "toolchain/include"), (builtin_include_dir(), "clang/include"))
+        flags += ["-g", "-gdwarf-2", *(f"-fdebug-prefix-map={path}={name}" for path, name in own)]
+    if any(word.startswith("-fsanitize=") for word in options.clang):
+        flags.append("-fsanitize-trap=all")  # there is no sanitizer run-time library
+    named = any(word.startswith("-std=") or word == "-ansi" for word in options.clang)
+    if is_cxx(language):
+        flags += CXX_FLAGS if named else [*CXX_FLAGS, "-std=gnu++17"]
+        flags += [word for word in options.clang if word not in C_ONLY]
+        folders = (library_include_dir(), INCLUDE_DIR, builtin_include_dir())
+        return [*flags, *(word for folder in folders for word in ("-isystem", str(folder)))]
+    if not named:
+        flags.append("-fgnu89-inline")  # XC16 takes C for gnu89, where plain `inline` defines the function
+    if not {"-Werror", "-pedantic-errors"} & set(options.clang):
+        flags += [f"-Wno-error={name}" for name in WARNINGS_OF_C]
+    flags += options.clang
+    return [*flags, "-isystem", str(INCLUDE_DIR), "-isystem", str(builtin_include_dir())]
+
+
+def is_cxx(language: str) -> bool:
+    """Whether a language of `-x` is C++."""
+    return language.startswith("c++")
+
+
+def _dependency_flags(options: CcOptions, item: Input) -> list[str]:
+    """The -MD family: `-MF` defaults to a .d file beside the output, the target to the file the driver writes."""
+    flags = list(options.dependency)
+    if not {"-MD", "-MMD"} & set(flags):
+        return flags
+    output = options.output or Path(item.path.stem + ".o")
+    if "-MF" not in flags:
+        beside = output if len(options.inputs) == 1 else output.parent / item.path.name
+        flags += ["-MF", str(beside.with_suffix(".d"))]
+    if "-MT" not in flags and "-MQ" not in flags:
+        flags += ["-MQ", str(output)]
+    return flags
+
+
+def ir_job(options: CcOptions, item: Input, output: Path) -> Job:
+    """Job that turns one C file into unoptimised IR text carrying the level's attributes."""
+    arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
+    arguments += [*LAYOUT_FLAGS, "-Xclang", "-disable-llvm-passes", "-emit-llvm", "-S"]
+    arguments += ["-x", item.language, str(item.path)]
+    return Job([*arguments, "-o", str(output)], item.path, output.with_suffix(".layouts"), options.chip)
+
+
+def repaired(ir: bytes) -> bytes:
+    """IR as the middle end accepts it: clang gives these calls an `int`, which has 16 bits here, and they take i32."""
+    for name in (b"returnaddress", b"frameaddress.p0"):
+        ir = ir.replace(b"@llvm.%s(i16 " % name, b"@llvm.%s(i32 " % name)
+    return ir
+
+
+def preprocess_job(options: CcOptions, item: Input, output: Path | None) -> Job:
+    """Job for -E, -M and -fsyntax-only; output None is stdout."""
+    arguments = [*front_end_flags(options, item.language), *_dependency_flags(options, item)]
+    if item.language == "assembler-with-cpp":
+        arguments.append("-D__ASSEMBLER__=1")
+    if "-fsyntax-only" not in options.clang and not {"-M", "-MM"} & set(options.dependency):
+        arguments.append("-E")
+    arguments += ["-x", item.language, str(item.path)]
+    return Job(arguments if output is None else [*arguments, "-o", str(output)], item.path)
+
+
+def optimise_job(options: CcOptions, module: Path, output: Path) -> Job:
+    """Job that runs clang's middle end once over IR."""
+    passed = [flag for flag in options.clang if flag.startswith(("-funroll", "-fno-unroll", "-ffast", "-fno-inline"))]
+    if options.level != "2":  # a table of 256 words for a loop of eight turns is not what these levels are for
+        passed += ["-mllvm", "-disable-loop-idiom-hashrecognize"]
+    arguments = [*TARGET_FLAGS, CLANG_LEVEL[options.level], *passed, "-Wno-override-module", "-x", "ir"]
+    return Job([*arguments, "-S", "-emit-llvm", str(module), "-o", str(output)], module)
+
+
+def _run_changed(
+    program: list[str], arguments: list[str], change: Callable[[str], str]
+) -> subprocess.CompletedProcess[bytes]:
+    """Once more, by way of preprocessed text that `change` puts into the front end's words."""
+    *options, _, language, source, _, output = arguments  # ... -x LANGUAGE SOURCE -o OUTPUT
+    text = Path(output).with_suffix(".changed.i")
+    emit = {"-emit-llvm", "-S"}
+    first = [option for option in options if option not in emit]
+    made = subprocess.run(
+        [*program, *first, "-E", "-x", language, source, "-o", str(text)], capture_output=True, check=False
+    )
+    if made.returncode:
+        return made
+    text.write_text(change(text.read_text(errors="surrogateescape")), errors="surrogateescape")
+    second = [*without_preprocessing(options), "-Wno-unused-command-line-argument"]
+    second += ["-x", "c++-cpp-output" if is_cxx(language) else "cpp-output", str(text), "-o", output]
+    return subprocess.run([*program, *second], capture_output=True, check=False)
+
+
+def _run_job(program: list[str], arguments: list[str], chip: Chip) -> subprocess.CompletedProcess[bytes]:
+    """One clang run, and another for a source that says what XC16 knows and the front end does not."""
+    result = subprocess.run([*program, *arguments], capture_output=True, check=False)
+    if result.returncode and header_case.MISSING.search(result.stderr) and "-ivfsoverlay" not in arguments:
+        with tempfile.TemporaryDirectory(prefix="dspic-names-") as folder:
+            overlay = Path(folder) / "overlay.yaml"
+            overlay.write_text(header_case.overlay(arguments))
+            return _run_job(program, ["-ivfsoverlay", str(overlay), *arguments], chip)
+    changes: list[Callable[[str], str]] = []
+    if "-emit-llvm" in arguments and config_pragma.PRESENT in result.stderr:
+        changes.append(lambda text: config_pragma.applied(text, chip))
+    if result.returncode and REFUSED.search(result.stderr):
+        changes.append(respell)
+    if result.returncode and asm_constraints.REFUSED.search(result.stderr):
+        changes += [respell, asm_constraints.respell]
+    if result.returncode and accumulators.REFUSED.search(result.stderr):
+        changes += [respell, accumulators.applied]
+    if changes:
+        return _run_changed(program, arguments, lambda text: reduce(lambda t, change: change(t), changes, text))
+    return result
+
+
+def without_preprocessing(options: list[str]) -> list[str]:
+    """Options of a clang run whose input is preprocessed already: no forced includes, no dependency files."""
+    out: list[str] = []
+    words = iter(options)
+    for word in words:
+        if word in ("-include", "-MF", "-MT", "-MQ"):
+            next(words)
+        elif word not in ("-MD", "-MMD", "-MP"):
+            out.append(word)
+    return out
+
+
+def run_jobs(jobs: list[Job], parallel: int, show: bool = False) -> None:
+    """Run `jobs`, at most `parallel` at once (0: one per core); diagnostics appear in the order of the jobs.
+
+    With `show` the commands are printed first.
+    Raises CompileError after the last job when any of them failed.
+    """
+    program = clang_program()
+    colour = ["-fdiagnostics-color=always"] if os.isatty(2) and not os.environ.get("NO_COLOR") else []
+
+    if show:
+        for job in jobs:
+            print(shlex.join([*program, *job.arguments]), file=sys.stderr)
+
+    def run(job: Job) -> subprocess.CompletedProcess[bytes]:
+        return _run_job([*program, *colour], job.arguments, job.chip)
+
+    with ThreadPoolExecutor(max_workers=parallel or os.cpu_count() or 1) as pool:
+        results = list(pool.map(run, jobs))
+    for job, result in zip(jobs, results, strict=True):
+        sys.stderr.write(result.stderr.decode(errors="replace").replace("zig: ", "cc: "))
+        if job.printed is None:
+            sys.stdout.write(result.stdout.decode(errors="replace"))
+        else:
+            job.printed.write_bytes(result.stdout)
+    if any(result.returncode != 0 for result in results):
+        raise CompileError

@@ -1,0 +1,112 @@
+"""XC16's `#pragma config SETTING = VALUE, ...`: settings in preprocessed C become definitions of configuration words.
+
+Fields, positions and words come from the chip; the names of the values are those of the device header, whose macros are
+16-bit masks with ones outside the field they set (dspic30f6014a.md §2). Enters: preprocessed C with line markers.
+Leaves: the same text without the pragmas, definitions of the words behind it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from emu.chips.chip import Chip
+from toolchain.errors import ToolError
+
+PRESENT = b"#pragma config"
+"""What clang shows of a source that needs this, in its warning about unknown pragmas."""
+
+_PRAGMA = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+config\b(.*)$", re.MULTILINE)
+_MARKER = re.compile(r'^# (\d+) "((?:[^"\\]|\\.)*)".*$', re.MULTILINE)
+_HEADER = Path(__file__).parents[1] / "include" / "dspic_compiler.h"
+_MACRO = re.compile(r"^#define (\w+) 0x([0-9A-F]{4})$", re.MULTILINE)
+_PRAGMA_VALUES = {"NONE": 0xFFFF}  # XC16's name of the reserved brown-out voltage; too common a word for a macro
+_SETTING = re.compile(r"\s*(\w+)\s*=\s*(\w+)\s*")
+# What MPLAB X writes, where it differs from the field's own name: setting -> word and fields it may change.
+_SETTINGS = {
+    "FOSFPR": ("FOSC", ("FOS", "FPR")), "FCKSMEN": ("FOSC", ("FCKSM",)), "WDT": ("FWDT", ("FWDTEN",)),
+    "BODENV": ("FBORPOR", ("BORV",)), "MCLRE": ("FBORPOR", ("MCLREN",)), "GCP": ("FGS", ("GSS",)),
+}  # fmt: skip
+
+
+def settings(chip: Chip) -> dict[str, tuple[str, int]]:
+    """Name of a setting -> name of its word, mask of the bits it may change."""
+    known = {}
+    for word in chip.config.values():
+        for field, (lsb, width) in word.fields.items():
+            known[field] = (word.name, ((1 << width) - 1) << lsb)
+    for name, (register, fields) in _SETTINGS.items():
+        if name not in known and known.keys() >= set(fields):
+            known[name] = (register, sum(known[field][1] for field in fields))
+    return known
+
+
+def values() -> dict[str, int]:
+    """Names of values, those of the device header among them: name -> mask with zeros where the setting clears bits."""
+    return _PRAGMA_VALUES | {name: int(number, 16) for name, number in _MACRO.findall(_HEADER.read_text())}
+
+
+def applied(text: str, chip: Chip) -> str:
+    """`text` with its configuration pragmas made definitions. Raises `ToolError` listing every wrong one by line."""
+    known, codes = settings(chip), values()
+    words: dict[str, int] = {}
+    findings: list[str] = []
+    given: dict[str, tuple[str, str]] = {}
+    for pragma in _PRAGMA.finditer(text):
+        for setting in pragma[1].split(","):
+            place = _place(text, pragma.start())
+            finding = _apply(setting, known, codes, words) or _contradicted(setting, place, given)
+            if finding:
+                findings.append(f"{place}: error: {finding}")
+    if findings:
+        raise ToolError.of(findings)
+    definitions = [
+        f'__attribute__((__used__, __section__("__{name}.sec"))) static const unsigned short '
+        f"__dspic_pragma_{name} = 0x{value:04X};"
+        for name, value in sorted(words.items())
+    ]
+    return "\n".join([_PRAGMA.sub("", text), *definitions, ""])
+
+
+def _apply(setting: str, known: dict[str, tuple[str, int]], codes: dict[str, int], words: dict[str, int]) -> str:
+    """Enter one setting; returns what is wrong with it."""
+    found = _SETTING.fullmatch(setting)
+    if found is None:
+        return f"#pragma config expects SETTING = VALUE, found '{setting.strip()}'"
+    name, value = found[1], found[2]
+    if name not in known:
+        return f"#pragma config: no setting '{name}' on this device{_hint(name, known)}"
+    register, mask = known[name]
+    if value in codes:
+        bits = codes[value]
+    else:
+        try:
+            bits = int(value, 0)
+        except ValueError:
+            return f"#pragma config: '{value}' is not a value of {name}{_hint(value, codes)}"
+        bits = bits * (mask & -mask) | ~mask
+    words[register] = words.get(register, 0xFFFF) & ~mask & 0xFFFF | bits & mask
+    return ""
+
+
+def _contradicted(setting: str, place: str, given: dict[str, tuple[str, str]]) -> str:
+    """Enter a setting and where it was made; returns what is wrong if it was made otherwise before."""
+    name, _, value = (word.strip() for word in setting.partition("="))
+    before, there = given.setdefault(name, (value, place))
+    return "" if before == value else f"#pragma config {name} = {value}, but {name} = {before} at {there}"
+
+
+def _hint(word: str, candidates: Iterable[str]) -> str:
+    close = difflib.get_close_matches(word, list(candidates), 3)
+    return f" (did you mean {', '.join(close)}?)" if close else ""
+
+
+def _place(text: str, at: int) -> str:
+    """FILE:LINE of a position, by the last line marker before it."""
+    markers = list(_MARKER.finditer(text, 0, at))
+    if not markers:
+        return f"<source>:{text.count(chr(10), 0, at) + 1}"
+    marker = markers[-1]
+    return f"{marker[2]}:{int(marker[1]) + text.count(chr(10), marker.end() + 1, at)}"

@@ -1,0 +1,1 @@
+"""Legalisation: LLVM IR to operations and widths that the machine has."""

@@ -1,0 +1,401 @@
+"""Expansion of llvm.* intrinsics into legal IR. One function per family; the table at the end names them all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from emu.dspic30f.isa.debug import PLAIN_TRAP
+from toolchain.ir.build import const, legal_type
+from toolchain.ir.model import I1, I8, I16, I32, VOID, ConstInt, GlobalRef, Instr, UnsupportedError, Value, int_type
+from toolchain.legalize import mathlib
+
+if TYPE_CHECKING:
+    from toolchain.legalize.legalize import Legalizer
+
+Result = Value | list[Value] | None
+INLINE_COPY_UNITS = 0x4000  # REPEAT counts 14 bits (isa.md §5.7)
+
+
+def expand(lz: Legalizer, i: Instr, name: str) -> Result:
+    """Translate one intrinsic call. Raises UnsupportedError for intrinsics not in the table."""
+    base = name[len("llvm.") :]
+    for prefix, handler in FAMILIES:
+        if base == prefix or base.startswith(prefix + "."):
+            return handler(lz, i, base)
+    return mathlib.expand(lz, i, base)
+
+
+def _nothing(lz: Legalizer, i: Instr, name: str) -> Result:
+    """Hints: lifetime, assume, prefetch. No code."""
+    return None
+
+
+def _first(lz: Legalizer, i: Instr, name: str) -> Result:
+    """Intrinsics whose value is their first operand."""
+    return lz.use(i.args[0])
+
+
+def _minmax(lz: Legalizer, i: Instr, name: str) -> Result:
+    signed = name[0] == "s"
+    extend = lz.sign_extended if signed else lz.zero_extended
+    a, b = extend(i.args[0]), extend(i.args[1])
+    pred = ("s" if signed else "u") + ("lt" if name[1:4] == "min" else "gt")
+    return lz.b.select(lz.b.icmp(pred, a, b), a, b)
+
+
+def _compare3(lz: Legalizer, i: Instr, name: str) -> Result:
+    """scmp / ucmp: -1, 0 or 1."""
+    signed = name[0] == "s"
+    extend = lz.sign_extended if signed else lz.zero_extended
+    a, b = extend(i.args[0]), extend(i.args[1])
+    t, k = legal_type(i.type), "s" if signed else "u"
+    more = lz.b.cast("zext", lz.b.icmp(k + "gt", a, b), t)
+    less = lz.b.cast("zext", lz.b.icmp(k + "lt", a, b), t)
+    return lz.b.binary("sub", more, less)
+
+
+def _abs(lz: Legalizer, i: Instr, name: str) -> Result:
+    a = lz.sign_extended(i.args[0])
+    zero = const(a.type, 0)
+    return lz.b.select(lz.b.icmp("slt", a, zero), lz.b.binary("sub", zero, a), a)
+
+
+def _overflow(lz: Legalizer, i: Instr, name: str) -> Result:
+    """{s,u}{add,sub,mul}.with.overflow -> [result, flag]."""
+    signed, op, bits = name[0] == "s", name[1:4], i.args[0].type.bits
+    extend = lz.sign_extended if signed else lz.zero_extended
+    a, b = extend(i.args[0]), extend(i.args[1])
+    return list(_checked(lz, op, signed, bits, a, b))
+
+
+def _checked(lz: Legalizer, op: str, signed: bool, bits: int, a: Value, b: Value) -> tuple[Value, Value]:
+    """Result and overflow flag of an operation on operands extended from `bits`."""
+    t = a.type
+    if op == "mul" or bits != t.bits:
+        wide = legal_type(int_type(bits * 2 if op == "mul" else bits + 1))
+        ext = "sext" if signed else "zext"
+        wa, wb = lz.b.cast(ext, a, wide), lz.b.cast(ext, b, wide)
+        exact = lz.multiply(wa, wb) if op == "mul" else lz.b.binary(op, wa, wb)
+        result = lz.b.cast("trunc", exact, t)
+        if bits == t.bits:
+            again = lz.b.cast(ext, result, wide)
+        else:
+            pad = wide.bits - bits
+            again = lz.b.shift("ashr" if signed else "lshr", lz.b.shift("shl", exact, pad), pad)
+        return result, lz.b.icmp("ne", again, exact)
+    result = lz.b.binary(op, a, b)
+    if not signed:
+        return result, lz.b.icmp("ult", result, a) if op == "add" else lz.b.icmp("ult", a, b)
+    changed = lz.b.binary("xor", a, result)
+    other = lz.b.binary("xor", b, result) if op == "add" else lz.b.binary("xor", a, b)
+    both = lz.b.binary("and", changed, other)  # negative when the sign is not the one of the exact result
+    return result, lz.b.icmp("slt", both, const(t, 0))
+
+
+def _saturating(lz: Legalizer, i: Instr, name: str) -> Result:
+    signed, op, bits = name[0] == "s", name[1:4], i.type.bits
+    if op == "shl":
+        raise UnsupportedError(f"intrinsic llvm.{name}")
+    extend = lz.sign_extended if signed else lz.zero_extended
+    a, b = extend(i.args[0]), extend(i.args[1])
+    t = a.type
+    result, over = _checked(lz, op, signed, bits, a, b)
+    if not signed:
+        return lz.b.select(over, const(t, (1 << bits) - 1 if op == "add" else 0), result)
+    low, high = const(t, 1 << (bits - 1)), const(t, (1 << (bits - 1)) - 1)
+    return lz.b.select(over, lz.b.select(lz.b.icmp("slt", a, const(t, 0)), low, high), result)
+
+
+def _funnel(lz: Legalizer, i: Instr, name: str) -> Result:
+    """fshl / fshr: the double-width value a:b shifted by n modulo the width."""
+    bits = i.type.bits
+    a, b, n = lz.zero_extended(i.args[0]), lz.zero_extended(i.args[1]), lz.zero_extended(i.args[2])
+    t = a.type
+    left = name.startswith("fshl")
+    if isinstance(n, ConstInt):
+        k = n.value % bits
+        if k == 0:
+            return a if left else b
+        k = k if left else bits - k
+        return lz.b.binary("or", lz.b.shift("shl", a, k), lz.b.shift("lshr", b, bits - k))
+    if bits & (bits - 1):
+        raise UnsupportedError(f"rotation of a {bits}-bit value by a variable")
+    n = lz.b.binary("and", n, const(t, bits - 1))
+    rest = lz.b.binary("xor", n, const(t, bits - 1))  # bits-1-n
+    if left:
+        low = lz.b.binary("lshr", lz.b.shift("lshr", b, 1), rest)
+        return lz.b.binary("or", lz.b.binary("shl", a, n), low)
+    high = lz.b.binary("shl", lz.b.shift("shl", a, 1), rest)
+    return lz.b.binary("or", high, lz.b.binary("lshr", b, n))
+
+
+def _count_zeros(lz: Legalizer, i: Instr, name: str) -> Result:
+    """ctlz / cttz word by word with FF1L / FF1R (isa.md §6.4), which give 1-based positions and 0 for none."""
+    bits = i.type.bits
+    leading = name.startswith("ctlz")
+    v = lz.zero_extended(i.args[0])
+    t = v.type
+    if t.bits < 16:
+        v = lz.b.cast("zext", v, I16)
+    words = max(t.bits // 16, 1)
+    result: Value = const(I16, bits)
+    order = range(words) if leading else reversed(range(words))
+    for k in order:
+        word = lz.b.cast("trunc", lz.b.shift("lshr", v, 16 * k), I16) if words > 1 else v
+        position = lz.b.emit("ff1l" if leading else "ff1r", I16, [word])
+        before = bits - 16 * (k + 1) if leading else 16 * k
+        count = lz.b.add(position, before - 1)
+        result = lz.b.select(lz.b.icmp("eq", word, const(I16, 0)), result, count)
+    return lz.b.cast("trunc" if t.bits < 16 else "zext", result, t)
+
+
+def _popcount(lz: Legalizer, i: Instr, name: str) -> Result:
+    """Sum over the words; each by the run-time function (abi-elf.md §2.8)."""
+    v = lz.zero_extended(i.args[0])
+    t = v.type
+    if t.bits < 16:
+        v = lz.b.cast("zext", v, I16)
+    total: Value | None = None
+    for k in range(max(t.bits // 16, 1)):
+        word = lz.b.cast("trunc", lz.b.shift("lshr", v, 16 * k), I16) if t.bits > 16 else v
+        count = lz.b.call("__popcounthi2", I16, [word])
+        total = count if total is None else lz.b.binary("add", total, count)
+    assert total is not None
+    return lz.b.cast("trunc" if t.bits < 16 else "zext", total, t)
+
+
+def _bswap(lz: Legalizer, i: Instr, name: str) -> Result:
+    v = lz.use(i.args[0])
+    t, words = v.type, i.type.bits // 16
+    if i.type.bits % 16:
+        raise UnsupportedError(f"byte swap of i{i.type.bits}")
+    result: Value | None = None
+    for k in range(words):
+        word = lz.b.cast("trunc", lz.b.shift("lshr", v, 16 * k), I16)
+        swapped = lz.b.cast("zext", lz.b.emit("swap", I16, [word]), t)
+        placed = lz.b.shift("shl", swapped, 16 * (words - 1 - k))
+        result = placed if result is None else lz.b.binary("or", result, placed)
+    return result
+
+
+def _bitreverse(lz: Legalizer, i: Instr, name: str) -> Result:
+    """Swap ever larger groups of bits."""
+    bits = i.type.bits
+    if bits & (bits - 1):
+        raise UnsupportedError(f"bit reversal of i{bits}")
+    v: Value = lz.use(i.args[0])
+    t, step = v.type, 1
+    while step < bits:
+        mask = sum(((1 << step) - 1) << k for k in range(0, bits, 2 * step))
+        low = lz.b.shift("shl", lz.b.binary("and", v, const(t, mask)), step)
+        v = lz.b.binary("or", low, lz.b.binary("and", lz.b.shift("lshr", v, step), const(t, mask)))
+        step *= 2
+    return v
+
+
+def _memory(lz: Legalizer, i: Instr, name: str) -> Result:
+    """memcpy memmove memset: REPEAT forms for constant sizes, library calls otherwise."""
+    dst, src, size = (lz.use(a) for a in i.args[:3])
+    if size.type.bits != 16:
+        size = lz.b.cast("trunc" if size.type.bits > 16 else "zext", size, I16)
+    kind = name[:6]
+    attrs = i.extra["attrs"]
+    assert isinstance(attrs, list)
+    if isinstance(size, ConstInt) and size.value == 0:
+        return None
+    even = lz.even(dst, attrs[0].get("align", 1))
+    if kind != "memset":
+        even = even and lz.even(src, attrs[1].get("align", 1))
+    unit = 2 if even and isinstance(size, ConstInt) and not size.value & 1 else 1
+    inline = isinstance(size, ConstInt) and size.value // unit <= INLINE_COPY_UNITS
+    if kind == "memset":
+        value = lz.b.cast("trunc", src, I8)
+        if inline and isinstance(size, ConstInt):
+            _fill(lz, dst, value, size.value, unit)
+        else:
+            lz.b.call("memset", I16, [dst, lz.b.cast("zext", value, I16), size])
+    elif inline and kind == "memcpy" and isinstance(size, ConstInt):
+        lz.b.emit("blockcopy", VOID, [dst, src], count=size.value // unit, unit=unit)
+    else:
+        lz.b.call(kind if kind == "memcpy" else "memmove", I16, [dst, src, size])
+    return None
+
+
+def _fill(lz: Legalizer, dst: Value, value: Value, size: int, unit: int) -> None:
+    if unit == 2:
+        value = (
+            const(I16, value.value * 0x101)
+            if isinstance(value, ConstInt)
+            else lz.b.binary("mul", lz.b.cast("zext", value, I16), const(I16, 0x101))
+        )
+    lz.b.emit("blockfill", VOID, [dst, value], count=size // unit, unit=unit)
+
+
+def _va_start(lz: Legalizer, i: Instr, name: str) -> Result:
+    lz.b.store(lz.b.emit("vastart", I16, []), lz.use(i.args[0]))
+    return None
+
+
+def _va_copy(lz: Legalizer, i: Instr, name: str) -> Result:
+    lz.b.store(lz.b.load(I16, lz.use(i.args[1])), lz.use(i.args[0]))
+    return None
+
+
+def _stacksave(lz: Legalizer, i: Instr, name: str) -> Result:
+    return lz.b.emit("getsp", I16, [])
+
+
+def _stackrestore(lz: Legalizer, i: Instr, name: str) -> Result:
+    lz.b.emit("setsp", VOID, [lz.use(i.args[0])])
+    return None
+
+
+def _entry_word(lz: Legalizer, i: Instr, name: str) -> Result:
+    """__builtin_return_address / frame_address of this function; outer levels are unknown: 0, as GCC allows."""
+    level = i.args[0]
+    if not isinstance(level, ConstInt) or level.value:
+        return const(I16, 0)
+    return lz.b.emit("entryword", I16, [], address=name.startswith("frame"))
+
+
+def _fmuladd(lz: Legalizer, i: Instr, name: str) -> Result:
+    """Not fused: two roundings, as XC16 does."""
+    a, b, c = (lz.use(x) for x in i.args[:3])
+    mode = "sf" if a.type.bits == 32 else "df"
+    return lz.b.call(f"__add{mode}3", a.type, [lz.b.call(f"__mul{mode}3", a.type, [a, b]), c])
+
+
+def _fabs(lz: Legalizer, i: Instr, name: str) -> Result:
+    a = lz.use(i.args[0])
+    return lz.b.binary("and", a, const(a.type, (1 << (a.type.bits - 1)) - 1))
+
+
+def _copysign(lz: Legalizer, i: Instr, name: str) -> Result:
+    a, s = lz.use(i.args[0]), lz.use(i.args[1])
+    sign = 1 << (a.type.bits - 1)
+    return lz.b.binary("or", lz.b.binary("and", a, const(a.type, sign - 1)), lz.b.binary("and", s, const(a.type, sign)))
+
+
+def _round_to_int(lz: Legalizer, i: Instr, name: str) -> Result:
+    stem = name.split(".")[0]
+    return lz.b.call(stem + ("f" if i.args[0].type.bits == 32 else ""), legal_type(i.type), [lz.use(i.args[0])])
+
+
+def _fpclass(lz: Legalizer, i: Instr, name: str) -> Result:
+    """llvm.is.fpclass: the mask bits in LangRef order, decided on the raw bits."""
+    a, mask = lz.use(i.args[0]), i.args[1]
+    assert isinstance(mask, ConstInt)
+    t, bits = a.type, a.type.bits
+    fraction = 23 if bits == 32 else 52
+    sign, infinity = 1 << (bits - 1), ((1 << (bits - 1 - fraction)) - 1) << fraction
+    magnitude = lz.b.binary("and", a, const(t, sign - 1))
+    negative = lz.b.icmp("slt", a, const(t, 0))
+    above = lz.b.icmp("ugt", magnitude, const(t, infinity))
+    quiet = lz.b.icmp("uge", magnitude, const(t, infinity | 1 << (fraction - 1)))
+    zero = lz.b.icmp("eq", magnitude, const(t, 0))
+    infinite = lz.b.icmp("eq", magnitude, const(t, infinity))
+    finite = lz.b.icmp("ult", magnitude, const(t, infinity))
+    normal = lz.b.binary("and", finite, lz.b.icmp("uge", magnitude, const(t, 1 << fraction)))
+    subnormal = lz.b.binary("and", lz.b.icmp("ult", magnitude, const(t, 1 << fraction)), lz.b.logical_not(zero))
+    by_bit: list[tuple[Value, bool | None]] = [
+        (lz.b.binary("and", above, lz.b.logical_not(quiet)), None), (quiet, None), (infinite, True), (normal, True),
+        (subnormal, True), (zero, True), (zero, False), (subnormal, False), (normal, False), (infinite, False),
+    ]  # fmt: skip
+    result: Value = const(I1, 0)
+    for k, (kind, wants_negative) in enumerate(by_bit):
+        if mask.value >> k & 1:
+            if wants_negative is not None:
+                kind = lz.b.binary("and", kind, negative if wants_negative else lz.b.logical_not(negative))
+            result = lz.b.binary("or", result, kind)
+    return result
+
+
+def _fptoint_sat(lz: Legalizer, i: Instr, name: str) -> Result:
+    """The run-time conversions already saturate at 32 and 64 bits (abi-elf.md §2.8); narrower results are clamped."""
+    signed = name.startswith("fptosi")
+    from toolchain.legalize import softfloat
+
+    bits = i.type.bits
+    wide = int_type(64 if bits > 32 else 32)
+    v = softfloat.to_int(lz.b, lz.use(i.args[0]), signed, wide)
+    if bits < wide.bits:
+        low, high = (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) if signed else (0, (1 << bits) - 1)
+        k = "s" if signed else "u"
+        v = lz.b.select(lz.b.icmp(k + "gt", v, const(wide, high)), const(wide, high), v)
+        if signed:
+            v = lz.b.select(lz.b.icmp("slt", v, const(wide, low)), const(wide, low), v)
+    return lz.b.cast("trunc", v, legal_type(i.type))
+
+
+def _trap(lz: Legalizer, i: Instr, name: str) -> Result:
+    """Stop: the software breakpoint word, then a reset (abi-elf.md §3.3, as the default interrupt handler).
+
+    Behind them, where nothing runs, the number of the check that failed tells a debugger that this is no ordinary end.
+    """
+    if name == "debugtrap":
+        lz.b.emit("builtin", VOID, [], name="__builtin_software_breakpoint")
+        return None
+    check = i.args[0] if name == "ubsantrap" else const(I16, PLAIN_TRAP)
+    assert isinstance(check, ConstInt)
+    lz.b.emit("builtin", VOID, [const(I16, check.value & 0xFF)], name="__builtin_failed_check")
+    return None
+
+
+def _object_size(lz: Legalizer, i: Instr, name: str) -> Result:
+    flag = i.args[1]
+    assert isinstance(flag, ConstInt)
+    return const(legal_type(i.type), 0 if flag.value else -1)
+
+
+def _constant_p(lz: Legalizer, i: Instr, name: str) -> Result:
+    return const(I1, isinstance(i.args[0], ConstInt | GlobalRef))
+
+
+def _powi(lz: Legalizer, i: Instr, name: str) -> Result:
+    suffix = "f" if i.type.bits == 32 else ""
+    mode = "sf" if i.type.bits == 32 else "df"
+    n = lz.b.cast("sext", lz.sign_extended(i.args[1]), I32)
+    exponent = lz.b.call(f"__floatsi{mode}", legal_type(i.type), [n])
+    return lz.b.call("pow" + suffix, legal_type(i.type), [lz.use(i.args[0]), exponent])
+
+
+FAMILIES: list[tuple[str, Callable[[Legalizer, Instr, str], Result]]] = [
+    *((n, _nothing) for n in ("lifetime.start", "lifetime.end", "assume", "prefetch", "donothing", "va_end",
+      "invariant", "clear_cache",
+                              "sideeffect", "experimental.noalias.scope.decl", "pseudoprobe", "fake.use")),
+    *((n, _first) for n in ("expect", "annotation", "ptr.annotation", "launder.invariant.group", "ssa.copy",
+                            "strip.invariant.group", "threadlocal.address", "preserve.array.access.index",
+                            "preserve.struct.access.index", "arithmetic.fence", "canonicalize")),
+    *((n, _minmax) for n in ("smin", "smax", "umin", "umax")),
+    ("scmp", _compare3),
+    ("ucmp", _compare3),
+    ("abs", _abs),
+    *((k + op + ".with.overflow", _overflow) for k in "su" for op in ("add", "sub", "mul")),
+    *((k + op + ".sat", _saturating) for k in "su" for op in ("add", "sub")),
+    ("fshl", _funnel),
+    ("fshr", _funnel),
+    ("ctlz", _count_zeros),
+    ("cttz", _count_zeros),
+    ("ctpop", _popcount),
+    ("bswap", _bswap),
+    ("bitreverse", _bitreverse),
+    *((n, _memory) for n in ("memcpy", "memcpy.inline", "memmove", "memset", "memset.inline")),
+    ("va_start", _va_start),
+    ("va_copy", _va_copy),
+    ("stacksave", _stacksave),
+    ("stackrestore", _stackrestore),
+    ("frameaddress", _entry_word),
+    ("returnaddress", _entry_word),
+    ("fmuladd", _fmuladd),
+    ("fabs", _fabs),
+    ("copysign", _copysign),
+    *((n, _round_to_int) for n in ("lrint", "llrint", "lround", "llround")),
+    ("is.fpclass", _fpclass),
+    ("fptosi.sat", _fptoint_sat),
+    ("fptoui.sat", _fptoint_sat),
+    *((n, _trap) for n in ("trap", "debugtrap", "ubsantrap")),
+    ("objectsize", _object_size),
+    ("is.constant", _constant_p),
+    ("powi", _powi),
+]  # fmt: skip

@@ -1,0 +1,135 @@
+"""Division by constants as multiplication: x / d is the high word of x * m, shifted (Granlund, Montgomery 1994).
+
+MUL takes a cycle where REPEAT DIV takes 19 (isa.md §6.7). Signed division by 2^k is a shift of x, made 2^k - 1 larger
+where it is negative. Needs: legal IR. For size only where this takes no more words than DIV. 32 bits, which
+otherwise call the run-time library, only for speed: 17 words and cycles where the call takes 3 words and 50 cycles.
+"""
+
+from __future__ import annotations
+
+from toolchain.ir.build import Builder, const
+from toolchain.ir.model import I16, I32, Block, ConstInt, Function, Instr, Value
+
+OPERATIONS = frozenset(("udiv", "sdiv", "urem", "srem"))
+REMAINDER = {"udiv": "urem", "sdiv": "srem"}
+
+
+def run(f: Function, for_size: bool, for_speed: bool = False) -> None:
+    """Rewrite quotients and remainders of every block; those of the same operands share the quotient."""
+    for b in f.blocks:
+        if for_speed:
+            for i in b.instrs:
+                _inline(i)
+        wanted = [i for i in b.instrs if _wanted(i)]
+        if for_size:
+            wanted = [i for i in wanted if _short(i, wanted)]
+        scratch = Block(b.name)
+        quotients: dict[tuple[str, int, int], Value] = {}
+        for i in b.instrs:
+            if i in wanted:
+                _rewrite(scratch, i, quotients)
+            scratch.instrs.append(i)
+        b.instrs = scratch.instrs
+
+
+def _inline(i: Instr) -> None:
+    """A call that legalisation made of a division by a constant becomes the operation itself, for `_rewrite`."""
+    op = i.extra.get("divides")
+    if isinstance(op, str) and i.type is I32 and _divides(op, i.args[0], i.args[1]):
+        i.op, i.args, i.extra = op, i.args[:2], {}
+
+
+def _wanted(i: Instr) -> bool:
+    if i.op not in OPERATIONS or (i.type is not I16 and i.type is not I32) or "other" in i.extra:
+        return False
+    return _divides(i.op, i.args[0], i.args[1])
+
+
+def _divides(op: str, x: Value, d: Value) -> bool:
+    """Whether there is a product for this quotient or remainder."""
+    if not isinstance(d, ConstInt) or isinstance(x, ConstInt) or d.type.bits not in (16, 32):
+        return False
+    least = 1 << d.type.bits - 1
+    if op[0] == "s":
+        return 2 <= abs(d.signed) < least
+    return d.value > 2 and d.value & (d.value - 1) != 0 and d.value < least
+
+
+def _short(i: Instr, others: list[Instr]) -> bool:
+    """MOV, MUL, LSR or LSR, ADD, ASR instead of MOV, REPEAT, DIV, unless that DIV gives a remainder too."""
+    d = i.args[1]
+    assert isinstance(d, ConstInt)
+    halved = i.op == "sdiv" and d.value == 2
+    if not halved and (i.op != "udiv" or unsigned_factor(d.value)[0] >= 1 << 16):
+        return False
+    same = [o for o in others if o.op == REMAINDER[i.op] and o.args[0] is i.args[0]]
+    return not any(isinstance(o.args[1], ConstInt) and o.args[1].value == d.value for o in same)
+
+
+def _rewrite(block: Block, i: Instr, quotients: dict[tuple[str, int, int], Value]) -> None:
+    """Put what comes before `i` into the block and make `i` the last step."""
+    x, d = i.args
+    assert isinstance(d, ConstInt)
+    b = Builder(block)
+    b.line = i.line
+    key = (i.op[0], id(x), d.value)
+    quotient = quotients.get(key)
+    if quotient is None:
+        quotient = _signed(b, x, d.signed) if i.op[0] == "s" else _unsigned(b, x, d.value)
+        quotients[key] = quotient
+    remainder = i.op.endswith("rem")
+    i.extra = {}
+    i.op = "sub" if remainder else "bits"
+    i.args = [x, b.binary("mul", quotient, d)] if remainder else [quotient]
+
+
+def unsigned_factor(d: int, bits: int = 16) -> tuple[int, int]:
+    """(m, s) with x // d == x * m >> bits + s for all x of that many bits; m has at most one bit more."""
+    word = 1 << bits
+    for s in range(bits + 1):
+        m = (word << s) // d + 1
+        if (m * d - (word << s)) * (word - 1) < word << s:
+            return m, s
+    raise AssertionError(d)
+
+
+def signed_factor(d: int, bits: int = 16) -> tuple[int, int]:
+    """(m, s) with x / d == (x * m >> bits + s) + (x < 0), towards 0, for all signed x; m has no bit more."""
+    word = 1 << bits
+    for s in range(bits):
+        m = (word << s) // d + 1
+        if (m * d - (word << s)) * (word >> 1) < word << s:
+            return m, s
+    raise AssertionError(d)
+
+
+def _high(b: Builder, x: Value, m: int, extend: str) -> Value:
+    """Upper half of x * m, x signed (sext) or not (zext) and 0 <= m < 2^bits."""
+    if x.type is I32:
+        return b.emit("mulhigh", I32, [x, const(I32, m)], signed=extend == "sext")
+    product = b.binary("mul", b.cast(extend, x, I32), b.cast(extend, const(I16, m), I32))
+    high = b.cast("trunc", b.shift("lshr", product, 16), I16)
+    return b.binary("add", high, x) if extend == "sext" and m >= 1 << 15 else high
+
+
+def _unsigned(b: Builder, x: Value, d: int) -> Value:
+    bits = x.type.bits
+    m, s = unsigned_factor(d, bits)
+    if m < 1 << bits:
+        return b.shift("lshr", _high(b, x, m, "zext"), s)
+    high = _high(b, x, m - (1 << bits), "zext")  # (x + high) >> s without the bit above the others
+    half = b.shift("lshr", b.binary("sub", x, high), 1)
+    return b.shift("lshr", b.binary("add", half, high), s - 1)
+
+
+def _signed(b: Builder, x: Value, d: int) -> Value:
+    bits = x.type.bits
+    if d < 0:
+        return b.binary("sub", const(x.type, 0), _signed(b, x, -d))
+    if d & (d - 1) == 0:
+        k = d.bit_length() - 1
+        sign = b.shift("ashr", x, bits - 1) if k > 1 else x
+        return b.shift("ashr", b.binary("add", x, b.shift("lshr", sign, bits - k)), k)
+    m, s = signed_factor(d, bits)
+    high = _high(b, x, m, "sext")
+    return b.binary("add", b.shift("ashr", high, s), b.shift("lshr", x, bits - 1))

@@ -1,0 +1,290 @@
+"""Legalisation of addresses, loads, stores, locals and atomics. Odd addresses are accessed byte by byte (isa.md §3)."""
+
+from __future__ import annotations
+
+from toolchain.ir.build import const, legal_type
+from toolchain.ir.model import (
+    I1,
+    I8,
+    I16,
+    VOID,
+    ConstInt,
+    GlobalRef,
+    Instr,
+    Type,
+    Undef,
+    UnsupportedError,
+    Value,
+    int_type,
+    size_of,
+    store_size,
+    struct_offsets,
+)
+from toolchain.legalize.base import AGGREGATES, LegalizerBase, leaves_of
+
+ATOMIC_CALLS = {"__atomic_load", "__atomic_store", "__atomic_exchange", "__atomic_compare_exchange"}
+
+
+class MemoryLegalizer(LegalizerBase):
+    """Everything that touches memory."""
+
+    # -- memory -------------------------------------------------------------------------------------------------------
+
+    def gep(self, i: Instr) -> Value:
+        """Address arithmetic: base + scaled indices + one constant."""
+        t = i.extra["type"]
+        assert isinstance(t, Type)
+        address, offset = self.use(i.args[0]), 0
+        for k, index in enumerate(i.args[1:]):
+            if k and t.kind == "struct":
+                assert isinstance(index, ConstInt)
+                offset += struct_offsets(t)[index.value]
+                t = t.elems[index.value]
+                continue
+            if k:
+                t = t.elems[0]
+            stride = size_of(t)
+            if isinstance(index, ConstInt):
+                offset += index.signed * stride
+                continue
+            scaled = self.use(index)
+            if scaled.type.bits < 16:
+                scaled = self.b.cast("sext", self.sign_extended(index), I16)
+            elif scaled.type.bits > 16:
+                scaled = self.b.cast("trunc", scaled, I16)
+            if stride:
+                address = self.b.binary("add", address, self.b.binary("mul", scaled, const(I16, stride)))
+        return self.b.binary("add", address, const(I16, offset)) if offset & 0xFFFF else address
+
+    def alloca(self, i: Instr) -> Value:
+        """Fixed-size objects become frame slots, others move the stack pointer."""
+        t = i.extra["type"]
+        assert isinstance(t, Type)
+        size = size_of(t)
+        count = self.use(i.args[0]) if i.args else const(I16, 1)
+        align = i.extra.get("align", 1)
+        assert isinstance(align, int)
+        slack = align if align > 2 else 0
+        if isinstance(count, ConstInt) and (self.blocks[0] is self.b.block):
+            return self.aligned(self.b.emit("slot", I16, [], size=size * count.value + slack, source=i.name), slack)
+        if count.type.bits > 16:
+            count = self.b.cast("trunc", count, I16)
+        elif count.type.bits < 16:
+            count = self.b.cast("zext", count, I16)
+        total = self.b.add(self.b.binary("mul", count, const(I16, size)), slack)
+        return self.aligned(self.b.emit("dynalloca", I16, [total]), slack)
+
+    def frame_slot(self, size: int) -> Instr:
+        """Address of fresh bytes in the frame, wherever the code stands."""
+        slot = Instr("slot", I16, [])
+        slot.extra["size"] = size
+        self.blocks[0].instrs.insert(0, slot)
+        return slot
+
+    def aligned(self, p: Value, align: int) -> Value:
+        """The next multiple of `align` (0: as is); the stack itself is aligned to 2 only."""
+        return self.b.binary("and", self.b.add(p, align - 1), const(I16, -align)) if align else p
+
+    def even(self, p: Value, align: int) -> bool:
+        """Whether a pointer is known to be even, so that word accesses do not trap (isa.md §3)."""
+        if align >= 2:
+            return True
+        offset = 0
+        while isinstance(p, Instr) and p.op == "add" and isinstance(p.args[1], ConstInt):
+            offset += p.args[1].value
+            p = p.args[0]
+        if isinstance(p, ConstInt):
+            return not (p.value + offset) & 1
+        if isinstance(p, GlobalRef):
+            var = self.module.globals.get(p.name)
+            strong = var is not None and var.init is not None and var.linkage in ("", "internal", "private")
+            return strong and not (p.offset + offset) & 1
+        return isinstance(p, Instr) and p.op in ("slot", "dynalloca") and not offset & 1
+
+    def load(self, i: Instr) -> Value | list[Value]:
+        p = self.use(i.args[0])
+        align = i.extra.get("align", 2)
+        assert isinstance(align, int)
+        if i.type.kind in AGGREGATES:
+            return self.load_aggregate(i.type, p, align, i.volatile)
+        t, size, even = legal_type(i.type), store_size(i.type), self.even(p, align)
+        value = (
+            self.load_at_once(t, size, p, even)
+            if "ordering" in i.extra
+            else self.load_bits(t, size, p, even, i.volatile)
+        )
+        return self.to_bool(value) if i.type.bits == 1 else value
+
+    def load_at_once(self, t: Type, size: int, p: Value, even: bool) -> Value:
+        """Atomic load: one instruction, or with interrupts held off."""
+        if size == 1 or (even and size == 2):
+            return self.load_bits(t, size, p, even, True)
+        if even and size == 4:
+            return self.b.emit("loadpair", t, [p])
+        self.hold()
+        value = self.load_bits(t, size, p, even, True)
+        self.release()
+        return value
+
+    def load_bits(self, t: Type, size: int, p: Value, even: bool, volatile: bool) -> Value:
+        """Load `size` bytes into the low end of a legal type."""
+        if t is I1:
+            return self.b.load(I8, p, volatile)
+        if even and size * 8 == t.bits:
+            return self.b.load(t, p, volatile)
+        if size == 1:
+            return self.b.cast("zext", self.b.load(I8, p, volatile), t)
+        value: Value | None = None
+        for at, step in _pieces(size, even):
+            part = self.b.load(I16 if step == 2 else I8, self.b.add(p, at), volatile)
+            wide = self.b.shift("shl", self.b.cast("zext", part, t), at * 8)
+            value = wide if value is None else self.b.binary("or", value, wide)
+        assert value is not None
+        return value
+
+    def store(self, i: Instr) -> None:
+        v, p = i.args[0], self.use(i.args[1])
+        align = i.extra.get("align", 2)
+        assert isinstance(align, int)
+        if v.type.kind in AGGREGATES:
+            self.store_aggregate(v, p, align, i.volatile)
+            return
+        if isinstance(v, Undef) and not i.volatile:
+            return
+        value = self.b.cast("zext", self.use(v), I8) if v.type.bits == 1 else self.zero_extended(v)
+        size, even = store_size(v.type), self.even(p, align)
+        if "ordering" in i.extra:
+            self.store_at_once(value, size, p, even)
+        else:
+            self.store_bits(value, size, p, even, i.volatile)
+
+    def store_at_once(self, value: Value, size: int, p: Value, even: bool) -> None:
+        """Atomic store: one instruction, or with interrupts held off."""
+        if size == 1 or (even and size == 2):
+            self.store_bits(value, size, p, even, True)
+        elif even and size == 4:
+            self.b.emit("storepair", VOID, [value, p])
+        else:
+            self.hold()
+            self.store_bits(value, size, p, even, True)
+            self.release()
+
+    def store_bits(self, v: Value, size: int, p: Value, even: bool, volatile: bool) -> None:
+        """Store the low `size` bytes of a legal value."""
+        if even and size * 8 == v.type.bits:
+            self.b.store(v, p, volatile)
+            return
+        if size == 1:
+            self.b.store(self.b.cast("trunc", v, I8), p, volatile)
+            return
+        for at, step in _pieces(size, even):
+            part = self.b.cast("trunc", self.b.shift("lshr", v, at * 8) if at else v, I16 if step == 2 else I8)
+            self.b.store(part, self.b.add(p, at), volatile)
+
+    def hold(self) -> None:
+        """From here to `release`, interrupts of priority 1-6 wait (isa.md §12). No calls and branches in between."""
+        self.b.emit("builtin", VOID, [], name="__builtin_hold")
+
+    def release(self) -> None:
+        self.b.emit("builtin", VOID, [], name="__builtin_release")
+
+    def load_aggregate(self, whole: Type, p: Value, align: int, volatile: bool) -> list[Value]:
+        out = []
+        for t, at in leaves_of(whole):
+            q = self.b.add(p, at)
+            even = self.even(q, 1 if at & 1 else align)
+            out.append(self.load_bits(legal_type(t), store_size(t), q, even, volatile))
+        return out
+
+    def store_aggregate(self, v: Value, p: Value, align: int, volatile: bool) -> None:
+        for (t, at), part in zip(leaves_of(v.type), self.fields(v), strict=True):
+            q = self.b.add(p, at)
+            self.store_bits(part, store_size(t), q, self.even(q, 1 if at & 1 else align), volatile)
+
+    def va_arg(self, i: Instr) -> Value:
+        """Step the pointer down by the rounded size, then read (abi-elf.md §2.4)."""
+        if i.type.kind not in ("int", "float", "ptr"):
+            raise UnsupportedError(f"va_arg of type {i.type}")
+        pp = self.use(i.args[0])
+        size = (store_size(i.type) + 1) // 2 * 2
+        p = self.b.add(self.b.load(I16, pp), -size)
+        self.b.store(p, pp)
+        value = self.load_bits(legal_type(i.type), store_size(i.type), p, True, False)
+        return self.to_bool(value) if i.type.bits == 1 else value
+
+    # -- atomics ------------------------------------------------------------------------------------------------------
+
+    def atomicrmw(self, i: Instr) -> Value:
+        """Read, modify, write with interrupts of priority 1-6 held off for the length of the sequence."""
+        kind = str(i.extra["kind"])
+        p, v = self.use(i.args[0]), self.use(i.args[1])
+        t = legal_type(i.type)
+        self.hold()
+        old = self.b.load(t, p, True)
+        new = self.modified(kind, t, old, v)
+        self.b.store(new, p, True)
+        self.release()
+        return old
+
+    def modified(self, kind: str, t: Type, old: Value, v: Value) -> Value:
+        """What atomicrmw writes."""
+        if kind in ("add", "sub", "and", "or", "xor"):
+            return self.b.binary(kind, old, v)
+        if kind == "xchg":
+            return v
+        if kind == "nand":
+            return self.b.binary("xor", self.b.binary("and", old, v), const(t, -1))
+        if kind in ("max", "min", "umax", "umin"):
+            pred = ("u" if kind[0] == "u" else "s") + ("gt" if kind.endswith("max") else "lt")
+            return self.b.select(self.b.icmp(pred, old, v), old, v)
+        raise UnsupportedError(f"atomicrmw {kind}")
+
+    def cmpxchg(self, i: Instr) -> list[Value]:
+        p, expected, new = (self.use(a) for a in i.args)
+        t = legal_type(i.args[1].type)
+        self.hold()
+        old = self.b.load(t, p, True)
+        same = self.b.icmp("eq", old, expected)
+        self.b.store(self.b.select(same, new, old), p, True)
+        self.release()
+        return [old, same]
+
+    def atomic_call(self, i: Instr, name: str) -> Value | None:
+        """Calls of GCC's generic atomic functions, which the front end makes for objects declared _Atomic."""
+        size, p, *operands = (self.use(a) for a in i.args[:-2])
+        assert isinstance(size, ConstInt)
+        n = size.value
+        t = I8 if n == 1 else int_type(8 * n)
+        even = self.even(p, 1)
+        if name == "__atomic_load":
+            value = self.load_at_once(t, n, p, even)
+            self.store_bits(value, n, operands[0], self.even(operands[0], 1), False)
+            return None
+        given = operands[1] if name == "__atomic_compare_exchange" else operands[0]
+        new = self.load_bits(t, n, given, self.even(given, 1), False)
+        if name == "__atomic_store":
+            self.store_at_once(new, n, p, even)
+            return None
+        if name == "__atomic_exchange":
+            self.hold()
+            old = self.load_bits(t, n, p, even, True)
+            self.store_bits(new, n, p, even, True)
+            self.release()
+            self.store_bits(old, n, operands[1], self.even(operands[1], 1), False)
+            return None
+        where = operands[0]
+        expected = self.load_bits(t, n, where, self.even(where, 1), False)
+        self.hold()
+        old = self.load_bits(t, n, p, even, True)
+        same = self.b.icmp("eq", old, expected)
+        self.store_bits(self.b.select(same, new, old), n, p, even, True)
+        self.release()
+        self.store_bits(old, n, where, self.even(where, 1), False)  # when they were equal, what is there already
+        return same
+
+
+def _pieces(size: int, even: bool) -> list[tuple[int, int]]:
+    """(offset, bytes) of the accesses that cover `size` bytes."""
+    if not even:
+        return [(k, 1) for k in range(size)]
+    return [(k, 2) for k in range(0, size - 1, 2)] + ([(size - 1, 1)] if size & 1 else [])

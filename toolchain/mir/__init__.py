@@ -1,0 +1,1 @@
+"""Machine form: dsPIC30F instructions over virtual and real registers, and liveness."""

@@ -1,0 +1,1 @@
+"""Optimisation passes over legal IR and machine form."""

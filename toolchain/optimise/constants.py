@@ -1,0 +1,134 @@
+"""Constants in registers: loaded once per block stretch and once per loop instead of at every use.
+
+Needs: virtual registers. A moved constant keeps a single definition, so the allocator can still load it again at its
+uses when registers run out (see `spill`).
+"""
+
+from __future__ import annotations
+
+from toolchain.ir.cfg import natural_loops
+from toolchain.mir.liveness import live_out
+from toolchain.mir.mir import MI, Imm, MBlock, MFunction
+
+REACH = 12  # instructions over which a repeated constant is kept
+LOOP_REGISTERS = 9  # registers a loop may hold with its constants: W0-W7 and one spare
+Key = tuple[str, object]
+
+
+def run(m: MFunction) -> None:
+    """Both rewrites."""
+    counts = _definition_counts(m)
+    out = live_out(m)
+    for b in m.blocks:
+        _share_in_block(b, counts, out[b.name])
+    _hoist_from_loops(m, counts)
+
+
+def _definition_counts(m: MFunction) -> dict[int, int]:
+    counts: dict[int, int] = {}
+    for b in m.blocks:
+        for mi in b.insts:
+            for r in mi.defs():
+                counts[r] = counts.get(r, 0) + 1
+    return counts
+
+
+def _key(mi: MI, counts: dict[int, int]) -> Key | None:
+    """What a constant load loads; None for anything else, or when the register has other definitions."""
+    if mi.pred or mi.byte or not mi.args or not isinstance(mi.args[-1], int):
+        return None
+    if mi.args[-1] < 16 or counts.get(mi.args[-1]) != 1:
+        return None
+    if mi.op in ("clr", "setm"):
+        return mi.op, None
+    if mi.op == "mov" and isinstance(mi.args[0], Imm):
+        return "mov", mi.args[0].value
+    if mi.op == "lea":
+        return "lea", mi.args[0]
+    return None
+
+
+def _is_call(mi: MI) -> bool:
+    return mi.op in ("call", "callr", "asm")
+
+
+def _share_in_block(b: MBlock, counts: dict[int, int], live: int) -> None:
+    """Reuse the register of an equal constant loaded a few instructions earlier; those live at the end stay."""
+    known: dict[Key, tuple[int, int]] = {}
+    rename: dict[int, int] = {}
+    out: list[MI] = []
+    for at, mi in enumerate(b.insts):
+        if _is_call(mi):
+            known.clear()
+        key = _key(mi, counts)
+        if key is not None:
+            r = mi.args[-1]
+            assert isinstance(r, int)
+            found = known.get(key)
+            if found is not None and at - found[1] <= REACH and not live >> r & 1:
+                rename[r] = found[0]
+                known[key] = (found[0], at)
+                continue
+            known[key] = (r, at)
+        elif rename:
+            mi.map_registers(rename)
+        out.append(mi)
+    b.insts = out
+
+
+def _hoist_from_loops(m: MFunction, counts: dict[int, int]) -> None:
+    """Innermost loops without calls: constants move to the block before the loop."""
+    succs = {b.name: b.succs for b in m.blocks}
+    loops = natural_loops(succs, m.blocks[0].name)
+    blocks = m.block_map()
+    out = None
+    for header, body in sorted(loops.items(), key=lambda e: len(e[1])):
+        if any(other != header and other in body for other in loops):
+            continue
+        if any(_is_call(mi) for n in body for mi in blocks[n].insts):
+            continue
+        entry = _entry(blocks, succs, header, body)
+        if entry is None:
+            continue
+        out = out if out is not None else live_out(m)
+        room = LOOP_REGISTERS - max(out[n].bit_count() for n in body) - 2
+        _hoist(m, entry, [blocks[n] for n in succs if n in body], counts, room)
+
+
+def _entry(blocks: dict[str, MBlock], succs: dict[str, list[str]], header: str, body: set[str]) -> MBlock | None:
+    """The only block that enters the loop, if it goes nowhere else."""
+    outside = [n for n, s in succs.items() if header in s and n not in body]
+    if len(outside) != 1 or succs[outside[0]] != [header]:
+        return None
+    return blocks[outside[0]]
+
+
+def _hoist(m: MFunction, entry: MBlock, body: list[MBlock], counts: dict[int, int], room: int) -> None:
+    found: dict[Key, int] = {}
+    rename: dict[int, int] = {}
+    for b in body:
+        kept: list[MI] = []
+        for mi in b.insts:
+            key = _key(mi, counts)
+            if key is None or (key not in found and len(found) >= room) or _used_outside(m, mi, body):
+                kept.append(mi)
+                continue
+            r = mi.args[-1]
+            assert isinstance(r, int)
+            if key in found:
+                rename[r] = found[key]
+            else:
+                found[key] = r
+                entry.insts.insert(len(entry.insts) - 1, mi)
+        b.insts = kept
+    if rename:
+        for b in body:
+            for mi in b.insts:
+                mi.map_registers(rename)
+
+
+def _used_outside(m: MFunction, mi: MI, body: list[MBlock]) -> bool:
+    """Constants are used in their own block only, unless an earlier pass says otherwise."""
+    r = mi.args[-1]
+    names = {b.name for b in body}
+    return any(r in x.uses() for b in m.blocks if b.name not in names for x in b.insts)

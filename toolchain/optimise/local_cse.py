@@ -1,0 +1,72 @@
+"""Computations that a block makes twice: the second one gives way to the register of the first.
+
+The front end's addresses, such as a[i] and b[i], share their scaled index only in the machine form.
+Needs: virtual registers. A register that takes over has a single definition, so it still holds the value at every use.
+"""
+
+from __future__ import annotations
+
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, MBlock, MFunction
+from toolchain.optimise.peephole import flags_unused
+
+REACH = 12  # instructions over which a result is kept: longer lives cost registers
+PURE = frozenset((
+    "add", "sub", "subr", "and", "ior", "xor", "inc", "inc2", "dec", "dec2", "neg", "com", "sl", "lsr", "asr", "sl1",
+    "lsr1", "asr1", "se", "ze", "rlnc", "rrnc",
+))  # fmt: skip
+Key = tuple[object, ...]
+
+
+def run(m: MFunction) -> None:
+    """Every block on its own."""
+    counts: dict[int, int] = {}
+    for b in m.blocks:
+        for mi in b.insts:
+            for r in mi.defs():
+                counts[r] = counts.get(r, 0) + 1
+    rename: dict[int, int] = {}
+    hinted = {*m.pair_hints, *m.pair_hints.values()}
+    for b in m.blocks:
+        _block(b, counts, hinted, rename)
+    if rename:
+        for b in m.blocks:
+            for mi in b.insts:
+                mi.map_registers(rename)
+        for record, (variable, words) in m.bindings.items():
+            m.bindings[record] = (variable, tuple(rename.get(r, r) for r in words))
+
+
+def _block(b: MBlock, counts: dict[int, int], hinted: set[int], rename: dict[int, int]) -> None:
+    known: dict[Key, tuple[int, int]] = {}
+    out: list[MI] = []
+    for at, mi in enumerate(b.insts):
+        if mi.op in ("call", "callr", "asm"):
+            known.clear()
+        mi.map_registers(rename)
+        key = _key(mi, counts)
+        dest = mi.args[-1] if mi.args else None
+        if key is not None and isinstance(dest, int):
+            found = known.get(key)
+            if found is not None and at - found[1] <= REACH and dest not in hinted and flags_unused(b, at):
+                rename[dest] = found[0]
+                known[key] = (found[0], at)
+                continue
+        written = set(mi.defs())
+        for old in [k for k in known if written & set(k[2:])]:
+            del known[old]
+        if key is not None and isinstance(dest, int):
+            known[key] = (dest, at)
+        out.append(mi)
+    b.insts = out
+
+
+def _key(mi: MI, counts: dict[int, int]) -> Key | None:
+    """Operation and operands of a computation whose result nothing changes; None for all else."""
+    if mi.op not in PURE or mi.pred:
+        return None
+    *sources, dest = mi.args
+    if not isinstance(dest, int) or dest < FIRST_VIRTUAL or counts[dest] != 1:
+        return None
+    if not all(isinstance(a, Imm) or (isinstance(a, int) and a >= FIRST_VIRTUAL) for a in sources):
+        return None
+    return mi.op, mi.byte, *sources

@@ -1,0 +1,107 @@
+"""Fill RAW stalls: an instruction that uses Wn as a source address right after one that writes Wn waits a cycle
+(isa.md §13.2). Another instruction is moved between the two when nothing else changes by it.
+
+Needs: final instructions of each block, before branches are laid out. Keeps behaviour and size.
+"""
+
+from __future__ import annotations
+
+from toolchain.abi.target import SP
+from toolchain.mir.liveness import bits
+from toolchain.mir.mir import MI, SKIPS, STEPPING, Mem, MFunction
+
+WINDOW = 4
+
+
+def run(m: MFunction) -> None:
+    """One pass over every block."""
+    for b in m.blocks:
+        k = 0
+        while k + 1 < len(b.insts):
+            if stalls(b.insts[k], b.insts[k + 1]) and not _fill_from_below(b.insts, k):
+                _fill_from_above(b.insts, k)
+            k += 1
+
+
+def stalls(first: MI, second: MI) -> bool:
+    """Whether `second` waits for a register `first` writes."""
+    written = bits(_destination_writes(first))
+    return bool(written & bits(_source_addresses(second)))
+
+
+def _destination_writes(mi: MI) -> list[int]:
+    """Registers written directly or by modification of the destination pointer; source pointers are early."""
+    out = list(mi.also_defs) if mi.op not in ("call", "callr") else []
+    for role, a in zip(mi.info.roles, mi.args, strict=False):
+        if isinstance(a, int):
+            if role in "dbD":
+                out += [a, a + 1] if role == "D" else [a]
+        elif isinstance(a, Mem) and role == "d" and a.mode in STEPPING:
+            out.append(a.base)
+    return out
+
+
+def _source_addresses(mi: MI) -> list[int]:
+    out = []
+    for role, a in zip(mi.info.roles, mi.args, strict=False):
+        if isinstance(a, Mem) and role in "sbS":
+            out.append(a.base)
+            if a.mode == "idx":
+                out.append(a.off)
+    return out
+
+
+def _movable(mi: MI) -> bool:
+    """Register work and plain loads: no effect, not part of a skip, nothing with the stack pointer."""
+    if mi.pred or mi.effect() or mi.also_defs or mi.also_uses:
+        return False
+    return all(a != SP and not (isinstance(a, Mem) and a.base == SP) for a in mi.args)
+
+
+def _independent(a: MI, b: MI) -> bool:
+    """Whether two neighbours may change places."""
+    if a.info.fixed or b.info.fixed:
+        return False
+    if (a.writes_memory() and (b.reads_memory() or b.writes_memory())) or (b.writes_memory() and a.reads_memory()):
+        return False
+    da, db = bits(a.defs()), bits(b.defs())
+    if da & db or da & bits(b.uses()) or db & bits(a.uses()):
+        return False
+    wa, wb = set(a.flags_written()), set(b.flags_written())
+    return not (wa & wb or wa & set(b.flags_read()) or wb & set(a.flags_read()))
+
+
+def _fill_from_below(insts: list[MI], k: int) -> bool:
+    """Bring a later instruction up between insts[k] and insts[k+1]."""
+    for j in range(k + 2, min(k + 2 + WINDOW, len(insts))):
+        mover = insts[j]
+        if insts[j - 1].op in SKIPS or insts[j - 1].pred or mover.info.fixed:
+            return False
+        free = _movable(mover) and all(_independent(mover, x) for x in insts[k + 1 : j])
+        if free and not stalls(insts[k], mover) and not _flags_reach_end(insts, j, mover):
+            insts.insert(k + 1, insts.pop(j))
+            return True
+    return False
+
+
+def _flags_reach_end(insts: list[MI], j: int, mover: MI) -> bool:
+    """Whether somebody after position j reads flags the mover writes: then it stays in place."""
+    live = set(mover.flags_written())
+    for mi in insts[j + 1 :]:
+        if live & set(mi.flags_read()) or mi.op in ("asm", "text"):
+            return True
+        if not mi.pred:
+            live -= set(mi.flags_written())
+    return False
+
+
+def _fill_from_above(insts: list[MI], k: int) -> None:
+    """Move insts[k-1] down behind insts[k]."""
+    if k == 0 or insts[k - 1].op in SKIPS or insts[k].pred or insts[k + 1].pred:
+        return
+    mover = insts[k - 1]
+    if k >= 2 and (insts[k - 2].op in SKIPS or insts[k - 2].pred or stalls(insts[k - 2], insts[k])):
+        return
+    free = _movable(mover) and not mover.flags_written() and _independent(mover, insts[k])
+    if free and not stalls(mover, insts[k + 1]):
+        insts[k - 1], insts[k] = insts[k], insts[k - 1]

@@ -1,0 +1,383 @@
+"""Machine code on symbolic inputs: one more reader of the instruction table, whose values are z3 terms.
+
+Nothing of an instruction's meaning is written here. What the code does that the world sees (volatile accesses, calls,
+assembly statements) is held against what one path of the source does (`Event`), in order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Set
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import z3
+
+from emu.dspic30f.isa.builder import Context
+from emu.dspic30f.isa.row import Insn
+from emu.image.elf_facts import PSV_WINDOW
+from toolchain.abi.target import SFR_END, W_END, register
+from toolchain.proof.memory import STACK, Frame, Memory, joined, split
+from toolchain.proof.path import Event
+from toolchain.proof.solver import Refuted, Undecided, answer, demand
+from toolchain.proof.terms import (
+    BITS,
+    Number,
+    Term,
+    holds,
+    is_narrow,
+    is_short,
+    known,
+    lowest_bit,
+    narrow,
+    truth_number,
+    vector,
+    wide,
+    word,
+)
+
+CORE: Final = {register(name): name for name in ("TBLPAG", "PSVPAG", "RCOUNT")}
+"""Registers that a handler saves, and whose pages others rely on."""
+PSVPAG: Final = register("PSVPAG")
+ACCUMULATORS: Final = tuple(Number(z3.SignExt(BITS - 40, z3.BitVec(f"ACC{name}", 40))) for name in "AB")
+"""At entry."""
+SINGLE_BIT: Final = ("BSET", "BCLR", "BTG", "BTSS", "BTSC", "BTST", "BTSTS", "BSW")
+"""Instructions that touch a whole register in the device whichever byte they name (isa.md §5.4)."""
+
+
+@dataclass
+class State:
+    """Registers (ints or 16-bit terms), flags, own frame, shared memory, what holds on the path, the next event."""
+
+    w: list[Any]
+    memory: Memory
+    pc: int
+    flags: dict[str, Any] = field(default_factory=dict)
+    frame: dict[int, Term] = field(default_factory=dict)
+    accumulators: list[Any] = field(default_factory=lambda: list(ACCUMULATORS))
+    regs: dict[str, Any] = field(default_factory=dict)
+    path: list[Term] = field(default_factory=list)
+    event: int = 0
+    done: frozenset[int] = frozenset()
+    """Bytes of the event's access that have been made."""
+    top: int = STACK
+    """W15 before the instruction."""
+    trace: list[State] = field(default_factory=list)
+    """Earlier states at addresses that were asked for (`Code.watched`)."""
+
+    def copy(self) -> State:
+        """An independent state."""
+        return State([*self.w], self.memory.copy(), self.pc, dict(self.flags), dict(self.frame),
+                     [*self.accumulators], dict(self.regs), [*self.path], self.event, self.done, self.top,
+                     [*self.trace])  # fmt: skip
+
+    def forget_flags(self) -> None:
+        """They may be anything."""
+        for name in ("C", "Z", "OV", "N", "DC"):
+            self.flags[name] = truth_number(z3.FreshConst(z3.BoolSort(), "flag"))
+
+
+class Machine:
+    """A `Builder` (emu.dspic30f.isa.builder) on terms."""
+
+    context = Context()
+
+    def __init__(self, frame: Frame, events: list[Event], assumed: list[Term], page: Term, entry: Term) -> None:
+        self.page: Final = page
+        """What PSVPAG is for constants,"""
+        self.before: Final = {at: z3.BitVec(name, 16) for at, name in CORE.items()} | {PSVPAG: entry}
+        """and registers of CORE at entry."""
+        self.frame: Final = frame
+        self.events: Final = events
+        self.assumed: Final = assumed
+        self.state: State
+        self.settle: Callable[[Event], None] = lambda e: None
+        """Holds memory against what an event says must have been written before."""
+        self.volatile: Set[int] = frozenset()
+        """Bytes of RAM that are accessed only where the source does."""
+        self.insn: Insn
+        self.pc = 0
+
+    def begin(self, state: State, insn: Insn) -> None:
+        """Prepare for the instruction at the state's PC."""
+        self.state, self.insn, self.pc = state, insn, state.pc
+        self._release(state)
+
+    def _release(self, state: State) -> None:
+        """From W15 on nothing stays: an interrupt may come before any instruction."""
+        top = state.w[15]
+        places = {at for at in state.memory.written if self.frame.is_object(at)}
+        if top < state.top:
+            places |= {at for start, size in self.frame.objects.values() for at in range(start, start + size)}
+        for bytes_there, places_there in ((state.memory.written, places), (state.frame, list(state.frame))):
+            for at in places_there:
+                if at >= top:
+                    bytes_there[at] = z3.FreshConst(z3.BitVecSort(8), "free")
+        state.top = top
+
+    @property
+    def given(self) -> list[Term]:
+        """All that holds."""
+        return [*self.assumed, *self.state.path]
+
+    # -- values ------------------------------------------------------------------------------------------------------
+
+    def select(self, c: Any, a: Any, b: Any) -> Any:
+        if isinstance(c, int):
+            return a if c else b
+        chosen = holds(c)
+        small = is_narrow(a) and is_narrow(b)
+        low = z3.If(chosen, word(a), word(b))
+        return narrow(low) if small else Number(z3.If(chosen, wide(a), wide(b)), low)
+
+    def div_trunc(self, a: Any, b: Any) -> Any:
+        if isinstance(a, int) and isinstance(b, int):
+            return 0 if not b else abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+        if is_narrow(a) and is_narrow(b):
+            return narrow(z3.If(word(b) == 0, vector(0, 16), z3.UDiv(word(a), word(b))))
+        quotient = z3.If(wide(b) == 0, vector(0, BITS), wide(a) / wide(b))
+        if is_short(a) and is_short(b):
+            return Number(quotient, z3.If(word(b) == 0, vector(0, 16), word(a) / word(b)))
+        return Number(quotient)
+
+    def rem_trunc(self, a: Any, b: Any) -> Any:
+        if isinstance(a, int) and isinstance(b, int):
+            return 0 if not b else abs(a) % abs(b) * (1 if a >= 0 else -1)
+        if is_narrow(a) and is_narrow(b):
+            return narrow(z3.If(word(b) == 0, vector(0, 16), z3.URem(word(a), word(b))))
+        rest = z3.If(wide(b) == 0, vector(0, BITS), z3.SRem(wide(a), wide(b)))
+        if is_short(a) and is_short(b):
+            return Number(rest, z3.If(word(b) == 0, vector(0, 16), z3.SRem(word(a), word(b))))
+        return Number(rest)
+
+    def clz16(self, v: Any) -> Any:
+        return self._zeros(word(v), range(16), lambda k: 15 - k)
+
+    def ctz16(self, v: Any) -> Any:
+        return self._zeros(word(v), range(15, -1, -1), lambda k: k)
+
+    def _zeros(self, term: Term, order: range, count: Any) -> Any:
+        found = vector(16, 16)
+        for k in order:
+            found = z3.If(z3.Extract(k, k, term) == 1, vector(count(k), 16), found)
+        return narrow(found)
+
+    def let(self, v: Any) -> Any:
+        return v
+
+    # -- registers ---------------------------------------------------------------------------------------------------
+
+    def w(self, n: int) -> Any:
+        value = self.state.w[n]
+        return value if isinstance(value, int) else narrow(value)
+
+    def set_w(self, n: int, v: Any) -> None:
+        if isinstance(v, int):
+            self.state.w[n] = v & (0xFFFE if n == 15 else 0xFFFF)
+            return
+        place = known(v.word)
+        self.state.w[n] = v.word if place is None else place
+        if n == 15 and place is None:
+            raise Undecided("W15 moves by an amount that is not known")
+
+    def set_wb(self, n: int, v: Any) -> None:
+        old = word(self.w(n))
+        self.set_w(n, narrow(z3.simplify(z3.Concat(z3.Extract(15, 8, old), z3.Extract(7, 0, word(v))))))
+
+    def ptr(self, n: int, side: str) -> Any:
+        return self.w(n)
+
+    def set_ptr(self, n: int, v: Any, side: str) -> None:
+        self.set_w(n, v)
+
+    def flag(self, name: str) -> Any:
+        if name not in self.state.flags:
+            self.state.flags[name] = truth_number(z3.Bool(f"flag.{name}"))
+        return self.state.flags[name]
+
+    def set_flags(self, **flags: Any) -> None:
+        self.state.flags.update({name: lowest_bit(v) for name, v in flags.items()})
+
+    def reg(self, name: str) -> Any:
+        if name not in self.state.regs:
+            raise Undecided(f"the register {name}")
+        return self.state.regs[name]
+
+    def set_reg(self, name: str, v: Any) -> None:
+        self.state.regs[name] = v
+
+    def acc(self, i: int) -> Any:
+        return self.state.accumulators[i]
+
+    def set_acc(self, i: int, v: Any) -> None:
+        self.state.accumulators[i] = v
+
+    def when(self, c: Any, fn: Any) -> None:
+        if not isinstance(c, int):
+            raise Undecided("an effect that depends on data")
+        if c:
+            fn()
+
+    def trap_math(self, c: Any) -> None:
+        demand(z3.Not(holds(c)), self.given, "a math error trap")
+
+    def prog(self, address: Any) -> Any:
+        raise Undecided("a table read")
+
+    def table_write(self, address: Any, byte_mask: Any, v: Any) -> None:
+        raise Undecided("a table write")
+
+    def xload(self, ea: Any, ptr: int) -> Any:
+        return self.load(ea, 2)
+
+    def yload(self, ea: Any, ptr: int) -> Any:
+        return self.load(ea, 2)
+
+    # -- memory ------------------------------------------------------------------------------------------------------
+
+    def load(self, ea: Any, size: int, side: str = "src", ptr: int | None = None) -> Any:
+        at = self._place(ea, size)
+        seen = self._event("read", at, size)
+        if seen is not None:
+            return narrow(seen)
+        if isinstance(at, int):
+            if at < W_END:
+                return (
+                    narrow(z3.Extract(7, 0, z3.LShR(word(self.w(at // 2)), 8 * (at & 1))))
+                    if size == 1
+                    else self.w(at // 2)
+                )
+            if at in CORE and size == 2:
+                return narrow(self.core(at))
+            self._not_volatile(at, size)
+            if at < SFR_END:
+                raise Refuted(f"reads the register at {at:#x}, which the source does not here")
+            if self.frame.is_private(at):
+                value = joined([self.own(at + k) for k in range(size)])
+                place = known(value)
+                return narrow(value) if place is None else place
+        elif size == 2:
+            demand(z3.Extract(0, 0, at) == 0, self.given, "reads a word at an odd address")
+        self._seen_page(at)
+        return narrow(self.state.memory.read(at, size))
+
+    def store(self, ea: Any, v: Any, size: int, ptr: int | None = None) -> None:
+        at, value = self._place(ea, size), z3.Extract(8 * size - 1, 0, word(v)) if size == 1 else word(v)
+        if self._event("write", at, size, value) is not None:
+            return
+        if isinstance(at, int):
+            if at < W_END:
+                (self.set_w if size == 2 else self.set_wb)(at // 2, v)
+                return
+            if at in CORE and size == 2:
+                self.state.regs[CORE[at]] = narrow(value)
+                return
+            self._not_volatile(at, size)
+            if at < SFR_END:
+                raise Refuted(f"writes the register at {at:#x}, which the source does not here")
+            if self.frame.is_private(at):
+                for k, part in enumerate(split(value)):
+                    self.state.frame[at + k] = part
+                return
+        else:
+            demand(self.frame.spared(at, size), self.given, "writes to its own frame through a pointer")
+            if size == 2:
+                demand(z3.Extract(0, 0, at) == 0, self.given, "writes a word at an odd address")
+        self.state.memory.write(at, value)
+
+    def _not_volatile(self, at: int, size: int) -> None:
+        if not self.volatile.isdisjoint(range(at, at + size)):
+            raise Refuted(f"accesses what is volatile at {at:#x}, which the source does not here")
+
+    def _place(self, ea: Any, size: int) -> Any:
+        found = ea if isinstance(ea, int) else known(ea.word)
+        if found is not None and found & (size - 1):
+            raise Refuted(f"a word at the odd address {found:#x}")
+        return ea.word if found is None else found
+
+    def _seen_page(self, at: Any) -> None:
+        """Constants are read from their page."""
+        page = self.core(PSVPAG)
+        if not page.eq(self.page):
+            constant = z3.UGE(vector(at, 16) if isinstance(at, int) else at, vector(PSV_WINDOW, 16))
+            demand(z3.Or(z3.Not(constant), page == self.page), self.given, "reads a constant by another PSVPAG")
+
+    def core(self, at: int) -> Term:
+        """A register of CORE, as a term."""
+        if CORE[at] not in self.state.regs:
+            self.state.regs[CORE[at]] = narrow(self.before[at])
+        return word(self.state.regs[CORE[at]])
+
+    def own(self, at: int) -> Term:
+        """A byte of its own frame."""
+        if at not in self.state.frame:
+            self.state.frame[at] = z3.BitVec(f"stack.{at:x}", 8)
+        return self.state.frame[at]
+
+    # -- what the world sees -----------------------------------------------------------------------------------------
+
+    def expected(self) -> Event | None:
+        """What the source does next."""
+        return self.events[self.state.event] if self.state.event < len(self.events) else None
+
+    def passed(self) -> None:
+        """The next event has happened."""
+        self.state.event += 1
+        self.state.done = frozenset()
+
+    def _event(self, kind: str, at: Any, size: int, value: Term | None = None) -> Term | None:
+        """The access, if it is the next volatile one of the source: what it reads or has written."""
+        e = self.expected()
+        if e is None or e.kind != kind:
+            return None
+        distance = self._distance(at, e, size)
+        if distance is None:
+            return None
+        if distance in self.state.done:
+            raise Refuted(f"a {kind} is done twice, which the source does once")
+        part = z3.Extract(8 * (distance + size) - 1, 8 * distance, e.value)
+        single = size == 1 and self.insn.row.syntax.startswith(SINGLE_BIT)
+        whole = e.size == 2 and single
+        if e.even and size < min(e.size, 2) and not single:
+            raise Refuted(f"a {kind} of a word is done in bytes")
+        if kind == "write":
+            assert value is not None
+            demand(
+                part == value,
+                self.given,
+                f"writes something else than the source to {at if not isinstance(at, int) else hex(at)}",
+            )
+            if whole:
+                self._rest_as_read(e, distance)
+        if e.memory is not None and not self.state.done:
+            self.settle(e)
+        bytes_done = set(range(e.size)) if whole else self.state.done | set(range(distance, distance + size))
+        self.state.done = frozenset(bytes_done)
+        if len(bytes_done) == e.size:
+            self.passed()
+        return z3.simplify(part)
+
+    def _distance(self, at: Any, e: Event, size: int) -> int | None:
+        """How far within the event's access this one begins; None if it is another."""
+        start = known(e.address)
+        if isinstance(at, int) and start is not None:
+            distance = at - start
+            return distance if 0 <= distance <= e.size - size else None
+        here = vector(at, 16) if isinstance(at, int) else at
+        return next((k for k in range(0, e.size, size) if self._same(here, e.address + k)), None)
+
+    def _rest_as_read(self, e: Event, distance: int) -> None:
+        """A single bit is set in one byte: the other is written as it was read last."""
+        before = self.events[self.state.event - 1] if self.state.event else None
+        if before is None or before.kind != "read" or before.size != 2 or not self._same(before.address, e.address):
+            raise Refuted("a single bit is written where the source did not read the register right before")
+        other = 8 * (1 - distance)
+        same = z3.Extract(other + 7, other, e.value) == z3.Extract(other + 7, other, before.value)
+        demand(same, self.given, "leaves a byte of a register that the source changes")
+
+    def _same(self, a: Any, b: Any) -> bool:
+        if a is b:
+            return True
+        found, _ = answer([*self.given, a != b])
+        if found == z3.unknown:
+            raise Undecided("the solver gave up: whether two addresses are equal")
+        return bool(found == z3.unsat)

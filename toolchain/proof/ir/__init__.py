@@ -1,0 +1,1 @@
+"""Optimised LLVM IR on symbolic inputs."""

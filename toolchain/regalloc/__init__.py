@@ -1,0 +1,1 @@
+"""Register allocation by graph colouring, spill code and stack frames."""

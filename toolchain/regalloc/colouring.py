@@ -1,0 +1,432 @@
+"""Register allocation: graph colouring with conservative coalescing, pairs and rematerialisation.
+
+Terms. Nodes are registers; W0-W14 are nodes with their own colour. Two nodes interfere when one is written while the
+other is live. A word node may take any of W0-W14, a pair node an even register below W14 and the one after it.
+Method. Build the graph; merge copies when the merged node stays colourable (Briggs for two virtual registers, on trial
+George, too, who is asked against a real one); remove nodes in order of colourability, spilling candidates
+optimistically (Briggs, Cooper, Torczon 1994; the weights for pairs follow Smith, Ramsey, Holloway 2004); colour in
+reverse, preferring the register of a copy partner. What finds no colour is rematerialised when it is a constant, else
+kept in a frame slot, and all is repeated.
+"""
+
+from __future__ import annotations
+
+import copy
+
+from toolchain.abi.target import ALLOCATABLE, CALLEE_SAVED, CALLER_SAVED, FP
+from toolchain.debuginfo import variables
+from toolchain.ir.model import UnsupportedError
+from toolchain.mir.liveness import bits, live_out, members, remove_dead
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, MFunction
+from toolchain.regalloc.spill import rewrite_spills
+from toolchain.verify import allocation
+
+WORD_COLOURS = bits(list(ALLOCATABLE))
+PAIR_COLOURS = bits([r for r in ALLOCATABLE if r % 2 == 0 and r < 14])
+REAL = (1 << FIRST_VIRTUAL) - 1
+LOOP_WEIGHT = 8
+EXACT_SPILL_NODES = 300  # up to this many, the best victim is looked for anew at every step
+TRIAL_LIMIT = 400  # instructions; larger functions are allocated once
+
+
+class Graph:
+    """Interference graph of one round."""
+
+    def __init__(self, m: MFunction) -> None:
+        self.m = m
+        self.adjacent: dict[int, int] = {}
+        self.alias: dict[int, int] = {}
+        self.moves: list[tuple[int, int, int]] = []  # weight, source, destination
+        self.cost: dict[int, float] = {}
+        self.hints: dict[int, list[tuple[int, int]]] = {}  # node -> (partner, colour offset from the partner)
+        self.pair_mask = bits(sorted(m.pairs))
+        self._build()
+
+    def of_copy(self, m: MFunction) -> Graph:
+        """The graph of an independent copy of the function, independent as well."""
+        new = copy.copy(self)
+        new.m = m
+        new.adjacent, new.alias, new.moves, new.cost = {**self.adjacent}, {**self.alias}, [*self.moves], {**self.cost}
+        new.hints = {n: [*partners] for n, partners in self.hints.items()}
+        return new
+
+    def _build(self) -> None:
+        out = live_out(self.m)
+        adjacent = self.adjacent
+        for r in range(FIRST_VIRTUAL):
+            adjacent[r] = REAL & ~(1 << r)
+        for b in self.m.blocks:
+            live = out[b.name]
+            weight = LOOP_WEIGHT ** min(b.depth, 4)
+            for mi in reversed(b.insts):
+                live = self._instruction(mi, live, weight)
+        for n, mask in list(adjacent.items()):
+            for t in members(mask):
+                adjacent[t] = adjacent.get(t, 0) | 1 << n
+
+    def _instruction(self, mi: MI, live: int, weight: int) -> int:
+        adjacent, cost = self.adjacent, self.cost
+        defs, uses = mi.defs(), mi.uses()
+        after = live
+        if mi.is_copy():
+            after &= ~(1 << uses[0])
+            self.moves.append((weight, uses[0], defs[0]))
+        for k in mi.late:
+            a = mi.args[k]
+            if isinstance(a, int):
+                after |= 1 << a
+        d = bits(defs)
+        for r in defs:
+            adjacent[r] = adjacent.get(r, 0) | (after | d) & ~(1 << r)
+            cost[r] = cost.get(r, 0) + weight
+        for r in uses:
+            adjacent.setdefault(r, 0)
+            cost[r] = cost.get(r, 0) + weight
+        if mi.op == "split":
+            low, high, pair = mi.args
+            assert isinstance(low, int)
+            assert isinstance(high, int)
+            assert isinstance(pair, int)
+            self._pair_hints(pair, low, high)
+        elif mi.op == "splitlo":
+            low, pair = mi.args
+            assert isinstance(low, int)
+            assert isinstance(pair, int)
+            self.hints.setdefault(low, []).append((pair, 0))
+            self.hints.setdefault(pair, []).append((low, 0))
+        elif mi.op == "join":
+            pair, low, high = mi.args
+            assert isinstance(low, int)
+            assert isinstance(high, int)
+            assert isinstance(pair, int)
+            self._pair_hints(pair, low, high)
+        return live & ~d | bits(uses)
+
+    def _pair_hints(self, pair: int, low: int, high: int) -> None:
+        for part, offset in ((low, 0), (high, 1)):
+            self.hints.setdefault(part, []).append((pair, offset))
+            self.hints.setdefault(pair, []).append((part, -offset))
+
+    def find(self, n: int) -> int:
+        """Representative of a node."""
+        while n in self.alias:
+            n = self.alias[n]
+        return n
+
+    def pressure(self, n: int, mask: int) -> int:
+        """How many colours of n's class the nodes in `mask` can take away at most."""
+        if n in self.m.pairs:
+            return mask.bit_count()
+        return mask.bit_count() + (mask & self.pair_mask).bit_count()
+
+    def limit(self, n: int) -> int:
+        """Colours in n's class; W14 is none where it is the frame pointer."""
+        return 7 if n in self.m.pairs else 15 - self.m.uses_fp
+
+    # -- coalescing ---------------------------------------------------------------------------------------------------
+
+    def coalesce(self, eager: bool, thorough: bool) -> None:
+        """Merge copies, most frequent first, while that is safe; `eager` merges with real registers too.
+
+        `thorough` takes George's test for virtual registers, too: fewer moves, but what is spilled later is more."""
+        pending = sorted(self.moves, key=lambda m: -m[0])
+        changed = True
+        while changed and pending:
+            changed = False
+            rest = []
+            for weight, source, dest in pending:
+                a, b = self.find(source), self.find(dest)
+                if a == b:
+                    continue
+                if (eager or min(a, b) >= FIRST_VIRTUAL) and self._mergeable(a, b, thorough):
+                    self._merge(a, b)
+                    changed = True
+                else:
+                    rest.append((weight, source, dest))
+            pending = rest
+        for _, source, dest in pending:
+            a, b = self.find(source), self.find(dest)
+            if a != b and not self.adjacent[a] >> b & 1:
+                self.hints.setdefault(a, []).append((b, 0))
+                self.hints.setdefault(b, []).append((a, 0))
+
+    def _mergeable(self, a: int, b: int, thorough: bool) -> bool:
+        if a == 15 or b == 15 or self.adjacent[a] >> b & 1:
+            return False
+        if (a < FIRST_VIRTUAL and b < FIRST_VIRTUAL) or (a in self.m.pairs) != (b in self.m.pairs):
+            return False
+        if b < FIRST_VIRTUAL:
+            a, b = b, a
+        if a < FIRST_VIRTUAL:  # George: every neighbour of b already lives with a, or cannot cause trouble
+            return self._harmless(a, b)
+        both = self.adjacent[a] | self.adjacent[b]
+        if self.pressure(a, both) < self.limit(a):
+            return True
+        if thorough and (self._harmless(a, b) or self._harmless(b, a)):
+            return True
+        significant = (both & REAL).bit_count()
+        for t in members(both & ~REAL):
+            mask = self.adjacent[t]
+            shared = mask >> a & 1 and mask >> b & 1
+            if self.pressure(t, mask) - (1 if shared else 0) >= self.limit(t):
+                significant += 2 if t in self.m.pairs else 1
+        return significant < self.limit(a)
+
+    def _harmless(self, a: int, b: int) -> bool:
+        """Whether every neighbour of b already lives with a, or finds a register in any case."""
+        trouble = self.adjacent[b] & ~self.adjacent[a]
+        if a >= FIRST_VIRTUAL and trouble & REAL:
+            return False
+        return all(self.pressure(t, self.adjacent[t]) < self.limit(t) for t in members(trouble & ~REAL))
+
+    def _merge(self, a: int, b: int) -> None:
+        if b < FIRST_VIRTUAL:
+            a, b = b, a
+        self.alias[b] = a
+        mask = self.adjacent.pop(b)
+        self.adjacent[a] |= mask
+        bit_a, bit_b = 1 << a, 1 << b
+        for t in members(mask):
+            self.adjacent[t] = self.adjacent[t] & ~bit_b | bit_a
+        self.cost[a] = self.cost.get(a, 0) + self.cost.get(b, 0)
+        if b in self.m.temps:
+            self.m.temps.add(a)
+        if b in self.hints:
+            self.hints.setdefault(a, []).extend(self.hints.pop(b))
+
+    # -- simplification -----------------------------------------------------------------------------------------------
+
+    def simplify(self) -> list[int]:
+        """Order of removal; colour in reverse."""
+        remaining = {n for n in self.adjacent if n >= FIRST_VIRTUAL}
+        active = bits(sorted(remaining)) | REAL
+        stack: list[int] = []
+        ready = [n for n in remaining if self.pressure(n, self.adjacent[n] & active) < self.limit(n)]
+        queued = set(ready)
+        ranked: list[int] = []  # large graphs: cheapest last, by the degrees at the start
+        if len(remaining) > EXACT_SPILL_NODES:
+            ranked = sorted(remaining, key=lambda n: (self._spill_metric(n, active), n), reverse=True)
+        while remaining:
+            if not ready:
+                while ranked and ranked[-1] not in remaining:
+                    ranked.pop()
+                victim = ranked[-1] if ranked else min(remaining, key=lambda n: (self._spill_metric(n, active), n))
+                ready.append(victim)
+                queued.add(victim)
+            n = ready.pop()
+            if n not in remaining:
+                continue
+            remaining.discard(n)
+            active &= ~(1 << n)
+            stack.append(n)
+            for t in members(self.adjacent[n] & active & ~REAL):
+                if t not in queued and self.pressure(t, self.adjacent[t] & active) < self.limit(t):
+                    queued.add(t)
+                    ready.append(t)
+        return stack
+
+    def _spill_metric(self, n: int, active: int) -> float:
+        if n in self.m.temps:
+            return float("inf")
+        return self.cost.get(n, 0) / (1 + self.pressure(n, self.adjacent[n] & active))
+
+
+class Colouring:
+    """Assignment of real registers to the nodes of a simplified graph."""
+
+    def __init__(self, g: Graph) -> None:
+        self.g = g
+        self.m = g.m
+        self.colour: dict[int, int] = {r: r for r in range(FIRST_VIRTUAL)}
+        self.used_saved = 0
+        self.spilled: list[int] = []
+        self.partner: dict[int, list[tuple[int, int]]] = {}
+        for low, high in g.m.pair_hints.items():
+            a, b = g.find(low), g.find(high)
+            self.partner.setdefault(a, []).append((b, -1))
+            self.partner.setdefault(b, []).append((a, 1))
+
+    def run(self, order: list[int]) -> None:
+        """Colour nodes last removed first."""
+        for n in reversed(order):
+            allowed = self._allowed(n)
+            if not allowed:
+                self.spilled.append(n)
+                continue
+            c = self._choose(n, allowed)
+            self.colour[n] = c
+            self.used_saved |= (1 << c | (2 << c if n in self.m.pairs else 0)) & bits(list(CALLEE_SAVED))
+
+    def _allowed(self, n: int) -> int:
+        taken = 0
+        for t in members(self.g.adjacent[n]):
+            c = self.colour.get(t)
+            if c is not None:
+                taken |= (3 if t in self.m.pairs else 1) << c
+        if n in self.m.pairs:
+            return PAIR_COLOURS & ~taken & ~(taken >> 1)
+        if self.m.uses_fp:
+            taken |= 1 << FP
+        return WORD_COLOURS & ~taken
+
+    def _choose(self, n: int, allowed: int) -> int:
+        votes: dict[int, int] = {}
+        for partner, offset in self.g.hints.get(n, ()):
+            c = self.colour.get(self.g.find(partner))
+            if c is not None and c + offset >= 0 and allowed >> (c + offset) & 1:
+                votes[c + offset] = votes.get(c + offset, 0) + 4
+        for partner, offset in self.partner.get(n, ()):
+            c = self.colour.get(self.g.find(partner))
+            if c is not None and c + offset >= 0 and allowed >> (c + offset) & 1 and (c + offset) % 2 == (offset > 0):
+                votes[c + offset] = votes.get(c + offset, 0) + 3
+        if votes:
+            best = max(votes, key=lambda c: (votes[c], -self._fresh(c), -c))
+            if not self._fresh(best) or votes[best] > 3:
+                return best
+        return self._best(n, allowed)
+
+    def _fresh(self, c: int) -> int:
+        """1 when the register would have to be saved only for this node."""
+        return int(c in CALLEE_SAVED and not self.used_saved >> c & 1)
+
+    def _best(self, n: int, allowed: int) -> int:
+        """The register that costs least: one that needs no saving, of the half its pair wants, in a fixed order."""
+        registers = members(allowed)
+        if self.m.interrupt:
+            return registers[0]
+        partners = self.partner.get(n)
+        low = partners is not None and partners[0][1] < 0
+        best, least = -1, (3, 0, 0)
+        for c in registers:
+            mismatch = int(partners is not None and (c % 2 == 0) != low)
+            order = 7 - c if partners is None and c in CALLER_SAVED else c
+            rank = (self._fresh(c) * (1 + (c == 14)), mismatch, order)
+            if rank < least:
+                best, least = c, rank
+        return best
+
+
+def allocate(m: MFunction, for_size: bool, verify: bool = False) -> MFunction:
+    """Replace virtual registers by W0-W14. Ensures: pairs are even-aligned, split and join are moves or gone.
+
+    Merging a value with an argument or result register is usually right and sometimes crowds others out, so small
+    functions are allocated both ways, and with more merging among values, and the cheapest result is kept.
+    """
+    remove_dead(m)
+    size = sum(len(b.insts) for b in m.blocks)
+    if size > TRIAL_LIMIT:
+        _allocate(m, True, False, verify)
+        return m
+    trials = []
+    untouched = Graph(m)
+    for number, (eager, thorough) in enumerate(((True, False), (False, False), (True, True))):
+        trial = m.clone()
+        _allocate(trial, eager, thorough, verify, untouched.of_copy(trial))
+        trials.append((_cost(trial, for_size), number, trial))
+        if not number and not _crowded(trial):
+            return trial
+    return min(trials, key=lambda t: t[:2])[2]
+
+
+def _allocate(m: MFunction, eager: bool, thorough: bool, verify: bool, first: Graph | None = None) -> None:
+    """`first` is the graph of the first round where it is known. Every round that finds no colour for something of the
+    program keeps one register less of it, so there is a last one."""
+    while True:
+        g, first = first or Graph(m), None
+        g.coalesce(eager, thorough)
+        colouring = Colouring(g)
+        colouring.run(g.simplify())
+        if not colouring.spilled:
+            if verify:
+                allocation.check(m, {r: colouring.colour[g.find(r)] for r in [*g.adjacent, *g.alias]})
+            _apply(m, g, colouring.colour)
+            return
+        groups = {n: list(g_members(g, n)) for n in colouring.spilled}
+        if m.temps.issuperset(r for group in groups.values() for r in group):
+            raise _no_room(m, {r for group in groups.values() for r in group})
+        rewrite_spills(m, groups)
+
+
+def _no_room(m: MFunction, registers: set[int]) -> UnsupportedError:
+    """What to say where values of one instruction find no registers: only inline assembly can want that many."""
+    wanting = [mi for b in m.blocks for mi in b.insts if registers & {*mi.uses(), *mi.defs()}]
+    crowded = next((mi for mi in wanting if mi.op == "asm"), None)
+    if crowded is None:
+        return UnsupportedError("register allocation does not converge")
+    error = UnsupportedError("inline assembly: its operands and clobbers want more registers than there are")
+    error.line = crowded.line
+    return error
+
+
+def _crowded(m: MFunction) -> bool:
+    """Whether the result has moves or callee-saved registers that another choice might avoid."""
+    return any(mi.is_copy() or any(r in CALLEE_SAVED for r in mi.defs()) for b in m.blocks for mi in b.insts)
+
+
+def _cost(m: MFunction, for_size: bool) -> int:
+    """Words, or words weighted by loop depth, with the saves of callee-saved registers."""
+    saved: set[int] = set()
+    total = 0
+    for b in m.blocks:
+        weight = 1 if for_size else LOOP_WEIGHT ** min(b.depth, 3)
+        total += weight * sum(mi.info.words for mi in b.insts)
+        for mi in b.insts:
+            saved.update(r for r in mi.defs() if r in CALLEE_SAVED)
+    return total + 2 * len({r // 2 for r in saved})
+
+
+def g_members(g: Graph, n: int) -> list[int]:
+    """Virtual registers merged into node n."""
+    return [r for r in [n, *g.alias] if r >= FIRST_VIRTUAL and g.find(r) == n]
+
+
+PAIR_OPS = ("split", "splitlo", "join")
+
+
+def _apply(m: MFunction, g: Graph, colour: dict[int, int]) -> None:
+    rename = {r: colour[g.find(r)] for r in [*g.adjacent, *g.alias] if g.find(r) in colour}
+    if m.bindings:
+        variables.claim(m, rename, {r: g.find(r) for r in rename})
+    for b in m.blocks:
+        out: list[MI] = []
+        held: dict[int, int] = {}  # what copies to themselves would have written
+        for mi in b.insts:
+            mi.map_registers(rename)
+            start = len(out)
+            if mi.op == "split":
+                out += _pair_moves(mi, ((mi.args[2], mi.args[0], 0), (mi.args[2], mi.args[1], 1)), False)
+            elif mi.op == "splitlo":
+                out += _pair_moves(mi, ((mi.args[1], mi.args[0], 0),), False)
+            elif mi.op == "join":
+                out += _pair_moves(mi, ((mi.args[0], mi.args[1], 0), (mi.args[0], mi.args[2], 1)), True)
+            elif mi.is_copy() and mi.args[0] == mi.args[1]:
+                held.update(mi.holds)
+                continue
+            else:
+                out.append(mi)
+            if mi.holds and mi.op in PAIR_OPS:
+                moved = {d: made for made in out[start:] for d in made.defs()}
+                for r, value in mi.holds.items():
+                    (moved[r].holds if r in moved else held)[r] = value
+            elif held and len(out) > start:
+                out[start].holds_before, held = held, {}
+        b.insts = out
+    m.pairs = set()
+
+
+def _pair_moves(mi: MI, parts: tuple[tuple[object, object, int], ...], into_pair: bool) -> list[MI]:
+    """Two moves as if at once; EXCH for a swap."""
+    moves = []
+    for pair, word, offset in parts:
+        assert isinstance(pair, int)
+        assert isinstance(word, int)
+        source, dest = (word, pair + offset) if into_pair else (pair + offset, word)
+        if source != dest:
+            moves.append((source, dest))
+    if len(moves) == 2:
+        (s0, d0), (s1, d1) = moves
+        if d0 == s1 and d1 == s0:
+            return [MI("exch", s0, s1, line=mi.line)]
+        if d0 == s1:
+            moves.reverse()
+    return [MI("mov", s, d, line=mi.line) for s, d in moves]

@@ -1,0 +1,1 @@
+"""Instruction selection: legal IR to machine instructions over virtual registers."""

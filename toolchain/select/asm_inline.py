@@ -1,0 +1,285 @@
+"""Inline assembly: GCC-style operands as clang hands them over (`$0`, constraint list)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from toolchain.frontend.asm_constraints import CLASSES, MARK
+from toolchain.ir.model import ConstInt, GlobalRef, InlineAsm, Instr, Type, UnsupportedError, Value, size_of
+from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, opaque
+
+if TYPE_CHECKING:
+    from toolchain.select.select import Selector
+
+# The front end knows MSP430 register names only; r0-r3 have other names there.
+REGISTER_NAMES = {"pc": 0, "sp": 1, "sr": 2, "cg": 3, "fp": 4, **{f"r{n}": n for n in range(16)}}
+REFERENCE = re.compile(r"\$(?:(\d+)|\{(\d+)(?::(\w))?\}|\{:uid\}|\$)")
+REFUSED_LETTERS = frozenset("abcdetwABxyz")
+
+
+@dataclass
+class Constraint:
+    """One operand of the constraint string."""
+
+    output: bool
+    early: bool
+    indirect: bool
+    text: str
+    tied: int | None
+    fixed: int | None
+
+    @property
+    def either(self) -> bool:
+        """`rm` and `g`: a register, as GCC for this chip gives, whose instructions mostly take nothing else."""
+        return "r" in self.text and "m" in self.text
+
+
+def _parse(text: str) -> tuple[list[Constraint], list[int]]:
+    """Operands and clobbered registers."""
+    operands, clobbers = [], []
+    for part in _split(text):
+        if part.startswith("~"):
+            name = part[2:-1]
+            if name in REGISTER_NAMES:
+                clobbers.append(REGISTER_NAMES[name])
+            elif name not in ("memory", "cc", "dirflag", "fpsr", "flags"):
+                raise UnsupportedError(f"inline assembly clobber '{name}'")
+            continue
+        output = part.startswith("=")
+        body = part.lstrip("=")
+        early = "&" in body
+        indirect = "*" in body
+        body = body.replace("&", "").replace("*", "").replace("%", "")
+        fixed = None
+        if body.startswith("{"):
+            name = body[1:-1]
+            if name not in REGISTER_NAMES:
+                raise UnsupportedError(f"inline assembly register '{name}'")
+            fixed = REGISTER_NAMES[name]
+        tied = int(body) if body.isdigit() else None
+        operands.append(Constraint(output, early, indirect, body, tied, fixed))
+    return operands, clobbers
+
+
+def _place(constraints: list[Constraint], clobbers: list[int], text: str) -> None:
+    """Give operands that asked for a class of registers one of it. An input may share an output's register unless that
+    is written early. Raises UnsupportedError when a class has too few."""
+    mark = MARK.match(text)
+    if mark is None:
+        return
+    taken = {True: set(clobbers), False: set(clobbers)}
+    for c in constraints:
+        if c.fixed is not None:
+            taken[c.output].add(c.fixed)
+    for number, letter in re.findall(r"(\d+)([a-z])", mark[1]):
+        c = constraints[int(number)]
+        tied = any(other.tied == int(number) for other in constraints)
+        sides = (True, False) if tied or c.early else (c.output,)
+        free = [r for r in CLASSES[letter] if not any(r in taken[side] for side in sides)]
+        if not free:
+            raise UnsupportedError(f"inline assembly: no register is left for constraint '{letter}'")
+        c.fixed = free[0]
+        for side in sides:
+            taken[side].add(free[0])
+
+
+def _split(text: str) -> list[str]:
+    return re.findall(r"[^,{]*\{[^}]*\}[^,]*|[^,]+", text)
+
+
+class AsmBuilder:
+    """Collects operands of one statement. Registers get a role each; memory and immediates are text in place."""
+
+    def __init__(self, s: Selector, i: Instr) -> None:
+        self.s = s
+        self.i = i
+        asm = i.extra["asm"]
+        assert isinstance(asm, InlineAsm)
+        self.asm = asm
+        self.operands: list[Operand] = []
+        self.roles: list[str] = []
+        self.late: list[int] = []
+        self.after: list[tuple[int, tuple[int, ...]]] = []
+        self.stores: list[tuple[int, int, bool]] = []  # pointer, register, byte: "=rm" objects in memory
+        self.fixed_uses: list[int] = []
+        self.fixed_defs: list[int] = []
+        self.blocks = [0, 4]  # free register runs for 64-bit operands
+        self.reference: list[int] = []  # operand number in the text -> index in `operands`
+
+    def run(self) -> None:
+        constraints, clobbers = _parse(self.asm.constraints)
+        _place(constraints, clobbers, self.asm.text)
+        results = self.i.extra["results"]
+        assert isinstance(results, list)
+        inputs = list(self.i.args)
+        result_at = 0
+        early = False
+        for c in constraints:
+            if c.output and c.indirect and c.either:
+                self.output_by_way_of_register(c, inputs.pop(0), element(self.i, len(self.i.args) - len(inputs) - 1))
+            elif c.output and not c.indirect:
+                self.output(c, results[result_at], result_at)
+                result_at += 1
+                early |= c.early
+            elif c.tied is not None:
+                self.tied(c, inputs.pop(0))
+            else:
+                self.input(c, inputs.pop(0))
+        if early or clobbers:  # a clobbered register may be written before the inputs have been read
+            self.late = [k for k, r in enumerate(self.roles) if r in "sS"]
+        mi = MI("asm", *self.operands, line=self.s.line)
+        mi.info = opaque("".join(self.roles), "cznv", words=max(1, self.asm.text.count("\n") + 1))
+        mi.also_defs = tuple(dict.fromkeys([*clobbers, *self.fixed_defs]))
+        mi.also_uses = tuple(self.fixed_uses)
+        mi.late = tuple(self.late)
+        mi.cc = ""
+        mi.text = self.template()
+        if any(r >= 15 for r in mi.also_defs):
+            raise UnsupportedError("inline assembly clobbers the stack pointer W15")
+        self.s.out.append(mi)
+        for pointer, source, byte in self.stores:
+            self.s.emit("mov", source, Mem("ind", pointer), byte=byte)
+        for source, dest in self.after:
+            if len(dest) == 1:
+                self.s.copy(source, dest[0])
+            else:
+                self.s.emit("split", dest[0], dest[1], source)
+
+    def _check(self, c: Constraint, t: Type) -> int:
+        words = max(1, t.bits // 16)
+        if words == 4 and c.fixed is None and self.blocks and "r" in c.text:
+            c.fixed = self.blocks.pop()  # 64 bits travel in W4-W7 or W0-W3, as in calls
+        elif words > 2 and c.fixed is None:
+            raise UnsupportedError(f"inline assembly operand of {t.bits} bits")
+        letters = set(c.text) & REFUSED_LETTERS
+        if letters and c.fixed is None:
+            raise UnsupportedError(f"inline assembly constraint '{c.text}' (use r, i or m)")
+        return words
+
+    def add(self, operand: Operand, role: str) -> int:
+        self.operands.append(operand)
+        self.roles.append(role)
+        return len(self.operands) - 1
+
+    def output(self, c: Constraint, t: Type, index: int) -> None:
+        words = self._check(c, t)
+        dest = self.s.value_regs(self.i) if index == 0 else result_registers(self.s, self.i, index, words)
+        if c.fixed is not None:
+            self.reference.append(self.add(c.fixed, "d"))
+            self.fixed_defs += range(c.fixed, c.fixed + words)
+            for k in range(words):
+                self.after.append((c.fixed + k, (dest[k],)))
+            return
+        r = self.s.temp() if words == 1 else self.s.m.new_pair()
+        self.reference.append(self.add(r, "d" if words == 1 else "D"))
+        self.after.append((r, dest))
+
+    def output_by_way_of_register(self, c: Constraint, p: Value, t: Type) -> None:
+        """An object in memory that may as well be a register while the statement runs: it is stored behind it."""
+        size = size_of(t)
+        if size > 2:
+            raise UnsupportedError(f"inline assembly operand '{c.text}' of {size} bytes (use r or m)")
+        r = self.s.temp()
+        self.reference.append(self.add(r, "d"))
+        self.stores.append((self.s.reg(p), r, size == 1))
+
+    def tied(self, c: Constraint, v: Value) -> None:
+        """An input in the register of an output: the output becomes read and written."""
+        assert c.tied is not None
+        at = self.reference[c.tied]
+        r = self.operands[at]
+        if not isinstance(r, int):  # "+m": the object holds the value when the statement starts
+            self.s.emit("mov", self.s.reg(v), r, byte=v.type.bits == 8)
+            self.reference.append(at)
+            return
+        if r < FIRST_VIRTUAL:
+            for k, word in enumerate(self.s.regs(v)):
+                self.s.copy(word, r + k)
+                self.fixed_uses.append(r + k)
+            self.reference.append(at)
+            return
+        self._load(v, r, self.roles[at] == "D")
+        self.roles[at] = "b" if self.roles[at] == "d" else "B"
+        self.reference.append(at)
+
+    def _load(self, v: Value, r: int, pair: bool) -> None:
+        registers = self.s.regs(v)
+        if pair:
+            self.s.emit("join", r, registers[0], registers[1])
+        else:
+            self.s.copy(registers[0], r)
+
+    def input(self, c: Constraint, v: Value) -> None:
+        if c.indirect or c.text == "m":
+            if not c.indirect:
+                raise UnsupportedError("inline assembly memory operand without an address")
+            self.reference.append(self.add(self.memory(v), "s"))
+            return
+        if ("r" not in c.text and c.fixed is None) or (
+            ("i" in c.text or "n" in c.text) and not c.either and self.s.is_leaf(v)
+        ):
+            if isinstance(v, ConstInt):
+                self.reference.append(self.add(Imm(v.signed), "n"))
+                return
+            if isinstance(v, GlobalRef):
+                self.reference.append(self.add(Imm(self.s.address_expr(v)), "n"))
+                return
+            if "r" not in c.text and "g" not in c.text:
+                raise UnsupportedError(f"inline assembly operand for '{c.text}' is not a constant")
+        words = self._check(c, v.type)
+        if c.fixed is not None:
+            for k, r in enumerate(self.s.regs(v)):
+                self.s.copy(r, c.fixed + k)
+                self.fixed_uses.append(c.fixed + k)
+            self.reference.append(self.add(c.fixed, "s"))
+            return
+        if words == 2:
+            r = self.s.m.new_pair()
+            self._load(v, r, True)
+            self.reference.append(self.add(r, "S"))
+        else:
+            self.reference.append(self.add(self.s.reg(v), "s"))
+
+    def memory(self, p: Value) -> Operand:
+        """[Wn] of an address."""
+        return Mem("ind", self.s.reg(p))
+
+    def template(self) -> str:
+        """The text with operand numbers rewritten to indices into `args`, as {n} or {n:modifier}."""
+
+        def replace(m: re.Match[str]) -> str:
+            number = m[1] or m[2]
+            if number is None:
+                return "$" if m[0] == "$$" else "\x00uid\x00"
+            at = self.reference[int(number)]
+            return f"\x00{at}:{m[3] or ''}\x00"
+
+        return REFERENCE.sub(replace, MARK.sub("", self.asm.text))
+
+
+def element(asm: Instr, k: int) -> Type:
+    """Type of the object that argument `k`, an address, stands for."""
+    attributes = asm.extra.get("attrs")
+    assert isinstance(attributes, list)
+    t = attributes[k]["elementtype"]
+    assert isinstance(t, Type)
+    return t
+
+
+def result_registers(s: Selector, asm: Instr, index: int, words: int) -> tuple[int, ...]:
+    """Registers of the second and later results of a statement."""
+    for user in s.users.get(id(asm), ()):
+        if user.op == "asmresult" and user.extra["index"] == index:
+            return s.value_regs(user)
+    return tuple(s.temp() for _ in range(words))
+
+
+def select_asm(s: Selector, i: Instr) -> None:
+    """Emit one statement with its operand copies."""
+    AsmBuilder(s, i).run()
+
+
+def select_asmresult(s: Selector, i: Instr) -> None:
+    """Nothing: the statement writes its results itself."""

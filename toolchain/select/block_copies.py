@@ -1,0 +1,94 @@
+"""Selection of copies and fills of blocks of memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from toolchain.ir.model import ConstInt, Instr, Value
+from toolchain.mir.mir import Imm, Mem
+
+if TYPE_CHECKING:
+    from toolchain.select.select import Selector
+
+INLINE_WORDS = 3  # copies and fills of up to this many units are written out
+
+
+def _pointer(s: Selector, p: Value, size: int, block: Instr) -> tuple[int, int | None]:
+    """A private copy of a pointer, to be advanced, and the register of p + size that it goes to in the end, if somebody
+    wants that behind the operation on a block. Until then that register has no value, which a debugger should know."""
+    r = s.temp()
+    if s.is_leaf(p):
+        s.load_leaf(p, 0, r)
+    else:
+        s.copy(s.reg(p), r)
+    step = _step_behind(s, p, size, block)
+    if step is None:
+        return r, None
+    s.folded.add(id(step))
+    return r, s.value_regs(step)[0]
+
+
+def _step_behind(s: Selector, p: Value, size: int, block: Instr) -> Instr | None:
+    """p + size of this block, not emitted yet, whose register is read behind `block` only."""
+    _, at = s.position[id(block)]
+    for step in s.users.get(id(p), ()):
+        k = step.args[1] if step.op == "add" and step.args[0] is p else None
+        if not isinstance(k, ConstInt) or k.signed != size or not s.same_block(step):
+            continue
+        if s.position[id(step)][1] > at or id(step) not in s.wanted or id(step) in s.folded:
+            continue
+        if all(u.op == "phi" or not s.same_block(u) or s.position[id(u)][1] > at for u in s.users[id(step)]):
+            return step
+    return None
+
+
+def _modes(count: int, behind: int | None) -> list[str]:
+    """How a pointer is used `count` times in a row; it is advanced the last time only if the end is wanted."""
+    return ["++"] * (count - 1) + ["ind" if behind is None else "++"]
+
+
+def select_blockcopy(s: Selector, i: Instr) -> None:
+    """MOV [Ws++],[Wd++], under REPEAT when long (isa.md §15)."""
+    count, unit = i.extra["count"], i.extra["unit"]
+    assert isinstance(count, int)
+    assert isinstance(unit, int)
+    (dest, dest_end), (source, source_end) = (_pointer(s, p, count * unit, i) for p in i.args[:2])
+    byte = unit == 1
+    if count <= INLINE_WORDS:
+        for taken, put in zip(_modes(count, source_end), _modes(count, dest_end), strict=True):
+            s.emit("mov", Mem(taken, source), Mem(put, dest), byte=byte)
+    else:
+        s.emit("repmov", Imm(count - 1), source, dest, byte=byte)
+    for r, end in ((dest, dest_end), (source, source_end)):
+        if end is not None:
+            s.copy(r, end)
+
+
+def select_blockfill(s: Selector, i: Instr) -> None:
+    """CLR [Wd++] or MOV Ws,[Wd++], under REPEAT when long."""
+    count, unit = i.extra["count"], i.extra["unit"]
+    assert isinstance(count, int)
+    assert isinstance(unit, int)
+    value, byte = i.args[1], unit == 1
+    zero = isinstance(value, ConstInt) and value.value == 0
+    source = None if zero else s.reg(value)
+    dest, end = _pointer(s, i.args[0], count * unit, i)
+    if count <= INLINE_WORDS:
+        for mode in _modes(count, end):
+            if source is None:
+                s.emit("clr", Mem(mode, dest), byte=byte)
+            else:
+                s.emit("mov", source, Mem(mode, dest), byte=byte)
+    elif source is None:
+        s.emit("repclr", Imm(count - 1), dest, byte=byte)
+    else:
+        s.emit("repfill", Imm(count - 1), dest, source, byte=byte)
+    if end is not None:
+        s.copy(dest, end)
+
+
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+    "blockcopy": select_blockcopy,
+    "blockfill": select_blockfill,
+}

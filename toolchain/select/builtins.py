@@ -1,0 +1,202 @@
+"""XC16's machine builtins (abi-elf.md §2.9). They arrive as calls of external functions of these names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from emu.dspic30f.isa.debug import FAILED_CHECK, HALT
+from toolchain.abi.names import symbol
+from toolchain.ir.model import ConstInt, GlobalRef, Instr, UnsupportedError
+from toolchain.mir.mir import Imm, Mem, opaque
+
+if TYPE_CHECKING:
+    from toolchain.select.select import Selector
+
+
+def _constant(i: Instr, k: int, limit: int) -> int:
+    v = i.args[k]
+    if not isinstance(v, ConstInt) or v.value > limit:
+        raise UnsupportedError(f"{i.extra['name']}: argument {k + 1} must be a constant from 0 to {limit}")
+    return v.value
+
+
+def _disi(s: Selector, i: Instr) -> None:
+    s.emit("disi", Imm(_constant(i, 0, 0x3FFF)))
+
+
+def _hold(s: Selector, i: Instr) -> None:
+    s.emit("hold").also_defs = (0,)
+
+
+def _release(s: Selector, i: Instr) -> None:
+    s.emit("release")
+
+
+def _text(*lines: str) -> Callable[[Selector, Instr], None]:
+    def expand(s: Selector, i: Instr) -> None:
+        for line in lines:
+            s.emit("text", line)
+
+    return expand
+
+
+def _pwrsav(s: Selector, i: Instr) -> None:
+    s.emit("text", f"pwrsav #{_constant(i, 0, 1)}")
+
+
+def _osccon(byte: str, keys: tuple[int, int]) -> Callable[[Selector, Instr], None]:
+    """Key, key, value as three consecutive byte writes through a register, so that no instruction comes between."""
+
+    def expand(s: Selector, i: Instr) -> None:
+        value = s.reg(i.args[0])
+        pointer, first, second = s.temp(), s.temp(), s.temp()
+        s.emit("mov", Imm("_OSCCON" if byte == "L" else "_OSCCON+1"), pointer)
+        s.emit("mov", Imm(keys[0]), first)
+        s.emit("mov", Imm(keys[1]), second)
+        mi = s.emit("asm", first, second, value, pointer)
+        mi.info = opaque("ssss", words=3)
+        mi.text = "mov.b \x000:\x00,[\x003:\x00]\nmov.b \x001:\x00,[\x003:\x00]\nmov.b \x002:\x00,[\x003:\x00]"
+
+    return expand
+
+
+def _write_nvm(s: Selector, i: Instr) -> None:
+    """NVMKEY = 0x55, 0xAA, then WR; two NOPs follow (abi-elf.md §2.9)."""
+    for key in (0x55, 0xAA):
+        r = s.temp()
+        s.load_imm(key, r)
+        s.copy(r, 0)
+        mi = s.emit("asm", 0)
+        mi.info = opaque("s")
+        mi.text = "mov \x000:\x00,_NVMKEY"
+    _text("bset _NVMCON,#15", "nop", "nop")(s, i)
+
+
+def _table_read(op: str, byte: bool) -> Callable[[Selector, Instr], None]:
+    def expand(s: Selector, i: Instr) -> None:
+        s.emit(op, Mem("ind", s.reg(i.args[0])), s.value_regs(i)[0], byte=byte)
+
+    return expand
+
+
+def _table_write(op: str, byte: bool) -> Callable[[Selector, Instr], None]:
+    def expand(s: Selector, i: Instr) -> None:
+        s.emit(op, s.reg(i.args[1]), Mem("ind", s.reg(i.args[0])), byte=byte)
+
+    return expand
+
+
+def _address_part(operator: str) -> Callable[[Selector, Instr], None]:
+    def expand(s: Selector, i: Instr) -> None:
+        v = i.args[0]
+        if not isinstance(v, GlobalRef):
+            raise UnsupportedError(f"{i.extra['name']}: the argument must be the address of an object or function")
+        name = symbol(s.module, v.name)
+        at = f"{name}+{v.offset}" if v.offset else name
+        s.emit("mov", Imm(f"{operator}({at})"), s.value_regs(i)[0])
+
+    return expand
+
+
+def _multiply(kind: str) -> Callable[[Selector, Instr], None]:
+    def expand(s: Selector, i: Instr) -> None:
+        low, high = s.value_regs(i)
+        p = s.m.new_pair()
+        s.emit(f"mul.{kind}", s.reg(i.args[0]), s.reg(i.args[1]), p)
+        s.emit("split", low, high, p)
+
+    return expand
+
+
+def _divide(op: str, result: int) -> Callable[[Selector, Instr], None]:
+    """32 by 16 bits: REPEAT #17, DIV.SD or DIV.UD."""
+
+    def expand(s: Selector, i: Instr) -> None:
+        low, high = s.regs(i.args[0])
+        n = s.reg(i.args[1])
+        p = s.m.new_pair()
+        s.emit("join", p, low, high)
+        mi = s.emit(op, p, n)
+        mi.also_defs = (0, 1)
+        mi.late = (1,)
+        s.copy(result, s.value_regs(i)[0])
+
+    return expand
+
+
+def _bit_toggle(s: Selector, i: Instr) -> None:
+    s.emit("btg", Mem("ind", s.reg(i.args[0])), Imm(_constant(i, 1, 15)))
+
+
+def _get_isr_state(s: Selector, i: Instr) -> None:
+    """SR.IPL, bits 7-5."""
+    r, t = s.temp(), s.temp()
+    mi = s.emit("asm", r)
+    mi.info = opaque("d")
+    mi.text = "mov _SR,\x000:\x00"
+    s.emit("lsr", r, Imm(5), t)
+    s.emit("and", t, Imm(7), s.value_regs(i)[0])
+
+
+def _set_isr_state(s: Selector, i: Instr) -> None:
+    """SR.IPL = argument; flags in the low bits are scratch."""
+    r = s.temp()
+    s.emit("sl", s.reg(i.args[0]), Imm(5), r)
+    s.copy(r, 0)
+    mi = s.emit("asm", 0)
+    mi.info = opaque("s", "cznv")
+    mi.text = "mov.b WREG,_SR"
+
+
+def _failed_check(s: Selector, i: Instr) -> None:
+    for line in (f".pword {HALT:#08x}", "reset", f".pword {FAILED_CHECK | _constant(i, 0, 0xFF):#08x}"):
+        s.emit("text", line)
+
+
+BUILTINS: dict[str, Callable[[Selector, Instr], None]] = {
+    "disi": _disi,
+    "hold": _hold,
+    "release": _release,
+    "nop": _text("nop"),
+    "clrwdt": _text("clrwdt"),
+    "pwrsav": _pwrsav,
+    "software_breakpoint": _text(f".pword {HALT:#08x}"),
+    "failed_check": _failed_check,
+    "reset": _text("reset"),
+    "write_OSCCONL": _osccon("L", (0x46, 0x57)),
+    "write_OSCCONH": _osccon("H", (0x78, 0x9A)),
+    "write_NVM": _write_nvm,
+    "tblrdl": _table_read("tblrdl", False),
+    "tblrdh": _table_read("tblrdh", False),
+    "tblrdlb": _table_read("tblrdl", True),
+    "tblrdhb": _table_read("tblrdh", True),
+    "tblwtl": _table_write("tblwtl", False),
+    "tblwth": _table_write("tblwth", False),
+    "tblwtlb": _table_write("tblwtl", True),
+    "tblwthb": _table_write("tblwth", True),
+    "tblpage": _address_part("tblpage"),
+    "tbloffset": _address_part("tbloffset"),
+    "psvpage": _address_part("psvpage"),
+    "psvoffset": _address_part("psvoffset"),
+    "mulss": _multiply("ss"),
+    "muluu": _multiply("uu"),
+    "mulsu": _multiply("su"),
+    "mulus": _multiply("us"),
+    "divsd": _divide("div.sd", 0),
+    "divud": _divide("div.ud", 0),
+    "modsd": _divide("div.sd", 1),
+    "modud": _divide("div.ud", 1),
+    "btg": _bit_toggle,
+    "get_isr_state": _get_isr_state,
+    "set_isr_state": _set_isr_state,
+}
+
+
+def select_builtin(s: Selector, i: Instr) -> None:
+    """Expand one builtin in place. Raises UnsupportedError for unknown names."""
+    name = str(i.extra["name"]).removeprefix("__builtin_")
+    handler = BUILTINS.get(name)
+    if handler is None:
+        raise UnsupportedError(f"builtin function __builtin_{name}")
+    handler(s, i)

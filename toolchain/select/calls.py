@@ -1,0 +1,270 @@
+"""Selection of calls, returns and function entry by abi-elf.md §2.2-2.4, and of builtins and inline assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from toolchain.abi.arguments import Place, Shape, place_arguments, scalar_shape, struct_shape
+from toolchain.abi.names import symbol
+from toolchain.abi.struct_alignment import ATTRIBUTE
+from toolchain.abi.target import CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
+from toolchain.ir.model import Arg, ConstInt, Function, GlobalRef, Instr, Type, Undef, Value, align_of, size_of
+from toolchain.mir.mir import Imm, Mem, Slot
+from toolchain.select import asm_inline, builtins
+
+if TYPE_CHECKING:
+    from toolchain.select.select import Selector
+
+BLOCK_PUSH_WORDS = 5
+
+
+def _byval(attrs: dict[str, object]) -> Type | None:
+    t = attrs.get("byval")
+    return t if isinstance(t, Type) else None
+
+
+def shape_of(v: Value, attrs: dict[str, object]) -> Shape:
+    """What placement needs to know of an argument or parameter with such attributes."""
+    t = _byval(attrs)
+    if t is None:
+        return scalar_shape(v.type)
+    align = attrs.get("align", 0)
+    assert isinstance(align, int)
+    return struct_shape(t, align, ATTRIBUTE in attrs)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# function entry
+
+
+def is_struct(a: Arg) -> bool:
+    """Whether a parameter is the address of a copy the caller makes."""
+    return _byval(a.attrs) is not None
+
+
+def parameter_places(f: Function) -> list[Place]:
+    """Where every parameter travels."""
+    return place_arguments([shape_of(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
+
+
+def incoming(s: Selector) -> None:
+    """Decide where every parameter lives before any code is selected."""
+    f = s.f
+    s.places = parameter_places(f)
+    read = [i.extra["argument"] for i in f.blocks[0].instrs if i.op == "argword"]
+    low = RETURN_ADDRESS_BYTES
+    for a, place in zip(f.args, s.places, strict=True):
+        t = _byval(a.attrs)
+        if place.stack:
+            low = max(low, place.stack)
+            slot = s.new_slot(2 * place.words, -place.stack)
+            s.arg_slots[id(a)] = slot
+            if t is not None:
+                s.slots[id(a)] = slot
+        elif t is not None and a not in read:
+            s.slots[id(a)] = s.new_slot(max(2 * place.words, 1))
+    s.variadic_anchor = s.new_slot(2, -low) if f.vararg else 0
+
+
+def receive(s: Selector) -> None:
+    """Entry code: parameters from registers and stack to virtual registers or their slots."""
+    late: list[tuple[Arg, Place]] = []
+    for a, place in zip(s.f.args, s.places, strict=True):
+        if place.register is None:
+            late.append((a, place))
+            continue
+        if id(a) in s.slots:
+            for k in range(place.words):
+                s.emit("mov", place.register + k, Slot(s.slots[id(a)], 2 * k))
+        elif is_struct(a):
+            for word in s.f.blocks[0].instrs:
+                if word.op == "argword" and word.extra["argument"] is a and id(word) in s.needed:
+                    s.copy(place.register + int(str(word.extra["word"])), s.value_regs(word)[0])
+        elif id(a) in s.needed:
+            for k, r in enumerate(s.value_regs(a)):
+                s.copy(place.register + k, r)
+    for a, place in late:
+        if place.stack and id(a) not in s.slots and id(a) in s.needed:
+            for k, r in enumerate(s.value_regs(a)):
+                s.emit("mov", Slot(s.arg_slots[id(a)], 2 * k), r)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# calls
+
+
+def select_call(s: Selector, i: Instr) -> None:
+    """Stack arguments last to first, then register arguments, the call, the result."""
+    callee = i.args[-1]
+    args = i.args[:-1]
+    attrs = i.extra["attrs"]
+    assert isinstance(attrs, list)
+    named = i.extra["fixed"] if i.extra.get("vararg") else None
+    assert named is None or isinstance(named, int)
+    places = place_arguments([shape_of(a, k) for a, k in zip(args, attrs, strict=True)], named)
+    target: int | str
+    target = symbol(s.module, callee.name) if isinstance(callee, GlobalRef) else s.reg(callee)
+    pushed = _push_stack_arguments(s, args, attrs, places)
+    used = _load_register_arguments(s, args, attrs, places)
+    mi = s.emit("callr", target) if isinstance(target, int) else s.emit("call", target)
+    mi.also_uses = tuple(used)
+    mi.also_defs = CALLER_SAVED
+    mi.tail = i.extra.get("tail") in ("tail", "musttail") and not pushed
+    if pushed:
+        s.emit("spadd", Imm(-pushed))
+    _take_results(s, i)
+
+
+def _take_results(s: Selector, i: Instr) -> None:
+    """Copy the result registers; the parts of an aggregate follow one another from W0."""
+    results = i.extra.get("results")
+    if not results:
+        if id(i) in s.needed:
+            for k, r in enumerate(s.value_regs(i)):
+                s.copy(k, r)
+        return
+    assert isinstance(results, list)
+    at = 0
+    users = {u.extra["index"]: u for u in s.users.get(id(i), ()) if u.op == "callresult"}
+    for k, t in enumerate(results):
+        part = i if k == 0 else users.get(k)
+        words = max(1, t.bits // 16)
+        if part is not None and id(part) in s.needed:
+            for n, r in enumerate(s.value_regs(part)):
+                s.copy(at + n, r)
+        at += words
+
+
+def _push_stack_arguments(s: Selector, args: list[Value], attrs: list[dict[str, object]], places: list[Place]) -> int:
+    """Push in descending distance; returns the bytes pushed."""
+    pushed = 0
+    for k in sorted((k for k in range(len(args)) if places[k].stack), key=lambda k: -places[k].stack):
+        v = args[k]
+        t = _byval(attrs[k])
+        if t is not None:
+            _push_struct(s, v, t)
+        elif s.is_leaf(v):
+            for word in range(places[k].words):
+                if isinstance(v, ConstInt) and not v.value >> 16 * word & 0xFFFF:
+                    s.emit("clr", Mem("++", SP))
+                else:
+                    s.emit("mov", s.leaf_word(v, word), Mem("++", SP))
+        else:
+            for r in s.regs(v):
+                s.emit("mov", r, Mem("++", SP))
+        pushed += 2 * places[k].words
+    return pushed
+
+
+def _push_struct(s: Selector, v: Value, t: Type) -> None:
+    words = (size_of(t) + 1) // 2
+    if align_of(t) == 2 and words >= BLOCK_PUSH_WORDS:
+        source = s.temp()
+        s.copy(s.reg(v), source)
+        s.emit("repmov", Imm(words - 1), source, SP)
+        return
+    if words >= BLOCK_PUSH_WORDS:  # bytes: W15 itself must stay even
+        source, dest = s.temp(), s.temp()
+        s.copy(s.reg(v), source)
+        s.emit("mov", SP, dest)
+        s.emit("spadd", Imm(2 * words))
+        s.emit("repmov", Imm(size_of(t) - 1), source, dest, byte=True)
+        return
+    for r in _struct_words(s, v, t):
+        s.emit("mov", r, Mem("++", SP))
+
+
+def _struct_words(s: Selector, v: Value, t: Type) -> list[int]:
+    """Registers with the words of a struct in memory; the padding byte of an odd size is not read."""
+    base, size = s.reg(v), size_of(t)
+    out = []
+    for at in range(0, size, 2):
+        r = s.temp()
+        if align_of(t) == 2:
+            s.emit("mov", s.offset_operand(base, at, False), r)
+        elif at + 1 == size:
+            s.emit("mov", s.offset_operand(base, at, True), r, byte=True)
+        else:
+            low, high, shifted = s.temp(), s.temp(), s.temp()
+            raw = s.temp()
+            s.emit("mov", s.offset_operand(base, at, True), raw, byte=True)
+            s.emit("ze", raw, low)
+            s.emit("mov", s.offset_operand(base, at + 1, True), high, byte=True)
+            s.emit("sl", high, Imm(8), shifted)
+            s.emit("ior", low, shifted, r)
+        out.append(r)
+    return out
+
+
+def _load_register_arguments(
+    s: Selector, args: list[Value], attrs: list[dict[str, object]], places: list[Place]
+) -> list[int]:
+    """Copies into W0-W7; everything that needs work is computed before the first copy."""
+    moves: list[tuple[int, int]] = []
+    leaves: list[tuple[Value, int, int]] = []
+    used: list[int] = []
+    for v, a, place in zip(args, attrs, places, strict=True):
+        if place.register is None:
+            continue
+        if isinstance(v, Undef):
+            continue
+        used += range(place.register, place.register + place.words)
+        t = _byval(a)
+        if t is not None:
+            moves += [(r, place.register + k) for k, r in enumerate(_struct_words(s, v, t))]
+        elif s.is_leaf(v):
+            leaves += [(v, k, place.register + k) for k in range(place.words)]
+        else:
+            moves += [(r, place.register + k) for k, r in enumerate(s.regs(v))]
+    for source, dest in moves:
+        s.copy(source, dest)
+    for leaf, word, dest in leaves:
+        s.load_leaf(leaf, word, dest)
+    return used
+
+
+def select_ret(s: Selector, i: Instr) -> None:
+    """Result in W0.. (abi-elf.md §2.3)."""
+    at = 0
+    used: list[int] = []
+    leaves: list[tuple[Value, int, int]] = []
+    for v in i.args:
+        words = max(1, v.type.bits // 16)
+        if not isinstance(v, Undef):
+            used += range(at, at + words)
+            if s.is_leaf(v):
+                leaves += [(v, k, at + k) for k in range(words)]
+            else:
+                for k, r in enumerate(s.regs(v)):
+                    s.copy(r, at + k)
+        at += words
+    for leaf, word, dest in leaves:
+        s.load_leaf(leaf, word, dest)
+    s.emit("ret").also_uses = tuple(used)
+
+
+def select_entryword(s: Selector, i: Instr) -> None:
+    """Return address (first word) or frame address of this function."""
+    slot = s.new_slot(2, -RETURN_ADDRESS_BYTES)
+    s.emit("lea" if i.extra["address"] else "mov", Slot(slot), s.value_regs(i)[0])
+
+
+def select_argword(s: Selector, i: Instr) -> None:
+    """Nothing: the entry code puts the word into its register."""
+
+
+def select_callresult(s: Selector, i: Instr) -> None:
+    """Nothing: the call copies all parts of its result."""
+
+
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+    "call": select_call,
+    "ret": select_ret,
+    "callresult": select_callresult,
+    "entryword": select_entryword,
+    "argword": select_argword,
+    "builtin": builtins.select_builtin,
+    "asm": asm_inline.select_asm,
+    "asmresult": asm_inline.select_asmresult,
+}

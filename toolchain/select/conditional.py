@@ -1,0 +1,242 @@
+"""Selection of `select`: a value that hangs on a condition.
+
+All selects of one condition that stand together share one test and one skip. Each starts from one of its two values;
+what makes it the other stands under the skip: a move, a constant, or the operation that makes one from the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from toolchain.ir.model import ConstInt, Instr, Undef, Value
+from toolchain.mir.mir import CC_INVERSE, MI, Imm
+from toolchain.select.arith import apply_rule
+from toolchain.select.compare import condition
+from toolchain.select.rules import CARRY_OP, REGISTER_OP, immediate_rule
+
+if TYPE_CHECKING:
+    from toolchain.select.select import Selector
+
+CONDITIONAL = frozenset(("add", "sub", "and", "or", "xor"))
+# Operation on the first word, operation on those behind it, order of the words.
+SHIFT_BY_ONE = {"shl": ("sl1", "rlc", 1), "lshr": ("lsr1", "rrc", -1), "ashr": ("asr1", "rrc", -1)}
+
+
+def select_select(s: Selector, i: Instr) -> None:
+    """`i`, and those right before it that hang on the same condition."""
+    if _undefined(s, i):
+        return
+    group = _group(s, i)
+    when = min((False, True), key=lambda w: sum(_cost(s, g, w) for g in group))
+    shifted = _shifted_out(s, i, when) if len(group) == 1 else None
+    outer, s.out = s.out, []
+    cc = shifted or condition(s, i.args[0], i)
+    test, s.out = s.out, outer
+    skip = CC_INVERSE[cc] if when else cc
+    if len(group) == 1:
+        skip = _strict(i, skip)
+    bodies = [mi for g in group for mi in _alternative(s, g, when, shifted is not None)]
+    s.out += test
+    if bodies:
+        s.emit("skip", "", cc=skip)
+    for mi in bodies:
+        mi.pred = True
+    s.out += bodies
+
+
+def _undefined(s: Selector, i: Instr) -> bool:
+    """A select with a value nobody defined is its other value."""
+    _, a, b = i.args
+    if not isinstance(a, Undef) and not isinstance(b, Undef):
+        return False
+    _assign(s, b if isinstance(a, Undef) else a, s.value_regs(i))
+    return True
+
+
+def _assign(s: Selector, v: Value, d: tuple[int, ...]) -> None:
+    """d = v, as copies or constant loads."""
+    if s.is_leaf(v):
+        for k, r in enumerate(d):
+            s.load_leaf(v, k, r)
+    else:
+        for x, r in zip(s.value_regs(v), d, strict=True):
+            s.copy(x, r)
+
+
+def _group(s: Selector, i: Instr) -> list[Instr]:
+    """`i` and the wanted selects right before it with its condition and none of its values; they are taken along."""
+    group = [i]
+    for j in reversed(s.block.instrs[: s.block.instrs.index(i)]):
+        same = j.op == "select" and j.args[0] is i.args[0] and not any(isinstance(a, Undef) for a in j.args)
+        if not same or id(j) not in s.needed or id(j) in s.folded:
+            break
+        if any(a is j or (isinstance(a, Instr) and j in a.args) for g in group for a in g.args):
+            break
+        s.folded.add(id(j))
+        group.insert(0, j)
+    return group
+
+
+def _starts_from(i: Instr, when: bool) -> tuple[Value, Value]:
+    """(value to start from, value under the skip, which is executed when the condition is `when`)."""
+    return (i.args[2], i.args[1]) if when else (i.args[1], i.args[2])
+
+
+def _cost(s: Selector, i: Instr, when: bool) -> int:
+    """In quarter words, to compare both ways to make a select."""
+    base, other = _starts_from(i, when)
+    cost = 1 if when else 0
+    if _operation(s, i, base, other) is not None:
+        cost -= 16
+    if isinstance(base, Instr) and base.op == "phi" and i in base.args:  # stays in the register of the loop
+        cost -= 12
+    if s.is_leaf(base) and not s.is_leaf(other):
+        cost += 8
+    elif not s.is_leaf(base) and not s.is_leaf(other) and s.single_use(base) and not s.single_use(other):
+        cost -= 4
+    return cost
+
+
+def _strict(i: Instr, skip: str) -> str:
+    """Of a minimum or maximum the case of equality does not matter; CPSLT and CPSGT know the strict orders only.
+
+    A comparison with a constant may have become one with its neighbour."""
+    c = i.args[0]
+    if not isinstance(c, Instr) or c.op != "icmp" or any(isinstance(v, ConstInt) for v in c.args):
+        return skip
+    if {id(v) for v in c.args} == {id(v) for v in i.args[1:]}:
+        return {"ge": "gt", "le": "lt"}.get(skip, skip)
+    return skip
+
+
+def _alternative(s: Selector, i: Instr, when: bool, shifted: bool) -> list[MI]:
+    """Emit the start of a select; returns what makes it the other value."""
+    base, other = _starts_from(i, when)
+    d = s.value_regs(i)
+    operation = _operation(s, i, base, other)
+    if operation is not None:
+        return _operate(s, operation, base, d, shifted)
+    if not s.is_leaf(other):
+        s.value_regs(other)
+    _assign(s, base, d)
+    outer, s.out = s.out, []
+    _assign(s, other, d)
+    body, s.out = s.out, outer
+    return body
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# operations under the skip
+
+
+def _operation(s: Selector, i: Instr, base: Value, other: Value) -> Instr | None:
+    """`other` if it is base op x or 0 - base and nobody else wants it, so that it can stand under the skip."""
+    if not isinstance(other, Instr) or other.op not in CONDITIONAL or not s.single_use(other):
+        return None
+    if not s.same_block(other) or s.is_leaf(base) or id(other) in s.wanted or i.type.bits not in (8, 16, 32):
+        return None
+    a, b = other.args
+    if other.op == "sub" and b is base and isinstance(a, ConstInt) and not a.value:
+        return other
+    return other if a is base else None
+
+
+def _operate(s: Selector, operation: Instr, base: Value, d: tuple[int, ...], shifted: bool) -> list[MI]:
+    """Emit d = base; returns d = d op x. Constants without an immediate form are loaded in front."""
+    byte = base.type.bits == 8
+    s.folded.add(id(operation))
+    negated = operation.args[0] is not base
+    x = operation.args[1]
+    operands = [] if negated else [_operand(s, operation.op, x, k, byte) for k in range(len(d))]
+    if shifted:
+        assert isinstance(base, Instr)
+        _shift_out(s, base, d)
+    else:
+        for source, r in zip(s.value_regs(base), d, strict=True):
+            s.copy(source, r)
+    outer, s.out = s.out, []
+    if negated and len(d) == 1:
+        s.emit("neg", d[0], d[0], byte=byte)
+    elif negated:
+        for k, r in enumerate(d):
+            s.emit("subbr" if k else "subr", r, Imm(0), r)
+    else:
+        for k, (r, operand) in enumerate(zip(d, operands, strict=True)):
+            _apply(s, operation.op, operand, r, k, byte)
+    body, s.out = s.out, outer
+    return body
+
+
+def _operand(s: Selector, op: str, x: Value, k: int, byte: bool) -> int | ConstInt:
+    """Word k of the second operand: a register, or a constant that `_apply` needs no register for."""
+    if not isinstance(x, ConstInt):
+        return s.leaf_word(x, k) if s.is_leaf(x) else s.value_regs(x)[k]
+    ones = 0xFF if byte else 0xFFFF
+    word = ConstInt(x.type, x.value >> 16 * k & ones)
+    if x.type.bits > 16 and op in ("add", "sub"):  # the carry wants every word
+        return word if word.value <= 31 else s.leaf_word(x, k)
+    name, value = ("add", -word.value & ones) if op == "sub" else (op, word.value)
+    return word if _changes_nothing(op, word) or immediate_rule(name, value, 8 if byte else 16) else s.leaf_word(x, k)
+
+
+def _changes_nothing(op: str, word: ConstInt) -> bool:
+    """A word of a long constant that leaves the other operand as it is."""
+    return word.type.bits > 16 and op in ("and", "or", "xor") and word.value == (0xFFFF if op == "and" else 0)
+
+
+def _apply(s: Selector, op: str, operand: int | ConstInt, r: int, k: int, byte: bool) -> None:
+    """r = r op operand, for word k of a value."""
+    name = (CARRY_OP if k else REGISTER_OP)[op]
+    if isinstance(operand, int):
+        s.emit(name, r, operand, r, byte=byte)
+    elif operand.type.bits > 16 and op in ("add", "sub"):
+        s.emit(name, r, Imm(operand.value), r)
+    elif not _changes_nothing(op, operand):
+        bits = 8 if byte else 16
+        value = -operand.value & ((1 << bits) - 1) if op == "sub" else operand.value
+        name = "add" if op == "sub" else op
+        apply_rule(s, immediate_rule(name, value, bits), name, r, value, r, byte)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# the bit that a shift loses
+
+
+def _shifted_out(s: Selector, i: Instr, when: bool) -> str | None:
+    """The condition by the carry, when a select starts from x shifted by one and asks for the bit that leaves x."""
+    base, other = _starts_from(i, when)
+    operation, c = _operation(s, i, base, other), i.args[0]
+    if operation is None or operation.args[0] is not base or base.type.bits not in (16, 32):
+        return None
+    if not isinstance(base, Instr) or base.op not in SHIFT_BY_ONE or not isinstance(c, Instr) or c.op != "icmp":
+        return None
+    x, n = base.args
+    tested, zero = c.args
+    if s.is_leaf(x) or not isinstance(n, ConstInt) or n.value != 1 or not isinstance(zero, ConstInt):
+        return None
+    if base.op == "shl" and tested is x and (c.pred, zero.signed) in (("slt", 0), ("sgt", -1)):
+        return "c" if c.pred == "slt" else "nc"
+    lost = base.type.bits - 1 if base.op == "shl" else 0
+    if c.pred in ("eq", "ne") and not zero.value and _only_bit(tested, x, lost):
+        return "c" if c.pred == "ne" else "nc"
+    return None
+
+
+def _only_bit(masked: Value, x: Value, bit: int) -> bool:
+    """x & 1 << bit, perhaps of the low word of x."""
+    if not isinstance(masked, Instr) or masked.op != "and":
+        return False
+    a, mask = masked.args
+    same = a is x or (isinstance(a, Instr) and a.op == "trunc" and a.args[0] is x and bit < a.type.bits)
+    return same and isinstance(mask, ConstInt) and mask.value == 1 << bit
+
+
+def _shift_out(s: Selector, base: Instr, d: tuple[int, ...]) -> None:
+    """d = x shifted by one, the lost bit in the carry."""
+    first, rest, order = SHIFT_BY_ONE[base.op]
+    for k, (source, r) in enumerate(list(zip(s.value_regs(base.args[0]), d, strict=True))[::order]):
+        s.emit(rest if k else first, source, r)
+
+
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {"select": select_select}

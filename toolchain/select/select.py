@@ -1,0 +1,211 @@
+"""Instruction selection: legal IR -> machine form over virtual registers.
+
+Every block is walked from its end. An instruction emits code only when it has an effect or somebody asked for its
+registers; whoever asks may instead fold it (a load into an ALU operand, an addition into an address, a comparison into
+a branch). Code of one IR instruction is collected in order in `out` and put before what is already there.
+Needs: legal IR, critical edges split, no switch. Ensures: machine form with virtual registers, phis turned into copies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from toolchain.ir.cfg import loop_depths, predecessors
+from toolchain.ir.model import ConstInt, DbgRecord, Instr, Undef, UnsupportedError, Value
+from toolchain.mir.mir import CONSTANT, GONE, MI, MBlock, MFunction
+from toolchain.select import arith, block_copies, calls, compare, conditional, memory, multiply, shifts
+from toolchain.select.address import AddressSelector
+
+
+class Selector(AddressSelector):
+    """Drives the walk over blocks; terminators and phis."""
+
+    # -- function -----------------------------------------------------------------------------------------------------
+
+    def run(self) -> MFunction:
+        """Select the whole function."""
+        f = self.f
+        depths = loop_depths(f)
+        preds = predecessors(f)
+        ends = {b.name: b.instrs[-1].op for b in f.blocks}
+        for b in f.blocks:
+            if any(ends[p] == "indirectbr" for p in preds[b.name]):
+                self.two_stage.add(b.name)
+        calls.incoming(self)
+        bodies: dict[str, list[list[MI]]] = {}
+        for block in f.blocks:
+            self.block = block
+            chunks: list[list[MI]] = []
+            for i in reversed(block.instrs):
+                self.out = []
+                self.line = i.line
+                try:
+                    self.instruction(i)
+                except UnsupportedError as e:
+                    e.line = i.line
+                    raise
+                if self.out:
+                    chunks.append(self.out)
+            bodies[block.name] = chunks
+        for block in f.blocks:
+            mb = MBlock(block.name, [], block.succs, depths[block.name], block.name in self.taken)
+            if block is f.blocks[0]:
+                self.out = []
+                self.line = None
+                calls.receive(self)
+                mb.insts += self.out
+            if block.name in self.two_stage:
+                self.out = []
+                for phi in block.phis():
+                    if id(phi) in self.needed:
+                        for source, dest in zip(self.phi_input(phi), self.value_regs(phi), strict=True):
+                            self.copy(source, dest)
+                mb.insts += self.out
+            for chunk in reversed(bodies[block.name]):
+                mb.insts += chunk
+            self.m.blocks.append(mb)
+        self.m.slot_of = dict(self.slots)
+        for k, record in enumerate(self.f.dbg_records):
+            slot = self.slots.get(id(record.value)) if record.kind == "memory" else None
+            found = (-1 - slot,) if slot is not None else self._words_of(record)
+            if found:
+                self.m.bindings[k] = (record.variable, found)
+        return self.m
+
+    def _words_of(self, record: DbgRecord) -> tuple[int, ...]:
+        """Where a variable's words are (`mir.Located`); none where that is not known."""
+        if record.kind == "parameter":
+            return tuple(self.registers.get(id(word), (GONE,))[0] for word in record.words)
+        if record.kind != "dbg_value" or record.expression:
+            return ()
+        if isinstance(record.value, ConstInt):
+            words = max(1, record.value.type.bits // 16)
+            return tuple(CONSTANT + (record.value.value >> 16 * k & 0xFFFF) for k in range(words))
+        return tuple(self.registers.get(id(record.value), ()))
+
+    def phi_input(self, phi: Instr) -> tuple[int, ...]:
+        """Registers predecessors write for a phi: its own, or separate ones below an indirectbr."""
+        if self.position[id(phi)][0] not in self.two_stage:
+            return self.value_regs(phi)
+        if id(phi) not in self.phi_inputs:
+            self.phi_inputs[id(phi)] = tuple(self.temp() for _ in self.value_regs(phi))
+        return self.phi_inputs[id(phi)]
+
+    def instruction(self, i: Instr) -> None:
+        """Emit one instruction if its effect or its value is wanted."""
+        if id(i) in self.folded:
+            return
+        if i.op in EFFECTS or i.volatile or id(i) in self.needed:
+            SELECT[i.op](self, i)
+
+    def result(self, i: Instr) -> int:
+        """Register of a one-word result."""
+        return self.value_regs(i)[0]
+
+    # -- terminators --------------------------------------------------------------------------------------------------
+
+    def phi_copies(self, targets: list[str]) -> list[tuple[int, int | tuple[Value, int]]]:
+        """Moves (destination, source register or leaf word) for the edges to `targets`."""
+        moves: list[tuple[int, int | tuple[Value, int]]] = []
+        for target in targets:
+            for phi in self.by_name[target].phis():
+                if id(phi) not in self.needed:
+                    continue
+                v = phi.args[phi.blocks.index(self.block.name)]
+                if isinstance(v, Undef):
+                    continue
+                dest = self.phi_input(phi)
+                if self.is_leaf(v):
+                    moves += [(d, (v, k)) for k, d in enumerate(dest)]
+                else:
+                    moves += [(d, s) for d, s in zip(dest, self.value_regs(v), strict=True) if d != s]
+        return moves
+
+    def parallel_copy(self, moves: list[tuple[int, int | tuple[Value, int]]]) -> None:
+        """Perform moves as if at once: registers first, cycles through a temporary, constants last."""
+        pending = {d: s for d, s in moves if isinstance(s, int)}
+        while pending:
+            sources = set(pending.values())
+            ready = [d for d in pending if d not in sources]
+            if not ready:
+                d = next(iter(pending))
+                t = self.temp()
+                self.emit("mov", pending[d], t)
+                pending[d] = t
+                continue
+            for d in ready:
+                self.emit("mov", pending.pop(d), d)
+        for d, s in moves:
+            if not isinstance(s, int):
+                self.load_leaf(s[0], s[1], d)
+
+
+def select_br(s: Selector, i: Instr) -> None:
+    """Branches; a comparison used here becomes CP and a condition."""
+    if not i.args:
+        s.parallel_copy(s.phi_copies(i.blocks))
+        s.emit("jump", i.blocks[0])
+        return
+    cc = compare.condition(s, i.args[0], i)
+    s.emit("bra", i.blocks[0], cc=cc)
+    s.emit("jump", i.blocks[1])
+
+
+def select_brtable(s: Selector, i: Instr) -> None:
+    """BRA Wn into a table of BRA instructions (isa.md §7.1: the offset counts instruction words)."""
+    s.m.tables.append((s.block.name, list(i.blocks)))
+    s.emit("brtable", s.reg(i.args[0]), str(len(s.m.tables) - 1))
+
+
+def select_indirectbr(s: Selector, i: Instr) -> None:
+    """GNU computed goto through a handle."""
+    r = s.reg(i.args[0])
+    s.parallel_copy(s.phi_copies(list(dict.fromkeys(i.blocks))))
+    s.emit("jumpr", r)
+
+
+def select_unreachable(s: Selector, i: Instr) -> None:
+    """Nothing: control never comes here. An empty function still needs a word, so a reset stands for it."""
+    s.emit("text", "reset")
+
+
+def select_phi(s: Selector, i: Instr) -> None:
+    """Phis emit nothing here; predecessors copy into their registers."""
+    s.value_regs(i)
+
+
+def select_nothing(s: Selector, i: Instr) -> None:
+    """slot, and aliases whose registers are those of their operand."""
+
+
+def select_cast_alias(s: Selector, i: Instr) -> None:
+    """trunc and bits: alias of the low words, or a leaf loaded into fresh registers."""
+    if s.is_leaf(i.args[0]):
+        for k, r in enumerate(s.value_regs(i)):
+            s.load_leaf(i.args[0], k, r)
+    else:
+        s.value_regs(i)
+
+
+EFFECTS = frozenset((
+    "store", "loadpair", "storepair", "call", "asm", "builtin", "blockcopy", "blockfill", "setsp", "dynalloca", "br",
+    "brtable", "indirectbr", "ret", "unreachable",
+))  # fmt: skip
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+    "br": select_br,
+    "brtable": select_brtable,
+    "indirectbr": select_indirectbr,
+    "unreachable": select_unreachable,
+    "phi": select_phi,
+    "slot": select_nothing,
+    "trunc": select_cast_alias,
+    "bits": select_cast_alias,
+    **arith.SELECT,
+    **multiply.SELECT,
+    **shifts.SELECT,
+    **conditional.SELECT,
+    **compare.SELECT,
+    **memory.SELECT,
+    **block_copies.SELECT,
+    **calls.SELECT,
+}

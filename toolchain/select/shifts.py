@@ -1,0 +1,187 @@
+"""Selection of shifts by constants and variables, any width."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from toolchain.ir.model import ConstInt, Instr, Value
+from toolchain.mir.mir import MI, Imm, OpInfo
+
+if TYPE_CHECKING:
+    from toolchain.select.select import Selector
+
+
+MULTIPLIED = 4  # MUL has literals below 32
+
+
+def _words(v: Value) -> int:
+    return max(1, v.type.bits // 16)
+
+
+def select_shift(s: Selector, i: Instr) -> None:
+    """shl lshr ashr by constants or variables, any width."""
+    a, n = i.args
+    if isinstance(n, ConstInt):
+        if _words(i) == 1:
+            _shift_word(s, i, n.value)
+        else:
+            _shift_wide_constant(s, i.op, s.regs(a), n.value, s.value_regs(i))
+    elif _words(i) == 1:
+        _shift_word_variable(s, i)
+    elif _low_word_suffices(s, i):
+        s.emit("sl", s.regs(a)[0], s.regs(n)[0], s.value_regs(i)[0])
+    else:
+        _shift_wide_variable(s, i)
+
+
+SHIFT_OP = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
+
+
+def _extended_byte(s: Selector, v: Value, signed: bool, user: Instr) -> int:
+    """A byte value extended to a word."""
+    r = s.temp()
+    s.emit("se" if signed else "ze", s.source(v, user), r)
+    return r
+
+
+def _shift_word(s: Selector, i: Instr, n: int) -> None:
+    d, byte = s.result(i), i.type.bits == 8
+    if n >= i.type.bits:
+        s.emit("clr", d)
+        return
+    if byte and i.op != "shl":
+        if n == 1:
+            s.emit("lsr1" if i.op == "lshr" else "asr1", s.source(i.args[0], i), d, byte=True)
+            return
+        wide = _extended_byte(s, i.args[0], i.op == "ashr", i)
+        s.emit(SHIFT_OP[i.op], wide, Imm(n), d)
+        return
+    if n == 1 and not byte:
+        s.emit(SHIFT_OP[i.op] + "1", s.source(i.args[0], i), d)
+        return
+    s.emit(SHIFT_OP[i.op], s.reg(i.args[0]), Imm(n), d)
+
+
+def _shift_word_variable(s: Selector, i: Instr) -> None:
+    """Native for words; the count uses its low 5 bits, counts of 16 and more are undefined in the IR."""
+    d, byte = s.result(i), i.type.bits == 8
+    a = _extended_byte(s, i.args[0], i.op == "ashr", i) if byte and i.op != "shl" else s.reg(i.args[0])
+    s.emit(SHIFT_OP[i.op], a, s.reg(i.args[1]), d)
+
+
+def _low_word_suffices(s: Selector, i: Instr) -> bool:
+    """Whether two words go left and only the lower is read: SL gives 0 for the counts of 16 to 31 (isa.md §6.3)."""
+    if i.op != "shl" or _words(i) != 2:
+        return False
+    return all(user.op == "trunc" and _words(user) == 1 for user in s.users[id(i)])
+
+
+def _shift_wide_constant(s: Selector, op: str, a: tuple[int, ...], n: int, d: tuple[int, ...]) -> None:
+    """Whole words move; the rest is shifted with neighbours' bits brought in."""
+    count = len(a)
+    jump, bits = n // 16, n % 16
+    if jump >= count:
+        for r in d:
+            s.emit("clr", r)
+        return
+    if bits == 0:
+        _move_words(s, op, a, jump, d)
+    elif bits == 1 and jump == 0:
+        _shift_by_one(s, op, a, d)
+    elif count == 2 and op == "shl" and bits <= MULTIPLIED and jump == 0:
+        _shift_by_product(s, a, bits, d)
+    elif count == 2 and op != "shl" and n == 8:
+        _shift_by_byte(s, op, a, d)
+    elif op == "shl":
+        for k in range(count - 1, -1, -1):
+            if k < jump:
+                s.emit("clr", d[k])
+            elif k == jump:
+                s.emit("sl", a[0], Imm(bits), d[k])
+            else:
+                _combine(s, "sl", a[k - jump], bits, "lsr", a[k - jump - 1], d[k])
+    else:
+        top = count - 1
+        for k in range(count):
+            if k + jump > top:
+                fill(s, op, a[top], d[k])
+            elif k + jump == top:
+                s.emit(SHIFT_OP[op], a[top], Imm(bits), d[k])
+            else:
+                _combine(s, "lsr", a[k + jump], bits, "sl", a[k + jump + 1], d[k])
+
+
+def _shift_by_product(s: Selector, a: tuple[int, ...], bits: int, d: tuple[int, ...]) -> None:
+    """The product of the low word and 2^bits has the bits that cross over in its upper word."""
+    upper, crossing, p = s.temp(), s.temp(), s.m.new_pair()
+    s.emit("sl", a[1], Imm(bits), upper)
+    s.emit("mul.uu", a[0], Imm(1 << bits), p)
+    s.emit("split", d[0], crossing, p)
+    s.emit("ior", crossing, upper, d[1])
+
+
+def _shift_by_byte(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
+    """The low byte of the upper word takes the place of the low byte of the lower, then both bytes change places."""
+    s.copy(a[0], d[0])
+    s.emit("movlow", a[1], d[0], byte=True)
+    s.emit("swap", d[0])
+    s.emit(SHIFT_OP[op], a[1], Imm(8), d[1])
+
+
+def _combine(s: Selector, op: str, main: int, bits: int, other_op: str, other: int, d: int) -> None:
+    """d = main shifted by bits | neighbour shifted the other way."""
+    x, y = s.temp(), s.temp()
+    s.emit(op, main, Imm(bits), x)
+    s.emit(other_op, other, Imm(16 - bits), y)
+    s.emit("ior", x, y, d)
+
+
+def fill(s: Selector, op: str, top: int, d: int) -> None:
+    """Word above the value: zero or sign."""
+    if op == "ashr":
+        s.emit("asr", top, Imm(15), d)
+    else:
+        s.emit("clr", d)
+
+
+def _move_words(s: Selector, op: str, a: tuple[int, ...], jump: int, d: tuple[int, ...]) -> None:
+    count = len(a)
+    for k in range(count):
+        source = k - jump if op == "shl" else k + jump
+        if 0 <= source < count:
+            s.copy(a[source], d[k])
+        elif op == "shl":
+            s.emit("clr", d[k])
+        else:
+            fill(s, op, a[count - 1], d[k])
+
+
+def _shift_by_one(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
+    """Through the carry: SL/RLC upward, LSR or ASR/RRC downward (abi-elf.md §8.1)."""
+    if op == "shl":
+        for k in range(len(a)):
+            s.emit("sl1" if k == 0 else "rlc", a[k], d[k])
+        return
+    top = len(a) - 1
+    for k in range(top, -1, -1):
+        s.emit(("asr1" if op == "ashr" else "lsr1") if k == top else "rrc", a[k], d[k])
+
+
+def _shift_wide_variable(s: Selector, i: Instr) -> None:
+    """A loop of one-bit shifts on copies (abi-elf.md §8.1: 5 words for 32 bits)."""
+    d = s.value_regs(i)
+    a = s.regs(i.args[0])
+    n = s.regs(i.args[1])[0]
+    count = s.temp()
+    for x, r in zip(a, d, strict=True):
+        s.copy(x, r)
+    s.copy(n, count)
+    mi = MI("shiftloop", i.op, count, *d, line=s.line)
+    mi.info = OpInfo("nb" + "b" * len(d), "cznv", words=len(d) + 3)
+    s.out.append(mi)
+
+
+SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+    **dict.fromkeys(("shl", "lshr", "ashr"), select_shift),
+}

@@ -1,0 +1,173 @@
+"""switch -> compare chains, binary search or branch tables, chosen by size.
+
+A chain costs 2 words a case (CP #lit5, BRA; 3 with a large constant). A table costs a range check, BRA Wn and one BRA
+per value of its range (abi-elf.md §8.1).
+"""
+
+from __future__ import annotations
+
+from toolchain.ir.build import Builder, const
+from toolchain.ir.cfg import new_branch, retarget_phis
+from toolchain.ir.model import I16, VOID, Block, Function, Instr, Value
+
+TABLE_OVERHEAD_WORDS = 5
+CHAIN_WORDS = 2
+Run = tuple[int, int, str]  # first value, last value, target
+
+
+class SwitchLowering:
+    """Replaces one switch; collects the new blocks and who branches where."""
+
+    def __init__(self, blocks: dict[str, Block], block: Block, for_size: bool) -> None:
+        self.blocks = blocks
+        self.block = block
+        self.switch = block.instrs.pop()
+        self.value = self.switch.args[0]
+        self.default = self.switch.blocks[0]
+        self.longest_chain = 10 if for_size else 4
+        self.start = block
+        self.new_blocks: list[Block] = []
+        self.edges: dict[str, list[str]] = {}
+
+    def run(self) -> list[Block]:
+        """Rewrite; returns the added blocks in layout order."""
+        cases = self.switch.extra["cases"]
+        assert isinstance(cases, list)
+        pairs = sorted(zip(cases, self.switch.blocks[1:], strict=True))
+        pairs = [(k, t) for k, t in pairs if t != self.default]
+        if self.value.type.bits > 16 and pairs:
+            pairs = self._narrow(pairs)
+        self._search(self.start, _runs(pairs), 0, (1 << self.value.type.bits) - 1)
+        for target in dict.fromkeys(self.switch.blocks):
+            retarget_phis(self.blocks[target], self.block.name, self.edges.get(target, []))
+        return self.new_blocks
+
+    def _narrow(self, pairs: list[tuple[int, str]]) -> list[tuple[int, str]]:
+        """Switch on a wide value: when all cases fit a word, check the upper part once; else compare wide."""
+        base, top = pairs[0][0], pairs[-1][0]
+        if top - base > 0xFFFF or len(pairs) < 3:
+            return pairs
+        b = Builder(self.block)
+        b.line = self.switch.line
+        shifted = b.binary("sub", self.value, const(self.value.type, base))
+        inside = b.icmp("ule", shifted, const(shifted.type, top - base))
+        rest = self._block()
+        self._branch(self.block, inside, rest.name, self.default)
+        self.start = rest
+        b.block = rest
+        self.value = b.cast("trunc", shifted, I16)
+        return [(k - base, t) for k, t in pairs]
+
+    def _block(self) -> Block:
+        block = Block(f"{self.block.name}.s{len(self.new_blocks)}")
+        self.new_blocks.append(block)
+        return block
+
+    def _edge(self, source: str, target: str) -> None:
+        sources = self.edges.setdefault(target, [])
+        if source not in sources:
+            sources.append(source)
+
+    def _branch(self, block: Block, c: Value, yes: str, no: str) -> None:
+        i = Instr("br", VOID, [c])
+        i.blocks = [yes, no]
+        i.line = self.switch.line
+        block.instrs.append(i)
+        self._edge(block.name, yes)
+        self._edge(block.name, no)
+
+    def _jump(self, block: Block, target: str) -> None:
+        i = new_branch(target)
+        i.line = self.switch.line
+        block.instrs.append(i)
+        self._edge(block.name, target)
+
+    def _search(self, block: Block, runs: list[Run], low: int, high: int) -> None:
+        """Code for the cases in `runs`, when the value is known to lie in low..high."""
+        if not runs:
+            self._jump(block, self.default)
+        elif self._wants_table(runs):
+            self._table(block, runs, low, high)
+        elif len(runs) <= self.longest_chain:
+            self._chain(block, runs, low, high)
+        else:
+            middle = len(runs) // 2
+            pivot = runs[middle][0]
+            left, right = self._block(), self._block()
+            b = Builder(block)
+            b.line = self.switch.line
+            self._branch(block, b.icmp("ult", self.value, const(self.value.type, pivot)), left.name, right.name)
+            self._search(left, runs[:middle], low, pivot - 1)
+            self._search(right, runs[middle:], pivot, high)
+
+    def _wants_table(self, runs: list[Run]) -> bool:
+        span = runs[-1][1] - runs[0][0] + 1
+        chain = sum(CHAIN_WORDS + (first > 31) + (2 if last > first else 0) for first, last, _ in runs)
+        return len(runs) > 3 and span + TABLE_OVERHEAD_WORDS <= chain and self.value.type.bits <= 16
+
+    def _chain(self, block: Block, runs: list[Run], low: int, high: int) -> None:
+        t = self.value.type
+        for k, (first, last, target) in enumerate(runs):
+            b = Builder(block)
+            b.line = self.switch.line
+            if first <= low and last >= high:
+                self._jump(block, target)
+                return
+            if first == last:
+                test = b.icmp("eq", self.value, const(t, first))
+            elif first == 0:
+                test = b.icmp("ule", self.value, const(t, last))
+            else:
+                test = b.icmp("ule", b.binary("sub", self.value, const(t, first)), const(t, last - first))
+            final = k == len(runs) - 1
+            next_block = self.default if final else self._block().name
+            self._branch(block, test, target, next_block)
+            if not final:
+                block = self.new_blocks[-1]
+
+    def _table(self, block: Block, runs: list[Run], low: int, high: int) -> None:
+        base, top = runs[0][0], runs[-1][1]
+        b = Builder(block)
+        b.line = self.switch.line
+        index = b.cast("zext", self.value, I16) if self.value.type.bits < 16 else self.value
+        if 0 < base <= 2 and low == 0 and top - base > 3:
+            base = 0  # one or two extra table words replace the subtraction
+        if base:
+            index = b.binary("sub", index, const(I16, base))
+        if low < base or high > top:
+            inside = b.icmp("ule", index, const(I16, top - base))
+            table = self._block()
+            self._branch(block, inside, table.name, self.default)
+            block = table
+        targets = [self.default] * (top - base + 1)
+        for first, last, target in runs:
+            for k in range(first, last + 1):
+                targets[k - base] = target
+        i = Instr("brtable", VOID, [index])
+        i.blocks = targets
+        i.line = self.switch.line
+        block.instrs.append(i)
+        for target in targets:
+            self._edge(block.name, target)
+
+
+def _runs(pairs: list[tuple[int, str]]) -> list[Run]:
+    """Merge neighbouring values with one target."""
+    runs: list[Run] = []
+    for k, target in pairs:
+        if runs and runs[-1][1] == k - 1 and runs[-1][2] == target:
+            runs[-1] = (runs[-1][0], k, target)
+        else:
+            runs.append((k, k, target))
+    return runs
+
+
+def lower_switches(f: Function, for_size: bool) -> None:
+    """Replace every switch of the function. Ensures: terminators are br, brtable, indirectbr, ret, unreachable."""
+    out: list[Block] = []
+    blocks = {b.name: b for b in f.blocks}
+    for block in list(f.blocks):
+        out.append(block)
+        if block.instrs[-1].op == "switch":
+            out += SwitchLowering(blocks, block, for_size).run()
+    f.blocks = out
