@@ -1,4 +1,4 @@
-"""Every vector of vectors/abi.csv, on the caller's and on the callee's side (abi-elf.md §2.2, §2.3).
+"""Every vector of tests/vectors/abi.csv, on the caller's and on the callee's side (abi-elf.md §2.2, §2.3).
 
 Caller: a compiled function passes objects of random bytes; at the entry of the called function each is found where the
 vector says, and the result given back there arrives. Callee: entered with random registers and stack, it copies its
@@ -195,7 +195,7 @@ class Bench:
 @pytest.mark.parametrize("level", ["-O0", "-Os"])
 @pytest.mark.parametrize("side", ["caller", "callee"])
 def test_every_vector_of_the_calling_convention(side: str, level: str, vectors: Path, tmp_path: Path) -> None:
-    """vectors/abi.csv, all rows."""
+    """All rows of tests/vectors/abi.csv."""
     every = read(vectors / "abi.csv")
     types = SCALAR_DOUBLE.sub("float", (vectors / "abi.h").read_text())
     wrong: dict[int, str] = {}
