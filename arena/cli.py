@@ -34,7 +34,7 @@ from arena.scene.loader import SceneError, load_scene, scenes
 from arena.trial.record import FolderInUseError, RecordError
 from emu.host.completion import SHELLS, script
 from emu.host.completion import description as completion_description
-from emu.host.exit_status import BAD_INPUT, CANNOT_GO_ON, DONE, INTERRUPTED, unread_is_done
+from emu.host.exit_status import BAD_INPUT, CANNOT_CONTINUE, DONE, INTERRUPTED, ignore_unread_output
 
 COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
     "run": (run.parser, run.run),
@@ -55,7 +55,7 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
 }
 
 
-@unread_is_done
+@ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the process's exit status."""
     parser = argparse.ArgumentParser(
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise
     except (FolderInUseError, ClusterLostError) as error:
         print(f"arena: {error}; finished trials are kept, the same command goes on", file=sys.stderr)
-        return CANNOT_GO_ON
+        return CANNOT_CONTINUE
     except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
         print(f"arena: {error}", file=sys.stderr)
         return BAD_INPUT

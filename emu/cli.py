@@ -15,7 +15,7 @@ from typing import Final
 
 from emu.commands import COMMANDS
 from emu.host.command import CommandError, Parser
-from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, unread_is_done
+from emu.host.exit_status import BAD_INPUT, BAD_INPUT_AS_STATUS, DONE, ignore_unread_output
 
 _USAGE: Final = """usage: emu COMMAND [options]
 
@@ -25,7 +25,7 @@ example: emu run firmware.elf --seconds 5
 `emu COMMAND --help` explains a command; `emu --version` tells the version."""
 
 
-@unread_is_done
+@ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     return _answer(list(sys.argv[1:] if arguments is None else arguments))

@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import Final, Protocol, cast
 
-from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
+from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, ignore_unread_output
 
 COMMANDS: Final = {
     "new": "set up a project: Makefile, CMake, main.c, a test, settings for VS Code",
@@ -48,7 +48,7 @@ def command(name: str) -> Command:
     return cast(Command, import_module(f"openswarm.commands.{name}"))
 
 
-@unread_is_done
+@ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     words = list(sys.argv[1:] if arguments is None else arguments)

@@ -14,18 +14,18 @@ import pytest
 
 from arena.trial.record import RecordError, write_bytes
 from emu.boards.picture import write_picture
-from emu.host.files import is_opened, read_file, whole_file, whole_text_file
+from emu.host.files import is_opened, read_file, atomic_file, atomic_text_file
 from toolchain.errors import ToolError
 from toolchain.files import write_outputs
 
 
 def text(path: Path) -> None:
-    with whole_text_file(path) as stream:
+    with atomic_text_file(path) as stream:
         stream.write("text")
 
 
 def part_of(path: Path) -> None:
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         part.write_bytes(b"part")
 
 
@@ -95,7 +95,7 @@ def test_a_file_may_be_called_dash(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.chdir(tmp_path)
     write_outputs([("./-", b"object")])
     assert (tmp_path / "-").read_bytes() == b"object"
-    with whole_text_file("./-") as stream:
+    with atomic_text_file("./-") as stream:
         stream.write("text")
     assert read_file("./-") == b"text"
 

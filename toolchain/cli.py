@@ -11,7 +11,7 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, unread_is_done
+from emu.host.exit_status import BAD_INPUT, DONE, INTERRUPTED, ignore_unread_output
 from toolchain.errors import ToolError
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -43,7 +43,7 @@ def _usage() -> str:
     return USAGE.format(commands="\n".join(f"  {name:10} {text}" for name, (_, text) in COMMANDS.items()))
 
 
-@unread_is_done
+@ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0 done, 1 C errors, 2 bad input or usage."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-@unread_is_done
+@ignore_unread_output
 def by_name() -> int:
     """Run the command that the program is called after: `dspic-ar rcs x.a y.o`, as build systems want their tools.
 

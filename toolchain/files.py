@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from emu.host.files import is_opened, is_standard, part_beside, put_in_place, read_file, write_standard
+from emu.host.files import is_opened, is_standard, read_file, replace_file, temporary_beside, write_standard
 from toolchain.errors import ToolError
 
 
@@ -40,11 +40,11 @@ def write_outputs(outputs: Iterable[tuple[str | Path, bytes]]) -> None:
             if is_standard(target) or is_opened(target):
                 opened.append((target, data))
                 continue
-            part = part_beside(target)
+            part = temporary_beside(target)
             pending.append((part, target))
             part.write_bytes(data)
         for part, target in pending:
-            put_in_place(part, target)
+            replace_file(part, target)
         for target, data in opened:
             if is_standard(target):
                 write_standard(data)

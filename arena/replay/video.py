@@ -20,7 +20,7 @@ from arena.robots.controller import STRIP_PIXELS
 from arena.scene import dimensions
 from arena.scene.loader import Scene
 from arena.trial.record import RecordError, Trial, reason_of
-from emu.host.files import whole_file
+from emu.host.files import atomic_file
 
 SCALE: Final = 1.6
 """Pixels per cm."""
@@ -49,7 +49,7 @@ def write_movie(trial: Trial, path: Path, speed: float, seconds: float | None = 
         raise ValueError(f"--speed {speed:g} makes {count} frames of {end:g} s; the limit is {LIMIT}")
     pictures = frames(trial, [frame / FRAMES_PER_S * speed for frame in range(count)])
     try:
-        with whole_file(path) as part:
+        with atomic_file(path) as part:
             if kind == ".gif":
                 _gif(pictures, part)
             else:

@@ -28,7 +28,7 @@ class Noise:
         self._seed: Final = Cell(record, "noise.seed", "Q", seed & _ONES)
         self._strength: Final = Cell(record, "noise.strength", "Q")
         self.on_change: Final[list[Callable[[], None]]] = []
-        """Called before another strength begins to hold and once it does, by those who foretell levels."""
+        """Called before another strength begins to hold and once it does, by those who predict levels."""
 
     @property
     def strength(self) -> float:

@@ -15,14 +15,14 @@ from emu.system.events import Events
 from emu.system.record import Record
 
 
-class Part:
+class BoardPart:
     """One part of a board."""
 
     def __init__(self, name: str, chip: Peripherals) -> None:
         self.name: Final = name
         self.chip: Final = chip
-        self.record: Final[Record] = chip.kit.bus.record
-        self.events: Final[Events] = chip.kit.bus.events
+        self.record: Final[Record] = chip.context.bus.record
+        self.events: Final[Events] = chip.context.bus.events
         self.pins: Final[Pins] = chip.pins
 
     @property

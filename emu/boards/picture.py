@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from emu.host.files import whole_file
+from emu.host.files import atomic_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -40,5 +40,5 @@ def write_picture(path: str | os.PathLike[str], pixels: NDArray[np.uint8], enlar
     from PIL import Image
 
     large = np.repeat(np.repeat(pixels, enlarge, axis=0), enlarge, axis=1)
-    with whole_file(path) as part:
+    with atomic_file(path) as part:
         Image.fromarray(np.ascontiguousarray(large)).save(part, format="PNG")

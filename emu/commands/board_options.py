@@ -123,9 +123,9 @@ def start_watch(machine: Machine, options: argparse.Namespace) -> Callable[[], N
     """Print what is watched on standard error. Returns what to call at the end of the run."""
     if not options.watch:
         return lambda: None
-    from emu.boards.epuck.observer import Watch
+    from emu.boards.epuck.observer import RobotObserver
 
     try:
-        return Watch(machine.board, options.watch, partial(print, file=sys.stderr)).finish
+        return RobotObserver(machine.board, options.watch, partial(print, file=sys.stderr)).finish
     except ValueError as error:
         raise CommandError(str(error)) from None

@@ -13,9 +13,9 @@ from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, seconds
 from emu.host.exit_status import DONE, FAULT
-from emu.host.files import whole_text_file
+from emu.host.files import atomic_text_file
 from emu.image.model import Image
-from emu.instruments.coverage import Counts, Report, counting
+from emu.instruments.coverage import Counts, CoverageReport, count_executions
 
 DESCRIPTION: Final = """\
 Run a firmware image and tell what of it was executed, from exact counts of the very code that a robot runs.
@@ -56,19 +56,19 @@ def run(options: argparse.Namespace) -> int:
     counts = _earlier(options, image)
     if not options.json:
         machine.uart[1].listen(lambda byte, _cycle: print(chr(byte & 0xFF), end="", flush=byte == 0x0A))
-    stop_counting = counting(machine, counts)
+    stop_counting = count_executions(machine, counts)
     stop = machine.run(seconds=options.seconds)
     stop_counting()
     root = Path(options.root).resolve()
-    report = Report(machine.inside, counts, root.joinpath)
+    report = CoverageReport(machine.inside, counts, root.joinpath)
     if options.lcov:
-        with whole_text_file(options.lcov) as stream:
+        with atomic_text_file(options.lcov) as stream:
             stream.writelines(f"{line}\n" for line in report.lcov(root.joinpath))
     if options.cobertura:
-        with whole_text_file(options.cobertura) as stream:
+        with atomic_text_file(options.cobertura) as stream:
             stream.write(report.cobertura(root.joinpath))
     if options.counts:
-        with whole_text_file(options.counts) as stream:
+        with atomic_text_file(options.counts) as stream:
             json.dump(counts.facts(image), stream)
     _print(report, options.json)
     if stop.fault is not None:
@@ -85,7 +85,7 @@ def _earlier(options: argparse.Namespace, image: Image) -> Counts:
         raise CommandError(f"{options.counts}: {error}") from None
 
 
-def _print(report: Report, as_json: bool) -> None:
+def _print(report: CoverageReport, as_json: bool) -> None:
     lines = [count for one in report.files.values() for count in one.lines.values()]
     totals = {
         "lines": (sum(count > 0 for count in lines), len(lines)),

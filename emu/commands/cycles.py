@@ -23,7 +23,7 @@ the source lines that grew, and ends with status 1."""
 def parser() -> Parser:
     made = Parser("cycles", DESCRIPTION, "emu cycles firmware/build/latency/firmware.elf --check firmware/cycles.json")
     made.add_argument("image", metavar="IMAGE", help="ELF executable of the application `latency` or `options`")
-    made.add_argument("--engine", metavar="NAME", default="interp", help="auto, jit, interp or plain (default interp)")
+    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit or plain (default auto)")
     made.add_argument("--json", action="store_true", help="print one JSON object")
     add_baseline_arguments(made)
     return made

@@ -40,7 +40,7 @@ def parser() -> Parser:
     made.add_argument("--port", metavar="N", type=port, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
     made.add_argument("--once", action="store_true", help="with --port: end after the first client")
     made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file here; what follows is for that")
-    made.add_argument("--engine", default="auto", help="auto, jit, interp or plain (default auto)")
+    made.add_argument("--engine", default="auto", help="auto, jit or plain (default auto)")
     made.add_argument("--strict", action="store_true", help="faults of what the hardware lets pass, as for `emu run`")
     add_board_options(made)
     return made

@@ -17,7 +17,7 @@ from typing import Final, TextIO
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, count
 from emu.host.exit_status import DONE
-from emu.host.files import whole_text_file
+from emu.host.files import atomic_text_file
 from emu.host.paths import use_cache
 from emu.image.model import Image
 from emu.inject.campaign import Campaign, CampaignError, read
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         return DONE
     outcomes = _all(image, campaign, options)
     if options.out:
-        with whole_text_file(options.out) as stream:
+        with atomic_text_file(options.out) as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow([one.name for one in fields(Outcome)])
             writer.writerows(astuple(outcome) for outcome in outcomes)

@@ -13,7 +13,7 @@ from emu.commands.board_options import add_board_options, board_of, set_up
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, count, seconds
 from emu.host.exit_status import DONE, FAULT
-from emu.host.files import whole_text_file
+from emu.host.files import atomic_text_file
 from emu.image.model import Image
 from emu.profile import callgrind
 from emu.profile.cycle_shares import Profile, Profiler
@@ -89,17 +89,17 @@ def run(options: argparse.Namespace) -> int:
 def _write(profile: Profile, profiler: Profiler, image: Image, options: argparse.Namespace) -> None:
     """The files that were asked for."""
     if options.callgrind:
-        with whole_text_file(options.callgrind) as stream:
+        with atomic_text_file(options.callgrind) as stream:
             stream.writelines(f"{line}\n" for line in callgrind.lines(profile, str(image.path), profiler.place))
     if not (options.speedscope or options.perfetto):
         return
     tracks = Tracks(profile.turns, lambda pc: profiler.place(pc)[0], profile.start, profile.end, profile.entry)
     name = Path(image.path).name
     if options.speedscope:
-        with whole_text_file(options.speedscope) as stream:
+        with atomic_text_file(options.speedscope) as stream:
             stream.writelines(speedscope(tracks, profiler.place, name, profile.start, profile.end))
     if options.perfetto:
-        with whole_text_file(options.perfetto) as stream:
+        with atomic_text_file(options.perfetto) as stream:
             stream.writelines(perfetto(tracks, profiler.place, name, float(profiler.hz), profiler.inside))
 
 

@@ -16,15 +16,15 @@ from emu.commands.board_options import add_board_options, add_watch_option, boar
 from emu.commands.image_option import add_chip_option, image_of
 from emu.host.command import CommandError, Parser, cycles, seconds
 from emu.host.exit_status import DONE, FAULT, FAULT_AS_STATUS, INTERRUPTED, LIMIT_AS_STATUS
-from emu.host.files import whole_text_file
+from emu.host.files import atomic_text_file
 from emu.image.model import Image
 from emu.run.console import SPECIFICATIONS, Port, open_port
-from emu.run.input_log import HEADER, Stamp, read_stamps
+from emu.run.input_log import HEADER, TimestampedInput, read_input_log
 from emu.run.session import FOREVER, Session
 
 if TYPE_CHECKING:
     from emu.dspic30f.isa.row import Insn
-    from emu.instruments.vcd import Waves
+    from emu.instruments.vcd import WaveformRecorder
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
@@ -74,7 +74,7 @@ def parser() -> Parser:
     )
     made.add_argument("--json", action="store_true", help="print one JSON object instead of text; UARTs go into it")
     made.add_argument("--exit-code", action="store_true", help="let the firmware's status be the exit status")
-    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit, interp or plain (default auto)")
+    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit or plain (default auto)")
     made.add_argument(
         "--ipl-slip", type=int, choices=(0, 1), default=0, help="1: one interrupt may slip through after raising IPL"
     )
@@ -108,11 +108,11 @@ def run(options: argparse.Namespace) -> int:
     captured: dict[int, bytearray] = {}
     with ExitStack() as stack:
         ports = _ports(options, stack, captured)
-        trace = stack.enter_context(whole_text_file(options.trace)) if options.trace else None
+        trace = stack.enter_context(atomic_text_file(options.trace)) if options.trace else None
         record = stack.enter_context(_recording(options.record)) if options.record else None
         advance = _tracer(machine, image, trace) if trace is not None else None
         if options.vcd:
-            waves = _waves(options, machine, stack.enter_context(whole_text_file(options.vcd)), advance)
+            waves = _waves(options, machine, stack.enter_context(atomic_text_file(options.vcd)), advance)
             stack.callback(waves.close)
             advance = waves.advance
         elif options.vcd_watch:
@@ -233,9 +233,9 @@ def _addresses(image: Image, places: list[str]) -> set[int]:
     return {code_address(image, place) for place in places}
 
 
-def _replay(options: argparse.Namespace, machine: Machine) -> list[Stamp]:
+def _replay(options: argparse.Namespace, machine: Machine) -> list[TimestampedInput]:
     try:
-        return read_stamps(options.replay, tuple(machine.uart))
+        return read_input_log(options.replay, tuple(machine.uart))
     except ValueError as error:
         raise CommandError(str(error)) from None
 
@@ -261,7 +261,7 @@ def _ports(options: argparse.Namespace, stack: ExitStack, captured: dict[int, by
 
 @contextlib.contextmanager
 def _recording(path: str) -> Iterator[TextIO]:
-    with whole_text_file(path) as stream:
+    with atomic_text_file(path) as stream:
         print(HEADER, file=stream)
         yield stream
 
@@ -280,13 +280,13 @@ def _tracer(machine: Machine, image: Image, stream: TextIO) -> Any:
     return Tracer(machine, image, stream).advance
 
 
-def _waves(options: argparse.Namespace, machine: Machine, stream: TextIO, advance: Any) -> Waves:
-    from emu.instruments.vcd import Waves
+def _waves(options: argparse.Namespace, machine: Machine, stream: TextIO, advance: Any) -> WaveformRecorder:
+    from emu.instruments.vcd import WaveformRecorder
 
     if advance is not None and options.vcd_watch:
         raise CommandError("--vcd-watch and --trace both step the machine; give one")
     try:
-        return Waves(machine, stream, options.vcd_watch, advance)
+        return WaveformRecorder(machine, stream, options.vcd_watch, advance)
     except ValueError as error:
         raise CommandError(str(error)) from None
 

@@ -40,7 +40,7 @@ def parser() -> Parser:
     made.add_argument("--size", metavar="WxH", type=_size, help="pixels of the frame, for example 20x20")
     made.add_argument("--format", choices=FORMATS, default="rgb565", help="of the frame (default rgb565)")
     made.add_argument("--enlarge", metavar="N", type=_enlargement, default=1, help="make every pixel N x N large")
-    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit, interp or plain (default auto)")
+    made.add_argument("--engine", metavar="NAME", default="auto", help="auto, jit or plain (default auto)")
     made.add_argument("--json", action="store_true", help="print one JSON object")
     add_board_options(made)
     return made

@@ -45,7 +45,7 @@ def _members(inside: Inside, frame: Frame | None, whole: str) -> Iterator[Name]:
 
 def _all(inside: Inside, frame: Frame | None) -> Iterator[Name]:
     """Later ones win."""
-    symbols = (one for one in inside.image.symbols.all if one.names_a_place)
+    symbols = (one for one in inside.image.symbols.all if one.names_content)
     for one in symbols:
         yield one.name.removeprefix("_"), "function" if one.space == "code" else "variable"
     yield from ((name, "enum") for name in inside.debug.constants)

@@ -16,7 +16,7 @@ P = ParamSpec("P")
 DONE: Final = 0
 FAULT: Final = 1
 BAD_INPUT: Final = 2
-CANNOT_GO_ON: Final = 3
+CANNOT_CONTINUE: Final = 3
 LIMIT_AS_STATUS: Final = 124
 FAULT_AS_STATUS: Final = 125
 BAD_INPUT_AS_STATUS: Final = 126
@@ -28,7 +28,7 @@ MEANING: Final = {
     "source, a number over its baseline or limit, something that `openswarm doctor` misses and that is needed, "
     "a robot that does not answer `openswarm flash` or refuses a row",
     BAD_INPUT: "bad input or usage, or an extra that is not installed; the message says what was expected",
-    CANNOT_GO_ON: "`arena`: cluster lost, or folder in use by another run; finished trials are kept",
+    CANNOT_CONTINUE: "`arena`: cluster lost, or folder in use by another run; finished trials are kept",
     LIMIT_AS_STATUS: "`emu run --exit-code`: the limit was reached before the firmware ended",
     FAULT_AS_STATUS: "`emu run --exit-code`: a fault of the firmware",
     BAD_INPUT_AS_STATUS: "`emu run --exit-code`: bad input or usage",
@@ -55,7 +55,7 @@ def _drop_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def unread_is_done(main: Callable[P, int]) -> Callable[P, int]:
+def ignore_unread_output(main: Callable[P, int]) -> Callable[P, int]:
     """Wrap a command line: that nobody reads its output to the end (`| head`) is no failure, and nothing is said of it;
     a full disk under it is one line, and who closed it before wants none.
 

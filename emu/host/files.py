@@ -58,7 +58,7 @@ def write_standard(data: bytes) -> None:
 
 
 @contextmanager
-def whole_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
+def atomic_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
     """A text file that becomes `path` when the block ends without an exception.
 
     Pipes and devices are written directly, and so is standard output. Raises OSError as `open` does.
@@ -71,17 +71,17 @@ def whole_text_file(path: str | os.PathLike[str]) -> Iterator[TextIO]:
         with open(path, "w", encoding="utf-8") as stream:
             yield stream
         return
-    with whole_file(path) as part, part.open("w", encoding="utf-8") as stream:
+    with atomic_file(path) as part, part.open("w", encoding="utf-8") as stream:
         yield stream
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A new, empty file beside `path`, to be written by name. It becomes `path` when the block ends without an
     exception; for standard output, a pipe or a device what it holds is copied. Raises OSError as `open` does.
     """
     copied = is_standard(path) or is_opened(path)
-    part = _temporary(path) if copied else part_beside(path)
+    part = _temporary(path) if copied else temporary_beside(path)
     try:
         yield part
         if is_standard(path):
@@ -89,12 +89,12 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         elif copied:
             Path(path).write_bytes(part.read_bytes())
         else:
-            put_in_place(part, path)
+            replace_file(part, path)
     finally:
         part.unlink(missing_ok=True)
 
 
-def part_beside(path: str | os.PathLike[str]) -> Path:
+def temporary_beside(path: str | os.PathLike[str]) -> Path:
     """A new, empty file that may become `path`. Raises OSError as `open` would for `path`."""
     target = _followed(path)
     if target.exists() and not os.access(target, os.W_OK):
@@ -105,8 +105,8 @@ def part_beside(path: str | os.PathLike[str]) -> Path:
         raise OSError(error.errno, error.strerror, os.fspath(path)) from error
 
 
-def put_in_place(part: Path, path: str | os.PathLike[str]) -> None:
-    """What `part_beside` made becomes `path`, with the permissions of the file that was there. Raises OSError."""
+def replace_file(part: Path, path: str | os.PathLike[str]) -> None:
+    """What `temporary_beside` made becomes `path`, with the permissions of the file that was there. Raises OSError."""
     target = _followed(path)
     try:
         mode = stat.S_IMODE(target.stat().st_mode)

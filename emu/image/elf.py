@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 from emu.chips import chip_named, chip_of
 from emu.chips.chip import Chip
 from emu.image.elf_facts import EM_DSPIC30F, OCTETS_PER_UNIT, OCTETS_PER_WORD, PROCESSOR_MASK, SectionFlag
-from emu.image.model import Block, Image, LoadError, Section, checked
+from emu.image.model import Block, Image, LoadError, Section, check_blocks
 from emu.image.symbols import Symbol
 
 ET_REL, ET_EXEC = 1, 2
@@ -106,7 +106,7 @@ def read_elf(data: bytes, path: str, chip: Chip | None) -> Image:
     names = _strings(reader, headers, shstrndx)
     sections = [_section(reader, header, _name(names, header.name), segments) for header in headers]
     blocks = [_block(reader, section) for section in sections if section.load_address is not None and section.octets]
-    placed = checked(path, chip, blocks)
+    placed = check_blocks(path, chip, blocks)
     if not placed:
         raise reader.fail("holds no program words: no section is marked as code, psv or EEPROM")
     symbols = _symbols(reader, headers, sections)

@@ -109,7 +109,7 @@ def _cuts(image: Image, section: Section, space: str) -> list[tuple[Symbol | Non
     names: dict[int, Symbol] = {}
     for symbol in image.symbols.all:
         inside = symbol.space == space and section.address <= symbol.address < end
-        if inside and symbol.names_a_place and (symbol.address not in names or symbol.kind != "label"):
+        if inside and symbol.names_content and (symbol.address not in names or symbol.kind != "label"):
             names[symbol.address] = symbol
     starts = sorted({section.address, *names})
     return [(names.get(start), start, stop) for start, stop in zip(starts, [*starts[1:], end], strict=True)]

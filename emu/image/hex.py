@@ -11,7 +11,7 @@ from array import array
 
 from emu.chips.chip import Chip
 from emu.image.elf_facts import OCTETS_PER_WORD, UNITS_PER_WORD
-from emu.image.model import ERASED, LOADABLE, Block, Image, LoadError, checked
+from emu.image.model import ERASED, LOADABLE, Block, Image, LoadError, check_blocks
 
 DATA, END, SEGMENT, START_SEGMENT, LINEAR, START_LINEAR = range(6)
 """Record types. 02, 03 and 05 are never written by Microchip's tools but are part of the format."""
@@ -23,7 +23,7 @@ def read_hex(data: bytes, path: str, chip: Chip) -> Image:
     """Read the contents of an Intel HEX file. Raises LoadError with the line number of the first mistake."""
     octets, warnings = _collect(data, path, chip)
     words = _words(octets)
-    blocks = checked(path, chip, _blocks(words))
+    blocks = check_blocks(path, chip, _blocks(words))
     if not blocks:
         raise LoadError(path, "holds no data records")
     return Image(path, "hex", chip, blocks, warnings=warnings)

@@ -39,7 +39,7 @@ class Line:
         return f"{self.file}:{self.line}"
 
 
-def undoubled(sections: Mapping[str, bytes]) -> dict[str, bytes]:
+def remove_phantom_octets(sections: Mapping[str, bytes]) -> dict[str, bytes]:
     """DWARF bytes of debug sections stored with phantoms, by name; the octets themselves if they are not.
 
     Names and strings of the entries decide for all: a plain list of small addresses has zeros at the same places.
@@ -100,7 +100,7 @@ def dwarf_of(sections: Mapping[str, bytes]) -> DWARFInfo:
     """A pyelftools view of debug sections, doubled or plain."""
     from elftools.dwarf.dwarfinfo import DebugSectionDescriptor, DwarfConfig, DWARFInfo
 
-    plain = undoubled({name: octets for name, octets in sections.items() if name.startswith(".debug_")})
+    plain = remove_phantom_octets({name: octets for name, octets in sections.items() if name.startswith(".debug_")})
 
     def descriptor(name: str) -> DebugSectionDescriptor | None:
         if name not in plain:

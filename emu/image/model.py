@@ -142,7 +142,7 @@ class Image:
         return Lines({section.name: section.octets for section in self.sections if section.kind == "info"})
 
 
-def checked(path: str, chip: Chip, blocks: list[Block]) -> tuple[Block, ...]:
+def check_blocks(path: str, chip: Chip, blocks: list[Block]) -> tuple[Block, ...]:
     """Sort blocks; raise LoadError if two overlap or one leaves the chip's program memory."""
     regions = [chip.program[name] for name in LOADABLE]
     blocks = sorted(blocks, key=lambda block: block.base)

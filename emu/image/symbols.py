@@ -37,7 +37,7 @@ class Symbol:
         return _COMPILER_LABEL.match(self.name) is not None
 
     @property
-    def names_a_place(self) -> bool:
+    def names_content(self) -> bool:
         """Whether what follows the symbol is called by its name: functions, objects, global labels."""
         return not self.is_compiler_label and (self.kind != "label" or self.is_global)
 

@@ -79,7 +79,7 @@ def do(fault: Fault, machine: Machine) -> str:
     if fault.kind == "skip":
         return _skip(machine)
     if fault.kind == "uart":
-        was = machine.uart[fault.place].lose()
+        was = machine.uart[fault.place].drop_next_frame()
         return f"a byte for UART{fault.place}" if was else f"no byte for UART{fault.place} was on its way"
     if fault.kind == "sensor":
         distance = NEAREST_MM + fault.value / 10

@@ -50,7 +50,7 @@ class Outcome:
 
 
 @dataclass(slots=True)
-class Golden:
+class GoldenRun:
     """The run without faults."""
 
     states: list[tuple[int, bytes, tuple[int, ...]]] = field(default_factory=list)
@@ -91,8 +91,8 @@ class Trials:
     def _hear(self, number: int, byte: int, _start: int) -> None:
         self._said[number].append(byte & 0xFF)
 
-    def _run_golden(self) -> Golden:
-        machine, golden = self._machine, Golden()
+    def _run_golden(self) -> GoldenRun:
+        machine, golden = self._machine, GoldenRun()
         for part in range(STATES + 1):
             golden.stop = machine.run_until(self._end * part // STATES) if part else None
             if golden.stop is not None:

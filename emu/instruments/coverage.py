@@ -69,7 +69,7 @@ def fingerprint(image: Image) -> str:
     return text.hexdigest()
 
 
-def counting(machine: Machine, counts: Counts) -> Callable[[], None]:
+def count_executions(machine: Machine, counts: Counts) -> Callable[[], None]:
     """Count from now on what `machine` executes; returns how to stop. Raises ValueError unless its engine is plain."""
     if machine.engine != "plain":
         raise ValueError(f"counting needs the plain engine, not {machine.engine!r}")
@@ -125,7 +125,7 @@ class FileCoverage:
     """Line and count."""
 
 
-class Report:
+class CoverageReport:
     """Counts by source file. `path_of` finds a file of the line table on this machine, for exclusion comments."""
 
     def __init__(self, inside: Inside, counts: Counts, path_of: Callable[[str], Path]) -> None:

@@ -26,7 +26,7 @@ CPU: Final = ("ipl", "asleep", "thread")
 """What can be watched beside variables."""
 
 
-class Waves:
+class WaveformRecorder:
     """Records `machine` while it is run by `advance`. `watch`: names of CPU, or expressions that name a variable.
 
     With `again` it also sees what is run again aside, which nobody else is told. Raises ValueError for what cannot be

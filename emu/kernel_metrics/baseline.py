@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from emu.host.files import read_file, whole_text_file
+from emu.host.files import read_file, atomic_text_file
 
 GREW_SHOWN: Final = 4
 """Places shown for a number that grew."""
@@ -91,7 +91,7 @@ def short(file: str) -> str:
 def save(path: str, numbers: Mapping[str, Number]) -> None:
     """Write a baseline, whole or not at all."""
     table = {name: {"value": number.value, "where": number.where} for name, number in numbers.items()}
-    with whole_text_file(path) as stream:
+    with atomic_text_file(path) as stream:
         json.dump(table, stream, indent=1)
         stream.write("\n")
 

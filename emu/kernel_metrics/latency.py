@@ -86,7 +86,7 @@ def measures() -> Iterator[Measure]:
     yield Measure("slice end with one ready thread", Scenario(threads=1), tick("T2", "_T2Interrupt"))
 
 
-def run_measures(image: Image, engine: str = "interp") -> dict[str, Window]:
+def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
     """Take all of them. Raises MeasureError when a scenario does not show what it should."""
     target = Target(image, "latency_begin", engine)
     taken = {}

@@ -14,7 +14,7 @@ from typing import Final
 
 from emu.image.footprint import pieces
 from emu.image.model import Image
-from emu.kernel_metrics.shares import DEVICES, KERNEL, shares
+from emu.kernel_metrics.shares import DEVICES, KERNEL, sizes_by_owner
 from emu.kernel_metrics.target import WORD, MeasureError, Target
 
 APPLICATION: Final = "footprint_wanted"
@@ -140,7 +140,7 @@ class Heap:
         raise MeasureError("a list of the kernel does not end")
 
 
-def measure(image: Image, engine: str = "interp") -> Equation:
+def measure(image: Image, engine: str = "auto") -> Equation:
     """Run all loads and fit the equation. Raises MeasureError if the application or the counts do not agree."""
     target = Target(image, "footprint_begin", engine)
     heap = Heap(target)
@@ -195,7 +195,7 @@ def _constant(target: Target, heap: Heap, empty: int, own: int) -> dict[str, int
 
 def _roms(image: Image) -> dict[str, int]:
     """ROM of the kernel alone and with its devices."""
-    owned = shares(image)
+    owned = sizes_by_owner(image)
     return {KERNEL: owned[KERNEL].rom, DEVICES: owned[KERNEL].rom + owned[DEVICES].rom}
 
 

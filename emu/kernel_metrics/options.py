@@ -139,7 +139,7 @@ def _play(target: Target, scene: str, stop: str = "options_ready") -> Meter:
     return Meter(target)
 
 
-def run_measures(image: Image, engine: str = "interp") -> dict[str, Window]:
+def run_measures(image: Image, engine: str = "auto") -> dict[str, Window]:
     """Take all of them. Raises MeasureError when a scene does not show what it should."""
     target = Target(image, "options_begin", engine)
     taken: dict[str, Window] = {}
@@ -155,7 +155,7 @@ def run_measures(image: Image, engine: str = "interp") -> dict[str, Window]:
     return taken
 
 
-def sizes(image: Image, engine: str = "interp") -> dict[str, int]:
+def sizes(image: Image, engine: str = "auto") -> dict[str, int]:
     """Bytes by name: ROM and RAM of each option, of its objects, and what it takes from the heap."""
     target = Target(image, "options_begin", engine)
     found: dict[str, int] = {}

@@ -28,14 +28,14 @@ _HANDLES: Final = ".handle"
 
 
 @dataclass(frozen=True, slots=True)
-class Share:
+class OwnerSize:
     """Bytes of one owner."""
 
     rom: int
     ram: int
 
 
-def shares(image: Image) -> dict[str, Share]:
+def sizes_by_owner(image: Image) -> dict[str, OwnerSize]:
     """Bytes by owner; those of variables include the array that heap and kernel stack are cut from."""
     found = [piece for piece in pieces(image) if piece.name not in _WITHOUT_OWNER]
     homes = _homes(found)
@@ -48,7 +48,7 @@ def shares(image: Image) -> dict[str, Share]:
             ram[owner] += piece.ram
     for file, size in handles(image):
         rom[_owner(file)] += size
-    return {owner: Share(rom[owner], ram[owner]) for owner in (KERNEL, DEVICES, APPLICATION)}
+    return {owner: OwnerSize(rom[owner], ram[owner]) for owner in (KERNEL, DEVICES, APPLICATION)}
 
 
 def _owner(module: str) -> str:

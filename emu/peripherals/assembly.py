@@ -8,7 +8,7 @@ from typing import Final
 
 from emu.chips.chip import Chip
 from emu.peripherals.adc.adc import Adc
-from emu.peripherals.base import IDLE, SLEEP, Cell, Kit, Peripheral, Wires
+from emu.peripherals.base import IDLE, SLEEP, Cell, ChipContext, Peripheral, CpuSignals
 from emu.peripherals.can.can import Can
 from emu.peripherals.i2c.i2c import I2c
 from emu.peripherals.interrupt_lines import Interrupts
@@ -40,40 +40,40 @@ _CHANGE_NOTICE_IRQ: Final = "CN"
 class Peripherals:
     """The devices by role. Order of construction is the priority of events that fall due in the same cycle."""
 
-    def __init__(self, kit: Kit) -> None:
-        self.kit: Final = kit
-        chip = kit.chip
+    def __init__(self, context: ChipContext) -> None:
+        self.context: Final = context
+        chip = context.chip
         numbers = {source.name: irq for irq, source in chip.interrupts.items()}
-        self.pins: Final = kit.pins
-        self.interrupts: Final = Interrupts(kit)
-        self.oscillator: Final = Oscillator(kit)
-        self.resets: Final = Resets(kit)
-        self.watchdog: Final = Watchdog(kit, self.resets)
+        self.pins: Final = context.pins
+        self.interrupts: Final = Interrupts(context)
+        self.oscillator: Final = Oscillator(context)
+        self.resets: Final = Resets(context)
+        self.watchdog: Final = Watchdog(context, self.resets)
         self.lvd: Final = (
-            LowVoltageDetect(kit, self.interrupts, self.resets.rcon, chip.lvd_irq) if chip.lvd_irq is not None else None
+            LowVoltageDetect(context, self.interrupts, self.resets.rcon, chip.lvd_irq) if chip.lvd_irq is not None else None
         )
-        self.nvm: Final = Nvm(kit, self.interrupts)
-        self.ports: Final = {PORTS.index(letter): Port(letter, kit) for letter in chip.ports}
-        self.change_notice: Final = ChangeNotice(kit, numbers[_CHANGE_NOTICE_IRQ])
-        self.external: Final = ExternalInterrupts(kit, self.interrupts)
-        self.timer: Final = timers(kit)
-        self.uart: Final = {site.number: Uart(site, kit, self.interrupts, self.ports) for site in chip.uarts}
-        self.adc: Final = Adc(chip.adc, kit, self.interrupts, self.timer)
+        self.nvm: Final = Nvm(context, self.interrupts)
+        self.ports: Final = {PORTS.index(letter): Port(letter, context) for letter in chip.ports}
+        self.change_notice: Final = ChangeNotice(context, numbers[_CHANGE_NOTICE_IRQ])
+        self.external: Final = ExternalInterrupts(context, self.interrupts)
+        self.timer: Final = timers(context)
+        self.uart: Final = {site.number: Uart(site, context, self.interrupts, self.ports) for site in chip.uarts}
+        self.adc: Final = Adc(chip.adc, context, self.interrupts, self.timer)
         self.external.on_int0 = self.adc.int0
         self.oscillator.before_change.append(self.adc.clock_changes)
         self.oscillator.on_change.extend((self.adc.clock_changed, self.nvm.clock_changed))
-        self.spi: Final = {site.number: Spi(site, kit, self.interrupts, self.ports) for site in chip.spis}
-        self.capture: Final = {site.number: Capture(site, kit, self.interrupts, self.timer) for site in chip.captures}
+        self.spi: Final = {site.number: Spi(site, context, self.interrupts, self.ports) for site in chip.spis}
+        self.capture: Final = {site.number: Capture(site, context, self.interrupts, self.timer) for site in chip.captures}
         self.compare: Final = {
-            site.number: Compare(site, kit, self.interrupts, self.timer, self.ports) for site in chip.compares
+            site.number: Compare(site, context, self.interrupts, self.timer, self.ports) for site in chip.compares
         }
-        self.i2c: Final = I2c(chip.i2c, kit, self.interrupts, self.ports) if chip.i2c is not None else None
-        self.dci: Final = Dci(chip.dci, kit, self.interrupts, self.ports) if chip.dci is not None else None
-        self.can: Final = {site.number: Can(site, kit, self.interrupts, self.ports) for site in chip.cans}
+        self.i2c: Final = I2c(chip.i2c, context, self.interrupts, self.ports) if chip.i2c is not None else None
+        self.dci: Final = Dci(chip.dci, context, self.interrupts, self.ports) if chip.dci is not None else None
+        self.can: Final = {site.number: Can(site, context, self.interrupts, self.ports) for site in chip.cans}
         for uart in self.uart.values():
             if uart.site.autobaud_capture in self.capture:
                 uart.connect_capture(self.capture[uart.site.autobaud_capture])
-        self.pmd: Final = ModuleDisable(kit, self._modules())
+        self.pmd: Final = ModuleDisable(context, self._modules())
         parts: tuple[Peripheral | None, ...] = (
             self.oscillator,
             self.resets,
@@ -95,13 +95,13 @@ class Peripherals:
             self.pmd,
         )
         self.all: Final[tuple[Peripheral, ...]] = tuple(part for part in parts if part is not None)
-        self._stopped: Final = Cell(kit.bus.record, "power.stopped", "B")
+        self._stopped: Final = Cell(context.bus.record, "power.stopped", "B")
         self.config: Mapping[int, int] = {}
         """Configuration words that the chip keeps when an image brings none, by program address."""
-        self.fit(crystal=kit.crystal)
+        self.fit(crystal=context.crystal)
         self.on_restored: Final[list[Callable[[], None]]] = []
         """Parts of a board that keep something derived from the record."""
-        self.on_settle: Final[list[Callable[[], None]]] = []
+        self.on_synchronize: Final[list[Callable[[], None]]] = []
         """Parts of a board that find out late, when somebody looks, what has happened."""
 
     def _modules(self) -> dict[str, Peripheral]:
@@ -121,8 +121,8 @@ class Peripherals:
 
         To be called before the first reset. Raises KeyError for a word that the chip does not have.
         """
-        self.kit.crystal = crystal
-        self.config = {self.kit.chip.config[name].address: word for name, word in config.items()}
+        self.context.crystal = crystal
+        self.config = {self.context.chip.config[name].address: word for name, word in config.items()}
 
     def reset(self, cause: str) -> None:
         """Every peripheral register to its reset value, every device to its reset state; RCON tells the cause.
@@ -130,8 +130,8 @@ class Peripherals:
         `cause` is an RCON bit name: POR, BOR, EXTR, SWR, WDTO, TRAPR or IOPUWR (§4). The CPU resets its own registers
         (below INTCON1). Raises ValueError for another cause.
         """
-        bus = self.kit.bus
-        first = self.kit.chip.sfrs["INTCON1"].address >> 1
+        bus = self.context.bus
+        first = self.context.chip.sfrs["INTCON1"].address >> 1
         kept = self.resets.rcon.value
         osccon = self.oscillator.con.value
         for word in range(first, len(bus.reset_value)):
@@ -147,7 +147,7 @@ class Peripherals:
 
     def sleep(self, mode: int, cycle: int) -> None:
         """PWRSAV in `cycle`: `mode` 1 = Idle, 2 = Sleep. RCON tells, the watchdog restarts, clocks stop (§17)."""
-        if mode == IDLE and self.kit.bus.integers.fire(self.watchdog.idling):
+        if mode == IDLE and self.context.bus.integers.fire(self.watchdog.idling):
             return
         self.watchdog.clear(cycle)
         self.watchdog.power_mode(mode)
@@ -181,7 +181,7 @@ class Peripherals:
 
     def settle(self) -> None:
         """Have found out what would be found out late, so that the record does not depend on who has looked."""
-        for listener in self.on_settle:
+        for listener in self.on_synchronize:
             listener()
 
     def restored(self) -> None:
@@ -201,7 +201,7 @@ class Peripherals:
         return self.oscillator.fcy()
 
 
-def wire_bus(chip: Chip, bus: Bus) -> None:
+def configure_bus(chip: Chip, bus: Bus) -> None:
     """Tell the bus which bits exist, which of them software can change, and what a reset makes of them."""
     for sfr in chip.sfrs.values():
         if sfr.size != 2:
@@ -214,12 +214,12 @@ def wire_bus(chip: Chip, bus: Bus) -> None:
 
 
 def build(
-    chip: Chip, bus: Bus, program: ProgramMemory, wires: Wires | None = None, crystal: int = CRYSTAL_HZ
+    chip: Chip, bus: Bus, program: ProgramMemory, cpu_signals: CpuSignals | None = None, crystal: int = CRYSTAL_HZ
 ) -> Peripherals:
     """Fill in the bus from the chip's data and put every device on it. `crystal` in Hz.
 
-    The caller keeps `wires` and may fill in its callbacks later. Call `reset("POR")` once before the first cycle.
+    The caller keeps `cpu_signals` and may fill in its callbacks later. Call `reset("POR")` once before the first cycle.
     """
-    wire_bus(chip, bus)
+    configure_bus(chip, bus)
     pins = Pins(bus.record, bus.events)
-    return Peripherals(Kit(chip, bus, pins, program, wires or Wires(), crystal))
+    return Peripherals(ChipContext(chip, bus, pins, program, cpu_signals or CpuSignals(), crystal))

@@ -31,7 +31,7 @@ def _nothing(*_arguments: object) -> None:
 
 
 @dataclass
-class Wires:
+class CpuSignals:
     """Lines from the peripherals to the CPU. The machine fills in what it has; the defaults ignore the signal."""
 
     reset: Callable[[str], None] = _nothing
@@ -75,14 +75,14 @@ class Cell:
 
 
 @dataclass
-class Kit:
+class ChipContext:
     """Everything a peripheral may touch."""
 
     chip: Chip
     bus: Bus
     pins: Pins
     program: ProgramMemory
-    wires: Wires
+    cpu_signals: CpuSignals
     crystal: int
     """Frequency at OSC1 in Hz."""
     fcy: Callable[[], float] = lambda: 0.0
@@ -99,22 +99,22 @@ class Peripheral(Device):
     idle_bit: tuple[Register, str] | None = None
     """Control register and name of the bit that stops the device in Idle."""
 
-    def __init__(self, name: str, kit: Kit) -> None:
-        super().__init__(name, kit.bus)
-        self.kit: Final = kit
+    def __init__(self, name: str, context: ChipContext) -> None:
+        super().__init__(name, context.bus)
+        self.context: Final = context
         self._moments: Final[list[Cell]] = []
         self._slots: Final[list[tuple[int, Cell]]] = []
         self._frozen: Final = self.cell("frozen", "Q", NEVER)
 
     def register(self, name: str) -> Register:
         """The register called `name` in the chip's data. Raises KeyError if the chip has none."""
-        sfr = self.kit.chip.sfrs[name]
+        sfr = self.context.chip.sfrs[name]
         return Register(self.bus, name, sfr.address, sfr.fields)
 
     def irq(self, number: int) -> Irq:
         """The request line of interrupt `number` (natural order)."""
-        flag, bit = self.kit.chip.interrupts[number].flag
-        return Irq(self.record, self.events, self.kit.chip.sfrs[flag].address, bit)
+        flag, bit = self.context.chip.interrupts[number].flag
+        return Irq(self.record, self.events, self.context.chip.sfrs[flag].address, bit)
 
     def cell(self, purpose: str, kind: str = "I", initial: int = 0) -> Cell:
         """Reserve a scalar of hidden state under `<device>.<purpose>`."""
@@ -138,7 +138,7 @@ class Peripheral(Device):
         slot = self.events.slot(f"{self.name}.{purpose}", fire)
         self._slots.append((slot, self.cell(f"{purpose}.held", "Q", NEVER)))
         if in_seconds:
-            self.kit.in_seconds.append(slot)
+            self.context.in_seconds.append(slot)
         return slot
 
     def ruled(self, slot: int, rule: Rule) -> None:
@@ -158,7 +158,7 @@ class Peripheral(Device):
             held.value = NEVER
         self.reset(power_on)
 
-    def held_since(self, slot: int) -> int:
+    def remaining_delay(self, slot: int) -> int:
         """How many Tcy behind the stop of this device's clock `slot` is due, NEVER if nothing of it waits."""
         held = next(cell.value for one, cell in self._slots if one == slot)
         return NEVER if held == NEVER else held - self._frozen.value
@@ -166,12 +166,12 @@ class Peripheral(Device):
     def restart(self) -> None:
         """As after a reset of this device alone, which has lost what its registers held."""
         self.power_up(power_on=False)
-        self.give_back()
+        self.release_pins()
 
-    def give_back(self) -> None:
+    def release_pins(self) -> None:
         """Leave pins the device has taken to LAT and TRIS. A reset of the chip does that by itself (§6)."""
 
-    def switched_off(self) -> None:
+    def before_disable(self) -> None:
         """PMD is about to clear the device's registers."""
 
     def stops_in(self, mode: int) -> bool:

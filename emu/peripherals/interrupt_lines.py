@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.peripherals.base import Kit
+from emu.peripherals.base import ChipContext
 from emu.system.device import Irq
 
 
 class Interrupts:
     """One line per implemented source."""
 
-    def __init__(self, kit: Kit) -> None:
-        sfrs = kit.chip.sfrs
+    def __init__(self, context: ChipContext) -> None:
+        sfrs = context.chip.sfrs
         self._lines: Final = {
-            number: Irq(kit.bus.record, kit.bus.events, sfrs[source.flag[0]].address, source.flag[1])
-            for number, source in kit.chip.interrupts.items()
+            number: Irq(context.bus.record, context.bus.events, sfrs[source.flag[0]].address, source.flag[1])
+            for number, source in context.chip.interrupts.items()
         }
 
     def line(self, number: int) -> Irq:

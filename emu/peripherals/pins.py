@@ -46,15 +46,15 @@ class Waveform(Protocol):
     def nth_rise(self, mask: int, after: int, count: int) -> int:
         """Cycle of the `count`-th rising edge (1 = next) of the pin in `mask` behind cycle `after`, or NEVER."""
 
-    def stands_until(self, cycle: int) -> int:
+    def constant_until(self, cycle: int) -> int:
         """First cycle behind `cycle` in which `bits` may differ from those in `cycle`, if nobody calls
-        `Pins.disturb`; `cycle` itself if nothing is promised."""
+        `Pins.invalidate`; `cycle` itself if nothing is promised."""
 
 
-class Described(Protocol):
+class RuleWaveform(Protocol):
     """A waveform that also says as text for every engine (emu/system/rules.py) when it rises."""
 
-    def text_of_rise(self, m: Any, mask: int, after: Number, count: Number) -> Number:
+    def nth_rise_rule(self, m: Any, mask: int, after: Number, count: Number) -> Number:
         """`Waveform.nth_rise`."""
 
 
@@ -81,7 +81,7 @@ class Pins:
         self.output: Final = words("output")
         self.level: Final = words("level")
         self.pullup: Final = words("pullup")
-        self.described: Final[dict[tuple[int, int], tuple[Described, Place]]] = {}
+        self.described: Final[dict[tuple[int, int], tuple[RuleWaveform, Place]]] = {}
         """By port and mask of one pin; see `describe`."""
         for port in range(len(PORTS)):
             self.open[port] = 0xFFFF  # nothing is connected yet
@@ -95,12 +95,12 @@ class Pins:
         """Pins whose changes Python must hear of at once."""
         self.lazy: Final = words("lazy")
         """Pins whose changes may wait in `ring`."""
-        self.waving: Final = words("waving")
+        self.waveform_pins: Final = words("waveform_pins")
         """Pins whose levels an attached waveform supplies."""
-        self.standing: Final = words("standing")
-        """Levels of the waving pins that hold before the cycle in `stands_until`, so that native code can read them."""
-        first = record.reserve("pins.stands_until", "Q", len(PORTS)).index
-        self.stands_until: Final = record.u64[first : first + len(PORTS)]
+        self.constant_levels: Final = words("constant_levels")
+        """Levels of the waveform_pins pins that hold before the cycle in `constant_until`, so that native code can read them."""
+        first = record.reserve("pins.constant_until", "Q", len(PORTS)).index
+        self.constant_until: Final = record.u64[first : first + len(PORTS)]
         self._told: Final = words("told")
         """Levels the lazy watchers know."""
         ring = record.reserve("pins.ring", "Q", RING).index
@@ -120,7 +120,7 @@ class Pins:
         self._readers: Final[list[RingReader]] = []
         self._clean: Final = memoryview(bytes(8 * RING)).cast("Q")
         self._ring_address: Final = record.address + 8 * ring
-        self.ring_places: Final = tuple(
+        self.ring_addresses: Final = tuple(
             record.address + record.fields[f"pins.{name}"].offset for name in ("ring", "ring_count", "told")
         )
         """Addresses of the host, for a reader that is compiled code: `ring`, how many changes are in it, and the levels
@@ -177,7 +177,7 @@ class Pins:
         table = self.lazy if lazy else self.eager
         table[port] |= 0 if inputs_only else mask
 
-    def heard_of(self, readers: int) -> int:
+    def watched_ports(self, readers: int) -> int:
         """Bit n: what the ring has of port n is to be told to somebody else than so many readers, who ask."""
         return self._heard if len(self._readers) == readers else -1
 
@@ -212,7 +212,7 @@ class Pins:
             self._waveforms[port].append((mask, waveform))
             self._wave(port)
 
-    def describe(self, port: int, mask: int, waveform: Described, attached: Place) -> None:
+    def describe(self, port: int, mask: int, waveform: RuleWaveform, attached: Place) -> None:
         """While the number at `attached` is not 0, the waveform on the pins in `mask` is this one."""
         for bit in range(16):
             if mask >> bit & 1:
@@ -224,13 +224,13 @@ class Pins:
         self._wave(port)
 
     def _wave(self, port: int) -> None:
-        """The set of waving pins of `port` follows the list; after a restore the record has it already."""
-        waving = 0
+        """The set of waveform_pins pins of `port` follows the list; after a restore the record has it already."""
+        waveform_pins = 0
         for mask, _waveform in self._waveforms[port]:
-            waving |= mask
-        if waving != self.waving[port]:
-            self.waving[port] = waving
-            self.disturb(port)
+            waveform_pins |= mask
+        if waveform_pins != self.waveform_pins[port]:
+            self.waveform_pins[port] = waveform_pins
+            self.invalidate(port)
 
     def waveform(self, port: int, mask: int) -> Waveform | None:
         """The waveform on the pins in `mask`, if one is attached."""
@@ -246,13 +246,13 @@ class Pins:
             before(cycle)
         change()
         for port in range(len(PORTS)):
-            self.disturb(port)
+            self.invalidate(port)
         for _, after in self._on_waveform:
             after()
 
-    def disturb(self, port: int) -> None:
+    def invalidate(self, port: int) -> None:
         """A waveform on `port` has got a new future, or what it depends on has changed: forget what it promised."""
-        self.stands_until[port] = 0
+        self.constant_until[port] = 0
 
     def set(self, name: str, level: int, cycle: int | None = None) -> None:
         """The outside drives one pin with `level` (0 or 1) from `cycle` on (default: now)."""
@@ -289,21 +289,21 @@ class Pins:
     def read_port(self, port: int, cycle: int) -> int:
         """What an instruction reads from PORT in `cycle`: outputs show one cycle late (§6)."""
         level = (self.before if cycle <= self.changed[port] else self.level)[port]
-        waving = self.waving[port]
-        if not waving:
+        waveform_pins = self.waveform_pins[port]
+        if not waveform_pins:
             return level
-        if cycle < self.stands_until[port]:
-            return level & ~waving | self.standing[port]
+        if cycle < self.constant_until[port]:
+            return level & ~waveform_pins | self.constant_levels[port]
         waveforms = self._waveforms[port]
         if len(waveforms) == 1:
             ((mask, wave),) = waveforms
-            waved, until = wave.bits(cycle) & mask, wave.stands_until(cycle)
+            waved, until = wave.bits(cycle) & mask, wave.constant_until(cycle)
         else:
             waved = self._with_waveforms(port, cycle, 0)
-            until = min(wave.stands_until(cycle) for _, wave in waveforms)
+            until = min(wave.constant_until(cycle) for _, wave in waveforms)
         if until > cycle:
-            self.standing[port], self.stands_until[port] = waved, until
-        return level & ~waving | waved
+            self.constant_levels[port], self.constant_until[port] = waved, until
+        return level & ~waveform_pins | waved
 
     def apply(self, port: int, cycle: int, by_chip: bool = False) -> None:
         """Recompute a port's levels after any of the arrays changed; they hold from `cycle` on."""
@@ -318,7 +318,7 @@ class Pins:
         if not changed:
             return
         self.level[port] = level
-        self.disturb(port)
+        self.invalidate(port)
         if self._edges is not None and not self._events.quiet:
             self._edges.append((cycle, port, level))
         if self._lazy_watchers[port]:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 from typing import Any, Final
 
-from emu.peripherals.base import Wires
+from emu.peripherals.base import CpuSignals
 
 Pattern = str | bytes | re.Pattern[bytes]
 SHOWN: Final = 200
@@ -21,10 +21,10 @@ class ExpectError(AssertionError):
     """What was expected was not said in time; the text tells what was."""
 
 
-class Ear:
+class OutputMatcher:
     """Listens to one line from its first use on."""
 
-    def __init__(self, name: str, wires: Wires, fcy: Callable[[], float], now: Callable[[], int]) -> None:
+    def __init__(self, name: str, wires: CpuSignals, fcy: Callable[[], float], now: Callable[[], int]) -> None:
         self._name: Final = name
         self._wires: Final = wires
         self._fcy: Final = fcy

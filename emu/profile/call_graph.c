@@ -14,18 +14,18 @@ enum { OPEN = 1, CLOSE, SWITCH, SLEEP };
 
 typedef struct { u64 start, stolen; u32 site, entry, place, level, edge; } Frame;
 typedef struct { u64 left; u32 depth; Frame frame[DEPTH]; } Stack;
-typedef struct { u64 key, calls, cycles, most, least; } Edge;
-typedef struct { u64 cycle, since; u32 what, stack, level, entry, site, length; } Turn;
+typedef struct { u64 key, calls, cycles, most, least; } CallEdge;
+typedef struct { u64 cycle, since; u32 what, stack, level, entry, site, length; } CallEvent;
 typedef struct {
     u64 now;
     u32 current, lost, edges, spare;
-    Turn *turn;
+    CallEvent *turn;
     u64 turns;
-    Edge edge[EDGES];
+    CallEdge edge[EDGES];
     Stack stack[STACKS];
-} Tree;
+} CallGraph;
 
-static u32 edge_of(Tree *t, u32 site, u32 entry) {
+static u32 edge_of(CallGraph *t, u32 site, u32 entry) {
     u64 key = ((u64)site << 32 | entry) + 1;
     u32 at = (u32)(key * 0x9E3779B97F4A7C15ull >> 48) & (EDGES - 1);
     while (t->edge[at].key && t->edge[at].key != key) at = (at + 1) & (EDGES - 1);
@@ -40,9 +40,9 @@ static u32 edge_of(Tree *t, u32 site, u32 entry) {
     return at;
 }
 
-static void tell(Tree *t, u32 what, const Frame *f, u64 since, u32 length) {
+static void tell(CallGraph *t, u32 what, const Frame *f, u64 since, u32 length) {
     if (!t->turn) return;
-    Turn *turn = &t->turn[t->turns++];
+    CallEvent *turn = &t->turn[t->turns++];
     turn->cycle = t->now;
     turn->since = since;
     turn->what = what;
@@ -53,7 +53,7 @@ static void tell(Tree *t, u32 what, const Frame *f, u64 since, u32 length) {
     turn->length = length;
 }
 
-static void push(Tree *t, u64 start, u32 site, u32 entry, u32 place, u32 level, u64 since) {
+static void push(CallGraph *t, u64 start, u32 site, u32 entry, u32 place, u32 level, u64 since) {
     Stack *s = &t->stack[t->current];
     if (s->depth == DEPTH) {
         t->lost++;
@@ -69,7 +69,7 @@ static void push(Tree *t, u64 start, u32 site, u32 entry, u32 place, u32 level, 
 }
 
 /* The top frame of the present stack ends. Inclusive time of recursion counts for the outermost call. */
-static void pop(Tree *t) {
+static void pop(CallGraph *t) {
     Stack *s = &t->stack[t->current];
     Frame *f = &s->frame[--s->depth];
     u64 all = t->now - f->start;
@@ -80,7 +80,7 @@ static void pop(Tree *t) {
             if (s->frame[i].level) break;
         }
     if (outermost) {
-        Edge *e = &t->edge[f->edge];
+        CallEdge *e = &t->edge[f->edge];
         u64 own = all - f->stolen;
         e->cycles += own;
         if (own > e->most) e->most = own;
@@ -90,7 +90,7 @@ static void pop(Tree *t) {
     tell(t, CLOSE, f, 0, 0);
 }
 
-static void to_stack(Tree *t, u32 other) {
+static void to_stack(CallGraph *t, u32 other) {
     Stack *s = &t->stack[other];
     t->stack[t->current].left = t->now;
     t->current = other;
@@ -105,7 +105,7 @@ static int find(const Stack *s, u32 place) {
 }
 
 /* An unused stack, else the one that was left first. */
-static u32 fresh(Tree *t) {
+static u32 fresh(CallGraph *t) {
     u32 best = t->current ? 0 : 1;
     for (u32 i = 0; i < STACKS; i++) {
         if (i == t->current) continue;
@@ -116,7 +116,7 @@ static u32 fresh(Tree *t) {
     return best;
 }
 
-static void returned(Tree *t, u32 site, u32 place, u32 target) {
+static void returned(CallGraph *t, u32 site, u32 place, u32 target) {
     int at = find(&t->stack[t->current], place);
     if (at < 0) {
         u32 other = STACKS;
@@ -132,7 +132,7 @@ static void returned(Tree *t, u32 site, u32 place, u32 target) {
     while (t->stack[t->current].depth > (u32)at) pop(t);
 }
 
-static void close_all(Tree *t) {
+static void close_all(CallGraph *t) {
     for (u32 i = 0; i < STACKS; i++) {
         if (!t->stack[i].depth) continue;
         if (i != t->current) to_stack(t, i);
@@ -140,16 +140,16 @@ static void close_all(Tree *t) {
     }
 }
 
-u64 tree_size(void) { return sizeof(Tree); }
+u64 tree_size(void) { return sizeof(CallGraph); }
 
 /* The program is at `entry` in cycle `now`. */
-void tree_begin(Tree *t, u64 now, u64 entry) {
+void tree_begin(CallGraph *t, u64 now, u64 entry) {
     t->now = now;
     push(t, now, TOP, (u32)entry, ~0u, 0, 0);
 }
 
 /* Forget what has been counted; who is where stays. */
-void tree_clear(Tree *t, u64 now) {
+void tree_clear(CallGraph *t, u64 now) {
     for (u32 i = 0; i < EDGES; i++) t->edge[i].calls = t->edge[i].cycles = t->edge[i].most = t->edge[i].least = 0;
     for (u32 i = 0; i < STACKS; i++) {
         Stack *s = &t->stack[i];
@@ -159,20 +159,20 @@ void tree_clear(Tree *t, u64 now) {
     t->now = now;
 }
 
-void tree_end(Tree *t, u64 now) {
+void tree_end(CallGraph *t, u64 now) {
     t->now = now;
     close_all(t);
 }
 
 /* Frames that are open, in all stacks. */
-u64 tree_open(const Tree *t) {
+u64 tree_open(const CallGraph *t) {
     u64 sum = 0;
     for (u32 i = 0; i < STACKS; i++) sum += t->stack[i].depth;
     return sum;
 }
 
 /* Follow `count` notes; `turn` gets what happened, at most 2 * count turns and one for every open frame and stack. */
-u64 tree_follow(Tree *t, const u64 *note, u64 count, Turn *turn) {
+u64 tree_follow(CallGraph *t, const u64 *note, u64 count, CallEvent *turn) {
     t->turn = turn;
     t->turns = 0;
     for (; count; count--, note += 4) {
@@ -199,12 +199,12 @@ u64 tree_follow(Tree *t, const u64 *note, u64 count, Turn *turn) {
 }
 
 /* The edges in use: call site or 0xFFFFFF, entry, calls, cycles, those of the longest and the shortest call. */
-u64 tree_edges(const Tree *t, u64 *out) {
+u64 tree_edges(const CallGraph *t, u64 *out) {
     u64 n = 0;
     for (u32 i = 0; i < EDGES; i++)
         if (t->edge[i].key && (t->edge[i].calls || t->edge[i].cycles)) {
             u64 key = t->edge[i].key - 1;
-            const Edge *e = &t->edge[i];
+            const CallEdge *e = &t->edge[i];
             u64 row[] = {key >> 32, (u32)key, e->calls, e->cycles, e->most, e->least};
             for (u32 k = 0; k < 6; k++) out[6 * n + k] = row[k];
             n++;
@@ -212,4 +212,4 @@ u64 tree_edges(const Tree *t, u64 *out) {
     return n;
 }
 
-u64 tree_lost(const Tree *t) { return t->lost; }
+u64 tree_lost(const CallGraph *t) { return t->lost; }

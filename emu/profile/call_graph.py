@@ -1,6 +1,6 @@
 """Who called whom while a program ran, through interrupts and threads; the work is done by follow.c.
 
-What enters: notes of a ledger. What leaves: `Edge`s, one for every place that called something, and if wanted `Turn`s,
+What enters: notes of a ledger. What leaves: `CallEdge`s, one for every place that called something, and if wanted `CallEvent`s,
 everything that happened in order.
 """
 
@@ -43,7 +43,7 @@ def _code() -> dict[str, Callable[..., int]]:
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class CallEdge:
     """Calls from one place to one function. Handlers of interrupts, and where a stack begins, are called by nobody."""
 
     site: int | None
@@ -57,7 +57,7 @@ class Edge:
     least: int
 
 
-class Turn(NamedTuple):
+class CallEvent(NamedTuple):
     """Something that happened in `cycle`. There are many: tuples are made at half the cost."""
 
     cycle: int
@@ -76,7 +76,7 @@ class Turn(NamedTuple):
     """Tcy of a sleep that ends now."""
 
 
-class Tree:
+class CallGraph:
     """Follows the notes it is given, from a program that is at `entry` in `cycle`. `timed` keeps the turns."""
 
     def __init__(self, cycle: int, entry: int, timed: bool = False) -> None:
@@ -104,7 +104,7 @@ class Tree:
         """Count from now on; who is where stays. The turns up to now are dropped but for what is still open."""
         self._code["tree_clear"](self._at, cycle)
 
-    def end(self, cycle: int) -> list[Edge]:
+    def end(self, cycle: int) -> list[CallEdge]:
         """The program ends in `cycle`: all edges. Raises OverflowError if there are more than can be followed."""
         self._code["tree_end"](self._at, cycle)
         if self._code["tree_lost"](self._at):
@@ -112,9 +112,9 @@ class Tree:
         room = np.zeros((_MOST_EDGES, _EDGE_WORDS), dtype=np.uint64)
         made = self._code["tree_edges"](self._at, int(room.ctypes.data))
         rows: list[list[int]] = room[:made].tolist()
-        return [Edge(None if site == NOWHERE else site, *rest) for site, *rest in sorted(rows)]
+        return [CallEdge(None if site == NOWHERE else site, *rest) for site, *rest in sorted(rows)]
 
-    def turns(self) -> Iterator[Turn]:
+    def turns(self) -> Iterator[CallEvent]:
         """What happened, in order."""
         for part in self._parts:
-            yield from map(Turn._make, part.tolist())
+            yield from map(CallEvent._make, part.tolist())

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 
-from emu.profile.call_graph import Edge
+from emu.profile.call_graph import CallEdge
 from emu.profile.cycle_shares import Place, Profile
 
 
@@ -25,7 +25,7 @@ def lines(profile: Profile, image: str, place_of: Callable[[int], Place]) -> Ite
     yield f"summary: {profile.busy}"
     costs: dict[tuple[str, str], list[tuple[int, int, int, str]]] = defaultdict(list)
     home: dict[str, str] = {}
-    calls: dict[str, list[Edge]] = defaultdict(list)
+    calls: dict[str, list[CallEdge]] = defaultdict(list)
     for pc, cycles in profile.addresses.items():
         name, file, line = place_of(pc)
         costs[name, file].append((pc, line, cycles, file))

@@ -17,7 +17,7 @@ import numpy as np
 
 from emu.dspic30f.cycle_accounting import Ledger
 from emu.image.model import Image
-from emu.profile.call_graph import Edge, Tree, Turn
+from emu.profile.call_graph import CallEdge, CallGraph, CallEvent
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -44,9 +44,9 @@ class Profile:
     """By function, source file and line: code that was inlined keeps its file."""
     levels: Counter[int] = field(default_factory=Counter)
     """By CPU priority: 0 to 7, traps 8 and above."""
-    edges: list[Edge] = field(default_factory=list)
+    edges: list[CallEdge] = field(default_factory=list)
     """Who called whom, how often, for how long."""
-    turns: Iterable[Turn] = ()
+    turns: Iterable[CallEvent] = ()
     """What happened in order, if it was asked for: to be gone through once."""
     stop: Stop | None = None
     """What ended the run before its time."""
@@ -97,17 +97,14 @@ class Profiler:
     """
 
     def __init__(self, machine: Machine, image: Image, timed: bool = False) -> None:
-        from emu.dspic30f.engines import PlainEngine
         from emu.dspic30f.jit.engine import JitEngine
 
         self._machine: Final = machine
         self._image: Final = image
         self._runner: Final = machine.runner
-        if not isinstance(self._runner, JitEngine | PlainEngine):
-            raise ValueError(f"profiles need the engine jit or plain, not {machine.engine!r}")
         self._native: Final = self._runner if isinstance(self._runner, JitEngine) else None
         self._timed: Final = timed
-        self._tree: Final = Tree(machine.cycle, machine.pc, timed)
+        self._tree: Final = CallGraph(machine.cycle, machine.pc, timed)
         self._ledger: Final = Ledger(machine.core, self._tree.take)
         self._rows: Final[dict[int, int]] = {}
         self._inside: Final[dict[int, frozenset[str]]] = {}

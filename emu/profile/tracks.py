@@ -1,6 +1,6 @@
 """What happened in order, as tracks: one for every stack of the firmware and one for every interrupt level.
 
-What enters: turns. What leaves: `Mark`s in the order of time: something begins or ends on a track. While a track does
+What enters: turns. What leaves: `TrackEvent`s in the order of time: something begins or ends on a track. While a track does
 not run nothing is open on it; what was open is opened again when it goes on. So the open time of all tracks is the time
 in which the CPU worked.
 """
@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final, NamedTuple
 
-from emu.profile.call_graph import CLOSE, OPEN, SLEEP, SWITCH, Turn
+from emu.profile.call_graph import CLOSE, OPEN, SLEEP, SWITCH, CallEvent
 
 THREAD_START: Final = "_os_thread_start"
 """What calls a thread's function (firmware/openswarm/port/dspic30f/switch.S)."""
@@ -21,7 +21,7 @@ Track = tuple[int, int]
 """Stack and how many there were on it before; of a handler -1 and the CPU priority."""
 
 
-class Mark(NamedTuple):
+class TrackEvent(NamedTuple):
     """Something begins or ends."""
 
     cycle: int
@@ -40,7 +40,7 @@ class Tracks:
     """Follows turns. `name_of` gives the function around an address; marks are given of the cycles from `start` to
     `end`; the program began at `entry`."""
 
-    def __init__(self, turns: Iterable[Turn], name_of: Callable[[int], str], start: int, end: int, entry: int) -> None:
+    def __init__(self, turns: Iterable[CallEvent], name_of: Callable[[int], str], start: int, end: int, entry: int) -> None:
         self._name_of: Final = name_of
         self._stacks: Final[dict[int, list[tuple[int, int | None]]]] = {0: [(entry, None)]}
         """Frames by stack: entry, and the level of a handler."""
@@ -57,7 +57,7 @@ class Tracks:
             return f"level {track[1]}"
         return self._names.get(track, f"stack {track[0]}")
 
-    def _marks(self, turns: Iterable[Turn], start: int, end: int) -> Iterator[Mark]:
+    def _marks(self, turns: Iterable[CallEvent], start: int, end: int) -> Iterator[TrackEvent]:
         begun = False
         for turn in turns:
             if not begun and turn.cycle > start:
@@ -70,7 +70,7 @@ class Tracks:
             yield from self._go_on(start)
         yield from self._wait(end)
 
-    def _turn(self, turn: Turn) -> Iterator[Mark]:
+    def _turn(self, turn: CallEvent) -> Iterator[TrackEvent]:
         stack = self._stacks.setdefault(turn.stack, [])
         if turn.what == SWITCH:
             yield from self._wait(turn.cycle)
@@ -85,11 +85,11 @@ class Tracks:
             if level is not None:
                 yield from self._wait(turn.cycle)
             stack.append((turn.entry, level))
-            yield Mark(turn.cycle, self._track(), True, turn.entry, True, turn.since, turn.site)
+            yield TrackEvent(turn.cycle, self._track(), True, turn.entry, True, turn.since, turn.site)
         elif turn.what == CLOSE and stack:
             track = self._track()
             entry, level = stack.pop()
-            yield Mark(turn.cycle, track, False, entry, True)
+            yield TrackEvent(turn.cycle, track, False, entry, True)
             if level is not None:
                 yield from self._go_on(turn.cycle)
 
@@ -111,12 +111,12 @@ class Tracks:
         stack = self._stacks[self._current]
         return stack[max((n for n, (_, level) in enumerate(stack) if level is not None), default=0) :]
 
-    def _wait(self, cycle: int) -> Iterator[Mark]:
+    def _wait(self, cycle: int) -> Iterator[TrackEvent]:
         track = self._track()
         for entry, _ in reversed(self._running()):
-            yield Mark(cycle, track, False, entry, False)
+            yield TrackEvent(cycle, track, False, entry, False)
 
-    def _go_on(self, cycle: int) -> Iterator[Mark]:
+    def _go_on(self, cycle: int) -> Iterator[TrackEvent]:
         track = self._track()
         for entry, _ in self._running():
-            yield Mark(cycle, track, True, entry, False)
+            yield TrackEvent(cycle, track, True, entry, False)

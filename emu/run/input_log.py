@@ -14,7 +14,7 @@ HEADER: Final = "# input stamps: cycle, UART, bytes in hex"
 
 
 @dataclass(frozen=True, slots=True)
-class Stamp:
+class TimestampedInput:
     """`data` began to arrive at UART number `uart` at `cycle` (Tcy since power-on)."""
 
     cycle: int
@@ -26,15 +26,15 @@ class Stamp:
         stream.write(f"{self.cycle} {self.uart} {self.data.hex()}\n")
 
 
-def read_stamps(path: str, uarts: tuple[int, ...]) -> list[Stamp]:
+def read_input_log(path: str, uarts: tuple[int, ...]) -> list[TimestampedInput]:
     """The stamps of a record file. Raises ValueError with the line of the first mistake, OSError if unreadable."""
-    stamps: list[Stamp] = []
+    stamps: list[TimestampedInput] = []
     for number, line in enumerate(read_file(path).decode("ascii", "replace").splitlines(), start=1):
         if not line.strip() or line.startswith("#"):
             continue
         try:
             cycle, uart, data = line.split()
-            stamp = Stamp(int(cycle), int(uart), bytes.fromhex(data))
+            stamp = TimestampedInput(int(cycle), int(uart), bytes.fromhex(data))
         except ValueError:
             raise ValueError(f"{path}: line {number}: expected `CYCLE UART HEX`, found {line[:40]!r}") from None
         if stamp.uart not in uarts:

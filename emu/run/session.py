@@ -14,7 +14,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from emu.run.console import Port, wait_for_input
-from emu.run.input_log import Stamp
+from emu.run.input_log import TimestampedInput
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -42,7 +42,7 @@ class Session:
         ports: dict[int, Port],
         *,
         limit: int = FOREVER,
-        replay: list[Stamp] | None = None,
+        replay: list[TimestampedInput] | None = None,
         record: TextIO | None = None,
         realtime: bool = False,
         advance: Callable[[int], Stop | None] | None = None,
@@ -139,11 +139,11 @@ class Session:
         for number, port in self.ports.items():
             data = port.read()
             if data:
-                self._hand_over(Stamp(cycle, number, data))
+                self._hand_over(TimestampedInput(cycle, number, data))
                 taken = True
         return taken
 
-    def _hand_over(self, stamp: Stamp) -> None:
+    def _hand_over(self, stamp: TimestampedInput) -> None:
         """Bytes for a running machine wait until its receiver is on; for a sleeping one they come at their date."""
         late = stamp.cycle > self.machine.cycle
         self._links[stamp.uart].feed(stamp.data, stamp.cycle if late else None)

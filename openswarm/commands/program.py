@@ -10,7 +10,7 @@ from typing import Final
 
 from emu.host import paths
 from emu.host.exit_status import DONE
-from emu.host.files import whole_text_file
+from emu.host.files import atomic_text_file
 from emu.image.loader import load_image
 from emu.image.model import Image
 from openswarm.commands import made_parser
@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     image = load_image(str(output))
     made = program_of(image)
     if options.header is not None:
-        with whole_text_file(options.header) as file:
+        with atomic_text_file(options.header) as file:
             file.write(header(options.header.stem, output.name, made))
     _tell(options, image, made)
     return DONE

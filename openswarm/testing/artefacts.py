@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, TextIO
 
 from emu.debug.replay import aside
-from emu.instruments.vcd import Waves
+from emu.instruments.vcd import WaveformRecorder
 from emu.machine.fault_report import standing
 from openswarm.testing.robot import Robot
 
@@ -40,6 +40,6 @@ def _waves(robot: Robot, stream: TextIO) -> None:
     end, began = machine.cycle, machine.evidence.began
     with aside(machine, began):
         machine.run_until(end - machine.cycles_in(STRETCH_MS / 1000))
-        waves = Waves(machine, stream, again=True)
+        waves = WaveformRecorder(machine, stream, again=True)
         waves.advance(end)
         waves.close()

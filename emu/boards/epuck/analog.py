@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from emu.boards.noise import Noise
-from emu.boards.part import Part
+from emu.boards.part import BoardPart
 from emu.native_library import ADDRESS, DOUBLE, INT, address_of, functions
 from emu.peripherals import Peripherals
 
@@ -74,7 +74,7 @@ def _code() -> dict[str, Callable[..., int]]:
     })  # fmt: skip
 
 
-class Infrared(Part):
+class Infrared(BoardPart):
     """Eight reflective sensors: raw = ambient - reflection x how far the receiver has settled - `shine`'s (ring.c)."""
 
     def __init__(self, chip: Peripherals, noise: Noise) -> None:
@@ -108,9 +108,9 @@ class Infrared(Part):
             chip.adc.source[_FIRST_CHANNEL + sensor] = self._sources[sensor]
         for line, pin in enumerate(PULSE_PINS):
             self.pins.watch(pin, partial(self._switched, line))
-            self._foretell(line)
+            self._predict(line)
         self.answer(True)
-        noise.on_change.append(self._foretell_all)
+        noise.on_change.append(self._predict_all)
 
     @property
     def tau_seconds(self) -> float:
@@ -126,14 +126,14 @@ class Infrared(Part):
     def _retime(self) -> None:
         (self._tau.value,) = struct.unpack("<Q", struct.pack("<d", self._tau_seconds * self.chip.fcy))
 
-    def shine(self, prepare: Callable[[int], None], light: int, data: int) -> None:
+    def set_external_light(self, prepare: Callable[[int], None], light: int, data: int) -> None:
         """From now on each conversion asks host code for the counts taken off by whatever else shines on a sensor:
         double light(data, sensor, cycle). Before, `prepare(cycle)` is called, which may set `ambient` and `reflection`,
         unless `answer` has said that there is no need."""
         self._prepare = prepare
         self._ring.outside, self._ring.light = light, data
         self.answer(False)
-        self._foretell_all()
+        self._predict_all()
 
     def answer(self, is_ready: bool) -> None:
         """Whether the levels of all cycles up to the next call are known without preparation, so that native code may
@@ -145,7 +145,7 @@ class Infrared(Part):
             code = self._answers if is_ready else 0
             self.chip.adc.source.answer(_FIRST_CHANNEL + sensor, source, code, self._ring_at)
 
-    def part_from(self, cycle: int) -> None:
+    def start_segment(self, cycle: int) -> None:
         """What `ambient` and `reflection` become now holds from `cycle` on; for conversions before it they stay what
         they are. Those before the cycle said last must have been carried out."""
         ring = self._ring
@@ -161,13 +161,13 @@ class Infrared(Part):
         self.chip.adc.catch_up(self.now)
         for sensor, millimetres, share in surfaces:
             self.reflection[sensor] = round(reflection_at(millimetres) * share)
-        self._foretell_all()
+        self._predict_all()
 
     def set_ambient(self, sensor: int, counts: int) -> None:
         """Ambient light at a sensor as raw counts 0..4095 (dark is high)."""
         self.chip.adc.catch_up(self.now)
         self.ambient[sensor] = counts
-        self._foretell(sensor % len(PULSE_PINS))
+        self._predict(sensor % len(PULSE_PINS))
 
     def is_lit(self, sensor: int) -> bool:
         """Whether the emitter of a sensor is on: other robots may see it."""
@@ -183,20 +183,20 @@ class Infrared(Part):
         self._from[line] = round(share * 0xFFFF)
         self._since[line] = cycle
         self._lit[line] = bool(levels & changed)
-        self._foretell(line)
+        self._predict(line)
 
-    def _foretell_all(self) -> None:
+    def _predict_all(self) -> None:
         self.chip.adc.catch_up(self.now)
         for line in range(len(PULSE_PINS)):
-            self._foretell(line)
+            self._predict(line)
 
-    def _foretell(self, line: int) -> None:
+    def _predict(self, line: int) -> None:
         """Tell the converter what the receivers of a line will show once they have settled: without noise a number."""
         for sensor in (line, line + len(PULSE_PINS)):
             raw = self.ambient[sensor] - self.reflection[sensor] * bool(self._lit[line])
             level = None if self._noise.strength or self._prepare else min(max(raw, 0), 4095) << 4
             settled = self._since[line] + round(_SETTLED * self._tau_seconds * _FASTEST_HZ)
-            self.chip.adc.source.foretell(_FIRST_CHANNEL + sensor, self._sources[sensor], level, settled)
+            self.chip.adc.source.predict(_FIRST_CHANNEL + sensor, self._sources[sensor], level, settled)
 
     def _level(self, sensor: int, cycle: int) -> int:
         if self._prepare is not None:
@@ -204,7 +204,7 @@ class Infrared(Part):
         return self._level_of(self.record.address, self._ring_at, _FIRST_CHANNEL + sensor, cycle)
 
 
-class Accelerometer(Part):
+class Accelerometer(BoardPart):
     """The analog part of hardware up to 1.2 on AN5..AN7: 2048 at 0 g, 800 counts per g (epuck.md §6)."""
 
     ZERO: Final = 2048
@@ -222,7 +222,7 @@ class Accelerometer(Part):
             self.chip.adc.set_input(self._FIRST + axis, min(max(code, 0), 4095) << 4)
 
 
-class Microphones(Part):
+class Microphones(BoardPart):
     """Three microphones on AN2..AN4: 2048 in silence; sound is a function of the cycle."""
 
     ZERO: Final = 2048
@@ -236,7 +236,7 @@ class Microphones(Part):
         self._quiet: Final = [partial(self._level, self._FIRST + microphone, None) for microphone in range(3)]
         for microphone in range(3):
             self.play(microphone, None)
-        noise.on_change.append(self._foretell)
+        noise.on_change.append(self._predict)
 
     def play(self, microphone: int, sound: Callable[[int], float] | None) -> None:
         """Let `sound(cycle)` (in counts around 0) reach microphone 0..2 (right, left, back), or None for silence."""
@@ -244,14 +244,14 @@ class Microphones(Part):
         channel = self._FIRST + microphone
         loud = partial(self._level, channel, sound)
         self.chip.adc.source[channel] = self._quiet[microphone] if sound is None else loud
-        self._foretell()
+        self._predict()
 
-    def _foretell(self) -> None:
+    def _predict(self) -> None:
         """Silence without noise is a number."""
         self.chip.adc.catch_up(self.now)
         for microphone, quiet in enumerate(self._quiet):
             level = None if self._noise.strength else self.ZERO << 4
-            self.chip.adc.source.foretell(self._FIRST + microphone, quiet, level)
+            self.chip.adc.source.predict(self._FIRST + microphone, quiet, level)
 
     def _level(self, channel: int, sound: Callable[[int], float] | None, cycle: int) -> int:
         heard = self.ZERO + self._noise.at(channel, cycle, self.DEVIATION) + (sound(cycle) if sound is not None else 0)

@@ -28,11 +28,11 @@ class Epuck:
     """
 
     def __init__(self, chip: Peripherals, *, camera: str | None = "PO6030K", selector: int = 0, seed: int = 0) -> None:
-        if chip.kit.chip.name != CHIP:
-            raise ValueError(f"an e-puck carries a {CHIP}, not a {chip.kit.chip.name}")
+        if chip.context.chip.name != CHIP:
+            raise ValueError(f"an e-puck carries a {CHIP}, not a {chip.context.chip.name}")
         chip.fit(crystal=CRYSTAL_HZ, config=CONFIG)
         self.chip: Final = chip
-        self.noise: Final = Noise(chip.kit.bus.record, seed)
+        self.noise: Final = Noise(chip.context.bus.record, seed)
         self.leds: Final = Leds(chip)
         self.motors: Final = Motors(chip)
         self.selector: Final = Selector(chip, selector)

@@ -108,7 +108,7 @@ struct pair {
 
 // Both motors' steps, left, right, left and so on, once both know what is in the ring, and what counts by cycle `now`.
 // 0, and nothing is done, if others want to know of it.
-i64 both_by(const struct pair *p, i64 now, const i64 *cycles, i64 count, i64 *steps)
+i64 steps_of_both(const struct pair *p, i64 now, const i64 *cycles, i64 count, i64 *steps)
 {
     i64 changes = (i64)*p->count;
     for (i64 i = 0; i < changes; i++)

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from emu.boards.part import Part
+from emu.boards.part import BoardPart
 from emu.native_library import ADDRESS, INT, address_of, functions
 from emu.peripherals import Peripherals
 
@@ -50,11 +50,11 @@ def _code() -> dict[str, Callable[..., int]]:
         "settle_by": (None, (ADDRESS, INT)),
         "change": (None, (ADDRESS, INT, INT)),
         "decode": (None, (ADDRESS, ADDRESS, INT, INT)),
-        "both_by": (INT, (ADDRESS, INT, ADDRESS, INT, ADDRESS)),
+        "steps_of_both": (INT, (ADDRESS, INT, ADDRESS, INT, ADDRESS)),
     })  # fmt: skip
 
 
-class Stepper(Part):
+class Stepper(BoardPart):
     """One motor. `steps` counts full steps, forward positive.
 
     State is one run of signed 64-bit numbers in the record, because edges come by the thousand per second.
@@ -77,7 +77,7 @@ class Stepper(Part):
         self.at: Final = addressof(self._motor)
         """Where `struct motor` of motors.c is."""
         self.pins.watch_port(PORT, 0xF << shift, self._changed, lazy=True, reader=self._read)
-        chip.on_settle.append(self._catch_up)
+        chip.on_synchronize.append(self._catch_up)
 
     @property
     def steps(self) -> int:
@@ -117,15 +117,15 @@ class Stepper(Part):
         self._on_step = on_step
         self.pins.watch_port(PORT, 0xF << self._shift, lambda *_edge: None)  # so that edges come by as they happen
 
-    def remember(self) -> None:
+    def record_history(self) -> None:
         """Keep from now on when steps were made, for `Motors.steps_by`."""
         self._catch_up()
         self._history = _History(self._state[_STEPS], 0)
         self._motor.history = pointer(self._history)
 
     @contextmanager
-    def unremembered(self) -> Iterator[None]:
-        """As `Motors.unremembered`."""
+    def history_paused(self) -> Iterator[None]:
+        """As `Motors.history_paused`."""
         kept, self._motor.history = self._history, None
         try:
             yield
@@ -148,7 +148,7 @@ class Stepper(Part):
         self._telling(self._change, cycle, levels)
 
     @property
-    def tells(self) -> bool:
+    def has_listener(self) -> bool:
         """Whether somebody hears of each step."""
         return self._on_step is not None
 
@@ -171,9 +171,9 @@ class Motors:
     def __init__(self, chip: Peripherals) -> None:
         self.left: Final = Stepper("motor.left", chip, 0, -1)
         self.right: Final = Stepper("motor.right", chip, 4, 1)
-        self._both_by: Final = _code()["both_by"]
+        self._both_by: Final = _code()["steps_of_both"]
         self._pins: Final = chip.pins
-        self._pair: Final = _Pair(self.left.at, self.right.at, PORT, *chip.pins.ring_places, 0)
+        self._pair: Final = _Pair(self.left.at, self.right.at, PORT, *chip.pins.ring_addresses, 0)
         self._pair_at: Final = addressof(self._pair)
 
     def steps(self) -> tuple[int, int]:
@@ -183,37 +183,37 @@ class Motors:
         now = left.events.now
         return left.settled_steps(now), self.right.settled_steps(now)
 
-    def remember(self) -> None:
-        """As `Stepper.remember`."""
-        self.left.remember()
-        self.right.remember()
+    def record_history(self) -> None:
+        """As `Stepper.record_history`."""
+        self.left.record_history()
+        self.right.record_history()
 
     @contextmanager
-    def unremembered(self) -> Iterator[None]:
+    def history_paused(self) -> Iterator[None]:
         """Steps made inside the block are not kept for `steps_by`: they have been made before, and are made again."""
-        with self.left.unremembered(), self.right.unremembered():
+        with self.left.history_paused(), self.right.history_paused():
             yield
 
     @property
     def code(self) -> int:
-        """Where `both_by` of motors.c is."""
+        """Where `steps_of_both` of motors.c is."""
         return address_of(self._both_by)
 
-    def lend(self) -> int:
+    def native_pair(self) -> int:
         """For compiled code that calls it: where `struct pair` is, up to date until somebody begins or ceases to watch
         pins; 0 while somebody is told of each step."""
-        self._pair.heard = self._pins.heard_of(2)
-        return 0 if self.left.tells or self.right.tells else self._pair_at
+        self._pair.heard = self._pins.watched_ports(2)
+        return 0 if self.left.has_listener or self.right.has_listener else self._pair_at
 
     def steps_by(self, cycles: Sequence[int]) -> array[int]:
         """Steps of both (left, right, left and so on) as they were in some cycles, which rise from call to call; see
         `remember`."""
         left, right, pins = self.left, self.right, self._pins
-        if left.tells or right.tells:
+        if left.has_listener or right.has_listener:
             self.steps()
         count = len(cycles)
         asked, made = array("q", cycles), array("q", bytes(16 * count))
-        self._pair.heard = pins.heard_of(2)
+        self._pair.heard = pins.watched_ports(2)
         arguments = self._pair_at, left.events.now, asked.buffer_info()[0], count, made.buffer_info()[0]
         if not self._both_by(*arguments):
             pins.flush()

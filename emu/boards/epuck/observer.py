@@ -14,7 +14,7 @@ _PAUSE_SECONDS: Final = 0.1
 """Motors and sound are reported at most this often."""
 
 
-class Watch:
+class RobotObserver:
     """Writes a line, with its time, when something visible changes. `write` gets lines without newline.
 
     Raises ValueError for a topic that is not one of TOPICS.
@@ -82,7 +82,7 @@ class Watch:
 
     def finish(self) -> None:
         """The run is over: print what is still open."""
-        now = self._board.chip.kit.bus.events.now
+        now = self._board.chip.context.bus.events.now
         for number, text in self._text.items():
             if text:
                 self._line(now, f"uart{number} {text.decode('latin-1')!r}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.boards.part import Part
+from emu.boards.part import BoardPart
 from emu.peripherals import Peripherals
 from emu.system.events import NEVER
 
@@ -20,7 +20,7 @@ KEYS: Final = {"standby": 12, "swap": 34, "sleep": 42, "ok": 53}
 """Command codes the demonstration programs use (openswarm-original.md §5.6)."""
 
 
-class Remote(Part):
+class Remote(BoardPart):
     """A hand-held sender. Frames wait for each other; those on their way when a snapshot is taken are part of it."""
 
     def __init__(self, chip: Peripherals) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Final
 
-from emu.boards.part import Part
+from emu.boards.part import BoardPart
 from emu.peripherals import Peripherals
 from emu.peripherals.pins import parse_pin
 from emu.system.observers import Listeners
@@ -21,7 +21,7 @@ LED_PINS: Final = {
 """LED0 is in front, the ring goes clockwise seen from above (epuck.md §2)."""
 
 
-class Leds(Part):
+class Leds(BoardPart):
     """Ten LEDs, on while their pin is driven high."""
 
     def __init__(self, chip: Peripherals) -> None:
@@ -55,7 +55,7 @@ class Leds(Part):
         return [level[port] & mask != 0 for port, mask in self._places.values()]
 
 
-class Selector(Part):
+class Selector(BoardPart):
     """The 16-position switch on RG6..RG9 (epuck.md §2)."""
 
     def __init__(self, chip: Peripherals, position: int = 0) -> None:
@@ -76,7 +76,7 @@ class Selector(Part):
         self.pins.set_port(port, 0xF << 6, position << 6)
 
 
-class Battery(Part):
+class Battery(BoardPart):
     """BATT_LOW on RF1: 1 = ok, 0 = below 3.4 V (epuck.md §2). On hardware 1.3 AN7 measures the voltage."""
 
     LOW_VOLTS: Final = 3.4
@@ -106,7 +106,7 @@ class Battery(Part):
             self.chip.adc.set_input(self._CHANNEL, min(max(code, 0), 4095) << 4)
 
 
-class Codec(Part):
+class Codec(BoardPart):
     """The Si3000 behind the DCI: takes samples and control words, returns silence; RF0 low holds it in reset
     (epuck.md §6). A sample with bit 0 set asks for a secondary frame: the next word is a control word.
 
@@ -165,7 +165,7 @@ class Codec(Part):
                 self.registers[number] = 0
 
 
-class Bluetooth(Part):
+class Bluetooth(BoardPart):
     """UART1 as a byte pipe to a computer. Bytes can get lost: while the link is down, or at random (seeded).
 
     It has the interface of a `Uart` seen from outside: `on_byte` and `feed`.

@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.remote import KEYS
 from emu.boards.epuck.waveform import WaveformError, moment, read_csv, read_vcd
-from emu.boards.part import Part
+from emu.boards.part import BoardPart
 from emu.boards.picture import read_picture
 from emu.host.files import read_file
 from emu.peripherals.pins import parse_pin
@@ -280,7 +280,7 @@ def _i2c(board: Epuck, words: list[str]) -> Action:
     raise ValueError("expected `sda CLOCKS`, `scl` or `free`")
 
 
-class Stimulus(Part):
+class Stimulus(BoardPart):
     """Plays a script on a board. The position is in the record, so snapshots continue where they were taken."""
 
     def __init__(self, board: Epuck) -> None:

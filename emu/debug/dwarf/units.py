@@ -13,7 +13,7 @@ from typing import Any, Final
 from weakref import WeakKeyDictionary
 
 from emu.debug.dwarf.types import TAGGED, VOID, Member, Type
-from emu.image.lines import dwarf_of, file_names, undoubled
+from emu.image.lines import dwarf_of, file_names, remove_phantom_octets
 from emu.image.model import Image
 
 Ranges = tuple[tuple[int, int], ...]
@@ -112,7 +112,7 @@ class DebugInfo:
         """Base types and typedefs by name, tags as `struct node`, by unit; the complete ones."""
         self.constants: Final[dict[str, int]] = {}
         """Enumerators by name."""
-        sections = undoubled({s.name: s.octets for s in image.sections if s.name.startswith(".debug_")})
+        sections = remove_phantom_octets({s.name: s.octets for s in image.sections if s.name.startswith(".debug_")})
         if sections.get(".debug_info") and sections.get(".debug_abbrev"):
             _Reader(self, sections).read()
         self.functions.sort(key=lambda one: one.ranges[0])

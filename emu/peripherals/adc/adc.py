@@ -17,15 +17,15 @@ from emu.peripherals.adc.rules import (
     OFF,
     SAMPLING,
     WAITING,
-    AdcPlaces,
-    Standing,
+    AdcOperands,
+    StableRegister,
     fire_round,
-    read_standing,
+    read_stable,
     write_con1,
     write_scan,
 )
-from emu.peripherals.adc.schedule import FOREVER, Course, Inputs, Published
-from emu.peripherals.base import SLEEP, Kit, Peripheral
+from emu.peripherals.adc.schedule import FOREVER, ConversionSettings, AnalogInputs, PublishedSettings
+from emu.peripherals.base import SLEEP, ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.timers.timers import Timer
@@ -35,7 +35,7 @@ from emu.system.rules import Rule, place_of, slot_of
 
 FULL_SCALE: Final = 0x10000
 """AVDD in units of analog level."""
-_COURSES: Final = 64
+_SETTINGS_CACHE_SIZE: Final = 64
 """Register settings remembered; firmware has a handful."""
 _RC_TAD_SECONDS: Final = 1.5e-6  # UNVERIFIED: 1.2 to 1.5 us (§13)
 
@@ -46,8 +46,8 @@ _MANUAL, _INT0, _TIMER3, _AUTO = 0, 1, 2, 7
 class Adc(Peripheral):
     """One sample-and-hold behind two input multiplexers."""
 
-    def __init__(self, site: AdcSite, kit: Kit, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
-        super().__init__("adc", kit)
+    def __init__(self, site: AdcSite, context: ChipContext, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
+        super().__init__("adc", context)
         self.site: Final = site
         self._line: Final = interrupts.line(site.irq)
         self._timers: Final = timers
@@ -68,11 +68,11 @@ class Adc(Peripheral):
             register.written_by(partial(self._setting_written, register))
         self.pcfg.written_by(lambda _old, _new, _lanes: self._route(self.now + 1))
         self._port: Final = parse_pin(site.pins[0])[0]
-        self.source: Final = Inputs(self, CHANNELS)
-        """By channel a function of the cycle that replaces its level; call `catch_up` before it changes its course."""
+        self.source: Final = AnalogInputs(self, CHANNELS)
+        """By channel a function of the cycle that replaces its level; call `catch_up` before it changes its settings."""
         self.input: Final = self.source.level
         """Analog level of each channel; change it through `set_input`."""
-        self._published: Final = Published(self, CHANNELS)
+        self._published: Final = PublishedSettings(self, CHANNELS)
         self._vref_high: Final = self.cell("vref_high", "I", FULL_SCALE)
         self._vref_low: Final = self.cell("vref_low", "I", 0)
         self._state: Final = self.cell("state", "B")
@@ -84,29 +84,29 @@ class Adc(Peripheral):
         self._use_b: Final = self.cell("use_b", "B")
         self._next: Final = self.cell("next", "B")
         self._count: Final = self.cell("count", "B")
-        self._stands: Final = self.moment("stands_until", FOREVER)
+        self._stands: Final = self.moment("constant_until", FOREVER)
         """First cycle in which ADCBUFx, ADCON1 and ADCON2 may differ from what is stored."""
         self._step: Final = self.slot("step", self._due)
         self._settings: Final = tuple(
-            (register.address >> 1, ~sum(1 << kit.chip.sfrs[register.name].fields[bit][0] for bit in owned) & 0xFFFF)
+            (register.address >> 1, ~sum(1 << context.chip.sfrs[register.name].fields[bit][0] for bit in owned) & 0xFFFF)
             for register, owned in (
                 (self.con1, ("SAMP", "DONE")), (self.con2, ("BUFS",)), (self.con3, ()), (self.chs, ()), (self.cssl, ()))
         )  # fmt: skip
-        """Record words and bits the course depends on."""
-        self._courses: Final[dict[tuple[int, ...], Course]] = {}
+        """Record words and bits the settings depends on."""
+        self._settings_cache: Final[dict[tuple[int, ...], ConversionSettings]] = {}
         for register in (*self._buffers, self.con2):
-            register.ruled(Rule(Standing(register.place, self._stands.place), read_standing))
+            register.ruled(Rule(StableRegister(register.place, self._stands.place), read_stable))
         places = self._places()
-        self.con1.ruled(Rule(places, read_standing, write_con1))
+        self.con1.ruled(Rule(places, read_stable, write_con1))
         self.cssl.ruled(Rule(places, None, write_scan))
         self.ruled(self._step, Rule(places, fires=fire_round))
 
-    def _places(self) -> AdcPlaces:
-        sfrs, record = self.kit.chip.sfrs, self.record
+    def _places(self) -> AdcOperands:
+        sfrs, record = self.context.chip.sfrs, self.record
         adon, samp, done = (1 << sfrs["ADCON1"].fields[name][0] for name in ("ADON", "SAMP", "DONE"))
         cells = ("native", "frozen", "sampling", "conversion", "results", "halves", "length", "state", "mark", "half",
                  "scan", "use_b", "next", "count", "held", "channels", "level_from")  # fmt: skip
-        return AdcPlaces(
+        return AdcOperands(
             register=self.con1.place,
             until=self._stands.place,
             con2=self.con2.place,
@@ -144,21 +144,21 @@ class Adc(Peripheral):
         self.catch_up(self.now)
         self._vref_low.value, self._vref_high.value = low, high
 
-    def _course(self) -> Course:
-        """The present course, remembered by the contents of the registers."""
+    def _current_settings(self) -> ConversionSettings:
+        """The present settings, remembered by the contents of the registers."""
         u16 = self.record.u16
         key = tuple([u16[word] & bits for word, bits in self._settings])
-        course = self._courses.get(key)
-        if course is None:
-            if len(self._courses) >= _COURSES:
-                self._courses.clear()
-            course = self._courses[key] = self._read_course()
-        return course if not self.con3["ADRC"] else self._read_course()  # Fcy is no register
+        settings = self._settings_cache.get(key)
+        if settings is None:
+            if len(self._settings_cache) >= _SETTINGS_CACHE_SIZE:
+                self._settings_cache.clear()
+            settings = self._settings_cache[key] = self._decode_settings()
+        return settings if not self.con3["ADRC"] else self._decode_settings()  # Fcy is no register
 
-    def _read_course(self) -> Course:
-        tad = max(round(2 * _RC_TAD_SECONDS * self.kit.fcy()), 1) if self.con3["ADRC"] else self.con3["ADCS"] + 1
+    def _decode_settings(self) -> ConversionSettings:
+        tad = max(round(2 * _RC_TAD_SECONDS * self.context.fcy()), 1) if self.con3["ADRC"] else self.con3["ADCS"] + 1
         con2, chs = self.con2, self.chs
-        return Course(
+        return ConversionSettings(
             tad=tad,
             sampling=self.con3["SAMC"] * tad if self.con1["SSRC"] == _AUTO else NEVER,
             again=bool(self.con1["ASAM"]),
@@ -177,19 +177,19 @@ class Adc(Peripheral):
             return 0, FULL_SCALE
         return self._vref_low.value if vcfg & 2 else 0, self._vref_high.value if vcfg & 1 else FULL_SCALE
 
-    def _sampled(self, course: Course, channel: int, negative: int, cycle: int) -> int:
+    def _sampled(self, settings: ConversionSettings, channel: int, negative: int, cycle: int) -> int:
         """Code of an input, 0..4095."""
-        low, high = self._references(course.references)
+        low, high = self._references(settings.references)
         zero = self.source.at(1, cycle) if negative else low
         return min(max((self.source.at(channel, cycle) - zero) * 4096 // max(high - low, 1), 0), 4095)
 
     # -- time --------------------------------------------------------------------------------------------------------
 
-    def _duration(self, course: Course, state: int) -> int:
+    def _duration(self, settings: ConversionSettings, state: int) -> int:
         """Half Tcy after which a state ends by itself, or NEVER."""
         if state == CONVERTING:
-            return course.conversion
-        return course.sampling if state == SAMPLING else NEVER
+            return settings.conversion
+        return settings.sampling if state == SAMPLING else NEVER
 
     def _enter(self, state: int, halves: int) -> None:
         self._state.value = state
@@ -198,9 +198,9 @@ class Adc(Peripheral):
         self.con1["SAMP"] = state == SAMPLING
         if state == CONVERTING:
             self.con1["DONE"] = 0
-            course = self._course()
-            channel, negative, self._scan.value, self._use_b.value = course.turn(self._scan.value, self._use_b.value)
-            self._held.value = self._sampled(course, channel, negative, halves + 1 >> 1)
+            settings = self._current_settings()
+            channel, negative, self._scan.value, self._use_b.value = settings.turn(self._scan.value, self._use_b.value)
+            self._held.value = self._sampled(settings, channel, negative, halves + 1 >> 1)
 
     def catch_up(self, cycle: int) -> None:
         """Carry out every conversion that ends at or before `cycle`, but for the one that raises the interrupt: that is
@@ -213,25 +213,25 @@ class Adc(Peripheral):
         state = self._state.value
         if state <= WAITING:
             return False
-        course = self._course()
+        settings = self._current_settings()
         begun = 2 * self._mark.value + self._half.value
         interrupted, moved = False, False
         held, done = self._held.value, 0
         scan, use_b = self._scan.value, self._use_b.value
         while True:
-            duration = self._duration(course, state)
+            duration = self._duration(settings, state)
             if duration == NEVER or begun + duration + 1 >> 1 > cycle:
                 break
             begun += duration
             moved = True
             if state == SAMPLING:
                 state, done = CONVERTING, 0
-                channel, negative, scan, use_b = course.turn(scan, use_b)
-                held = self._sampled(course, channel, negative, begun + 1 >> 1)
+                channel, negative, scan, use_b = settings.turn(scan, use_b)
+                held = self._sampled(settings, channel, negative, begun + 1 >> 1)
             else:
-                if self._store(course, held):
+                if self._store(settings, held):
                     interrupted, scan = True, 0  # the scan starts again behind every interrupt (§13)
-                state, done = (SAMPLING if course.again else WAITING), 1
+                state, done = (SAMPLING if settings.again else WAITING), 1
         if moved:
             self._state.value, self._held.value = state, held
             self._scan.value, self._use_b.value = scan, use_b
@@ -241,18 +241,18 @@ class Adc(Peripheral):
             self._stands.value = FOREVER if duration == NEVER else begun + duration + 1 >> 1
         return interrupted
 
-    def _store(self, course: Course, code: int) -> bool:
+    def _store(self, settings: ConversionSettings, code: int) -> bool:
         """A conversion is complete: buffer, pointer, halves; True at every SMPI + 1 results."""
-        value = code - 2048 if course.form & 1 else code
+        value = code - 2048 if settings.form & 1 else code
         place = self._next.value
-        self._buffers[place].value = value << 4 if course.form & 2 else value
+        self._buffers[place].value = value << 4 if settings.form & 2 else value
         count = self._count.value + 1
-        if count < course.results:
+        if count < settings.results:
             self._count.value = count
             self._next.value = (place + 1) % 16
             return False
         self._count.value = 0
-        if course.in_halves:
+        if settings.in_halves:
             self.con2["BUFS"] = 1 - self.con2["BUFS"]
             self._next.value = 8 * self.con2["BUFS"]
         else:
@@ -261,9 +261,9 @@ class Adc(Peripheral):
 
     def _plan(self) -> None:
         """Post the next interrupt, or the end of the state if what follows depends on somebody else."""
-        course, state = self._course(), self._state.value
-        self._published.tell(course, changes_by_itself=bool(self.con3["ADRC"]))
-        duration = self._duration(course, state)
+        settings, state = self._current_settings(), self._state.value
+        self._published.publish(settings, changes_by_itself=bool(self.con3["ADRC"]))
+        duration = self._duration(settings, state)
         if duration == NEVER:
             self.events.cancel(self._step)
             self._stands.value = FOREVER
@@ -274,10 +274,10 @@ class Adc(Peripheral):
             self._mark.value, self._half.value = end - duration >> 1, end - duration & 1
         self._stands.value = end + 1 >> 1
         if state == SAMPLING:
-            end += course.conversion
-        if course.again and course.sampling != NEVER:
-            missing = max(course.results - 1 - self._count.value, 0)
-            end += missing * (course.sampling + course.conversion)
+            end += settings.conversion
+        if settings.again and settings.sampling != NEVER:
+            missing = max(settings.results - 1 - self._count.value, 0)
+            end += missing * (settings.sampling + settings.conversion)
         self.events.set(self._step, end + 1 >> 1)
 
     def _due(self, due: int) -> None:
@@ -299,7 +299,7 @@ class Adc(Peripheral):
     def _con1_written(self, old: int, new: int, lanes: int) -> None:
         left = self._settle(self.con1, old, new, lanes)
         new = self.con1.value = self.con1.value & (left | ~self._clear_only)
-        fields = self.kit.chip.sfrs["ADCON1"].fields
+        fields = self.context.chip.sfrs["ADCON1"].fields
         adon, samp = (1 << fields[name][0] for name in ("ADON", "SAMP"))
         start = 2 * (self.now + 1)
         if not new & adon:
@@ -377,8 +377,8 @@ class Adc(Peripheral):
 
     def _route(self, cycle: int) -> None:
         """ADPCFG = 0 makes a pin analog: its digital input reads 0 (§6)."""
-        self.kit.pins.analog[self._port] = ~self.pcfg.value & 0xFFFF
-        self.kit.pins.apply(self._port, cycle)
+        self.context.pins.analog[self._port] = ~self.pcfg.value & 0xFFFF
+        self.context.pins.apply(self._port, cycle)
 
     # -- power and reset ---------------------------------------------------------------------------------------------
 

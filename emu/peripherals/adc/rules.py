@@ -18,21 +18,21 @@ OFF, WAITING, SAMPLING, CONVERTING = range(4)
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class StableRegister:
     """A register the converter changes by itself, but not before a cycle it has published."""
 
     register: Place
     until: Place
 
 
-def read_standing(m: Reader, p: Standing) -> Number:
+def read_stable(m: Reader, p: StableRegister) -> Number:
     """What is stored, until then."""
     m.need(m.now < m.get(p.until))
     return m.get(p.register)
 
 
 @dataclass(frozen=True, slots=True)
-class AdcPlaces:
+class AdcOperands:
     """ADCON1 and ADCON2 with their bits, and cells of the converter."""
 
     register: Place
@@ -78,7 +78,7 @@ class AdcPlaces:
     line: Line
 
 
-def write_con1(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
+def write_con1(m: Reader, p: AdcOperands, value: Number, lanes: int) -> bool:
     """ADON changes and no setting does. On: sampling begins with the next cycle, from the first channel on. Off: the
     conversion under way is lost. SAMP is the converter's in both cases."""
     old = m.get(p.register)
@@ -102,7 +102,7 @@ def write_con1(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
     return True
 
 
-def write_scan(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
+def write_scan(m: Reader, p: AdcOperands, value: Number, lanes: int) -> bool:
     """ADCSSL written while the converter is off: the channels in turn from now on."""
     if lanes != 0xFFFF:
         return False
@@ -118,8 +118,8 @@ def write_scan(m: Reader, p: AdcPlaces, value: Number, lanes: int) -> bool:
     return True
 
 
-def fire_round(m: Reader, p: AdcPlaces) -> None:
-    """All conversions up to the interrupt that is due: automatic, one multiplexer, inputs that hold, were foretold to,
+def fire_round(m: Reader, p: AdcOperands) -> None:
+    """All conversions up to the interrupt that is due: automatic, one multiplexer, inputs that hold, were predicted to,
     or are known to host code."""
     sampling, results, length = m.get(p.sampling), m.get(p.results), m.get(p.length)
     step, scan, count, following = sampling + m.get(p.conversion), m.get(p.scan), m.get(p.count), m.get(p.next)

@@ -25,7 +25,7 @@ AnalogSource = Callable[[int], int]
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class ConversionSettings:
     """What the control registers ask for; times in half Tcy."""
 
     tad: int
@@ -52,7 +52,7 @@ class Course:
 
     @property
     def channels(self) -> tuple[int, ...]:
-        """Inputs in turn, multiplexer A."""
+        """AnalogInputs in turn, multiplexer A."""
         return self.scanned or (self.inputs[0][0],)
 
     def turn(self, scan: int, use_b: int) -> tuple[int, int, int, int]:
@@ -70,15 +70,15 @@ class Course:
         return self.again and SHORTEST_SAMPLING <= self.sampling < NEVER and not odd
 
 
-class Inputs:
+class AnalogInputs:
     """Levels of the channels: numbers in the record, or functions of the cycle that replace them.
 
-    Where a function will be constant from some cycle on, its owner may foretell it; native code then needs no function.
+    Where a function will be constant from some cycle on, its owner may predict it; native code then needs no function.
     """
 
     def __init__(self, device: Peripheral, channels: int) -> None:
         self.level: Final = device.array("input", "H", channels)
-        """0..65535 of AVDD; of a function what it was foretold to be."""
+        """0..65535 of AVDD; of a function what it was predicted to be."""
         self._holds_from: Final = device.array("level_from", "Q", channels)
         """First cycle from which `level` is what the channel shows; FOREVER while that is not known."""
         self.asked: Final = Place(device.record.reserve_addresses(2 * channels), 64)
@@ -94,7 +94,7 @@ class Inputs:
         self._holds_from[channel] = 0 if source is None else FOREVER
         self._asked[2 * channel] = 0
 
-    def foretell(self, channel: int, source: AnalogSource, level: int | None, cycle: int = 0) -> None:
+    def predict(self, channel: int, source: AnalogSource, level: int | None, cycle: int = 0) -> None:
         """`source` will return `level` in every cycle from `cycle` on (None: nobody knows), unless it was replaced."""
         if self._source[channel] != source:
             return
@@ -115,8 +115,8 @@ class Inputs:
         return self.level[channel] if known else source(cycle)  # type: ignore[misc]
 
 
-class Published:
-    """The course as numbers: `adc.native` (u8), `adc.sampling` and `adc.conversion` (u32, half Tcy), `adc.results`,
+class PublishedSettings:
+    """The settings as numbers: `adc.native` (u8), `adc.sampling` and `adc.conversion` (u32, half Tcy), `adc.results`,
     `adc.halves`, `adc.length` (u8) and `adc.channels` (u8 each)."""
 
     def __init__(self, device: Peripheral, channels: int) -> None:
@@ -128,14 +128,14 @@ class Published:
         self._length: Final = device.cell("length", "B")
         self._channels: Final = device.array("channels", "B", channels)
 
-    def tell(self, course: Course, changes_by_itself: bool) -> None:
+    def publish(self, settings: ConversionSettings, changes_by_itself: bool) -> None:
         """Write it down; `changes_by_itself`: no register tells when it is another."""
-        plain = course.is_plain and not changes_by_itself
+        plain = settings.is_plain and not changes_by_itself
         self._native.value = plain
         if not plain:
             return
-        self._sampling.value, self._conversion.value = course.sampling, course.conversion
-        self._results.value, self._length.value = course.results, len(course.channels)
-        self._halves.value = course.in_halves
-        for place, channel in enumerate(course.channels):
+        self._sampling.value, self._conversion.value = settings.sampling, settings.conversion
+        self._results.value, self._length.value = settings.results, len(settings.channels)
+        self._halves.value = settings.in_halves
+        for place, channel in enumerate(settings.channels):
             self._channels[place] = channel

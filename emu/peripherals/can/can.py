@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from emu.chips.chip import CanSite
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.can.frame import CanFrame
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
@@ -33,12 +33,12 @@ _FILTERS: Final = {0: (0, 1), 1: (2, 3, 4, 5)}
 class Can(Peripheral):
     """One CAN module."""
 
-    def __init__(self, site: CanSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
-        super().__init__(f"can{site.number}", kit)
+    def __init__(self, site: CanSite, context: ChipContext, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__(f"can{site.number}", context)
         self._line: Final = interrupts.line(site.irq)
         self._prefix: Final = f"C{site.number}"
         prefix = self._prefix
-        registers = [name for name, sfr in kit.chip.sfrs.items() if name.startswith(prefix) and sfr.size == 2]
+        registers = [name for name, sfr in context.chip.sfrs.items() if name.startswith(prefix) and sfr.size == 2]
         self._r: Final = {name[len(prefix) :]: self.register(name) for name in registers}
         self.ctrl, self.intf, self.inte, self.ec = (self._r[name] for name in ("CTRL", "INTF", "INTE", "EC"))
         self.idle_bit = (self.ctrl, "CANSIDL")
@@ -212,7 +212,7 @@ class Can(Peripheral):
 
     def _raise(self, flag: str) -> None:
         self.intf[flag] = 1
-        self._signal(1 << self.kit.chip.sfrs[self.intf.name].fields[flag][0])
+        self._signal(1 << self.context.chip.sfrs[self.intf.name].fields[flag][0])
 
     def _signal(self, flags: int) -> None:
         """CiIF rises with a flag whose enable is set (§15)."""
@@ -224,7 +224,7 @@ class Can(Peripheral):
         pending = (code for flag, code in _ICODES if self.intf[flag] and self.inte[flag[:-1] + "E"])
         self.ctrl["ICODE"] = next(pending, 0)
 
-    def give_back(self) -> None:
+    def release_pins(self) -> None:
         """CiTX."""
         self._tx_port.disown(self._tx_pin)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.chips.chip import I2cSite
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.i2c.bus import I2cBus, I2cDevice
 from emu.peripherals.i2c.slave import I2cRegisters, I2cSlave
 from emu.peripherals.interrupt_lines import Interrupts
@@ -28,17 +28,17 @@ _SEQUENCE: Final = 0x1F
 class I2c(Peripheral):
     """The module as master. `wire` is the bus outside, `slave` the module's other half."""
 
-    def __init__(self, site: I2cSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
-        super().__init__("i2c", kit)
+    def __init__(self, site: I2cSite, context: ChipContext, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__("i2c", context)
         self._line: Final = interrupts.line(site.master_irq)
         self.rcv, self.trn, self.brg = (self.register(name) for name in ("I2CRCV", "I2CTRN", "I2CBRG"))
         self.con, self.stat, self.add = (self.register(name) for name in ("I2CCON", "I2CSTAT", "I2CADD"))
         self.idle_bit = (self.con, "I2CSIDL")
-        self._sclrel: Final = 1 << kit.chip.sfrs["I2CCON"].fields["SCLREL"][0]
+        self._sclrel: Final = 1 << context.chip.sfrs["I2CCON"].fields["SCLREL"][0]
         self.con.written_by(self._con_written)
         self.trn.written_by(self._trn_written)
         self.rcv.read_by(self._rcv_read)
-        self.wire: Final = I2cBus(kit.pins, self.events, site.sda_pin, site.scl_pin)
+        self.wire: Final = I2cBus(context.pins, self.events, site.sda_pin, site.scl_pin)
         self._port: Final = ports[self.wire.port]
         self._operation: Final = self.cell("operation", "B")
         self._begun: Final = self.moment("begun", NEVER)
@@ -57,7 +57,7 @@ class I2c(Peripheral):
         """Between Start and Stop: SCL rests low."""
         self._stalled: Final = self.cell("stalled", "B")
         self._step: Final = self.slot("step", self._due)
-        kit.pins.watch(site.scl_pin, self._scl_moved)
+        context.pins.watch(site.scl_pin, self._scl_moved)
         registers = I2cRegisters(self.rcv, self.trn, self.con, self.stat, self.add)
         self.slave: Final = I2cSlave(
             registers, interrupts.line(site.slave_irq), self.cell("slave.state", "B"), self.cell("slave.ten_bit", "B")
@@ -75,7 +75,7 @@ class I2c(Peripheral):
 
     def bits(self, cycle: int) -> int:
         """SDA and SCL while the module drives them."""
-        outside = self.kit.pins.level[self.wire.port]
+        outside = self.context.pins.level[self.wire.port]
         scl, sda = self._own_levels(cycle)
         return outside & ((self.wire.scl if scl else 0) | (self.wire.sda if sda else 0))
 
@@ -105,21 +105,21 @@ class I2c(Peripheral):
         """The bus clocks nothing else inside the chip."""
         return NEVER
 
-    def stands_until(self, cycle: int) -> int:
+    def constant_until(self, cycle: int) -> int:
         """Between operations nothing moves."""
         return NEVER if self._operation.value == _NONE or self._stalled.value else cycle
 
     def restored(self) -> None:
         """The pins carry the waveform while the module is on."""
         if self.con["I2CEN"]:
-            self.kit.pins.attach(self.wire.port, self.wire.sda | self.wire.scl, self)
+            self.context.pins.attach(self.wire.port, self.wire.sda | self.wire.scl, self)
         else:
-            self.kit.pins.detach(self.wire.port, self)
+            self.context.pins.detach(self.wire.port, self)
 
     # -- operations --------------------------------------------------------------------------------------------------
 
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
-        enable = 1 << self.kit.chip.sfrs["I2CCON"].fields["I2CEN"][0]
+        enable = 1 << self.context.chip.sfrs["I2CCON"].fields["I2CEN"][0]
         if old & ~new & self._sclrel and not self.con["STREN"]:  # UNVERIFIED: §11 does not say who may clear SCLREL
             new |= self._sclrel
             self.con.value = new
@@ -152,12 +152,12 @@ class I2c(Peripheral):
             self._port.disown(lines)
         self.restored()
 
-    def _disturb(self) -> None:
-        self.kit.pins.disturb(self.wire.port)
+    def _invalidate_pins(self) -> None:
+        self.context.pins.invalidate(self.wire.port)
 
     def _abort(self) -> None:
         self._operation.value = _NONE
-        self._disturb()
+        self._invalidate_pins()
         self._owns.value = self._stalled.value = 0
         self._begun.value = NEVER
         self.events.cancel(self._step)
@@ -179,7 +179,7 @@ class I2c(Peripheral):
     def _begin(self, operation: int) -> None:
         """Start an operation in the next cycle; a line that something holds low may end it at once."""
         lines = self.wire
-        self._disturb()
+        self._invalidate_pins()
         self._operation.value = operation
         self._half_bit.value = self.brg.value + 1
         self._collides.value = 0
@@ -249,7 +249,7 @@ class I2c(Peripheral):
 
     def _finish(self, operation: int, due: int) -> None:
         self._operation.value = _NONE
-        self._disturb()
+        self._invalidate_pins()
         if operation in _BITS:
             self.con[_BITS[operation]] = 0
         if operation in (_START, _RESTART):
@@ -305,16 +305,16 @@ class I2c(Peripheral):
         """SCL is free again: an operation that waited for it goes on."""
         if levels & self.wire.scl and self._stalled.value and not self.is_frozen:
             self._stalled.value = 0
-            self._disturb()
+            self._invalidate_pins()
             self._run(cycle + 1)
 
     def _log_edges(self, first: int, end: int) -> None:
         """Write the operation's own edges to the pins' log, from Tbrg `first` on."""
-        log = self.kit.pins.edges
+        log = self.context.pins.edges
         if log is None:
             return
         port, both = self.wire.port, self.wire.sda | self.wire.scl
-        others = self.kit.pins.level[port] & ~both
+        others = self.context.pins.level[port] & ~both
         for count in range(first, end):
             cycle = self._edge(count)
             log.append((cycle, port, others | self.bits(cycle)))
@@ -326,7 +326,7 @@ class I2c(Peripheral):
         super().thaw(cycle)
         self._scl_moved(cycle, 0, self.wire.scl if self.wire.scl_high else 0)
 
-    def give_back(self) -> None:
+    def release_pins(self) -> None:
         """Both lines."""
         self._port.disown(self.wire.sda | self.wire.scl)
 

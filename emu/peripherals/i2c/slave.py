@@ -174,7 +174,7 @@ class Transfer:
     done: bool = False
 
 
-class OutsideMaster:
+class ExternalMaster:
     """Another master on the bus, for tests and for robots whose extension board polls the dsPIC. Host-side state."""
 
     def __init__(self, slave: I2cSlave, events: Events, bit_tcy: int = 151) -> None:

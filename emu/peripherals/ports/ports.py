@@ -6,10 +6,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import PORTS, parse_pin
-from emu.peripherals.ports.rules import PortPlaces, Stretch, read_port, write_latch, write_port
+from emu.peripherals.ports.rules import PortOperands, Stretch, read_port, write_latch, write_port
 from emu.system.events import NEVER
 from emu.system.rules import Rule, place_of
 
@@ -17,18 +17,18 @@ from emu.system.rules import Rule, place_of
 class Port(Peripheral):
     """One port: TRIS, PORT and LAT, and the pins that other peripherals have taken over."""
 
-    def __init__(self, letter: str, kit: Kit) -> None:
-        super().__init__("port" + letter, kit)
+    def __init__(self, letter: str, context: ChipContext) -> None:
+        super().__init__("port" + letter, context)
         self.index: Final = PORTS.index(letter)
-        self.mask: Final = kit.chip.sfrs["TRIS" + letter].mask
-        kit.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins the package does not have read 0
+        self.mask: Final = context.chip.sfrs["TRIS" + letter].mask
+        context.pins.analog[self.index] = ~self.mask & 0xFFFF  # pins the package does not have read 0
         self.tris: Final = self.register("TRIS" + letter)
         self.port: Final = self.register("PORT" + letter)
         self.lat: Final = self.register("LAT" + letter)
         self.tris.written_by(self._changed)
         self.lat.written_by(self._changed)
         self.port.written_by(self._port_written)
-        self.port.computed(lambda: self.kit.pins.read_port(self.index, self.now))
+        self.port.computed(lambda: self.context.pins.read_port(self.index, self.now))
         self._owned: Final = self.cell("owned", "H")
         self._own_drive: Final = self.cell("own_drive", "H")
         self._own_level: Final = self.cell("own_level", "H")
@@ -37,11 +37,11 @@ class Port(Peripheral):
     def _rule(self, stretch: Stretch | None = None) -> None:
         """The common case of accesses to PORT and LAT; `stretch`: bytes that something shows on the pins."""
         record = self.record
-        arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waving", "standing", "stands_until",
+        arrays = ("output", "level", "drive", "analog", "eager", "lazy", "before", "waveform_pins", "constant_levels", "constant_until",
                   "changed")  # fmt: skip
-        places = PortPlaces(
+        places = PortOperands(
             number=self.index,
-            implemented=self.kit.chip.sfrs[self.lat.name].writable,
+            implemented=self.context.chip.sfrs[self.lat.name].writable,
             lat=self.lat.place,
             port=self.port.place,
             owned=self._owned.place,
@@ -104,7 +104,7 @@ class Port(Peripheral):
 
     def _drive(self, cycle: int) -> None:
         owned = self._owned.value
-        pins = self.kit.pins
+        pins = self.context.pins
         pins.drive[self.index] = (self._own_drive.value & owned | ~self.tris.value & ~owned) & self.mask
         pins.output[self.index] = (self._own_level.value & owned | self.lat.value & ~owned) & self.mask
         pins.apply(self.index, cycle, by_chip=True)
@@ -113,19 +113,19 @@ class Port(Peripheral):
 class ChangeNotice(Peripheral):
     """CN0-CN23: CNIF rises one cycle after any enabled input pin changes (§6.2); pull-ups for open pins."""
 
-    def __init__(self, kit: Kit, irq: int) -> None:
-        super().__init__("cn", kit)
+    def __init__(self, context: ChipContext, irq: int) -> None:
+        super().__init__("cn", context)
         self._enables: Final = [self.register(name) for name in ("CNEN1", "CNEN2")]
         self._pullups: Final = [self.register(name) for name in ("CNPU1", "CNPU2")]
         for register in self._pullups:
             register.written_by(self._pull)
         self._line: Final = self.irq(irq)
         self._flag: Final = self.slot("flag", lambda _due: self._line.request())
-        self._pins: Final = [(number, *parse_pin(name)) for number, name in enumerate(kit.chip.change_pins) if name]
-        self._tris: Final = {port: kit.chip.sfrs["TRIS" + PORTS[port]].address >> 1 for _, port, _ in self._pins}
+        self._pins: Final = [(number, *parse_pin(name)) for number, name in enumerate(context.chip.change_pins) if name]
+        self._tris: Final = {port: context.chip.sfrs["TRIS" + PORTS[port]].address >> 1 for _, port, _ in self._pins}
         for port in self._tris:
             mask = sum(bit for _, pin_port, bit in self._pins if pin_port == port)
-            kit.pins.watch_port(port, mask, partial(self._edge, port), inputs_only=True)
+            context.pins.watch_port(port, mask, partial(self._edge, port), inputs_only=True)
 
     def stops_in(self, mode: int) -> bool:
         """Never: change notification wakes from Sleep."""
@@ -148,26 +148,26 @@ class ChangeNotice(Peripheral):
     def _pull(self, _old: int, _new: int, _lanes: int) -> None:
         pulled = self._pullups[0].value | self._pullups[1].value << 16
         for port in self._tris:
-            self.kit.pins.pullup[port] = sum(
+            self.context.pins.pullup[port] = sum(
                 bit for number, pin_port, bit in self._pins if pin_port == port and pulled >> number & 1
             )
-            self.kit.pins.apply(port, self.now + 1)
+            self.context.pins.apply(port, self.now + 1)
 
 
 class ExternalInterrupts(Peripheral):
     """INT0-INT4: the flag rises one cycle after the chosen edge on the pin, whoever drives it (§5.5)."""
 
-    def __init__(self, kit: Kit, interrupts: Interrupts) -> None:
-        super().__init__("int", kit)
+    def __init__(self, context: ChipContext, interrupts: Interrupts) -> None:
+        super().__init__("int", context)
         self._interrupts: Final = interrupts
-        self._control: Final = kit.chip.sfrs["INTCON2"].address >> 1
+        self._control: Final = context.chip.sfrs["INTCON2"].address >> 1
         self._waiting: Final = self.cell("waiting", "B")
         self._flag: Final = self.slot("flag", self._raise)
-        self._irqs: Final = [irq for _, irq in kit.chip.external_pins]
+        self._irqs: Final = [irq for _, irq in context.chip.external_pins]
         self.on_int0: Callable[[int], None] | None = None
         """Called with the cycle the INT0 flag rises: an ADC trigger (§13)."""
-        for number, (pin, _) in enumerate(kit.chip.external_pins):
-            kit.pins.watch(pin, partial(self._edge, number))
+        for number, (pin, _) in enumerate(context.chip.external_pins):
+            context.pins.watch(pin, partial(self._edge, number))
 
     def stops_in(self, mode: int) -> bool:
         """Never: external interrupts wake from Sleep."""

@@ -20,7 +20,7 @@ class Stretch:
 
 
 @dataclass(frozen=True, slots=True)
-class PortPlaces:
+class PortOperands:
     """Registers of a port and its words in the arrays of `pins.py`."""
 
     number: int
@@ -35,9 +35,9 @@ class PortPlaces:
     eager: Place
     lazy: Place
     before: Place
-    waving: Place
-    standing: Place
-    stands_until: Place
+    waveform_pins: Place
+    constant_levels: Place
+    constant_until: Place
     changed: Place
     ring: Place
     ring_size: int
@@ -45,38 +45,38 @@ class PortPlaces:
     stretch: Stretch | None = None
 
 
-def read_port(m: Reader, p: PortPlaces) -> Number:
+def read_port(m: Reader, p: PortOperands) -> Number:
     """Levels of the pins; outputs show one cycle late. Waveforms: while they stand, or show bytes of the record."""
     levels = m.select(m.now <= m.get(p.changed), m.get(p.before), m.get(p.level))
-    waving = m.get(p.waving)
-    stands = m.below(m.now, m.get(p.stands_until)) | (waving == 0)
-    standing = (levels & (waving ^ 0xFFFF)) | (m.get(p.standing) & waving)
+    waveform_pins = m.get(p.waveform_pins)
+    stands = m.below(m.now, m.get(p.constant_until)) | (waveform_pins == 0)
+    constant_levels = (levels & (waveform_pins ^ 0xFFFF)) | (m.get(p.constant_levels) & waveform_pins)
     if p.stretch is None:
         m.need(stands)
-        return standing
+        return constant_levels
     s = p.stretch
     begin, width = m.get(s.begin), m.get(s.width)
-    inside = (m.now >= begin) & (m.now < m.get(s.end)) & ((waving & (0xFFFF & ~s.mask)) == 0)
+    inside = (m.now >= begin) & (m.now < m.get(s.end)) & ((waveform_pins & (0xFFFF & ~s.mask)) == 0)
     m.need(stands | inside)
     place = m.div(m.select(inside, m.now - begin, 0), m.select(width == 0, 1, width))
     shown = (levels & (0xFFFF & ~s.mask)) | (m.get(s.first, place) << s.shift)
-    return m.select(stands, standing, shown)
+    return m.select(stands, constant_levels, shown)
 
 
-def _write(is_port: bool, m: Reader, p: PortPlaces, value: Number, lanes: int) -> bool:
+def _write(is_port: bool, m: Reader, p: PortOperands, value: Number, lanes: int) -> bool:
     """New levels from the next cycle on; lazy watchers find them in the ring."""
     free = p.implemented & lanes
     new = (m.get(p.lat) & (0xFFFF & ~free)) | (value & free)
-    own, drive, level, waving = m.get(p.owned), m.get(p.drive), m.get(p.level), m.get(p.waving)
+    own, drive, level, waveform_pins = m.get(p.owned), m.get(p.drive), m.get(p.level), m.get(p.waveform_pins)
     out = (m.get(p.output) & own) | (new & (own ^ 0xFFFF) & p.implemented)
     shown = (level & (drive ^ 0xFFFF)) | (out & drive & (m.get(p.analog) ^ 0xFFFF))
     changed = level ^ shown
     lazy, told = (changed & m.get(p.lazy)) != 0, m.get(p.ring_count)
-    loud = ((changed & m.get(p.eager)) | (waving & drive)) != 0
+    loud = ((changed & m.get(p.eager)) | (waveform_pins & drive)) != 0
     m.need(((lazy & (told >= p.ring_size)) | loud) == 0)
     following = m.now + 1
     m.put(p.before, m.select(m.get(p.changed) == following, m.get(p.before), level))
-    m.put(p.stands_until, m.select(changed == 0, m.get(p.stands_until), 0))
+    m.put(p.constant_until, m.select(changed == 0, m.get(p.constant_until), 0))
     if is_port:
         m.put(p.port, (m.get(p.port) & (0xFFFF & ~free)) | (value & free))
     free_place = m.select(lazy, told, p.ring_size - 1)
@@ -90,11 +90,11 @@ def _write(is_port: bool, m: Reader, p: PortPlaces, value: Number, lanes: int) -
     return True
 
 
-def write_latch(m: Reader, p: PortPlaces, value: Number, lanes: int) -> bool:
+def write_latch(m: Reader, p: PortOperands, value: Number, lanes: int) -> bool:
     """LAT written."""
     return _write(False, m, p, value, lanes)
 
 
-def write_port(m: Reader, p: PortPlaces, value: Number, lanes: int) -> bool:
+def write_port(m: Reader, p: PortOperands, value: Number, lanes: int) -> bool:
     """PORT written: the latch gets the value."""
     return _write(True, m, p, value, lanes)

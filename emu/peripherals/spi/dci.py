@@ -13,7 +13,7 @@ from functools import partial
 from typing import Final
 
 from emu.chips.chip import DciSite
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports.ports import Port
@@ -26,8 +26,8 @@ _BUFFERS: Final = 4
 class Dci(Peripheral):
     """The codec port. A frame is (COFSG + 1) slots of (WS + 1) bits; a bit is 2 (BCG + 1) Tcy."""
 
-    def __init__(self, site: DciSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
-        super().__init__("dci", kit)
+    def __init__(self, site: DciSite, context: ChipContext, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__("dci", context)
         self._line: Final = interrupts.line(site.irq)
         self.con1, self.con2, self.con3 = (self.register(f"DCICON{number}") for number in (1, 2, 3))
         self.stat: Final = self.register("DCISTAT")
@@ -153,7 +153,7 @@ class Dci(Peripheral):
         return stored | passed // self._slot_time << 8
 
     def _con1_written(self, old: int, new: int, _lanes: int) -> None:
-        enable = 1 << self.kit.chip.sfrs["DCICON1"].fields["DCIEN"][0]
+        enable = 1 << self.context.chip.sfrs["DCICON1"].fields["DCIEN"][0]
         if new & enable and self.con1["CSCKD"]:
             self.bus.lacks("DCICON1.CSCKD, nobody clocks the codec port from outside: it stands still")
         if new & enable and self.con1["COFSM"] & 2:
@@ -201,7 +201,7 @@ class Dci(Peripheral):
             self.events.cancel(self._word_event)
             self._release()
 
-    def give_back(self) -> None:
+    def release_pins(self) -> None:
         """All four pins."""
         self._release()
 

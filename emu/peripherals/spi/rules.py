@@ -14,7 +14,7 @@ _PRIMARY: Final = (64, 16, 4, 1)
 
 
 @dataclass(frozen=True, slots=True)
-class SpiPlaces:
+class SpiOperands:
     """Registers and cells of one module."""
 
     stat: Place
@@ -39,22 +39,22 @@ class SpiPlaces:
     line: Line
 
 
-def word_bits(m: Reader, s: SpiPlaces) -> Number:
+def word_bits(m: Reader, s: SpiOperands) -> Number:
     """8 or 16 (MODE16)."""
     return m.select((m.get(s.con) & s.bit["MODE16"]) != 0, 16, 8)
 
 
-def bit_time(m: Reader, s: SpiPlaces) -> Number:
+def bit_time(m: Reader, s: SpiOperands) -> Number:
     """Length of a bit as master in Tcy: primary x secondary prescale (§12)."""
     con = m.get(s.con)
     return m.table(_PRIMARY, con & 3) * (8 - (con >> s.spre & 7))
 
 
-def _word(m: Reader, s: SpiPlaces, number: Number) -> Number:
+def _word(m: Reader, s: SpiOperands, number: Number) -> Number:
     return m.select((m.get(s.con) & s.bit["MODE16"]) != 0, number & 0xFFFF, number & 0xFF)
 
 
-def push(m: Reader, s: SpiPlaces, value: Number, lanes: int) -> bool:
+def push(m: Reader, s: SpiOperands, value: Number, lanes: int) -> bool:
     """BUF written; a word written while TXB is full is lost (§12)."""
     stat, busy, due = m.get(s.stat), m.get(s.busy) != 0, m.get(s.step.due)
     word = (m.get(s.buf) & (0xFFFF & ~lanes)) | (value & lanes)
@@ -67,13 +67,13 @@ def push(m: Reader, s: SpiPlaces, value: Number, lanes: int) -> bool:
     return True
 
 
-def take(m: Reader, s: SpiPlaces) -> Number:
+def take(m: Reader, s: SpiOperands) -> Number:
     """BUF read: RXB is empty."""
     m.put(s.stat, m.get(s.stat) & (0xFFFF & ~s.bit["SPIRBF"]))
     return m.get(s.received)
 
 
-def begin(m: Reader, s: SpiPlaces, cycle: Number, bit: Number, when: Number = True) -> None:
+def begin(m: Reader, s: SpiOperands, cycle: Number, bit: Number, when: Number = True) -> None:
     """`when` that holds: TXB moves to the shift register, which is clocked from `cycle` on."""
     stat, shift = m.get(s.stat), m.get(s.shift)
     waits = when & ((stat & s.bit["SPITBF"]) != 0)
@@ -84,7 +84,7 @@ def begin(m: Reader, s: SpiPlaces, cycle: Number, bit: Number, when: Number = Tr
     m.post(s.step, m.select(when, cycle + word_bits(m, s) * bit, NEVER))
 
 
-def finish(m: Reader, s: SpiPlaces, number: Number, when: Number = True) -> None:
+def finish(m: Reader, s: SpiOperands, number: Number, when: Number = True) -> None:
     """`when` that holds: a word has been exchanged for the low bits of `number`; one that finds RXB full is lost."""
     word, stat = _word(m, s, number), m.get(s.stat)
     told = when & ((stat & s.bit["SPIROV"]) == 0)
@@ -96,17 +96,17 @@ def finish(m: Reader, s: SpiPlaces, number: Number, when: Number = True) -> None
     request(m, s.line, m.now, told)
 
 
-def open_end(m: Reader, s: SpiPlaces) -> Number:
+def open_end(m: Reader, s: SpiOperands) -> Number:
     """What a master reads where nobody is: the level of SDI in every bit."""
     return m.select((m.get(s.level) & s.sdi) != 0, 0xFFFF, 0)
 
 
-def waits_to_begin(m: Reader, s: SpiPlaces) -> Number:
+def waits_to_begin(m: Reader, s: SpiOperands) -> Number:
     """Truth of "a master that rests has a word in TXB"."""
     return ((m.get(s.con) & s.bit["MSTEN"]) != 0) & ((m.get(s.stat) & s.bit["SPITBF"]) != 0) & (m.get(s.busy) == 0)
 
 
-def fire(m: Reader, s: SpiPlaces) -> None:
+def fire(m: Reader, s: SpiOperands) -> None:
     """A master's word has ended, and the next one begins."""
     m.need(((m.get(s.con) & s.bit["MSTEN"]) != 0) & (m.get(s.answered) == 0))
     finish(m, s, open_end(m, s), m.get(s.busy) != 0)

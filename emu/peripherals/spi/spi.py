@@ -11,12 +11,12 @@ from collections.abc import Callable
 from typing import Final
 
 from emu.chips.chip import SpiSite
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports.ports import Port
 from emu.peripherals.spi.rules import (
-    SpiPlaces,
+    SpiOperands,
     begin,
     bit_time,
     finish,
@@ -34,8 +34,8 @@ from emu.system.rules import Rule, place_of, slot_of
 class Spi(Peripheral):
     """One SPI module."""
 
-    def __init__(self, site: SpiSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
-        super().__init__(f"spi{site.number}", kit)
+    def __init__(self, site: SpiSite, context: ChipContext, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__(f"spi{site.number}", context)
         self._line: Final = interrupts.line(site.irq)
         prefix = f"SPI{site.number}"
         self.stat: Final = self.register(prefix + "STAT")
@@ -66,11 +66,11 @@ class Spi(Peripheral):
         self.buf.written_by(self._push)
         self.ruled(self._step, Rule(places, fires=fire))
 
-    def _registers(self) -> SpiPlaces:
-        sfrs, (port, pin) = self.kit.chip.sfrs, self._pins["sdi"]
+    def _registers(self) -> SpiOperands:
+        sfrs, (port, pin) = self.context.chip.sfrs, self._pins["sdi"]
         fields = {**sfrs[self.stat.name].fields, **sfrs[self.con.name].fields}
         cells = {name: name for name in ("waiting", "shift", "received", "busy", "start", "answered")}
-        return SpiPlaces(
+        return SpiOperands(
             stat=self.stat.place,
             con=self.con.place,
             buf=self.buf.place,
@@ -128,7 +128,7 @@ class Spi(Peripheral):
     def clock_word(self, word: int, bit_tcy: int = 16) -> bool:
         """An outside master clocks one word through this module, starting now. False if it is not listening."""
         port, pin = self._pins["ss"]
-        selected = not self.con["SSEN"] or not self.kit.pins.level[port] & pin
+        selected = not self.con["SSEN"] or not self.context.pins.level[port] & pin
         if not self.stat["SPIEN"] or self.con["MSTEN"] or self._busy.value or self.is_frozen or not selected:
             return False
         self._reply.value = word
@@ -171,7 +171,7 @@ class Spi(Peripheral):
         """SCK clocks nothing else inside the chip."""
         return NEVER
 
-    def stands_until(self, cycle: int) -> int:
+    def constant_until(self, cycle: int) -> int:
         """Nothing is promised: idle levels follow control bits that are plain storage."""
         return cycle
 
@@ -179,11 +179,11 @@ class Spi(Peripheral):
         """SCK (as master) and SDO carry the waveform while the module is on."""
         self._answered.value = self._exchange is not None
         port = self._pins["sck"][0]
-        self.kit.pins.detach(port, self)
+        self.context.pins.detach(port, self)
         mask = self._pins["sck"][1] if self.con["MSTEN"] else 0
         mask |= 0 if self.con["DISSDO"] else self._pins["sdo"][1]
         if self.stat["SPIEN"] and mask:
-            self.kit.pins.attach(port, mask, self)
+            self.context.pins.attach(port, mask, self)
 
     # -- control -----------------------------------------------------------------------------------------------------
 
@@ -193,7 +193,7 @@ class Spi(Peripheral):
         self._take_pins()
 
     def _stat_written(self, old: int, new: int, _lanes: int) -> None:
-        enable = 1 << self.kit.chip.sfrs[self.stat.name].fields["SPIEN"][0]
+        enable = 1 << self.context.chip.sfrs[self.stat.name].fields["SPIEN"][0]
         if (old ^ new) & enable:
             if not new & enable:
                 self._clear()
@@ -207,7 +207,7 @@ class Spi(Peripheral):
         self._start.value = NEVER
         self.events.cancel(self._step)
 
-    def give_back(self) -> None:
+    def release_pins(self) -> None:
         """All pins: SPIEN is 0."""
         self._take_pins()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.system.device import Register
 from emu.system.events import NEVER
@@ -20,15 +20,15 @@ _BAND_GAP_SECONDS: Final = 20e-6
 class LowVoltageDetect(Peripheral):
     """LVDIF rises when the supply falls below the chosen threshold; LVDEN and LVDL live in RCON."""
 
-    def __init__(self, kit: Kit, interrupts: Interrupts, rcon: Register, irq: int) -> None:
-        super().__init__("lvd", kit)
+    def __init__(self, context: ChipContext, interrupts: Interrupts, rcon: Register, irq: int) -> None:
+        super().__init__("lvd", context)
         self._line: Final = interrupts.line(irq)
         self._rcon: Final = rcon
         self._supply: Final = self.cell("supply", "H", 5000)
         self._stable: Final = self.slot("stable", self._band_gap_stable, in_seconds=True)
         self._below: Final = self.cell("below", "B")
         """The supply was below the threshold when somebody last looked."""
-        before = kit.bus.on_write[rcon.address >> 1]
+        before = context.bus.on_write[rcon.address >> 1]
 
         def written(old: int, new: int, lanes: int) -> None:
             if before is not None:
@@ -64,7 +64,7 @@ class LowVoltageDetect(Peripheral):
             self._rcon["BGST"] = 0
             self.events.cancel(self._stable)
         elif not self._rcon["BGST"] and self.events.due(self._stable) == NEVER:
-            self.events.set(self._stable, self.now + 1 + round(_BAND_GAP_SECONDS * self.kit.fcy()))
+            self.events.set(self._stable, self.now + 1 + round(_BAND_GAP_SECONDS * self.context.fcy()))
         self._look()
 
     def _band_gap_stable(self, _due: int) -> None:

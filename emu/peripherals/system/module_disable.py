@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.system.bus import Access
 
 _PREFIXES: Final = {
@@ -25,8 +25,8 @@ _OFF: Final = Access(0, 0, _zero, None, None, None)
 class ModuleDisable(Peripheral):
     """PMD1 and PMD2. What is off follows from the registers, so a restored record needs no more than `restored`."""
 
-    def __init__(self, kit: Kit, modules: dict[str, Peripheral]) -> None:
-        super().__init__("pmd", kit)
+    def __init__(self, context: ChipContext, modules: dict[str, Peripheral]) -> None:
+        super().__init__("pmd", context)
         self._modules: Final = modules
         self._off: Final[dict[int, Access]] = {}
         self._bits: Final[list[tuple[Callable[[], int], str]]] = []
@@ -35,10 +35,10 @@ class ModuleDisable(Peripheral):
         for name in ("PMD1", "PMD2"):
             register = self.register(name)
             register.written_by(lambda _old, _new, _lanes: self._written())
-            for field in register_fields(kit, name):
+            for field in register_fields(context, name):
                 self._bits.append((lambda register=register, field=field: register[field], field[:-2]))  # type: ignore[misc]
                 self._words[field[:-2]] = self._words_of(field[:-2])
-        if "PMD3" in kit.chip.sfrs:
+        if "PMD3" in context.chip.sfrs:
             self.register("PMD3")
 
     def stops_in(self, mode: int) -> bool:
@@ -51,7 +51,7 @@ class ModuleDisable(Peripheral):
         return sorted(
             {
                 sfr.address >> 1
-                for name, sfr in self.kit.chip.sfrs.items()
+                for name, sfr in self.context.chip.sfrs.items()
                 if (name in (f"TMR{timer}", f"PR{timer}", f"T{timer}CON") if timer else name.startswith(prefixes))
             }
         )
@@ -67,7 +67,7 @@ class ModuleDisable(Peripheral):
         """The module loses its state, as by a reset of its own."""
         device = self._modules.get(module)
         if device is not None:
-            device.switched_off()
+            device.before_disable()
         for word in self._words[module]:
             self.record.u16[word] = self.bus.reset_value[word]
         if device is not None:
@@ -97,7 +97,7 @@ class ModuleDisable(Peripheral):
         self.bus.rewire(word, self._off.pop(word))
 
 
-def register_fields(kit: Kit, name: str) -> list[str]:
+def register_fields(context: ChipContext, name: str) -> list[str]:
     """Field names of a register, least significant first."""
-    fields = kit.chip.sfrs[name].fields
+    fields = context.chip.sfrs[name].fields
     return sorted(fields, key=lambda field: fields[field][0])

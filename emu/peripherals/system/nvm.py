@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.system.program import EEPROM_LATCHES, ERASED_HALF, ERASED_WORD, FLASH_LATCHES
 
@@ -37,9 +37,9 @@ _EEPROM: Final = (ERASE_WORD, ERASE_ROW, ERASE_ALL, PROGRAM_WORD, PROGRAM_ROW)
 class Nvm(Peripheral):
     """The programming state machine."""
 
-    def __init__(self, kit: Kit, interrupts: Interrupts) -> None:
-        super().__init__("nvm", kit)
-        self._line: Final = interrupts.line(kit.chip.nvm_irq)
+    def __init__(self, context: ChipContext, interrupts: Interrupts) -> None:
+        super().__init__("nvm", context)
+        self._line: Final = interrupts.line(context.chip.nvm_irq)
         self.con: Final = self.register("NVMCON")
         self.adr: Final = self.register("NVMADR")
         self.adru: Final = self.register("NVMADRU")
@@ -53,8 +53,8 @@ class Nvm(Peripheral):
         self._address: Final = self.cell("address", "I")
         self._data: Final = self.array("data", "I", FLASH_LATCHES)
         self._done: Final = self.slot("done", self._finish, in_seconds=True)
-        self._wr, self._wren = (1 << kit.chip.sfrs["NVMCON"].fields[name][0] for name in ("WR", "WREN"))
-        kit.program.captured_in = self.adr.address, self.adru.address
+        self._wr, self._wren = (1 << context.chip.sfrs["NVMCON"].fields[name][0] for name in ("WR", "WREN"))
+        context.program.captured_in = self.adr.address, self.adru.address
 
     def stops_in(self, mode: int) -> bool:
         """Never: programming is timed by the array itself."""
@@ -70,7 +70,7 @@ class Nvm(Peripheral):
             self.con["WRERR"] = 1
         self._operation.value = 0
         self._stage.value = 0
-        self.kit.program.clear_latches()
+        self.context.program.clear_latches()
 
     @property
     def is_busy(self) -> bool:
@@ -99,21 +99,21 @@ class Nvm(Peripheral):
         self._begin(operation)
 
     def _begin(self, operation: int) -> None:
-        program = self.kit.program
+        program = self.context.program
         self._operation.value = operation
         self._address.value = self.adru.value << 16 | self.adr.value
         latches = program.eeprom_latch if operation in _EEPROM else program.flash_latch
         for index, word in enumerate(latches):
             self._data[index] = word
-        end = self.now + 1 + round(BUSY_SECONDS * self.kit.fcy())
+        end = self.now + 1 + round(BUSY_SECONDS * self.context.fcy())
         self.events.set(self._done, end)
         if operation in _FLASH:
-            self.kit.wires.stall_until(end)
+            self.context.cpu_signals.stall_until(end)
 
     def clock_changed(self) -> None:
         """A switch ended while the CPU stands: it stands until the array is done, however many Tcy that is now."""
         if self.is_busy and self._operation.value in _FLASH:
-            self.kit.wires.stall_until(self.events.due(self._done))
+            self.context.cpu_signals.stall_until(self.events.due(self._done))
 
     def _finish(self, _due: int) -> None:
         self._apply()
@@ -128,15 +128,15 @@ class Nvm(Peripheral):
             self._apply_flash(operation, address & ~(2 * FLASH_LATCHES - 1))
         elif operation in _EEPROM:
             self._apply_eeprom(operation, address)
-        elif address in self.kit.chip.program["config"]:
-            self.kit.program.put(address & ~1, self._data[address >> 1 & FLASH_LATCHES - 1])
+        elif address in self.context.chip.program["config"]:
+            self.context.program.put(address & ~1, self._data[address >> 1 & FLASH_LATCHES - 1])
         if not operation & _ERASING:
-            self.kit.program.clear_latches()
+            self.context.program.clear_latches()
 
     def _apply_flash(self, operation: int, row: int) -> None:
         """Rows outside the array are ignored; programming only clears bits (§16)."""
-        program = self.kit.program
-        if row not in self.kit.chip.program["flash"]:
+        program = self.context.program
+        if row not in self.context.chip.program["flash"]:
             return
         words = [ERASED_WORD] * FLASH_LATCHES
         if operation == PROGRAM_FLASH_ROW:
@@ -144,8 +144,8 @@ class Nvm(Peripheral):
         program.put_flash(row, words)
 
     def _apply_eeprom(self, operation: int, address: int) -> None:
-        program = self.kit.program
-        region = self.kit.chip.program["eedata"]
+        program = self.context.program
+        region = self.context.chip.program["eedata"]
         if address not in region:
             return
         first, count = address & ~1, 1

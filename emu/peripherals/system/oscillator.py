@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.system.events import NEVER
 
 FRC_HZ: Final = 7_370_000
@@ -57,11 +57,11 @@ _PS: Final = 10**12
 class Oscillator(Peripheral):
     """OSCCON, OSCTUN and the length of a Tcy."""
 
-    def __init__(self, kit: Kit) -> None:
-        super().__init__("osc", kit)
+    def __init__(self, context: ChipContext) -> None:
+        super().__init__("osc", context)
         self.con: Final = self.register("OSCCON")
         self.tun: Final = self.register("OSCTUN")
-        sfr = kit.chip.sfrs["OSCCON"]
+        sfr = context.chip.sfrs["OSCCON"]
         self._free: Final = sfr.writable
         self._flags: Final = sfr.clear_only
         word = sfr.address >> 1
@@ -85,19 +85,19 @@ class Oscillator(Peripheral):
         """Called once another `fcy` holds."""
         self.before_change: Final[list[Callable[[], None]]] = []
         """Called while the `fcy` before that still holds."""
-        kit.fcy = self.fcy
+        context.fcy = self.fcy
 
     # -- rates -------------------------------------------------------------------------------------------------------
 
     def _config(self, name: str) -> int:
-        return self.kit.chip.config["FOSC"].field(self.kit.program.setting("FOSC"), name)
+        return self.context.chip.config["FOSC"].field(self.context.program.setting("FOSC"), name)
 
     def _source_hz(self, code: int, tune: int) -> float:
         frc = FRC_HZ * (1 + _TUNE * (tune - 16 if tune & 8 else tune))
         if code == _PLL:
             source, multiplier = _MULTIPLIERS.get(self._config("FPR"), _UNPROGRAMMED)
-            return (frc if source == "frc" else self.kit.crystal) * multiplier
-        return {_LP: LP_HZ, _FRC: frc, _LPRC: LPRC_HZ}.get(code, self.kit.crystal)
+            return (frc if source == "frc" else self.context.crystal) * multiplier
+        return {_LP: LP_HZ, _FRC: frc, _LPRC: LPRC_HZ}.get(code, self.context.crystal)
 
     def fcy(self) -> float:
         """Instruction cycles per second at present: a quarter of the oscillator behind the postscaler (§3)."""
@@ -124,7 +124,7 @@ class Oscillator(Peripheral):
         """What is due after a time in seconds takes `factor` times as many Tcy from `cycle` on."""
         if factor == 1:
             return
-        for slot in self.kit.in_seconds:
+        for slot in self.context.in_seconds:
             due = self.events.due(slot)
             if cycle < due != NEVER:
                 self.events.set(slot, cycle + max(round((due - cycle) * factor), 1))
@@ -174,7 +174,7 @@ class Oscillator(Peripheral):
         """Present Tcy until a source that was off runs: start-up timer of crystals, then the PLL's lock (§3)."""
         wait = 0.0
         if code in (_LP, _EXTERNAL, _PLL):
-            wait = _START_PERIODS / (LP_HZ if code == _LP else self.kit.crystal)
+            wait = _START_PERIODS / (LP_HZ if code == _LP else self.context.crystal)
         if code == _PLL:
             wait += _LOCK_SECONDS
         return round(wait * self.fcy())
@@ -208,7 +208,7 @@ class Oscillator(Peripheral):
             self.abandon_switch()
             self._run_from(_FRC, self.now + 1)
             self.con["CF"] = 1
-            self.kit.wires.trap("OSCFAIL")
+            self.context.cpu_signals.trap("OSCFAIL")
 
     # -- power and reset ---------------------------------------------------------------------------------------------
 

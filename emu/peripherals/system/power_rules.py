@@ -12,7 +12,7 @@ from emu.system.rules import Number, Place, Reader, slot_of
 
 
 @dataclass(frozen=True, slots=True)
-class PowerPlaces:
+class PowerOperands:
     """Words, and the bits that count in them."""
 
     rcon: Place
@@ -28,14 +28,14 @@ class PowerPlaces:
     """0 while the CPU runs, IDLE or SLEEP."""
 
 
-def places_of(record: Record, chip: Chip, timeout: int, mode: Place) -> PowerPlaces:
+def places_of(record: Record, chip: Chip, timeout: int, mode: Place) -> PowerOperands:
     """From a chip's data; `timeout` is the watchdog's event slot."""
     rcon, word = chip.sfrs["RCON"], chip.config["FWDT"]
     config = record.fields["program.config"].offset + word.address - chip.program["config"].start
     bits = {name: 1 << rcon.fields[name][0] for name in ("IDLE", "WDTO", "SWDTEN")}
     stops = {sfr.address: sum(1 << lsb for name, (lsb, _width) in sfr.fields.items() if name.endswith("SIDL"))
              for sfr in chip.sfrs.values()}  # fmt: skip
-    return PowerPlaces(
+    return PowerOperands(
         rcon=Place(rcon.address, 16),
         idle=bits["IDLE"],
         wdto=bits["WDTO"],
@@ -54,14 +54,14 @@ def any_bit(m: Reader, words: tuple[tuple[Place, int], ...]) -> Number:
     return found
 
 
-def clear_watchdog(m: Reader, p: PowerPlaces) -> None:
+def clear_watchdog(m: Reader, p: PowerOperands) -> None:
     """CLRWDT: WDTO falls (UNVERIFIED: the family manual says so, §4), and nothing will expire."""
     m.need(any_bit(m, p.enables) == 0)
     m.put(p.rcon, m.get(p.rcon) & (0xFFFF & ~p.wdto))
     m.put(p.timeout, NEVER)
 
 
-def idle(m: Reader, p: PowerPlaces) -> None:
+def idle(m: Reader, p: PowerOperands) -> None:
     """PWRSAV #1: RCON tells, and all devices go on."""
     m.need(any_bit(m, p.stops) == 0)
     m.need(any_bit(m, p.enables) == 0)

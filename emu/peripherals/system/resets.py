@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from emu.peripherals.base import IDLE, SLEEP, Kit, Peripheral
+from emu.peripherals.base import IDLE, SLEEP, ChipContext, Peripheral
 from emu.peripherals.system.power_rules import any_bit, clear_watchdog, idle, places_of
 from emu.system.events import NEVER
 from emu.system.rules import Rule
@@ -21,8 +21,8 @@ CAUSES: Final = ("TRAPR", "IOPUWR", "EXTR", "SWR", "WDTO", "BOR", "POR")
 class Resets(Peripheral):
     """RCON: why the chip was reset, and what it slept through. Bits stay until software clears them."""
 
-    def __init__(self, kit: Kit) -> None:
-        super().__init__("rcon", kit)
+    def __init__(self, context: ChipContext) -> None:
+        super().__init__("rcon", context)
         self.rcon: Final = self.register("RCON")
 
     def stops_in(self, mode: int) -> bool:
@@ -34,7 +34,7 @@ class Resets(Peripheral):
         if cause not in CAUSES:
             raise ValueError(f"{cause!r} is no reset cause; expected one of {', '.join(CAUSES)}")
         if cause == "POR":  # POR and BOR set, LVDL = 0101
-            self.rcon.value = self.kit.chip.sfrs["RCON"].reset
+            self.rcon.value = self.context.chip.sfrs["RCON"].reset
             return
         self.rcon.value = kept
         self.rcon["SWDTEN"] = 0  # the watchdog that software switched on ends with every reset
@@ -44,16 +44,16 @@ class Resets(Peripheral):
 class Watchdog(Peripheral):
     """Free-running from the LPRC: resets the running chip, wakes the sleeping one."""
 
-    def __init__(self, kit: Kit, resets: Resets) -> None:
-        super().__init__("wdt", kit)
+    def __init__(self, context: ChipContext, resets: Resets) -> None:
+        super().__init__("wdt", context)
         self._resets: Final = resets
         self._mode: Final = self.cell("mode", "B")
         self._timeout: Final = self.slot("timeout", self._expired, in_seconds=True)
         resets.rcon.written_by(self._rcon_written)
-        kit.power_mode = lambda: self._mode.value
-        fields = kit.chip.sfrs["RCON"].fields
+        context.power_mode = lambda: self._mode.value
+        fields = context.chip.sfrs["RCON"].fields
         self._swdten, self._sleep = (1 << fields[name][0] for name in ("SWDTEN", "SLEEP"))
-        self._places: Final = places_of(self.bus.record, kit.chip, self._timeout, self._mode.place)
+        self._places: Final = places_of(self.bus.record, context.chip, self._timeout, self._mode.place)
         self.clearing: Final = Rule(self._places, fires=clear_watchdog)
         self.idling: Final = Rule(self._places, fires=idle)
 
@@ -74,10 +74,10 @@ class Watchdog(Peripheral):
     @property
     def period(self) -> int:
         """Time-out in Tcy, at least 1: 2 ms x A x B (§4), where a Tcy may take 8 ms."""
-        word = self.kit.chip.config["FWDT"]
-        stored = self.kit.program.setting("FWDT")
+        word = self.context.chip.config["FWDT"]
+        stored = self.context.program.setting("FWDT")
         counts = _COUNTER * _PRESCALE_A[word.field(stored, "FWPSA")] * (word.field(stored, "FWPSB") + 1)
-        return max(round(counts / WDT_HZ * self.kit.fcy()), 1)
+        return max(round(counts / WDT_HZ * self.context.fcy()), 1)
 
     def clear(self, cycle: int) -> None:
         """CLRWDT or PWRSAV in `cycle`: counter and prescalers restart, WDTO falls (§4)."""
@@ -105,9 +105,9 @@ class Watchdog(Peripheral):
         if self._mode.value in (IDLE, SLEEP):
             self._resets.rcon["WDTO"] = 1
             self._arm(due)
-            self.kit.wires.wake()
+            self.context.cpu_signals.wake()
         else:
-            self.kit.wires.reset("WDTO")
+            self.context.cpu_signals.reset("WDTO")
 
     def reset(self, power_on: bool) -> None:
         """Any reset clears the counter and both prescalers (§4)."""

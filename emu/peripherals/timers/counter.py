@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.chips.chip import TimerSite
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.timers.arithmetic import PRESCALE, advance, counts_until
 from emu.peripherals.timers.rules import PIN, TCY, WAVE
@@ -18,8 +18,8 @@ from emu.system.events import NEVER
 class Counter(Peripheral):
     """TMR, PR and TxCON, and what the count is or will be. 32 bits wide with T32 set and a partner above."""
 
-    def __init__(self, site: TimerSite, kit: Kit) -> None:
-        super().__init__(f"t{site.number}", kit)
+    def __init__(self, site: TimerSite, context: ChipContext) -> None:
+        super().__init__(f"t{site.number}", context)
         self.site: Final = site
         self.tmr: Final = self.register(f"TMR{site.number}")
         self.pr: Final = self.register(f"PR{site.number}")
@@ -73,7 +73,7 @@ class Counter(Peripheral):
         if source == TCY:
             return max(cycle - self.base.value, 0)
         if source == WAVE:
-            waveform = self.kit.pins.waveform(self._port, self._pin)
+            waveform = self.context.pins.waveform(self._port, self._pin)
             if waveform is not None and cycle > self.base.value:  # an edge in cycle c is counted in c + 1 (§7 rule 9)
                 return waveform.rises(self._pin, self.base.value - 1, cycle - 1)
         return 0
@@ -110,7 +110,7 @@ class Counter(Peripheral):
         clocks = (done + more) * self._prescale - self._phase.value
         if source == TCY:
             return self.base.value + clocks
-        waveform = self.kit.pins.waveform(self._port, self._pin)
+        waveform = self.context.pins.waveform(self._port, self._pin)
         edge = NEVER if waveform is None else waveform.nth_rise(self._pin, self.base.value - 1, clocks)
         return NEVER if edge == NEVER else edge + 1
 

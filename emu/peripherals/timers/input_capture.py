@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.chips.chip import CaptureSite
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.timers.timers import Timer
 from emu.system.events import NEVER
@@ -21,8 +21,8 @@ _DIVIDE: Final = {_FOURTH: 4, _SIXTEENTH: 16}
 class Capture(Peripheral):
     """One capture channel."""
 
-    def __init__(self, site: CaptureSite, kit: Kit, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
-        super().__init__(f"ic{site.number}", kit)
+    def __init__(self, site: CaptureSite, context: ChipContext, interrupts: Interrupts, timers: dict[int, Timer]) -> None:
+        super().__init__(f"ic{site.number}", context)
         self._line: Final = interrupts.line(site.irq)
         self._timers: Final = timers
         self.buf: Final = self.register(f"IC{site.number}BUF")
@@ -42,7 +42,7 @@ class Capture(Peripheral):
         self._capture: Final = self.slot("capture", self._due)
         self.autobaud = False
         """The UART's receive pin is connected instead of the channel's own."""
-        kit.pins.watch(site.pin, lambda cycle, changed, levels: self._own_edge(cycle, bool(levels & changed)))
+        context.pins.watch(site.pin, lambda cycle, changed, levels: self._own_edge(cycle, bool(levels & changed)))
 
     def _own_edge(self, cycle: int, rising: bool) -> None:
         if not self.autobaud:
@@ -51,7 +51,7 @@ class Capture(Peripheral):
     def edge(self, cycle: int, rising: bool) -> None:
         """The pin changes in `cycle`."""
         mode = self.con["ICM"]
-        if mode == _WAKE and rising and self.kit.power_mode():
+        if mode == _WAKE and rising and self.context.power_mode():
             self._line.request()
         if self.is_frozen or not self._wants(mode, rising):
             return
@@ -100,7 +100,7 @@ class Capture(Peripheral):
         return value
 
     def _con_written(self, old: int, new: int, _lanes: int) -> None:
-        mode = (1 << self.kit.chip.sfrs[self.con.name].fields["ICM"][1]) - 1
+        mode = (1 << self.context.chip.sfrs[self.con.name].fields["ICM"][1]) - 1
         if new & mode == _OFF:
             self.power_up(power_on=False)
             self.con["ICBNE"] = self.con["ICOV"] = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from emu.chips.chip import CompareSite
-from emu.peripherals.base import Kit, Peripheral
+from emu.peripherals.base import ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports.ports import Port
@@ -27,12 +27,12 @@ class Compare(Peripheral):
     def __init__(
         self,
         site: CompareSite,
-        kit: Kit,
+        context: ChipContext,
         interrupts: Interrupts,
         timers: dict[int, Timer],
         ports: dict[int, Port],
     ) -> None:
-        super().__init__(f"oc{site.number}", kit)
+        super().__init__(f"oc{site.number}", context)
         self._line: Final = interrupts.line(site.irq)
         self._timers: Final = timers
         self.r: Final = self.register(f"OC{site.number}R")
@@ -49,7 +49,7 @@ class Compare(Peripheral):
         self._phase: Final = self.cell("phase", "B")
         self._pin_event: Final = self.slot("pin", self._pin_due)
         self._flag_event: Final = self.slot("flag", lambda _due: self._line.request())
-        kit.pins.watch(site.fault_pin, self._fault_edge)
+        context.pins.watch(site.fault_pin, self._fault_edge)
 
     @property
     def _timer(self) -> Timer:
@@ -139,7 +139,7 @@ class Compare(Peripheral):
         self._level.value = mode == _CLEAR_ONCE or preset
         self._phase.value = _RISE
         self._port.own(self._pin, drive=True, level=self._level.value)
-        if mode == _PWM_FAULT and not self.kit.pins.level[self._fault_port] & self._fault_pin:
+        if mode == _PWM_FAULT and not self.context.pins.level[self._fault_port] & self._fault_pin:
             self._fault()
         else:
             self._plan()
@@ -165,12 +165,12 @@ class Compare(Peripheral):
     def thaw(self, cycle: int) -> None:
         """The time base may have gone on alone. A change decided when the clock stopped still happens (§9): with PWM
         the pin moves in the cycle of the match, else in the next."""
-        waiting = self.held_since(self._pin_event)
+        waiting = self.remaining_delay(self._pin_event)
         super().thaw(cycle)
         if waiting > (not self._is_pwm):
             self._plan()
 
-    def give_back(self) -> None:
+    def release_pins(self) -> None:
         """The channel's pin."""
         self._port.disown(self._pin)
 
@@ -179,4 +179,4 @@ class Compare(Peripheral):
         on, chosen = self.con["OCM"] != _OFF, self._timer
         for number in (2, 3):
             timer = self._timers[number]
-            timer.tell_changes(self._plan, on and timer is chosen)
+            timer.listen_to_changes(self._plan, on and timer is chosen)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from emu.peripherals.pins import Described
+from emu.peripherals.pins import RuleWaveform
 from emu.peripherals.timers.arithmetic import PRESCALE
 from emu.system.events import NEVER
 from emu.system.rules import Line, Number, Place, Reader, Slot, request
@@ -19,7 +19,7 @@ STOPPED, TCY, PIN, WAVE = range(4)
 
 
 @dataclass(frozen=True, slots=True)
-class TimerPlaces:
+class TimerOperands:
     """Registers and cells of one timer."""
 
     tmr: Place
@@ -46,7 +46,7 @@ class TimerPlaces:
     line: Line
 
 
-def read_count(m: Reader, t: TimerPlaces) -> Number:
+def read_count(m: Reader, t: TimerOperands) -> Number:
     """TMR as it is read: (stored + ticks since base) modulo (PR + 1), while the stored count is not above PR."""
     tick, stored, top = m.get(t.tick), m.get(t.tmr), m.get(t.pr)
     m.need((tick != 0) & (stored <= top) & (m.get(t.frozen) == NEVER))
@@ -55,10 +55,10 @@ def read_count(m: Reader, t: TimerPlaces) -> Number:
     return m.mod(stored + clocks, top + 1)
 
 
-def write_count(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
+def write_count(m: Reader, t: TimerOperands, value: Number, lanes: int) -> bool:
     """The written count stands from the next cycle, with an empty prescaler (§7 rules 6, 8).
 
-    Of a timer on a described clock only clearing is here, where the device has foretold what that leads to; of one that
+    Of a timer on a described clock only clearing is here, where the device has predicted what that leads to; of one that
     stands with no match on its way, all.
     """
     if lanes != 0xFFFF:
@@ -67,23 +67,23 @@ def write_count(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
     tick, limit, period = m.get(t.tick), m.get(t.pr), m.get(t.period)
     plain = (period != 0) & (limit != 0)
     known = m.below(m.now, m.get(t.clear_until)) & (m.get(t.clear_from) <= m.now) & (due != following)
-    foretold = (start == 0) & known
+    predicted = (start == 0) & known
     still = (m.get(t.source) == STOPPED) & ((m.get(t.pair) & t.t32) == 0) & (due == NEVER)
-    m.need((plain | foretold | still) & _alone(m, t))
+    m.need((plain | predicted | still) & _alone(m, t))
     stands = plain & (due == following)
     m.put(t.before, m.select(plain, m.get(t.before), start))
     m.put(t.phase, m.select(plain, m.get(t.phase), 0))
-    posted = m.select(foretold, m.get(t.clear_due), following + _counts_until(m, start, limit) * tick + 1)
+    posted = m.select(predicted, m.get(t.clear_due), following + _counts_until(m, start, limit) * tick + 1)
     posted = m.select(still, NEVER, posted)
     m.put(t.tmr, start)
     m.put(t.base, following)
     m.put(t.clear_until, m.select(still, 0, m.get(t.clear_until)))
-    m.put(t.period, m.select(foretold | still | stands, 0, (limit + 1) * tick))
+    m.put(t.period, m.select(predicted | still | stands, 0, (limit + 1) * tick))
     m.post(t.match, m.select(stands, due, posted))
     return True
 
 
-def write_period(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
+def write_period(m: Reader, t: TimerOperands, value: Number, lanes: int) -> bool:
     """Count up to the next cycle with the old PR, then go on with the new one."""
     if lanes != 0xFFFF:
         return False
@@ -105,11 +105,11 @@ def write_period(m: Reader, t: TimerPlaces, value: Number, lanes: int) -> bool:
 class ClockPin:
     """Where a timer's clock comes in."""
 
-    pins: Mapping[tuple[int, int], tuple[Described, Place]]
+    pins: Mapping[tuple[int, int], tuple[RuleWaveform, Place]]
     name: tuple[int, int]
 
     @property
-    def described(self) -> tuple[Described, Place] | None:
+    def described(self) -> tuple[RuleWaveform, Place] | None:
         """The waveform on it that every engine can read, and the place that says whether it is there."""
         return self.pins.get(self.name)
 
@@ -120,10 +120,10 @@ class ClockPin:
 
 
 @dataclass(frozen=True, slots=True)
-class MatchPlaces:
+class MatchOperands:
     """What a match looks at, too."""
 
-    timer: TimerPlaces
+    timer: TimerOperands
     con: Place
     writable: int
     ton: int
@@ -134,7 +134,7 @@ class MatchPlaces:
     pin: int
 
 
-def fire_match(m: Reader, p: MatchPlaces) -> None:
+def fire_match(m: Reader, p: MatchOperands) -> None:
     """A match of a timer that interrupts periodically (§7 rule 2), or on a described clock."""
     t, clock = p.timer, p.clock.described
     period = m.get(t.period)
@@ -148,16 +148,16 @@ def fire_match(m: Reader, p: MatchPlaces) -> None:
         waves = counts & (m.get(t.pr) != 0) & (m.get(t.listeners) == 0) & (period == 0)
         m.need((period != 0) | waves)
         cells = (t.clear_from, t.clear_until, t.clear_due)
-        due, *foretold = m.either(
-            waves, lambda: next_edges(m, p, lambda after, count: wave.text_of_rise(m, p.pin, after, count)),
+        due, *predicted = m.either(
+            waves, lambda: next_edges(m, p, lambda after, count: wave.nth_rise_rule(m, p.pin, after, count)),
             m.now + period, *(m.get(cell) for cell in cells))  # fmt: skip
-        for cell, value in zip(cells, foretold, strict=True):
+        for cell, value in zip(cells, predicted, strict=True):
             m.put(cell, value)
         m.post(t.match, due)
     request(m, t.line, m.now)
 
 
-def next_edges(m: Reader, p: MatchPlaces, nth_rise: Callable[[Number, Number], Number]) -> tuple[Number, ...]:
+def next_edges(m: Reader, p: MatchOperands, nth_rise: Callable[[Number, Number], Number]) -> tuple[Number, ...]:
     """After a match on a described clock: when the next one is due, and what clearing TMR leads to, because firmware
     that counts lines does that now: from when until when, and the match it leads to."""
     limit = m.get(p.timer.pr)
@@ -170,7 +170,7 @@ def next_edges(m: Reader, p: MatchPlaces, nth_rise: Callable[[Number, Number], N
     return due(m.now - 2, (limit + 1) * prescale), m.now, nth_rise(m.now, 1), due(m.now, limit * prescale)
 
 
-def switch(m: Reader, p: MatchPlaces, value: Number, lanes: int) -> bool:
+def switch(m: Reader, p: MatchOperands, value: Number, lanes: int) -> bool:
     """TON changes and nothing else, on a described clock. Off: the count is known if there was no edge since it was
     written, or just those to the match. On: counting begins with the next cycle. The prescaler is empty (§7 rule 6).
     Nothing changes: that is no new course."""
@@ -188,9 +188,9 @@ def switch(m: Reader, p: MatchPlaces, value: Number, lanes: int) -> bool:
     prescale = m.table(PRESCALE, new >> p.tckps & len(PRESCALE) - 1)
     clocks = _counts_until(m, tmr, limit) * prescale - m.select(starts, 0, m.get(t.phase))
     after = m.select(starts, m.now, m.get(t.base) - 1)
-    edge = wave.text_of_rise(m, p.pin, after, clocks)
+    edge = wave.nth_rise_rule(m, p.pin, after, clocks)
     matched = m.select(starts, 0, m.below(m.now, edge) == 0)
-    following = wave.text_of_rise(m, p.pin, after, m.select(matched, clocks, 0) + 1)
+    following = wave.nth_rise_rule(m, p.pin, after, m.select(matched, clocks, 0) + 1)
     m.need(same | starts | m.below(m.now, following))
     count, due = m.select(matched, limit, tmr), m.get(t.match.due)
     stands = (due == m.now + 1) | (starts & (due == m.now + 2) & (count == limit))
@@ -204,7 +204,7 @@ def switch(m: Reader, p: MatchPlaces, value: Number, lanes: int) -> bool:
     return True
 
 
-def _alone(m: Reader, t: TimerPlaces) -> Number:
+def _alone(m: Reader, t: TimerOperands) -> Number:
     """Nobody need be told of changes, and the clock runs."""
     return (m.get(t.listeners) == 0) & (m.get(t.frozen) == NEVER)
 

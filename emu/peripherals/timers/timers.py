@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Final
 
 from emu.chips.chip import TimerSite
-from emu.peripherals.base import IDLE, SLEEP, Kit
+from emu.peripherals.base import IDLE, SLEEP, ChipContext
 from emu.peripherals.timers.arithmetic import PRESCALE, advance
 from emu.peripherals.timers.counter import Counter
 from emu.peripherals.timers.rules import (
@@ -20,8 +20,8 @@ from emu.peripherals.timers.rules import (
     TCY,
     WAVE,
     ClockPin,
-    MatchPlaces,
-    TimerPlaces,
+    MatchOperands,
+    TimerOperands,
     fire_match,
     next_edges,
     read_count,
@@ -37,8 +37,8 @@ from emu.system.rules import Rule, place_of, slot_of
 class Timer(Counter):
     """One 16-bit timer, or, with T32 set, a 32-bit timer that owns its partner's registers too."""
 
-    def __init__(self, site: TimerSite, kit: Kit) -> None:
-        super().__init__(site, kit)
+    def __init__(self, site: TimerSite, context: ChipContext) -> None:
+        super().__init__(site, context)
         self.line: Final = self.irq(site.irq)
         self.low: Timer | None = None
         """For a type C timer: the type B timer that takes it over with T32."""
@@ -68,37 +68,37 @@ class Timer(Counter):
         self.pr.written_by(self._course_written)
         self.con.written_by(self._con_written)
         if site.clock_pin:
-            kit.pins.watch(site.clock_pin, self._edge)
-        kit.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
+            context.pins.watch(site.clock_pin, self._edge)
+        context.pins.on_waveform_change(self._waveform_changes, self._waveform_changed)
 
-    def _registers(self) -> TimerPlaces:
+    def _registers(self) -> TimerOperands:
         cells = ("base", "tick", "period", "before", "phase", "clear_from", "clear_until", "clear_due", "listeners",
                  "frozen")  # fmt: skip
         places = {name: place_of(self.record, f"{self.name}.{name}") for name in cells}
         match, line = slot_of(self.record, self._match), self.line.line
         pair = self.con if self.site.kind != "C" else self.register(f"T{self.site.partner}CON")
-        return TimerPlaces(
+        return TimerOperands(
             tmr=self.tmr.place,
             pr=self.pr.place,
             source=self._source.place,
             pair=pair.place,
-            t32=1 << self.kit.chip.sfrs[pair.name].fields["T32"][0] if self.site.kind != "A" else 0,
+            t32=1 << self.context.chip.sfrs[pair.name].fields["T32"][0] if self.site.kind != "A" else 0,
             match=match,
             line=line,
             **places,
         )
 
-    def _match_places(self, places: TimerPlaces) -> MatchPlaces:
-        con = self.kit.chip.sfrs[self.con.name]
+    def _match_places(self, places: TimerOperands) -> MatchOperands:
+        con = self.context.chip.sfrs[self.con.name]
         ton, tcs = (1 << con.fields[name][0] for name in ("TON", "TCS"))
-        return MatchPlaces(
+        return MatchOperands(
             timer=places,
             con=self.con.place,
             writable=con.writable,
             ton=ton,
             tcs=tcs,
             tckps=con.fields["TCKPS"][0],
-            clock=ClockPin(self.kit.pins.described, (self._port, self._pin)),
+            clock=ClockPin(self.context.pins.described, (self._port, self._pin)),
             pin=self._pin,
         )
 
@@ -160,8 +160,8 @@ class Timer(Counter):
         if self.is_taken or not self.con["TON"]:
             return STOPPED
         if self.con["TCS"]:
-            return WAVE if self.kit.pins.waveform(self._port, self._pin) is not None else PIN
-        if self.con["TGATE"] and not self.kit.pins.level[self._port] & self._pin:
+            return WAVE if self.context.pins.waveform(self._port, self._pin) is not None else PIN
+        if self.con["TGATE"] and not self.context.pins.level[self._port] & self._pin:
             return STOPPED
         return TCY
 
@@ -186,14 +186,14 @@ class Timer(Counter):
     def _post_edges(self, due: int) -> None:
         """After a match on a described clock that not every engine can read."""
         self.clear_until.value = 0
-        waveform, pin = self.kit.pins.waveform(self._port, self._pin), self._pin
+        waveform, pin = self.context.pins.waveform(self._port, self._pin), self._pin
         if waveform is None or self.is_wide or not self.limit or self._on_change:
             self._post(due - 1)
             return
-        following, *foretold = next_edges(
+        following, *predicted = next_edges(
             self.bus.integers, self._places, lambda after, count: waveform.nth_rise(pin, after, count))  # fmt: skip
         self.events.set(self._match, following)
-        for cell, value in zip((self.clear_from, self.clear_until, self.clear_due), foretold, strict=True):
+        for cell, value in zip((self.clear_from, self.clear_until, self.clear_due), predicted, strict=True):
             cell.value = value
 
     def high_written(self, new: int, lanes: int) -> None:
@@ -209,9 +209,9 @@ class Timer(Counter):
         shift = 0 if owner is self else 16
         previous = owner.limit & ~(0xFFFF << shift) | old << shift
         if old != new:
-            owner.recourse(previous)
+            owner.replan(previous)
 
-    def recourse(self, previous_limit: int) -> None:
+    def replan(self, previous_limit: int) -> None:
         """Count up to the next cycle with `previous_limit`, then plan with the present registers."""
         self._fold(self.now + 1, self._prescale, previous_limit)
         self._plan()
@@ -226,7 +226,7 @@ class Timer(Counter):
 
     @property
     def _t32(self) -> int:
-        return 1 << self.kit.chip.sfrs[self.con.name].fields["T32"][0] if self.high is not None else 0
+        return 1 << self.context.chip.sfrs[self.con.name].fields["T32"][0] if self.high is not None else 0
 
     def _join_changed(self, old: int, new: int) -> None:
         """T32 was set or cleared: both halves freeze their counts under the old arrangement, then start anew."""
@@ -251,7 +251,7 @@ class Timer(Counter):
         UNVERIFIED: the data sheet lists any write to TxCON as clearing it; here only those that change the clock.
         """
         present = self.con.value
-        lsb, width = self.kit.chip.sfrs[self.con.name].fields["TCKPS"]
+        lsb, width = self.context.chip.sfrs[self.con.name].fields["TCKPS"]
         old_prescale = PRESCALE[old_con >> lsb & (1 << width) - 1]
         self._fold(self.now + 1, old_prescale, self.limit)
         clock_bits = sum(((1 << w) - 1) << b for b, w in map(self._field, ("TON", "TCKPS", "TCS", "TGATE")))
@@ -262,7 +262,7 @@ class Timer(Counter):
         self._plan()
 
     def _field(self, name: str) -> tuple[int, int]:
-        return self.kit.chip.sfrs[self.con.name].fields[name]
+        return self.context.chip.sfrs[self.con.name].fields[name]
 
     # -- outside clock and gate --------------------------------------------------------------------------------------
 
@@ -318,7 +318,7 @@ class Timer(Counter):
             self._listeners.value = len(self._on_change) + len(self._on_match)
             self._plan()
 
-    def tell_changes(self, on_change: Callable[[], None], wanted: bool) -> None:
+    def listen_to_changes(self, on_change: Callable[[], None], wanted: bool) -> None:
         """Call `on_change()` whenever the course of the count has changed, or no longer (output compare, §9)."""
         if wanted != (on_change in self._on_change):
             self._on_change.append(on_change) if wanted else self._on_change.remove(on_change)
@@ -363,7 +363,7 @@ class Timer(Counter):
     def thaw(self, cycle: int) -> None:
         """Gate and described clocks did not wait: what they are now decides how it goes on. A match that had been
         counted when the clock stopped still raises its flag."""
-        waiting = self.held_since(self._match)
+        waiting = self.remaining_delay(self._match)
         super().thaw(cycle)
         if not self.is_taken and self.con["TON"] and (self.con["TCS"] or self.con["TGATE"]):
             self._source.value = self._choose_source()
@@ -374,7 +374,7 @@ class Timer(Counter):
             self._empty_prescaler()
         self._tell()
 
-    def switched_off(self) -> None:
+    def before_disable(self) -> None:
         """The upper half of a pair is a timer of its own without the lower one."""
         if self.is_wide:
             joined = self.con.value
@@ -394,10 +394,10 @@ class Timer(Counter):
         return count & 0xFFFF
 
 
-def timers(kit: Kit) -> dict[int, Timer]:
+def timers(context: ChipContext) -> dict[int, Timer]:
     """The timers of a chip by number, paired."""
-    by_number = {site.number: Timer(site, kit) for site in kit.chip.timers}
-    for site in kit.chip.timers:
+    by_number = {site.number: Timer(site, context) for site in context.chip.timers}
+    for site in context.chip.timers:
         if site.kind == "B":
             by_number[site.number].pair(by_number[site.partner])
     return by_number

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Final
 
 from emu.peripherals.uart.frame import FRAMING_MARK, PARITY_MARK, data_of, first_stop, is_nine, judge, length, pack
-from emu.peripherals.uart.rx_line import CAPACITY, ERRORS, LinePlaces
+from emu.peripherals.uart.rx_line import CAPACITY, ERRORS, RxQueueOperands
 from emu.system.events import NEVER
 from emu.system.rules import Line, Number, Place, Reader, Slot, request
 
@@ -29,7 +29,7 @@ CHARACTER: Final = 0x1FF
 
 
 @dataclass(frozen=True, slots=True)
-class UartPlaces:
+class UartOperands:
     """Registers and cells of one UART."""
 
     mode: Place
@@ -69,7 +69,7 @@ class UartPlaces:
     watched: Place
     """Pins of TX's port whose edges somebody wants to see, TX among them while edges are logged."""
     tx_pin: int
-    line: LinePlaces
+    line: RxQueueOperands
     send_slot: Slot
     receive_slot: Slot
     line_slot: Slot
@@ -78,7 +78,7 @@ class UartPlaces:
 
 
 # -- transmit --------------------------------------------------------------------------------------------------------
-def push(m: Reader, u: UartPlaces, value: Number, lanes: int) -> bool:
+def push(m: Reader, u: UartOperands, value: Number, lanes: int) -> bool:
     """TXREG written: the low byte pushes; a full FIFO drops the character (§10.1)."""
     mode, status, count, due = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.send_slot.due)
     free = u.writable & lanes
@@ -95,18 +95,18 @@ def push(m: Reader, u: UartPlaces, value: Number, lanes: int) -> bool:
     return True
 
 
-def bit_time(m: Reader, u: UartPlaces) -> Number:
+def bit_time(m: Reader, u: UartOperands) -> Number:
     """Length of a bit in Tcy: 16 (BRG + 1)."""
     return (m.get(u.brg) + 1) << 4
 
 
-def edge(m: Reader, u: UartPlaces, cycle: Number, step: Number) -> Number:
+def edge(m: Reader, u: UartOperands, cycle: Number, step: Number) -> Number:
     """The first edge of the free-running baud clock, divided to `step` Tcy, that is not before `cycle`."""
     clock = m.get(u.clock)
     return clock + m.div(cycle - clock + step - 1, step) * step
 
 
-def send_next(m: Reader, u: UartPlaces, cycle: Number) -> None:
+def send_next(m: Reader, u: UartOperands, cycle: Number) -> None:
     """FIFO to TSR: the start bit begins at the next edge of the bit clock (§10.1). An empty FIFO: TRMT rises."""
     mode, status, count, ended = m.get(u.mode), m.get(u.sta), m.get(u.tx_count), m.get(u.end)
     waits, data, bit = count != 0, m.get(u.tx), bit_time(m, u)
@@ -128,7 +128,7 @@ def send_next(m: Reader, u: UartPlaces, cycle: Number) -> None:
 
 
 # -- receive ---------------------------------------------------------------------------------------------------------
-def arrive(m: Reader, u: UartPlaces, start: Number, wave: Number, sampled: Number, bit_q8: Number) -> None:
+def arrive(m: Reader, u: UartOperands, start: Number, wave: Number, sampled: Number, bit_q8: Number) -> None:
     """A frame's start bit falls in cycle `start`; `wave` is what is on the line, `sampled` what will be seen of it,
     `bit_q8` the sender's bit time in Tcy/256."""
     mode, tick = m.get(u.mode), m.get(u.brg) + 1
@@ -140,14 +140,14 @@ def arrive(m: Reader, u: UartPlaces, start: Number, wave: Number, sampled: Numbe
     m.put(u.rx_start, start)
 
 
-def begin(m: Reader, u: UartPlaces) -> None:
+def begin(m: Reader, u: UartOperands) -> None:
     """The start bit has begun."""
     m.put(u.receiving, SAMPLING)
     m.put(u.sta, m.get(u.sta) & (0xFFFF & ~u.bit["RIDLE"]))
     m.post(u.receive_slot, m.get(u.done))
 
 
-def shown(u: UartPlaces, status: Number, count: Number, top: Number) -> Number:
+def shown(u: UartOperands, status: Number, count: Number, top: Number) -> Number:
     """`status` with URXDA, PERR and FERR, which belong to the character at the top of the FIFO (§10.2)."""
     bit, some = u.bit, count != 0
     others = status & (0xFFFF & ~(bit["URXDA"] | bit["PERR"] | bit["FERR"]))
@@ -156,7 +156,7 @@ def shown(u: UartPlaces, status: Number, count: Number, top: Number) -> Number:
     return others | some * bit["URXDA"] | wrong * bit["PERR"] | broken * bit["FERR"]
 
 
-def receive(m: Reader, u: UartPlaces) -> None:
+def receive(m: Reader, u: UartOperands) -> None:
     """A character is complete: FIFO, or the shift register when the FIFO is full (§10.2)."""
     bit, mode, count, character = u.bit, m.get(u.mode), m.get(u.rx_count), m.get(u.incoming)
     status = m.get(u.sta) | bit["RIDLE"]
@@ -176,7 +176,7 @@ def receive(m: Reader, u: UartPlaces) -> None:
     request(m, u.receive_line, m.now, taken & ((wanted == 0) | (wanted == after)))
 
 
-def pop(m: Reader, u: UartPlaces) -> Number:
+def pop(m: Reader, u: UartOperands) -> Number:
     """RXREG read: the top of the FIFO, which goes; an empty one shows the last character again."""
     count, data, before = m.get(u.rx_count), m.get(u.rx), m.get(u.sta)
     left = m.select(count == 0, 0, count - 1)
@@ -190,7 +190,7 @@ def pop(m: Reader, u: UartPlaces) -> Number:
 
 
 # -- rules -----------------------------------------------------------------------------------------------------------
-def fire_send(m: Reader, u: UartPlaces) -> None:
+def fire_send(m: Reader, u: UartOperands) -> None:
     """A frame has ended, or a character waits for the idle shift register."""
     mode, count, told = m.get(u.mode), m.get(u.tx_count), m.get(u.sent_count)
     sent = m.get(u.shifting) != 0
@@ -203,13 +203,13 @@ def fire_send(m: Reader, u: UartPlaces) -> None:
     send_next(m, u, m.now)
 
 
-def fire_receive(m: Reader, u: UartPlaces) -> None:
+def fire_receive(m: Reader, u: UartOperands) -> None:
     """The middle of the stop bit."""
     m.need(m.get(u.receiving) == SAMPLING)
     receive(m, u)
 
 
-def fire_line(m: Reader, u: UartPlaces) -> None:
+def fire_line(m: Reader, u: UartOperands) -> None:
     """A start bit falls on RX: a frame without errors, at the receiver's own rate."""
     line, mode, count, head = u.line, m.get(u.mode), m.get(u.line.count), m.get(u.line.head)
     data, following = m.get(line.data, head), m.select(head + 1 == CAPACITY, 0, head + 1)

@@ -21,13 +21,13 @@ PARITY_ERROR: Final = 0x400
 """The parity bit is inverted."""
 BREAK: Final = 0x800
 """The line is low for the whole frame."""
-PATIENT: Final = 0x1000
+WAIT_FOR_RECEIVER: Final = 0x1000
 """The frame is not sent before the receiver is enabled."""
 ERRORS: Final = FRAMING_ERROR | PARITY_ERROR | BREAK
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class QueuedFrame:
     """One frame: earliest cycle of its start bit, data with error marks, bit time in Tcy/256 (0 = the receiver's)."""
 
     earliest: int
@@ -36,7 +36,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class LinePlaces:
+class RxQueueOperands:
     """A ring of `CAPACITY` frames, and whether more of them wait outside."""
 
     earliest: Place
@@ -47,7 +47,7 @@ class LinePlaces:
     more: Place
 
 
-class SerialLine:
+class RxQueue:
     """First in, first out."""
 
     def __init__(self, record: Record, name: str) -> None:
@@ -65,26 +65,26 @@ class SerialLine:
         self._more: Final = reserve("line.more", "B")
         self._u16: Final = record.u16
         self._u8: Final = record.u8
-        places = (place_of(record, f"{name}.line.{one.name}") for one in fields(LinePlaces))
-        self.places: Final = LinePlaces(*places)
+        places = (place_of(record, f"{name}.line.{one.name}") for one in fields(RxQueueOperands))
+        self.places: Final = RxQueueOperands(*places)
         """For rules."""
-        self.backlog: Final[deque[Frame]] = deque()
+        self.backlog: Final[deque[QueuedFrame]] = deque()
         """What does not fit into the record yet."""
 
     def __len__(self) -> int:
         return self._u16[self._count] + len(self.backlog)
 
-    def put(self, frames: Iterable[Frame]) -> None:
+    def put(self, frames: Iterable[QueuedFrame]) -> None:
         """Append frames."""
         self.backlog.extend(frames)
         self._top_up()
 
-    def head(self) -> Frame | None:
+    def head(self) -> QueuedFrame | None:
         """The next frame, left in place."""
         if not self._u16[self._count]:
             return None
         index = self._u16[self._head]
-        return Frame(self._earliest[index], self._data[index], self._bit[index])
+        return QueuedFrame(self._earliest[index], self._data[index], self._bit[index])
 
     def drop(self) -> None:
         """Remove the next frame."""

@@ -30,7 +30,7 @@ class TxPin:
         """Edges of TX clock nothing inside the chip."""
         return NEVER
 
-    def stands_until(self, cycle: int) -> int:
+    def constant_until(self, cycle: int) -> int:
         """Firmware does not read its own TX pin often: nothing is promised."""
         return cycle
 

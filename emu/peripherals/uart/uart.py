@@ -12,7 +12,7 @@ from re import Match
 from typing import Final
 
 from emu.chips.chip import UartSite
-from emu.peripherals.base import SLEEP, Kit, Peripheral
+from emu.peripherals.base import SLEEP, ChipContext, Peripheral
 from emu.peripherals.interrupt_lines import Interrupts
 from emu.peripherals.pins import parse_pin
 from emu.peripherals.ports.ports import Port
@@ -24,7 +24,7 @@ from emu.peripherals.uart.rules import (
     FIFO,
     QUIET,
     SENT,
-    UartPlaces,
+    UartOperands,
     arrive,
     begin,
     bit_time,
@@ -38,9 +38,9 @@ from emu.peripherals.uart.rules import (
     send_next,
     shown,
 )
-from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR, PATIENT, Frame, SerialLine
+from emu.peripherals.uart.rx_line import BREAK, FRAMING_ERROR, PARITY_ERROR, WAIT_FOR_RECEIVER, QueuedFrame, RxQueue
 from emu.peripherals.uart.tx_pin import TxPin
-from emu.peripherals.wait import Ear, Pattern
+from emu.peripherals.wait import OutputMatcher, Pattern
 from emu.system.events import NEVER
 from emu.system.observers import Listeners
 from emu.system.rules import Rule, place_of, slot_of
@@ -51,8 +51,8 @@ _NO_SENT: Final = memoryview(bytes(8 * SENT)).cast("Q")
 class Uart(Peripheral):
     """One UART. Bit time is 16 (BRG + 1) Tcy (§10)."""
 
-    def __init__(self, site: UartSite, kit: Kit, interrupts: Interrupts, ports: dict[int, Port]) -> None:
-        super().__init__(f"u{site.number}", kit)
+    def __init__(self, site: UartSite, context: ChipContext, interrupts: Interrupts, ports: dict[int, Port]) -> None:
+        super().__init__(f"u{site.number}", context)
         self.site: Final = site
         self._interrupts: Final = interrupts
         prefix = f"U{site.number}"
@@ -67,7 +67,7 @@ class Uart(Peripheral):
         self.txreg.computed(lambda: 0)
         self.rxreg.computed(lambda: self._rx[0] & CHARACTER)
         self.brg.written_by(self._brg_written)
-        self._ear: Ear | None = None
+        self._ear: OutputMatcher | None = None
         self._at_once: Final = self.cell("at_once", "B")
         """Whether somebody must hear of a character in the cycle in which it has left."""
         self._sent: Final = self.array("sent", "Q", SENT)
@@ -75,7 +75,7 @@ class Uart(Peripheral):
         self._sent_count: Final = self.cell("sent_count", "B")
         self._sent_to: Final[Listeners[[int, int]]] = Listeners(self.events, self._at_once.set)
         self._capture: Capture | None = None
-        self._uarten: Final = 1 << kit.chip.sfrs[prefix + "MODE"].fields["UARTEN"][0]
+        self._uarten: Final = 1 << context.chip.sfrs[prefix + "MODE"].fields["UARTEN"][0]
         tx_port, self._tx_pin = parse_pin(site.tx_pin)
         rx_port, self._rx_pin = parse_pin(site.rx_pin)
         self._tx_port: Final = ports[tx_port]
@@ -94,7 +94,7 @@ class Uart(Peripheral):
         self._bit_began: Final = self.moment("bit_began", NEVER)
         """Cycle the bit in bit 0 of the wave begins in: the start bit, or the one in which BRG was written."""
         self._tx_event: Final = self.slot("tx", self._tx_due)
-        self._pin: Final = TxPin(kit.pins, tx_port, self._tx_pin, self._tx_level)
+        self._pin: Final = TxPin(context.pins, tx_port, self._tx_pin, self._tx_level)
 
         self._rx: Final = self.array("rx", "H", FIFO + 1)
         """FIFO; data in bits 8:0, errors above. The last element is the character in the shift register."""
@@ -112,20 +112,20 @@ class Uart(Peripheral):
         self._edge_bit: Final = self.cell("edge_bit", "B")
         self._edge_event: Final = self.slot("edge", self._edge_due)
 
-        self.line: Final = SerialLine(self.record, self.name)
+        self.line: Final = RxQueue(self.record, self.name)
         self._line_free: Final = self.cell("line_free", "Q")
         """First cycle the line is free for the next frame."""
         self._line_event: Final = self.events.slot(f"{self.name}.line", self._line_due)
         self._places: Final = self._registers()
         self._ruled(self._places)
 
-    def _registers(self) -> UartPlaces:
-        sfrs = self.kit.chip.sfrs
+    def _registers(self) -> UartOperands:
+        sfrs = self.context.chip.sfrs
         cells = ("clock", "tx", "tx_count", "shifting", "frame", "wave", "start", "end", "bit_began", "rx", "rx_count",
                  "held", "receiving", "incoming", "done", "rx_wave", "rx_start", "rx_bit", "line_free", "frozen",
                  "at_once", "sent", "sent_count")  # fmt: skip
         fields = {**sfrs[self.mode.name].fields, **sfrs[self.sta.name].fields}
-        return UartPlaces(
+        return UartOperands(
             mode=self.mode.place,
             sta=self.sta.place,
             brg=self.brg.place,
@@ -144,7 +144,7 @@ class Uart(Peripheral):
             **{name: place_of(self.record, f"{self.name}.{name}") for name in cells},
         )
 
-    def _ruled(self, places: UartPlaces) -> None:
+    def _ruled(self, places: UartOperands) -> None:
         """What has rules; hooks for who has taken the rules off the bus run the same text."""
         integers = self.bus.integers
         self.txreg.ruled(Rule(places, writes=push))
@@ -190,7 +190,7 @@ class Uart(Peripheral):
         Raises ExpectError (an AssertionError) with what was said instead, and with the fault if there was one.
         """
         if self._ear is None:
-            self._ear = Ear(self.name.upper().replace("U", "UART", 1), self.kit.wires, self.kit.fcy, lambda: self.now)
+            self._ear = OutputMatcher(self.name.upper().replace("U", "UART", 1), self.context.cpu_signals, self.context.fcy, lambda: self.now)
             self.listen(self._ear.hear, lazy=True)
         no_longer = self.listen(lambda _byte, _start: None)  # what ends a run must be heard at once
         try:
@@ -263,15 +263,15 @@ class Uart(Peripheral):
         With `cycle` the first start bit is not before that cycle and a closed receiver loses the frames; without it
         the sender waits until the receiver is enabled. `errors` may combine FRAMING_ERROR, PARITY_ERROR and BREAK.
         """
-        bit = round(self.kit.fcy() * 256 / baud) if baud else 0
-        marks = errors | (PATIENT if cycle is None else 0)
-        self.line.put(Frame(cycle or 0, byte & 0x1FF | marks, bit) for byte in data)
+        bit = round(self.context.fcy() * 256 / baud) if baud else 0
+        marks = errors | (WAIT_FOR_RECEIVER if cycle is None else 0)
+        self.line.put(QueuedFrame(cycle or 0, byte & 0x1FF | marks, bit) for byte in data)
         self._plan_line()
 
     def _plan_line(self) -> None:
         """Post the start bit of the frame at the head of the line."""
         frame = self.line.head()
-        if frame is None or (frame.data & PATIENT and not self._is_listening):
+        if frame is None or (frame.data & WAIT_FOR_RECEIVER and not self._is_listening):
             self.events.cancel(self._line_event)
             return
         self.events.set(self._line_event, max(frame.earliest, self._line_free.value, self.now + 1))
@@ -280,7 +280,7 @@ class Uart(Peripheral):
     def _is_listening(self) -> bool:
         return self.is_enabled and (not self.is_frozen or bool(self.mode["WAKE"]))
 
-    def lose(self) -> bool:
+    def drop_next_frame(self) -> bool:
         """The next frame that is on its way to RX never comes; whether there was one."""
         if self.line.head() is None:
             return False
@@ -350,7 +350,7 @@ class Uart(Peripheral):
     # -- control -----------------------------------------------------------------------------------------------------
 
     def _mode_written(self, old: int, new: int, _lanes: int) -> None:
-        enable = 1 << self.kit.chip.sfrs[self.mode.name].fields["UARTEN"][0]
+        enable = 1 << self.context.chip.sfrs[self.mode.name].fields["UARTEN"][0]
         if (old ^ new) & enable:
             if new & enable:
                 self._clock.value = self.now + 1
@@ -358,13 +358,13 @@ class Uart(Peripheral):
                 self._sender_switched(self.is_sending_enabled)
             else:
                 self._abort()
-        if "ALTIO" in self.kit.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
+        if "ALTIO" in self.context.chip.sfrs[self.mode.name].fields and self.mode["ALTIO"]:
             self.bus.lacks(f"{self.mode.name}.ALTIO, the UART keeps the pins it has")  # UNVERIFIED (§10)
         self.restored()
         self._plan_line()
 
     def _sta_written(self, old: int, new: int, _lanes: int) -> None:
-        fields = self.kit.chip.sfrs[self.sta.name].fields
+        fields = self.context.chip.sfrs[self.sta.name].fields
         utxen, oerr = (1 << fields[name][0] for name in ("UTXEN", "OERR"))
         if (old ^ new) & utxen and self.is_enabled:
             self._sender_switched(bool(new & utxen))
@@ -408,7 +408,7 @@ class Uart(Peripheral):
             self.events.cancel(slot)
         self.sta["RIDLE"] = 1
 
-    def give_back(self) -> None:
+    def release_pins(self) -> None:
         """TX and RX."""
         self._tx_port.disown(self._tx_pin)
         self._rx_port.disown(self._rx_pin)
@@ -466,9 +466,9 @@ class Uart(Peripheral):
     def restored(self) -> None:
         """The TX pin carries the waveform while the sender is enabled."""
         if self.is_sending_enabled:
-            self.kit.pins.attach(self._tx_port.index, self._tx_pin, self._pin)
+            self.context.pins.attach(self._tx_port.index, self._tx_pin, self._pin)
         else:
-            self.kit.pins.detach(self._tx_port.index, self._pin)
+            self.context.pins.detach(self._tx_port.index, self._pin)
         self._at_once.set(self._sent_to.urgent)
         if self._capture is not None:
             self._capture.autobaud = bool(self.mode["ABAUD"])

@@ -33,7 +33,7 @@ def test_run_gives_the_program_its_selector_and_camera(program, capsys):
 
 def test_watch_tells_what_happens_on_the_robot(program, tmp_path, capsys):
     """Part E: --watch prints what a person at the robot would see, with simulated time."""
-    arguments = ["run", str(program("steps.c")), "--seconds", "0.35", "--watch", "motors,leds", "--engine", "interp"]
+    arguments = ["run", str(program("steps.c")), "--seconds", "0.35", "--watch", "motors,leds", "--engine", "plain"]
     assert main(arguments) == 0
     lines = [line.split("  ")[-1] for line in capsys.readouterr().err.splitlines()]
     assert "motors 101 -33 steps, 1000 -330 steps/s" in lines
@@ -54,7 +54,7 @@ def test_screenshot_writes_what_the_driver_captured(program, scene, tmp_path, ca
     """Part E: emu screenshot; 20 x 20 pixels of the middle, left red, right green."""
     target = tmp_path / "frame.png"
     arguments = ["screenshot", str(program("camera.c", "lines.s")), "--camera", scene, "--seconds", "0.2", "-o"]
-    arguments += [str(target), "--buffer", "frame", "--size", "20x20", "--enlarge", "3", "--json", "--engine", "interp"]
+    arguments += [str(target), "--buffer", "frame", "--size", "20x20", "--enlarge", "3", "--json", "--engine", "plain"]
     assert main(arguments) == 0
     facts = json.loads(capsys.readouterr().out)
     assert (facts["width"], facts["height"]) == (20, 20)

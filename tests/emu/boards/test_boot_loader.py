@@ -22,7 +22,7 @@ def packet(words: list[int], damage: int = 0) -> bytes:
     return b"\xc1" + data + bytes([sum(data) + damage & 0xFF])
 
 
-@pytest.fixture(params=["interp", "auto"])
+@pytest.fixture(params=["plain", "auto"])
 def machine(request, program) -> Machine:
     image = load_image(program("bootload.c"))
     made = Machine(image.chip, engine=request.param, board=Epuck)

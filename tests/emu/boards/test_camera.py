@@ -70,7 +70,7 @@ def capture(robot, lines, bytes_per_line, skip_lines=0):
     robot.write("T5CON", 0x8002)
     robot.write("IFS1", 0)
     while not robot.read("IFS1") & 1 << 6:
-        robot.at(robot.machine.peripherals.kit.bus.events.next_due())
+        robot.at(robot.machine.peripherals.context.bus.events.next_due())
     robot.write("T5CON", 0)
     robot.write("T4CON", 0x8002)
     rows = []
@@ -149,7 +149,7 @@ def test_frame_rates(sensor, writes, frame, fps):
     """§7.4, §7.1: 800 x 500 or 852 x 1000 columns of N Tcy."""
     robot = Robot(camera=sensor)
     robot.configure(writes)
-    assert robot.board.camera.scan.course.frame_tcy == frame
+    assert robot.board.camera.scan.timing.frame_tcy == frame
     assert robot.board.camera.frames_per_second == pytest.approx(fps, rel=2e-3)
 
 
@@ -160,14 +160,14 @@ def test_line_spacing_of_the_fast_driver_is_the_same_in_every_mode(scale, form, 
     robot.configure(po3030(scale=scale, form=form))
     camera = robot.board.camera
     assert camera.scan.href(1) - camera.scan.href(0) == line
-    assert camera.scan.course.byte_tcy == 8
+    assert camera.scan.timing.byte_tcy == 8
 
 
 def test_short_exposure_shortens_the_frame_of_the_po3030k():
     """§7.4: rows = max(852, integration + 2)."""
     robot = Robot(camera="PO3030K")
     robot.configure([*po3030(), (0, 0x1A, 0x01), (0, 0x1B, 0x00)])
-    assert robot.board.camera.scan.course.frame_tcy == 852 * 852 * 4
+    assert robot.board.camera.scan.timing.frame_tcy == 852 * 852 * 4
 
 
 def test_vsync_rises_two_columns_behind_href_of_its_row():
@@ -194,7 +194,7 @@ def test_edge_arithmetic_agrees_with_the_levels(sensor, mask):
         assert camera.scan.bits(cycle) & mask
         assert not camera.scan.bits(cycle - 1) & mask
         assert (camera.scan.edges(mask, cycle - 1), camera.scan.edges(mask, cycle)) == (number - 1, number)
-        number += 1 if checked % 3 else max(per_frame(mask, camera.scan.course) * 3 // 10, 1)
+        number += 1 if checked % 3 else max(per_frame(mask, camera.scan.timing) * 3 // 10, 1)
         checked += 1
 
 
@@ -206,7 +206,7 @@ def test_byte_stands_on_the_bus_from_half_a_byte_before_to_half_behind():
     camera = robot.board.camera
     edge = camera.scan.href(30)
     assert [camera.bits(edge + t) >> 8 for t in (-5, -4, 3)] == [0, 255, 255]
-    last = edge + 8 * camera.scan.course.line_bytes - 4
+    last = edge + 8 * camera.scan.timing.line_bytes - 4
     assert [camera.bits(t) >> 8 for t in (last - 1, last)] == [255, 0]
 
 
@@ -338,11 +338,11 @@ def test_snapshot_restores_registers_and_timing(robot):
     """State is in the record; what is derived from it follows."""
     robot.configure(po6030())
     state = robot.machine.snapshot()
-    frame = robot.board.camera.scan.course.frame_tcy
+    frame = robot.board.camera.scan.timing.frame_tcy
     robot.configure([(1, 0x80, 0x20), (0, 0x91, 0xB0)])
-    assert robot.board.camera.scan.course.frame_tcy != frame
+    assert robot.board.camera.scan.timing.frame_tcy != frame
     robot.machine.restore(state)
-    assert robot.board.camera.scan.course.frame_tcy == frame
+    assert robot.board.camera.scan.timing.frame_tcy == frame
 
 
 def test_pictures_of_any_size_are_scaled_and_bad_shapes_refused(robot):
@@ -375,7 +375,7 @@ def test_t1_counts_one_edge_of_pclk_per_byte(robot):
     robot.at(camera.scan.href(5) - 100).write("TMR1", 0)
     robot.write("T1CON", 0x8002)
     robot.at(camera.scan.href(6) - 100)
-    assert robot.read("TMR1") == camera.scan.course.line_bytes == 202
+    assert robot.read("TMR1") == camera.scan.timing.line_bytes == 202
     robot.at(camera.scan.href(6) + 8 * 10 + 1)
     assert robot.read("TMR1") == 202 + 11
 
@@ -398,7 +398,7 @@ def test_automatic_exposure_follows_the_lamp_in_ten_frames(robot):
     camera = robot.board.camera
     camera.show(np.full((48, 64), 120, np.uint8))
     robot.configure(po6030(form="grey"))
-    frame = camera.scan.course.frame_tcy
+    frame = camera.scan.timing.frame_tcy
     assert grey_level(robot) == 120
     camera.lamp = 0.5
     levels = []

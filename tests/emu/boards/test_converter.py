@@ -48,7 +48,7 @@ def test_engines_agree_in_any_setting(program, seed):
     between runs, ADCON1 read while it works, Idle."""
     generator = random.Random(seed)
     image, settings = load_image(program("convert.c")), random_settings(generator)
-    one, other = (machine_with(image, engine, settings) for engine in ("interp", "jit"))
+    one, other = (machine_with(image, engine, settings) for engine in ("plain", "jit"))
     for number in range(12):
         cycles = generator.randrange(1, 6_000)
         for machine in (one, other):
@@ -73,7 +73,7 @@ def test_a_scan_at_the_vendors_rate_needs_no_python(program):
     assert [machine.peek(machine.address_of("seen") + 2 * i) for i in range(2)] == [2048, 2048]
 
 
-@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_one_late_interrupt_does_not_shift_the_channels_for_good(program, engine):
     """dspic30f6014a.md §13: the scan starts again behind every interrupt. Interrupt 5 comes when a round of five has
     three results; the round after the next has its own channels again."""

@@ -13,7 +13,7 @@ BUSY_TCY = 29_491
 """2 ms."""
 
 
-@pytest.fixture(params=["interp", "auto"])
+@pytest.fixture(params=["plain", "auto"])
 def machine(request, program) -> Machine:
     image = load_image(program("eeprom.c"))
     made = Machine(image.chip, engine=request.param, board=Epuck)

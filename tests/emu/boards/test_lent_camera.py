@@ -27,12 +27,12 @@ def rendered(robot: Robot, camera: Camera, cycle: int, pixels: np.ndarray) -> tu
     python = record.snapshot()
     record.restore(before)
     code = line_code()
-    row = code["asked"](addressof(camera.lent), camera.lent.setting, cycle, addressof(href))
+    row = code["asked"](addressof(camera.native), camera.native.setting, cycle, addressof(href))
     if row < 0:
         record.restore(python)
         return by_python, False
     seen = np.ascontiguousarray(pixels[row][camera._readout._columns])
-    code["send"](addressof(camera.lent), href.value, seen.ctypes.data)
+    code["send"](addressof(camera.native), href.value, seen.ctypes.data)
     assert record.snapshot() == python
     return by_python, True
 
@@ -47,11 +47,11 @@ def test_a_line_is_painted_alike_whoever_is_asked(sensor: str, writes: list[tupl
     robot, pixels, draw = Robot(camera=sensor), scene(), random.Random(repr((sensor, writes)))
     robot.configure(writes)
     camera = robot.board.camera
-    camera.sample(lambda y, columns, _cycle: pixels[y, columns], is_lent=True)
+    camera.sample(lambda y, columns, _cycle: pixels[y, columns], has_native_source=True)
     camera.lamp = lamp
-    course = camera.scan.course
+    course = camera.scan.timing
     assert camera._refresh(camera.scan.href(0, 3))  # Python is asked first
-    assert camera.lent.setting
+    assert camera.native.setting
     both = 0
     for _ in range(300):
         line = draw.randrange(course.lines)
@@ -91,7 +91,7 @@ def test_a_still_picture_is_seen_as_any_other(sensor: str, monkeypatch: pytest.M
         scan = still.board.camera.scan
         for _ in range(200):
             line = draw.randrange(10)
-            cycle = scan.href(line, draw.randrange(9)) + draw.randrange(-scan.course.byte_tcy, scan.course.line_tcy)
+            cycle = scan.href(line, draw.randrange(9)) + draw.randrange(-scan.timing.byte_tcy, scan.timing.line_tcy)
             found = [robot.board.camera._refresh(cycle) for robot in (still, other)]
             assert found[0] == found[1]
             assert still.machine.record.snapshot() == other.machine.record.snapshot()
@@ -105,7 +105,7 @@ def test_python_is_asked_first_in_every_new_setting() -> None:
     camera, href = robot.board.camera, c_int64()
 
     def painted_by_code(cycle: int) -> int:
-        return line_code()["asked"](addressof(camera.lent), camera.lent.setting, cycle, addressof(href))
+        return line_code()["asked"](addressof(camera.native), camera.native.setting, cycle, addressof(href))
 
     def asked() -> bool:
         cycle = camera.scan.href(3, 2)
@@ -121,7 +121,7 @@ def test_python_is_asked_first_in_every_new_setting() -> None:
     def source(y, columns, _cycle):
         return pixels[y, columns]
 
-    camera.sample(source, is_lent=True)
+    camera.sample(source, has_native_source=True)
     assert asked()
     assert not asked()
     kept = robot.machine.snapshot()
@@ -131,11 +131,11 @@ def test_python_is_asked_first_in_every_new_setting() -> None:
     assert asked()
     camera.sample(source)
     assert not asked()
-    assert not camera.lent.setting
-    camera.sample(source, is_lent=True)
+    assert not camera.native.setting
+    camera.sample(source, has_native_source=True)
     assert asked()
-    setting = camera.lent.setting
+    setting = camera.native.setting
     assert painted_by_code(camera.scan.href(3, 2)) >= 0
-    assert line_code()["asked"](addressof(camera.lent), setting + 1, camera.scan.href(3, 2), addressof(href)) == -1
+    assert line_code()["asked"](addressof(camera.native), setting + 1, camera.scan.href(3, 2), addressof(href)) == -1
     camera.unplug()
     assert painted_by_code(camera.scan.href(3, 2)) == -1

@@ -18,7 +18,7 @@ LOOP_HEX = b":020000040000FA\n:04000000FFFF3700C7\n:00000001FF\n"
 WATCHDOG_ON = 0xFFFF
 
 
-class Bench(Part):
+class Bench(BoardPart):
     """A slow crystal, the watchdog on, a lamp on RD0."""
 
     def __init__(self, chip: Peripherals) -> None:

@@ -90,7 +90,7 @@ def test_steps_by_the_ends_of_quanta_are_those_of_who_looks_at_each(blinks):
     quick.machine.pins.watch("RA6", lambda *edge: lit.append(edge), lazy=True)
     made, looked = [], []
     for robot in (quick, plain):
-        robot.board.motors.remember()
+        robot.board.motors.record_history()
     for first in range(0, len(ends), 4):
         until = ends[first + 3]
         due = [one for one in entries if (until - 4_000) <= one >> 24 < until]

@@ -19,7 +19,7 @@ from emu.machine.machine import Machine
 FCY = 14_745_600
 
 
-def start(path: Path, engine: str = "interp", **options) -> Machine:
+def start(path: Path, engine: str = "auto", **options) -> Machine:
     image = load_image(path)
     machine = Machine(image.chip, engine=engine, board=partial(Epuck, **options))
     machine.load(image)
@@ -89,7 +89,7 @@ def test_engines_agree_to_the_bit_on_a_busy_robot(program, sources, cycles, nois
     """Design §4.3: same inputs, same record, same cycle; noise, remote control and radio included. Without noise the
     analog inputs are numbers, which native code converts by itself."""
     states = []
-    for engine in ("interp", "auto"):
+    for engine in ("plain", "auto"):
         machine = start(program(*sources), engine, seed=7)
         robot = machine.board
         robot.camera.show(picture())

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from emu.boards.epuck.camera.scan import HREF, PCLK, VSYNC, Course, Scan
+from emu.boards.epuck.camera.scan import HREF, PCLK, VSYNC, FrameTiming, Scan
 from emu.boards.epuck.camera.sensors import SENSORS
 from emu.system.record import Record
 
@@ -24,7 +24,7 @@ def courses(draw):
     first = draw(st.integers(0, 20))
     frame = first + lines * line_tcy + draw(st.integers(1, 30))
     rise = draw(st.integers(1, frame))
-    return Course(frame, first, line_tcy, lines, line_bytes, byte_tcy, rise, draw(st.integers(rise, frame)))
+    return FrameTiming(frame, first, line_tcy, lines, line_bytes, byte_tcy, rise, draw(st.integers(rise, frame)))
 
 
 def ticking(course, cycles):
@@ -85,7 +85,7 @@ def test_no_register_value_breaks_the_sensor(sensor):
         )
         scan = camera.scan
         for _ in range(20):
-            cycle = generator.randrange(3 * scan.course.frame_tcy)
+            cycle = generator.randrange(3 * scan.timing.frame_tcy)
             camera.bits(cycle)
             for mask in (HREF, VSYNC):
                 edge = scan.nth_rise(mask, cycle, 1)
@@ -93,5 +93,5 @@ def test_no_register_value_breaks_the_sensor(sensor):
                     assert edge > cycle
                     assert scan.bits(edge) & mask
                     assert not scan.bits(edge - 1) & mask
-        if scan.course.lines:
-            camera.bits(scan.href(scan.course.lines - 1))
+        if scan.timing.lines:
+            camera.bits(scan.href(scan.timing.lines - 1))

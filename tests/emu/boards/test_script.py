@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emu.boards.epuck.observer import Watch
+from emu.boards.epuck.observer import RobotObserver
 from emu.boards.epuck.stimulus import StimulusError, parse
 
 FCY = 14_745_600
@@ -98,7 +98,7 @@ def test_script_position_is_part_of_a_snapshot(robot):
 def test_watch_tells_what_a_person_would_see(robot):
     """LEDs, motors and text lines, each with its time."""
     lines = []
-    Watch(robot.board, ["leds", "motors", "uart1"], lines.append)
+    RobotObserver(robot.board, ["leds", "motors", "uart1"], lines.append)
     robot.at(FCY).output("RA6", 1)
     robot.output("RC1", 1)
     robot.output("RA6", 0)
@@ -124,7 +124,7 @@ def test_watch_tells_what_a_person_would_see(robot):
 def test_unknown_topics_are_refused(robot):
     """Bad usage."""
     with pytest.raises(ValueError, match="cannot watch 'smell'"):
-        Watch(robot.board, ["smell"], print)
+        RobotObserver(robot.board, ["smell"], print)
 
 
 def test_a_script_may_press_more_often_than_frames_fit(robot):

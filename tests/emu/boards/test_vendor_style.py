@@ -14,7 +14,7 @@ from emu.machine.machine import Machine
 FCY = 14_745_600
 
 
-@pytest.fixture(params=["interp", "auto"])
+@pytest.fixture(params=["plain", "auto"])
 def start(request, program):
     """start("agenda.c", camera="PO3030K") -> a machine with the program loaded."""
 
@@ -113,7 +113,7 @@ def test_slow_camera_driver_captures_a_grey_picture(start):
 def test_engines_agree_to_the_bit(program, source):
     """Design §4.3."""
     states = []
-    for engine in ("interp", "auto"):
+    for engine in ("plain", "auto"):
         image = load_image(program(source))
         machine = Machine(image.chip, engine=engine, board=partial(Epuck, camera="PO3030K", seed=3))
         machine.load(image)

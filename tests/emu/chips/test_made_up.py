@@ -20,7 +20,6 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A  # noqa: E402
 from emu.dspic30f.engines import NAMES  # noqa: E402
 from emu.dspic30f.isa.table import ROWS  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
-from emu.dspic30f.specialised.engine import SpecialisedEngine  # noqa: E402
 from emu.machine.machine import Machine  # noqa: E402
 
 ENGINES = [name for name in NAMES if name != "auto"]
@@ -30,8 +29,6 @@ NO_WATCHDOG = 0x7FFF
 def machine_with(engine: str, text: str, **registers: int) -> Machine:
     """A made-up chip at the first instruction of `text`, whose code the engine makes before it runs it."""
     machine = Machine(MADE_UP, engine=engine)
-    if isinstance(machine.runner, SpecialisedEngine):
-        machine.runner.warm = 1
     if isinstance(machine.runner, JitEngine):
         machine.runner.threshold, machine.runner.wait, machine.runner.compiler = 1, True, QuickCompiler(0)
     machine.program.put(MADE_UP.config["FWDT"].address, NO_WATCHDOG)
@@ -114,8 +111,8 @@ def test_a_chip_whose_memory_does_not_fit_together_is_refused() -> None:
 
 def test_a_sample_of_the_instruction_campaign() -> None:
     """tests/fuzz/fuzz_engines.py --chip."""
-    assert check_pairs(7, len(ROWS), 2, "interp", MADE_UP)
-    assert check_programs(7, 4, "interp", MADE_UP)
+    assert check_pairs(7, len(ROWS), 2, "jit", MADE_UP)
+    assert check_programs(7, 4, "jit", MADE_UP)
 
 
 @pytest.mark.parametrize("seed", [1, 3, 5])

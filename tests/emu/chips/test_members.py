@@ -59,7 +59,7 @@ def test_every_interrupt_has_flag_enable_and_priority(chip: Chip) -> None:
 def test_a_program_runs_in_every_engine(chip: Chip) -> None:
     """Timer 1 interrupts a loop at the end of flash; the same state in the same cycle."""
     states = []
-    for engine in ("plain", "interp", "jit"):
+    for engine in ("plain", "jit"):
         machine = Machine(chip, engine=engine)
         machine.program.put(chip.config["FWDT"].address, 0x7FFF)
         machine.reset("POR")

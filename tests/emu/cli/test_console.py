@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from emu.run.console import open_port, wait_for_input
-from emu.run.input_log import HEADER, Stamp, read_stamps
+from emu.run.input_log import HEADER, TimestampedInput, read_input_log
 
 
 def test_a_file_gets_every_byte_and_gives_none(tmp_path):
@@ -90,12 +90,12 @@ def test_a_bad_tcp_port_is_refused(text):
 
 def test_stamps_come_back_as_they_were_written(tmp_path):
     path = tmp_path / "stamps"
-    stamps = [Stamp(0, 1, b"\x00\xff"), Stamp(147456, 2, b"go\n"), Stamp(147456, 1, b"!")]
+    stamps = [TimestampedInput(0, 1, b"\x00\xff"), TimestampedInput(147456, 2, b"go\n"), TimestampedInput(147456, 1, b"!")]
     with path.open("w") as stream:
         stream.write(HEADER + "\n\n")
         for stamp in stamps:
             stamp.write(stream)
-    assert read_stamps(str(path), (1, 2)) == stamps
+    assert read_input_log(str(path), (1, 2)) == stamps
 
 
 @pytest.mark.parametrize(
@@ -113,5 +113,5 @@ def test_a_damaged_record_is_refused_with_its_line(tmp_path, text, expected):
     path = tmp_path / "stamps"
     path.write_text(text)
     with pytest.raises(ValueError) as caught:
-        read_stamps(str(path), (1, 2))
+        read_input_log(str(path), (1, 2))
     assert expected in str(caught.value)

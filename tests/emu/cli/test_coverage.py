@@ -14,7 +14,7 @@ import pytest
 
 import emu
 from emu.cli import main
-from emu.instruments.coverage import Counts, counting
+from emu.instruments.coverage import Counts, count_executions
 from toolchain.driver import driver
 
 SOURCE = """\
@@ -84,7 +84,7 @@ def test_what_is_counted_is_what_a_trace_shows(build, tmp_path, seed, level):
     path = build(random_program(seed), level)
     machine = emu.load(path, engine="plain")
     counts = Counts()
-    counting(machine, counts)
+    count_executions(machine, counts)
     assert machine.run(cycles=200_000).reason == "halt"
     trace = tmp_path / "trace"
     assert main(["run", path, "--cycles", "200000", "--trace", str(trace)]) == 0

@@ -62,7 +62,7 @@ def test_entering_an_interrupt_counts_for_its_handler(image):
     happens at level 4, the reset priority."""
     _, one = profile_of(image, 1_000)
     assert one.functions["__T1Interrupt"] == one.levels[4]
-    machine = Machine(image.chip, engine="interp")
+    machine = Machine(image.chip, engine="plain")
     machine.load(image)
     machine.run_until(5_000)
     handler = image.symbols.find("_T1Interrupt").address
@@ -281,8 +281,3 @@ def test_perfetto_files_have_slices_on_tracks_and_flows_from_request_to_handler(
         assert finish[1].startswith("level")
         assert finish[2] > start[2]
         assert start[3] == finish[3]
-
-
-def test_an_engine_that_cannot_be_counted_is_refused(image):
-    with pytest.raises(ValueError, match="jit or plain"):
-        Profiler(Machine(image.chip, engine="interp"), image)

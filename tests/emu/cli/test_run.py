@@ -375,7 +375,7 @@ def test_nothing_is_left_of_a_trace_that_cannot_be_finished(build, tmp_path, cap
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "program.elf"]
 
 
-@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_a_register_without_a_model_is_named_once(build, capfd, engine):
     """BSRAM and SSRAM are on the list of plain registers (docs/plain-registers.md)."""
     source = "main:\nmov #1, w0\nmov w0, {BSRAM}\nmov {SSRAM}, w1\nmov w0, {BSRAM}\npwrsav #1\n"
@@ -386,7 +386,7 @@ def test_a_register_without_a_model_is_named_once(build, capfd, engine):
     assert "SSRAM is read at 0x000104 (_main+0x4) but has no model" in notes[1]
 
 
-@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_a_setting_without_a_model_is_named_once(build, capfd, engine):
     """Frame sync of SPI1 is on the list of docs/accuracy.md."""
     source = "main:\nmov #0x4020, w0\nmov w0, {SPI1CON}\nmov w0, {SPI1CON}\npwrsav #1\n"

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from emu.dspic30f.isa.text import parse
-from emu.dspic30f.specialised.engine import SpecialisedEngine
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 from emu.system.device import Irq
@@ -60,8 +59,6 @@ class Rig:
 
     def __init__(self, text: str, engine: str = "plain", ipl_slip: int = 0, **w: int) -> None:
         self.machine = Machine(engine=engine, ipl_slip=ipl_slip)
-        if isinstance(self.machine.runner, SpecialisedEngine):
-            self.machine.runner.warm = 1  # write functions at once
         self.machine.program.put(0xF80002, 0x7FFF)  # FWDT: no watchdog
         self.machine.reset("POR")
         words, self.labels = assemble(text)
@@ -80,7 +77,7 @@ class Rig:
         self.machine.program.put(address, self.labels[label])
 
     def window(self, *words: int, page: int = 1) -> None:
-        """Turn PSV on with `words` at the start of the window: program page 1 begins at 0x8000 (isa.md §7.8)."""
+        """CallEvent PSV on with `words` at the start of the window: program page 1 begins at 0x8000 (isa.md §7.8)."""
         for index, word in enumerate(words):
             self.machine.program.put(page << 15 | 2 * index, word)
         self.machine.poke("PSVPAG", page)

@@ -146,7 +146,7 @@ class QuickCompiler(Compiler):
         return super().now(text, min(level, self._block_level), key, entries)
 
 
-class Watch:
+class RobotObserver:
     """Counts every instruction of a plain machine, and those of its native twin that Python runs."""
 
     def __init__(self, plain: Machine, native: Machine) -> None:
@@ -310,7 +310,7 @@ def check_straight(seed: int, shape: Shape | None = None) -> Tally:
     firmware = straight_firmware(seed, shape)
     generator = random.Random(seed)
     plain, native = twins(firmware, seed & 1, 2 if seed % 32 == 5 else 0)
-    watch, runner = Watch(plain, native), native.runner
+    watch, runner = RobotObserver(plain, native), native.runner
     assert isinstance(runner, JitEngine)
     hooks = Hooks((plain, native), range(BODY, firmware.end, 2), generator) if seed % 3 == 0 else None
     runner.circle = object()
@@ -343,7 +343,7 @@ def check_wild(seed: int, stops: int = 20, chip: Chip = DSPIC30F6014A) -> Tally:
     """A short wild program with jumps, traps and mode changes at odd places; every third one with hooks."""
     generator = random.Random(seed)
     plain, native = twins(random_firmware(seed, chip), seed & 1, 2 if seed % 4 == 1 else 0, chip)
-    watch = Watch(plain, native)
+    watch = RobotObserver(plain, native)
     hooks = Hooks((plain, native), range(CODE, CODE + 2 * BODY_WORDS, 2), generator) if seed % 3 == 0 else None
     for _ in range(stops):
         advance(plain, native, generator.randrange(1, 600), watch.tally, generator.random() < 0.1)

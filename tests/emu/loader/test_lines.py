@@ -8,7 +8,7 @@ import pytest
 from dwarf_samples import debug_sections
 from elf_samples import doubled, xc16_like
 
-from emu.image.lines import undoubled
+from emu.image.lines import remove_phantom_octets
 from emu.image.loader import parse_image
 
 
@@ -40,13 +40,13 @@ def test_one_value_in_a_phantom_does_not_stop_the_un_doubling():
     """abi-elf.md §6.7: DW_AT_language of assembler units has its high byte in the phantom."""
     octets = bytearray(doubled(bytes(range(1, 200))))
     octets[9] = 0x80
-    assert undoubled({".debug_info": bytes(octets)})[".debug_info"] == bytes(range(1, 200))
+    assert remove_phantom_octets({".debug_info": bytes(octets)})[".debug_info"] == bytes(range(1, 200))
 
 
 def test_plain_lists_of_small_addresses_are_not_taken_for_doubled_ones():
     """What says how all are stored is the sections with text in them."""
     sections = {".debug_info": b"\1main.c\0main\0", ".debug_ranges": bytes([2, 0, 4, 0, 0, 0, 0, 0])}
-    assert undoubled(sections) == sections
+    assert remove_phantom_octets(sections) == sections
 
 
 def test_unreadable_dwarf_is_counted_and_never_fatal():

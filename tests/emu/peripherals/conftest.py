@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.peripherals import Peripherals, Wires, build
+from emu.peripherals import Peripherals, CpuSignals, build
 from emu.system.bus import Bus
 from emu.system.events import Events
 from emu.system.program import ProgramMemory
@@ -27,8 +27,8 @@ class Rig:
         self.program = ProgramMemory(self.record, DSPIC30F6014A)
         self.program.config[0] = fosc
         self.program.config[1] = fwdt
-        self.wires = Wires()
-        self.dev: Peripherals = build(DSPIC30F6014A, self.bus, self.program, self.wires)
+        self.cpu_signals = CpuSignals()
+        self.dev: Peripherals = build(DSPIC30F6014A, self.bus, self.program, self.cpu_signals)
         self.dev.reset("POR")
 
     def at(self, cycle: int) -> Rig:

@@ -30,11 +30,10 @@ from emu.boards.epuck.board import Epuck
 from emu.chips.chip import Chip
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised.engine import SpecialisedEngine
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 from emu.peripherals.i2c.bus import I2cDevice
-from emu.peripherals.i2c.slave import OutsideMaster
+from emu.peripherals.i2c.slave import ExternalMaster
 
 from .device_scenes import SCENES
 
@@ -314,7 +313,7 @@ class Subject:
     machine: Machine
     heard: list[tuple[int, int, int]] = field(default_factory=list)
     rendered: list[tuple[int, int]] = field(default_factory=list)
-    master: OutsideMaster | None = None
+    master: ExternalMaster | None = None
 
 
 @dataclass
@@ -365,8 +364,6 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
     board = partial(Epuck, camera=camera, selector=draw.randrange(16), seed=seed & 0xFFFF) if robot else None
     machine = Machine(chip, engine=engine, ipl_slip=int(draw.random() < 0.2), board=board)
     made = Subject(machine)
-    if isinstance(machine.runner, SpecialisedEngine):
-        machine.runner.warm = 1  # write functions at once
     if isinstance(machine.runner, JitEngine):
         machine.runner.threshold, machine.runner.wait = 1, True
         machine.runner.compiler = QuickCompiler(2 if seed % 16 == 5 else 0)
@@ -378,7 +375,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
     machine.reset("POR")
     if not robot and machine.peripherals.i2c is not None:
         machine.peripherals.i2c.wire.attach(0x6E, Scribe(made))
-        made.master = OutsideMaster(machine.peripherals.i2c.slave, machine.events)
+        made.master = ExternalMaster(machine.peripherals.i2c.slave, machine.events)
     for address, words in stretches.items():
         machine.program.put_flash(address, words)
     for port in machine.uart:
@@ -394,7 +391,7 @@ def subject(seed: int, engine: str, stretches: dict[int, list[int]], chip: Chip 
     return made
 
 
-def disturb(draw: random.Random, subject: Subject) -> None:
+def invalidate(draw: random.Random, subject: Subject) -> None:
     """Something happens outside, now or soon."""
     machine = subject.machine
     kind, cycle, board = draw.randrange(14), machine.cycle, machine.board
@@ -481,7 +478,7 @@ def difference(
                for one in subjects):  # fmt: skip
             break
         for one in subjects:
-            disturb(random.Random(f"{seed} {chunk} outside"), one)
+            invalidate(random.Random(f"{seed} {chunk} outside"), one)
     if tally is not None:
         tally.update(writer.touched)
     return None

@@ -27,7 +27,6 @@ from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.dspic30f.isa import text
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised.engine import SpecialisedEngine
 from emu.dspic30f.state.state import PSV
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
@@ -37,7 +36,7 @@ from .device_drills import CONTROL, DRILLS, MODES, Image, image_of, registers_of
 from .device_programs import CHIPS
 from .device_programs import words_of as sfrs_of
 
-ENGINES: Final = ("plain", "interp", "jit")
+ENGINES: Final = ("plain", "jit")
 BASES: Final = 3
 """Base states of an image."""
 ROUNDS: Final = 30
@@ -69,8 +68,6 @@ class Crew:
         self.clean: Final[list[Kept]] = []
         for machine, heard in zip(self.machines, self.heard, strict=True):
             runner = machine.runner
-            if isinstance(runner, SpecialisedEngine):
-                runner.warm = 1  # write functions at once
             if isinstance(runner, JitEngine):
                 runner.threshold, runner.wait, runner.compiler = 1, True, QuickCompiler(0)
             machine.stop_on_fault = False

@@ -11,7 +11,7 @@ import pytest
 
 from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.machine.machine import Machine
-from emu.peripherals.i2c.slave import OutsideMaster
+from emu.peripherals.i2c.slave import ExternalMaster
 from tests.emu.peripherals.conftest import Rig
 from tests.emu.peripherals.test_can import configure, load
 
@@ -141,7 +141,7 @@ def bus_slave(rig: Rig) -> None:
     """§11: the address matches."""
     rig.write("I2CADD", 0x42)
     rig.write("I2CCON", 0x9000)
-    OutsideMaster(rig.dev.i2c.slave, rig.events).transfer([0x84])
+    ExternalMaster(rig.dev.i2c.slave, rig.events).transfer([0x84])
     rig.at(5_000)
 
 
@@ -215,7 +215,7 @@ def test_device_raises_its_own_flag_and_no_other(rig, name):
 @pytest.mark.parametrize("name", sorted(SOURCES, key=SOURCES.__getitem__))
 def test_flag_leads_through_its_own_vector(name, alternate):
     """§5: vector at 0x14 + 2 irq, with ALTIVT at 0x94 + 2 irq; enable and priority bits of the same source."""
-    machine = Machine(engine="interp")
+    machine = Machine(engine="plain")
     source, irq = DSPIC30F6014A.interrupts[SOURCES[name]], SOURCES[name]
     for address in range(0x100, 0x110, 2):
         machine.program.put_flash(address, [0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from emu.peripherals.i2c.bus import I2cDevice
-from emu.peripherals.i2c.slave import OutsideMaster
+from emu.peripherals.i2c.slave import ExternalMaster
 
 I2CEN, SCLREL = 0x8000, 0x1000
 SEN, RSEN, PEN, RCEN, ACKEN, ACKDT = 1, 2, 4, 8, 0x10, 0x20
@@ -339,7 +339,7 @@ def slave(rig):
 def test_slave_receives_address_and_data(slave):
     """§11: SI2CIF at each ninth clock; D_A tells address from data."""
     seen = []
-    master = OutsideMaster(slave.dev.i2c.slave, slave.events)
+    master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0x84, 0x11, 0x22])
     run_slave(slave, lambda: seen.append((slave.field("I2CSTAT", "D_NOT_A"), slave.read("I2CRCV"))))
     assert seen == [(0, 0x84), (1, 0x11), (1, 0x22)]
@@ -349,7 +349,7 @@ def test_slave_receives_address_and_data(slave):
 
 def test_slave_ignores_other_addresses(slave):
     """§11."""
-    master = OutsideMaster(slave.dev.i2c.slave, slave.events)
+    master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0x86, 0x11])
     run_slave(slave, lambda: pytest.fail("not addressed"))
     assert result.acknowledged == [False, False]
@@ -357,7 +357,7 @@ def test_slave_ignores_other_addresses(slave):
 
 def test_slave_refuses_what_it_has_no_room_for(slave):
     """§11 I2COV: nothing was read."""
-    master = OutsideMaster(slave.dev.i2c.slave, slave.events)
+    master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0x84, 0x11])
     run_slave(slave, lambda: None)
     assert result.acknowledged == [True, False]
@@ -376,7 +376,7 @@ def test_slave_sends_and_stretches_until_it_is_ready(slave):
             slave.write("I2CTRN", value)
             slave.write("I2CCON", BASE)
 
-    master = OutsideMaster(slave.dev.i2c.slave, slave.events)
+    master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([], [0x85], 2)
     run_slave(slave, service)
     assert result.received == [0x99, 0x77]
@@ -385,7 +385,7 @@ def test_slave_sends_and_stretches_until_it_is_ready(slave):
 
 def test_slave_answers_the_general_call_only_if_asked_to(slave):
     """§11 GCEN, GCSTAT."""
-    master = OutsideMaster(slave.dev.i2c.slave, slave.events)
+    master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     assert not any(master.transfer([0x00]).acknowledged)
     slave.at(5000).write("I2CCON", BASE | 0x80)
     result = master.transfer([0x00])
@@ -399,7 +399,7 @@ def test_slave_matches_ten_bit_addresses(slave):
     """§11 A10M, ADD10."""
     slave.write("I2CADD", 0x2A5)
     slave.write("I2CCON", BASE | 0x400)
-    master = OutsideMaster(slave.dev.i2c.slave, slave.events)
+    master = ExternalMaster(slave.dev.i2c.slave, slave.events)
     result = master.transfer([0b11110100, 0xA5, 0x33])
     seen = []
     run_slave(slave, lambda: seen.append((slave.read("I2CRCV"), slave.field("I2CSTAT", "ADD10"))))

@@ -30,7 +30,7 @@ def test_table_write_captures_its_address(rig):
 def test_flash_row_is_erased_and_programmed_while_the_cpu_stands(rig):
     """§16: 32 words; 2 ms = 29491 Tcy; NVMIF at the end."""
     stalls, changes = [], []
-    rig.wires.stall_until = stalls.append
+    rig.cpu_signals.stall_until = stalls.append
     rig.program.changed.append(lambda low, high: changes.append((low, high)))
     rig.program.put_flash(0x1000, list(range(64)))
     latch(rig, 0x1044, 0xABCDEF)
@@ -67,7 +67,7 @@ def test_programming_only_clears_bits_and_resets_the_latches(rig):
 def test_eeprom_words_and_rows_are_written_while_the_cpu_runs(rig, erase, program, words):
     """§16: WR reads 1 until done, then NVMIF."""
     stalls = []
-    rig.wires.stall_until = stalls.append
+    rig.cpu_signals.stall_until = stalls.append
     for index in range(32):
         rig.program.put(0x7FF000 + 2 * index, 0x1111)
     latch(rig, 0x7FF022, 0)

@@ -104,7 +104,7 @@ def test_engines_agree_on_a_uart_that_sends_and_receives(seed: int) -> None:
         "pause": draw.choice((2, 5, 30)),
         "RX": int(A["U1RXREG"], 16),
     }
-    told = [history(machine(engine, UART, **settings), seed, True) for engine in ("plain", "interp", "jit")]
+    told = [history(machine(engine, UART, **settings), seed, True) for engine in ("plain", "jit")]
     assert len(told[0][-1]) > 5
     assert told[1] == told[0]
     assert told[2] == told[0]
@@ -120,7 +120,7 @@ def test_engines_agree_on_an_spi_master(seed: int) -> None:
         "BUF": int(A["SPI1BUF"], 16),
     }
     told = []
-    for engine in ("plain", "interp", "jit"):
+    for engine in ("plain", "jit"):
         rig, states, outside = machine(engine, SPI, **settings), [], random.Random(seed)
         for turn in range(12):
             rig.machine.pins.set("RF7", outside.randrange(2))

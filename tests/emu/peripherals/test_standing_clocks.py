@@ -146,7 +146,7 @@ def test_the_watchdog_keeps_its_seconds_when_the_tcy_changes():
     """§4: 2 ms of the LPRC, which no postscaler divides."""
     rig = Rig(fwdt=0x8000)
     expired = []
-    rig.wires.reset = lambda _cause: expired.append(rig.dev.seconds(rig.events.now))
+    rig.cpu_signals.reset = lambda _cause: expired.append(rig.dev.seconds(rig.events.now))
     unlock(rig, 100, 0xC0, LOW)
     rig.at(3000)
     assert expired == [pytest.approx(2e-3, rel=1e-2)]
@@ -166,7 +166,7 @@ def test_programming_takes_its_seconds_when_the_tcy_changes():
 def test_the_cpu_stands_until_flash_is_programmed_whatever_the_tcy_becomes():
     """§16, §3: a switch to the crystal ends while a row is erased: the rest takes an eighth of the Tcy."""
     rig, held = switching(), []
-    rig.wires.stall_until = held.append
+    rig.cpu_signals.stall_until = held.append
     for cycle, name, value in ((31, "NVMADRU", 0), (32, "NVMADR", 0x4000), (33, "NVMCON", 0x4041),
                                (34, "NVMKEY", 0x55), (35, "NVMKEY", 0xAA), (36, "NVMCON", 0xC041)):  # fmt: skip
         rig.at(cycle).write(name, value)
@@ -187,7 +187,7 @@ def test_a_slower_tcy_does_not_delay_a_clock_switch():
 def test_a_watchdog_faster_than_the_cpu_ends_idle_at_once():
     """§3, §4: 32 kHz through 64: a Tcy is 7.8 ms, the time-out 2 ms."""
     rig, woken = Rig(fosc=0x4006, fwdt=0x8000), []
-    rig.wires.wake = lambda: woken.append(rig.events.now)
+    rig.cpu_signals.wake = lambda: woken.append(rig.events.now)
     unlock(rig, 5, 0xC0, LOW)
     assert rig.dev.fcy == 128
     rig.dev.sleep(1, 7)
@@ -198,7 +198,7 @@ def test_a_watchdog_faster_than_the_cpu_ends_idle_at_once():
 def test_a_watchdog_that_software_switched_on_ends_with_a_reset():
     """§4: SWDTEN is 0 after every reset; FWDTEN is not software's."""
     rig, expired = Rig(fwdt=0x0000), []
-    rig.wires.reset = expired.append
+    rig.cpu_signals.reset = expired.append
     rig.at(10).write("RCON", 0x0520)
     rig.at(100).dev.reset("WDTO")
     assert rig.read("RCON") == 0x0510
@@ -333,7 +333,7 @@ class Square:
     def nth_rise(self, mask: int, after: int, count: int) -> int:
         return (max(after, 0) // 100 + count) * 100
 
-    def stands_until(self, cycle: int) -> int:
+    def constant_until(self, cycle: int) -> int:
         return cycle
 
 

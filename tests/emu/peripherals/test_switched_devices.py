@@ -6,7 +6,7 @@ import pytest
 
 from emu.machine.machine import Machine
 from emu.peripherals.i2c.bus import I2cDevice
-from emu.peripherals.i2c.slave import OutsideMaster
+from emu.peripherals.i2c.slave import ExternalMaster
 
 from .conftest import Rig
 
@@ -172,7 +172,7 @@ def test_a_slave_that_is_off_does_not_answer(rig, off):
     rig.write("I2CADD", 0x2A)
     for name, value in off.items():
         rig.write(name, value)
-    master = OutsideMaster(rig.dev.i2c.slave, rig.events)
+    master = ExternalMaster(rig.dev.i2c.slave, rig.events)
     transfer = master.transfer([0x54, 1])
     rig.at(20_000)
     assert not any(transfer.acknowledged)

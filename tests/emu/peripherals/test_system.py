@@ -119,7 +119,7 @@ def test_clock_failure_with_the_monitor_runs_from_the_frc_and_traps():
     """§3: FCKSM = 00."""
     rig = Rig(fosc=0x07E6)
     traps = []
-    rig.wires.trap = traps.append
+    rig.cpu_signals.trap = traps.append
     rig.at(100).dev.oscillator.fail()
     assert traps == ["OSCFAIL"]
     assert rig.field("OSCCON", "CF") == 1
@@ -178,7 +178,7 @@ def test_watchdog_resets_the_running_chip():
     """§4: 2 ms x 1 x 1."""
     rig = Rig(fwdt=0x8000)
     causes = []
-    rig.wires.reset = causes.append
+    rig.cpu_signals.reset = causes.append
     rig.at(TWO_MS - 1)
     assert causes == []
     rig.at(TWO_MS)
@@ -196,7 +196,7 @@ def test_clrwdt_restarts_the_watchdog_and_clears_wdto():
     """§4."""
     rig = Rig(fwdt=0x8000)
     causes = []
-    rig.wires.reset = causes.append
+    rig.cpu_signals.reset = causes.append
     rig.at(20000).write("RCON", 0x0510)
     rig.dev.clear_watchdog(20000)
     assert rig.field("RCON", "WDTO") == 0
@@ -210,8 +210,8 @@ def test_watchdog_wakes_the_sleeping_chip_without_reset():
     """§4: WDTO and SLEEP are set."""
     rig = Rig(fwdt=0x8000)
     woken, causes = [], []
-    rig.wires.wake = lambda: woken.append(rig.events.now)
-    rig.wires.reset = causes.append
+    rig.cpu_signals.wake = lambda: woken.append(rig.events.now)
+    rig.cpu_signals.reset = causes.append
     rig.at(100).dev.sleep(2, 100)
     rig.at(100 + TWO_MS)
     assert woken == [100 + TWO_MS]
@@ -222,7 +222,7 @@ def test_watchdog_wakes_the_sleeping_chip_without_reset():
 def test_software_enables_the_watchdog_with_swdten(rig):
     """§4: FWDTEN = 0, prescalers 512 and 16 in the e-puck's word: 16.384 s."""
     causes = []
-    rig.wires.reset = causes.append
+    rig.cpu_signals.reset = causes.append
     rig.at(1000).write("RCON", 0x0523)
     rig.at(1000 + 241_591_910)
     assert causes == ["WDTO"]

@@ -18,7 +18,7 @@ from emu.chips.dspic30f6014a import SFRS, VECTORS
 
 from .device_programs import CHIPS, difference
 
-ENGINES = ("plain", "interp", "jit")
+ENGINES = ("plain", "jit")
 A = {name: f"{sfr.address:#x}" for name, sfr in SFRS.items()}
 
 

@@ -13,10 +13,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from emu.boards.epuck.camera.exposure import Exposure
-from emu.boards.epuck.camera.native_camera import LentCamera
-from emu.boards.epuck.camera.scan import HREF, LINE_PIXELS, PCLK, VSYNC, Scan, course_of
-from emu.boards.epuck.camera.sensors import SENSORS, Picture, Timing
-from emu.boards.part import Part
+from emu.boards.epuck.camera.native_camera import NativeCamera
+from emu.boards.epuck.camera.scan import HREF, LINE_PIXELS, PCLK, VSYNC, Scan, frame_timing
+from emu.boards.epuck.camera.sensors import SENSORS, ImageSettings, SensorTiming
+from emu.boards.part import BoardPart
 from emu.peripherals import Peripherals
 from emu.peripherals.i2c.bus import I2cDevice
 from emu.peripherals.ports.rules import Stretch
@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # loaded when the first picture is: most runs start faster wi
     import numpy as np
     from numpy.typing import NDArray
 
-    from emu.boards.epuck.camera.pixels import Pixels, PixelSource, Readout, Still
+    from emu.boards.epuck.camera.pixels import Pixels, PixelSource, Readout, StillImage
 
 ADDRESS: Final = 0x6E
 """7-bit I2C address: 0xDC to write, 0xDD to read (epuck.md §7.1)."""
@@ -40,7 +40,7 @@ RowSource = Callable[[int, int], "Pixels"]
 """rows(y, cycle): line y (0 = top) of the upright scene, 640 x 3 values, as seen in `cycle`."""
 
 
-class Camera(Part, I2cDevice):
+class Camera(BoardPart, I2cDevice):
     """One image sensor on its connector. Raises ValueError for a sensor that is not in SENSORS."""
 
     def __init__(self, chip: Peripherals, sensor: str = "PO6030K", plugged: bool = True) -> None:
@@ -64,20 +64,20 @@ class Camera(Part, I2cDevice):
         self._byte: Final = self.cell("line_byte_tcy", "Q", 1)
         places = (place_of(self.record, f"camera.{name}") for name in ("line_from", "line_to", "line", "line_byte_tcy"))
         chip.ports[DATA_PORT].show(Stretch(DATA_MASK, 8, *places), self._refresh)
-        self.lent: Final = LentCamera.of(self.record)
+        self.native: Final = NativeCamera.of(self.record)
         """For compiled code that paints what `sample` was given."""
-        self._lent_at: Final = ctypes.addressof(self.lent)
-        self._is_lent, self._settings = False, 0
+        self._native_address: Final = ctypes.addressof(self.native)
+        self._has_native_source, self._settings = False, 0
         self._pixels: PixelSource | None = None
-        self._still: Still | None = None
+        self._still: StillImage | None = None
         self._href: Final = ctypes.c_int64()
         self._href_at: Final = ctypes.addressof(self._href)
         self._timing: Timing
-        self._picture: Picture
+        self._picture: ImageSettings
         self._readout: Readout | None
         self._load_defaults()
         self._interpret()
-        self.scan.begin(course_of(self._timing), self.now, running=True)
+        self.scan.begin(frame_timing(self._timing), self.now, running=True)
         self.pins.set(RESET_PIN, 1)  # UNVERIFIED: pulled up while nobody drives it
         self.pins.watch(RESET_PIN, self._reset_moved)
         if plugged:
@@ -91,24 +91,24 @@ class Camera(Part, I2cDevice):
         `turned` = 90, 180 or 270 turns it counter-clockwise before a sensor that is mounted turned (§7.1).
         Raises ValueError for something that is no picture.
         """
-        from emu.boards.epuck.camera.pixels import Still, as_vga
+        from emu.boards.epuck.camera.pixels import StillImage, as_vga
 
-        still = Still(as_vga(image, turned))
-        self.sample(still, is_lent=True)
+        still = StillImage(as_vga(image, turned))
+        self.sample(still, has_native_source=True)
         self._still = still
 
     def look(self, rows: RowSource) -> None:
         """Let the camera see what `rows(y, cycle)` returns for each line when it is read out."""
         self.sample(lambda y, columns, cycle: rows(y, cycle)[columns])
 
-    def sample(self, pixels: PixelSource, is_lent: bool = False) -> None:
+    def sample(self, pixels: PixelSource, has_native_source: bool = False) -> None:
         """Let the camera see what `pixels(y, columns, cycle)` returns for each line when it is read out.
 
         It is called with the cycle in which the line's HREF rises, only for lines that somebody reads, once per line.
-        `is_lent`: there is compiled code that paints the same, by `lent`, whoever of the two is asked.
+        `has_native_source`: there is compiled code that paints the same, by `lent`, whoever of the two is asked.
         """
-        self._pixels, self._is_lent, self._still = pixels, is_lent, None
-        self.lent.setting = 0
+        self._pixels, self._has_native_source, self._still = pixels, has_native_source, None
+        self.native.setting = 0
         self._line_to.value = 0
 
     @property
@@ -123,7 +123,7 @@ class Camera(Part, I2cDevice):
 
     @lamp.setter
     def lamp(self, brightness: float) -> None:
-        self._exposure.set_lamp(brightness, self.now, self.scan.course.frame_tcy)
+        self._exposure.set_lamp(brightness, self.now, self.scan.timing.frame_tcy)
         self._line_to.value = 0
 
     def frame(self, cycle: int | None = None) -> Pixels:
@@ -136,7 +136,7 @@ class Camera(Part, I2cDevice):
         at = self.now if cycle is None else cycle
         room = (ctypes.c_uint8 * (2 * LINE_PIXELS))()
         lines = []
-        for line in range(self.scan.course.lines):
+        for line in range(self.scan.timing.lines):
             count = self._sent(line, at, ctypes.addressof(room))
             lines.append(decode_line(bytes(room[:count]), self._picture.form))
         return np.stack(lines) if lines else np.zeros((0, 0, 3), np.uint8)
@@ -146,11 +146,11 @@ class Camera(Part, I2cDevice):
         if self._readout is None:
             from emu.boards.epuck.camera.pixels import Readout
 
-            self._readout = Readout(self._timing, self._picture, self.scan.course.lines)
-        if self._is_lent and not self.lent.setting:
+            self._readout = Readout(self._timing, self._picture, self.scan.timing.lines)
+        if self._has_native_source and not self.native.setting:
             self._settings += 1
-            self._readout.tell(self.lent, self._settings, self._picture)
-        brightness = self._exposure.brightness(self._picture.exposure, cycle, self.scan.course.frame_tcy)
+            self._readout.tell(self.native, self._settings, self._picture)
+        brightness = self._exposure.brightness(self._picture.exposure, cycle, self.scan.timing.frame_tcy)
         return self._readout.put(self._pixels, line, cycle, brightness, address)
 
     # -- connector ---------------------------------------------------------------------------------------------------
@@ -189,16 +189,16 @@ class Camera(Part, I2cDevice):
     @property
     def frames_per_second(self) -> float:
         """Frame rate at the present clock and setting."""
-        return self.chip.fcy / self.scan.course.frame_tcy
+        return self.chip.fcy / self.scan.timing.frame_tcy
 
     def align(self, cycle: int, line: int = 0) -> None:
         """Shift the sensor's phase so that HREF of a line (0 = first of the frame) rises in `cycle`, which is to come:
         for tests that put an edge on a chosen instruction. On a robot the phase is chance."""
-        course = self.scan.course
-        start = cycle - course.first_href - line * course.line_tcy
-        start -= max(-(-(start - self.now) // course.frame_tcy), 0) * course.frame_tcy
+        timing = self.scan.timing
+        start = cycle - timing.first_href - line * timing.line_tcy
+        start -= max(-(-(start - self.now) // timing.frame_tcy), 0) * timing.frame_tcy
         self._line_to.value = 0
-        self.pins.change_waveform(self.now, partial(self.scan.begin, course, start, self.scan.running))
+        self.pins.change_waveform(self.now, partial(self.scan.begin, timing, start, self.scan.running))
 
     # -- pixel bus ---------------------------------------------------------------------------------------------------
 
@@ -209,7 +209,7 @@ class Camera(Part, I2cDevice):
             return 0
         return self._line[(cycle - u64[first]) // u64[self._byte.index]] << 8
 
-    def stands_until(self, cycle: int) -> int:
+    def constant_until(self, cycle: int) -> int:
         """Between lines the next one; the bytes of a line are in the record."""
         u64 = self._u64
         is_on = u64[self._line_from.index] <= cycle < u64[self._line_to.index]
@@ -230,13 +230,13 @@ class Camera(Part, I2cDevice):
             return False
         return (self._still is not None and self._sent_at_once(self._still, cycle)) or self._render(cycle)
 
-    def _sent_at_once(self, still: Still, cycle: int) -> bool:
+    def _sent_at_once(self, still: StillImage, cycle: int) -> bool:
         """A line of a still picture put into the record by compiled code, if that would do what `_render` does and the
         row has been looked at before."""
-        row = still.asked(self._lent_at, self.lent.setting, cycle, self._href_at)
+        row = still.asked(self._native_address, self.native.setting, cycle, self._href_at)
         pixels = still.place(row)
         if pixels:
-            still.send(self._lent_at, self._href.value, pixels)
+            still.send(self._native_address, self._href.value, pixels)
         return bool(pixels)
 
     def _render(self, cycle: int) -> bool:
@@ -245,7 +245,7 @@ class Camera(Part, I2cDevice):
         if found is None:
             return False
         line, href = found
-        tcy = self.scan.course.byte_tcy
+        tcy = self.scan.timing.byte_tcy
         count = self._sent(line, href, self._line_at)
         self._line_from.value = begin = href - tcy // 2
         self._line_to.value = begin + count * tcy
@@ -289,18 +289,18 @@ class Camera(Part, I2cDevice):
         before = self._picture.exposure
         self._interpret()
         if (before is None) != (self._picture.exposure is None):
-            self._exposure.hold(cycle, self.scan.course.frame_tcy)
-        course = course_of(self._timing)
-        if course != self.scan.course:
-            self._exposure.hold(cycle, self.scan.course.frame_tcy)
-            self.pins.change_waveform(cycle, partial(self.scan.begin, course, cycle, self.scan.running))
+            self._exposure.hold(cycle, self.scan.timing.frame_tcy)
+        timing = frame_timing(self._timing)
+        if timing != self.scan.timing:
+            self._exposure.hold(cycle, self.scan.timing.frame_tcy)
+            self.pins.change_waveform(cycle, partial(self.scan.begin, timing, cycle, self.scan.running))
 
     def _interpret(self) -> None:
         """What the registers mean; a line already rendered is out of date."""
         self._timing = self.sensor.timing(self.register)
         self._picture = self.sensor.picture(self.register)
         self._readout = None
-        self.lent.setting = 0
+        self.native.setting = 0
         self._line_to.value = 0
 
     # -- reset -------------------------------------------------------------------------------------------------------
@@ -313,7 +313,7 @@ class Camera(Part, I2cDevice):
         self._load_defaults()
         self._interpret()
         self._exposure.restart(cycle)
-        self.scan.begin(course_of(self._timing), cycle, running)
+        self.scan.begin(frame_timing(self._timing), cycle, running)
 
     def _load_defaults(self) -> None:
         self._bank.value = 0

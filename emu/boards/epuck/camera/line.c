@@ -45,7 +45,7 @@ void encode(const uint8_t *pixels, i64 count, i64 form, const f64 *gains, uint8_
     }
 }
 
-// One frame in the machine's record, as scan.py has it (`Course`, `Scan`). Cycles.
+// One frame in the machine's record, as scan.py has it (`FrameTiming`, `Scan`). Cycles.
 struct scan {
     i64 frame_tcy, first_href, line_tcy, lines, line_bytes, byte_tcy, vsync_rise, vsync_fall, start;
     uint8_t running;

@@ -1,4 +1,4 @@
-"""`LentCamera`: a camera for compiled code that paints its lines instead of Python: `struct camera` of line.c.
+"""`NativeCamera`: a camera for compiled code that paints its lines instead of Python: `struct camera` of line.c.
 
 What it answers by itself is what `Camera` would; wherever it does not, Python is to be asked.
 """
@@ -11,7 +11,7 @@ from emu.boards.epuck.camera.exposure import ONE
 from emu.system.record import Record
 
 
-class LentCamera(Structure):
+class NativeCamera(Structure):
     """Where things are in the record, and what `Readout` knows; `setting` is 0 until it has told."""
 
     _fields_ = [
@@ -22,7 +22,7 @@ class LentCamera(Structure):
     setting: int
 
     @classmethod
-    def of(cls, record: Record) -> LentCamera:
+    def of(cls, record: Record) -> NativeCamera:
         """That of the camera in a record."""
         cells = ("frame_tcy", "plugged", "lamp", "exposure", "line_from", "line_to", "line_byte_tcy", "line")
         return cls(*(record.address + record.fields[f"camera.{cell}"].offset for cell in cells), one=ONE)

@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from emu.boards.epuck.camera.native_camera import LentCamera
-from emu.boards.epuck.camera.scan import course_of
-from emu.boards.epuck.camera.sensors import GREY, HEIGHT, RGB565, WIDTH, YUV, Picture, Timing
+from emu.boards.epuck.camera.native_camera import NativeCamera
+from emu.boards.epuck.camera.scan import frame_timing
+from emu.boards.epuck.camera.sensors import GREY, HEIGHT, RGB565, WIDTH, YUV, ImageSettings, SensorTiming
 from emu.native_library import ADDRESS, INT, functions
 
 Pixels = NDArray[np.uint8]
@@ -22,14 +22,14 @@ PixelSource = Callable[[int, NDArray[np.intp], int], Pixels]
 """pixels(y, columns, cycle): only these columns (0..639) of line y, len(columns) x 3 values."""
 
 
-def scene_columns(timing: Timing, picture: Picture) -> NDArray[np.intp]:
+def scene_columns(timing: SensorTiming, picture: ImageSettings) -> NDArray[np.intp]:
     """Scene column (0 = left, 0..639) of every pixel of a line. Beside the array its edge is seen."""
-    pixels = course_of(timing).line_bytes // timing.bytes_per_pixel
+    pixels = frame_timing(timing).line_bytes // timing.bytes_per_pixel
     columns = timing.first_column + timing.scale_x * np.arange(pixels) - picture.origin_x
     return np.clip(WIDTH - 1 - columns if picture.flip_x else columns, 0, WIDTH - 1)
 
 
-def scene_row(timing: Timing, picture: Picture, line: int) -> int:
+def scene_row(timing: SensorTiming, picture: ImageSettings, line: int) -> int:
     """Scene row (0 = top, 0..479) of a line of the frame."""
     row = timing.first_row + line * timing.scale_y - picture.origin_y
     return min(max(HEIGHT - 1 - row if picture.flip_y else row, 0), HEIGHT - 1)
@@ -40,7 +40,7 @@ def darkness(_y: int, columns: NDArray[np.intp], _cycle: int) -> Pixels:
     return np.zeros((len(columns), 3), dtype=np.uint8)
 
 
-class Still:
+class StillImage:
     """A picture that stays as it is (480 x 640 x 3): a row cut to the same columns is the same array each time."""
 
     def __init__(self, scene: Pixels) -> None:
@@ -83,7 +83,7 @@ def encode(pixels: int, count: int, form: str, gains: ctypes.Array[ctypes.c_doub
 class Readout:
     """Lines of the frame as one setting of a sensor sends them."""
 
-    def __init__(self, timing: Timing, picture: Picture, lines: int) -> None:
+    def __init__(self, timing: SensorTiming, picture: ImageSettings, lines: int) -> None:
         self._columns: Final = scene_columns(timing, picture)
         self._rows: Final = [scene_row(timing, picture, line) for line in range(lines)]
         self._row_numbers: Final = (ctypes.c_int64 * lines)(*self._rows)
@@ -93,7 +93,7 @@ class Readout:
         self._brightness = 1.0
         self._held: Final[dict[int, tuple[Pixels, int]]] = {}
 
-    def tell(self, camera: LentCamera, setting: int, picture: Picture) -> None:
+    def tell(self, camera: NativeCamera, setting: int, picture: ImageSettings) -> None:
         """Let compiled code know this setting, by a number of its own. It must live as long as it is in force."""
         camera.row, camera.count = ctypes.addressof(self._row_numbers), len(self._columns)
         camera.form, camera.gains[:] = _FORMS.index(self._form), self._gains

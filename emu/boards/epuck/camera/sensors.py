@@ -19,7 +19,7 @@ ReadRegister = Callable[[int, int], int]
 
 
 @dataclass(frozen=True, slots=True)
-class Timing:
+class SensorTiming:
     """When lines and bytes come."""
 
     columns: int
@@ -41,7 +41,7 @@ class Timing:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class ImageSettings:
     """What the bytes mean."""
 
     form: str
@@ -64,8 +64,8 @@ class Sensor:
     banks: int
     bank_register: int | None
     defaults: Mapping[tuple[int, int], int]
-    timing: Callable[[ReadRegister], Timing]
-    picture: Callable[[ReadRegister], Picture]
+    timing: Callable[[ReadRegister], SensorTiming]
+    picture: Callable[[ReadRegister], ImageSettings]
 
 
 def _word(read: ReadRegister, bank: int, high: int) -> int:
@@ -96,12 +96,12 @@ _PO3030K_DEFAULTS: Final = _defaults(  # §7.2
 )
 
 
-def _po3030k_timing(read: ReadRegister) -> Timing:
+def _po3030k_timing(read: ReadRegister) -> SensorTiming:
     scale = _PO3030K_SCALE.get(read(0, 0x20), 1)
     form = _PO3030K_FORM.get(read(0, 0x4E), YUV)
     # UNVERIFIED: a frame is at least as long as the exposure plus two rows (§7.4)
     rows = max(_word(read, 0, 0x06) + 1, _word(read, 0, 0x1A) + 2)
-    return Timing(
+    return SensorTiming(
         columns=_word(read, 0, 0x04) + 1,
         rows=rows,
         column_tcy=_PO3030K_DIVIDER[read(0, 0x1D) >> 4 & 7],
@@ -118,11 +118,11 @@ def _po3030k_timing(read: ReadRegister) -> Timing:
     )
 
 
-def _po3030k_picture(read: ReadRegister) -> Picture:
+def _po3030k_picture(read: ReadRegister) -> ImageSettings:
     control = read(0, 0xD4)
     exposure = None if control & 0x10 else _word(read, 0, 0xB0) / 0x07CC * read(0, 0x15) / 0x10
     gains = (read(0, 0x16), (read(0, 0x17) + read(0, 0x19)) / 2, read(0, 0x18))
-    return Picture(
+    return ImageSettings(
         form=_PO3030K_FORM.get(read(0, 0x4E), YUV),
         origin_x=210,
         origin_y=7,
@@ -172,13 +172,13 @@ _NOMINAL_EXPOSURE: Final = 0x0008_0000
 """Exposure registers at which the picture comes out as lit. UNVERIFIED: "8.0 units" in a public driver (§7.6)."""
 
 
-def _banked_timing(chip: _Banked, read: ReadRegister) -> Timing:
+def _banked_timing(chip: _Banked, read: ReadRegister) -> SensorTiming:
     scale_x = max(read(*chip.scale_x) >> 5, 1)
     scale_y = max(read(*chip.scale_y) >> 5, 1)
     form = chip.forms.get(read(*chip.form), YUV)
     # UNVERIFIED: the pixel behind the register's value is the first, so that drivers get the column they ask for
     first = chip.window_x + (_word(read, *chip.start_x) + 1) * scale_x
-    return Timing(
+    return SensorTiming(
         columns=chip.columns,
         rows=chip.rows,
         column_tcy=2 * chip.dividers.get(read(*chip.clock), 1),
@@ -195,14 +195,14 @@ def _banked_timing(chip: _Banked, read: ReadRegister) -> Timing:
     )
 
 
-def _banked_picture(chip: _Banked, read: ReadRegister) -> Picture:
+def _banked_picture(chip: _Banked, read: ReadRegister) -> ImageSettings:
     control = read(*chip.control)
     bank, first = chip.exposure
     manual = _word(read, bank, first) << 16 | _word(read, bank, first + 2)
     bank, first = chip.gains
     gains = (float(read(bank, first)), float(read(bank, first + 1)), float(read(bank, first + 2)))
     turned = read(*chip.mirror) ^ chip.upright
-    return Picture(
+    return ImageSettings(
         form=chip.forms.get(read(*chip.form), YUV),
         origin_x=chip.origin_x,
         origin_y=chip.origin_y,
