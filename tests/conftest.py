@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from skips import Skips
+from watchdog import Silence, WatchdogPlugin
 
 from emu.dspic30f.engines import NAMES, make_engine
 from emu.dspic30f.jit import engine as jit
@@ -24,7 +25,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """The compiler checks itself in all tests and the programs they start; skipped tests are told at the end."""
     os.environ["DSPIC_VERIFY_MACHINE"] = "1"
+    config.pluginmanager.register(WatchdogPlugin(), "watchdog")
     if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Silence(config), "silence")
         config.pluginmanager.register(Skips(config.getoption("--allowed-skips")), "skips")
 
 

@@ -18,7 +18,6 @@ WANTED = ("mkdocs", "material", "mkdocstrings_handlers")
     any(importlib.util.find_spec(name) is None for name in WANTED),
     reason="the site's generator is missing (extra: docs)",
 )
-@pytest.mark.timeout(1800)
 def test_the_site_builds_without_a_warning(tmp_path):
     words = [sys.executable, str(ROOT / "docs" / "site.py"), "--out", str(tmp_path / "site")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

@@ -118,7 +118,6 @@ def test_a_compiler_s_message_reaches_the_report(tests):
 
 
 @pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="not a clone, or no git")
-@pytest.mark.timeout(3600)
 def test_the_action_s_steps_as_they_are_from_the_wheel(tmp_path):
     """In an environment with nothing but the wheel: a new project passes; with a mistake in its C source, the summary
     names thread and line, and there is a waveform."""

@@ -53,7 +53,6 @@ def test_the_wheel_holds_everything_and_repeats(tmp_path):
     ]
 
 
-@pytest.mark.timeout(3600)
 def test_the_first_steps_say_what_happens(tmp_path):
     """docs/first-steps.md, played from the wheel in an empty folder with an empty HOME; nothing lands beside them."""
     words = [sys.executable, str(ROOT / "docs" / "newcomer.py"), "--check", "--keep", str(tmp_path / "newcomer")]
