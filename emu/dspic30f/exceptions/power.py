@@ -26,7 +26,7 @@ class Sleeping(Enum):
 
 
 @dataclass(slots=True)
-class CpuSignals:
+class PowerSignals:
     """Lines from the core to whoever wired it."""
 
     clear_watchdog: Callable[[], None] = lambda: None
@@ -51,23 +51,23 @@ class PowerSaving:
         self._events: Final = events
         self._exceptions: Final = exceptions
         self._slept: Final = state.record.reserve("cpu.slept", "Q").index
-        self.wires: Final = CpuSignals()
+        self.signals: Final = PowerSignals()
 
     def stop(self, mode: int, cycle: int) -> None:
         """PWRSAV executed in `cycle`; `mode` is IDLE or SLEEP."""
         self._events.arrive(cycle)
         self._state.mode = mode
         self._state.record.u64[self._slept] = cycle
-        self.cpu_signals.power(mode, cycle + 1)
+        self.signals.power(mode, cycle + 1)
         self._events.kick()
 
     def wake(self) -> None:
         """Leave Idle, or Sleep once the oscillator runs: execution goes on."""
         if self._state.mode != RUN:
             if self._state.mode == SLEEP:
-                self._state.cycle += self.cpu_signals.restart()
+                self._state.cycle += self.signals.restart()
             self._state.mode = RUN
-            self.cpu_signals.power(RUN, self._state.cycle)
+            self.signals.power(RUN, self._state.cycle)
             self._events.kick()
 
     def pass_time(self, limit: int) -> Sleeping:
@@ -85,7 +85,7 @@ class PowerSaving:
                     self.wake()
                 if state.mode == RUN:
                     return Sleeping.ENDED
-            if self.cpu_signals.interrupted():
+            if self.signals.interrupted():
                 return Sleeping.GOES_ON
             due = events.deadline
             if due < limit:
@@ -100,4 +100,4 @@ class PowerSaving:
 
     def _is_final(self) -> bool:
         """Nothing is enabled that could wake the CPU, whatever the devices still do."""
-        return not self._exceptions.armed() and not self.cpu_signals.can_wake()
+        return not self._exceptions.armed() and not self.signals.can_wake()

@@ -113,7 +113,7 @@ def surroundings_of(core: Core, key: Key, hooks: frozenset[int], offset: Mapping
     return Surroundings(
         offset, reads, writes, key.initialised, bool(key.limit_armed), (ram.start, ram.end), chip.data["yram"].start,
         chip.program["flash"].end // 2, tuple(sorted(words.items())), core.traps.flags,
-        core.sequencer.power.cpu_signals.idling, core.sequencer.power.cpu_signals.clearing, latches_of(core),
+        core.sequencer.power.signals.idling, core.sequencer.power.signals.clearing, latches_of(core),
         flow_rules.places_of(core.state),
         {2 * word: rule for word, rule in enumerate(bus.rules) if rule is not None}, hooks, start, end)  # fmt: skip
 
