@@ -20,10 +20,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from emu.api import Machine
 from emu.boards.epuck.board import Epuck
 from emu.dspic30f.jit.engine import JitEngine
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 FIRMWARE = Path(__file__).resolve().parents[1] / "firmware"
 START = 8

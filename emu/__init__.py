@@ -7,9 +7,9 @@
     >>> stop.reason, stop.fault                                     # doctest: +SKIP
     ('limit', None)
 
-`load` gives a `Machine` from a firmware file, `Machine` has everything else: run it, look into it, be told, take
-snapshots. A run ends with a `Stop`; if the firmware did something wrong, `Stop.fault` says what, where, in which thread
-and how it got there. Time is counted in Tcy (instruction cycles) since power-on, an integer that only grows.
+`load` returns a `Machine` for a firmware file. Its methods run it, read and change its state, install hooks and take
+snapshots. A run ends with a `Stop`. If the firmware failed, `Stop.fault` has the cause, the place, the thread, the call
+stack and the last branches. Time is an integer number of Tcy (instruction cycles) since power-on; it never decreases.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from emu.api import BuildError as BuildError
     from emu.api import Change as Change
+    from emu.api import Machine as Machine
     from emu.api import build as build
     from emu.api import load as load
     from emu.api import watch as watch
     from emu.image.loader import load_image as load_image
     from emu.image.model import Image as Image
     from emu.image.model import LoadError as LoadError
-    from emu.machine.machine import Machine as Machine
     from emu.machine.stops import Stop as Stop
 
 FCY_HZ: Final = 14_745_600
-"""Instruction cycles per second of an e-puck with the vendor's clock setting, XT_PLL8 (dspic30f6014a.md §3)."""
+"""Instruction cycles per second (Hz) of an e-puck with the vendor's clock setting, XT_PLL8 (dspic30f6014a.md §3)."""
 TCY_SECONDS: Final = 1 / FCY_HZ
 """Length of one instruction cycle in s at `FCY_HZ`."""
 
-# Names load when they are first used, so that tools which need only the instruction table or the chip's data pay for
-# nothing else.
-_HOME: Final = {
+# Modules are imported when a name is first used: tools that need only the instruction table or the chip's data start
+# faster.
+_MODULES: Final = {
     "BuildError": "emu.api",
     "Change": "emu.api",
     "Image": "emu.image.model",
     "LoadError": "emu.image.model",
-    "Machine": "emu.machine.machine",
-    "Stop": "emu.machine.machine",
+    "Machine": "emu.api",
+    "Stop": "emu.machine.stops",
     "build": "emu.api",
     "load": "emu.api",
     "load_image": "emu.image.loader",
@@ -66,10 +66,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name from the module it lives in. Raises AttributeError for any other name."""
-    if name not in _HOME:
+    """Import a public name from its module. Raises AttributeError for any other name."""
+    if name not in _MODULES:
         raise AttributeError(f"module 'emu' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
+    value = getattr(import_module(_MODULES[name]), name)
     globals()[name] = value
     return value
 

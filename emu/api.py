@@ -1,24 +1,24 @@
-"""The Python interface in one call: an image loaded into a machine, and variables watched by name.
+"""The Python interface: load an image, run it, and inspect it by the names of its source.
 
 >>> import emu
 >>> machine = emu.load("tests/emu/cli/hello.hex")
->>> said = bytearray()
->>> machine.uart[1].on_byte = lambda byte, cycle: said.append(byte)
+>>> output = bytearray()
+>>> machine.uart[1].on_byte = lambda byte, cycle: output.append(byte)
 >>> stop = machine.run(cycles=14_745_600)       # one second of an e-puck
->>> stop.reason, bytes(said)
+>>> stop.reason, bytes(output)
 ('halt', b'hi!\\n')
 >>> machine.w[0], hex(machine.pc), machine.peek("U1BRG")
 (5, '0x11e', 7)
 
-A snapshot is a copy of everything, also across engines:
+A snapshot is a copy of the whole state. It is valid in every engine:
 
->>> again = emu.load("tests/emu/cli/hello.hex", engine="plain")
->>> again.run(until=0x104).reason               # or a function that says when
+>>> other = emu.load("tests/emu/cli/hello.hex", engine="plain")
+>>> other.run(until=0x104).reason               # also: a name, or a function that returns a condition
 'until'
->>> state = again.snapshot()
->>> _ = again.run()
->>> again.restore(state)
->>> again.run().cycle == stop.cycle
+>>> state = other.snapshot()
+>>> _ = other.run()
+>>> other.restore(state)
+>>> other.run().cycle == stop.cycle
 True
 """
 
@@ -30,14 +30,115 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from emu.boards import board_named
 from emu.chips import chip_named
+from emu.chips.chip import Chip
+from emu.chips.dspic30f6014a import DSPIC30F6014A
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
+from emu.machine import machine as bare
+from emu.machine.state_access import MemoryObserver
 from emu.machine.stops import Stop
 from emu.peripherals import Peripherals
+
+if TYPE_CHECKING:
+    from emu.debug.inspector import Frame, Inspector, Value
+    from emu.debug.threads import Thread
+
+
+class Machine(bare.Machine):
+    """A machine with a debugger attached: access by names of the source, and stops that explain firmware faults.
+
+    With `strict`, null pointers, uninitialised reads and stores into other threads' stacks are faults
+    (emu/debug/strict.py); this needs the plain engine. The other arguments are those of `emu.machine.machine.Machine`.
+    Raises ValueError for an unknown engine, or for another engine than plain with `strict`.
+
+    Debug information is loaded when it is first needed, because reading it costs time and memory.
+    """
+
+    def __init__(
+        self,
+        chip: Chip = DSPIC30F6014A,
+        *,
+        engine: str = "auto",
+        ipl_slip: int = 0,
+        board: Callable[[Peripherals], Any] | None = None,
+        strict: bool = False,
+    ) -> None:
+        observer: Callable[[bare.Machine], MemoryObserver] | None = None
+        if strict:
+            from emu.debug.strict import StrictMode
+
+            if engine not in ("auto", "plain"):
+                raise ValueError(f"a strict run needs the plain engine, not {engine!r}")
+            engine, observer = "plain", StrictMode
+        super().__init__(chip, engine=engine, ipl_slip=ipl_slip, board=board, observer=observer)
+        self._inspector: Inspector | None = None
+        self.diagnose = self._explain
+
+    def _explain(self, stop: Stop) -> Stop:
+        from emu.debug.fault_report import explain  # most runs end without a fault
+
+        return explain(self, stop)
+
+    @property
+    def inspector(self) -> Inspector:
+        """The loaded program with its names, types and call stacks. Raises ValueError if no image is loaded."""
+        from emu.debug.inspector import Inspector
+
+        if self._inspector is None or self._inspector.image is not self.image:
+            self._inspector = Inspector(self)
+        return self._inspector
+
+    def value(self, expression: str) -> Value:
+        """Return the typed object that a C expression denotes: `machine.value("robot.speed[1]").set(3)`.
+
+        The expression may use locals of the current function, statics and globals, registers and their fields, and the
+        operators of C. Raises ValueError for an expression that denotes no object,
+        `emu.debug.dwarf.location.Unavailable` for a value that was optimised out.
+        """
+        from emu.debug import symbolic
+
+        return symbolic.variable(self.inspector, expression)
+
+    def var(self, expression: str) -> Any:
+        """Return the value of a C expression as a Python object: int, float, bool, list of elements, dict of members.
+
+        Raises as `value`, but permits plain numbers: `machine.var("total / 2 + U1BRG")`.
+        """
+        from emu.debug import symbolic
+
+        return symbolic.read(self.inspector, expression)
+
+    def set_var(self, expression: str, value: float) -> None:
+        """Assign to the object that a C expression denotes. Raises as `value`, and ValueError if `value` does not
+        fit."""
+        self.value(expression).set(value)
+
+    def backtrace(self) -> list[Frame]:
+        """Return the call stack, innermost first, through interrupts and inlined functions."""
+        return self.inspector.frames()
+
+    def threads(self) -> list[Thread]:
+        """Return the threads of an OpenSwarm firmware with states, call stacks and stack use; empty for any other."""
+        from emu.debug.threads import Threads
+
+        return Threads(self.inspector).all()
+
+    def call(self, function: str, *arguments: Any, cycles: int = 1_000_000) -> Any:
+        """Call a function of the firmware and return its result: `machine.call("crc16", b"hello", 5)`.
+
+        Numbers are converted to the parameters' types. Bytes are copied to the stack and passed as a pointer.
+        Interrupts are masked during the call. The function's effects on memory persist. The optimiser may have
+        changed a function, or inlined and removed it.
+
+        Raises KeyError for an unknown function, ValueError for unsuitable arguments,
+        `emu.debug.function_call.CallError` if the function does not return within `cycles`.
+        """
+        from emu.debug.function_call import call
+
+        return call(self, function, arguments, cycles)
 
 
 def load(
@@ -49,14 +150,14 @@ def load(
     strict: bool = False,
     chip: str | None = None,
 ) -> Machine:
-    """A machine with the firmware file at `path`, ELF or Intel HEX, ready to run from reset.
+    """Return a machine with the firmware file at `path` (ELF or Intel HEX), ready to run from reset.
 
-    `board` is what is around the chip: "epuck" as on the command line, "none" or None for bare pins, or what to call
-    with the chip's peripherals, for example `functools.partial(emu.boards.epuck.board.Epuck, selector=3)`.
-    `engine` is "auto", "jit", "interp" or "plain"; all give the same run. With `strict` the plain one also finds null
-    pointers, uninitialised reads and stores into other threads' stacks, and calls them faults.
-    `chip` is the part a HEX file is for (an ELF file says so itself): "dsPIC30F6014A" or "dsPIC30F4013".
-    Raises `emu.LoadError` if the file is not a usable image, ValueError for an unknown engine, board or chip.
+    `board` is the circuit around the chip: "epuck" as on the command line, "none" or None for bare pins, or a callable
+    that takes the chip's peripherals, for example `functools.partial(emu.boards.epuck.board.Epuck, selector=3)`.
+    `engine` is "auto", "jit", "interp" or "plain"; all give the same run. With `strict`, null pointers, uninitialised
+    reads and stores into other threads' stacks are faults; this needs the plain engine.
+    `chip` is the device of a HEX file: "dsPIC30F6014A" or "dsPIC30F4013". An ELF file names its device itself.
+    Raises `emu.LoadError` if the file is no usable image, ValueError for an unknown engine, board or chip.
     """
     image = load_image(path, None if chip is None else chip_named(chip))
     maker = board_named(board) if isinstance(board, str) else board
@@ -68,8 +169,10 @@ def load(
 def build(
     *sources: str | os.PathLike[str], flags: Sequence[str] = ("-Os", "-g"), output: str | os.PathLike[str]
 ) -> Path:
-    """Compile and link C files to the ELF file `output`, with the project's own compiler, for an e-puck's chip unless
-    `flags` say otherwise. Returns the path. Raises BuildError with what the compiler said."""
+    """Compile and link C files to the ELF file `output` with the project's own compiler, and return its path.
+
+    The target is the e-puck's chip unless `flags` name another. Raises BuildError with the compiler's messages.
+    """
     files = [*(os.fspath(source) for source in sources), "-o", os.fspath(output)]
     words = [sys.executable, "-m", "toolchain", "cc", *flags, *files]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
@@ -79,12 +182,12 @@ def build(
 
 
 class BuildError(RuntimeError):
-    """The compiler refused a program; the text is what it said."""
+    """A program cannot be compiled or linked. The text consists of the compiler's messages."""
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A watched value has changed: by the instruction that ended before `cycle`; `pc` is the next one."""
+    """A change of a watched value by the instruction that ended before `cycle`. `pc` is the next instruction."""
 
     cycle: int
     pc: int
@@ -92,11 +195,11 @@ class Change:
     new: int
 
 
-def watch(machine: Machine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
+def watch(machine: bare.Machine, place: str | int, *, size: int = 2, cycles: int | None = None) -> Iterator[Change]:
     """Run `machine` and yield every change of a variable, register or data address (`size` 1 or 2 bytes).
 
-    Looks after every instruction, so it runs at the speed of single steps. Ends with the run, after `cycles` Tcy at
-    the latest. Raises KeyError for an unknown name.
+    The value is compared after every instruction, so the machine runs at the speed of single steps. The iterator ends
+    with the run, after at most `cycles` Tcy. Raises KeyError for an unknown name.
     """
     address = machine.address_of(place)
     value = machine.peek(address, size)

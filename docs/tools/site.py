@@ -20,8 +20,9 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
 MODULES = (
     "emu",
+    "emu.api",
     "emu.machine.machine",
-    "emu.machine.fault_report",
+    "emu.machine.fault",
     "emu.boards.epuck.board",
     "emu.boards.epuck.exchange",
     "emu.debug.history",

@@ -45,7 +45,7 @@ def parser() -> Parser:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
-    from emu.machine.machine import Machine
+    from emu.api import Machine
 
     image = image_of(options)
     if not len(image.lines):
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     stop = machine.run(seconds=options.seconds)
     stop_counting()
     root = Path(options.root).resolve()
-    report = CoverageReport(machine.inside, counts, root.joinpath)
+    report = CoverageReport(machine.inspector, counts, root.joinpath)
     if options.lcov:
         with atomic_text_file(options.lcov) as stream:
             stream.writelines(f"{line}\n" for line in report.lcov(root.joinpath))

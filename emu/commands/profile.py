@@ -64,7 +64,7 @@ def _group(text: str) -> tuple[str, list[str]]:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
-    from emu.machine.machine import Machine
+    from emu.api import Machine
 
     image = image_of(options)
     machine = Machine(image.chip, board=board_of(options))

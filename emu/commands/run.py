@@ -23,9 +23,9 @@ from emu.run.input_log import HEADER, TimestampedInput, read_input_log
 from emu.run.session import FOREVER, Session
 
 if TYPE_CHECKING:
+    from emu.api import Machine
     from emu.dspic30f.isa.row import Insn
     from emu.instruments.vcd import WaveformRecorder
-    from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
 EXIT_SYMBOL: Final = "__exit_status"
@@ -131,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
         stop, host_seconds = session.run()
         end_watch()
         if stop.reason in ("halt", "limit", "interrupted") and (refused := _refused_before_start(machine, image)):
-            from emu.machine.fault_report import never_started
+            from emu.debug.fault_report import never_started
 
             stop = never_started(machine, stop, refused)
         lost = {number: port.lost for number, port in ports.items() if port.lost}
@@ -196,7 +196,7 @@ def _refused_before_start(machine: Machine, image: Image) -> int:
 
 def _machine(options: argparse.Namespace, image: Image) -> Machine:
     """A machine with the image, breakpoints set, telling about registers nobody models."""
-    from emu.machine.machine import Machine
+    from emu.api import Machine
 
     try:
         machine = Machine(

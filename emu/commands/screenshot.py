@@ -15,7 +15,7 @@ from emu.host.exit_status import DONE, FAULT
 from emu.host.files import is_standard
 
 if TYPE_CHECKING:
-    from emu.machine.machine import Machine
+    from emu.api import Machine
 
 FORMATS: Final = {"rgb565": 2, "yuv": 2, "grey": 1}
 """Bytes per pixel."""
@@ -61,8 +61,8 @@ def _enlargement(text: str) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Exit status as DESCRIPTION says."""
+    from emu.api import Machine
     from emu.boards.picture import write_picture
-    from emu.machine.machine import Machine
 
     if (options.buffer is None) != (options.size is None):
         raise CommandError("--buffer and --size belong together")

@@ -57,7 +57,7 @@ class Stopping(Looking):
         for one in arguments["breakpoints"]:
             try:
                 start = self._debuggee.machine.program_address(one["name"])
-                places: tuple[int, ...] = (self._debuggee.inside.body_of(start),)
+                places: tuple[int, ...] = (self._debuggee.inspector.prologue_end(start),)
             except KeyError:
                 places = ()
             made.append(self._breakpoint(one, "function", places, problem=f"there is no function {one['name']}"))
@@ -67,7 +67,7 @@ class Stopping(Looking):
         made = []
         for one in arguments["breakpoints"]:
             address = int(one["instructionReference"], 0) + int(one.get("offset", 0))
-            code = self._debuggee.inside.is_code(address) and not address & 1
+            code = self._debuggee.inspector.is_code(address) and not address & 1
             made.append(self._breakpoint(one, "instruction", (address,) if code else ()))
         return self._set("instruction", made)
 
@@ -112,7 +112,7 @@ class Stopping(Looking):
         if reference:
             return self._sights.find(int(reference), str(arguments["name"]))
         frame = self._sights.frame(arguments.get("frameId"))
-        return evaluate(self._debuggee.inside, str(arguments["name"]), frame)
+        return evaluate(self._debuggee.inspector, str(arguments["name"]), frame)
 
     def _do_setDataBreakpoints(self, arguments: Row) -> Row:
         made = []

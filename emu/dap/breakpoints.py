@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.expressions.expression import ExpressionError, evaluate, number_of
-from emu.debug.inspector import Inside
+from emu.debug.inspector import Inspector
 
 HIT: Final = re.compile(r"\s*(==|>=|<=|>|<|%|=)?\s*(\d+)\s*")
 COMPARE: Final[dict[str, Callable[[int, int], bool]]] = {
@@ -48,12 +48,12 @@ class Breakpoint:
         """Whether it is the same one, told again."""
         return all(getattr(self, name) == getattr(other, name) for name in SAME)
 
-    def stops(self, inside: Inside, say: Callable[[str], None]) -> bool:
+    def stops(self, inspector: Inspector, say: Callable[[str], None]) -> bool:
         """Whether a run ends here, now that it has come by. A condition that means nothing ends it, and says why."""
         if self.condition:
             try:
-                frames = inside.frames()
-                if not number_of(evaluate(inside, self.condition, frames[0] if frames else None)):
+                frames = inspector.frames()
+                if not number_of(evaluate(inspector, self.condition, frames[0] if frames else None)):
                     return False
             except (ExpressionError, Unavailable) as error:
                 say(f"condition {self.condition!r}: {error}\n")
@@ -63,18 +63,18 @@ class Breakpoint:
         if match is not None and not COMPARE[match[1] or "=="](self.hits, int(match[2])):
             return False
         if self.message:
-            say(filled(inside, self.message) + "\n")
+            say(filled(inspector, self.message) + "\n")
             return False
         return True
 
 
-def filled(inside: Inside, message: str) -> str:
+def filled(inspector: Inspector, message: str) -> str:
     """A log message with the values of the expressions in braces."""
-    frames = inside.frames()
+    frames = inspector.frames()
 
     def value(match: re.Match[str]) -> str:
         try:
-            found = evaluate(inside, match[1], frames[0] if frames else None)
+            found = evaluate(inspector, match[1], frames[0] if frames else None)
             return found.text() if not isinstance(found, (int, float)) else str(found)
         except (ExpressionError, Unavailable) as error:
             return f"<{error}>"

@@ -7,13 +7,13 @@ from typing import Any, Protocol
 
 from emu.debug.dwarf.location import Piece
 from emu.debug.dwarf.types import Type
-from emu.debug.inspector import Frame, Inside, Value
+from emu.debug.inspector import Frame, Inspector, Value
 
 
 class Change(Protocol):
     """Holds plain values only, so it can be told to another process."""
 
-    def do(self, inside: Inside) -> None:
+    def do(self, inspector: Inspector) -> None:
         """Change it there. Raises locate.Unavailable, ValueError, TypeError."""
 
 
@@ -28,9 +28,9 @@ class Assigned:
     bits: tuple[int, int] | None
     number: Any
 
-    def do(self, inside: Inside) -> None:
+    def do(self, inspector: Inspector) -> None:
         """As `Change.do`."""
-        Value(self.type, self.pieces, inside.view(self.frame), self.name, self.bits).set(self.number)
+        Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits).set(self.number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class Poked:
     address: int
     data: bytes
 
-    def do(self, inside: Inside) -> None:
+    def do(self, inspector: Inspector) -> None:
         """As `Change.do`."""
-        inside.machine.poke(self.address, int.from_bytes(self.data, "little"), len(self.data))
+        inspector.machine.poke(self.address, int.from_bytes(self.data, "little"), len(self.data))
 
 
 def assigned(place: Value, number: Any) -> Assigned:

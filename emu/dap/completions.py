@@ -9,7 +9,7 @@ from typing import Final
 from emu.dap.console import WORDS
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.expressions.expression import ExpressionError, evaluate
-from emu.debug.inspector import Frame, Inside, Value
+from emu.debug.inspector import Frame, Inspector, Value
 
 LAST: Final = re.compile(r"(?:([A-Za-z_$][\w.\[\]>-]*?)(?:\.|->))?([A-Za-z_$]?\w*)$")
 """What stands before the last point or arrow, if there is one, and the beginning of a name."""
@@ -18,23 +18,23 @@ Name = tuple[str, str]
 """A name and its kind in the protocol's words."""
 
 
-def completions(inside: Inside, frame: Frame | None, text: str) -> tuple[list[Name], int]:
+def completions(inspector: Inspector, frame: Frame | None, text: str) -> tuple[list[Name], int]:
     """What `text` may go on with, sorted, and how many of its last letters that replaces."""
     if text.startswith("/") and " " not in text:
         return [(f"/{word}", "keyword") for word in WORDS if word.startswith(text[1:])], len(text)
     match = LAST.search(text)
     whole, begun = (match[1], match[2]) if match is not None else (None, "")
-    names = _members(inside, frame, whole) if whole else _all(inside, frame)
+    names = _members(inspector, frame, whole) if whole else _all(inspector, frame)
     found = {name: kind for name, kind in names if name.startswith(begun)}
     return sorted(found.items())[:MOST], len(begun)
 
 
-def _members(inside: Inside, frame: Frame | None, whole: str) -> Iterator[Name]:
+def _members(inspector: Inspector, frame: Frame | None, whole: str) -> Iterator[Name]:
     try:
-        value = evaluate(inside, whole, frame)
+        value = evaluate(inspector, whole, frame)
         if not isinstance(value, Value):
             return
-        sfr = inside.image.chip.sfrs.get(value.name)
+        sfr = inspector.image.chip.sfrs.get(value.name)
         yield from ((name, "property") for name in (sfr.fields if sfr is not None else ()))
         kind = value.type.bare
         target = kind.target if kind.kind == "pointer" and kind.target is not None else kind
@@ -43,17 +43,17 @@ def _members(inside: Inside, frame: Frame | None, whole: str) -> Iterator[Name]:
         return
 
 
-def _all(inside: Inside, frame: Frame | None) -> Iterator[Name]:
+def _all(inspector: Inspector, frame: Frame | None) -> Iterator[Name]:
     """Later ones win."""
-    symbols = (one for one in inside.image.symbols.all if one.names_content)
+    symbols = (one for one in inspector.image.symbols.all if one.names_content)
     for one in symbols:
         yield one.name.removeprefix("_"), "function" if one.space == "code" else "variable"
-    yield from ((name, "enum") for name in inside.debug.constants)
-    yield from ((name, "variable") for name in inside.debug.globals)
-    yield from ((name, "property") for name in inside.image.chip.sfrs)
+    yield from ((name, "enum") for name in inspector.debug.constants)
+    yield from ((name, "variable") for name in inspector.debug.globals)
+    yield from ((name, "property") for name in inspector.image.chip.sfrs)
     yield from ((f"W{number}", "property") for number in range(16))
     yield from ((name, "property") for name in ("PC", "cycle"))
     if frame is not None:
         unit = frame.scopes[0].unit if frame.scopes else -1
-        yield from ((name, "variable") for name in inside.debug.statics.get(unit, {}))
-        yield from ((one.name, "variable") for one in inside.variables(frame))
+        yield from ((name, "variable") for name in inspector.debug.statics.get(unit, {}))
+        yield from ((one.name, "variable") for one in inspector.variables(frame))

@@ -45,7 +45,7 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
         return target.back_out
     if word == "lastwrite":
         frames = target.frames()
-        place = evaluate(target.inside, rest, frames[0] if frames else None)
+        place = evaluate(target.inspector, rest, frames[0] if frames else None)
         at = address_of(place.pieces) if isinstance(place, Value) else None
         if at is None or not isinstance(place, Value):
             raise ValueError(f"{rest} is not in memory")
@@ -72,4 +72,4 @@ def _last_write(target: Debuggee, address: int, size: int) -> Halt:
     found = target.history.last_write(address, size)
     if found is None:
         return Halt("goto", "nothing has changed it since the recording began")
-    return Halt("goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {target.inside.where(found.pc)}")
+    return Halt("goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {target.inspector.where(found.pc)}")

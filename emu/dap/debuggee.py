@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from emu.dap.breakpoints import Breakpoint
 from emu.debug.history import History
-from emu.debug.inspector import Frame, Inside
+from emu.debug.inspector import Frame, Inspector
 from emu.debug.threads import Thread, Threads
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
@@ -50,7 +50,7 @@ class Debuggee:
         self, machine: Machine, wanted: Callable[[], bool], say: Callable[[str], None], history: History
     ) -> None:
         self.machine: Final = machine
-        self.inside: Final[Inside] = machine.inside
+        self.inspector: Final = Inspector(machine)
         self.history: Final = history
         self.breakpoints: Final[dict[str, list[Breakpoint]]] = {}
         """By kind and, for those in sources, file."""
@@ -94,7 +94,7 @@ class Debuggee:
         self._hit = [
             one.id
             for one in self.all()
-            if one.kind != "data" and pc in one.places and one.stops(self.inside, self._say)
+            if one.kind != "data" and pc in one.places and one.stops(self.inspector, self._say)
         ]
         extra = self._extra is not None and pc in self._extra[0] and self._extra[1]()
         return bool(self._hit) or extra
@@ -118,11 +118,11 @@ class Debuggee:
                 if halt is not None or self._arrived_extra():
                     return halt
                 continue
-            self.machine.scout = self._arrived
+            self.machine.replay_condition = self._arrived
             try:
                 stop = self.history.advance(min(self.machine.cycle + SLICE, self._limit or sys.maxsize))
             finally:
-                self.machine.scout = None
+                self.machine.replay_condition = None
             if stop is None:
                 continue
             if stop.reason == "breakpoint" and not stop.detail:
@@ -176,10 +176,10 @@ class Debuggee:
                 if halt is not None:
                     return halt
                 hit = [one for one in data if any(_meets(one, touch) for touch in touched)]
-                ids = [one.id for one in hit if one.stops(self.inside, self._say)]
+                ids = [one.id for one in hit if one.stops(self.inspector, self._say)]
                 if ids:
                     verb = "/".join(sorted({touch[0] for touch in touched if any(_meets(one, touch) for one in hit)}))
-                    return Halt("data breakpoint", f"{verb} at {self.inside.where(pc)}", tuple(ids))
+                    return Halt("data breakpoint", f"{verb} at {self.inspector.where(pc)}", tuple(ids))
                 if machine.pc in places and self._arrived() and self._hit:
                     return Halt("breakpoint", breakpoints=tuple(self._hit))
                 if self._arrived_extra() or self._is_there():
@@ -209,7 +209,7 @@ class Debuggee:
 
     def step_line(self, into: bool) -> Halt:
         """To the next line; into functions that have lines, or over them. Interrupts are run through."""
-        frames = self.inside.frames()
+        frames = self.inspector.frames()
         entry = frames[0].raw.entry if frames else None
         line = self._line()
         has_entered = False
@@ -223,8 +223,8 @@ class Debuggee:
             top = self.machine.w[STACK_POINTER]
             if here is None:
                 continue
-            start = self.inside.start_of(self.machine.pc)
-            if start is not None and self.machine.pc < self.inside.body_of(start):
+            start = self.inspector.function_start(self.machine.pc)
+            if start is not None and self.machine.pc < self.inspector.prologue_end(start):
                 has_entered = True
                 continue
             if entry is not None and top < entry:
@@ -244,7 +244,7 @@ class Debuggee:
         halt = self._stepped()
         if halt is not None:
             return halt
-        if self.inside.is_handler(machine.pc) and machine.w[STACK_POINTER] == top + PUSHED and not calls:
+        if self.inspector.is_handler(machine.pc) and machine.w[STACK_POINTER] == top + PUSHED and not calls:
             return self.run_to([pc], lambda: machine.w[STACK_POINTER] == top)
         if calls and insn is not None and not (into and self._line() is not None):
             back = pc + 2 * insn.words
@@ -253,7 +253,7 @@ class Debuggee:
 
     def step_out(self) -> Halt:
         """To where the function goes back to."""
-        frames = [one for one in self.inside.frames() if one.kind != "inlined"]
+        frames = [one for one in self.inspector.frames() if one.kind != "inlined"]
         if len(frames) < 2 or frames[0].raw.entry is None:
             return Halt("step", "there is no caller")
         top = frames[0].raw.entry - 4
@@ -284,7 +284,7 @@ class Debuggee:
         return machine.cycle >= cycle
 
     def _line(self) -> Line | None:
-        return self.inside.image.lines.find(self.machine.pc)
+        return self.inspector.image.lines.find(self.machine.pc)
 
     # Back
 
@@ -294,14 +294,14 @@ class Debuggee:
 
     def back_line(self) -> Halt:
         """To the start of the line before, in this function or its caller."""
-        start = self.inside.start_of(self.machine.pc)
+        start = self.inspector.function_start(self.machine.pc)
         line = self._line()
         if line is not None and line.start != self.machine.pc:  # inside a line its own start comes first
             line = Line(-1, -1, line.file, -line.line)
         for positions in self.history.before():
             for at, (cycle, pc) in reversed(list(enumerate(positions))):
-                here = self.inside.image.lines.find(pc)
-                begins = here is not None and here.start == pc and self.inside.start_of(pc) == start
+                here = self.inspector.image.lines.find(pc)
+                begins = here is not None and here.start == pc and self.inspector.function_start(pc) == start
                 if begins and (line is None or here is None or (here.file, here.line) != (line.file, line.line)):
                     self.history.seek(cycle)
                     return Halt("step")
@@ -314,14 +314,18 @@ class Debuggee:
     def back_into(self) -> Halt:
         """To the start of the line before, in whatever function that was; interrupts are passed by."""
         now, line, depth = self.machine.pc, self._line(), len(self._interrupts())
-        here = (line.file, line.line, self.inside.start_of(now)) if line is not None and line.start == now else None
+        here = (
+            (line.file, line.line, self.inspector.function_start(now))
+            if line is not None and line.start == now
+            else None
+        )
         for positions in self.history.before():
             at = len(positions)
             while at:
                 at -= 1
                 cycle, pc = positions[at]
-                row = self.inside.image.lines.find(pc)
-                if row is None or row.start != pc or (row.file, row.line, self.inside.start_of(pc)) == here:
+                row = self.inspector.image.lines.find(pc)
+                if row is None or row.start != pc or (row.file, row.line, self.inspector.function_start(pc)) == here:
                     continue
                 self.history.seek(cycle)
                 handlers = self._interrupts()
@@ -334,12 +338,12 @@ class Debuggee:
 
     def _interrupts(self) -> list[int | None]:
         """Where the handlers begin in which the machine stands, innermost first."""
-        return [self.inside.start_of(one.raw.pc) for one in self.inside.frames() if one.kind == "interrupt"]
+        return [self.inspector.function_start(one.raw.pc) for one in self.inspector.frames() if one.kind == "interrupt"]
 
     def back_out(self) -> Halt:
         """To the call of this function, or to before the interrupt."""
-        frame = next((one for one in self.inside.frames() if one.kind != "inlined"), None)
-        start = self.inside.start_of(self.machine.pc)
+        frame = next((one for one in self.inspector.frames() if one.kind != "inlined"), None)
+        start = self.inspector.function_start(self.machine.pc)
         if frame is None or frame.raw.entry is None or start is None:
             return Halt("step", "there is no caller")
         machine, entry = self.machine, frame.raw.entry
@@ -359,7 +363,7 @@ class Debuggee:
                 self.history.seek(now)
                 written = self.history.last_write(one.places[0], one.size)
                 if written is not None:
-                    text = f"write at {self.inside.where(written.pc)}: {written.old.hex()} -> {written.new.hex()}"
+                    text = f"write at {self.inspector.where(written.pc)}: {written.old.hex()} -> {written.new.hex()}"
                     found.append((written.cycle, Halt("data breakpoint", text, (one.id,))))
         if not found:
             self.history.seek(self.history.start)
@@ -390,11 +394,11 @@ class Debuggee:
 
     def threads(self) -> list[Thread]:
         """OpenSwarm's threads; empty for other firmware."""
-        return Threads(self.inside).all()
+        return Threads(self.inspector).all()
 
     def frames(self) -> list[Frame]:
         """The call stack where the machine stands."""
-        return self.inside.frames()
+        return self.inspector.frames()
 
 
 START: Final = Halt("entry", "start of recording")

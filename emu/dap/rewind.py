@@ -108,7 +108,7 @@ class Returning(Stopping):
         machine = around.anew(cycle, left)
         self._say(f"the trial is run again up to cycle {cycle:,}\n")
         fresh = Debuggee(machine, self._wanted, self._say, self._record(machine))
-        self._target, self._sights.inside = fresh, machine.inside
+        self._target, self._sights.inspector = fresh, fresh.inspector
         self._listen(machine)
         is_there = self._arrived(cycle, [], changes)
         fresh.stop_at(target.breakpoints, target.stops_at_faults)
@@ -136,7 +136,7 @@ class Returning(Stopping):
             for at, change in changes[len(done) :]:
                 if not self._goes_to(at, target):
                     return False
-                change.do(target.inside)
+                change.do(target.inspector)
                 self._changes.append((at, change))
             return self._goes_to(cycle, target)
         finally:
@@ -154,6 +154,6 @@ class Returning(Stopping):
         if frozen:
             raise Refused(frozen)
         self._bring()
-        change.do(self._debuggee.inside)
+        change.do(self._debuggee.inspector)
         if self._debuggee.history.around is not None:
             self._changes.append((self._debuggee.machine.cycle, change))

@@ -164,9 +164,9 @@ class Server(Returning):
         program = Path(machine.image.path).resolve()
         roots = [Path(root) for root in arguments.get("sourceRoots", [])] + [Path.cwd(), *program.parents]
         self._target = Debuggee(machine, self._wanted, self._say, self._record(machine))
-        sources = Sources(machine.inside, roots)
+        sources = Sources(self._target.inspector, roots)
         world = self._world if self._target.history.around is not None else None
-        self._views = Sights(machine.inside, sources, world), sources
+        self._views = Sights(self._target.inspector, sources, world), sources
         self._listen(machine)
         return {}, lambda: self._event("initialized")
 

@@ -91,7 +91,7 @@ class Looking(ABC):
         return self._result(text, arguments)
 
     def _result(self, text: str, arguments: Row) -> Row:
-        found = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
+        found = evaluate(self._debuggee.inspector, text, self._sights.frame(arguments.get("frameId")))
         if not isinstance(found, Value):
             return {"result": str(found), "variablesReference": 0}
         row = self._sights.shown(found, text)
@@ -100,15 +100,15 @@ class Looking(ABC):
         return {"result": row.pop("value"), **row}
 
     def _assigned(self, name: str, text: str, arguments: Row) -> Row:
-        inside, frame = self._debuggee.inside, self._sights.frame(arguments.get("frameId"))
-        place = evaluate(inside, name, frame)
+        inspector, frame = self._debuggee.inspector, self._sights.frame(arguments.get("frameId"))
+        place = evaluate(inspector, name, frame)
         if not isinstance(place, Value):
             raise Refused(f"{name} is no place")
         self._write(place, text, arguments)
         return self._result(name, arguments)
 
     def _write(self, place: Value, text: str, arguments: Row) -> None:
-        value = evaluate(self._debuggee.inside, text, self._sights.frame(arguments.get("frameId")))
+        value = evaluate(self._debuggee.inspector, text, self._sights.frame(arguments.get("frameId")))
         number = value.get() if isinstance(value, Value) else value
         self._change(assigned(place, number))
 
@@ -117,7 +117,7 @@ class Looking(ABC):
         if place is None:
             raise Refused(f"{arguments['name']} cannot be set")
         self._write(place, str(arguments["value"]), arguments)
-        return self._sights.shown(place.within(self._debuggee.inside), str(arguments["name"]))
+        return self._sights.shown(place.within(self._debuggee.inspector), str(arguments["name"]))
 
     def _do_setExpression(self, arguments: Row) -> Row:
         row = self._assigned(str(arguments["expression"]), str(arguments["value"]), arguments)
@@ -128,7 +128,7 @@ class Looking(ABC):
         address += 2 * int(arguments.get("instructionOffset") or 0)
         symbols = bool(arguments.get("resolveSymbols"))
         count = _size(arguments, "instructionCount")
-        return {"instructions": disassembled(self._debuggee.inside, self._sources, address & ~1, count, symbols)}
+        return {"instructions": disassembled(self._debuggee.inspector, self._sources, address & ~1, count, symbols)}
 
     def _do_readMemory(self, arguments: Row) -> Row:
         address = int(str(arguments["memoryReference"]), 0) + int(arguments.get("offset") or 0)
@@ -152,7 +152,7 @@ class Looking(ABC):
 
     def _do_completions(self, arguments: Row) -> Row:
         text = str(arguments["text"])[: int(arguments["column"]) - 1]
-        names, replaced = completions(self._debuggee.inside, self._sights.frame(arguments.get("frameId")), text)
+        names, replaced = completions(self._debuggee.inspector, self._sights.frame(arguments.get("frameId")), text)
         start = len(text) - replaced
         return {"targets": [{"label": name, "type": kind, "start": start, "length": replaced} for name, kind in names]}
 

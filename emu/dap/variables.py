@@ -13,7 +13,7 @@ from urllib.parse import unquote
 
 from emu.debug.dwarf.location import Piece, Unavailable
 from emu.debug.dwarf.types import UNSIGNED, parts_of
-from emu.debug.inspector import Frame, Inside, Value
+from emu.debug.inspector import Frame, Inspector, Value
 from emu.image.lines import Line
 from emu.instruments.disassembly import instruction
 
@@ -28,9 +28,9 @@ class Sights:
     """References handed out since the machine stopped last. `world` tells what is around the machine, if anything."""
 
     def __init__(
-        self, inside: Inside, sources: Sources, world: Callable[[], list[tuple[str, str]]] | None = None
+        self, inspector: Inspector, sources: Sources, world: Callable[[], list[tuple[str, str]]] | None = None
     ) -> None:
-        self.inside = inside
+        self.inspector = inspector
         """Of the machine that is looked into; references hold as well for another that stands where it did."""
         self._sources: Final = sources
         self._world: Final = world
@@ -51,7 +51,7 @@ class Sights:
             if number not in self._frames:
                 raise ValueError(f"frame {number} is none of where the machine stands")
             return self._frames[number]
-        frames = self.inside.frames()
+        frames = self.inspector.frames()
         return frames[0] if frames else None
 
     def stack(self, frames: list[Frame]) -> list[Row]:
@@ -79,14 +79,14 @@ class Sights:
             def rows() -> Iterator[tuple[str, Value | None, str]]:
                 for one in names:
                     try:
-                        yield one.name, self.inside.value(one, frame), one.name
+                        yield one.name, self.inspector.value(one, frame), one.name
                     except Unavailable as why:
                         yield one.name, None, f"<{why}>"
 
             return rows
 
-        mine = of_variables(self.inside.variables(frame))
-        statics = of_variables(list(self.inside.debug.statics.get(unit, {}).values()))
+        mine = of_variables(self.inspector.variables(frame))
+        statics = of_variables(list(self.inspector.debug.statics.get(unit, {}).values()))
         everything = [("Locals", mine, "locals", False), ("Statics", statics, "", False),
                       ("Registers", lambda: self._registers(frame), "registers", False),
                       ("SFRs", self._sfrs, "registers", True)]  # fmt: skip
@@ -103,29 +103,29 @@ class Sights:
             yield name, None, text
 
     def _registers(self, frame: Frame) -> Iterator[tuple[str, Value | None, str]]:
-        view = self.inside.view(frame)
+        view = self.inspector.view(frame)
         for number in range(REGISTERS):
             known = view.register(number) is not None
             value = Value(UNSIGNED[2], (Piece("register", number),), view, f"W{number}")
             yield f"W{number}", value if known else None, f"W{number}" if known else "<not known in this frame>"
         yield "PC", None, f"{frame.pc:#08x}"
         yield "SR", self._sfr("SR"), "SR"
-        yield "cycle", None, f"{self.inside.machine.cycle:,}"
+        yield "cycle", None, f"{self.inspector.machine.cycle:,}"
 
     def _sfr(self, name: str) -> Value:
-        sfr = self.inside.image.chip.sfrs[name]
-        return Value(UNSIGNED[sfr.size], (Piece("memory", sfr.address),), self.inside.view(), name)
+        sfr = self.inspector.image.chip.sfrs[name]
+        return Value(UNSIGNED[sfr.size], (Piece("memory", sfr.address),), self.inspector.view(), name)
 
     def _sfrs(self) -> Iterator[tuple[str, Value | None, str]]:
-        for name in sorted(self.inside.image.chip.sfrs):
+        for name in sorted(self.inspector.image.chip.sfrs):
             yield name, self._sfr(name), name
 
     def _fields(self, value: Value) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
-        fields = self.inside.image.chip.sfrs[value.name].fields
+        fields = self.inspector.image.chip.sfrs[value.name].fields
 
         def rows() -> Iterator[tuple[str, Value | None, str]]:
             for name, (lsb, width) in fields.items():
-                part = Value(value.type, value.pieces, self.inside.view(), name, (width, lsb))
+                part = Value(value.type, value.pieces, self.inspector.view(), name, (width, lsb))
                 yield name, part, f"{value.name}.{name}"
 
         return rows
@@ -161,7 +161,7 @@ class Sights:
         row: Row = {"value": value.text(), "type": str(value.type), "variablesReference": 0, "evaluateName": path}
         if value.address is not None:
             row["memoryReference"] = f"{value.address:#06x}"
-        sfr = self.inside.image.chip.sfrs.get(value.name)
+        sfr = self.inspector.image.chip.sfrs.get(value.name)
         if sfr is not None and sfr.fields and value.bits is None and value.address == sfr.address:
             row["value"] = f"{value.get():#06x}"
             row["variablesReference"] = self._keep(self._fields(value))
@@ -195,8 +195,8 @@ class Sights:
 class Sources:
     """Files of the line table and where they are on this machine."""
 
-    def __init__(self, inside: Inside, roots: list[Path]) -> None:
-        self._inside: Final = inside
+    def __init__(self, inspector: Inspector, roots: list[Path]) -> None:
+        self._inspector: Final = inspector
         self._roots: Final = roots
         self._paths: Final[dict[str, Path]] = {}
 
@@ -214,17 +214,17 @@ class Sources:
 
     def all(self) -> list[Row]:
         """Every file that code comes from."""
-        return [self.row(file) for file in sorted({row.file for row in self._inside.image.lines.rows})]
+        return [self.row(file) for file in sorted({row.file for row in self._inspector.image.lines.rows})]
 
     def lines(self, path: str) -> list[Line]:
         """Rows of the line table that come from the file a client calls `path`."""
         _, is_uri, rest = path.partition("://")
         wanted = Path("/" + unquote(rest.partition("/")[2]) if is_uri else path)
         wanted = wanted.resolve() if wanted.exists() else wanted
-        files = {row.file for row in self._inside.image.lines.rows}
+        files = {row.file for row in self._inspector.image.lines.rows}
         mine = {file for file in files if self.path(file) == wanted}
         mine = mine or {file for file in files if Path(file).name == wanted.name}
-        return [row for row in self._inside.image.lines.rows if row.file in mine]
+        return [row for row in self._inspector.image.lines.rows if row.file in mine]
 
     def places(self, path: str, line: int) -> tuple[int, tuple[int, ...]]:
         """The first line at or behind `line` that has code, and where in each function it begins; 0 if none has."""
@@ -235,35 +235,35 @@ class Sources:
         found: dict[int | None, int] = {}
         for row in rows:
             if row.line == behind[0]:
-                start = self._inside.start_of(row.start)
-                place = row.start if row.start != start else self._inside.body_of(start)
+                start = self._inspector.function_start(row.start)
+                place = row.start if row.start != start else self._inspector.prologue_end(start)
                 found[start] = min(found.get(start, place), place)
         return behind[0], tuple(sorted(found.values()))
 
 
-def disassembled(inside: Inside, sources: Sources, address: int, count: int, symbols: bool) -> list[Row]:
+def disassembled(inspector: Inspector, sources: Sources, address: int, count: int, symbols: bool) -> list[Row]:
     """Exactly `count` rows of one word from `address`, with source lines where they begin."""
     rows: list[Row] = []
-    program, end = inside.machine.program, inside.image.chip.program["flash"].end
-    second = address >= 2 and _words(inside, address - 2) == 2
+    program, end = inspector.machine.program, inspector.image.chip.program["flash"].end
+    second = address >= 2 and _words(inspector, address - 2) == 2
     for at in range(address, address + 2 * count, 2):
         if not 0 <= at < end:
             rows.append({"address": f"{max(at, 0):#08x}", "instruction": "", "presentationHint": "invalid"})
             continue
-        item = None if second else instruction(inside.image, at, program.word(at), program.word(at + 2))
+        item = None if second else instruction(inspector.image, at, program.word(at), program.word(at + 2))
         row: Row = {"address": f"{at:#08x}", "instructionBytes": f"{program.word(at):06x}",
                     "instruction": item.text if item is not None else "" if second else ".pword"}  # fmt: skip
-        line = inside.image.lines.find(at)
+        line = inspector.image.lines.find(at)
         if line is not None and line.start == at:
             row |= {"location": sources.row(line.file), "line": line.line}
-        if symbols and inside.start_of(at) == at:
-            row["symbol"] = inside.name_of(at)
+        if symbols and inspector.function_start(at) == at:
+            row["symbol"] = inspector.function_name(at)
         rows.append(row)
-        second = not second and _words(inside, at) == 2
+        second = not second and _words(inspector, at) == 2
     return rows
 
 
-def _words(inside: Inside, at: int) -> int:
-    program = inside.machine.program
-    item = instruction(inside.image, at, program.word(at), program.word(at + 2))
+def _words(inspector: Inspector, at: int) -> int:
+    program = inspector.machine.program
+    item = instruction(inspector.image, at, program.word(at), program.word(at + 2))
     return len(item.words) if item is not None else 1

@@ -1,4 +1,6 @@
-"""Seeing inside a program that runs: variables, call stacks, threads, and the way it came.
+"""Debugger: variables, call stacks, threads, expressions, fault diagnosis, strict mode and time travel.
 
-Nothing here is in an engine's way: a machine that nobody looks into pays nothing for it.
+The debugger attaches to a machine from outside, so a machine that is not debugged runs at full speed.
 """
+
+from emu.debug.inspector import Inspector as Inspector

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from emu.debug.dwarf.types import UNSIGNED, Type, decode, encode
 from emu.debug.dwarf.units import Scope
-from emu.debug.inspector import Inside
+from emu.debug.inspector import Inspector
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -36,9 +36,9 @@ def call(machine: Machine, name: str, arguments: Sequence[Any], cycles: int) -> 
     KeyError for an unknown function, ValueError for arguments that do not fit, CallError if it does not return within
     `cycles`.
     """
-    inside = Inside(machine)
+    inspector = Inspector(machine)
     address = machine.program_address(name)
-    function = inside.debug.function(address)
+    function = inspector.debug.function(address)
     types = _parameters(function, arguments)
     kept = (machine.pc, [machine.w[n] for n in range(16)], machine.state.sr, machine.state.corcon)
     stall, repeat = machine.state.stall, machine.state.repeat

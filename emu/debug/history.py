@@ -150,7 +150,7 @@ class History:
         """One step. A sleeping CPU sleeps until something wakes it."""
         machine = self.machine
         before = place(machine)
-        stop = machine.approach(NEVER)
+        stop = machine.service_boundary(NEVER)
         if stop is not None:
             return stop
         return machine.run_until(machine.cycle) if place(machine) != before else machine.step()
@@ -160,7 +160,7 @@ class History:
         kept = self._kept[bisect_right(self._cycles, self.machine.cycle) - 1]
         if kept.is_input and kept.cycle == self.machine.cycle:
             with self._silence():
-                self.machine.put_back(self._state(kept))
+                self.machine.restore_record(self._state(kept))
 
     def _reached(self, following: int) -> None:
         cycle = self.machine.cycle
@@ -255,7 +255,7 @@ class History:
                 began_asleep = False
                 self._single()
                 if inputs and inputs[0].cycle <= machine.cycle:  # between two steps, or while the CPU sleeps
-                    machine.put_back(self._state(inputs.pop(0)))
+                    machine.restore_record(self._state(inputs.pop(0)))
 
     def before(self) -> Iterator[list[tuple[int, int]]]:
         """(cycle, PC) of the steps before now, oldest first, in longer and longer lists; the last begins where the
@@ -323,11 +323,11 @@ class History:
         removals = [machine.hook_pc(place, lambda: False) for place in places]
         try:
             with self._silence():
-                machine.put_back(self._state(begin))
-                machine.scout = arrived
+                machine.restore_record(self._state(begin))
+                machine.replay_condition = arrived
                 machine.run_until(end)
         finally:
-            machine.scout = None
+            machine.replay_condition = None
             for remove in removals:
                 remove()
         return last
@@ -344,11 +344,11 @@ class History:
             write(ea, value, width)
 
         with self._silence():
-            machine.put_back(self._state(begin))
+            machine.restore_record(self._state(begin))
             vars(data)["write"] = noted
             try:
                 while machine.cycle < end:
-                    if machine.approach(end) is not None or machine.cycle >= end:
+                    if machine.service_boundary(end) is not None or machine.cycle >= end:
                         break
                     cycle, pc = machine.cycle, machine.pc
                     old, hit = machine.peek_bytes(address, size), False
@@ -365,20 +365,20 @@ class History:
     def _restore(self, cycle: int) -> int:
         """Put the latest kept state at or before `cycle` back; returns its cycle."""
         kept = self._kept[max(bisect_right(self._cycles, cycle) - 1, 0)]
-        self.machine.put_back(self._state(kept))
+        self.machine.restore_record(self._state(kept))
         return kept.cycle
 
     @contextmanager
     def _silence(self) -> Iterator[None]:
         """Nobody hears what has been told already, nor are edges of pins that wait to be told taken for later ones."""
         self.machine.pins.flush()
-        self.machine.peripherals.tell()
-        events, held = self.machine.events, self.machine.hold()
+        self.machine.peripherals.deliver_uart_output()
+        events, held = self.machine.events, self.machine.save_host_state()
         quiet, events.quiet = events.quiet, True
         try:
             yield
         finally:
             self.machine.pins.flush()
-            self.machine.peripherals.tell()
+            self.machine.peripherals.deliver_uart_output()
             events.quiet = quiet
             held()

@@ -52,7 +52,7 @@ class Frame:
         return f"{self.function}{where} at {self.pc:#08x}" + (f" [{self.kind}]" if self.kind != "call" else "")
 
 
-class Inside:
+class Inspector:
     """Looks into `machine` as its loaded image's debug information tells. Raises ValueError if none is loaded."""
 
     def __init__(self, machine: Machine) -> None:
@@ -72,10 +72,10 @@ class Inside:
     @cached_property
     def unwinder(self) -> Unwinder:
         """Call stacks of this image."""
-        return Unwinder(Code(self.machine.program.word, self.is_code), self.start_of, self._handlers)
+        return Unwinder(Code(self.machine.program.word, self.is_code), self.function_start, self._vector_targets)
 
     @cached_property
-    def _handlers(self) -> frozenset[int]:
+    def _vector_targets(self) -> frozenset[int]:
         """Where the vectors lead."""
         vectors = self.image.chip.vectors
         targets = {self.image.word(table) for vector in vectors for table in (vector.ivt, vector.aivt)}
@@ -86,7 +86,7 @@ class Inside:
         index = bisect_right(self._starts, pc) - 1
         return index >= 0 and pc < self._ends[index]
 
-    def start_of(self, pc: int) -> int | None:
+    def function_start(self, pc: int) -> int | None:
         """First instruction of the function around `pc`."""
         if not self.is_code(pc):
             return None
@@ -96,15 +96,15 @@ class Inside:
         symbol = self.image.symbols.code(pc)
         return symbol[0].address if symbol is not None else None
 
-    def body_of(self, start: int) -> int:
+    def prologue_end(self, start: int) -> int:
         """Where the function that begins at `start` has its frame, parameters stored; `start` if it needs none.
 
         What makes a frame is a row of its own in the line table, that of the function's opening line."""
         if start not in self._bodies:
-            self._bodies[start] = self._behind_frame(start)
+            self._bodies[start] = self._find_prologue_end(start)
         return self._bodies[start]
 
-    def _behind_frame(self, start: int) -> int:
+    def _find_prologue_end(self, start: int) -> int:
         function, first = self.debug.function(start), self.image.lines.find(start)
         if function is None or first is None or first.start != start or not has_frame(function):
             return start
@@ -112,9 +112,9 @@ class Inside:
 
     def is_handler(self, start: int | None) -> bool:
         """Whether exceptions enter at `start`."""
-        return start is not None and start in self._handlers
+        return start is not None and start in self._vector_targets
 
-    def name_of(self, pc: int) -> str:
+    def function_name(self, pc: int) -> str:
         """The function around `pc` by its name in C."""
         function = self.debug.function(pc)
         if function is not None and function.name:
@@ -124,12 +124,12 @@ class Inside:
 
     def where(self, pc: int) -> str:
         """`0x000124 (worker+0x4, main.c:12)`."""
-        start = self.start_of(pc)
+        start = self.function_start(pc)
         if start is None:
             return f"{pc:#08x}"
         distance = f"+{pc - start:#x}" if pc != start else ""
         line = self.image.lines.find(pc)
-        return f"{pc:#08x} ({self.name_of(pc)}{distance}{f', {line}' if line is not None else ''})"
+        return f"{pc:#08x} ({self.function_name(pc)}{distance}{f', {line}' if line is not None else ''})"
 
     # Call stacks
 
@@ -158,14 +158,14 @@ class Inside:
         function = self.debug.function(at)
         kind = "interrupt" if raw.is_handler else "call"
         if function is None:
-            yield Frame(raw.pc, self.name_of(at), line, kind, (), raw, at)
+            yield Frame(raw.pc, self.function_name(at), line, kind, (), raw, at)
             return
         scopes = function.chain(at)
         while True:
             first = max((n for n, scope in enumerate(scopes) if scope.kind != "block"), default=0)
             own = scopes[first]
             inlined = own.kind == "inlined"
-            name = own.name or self.name_of(at)
+            name = own.name or self.function_name(at)
             yield Frame(raw.pc, name, line, "inlined" if inlined else kind, tuple(scopes[first:]), raw, at)
             if not inlined:
                 return
@@ -216,7 +216,11 @@ class Inside:
             raise location.Unavailable("optimised out")
         if code == ABSENT:
             raise location.Unavailable("not in the program: nothing uses it")
-        if lives_in_frame(variable) and (start := self.start_of(view.pc)) is not None and view.pc < self.body_of(start):
+        if (
+            lives_in_frame(variable)
+            and (start := self.function_start(view.pc)) is not None
+            and view.pc < self.prologue_end(start)
+        ):
             raise location.Unavailable("not set yet: the function is being entered")
         pieces = location.pieces_of(code, view, lambda: self._frame_base(frame))
         return Value(variable.type, pieces, view, variable.name)
@@ -260,8 +264,8 @@ def has_frame(scope: Scope) -> bool:
 class FrameView:
     """`locate.View` of one frame: registers as it left them, memory as it is."""
 
-    def __init__(self, inside: Inside, frame: Frame | None) -> None:
-        self._machine: Final = inside.machine
+    def __init__(self, inspector: Inspector, frame: Frame | None) -> None:
+        self._machine: Final = inspector.machine
         self.frame: Final = frame
         self._is_innermost: Final = frame is None or (
             frame.raw.pc == self._machine.pc and frame.raw.registers[STACK_POINTER] == self._machine.w[STACK_POINTER]
@@ -352,9 +356,9 @@ class Value:
         """The frame it is looked up in; none if that is the machine as it stands."""
         return self._view.frame if isinstance(self._view, FrameView) else None
 
-    def within(self, inside: Inside) -> Value:
+    def within(self, inspector: Inspector) -> Value:
         """The same place in another machine that stands where this one does."""
-        return Value(self.type, self.pieces, inside.view(self.frame), self.name, self.bits)
+        return Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits)
 
     def text(self) -> str:
         """For people, in one line; the reason if there is no value."""
@@ -371,7 +375,7 @@ class Value:
             if member is None:
                 raise KeyError(f"{self.type} has no member {part!r}")
             bits = (member.bits, member.lsb) if member.bits else None
-            return Value(member.type, self._inside(member.offset, member.type.bytes), self._view, part, bits)
+            return Value(member.type, self._slice(member.offset, member.type.bytes), self._view, part, bits)
         target = bare.target
         if bare.kind not in ("array", "pointer") or target is None:
             raise TypeError(f"{self.type} has no elements")
@@ -380,7 +384,7 @@ class Value:
             return Value(target, (place,), self._view, f"{self.name}[{part}]")
         if not 0 <= part < bare.count:
             raise KeyError(f"{self.name or 'the array'} has elements 0 to {bare.count - 1}, not {part}")
-        return Value(target, self._inside(part * target.bytes, target.bytes), self._view, f"{self.name}[{part}]")
+        return Value(target, self._slice(part * target.bytes, target.bytes), self._view, f"{self.name}[{part}]")
 
     def parts(self) -> Iterator[Value]:
         """Members or elements; what a pointer points to."""
@@ -389,9 +393,9 @@ class Value:
             yield self[0]
         for member in parts_of(self.type):
             bits = (member.bits, member.lsb) if member.bits else None
-            yield Value(member.type, self._inside(member.offset, member.type.bytes), self._view, member.name, bits)
+            yield Value(member.type, self._slice(member.offset, member.type.bytes), self._view, member.name, bits)
 
-    def _inside(self, offset: int, size: int) -> tuple[location.Piece, ...]:
+    def _slice(self, offset: int, size: int) -> tuple[location.Piece, ...]:
         """The pieces `size` bytes from `offset` lie in."""
         found = []
         begin = 0

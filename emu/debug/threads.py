@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from emu.debug.dwarf.location import Unavailable
-from emu.debug.inspector import REGISTERS, Frame, Inside, Value
-from emu.debug.replay import aside
+from emu.debug.inspector import REGISTERS, Frame, Inspector, Value
+from emu.debug.replay import sandboxed
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.flow import Return
@@ -64,10 +64,10 @@ class Thread:
 class Threads:
     """The threads as they are now. Empty without an OpenSwarm kernel, or before it has begun."""
 
-    def __init__(self, inside: Inside) -> None:
-        self._inside: Final = inside
-        self._machine: Final[Machine] = inside.machine
-        variable = inside.variable(RUNNING)
+    def __init__(self, inspector: Inspector) -> None:
+        self._inspector: Final = inspector
+        self._machine: Final[Machine] = inspector.machine
+        variable = inspector.variable(RUNNING)
         pcb = variable.type.target if variable is not None else None
         self._pcb: Final = pcb if pcb is not None and pcb.bytes else None
 
@@ -75,7 +75,7 @@ class Threads:
         """All threads: the ready ones in the order of their turns, then the blocked ones."""
         return [self._thread(pcb, blocked) for pcb, blocked in self._blocks()]
 
-    def blocks_but(self, address: int) -> list[range]:
+    def memory_of_others(self, address: int) -> list[range]:
         """Stack and control block of every thread but the one whose control block is at `address`."""
         found = []
         for pcb, _ in self._blocks():
@@ -93,10 +93,10 @@ class Threads:
 
     def _pointer(self, name: str) -> Value | None:
         """What a pointer variable of the kernel points to."""
-        variable = self._inside.variable(name) if self._pcb is not None else None
+        variable = self._inspector.variable(name) if self._pcb is not None else None
         if variable is None:
             return None
-        value = self._inside.value(variable)
+        value = self._inspector.value(variable)
         return value[0] if value.get() else None
 
     def _blocks(self) -> Iterator[tuple[Value, bool]]:
@@ -136,7 +136,7 @@ class Threads:
         """The stack lies between the start of the thread's block and its control block; what is above the limit is the
         port's."""
         first, end = _number(pcb, "block"), _number(pcb, "limit") + 2
-        ram = self._inside.image.chip.data["ram"]
+        ram = self._inspector.image.chip.data["ram"]
         if not first or not ram.start <= first < end <= ram.end:
             return None, None
         data = self._machine.peek_bytes(first, end - first)
@@ -144,17 +144,17 @@ class Threads:
 
     def _frames(self, pcb: Value, is_running: bool) -> list[Frame]:
         if is_running and self._is_on_own_stack(pcb):
-            return self._inside.frames()
-        place = self._inside.image.symbols.find(RESUME)
+            return self._inspector.frames()
+        place = self._inspector.image.symbols.find(RESUME)
         if place is None or pcb.address is None:
             return []
         found = self._resumed(place.address, pcb.address)
-        return self._inside.frames(*found) if found is not None else []
+        return self._inspector.frames(*found) if found is not None else []
 
     def _is_on_own_stack(self, pcb: Value) -> bool:
         """Whether the call stack of the machine leads back to this thread: no switch has put it aside."""
         first, end = _number(pcb, "block"), _number(pcb, "limit") + 2
-        frames = self._inside.frames()
+        frames = self._inspector.frames()
         tops = [frame.raw.registers[REGISTERS - 1] for frame in frames]
         if not first:  # the system thread: on no other thread's stack
             names = {frame.function for frame in frames}
@@ -164,7 +164,7 @@ class Threads:
     def _resumed(self, resume: int, pcb: int) -> tuple[int, tuple[int | None, ...]] | None:
         """PC and registers a thread that waits will go on with: the port's code runs up to its return, aside."""
         machine = self._machine
-        with aside(machine):
+        with sandboxed(machine):
             machine.pc = resume
             machine.w[0] = pcb
             machine.state.ipl = BLOCKING_LEVEL
@@ -173,7 +173,7 @@ class Threads:
                 if insn is None or machine.step() is not None or machine.state.intcon1 & machine.core.traps.flags:
                     return None  # what was saved is no longer there: a thread that has given up its context
                 if facts_of(insn).flow is Return:
-                    return machine.pc, self._inside.registers()
+                    return machine.pc, self._inspector.registers()
         return None
 
 

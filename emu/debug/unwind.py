@@ -281,12 +281,12 @@ class Raw:
 
 
 class Unwinder:
-    """Call stacks of one program. `start_of(pc)`: first instruction of the function around, None outside the program;
+    """Call stacks of one program. `function_start(pc)`: first instruction of the function around, None outside the program;
     `handlers`: where exceptions enter."""
 
-    def __init__(self, code: Code, start_of: Callable[[int], int | None], handlers: frozenset[int]) -> None:
+    def __init__(self, code: Code, function_start: Callable[[int], int | None], handlers: frozenset[int]) -> None:
         self._code: Final = code
-        self._start_of: Final = start_of
+        self._function_start: Final = function_start
         self._handlers: Final = handlers
 
     def frames(self, pc: int, registers: tuple[int | None, ...], memory: Memory) -> list[Raw]:
@@ -316,12 +316,12 @@ class Unwinder:
 
     def _plausible(self, pc: int, called: bool) -> bool:
         """Whether a function can have been called from, or interrupted, there."""
-        return _call_before(self._code, pc) is not None if called else self._start_of(pc) is not None
+        return _call_before(self._code, pc) is not None if called else self._function_start(pc) is not None
 
     def _picture(self, pc: int, called: bool) -> tuple[int | None, Picture | None]:
         """What the function around has done to registers and stack before it goes on at `pc`."""
         call = _call_before(self._code, pc) if called else None
-        start = self._start_of(pc if call is None else call)
+        start = self._function_start(pc if call is None else call)
         if start is None:
             return None, None
         picture = self._code.picture(start, pc)

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from emu.debug.inspector import Inspector
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.state.state import NOT_REPEATING
 
@@ -75,7 +76,7 @@ def do(fault: Fault, machine: Machine) -> str:
         return f"bit {fault.value} of W{fault.place}"
     if fault.kind == "flash":
         machine.program.put(fault.place, machine.program.word(fault.place) ^ 1 << fault.value)
-        return f"bit {fault.value} of the instruction at {machine.inside.where(fault.place)}"
+        return f"bit {fault.value} of the instruction at {Inspector(machine).where(fault.place)}"
     if fault.kind == "skip":
         return _skip(machine)
     if fault.kind == "uart":
@@ -103,9 +104,9 @@ def _skip(machine: Machine) -> str:
     if insn is None:
         return "no instruction to skip"
     machine.pc = pc + 2 * insn.words
-    return f"the instruction at {machine.inside.where(pc)}"
+    return f"the instruction at {Inspector(machine).where(pc)}"
 
 
 def _variable(machine: Machine, address: int) -> str:
-    symbol = machine.inside.image.symbols.data(address)
+    symbol = Inspector(machine).image.symbols.data(address)
     return f" ({symbol[0].name.removeprefix('_')}+{symbol[1]})" if symbol is not None else ""

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from emu.debug.fault_report import attach
 from emu.inject.campaign import Campaign
 from emu.inject.faults import choose, do
 from emu.machine.machine import Machine
@@ -28,7 +29,7 @@ STATES: Final = 64
 """States that are kept of the run without faults."""
 SHOWN: Final = 160
 KERNEL_STOPPED: Final = "the kernel stopped"
-"""How the explanation of a fault begins that the firmware's kernel found itself (emu/machine/fault_report.py)."""
+"""How the explanation of a fault begins that the firmware's kernel found itself (emu/debug/fault_report.py)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,8 @@ class Trials:
         self._image: Final = image
         self._machine: Final = Machine(image.chip, board=partial(Epuck, selector=campaign.selector))
         self._machine.load(image)
-        self._put_back: Final = self._machine.hold()
+        attach(self._machine)
+        self._restore_host_state: Final = self._machine.save_host_state()
         self._said: Final = {number: bytearray() for number in self._machine.uart}
         self._trapped = ""
         for number, uart in self._machine.uart.items():
@@ -108,7 +110,7 @@ class Trials:
         place = max(n for n, one in enumerate(self.golden.states) if one[0] <= fault.cycle)
         _, state, counts = self.golden.states[place]
         machine.restore(state)
-        self._put_back()
+        self._restore_host_state()
         self._trapped = ""
         for (which, said), count in zip(self._said.items(), counts, strict=True):
             said[:] = self.golden.said[which][:count]

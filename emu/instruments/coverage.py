@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
-from emu.debug.inspector import Inside
+from emu.debug.inspector import Inspector
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import flow_of
 from emu.dspic30f.isa.flow import Branch, Skip
@@ -128,10 +128,10 @@ class FileCoverage:
 class CoverageReport:
     """Counts by source file. `path_of` finds a file of the line table on this machine, for exclusion comments."""
 
-    def __init__(self, inside: Inside, counts: Counts, path_of: Callable[[str], Path]) -> None:
+    def __init__(self, inspector: Inspector, counts: Counts, path_of: Callable[[str], Path]) -> None:
         self.files: Final[dict[str, FileCoverage]] = {}
         self.instructions = self.instructions_run = self.outcomes = self.outcomes_seen = 0
-        self._inside: Final = inside
+        self._inspector: Final = inspector
         self._counts: Final = counts
         self._lines()
         self._branches()
@@ -147,10 +147,10 @@ class CoverageReport:
     def _lines(self) -> None:
         """A line counts how often it was begun: the most of its stretches in one copy, summed over inlined copies."""
         copies: dict[tuple[str, int], dict[object, int]] = defaultdict(dict)
-        for row in self._inside.image.lines.rows:
-            if not row.line or not self._inside.is_code(row.start):
+        for row in self._inspector.image.lines.rows:
+            if not row.line or not self._inspector.is_code(row.start):
                 continue
-            function = self._inside.debug.function(row.start)
+            function = self._inspector.debug.function(row.start)
             chain = function.chain(row.start) if function is not None else []
             copy = next((id(scope) for scope in reversed(chain) if scope.kind != "block"), None)
             counts = copies[row.file, row.line]
@@ -159,7 +159,7 @@ class CoverageReport:
             self._file(file).lines[line] = sum(counts.values())
 
     def _branches(self) -> None:
-        image = self._inside.image
+        image = self._inspector.image
         for block in image.blocks:
             if not block.is_code:
                 continue
@@ -180,8 +180,8 @@ class CoverageReport:
                 pc += 2 * (insn.words if insn is not None else 1)
 
     def _functions(self) -> None:
-        for one in self._inside.debug.functions:
-            if one.file and one.line and self._inside.is_code(one.ranges[0][0]):
+        for one in self._inspector.debug.functions:
+            if one.file and one.line and self._inspector.is_code(one.ranges[0][0]):
                 self._file(one.file).functions[one.name] = (one.line, self._counts.executed[one.ranges[0][0]])
 
     def lcov(self, path_of: Callable[[str], Path]) -> Iterator[str]:

@@ -43,7 +43,7 @@ class Tracer:
         machine = self.machine
         while machine.cycle < until:
             cycle, pc, before = machine.cycle, machine.pc, self._core.tolist()
-            stop = machine.approach(until)
+            stop = machine.service_boundary(until)
             if machine.pc != pc:
                 self._write(cycle, f"{'':8}  -- exception: {self.image.symbols.text(machine.pc)}", before)
             elif machine.cycle != cycle:

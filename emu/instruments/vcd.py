@@ -12,6 +12,8 @@ from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
+from emu.debug import symbolic
+from emu.debug.inspector import Inspector
 from emu.debug.threads import RUNNING
 from emu.peripherals.pins import PORTS, parse_pin
 
@@ -99,7 +101,7 @@ class WaveformRecorder:
             return self._writer.register_var("cpu", name, "wire", size=1, init=0), lambda: int(machine.is_asleep)
         if name == "thread":
             return self._writer.register_var("cpu", name, "integer", size=16, init=0), self._thread()
-        value = machine.value(name)
+        value = symbolic.variable(Inspector(machine), name)
         address, size = value.address, value.type.bytes
         if address is None or not value.type.is_number or value.bits is not None:
             raise ValueError(f"{name!r} is no variable in memory that holds one number")
@@ -108,13 +110,13 @@ class WaveformRecorder:
 
     def _thread(self) -> Callable[[], int]:
         """The PID of the running thread."""
-        inside = self._machine.inside
-        running = inside.variable(RUNNING)
+        inspector = Inspector(self._machine)
+        running = inspector.variable(RUNNING)
         pcb = running.type.target if running is not None else None
         pid = pcb.member("pid") if pcb is not None else None
         if running is None or pid is None:
             raise ValueError("'thread' can be watched in an OpenSwarm firmware only")
-        place = inside.value(running).address or 0
+        place = inspector.value(running).address or 0
 
         def number() -> int:
             block = self._machine.peek(place)
@@ -142,7 +144,7 @@ class WaveformRecorder:
 
     def _step(self, limit: int) -> Stop | None:
         """What is due before the next instruction, then that, with a look after each."""
-        stop = self._machine.approach(limit)
+        stop = self._machine.service_boundary(limit)
         self._look()
         if stop is None and self._machine.cycle < limit:
             stop = self._machine.step()

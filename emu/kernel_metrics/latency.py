@@ -263,7 +263,7 @@ def masked(meter: Meter) -> dict[str, Window]:
     since: dict[int, tuple[int, str]] = {}
     for _ in range(MASK_STEPS):
         cycle, pc = machine.cycle, machine.pc
-        if machine.approach(NEVER) is not None:
+        if machine.service_boundary(NEVER) is not None:
             raise MeasureError("the scenario ended")
         entered = cycle if machine.pc != pc else machine.cycle
         now = max(machine.state.ipl, DISI_LEVEL if machine.state.disi_end > machine.cycle else 0)

@@ -48,7 +48,7 @@ class Meter:
             window.where["(before the first instruction)"] = machine.cycle - begin
         while True:
             cycle, pc = machine.cycle, machine.pc
-            if machine.approach(NEVER) is not None or cycle - begin > LONGEST:
+            if machine.service_boundary(NEVER) is not None or cycle - begin > LONGEST:
                 raise MeasureError(f"the end was not reached: {self.place(machine.pc)}, {cycle - begin} cycles on")
             if machine.pc != pc:
                 window.interrupted = True

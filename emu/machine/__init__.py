@@ -1,1 +1,1 @@
-"""One microcontroller: record, bus, CPU and devices wired together, its main loop, and fault reports."""
+"""One microcontroller: record, bus, CPU and peripherals wired together, its run loop, and its stops."""

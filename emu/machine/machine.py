@@ -1,7 +1,8 @@
-"""One microcontroller: record, clock, bus, CPU and devices wired together, and THE loop that runs them.
+"""One microcontroller: record, clock, bus, CPU and peripherals wired together, and the run loop.
 
-What enters: an image, pin levels, bytes. What leaves: `Stop`s, registers and memory, callbacks of devices. Time is
-`Machine.cycle`, in Tcy since power-on; it only grows.
+Inputs: an image, pin levels, UART bytes. Outputs: `Stop`s, registers, memory, and callbacks of peripherals. Time is
+`Machine.cycle`, in Tcy since power-on; it never decreases. The machine knows no debugger: `emu.debug` attaches to it
+through `Machine.diagnose` and the `observer` argument.
 """
 
 from __future__ import annotations
@@ -12,15 +13,14 @@ from typing import Any, Final, Protocol
 
 from emu.chips.chip import Chip, Vector
 from emu.chips.dspic30f6014a import DSPIC30F6014A
-from emu.debug.symbolic import BySource
 from emu.dspic30f.core import Core
 from emu.dspic30f.engines import make_engine
 from emu.dspic30f.exceptions.faults import RESTART, Breakpoint, DeviceReset, Violation
 from emu.dspic30f.state.state import PC_MASK, RUN, W15_INITIALISED
 from emu.image.model import Image
-from emu.machine.state_access import Contents, Place
-from emu.machine.stops import CHECKPOINT_CYCLES, RESET_LOOP, RESETS_KEPT, Evidence, LastReset, Stop, following
-from emu.peripherals import Peripherals, Wires, build
+from emu.machine.state_access import Location, MemoryObserver, StateAccess
+from emu.machine.stops import CHECKPOINT_CYCLES, RESET_LOOP, RESETS_KEPT, LastReset, RunCheckpoints, Stop, next_reset
+from emu.peripherals import CpuSignals, Peripherals, build
 from emu.system.bus import Bus
 from emu.system.events import NEVER, Events
 from emu.system.native_handle import Native, Run
@@ -35,14 +35,13 @@ class _WRegisters(Protocol):
     def __setitem__(self, number: int, value: int) -> None: ...
 
 
-class Machine(Contents, BySource):
-    """A chip with a program. See engine documentation in README.md for the choice of `engine`.
+class Machine(StateAccess):
+    """A chip with a program. `emu/README.md` describes the engines.
 
-    `ipl_slip` = 1 lets an interrupt slip through right after a write that raises IPL or clears IEC (isa.md §14.3).
-    `board` puts the chip on a board: it is called with the peripherals before the engine is made (`emu.boards`).
-    `strict` makes null pointers, uninitialised reads and stores into other threads' stacks faults
-    (emu/debug/strict.py); it takes the plain engine.
-    Raises ValueError for an engine that does not exist, or is not plain though strict.
+    `ipl_slip` = 1 accepts an interrupt right after a write that raises IPL or clears IEC (isa.md §14.3).
+    `board` is called with the peripherals and returns the board around the chip (`emu.boards`).
+    `observer` is called with the machine and returns an observer of its memory; it may reserve room in the record.
+    Both are called before the engine is created. Raises ValueError for an unknown engine.
     """
 
     def __init__(
@@ -52,13 +51,13 @@ class Machine(Contents, BySource):
         engine: str = "auto",
         ipl_slip: int = 0,
         board: Callable[[Peripherals], Any] | None = None,
-        strict: bool = False,
+        observer: Callable[[Machine], MemoryObserver] | None = None,
     ) -> None:
         record = Record(chip.data["ram"].end)
         self.events: Final = Events(record)
         bus = Bus(record, self.events, chip.data["sfr"].end)
         program = ProgramMemory(record, chip)
-        wires = Wires()
+        wires = CpuSignals()
         self.peripherals: Final = build(chip, bus, program, wires)
         self.pins: Final = self.peripherals.pins
         self.uart: Final = self.peripherals.uart
@@ -66,7 +65,7 @@ class Machine(Contents, BySource):
         self.core.exceptions.ipl_slip = ipl_slip
         self._connect(wires)
         self.board: Final[Any] = board(self.peripherals) if board is not None else None
-        """What `board` made, for example an `emu.boards.epuck.board.Epuck`; its state is part of the record."""
+        """The board, for example an `emu.boards.epuck.board.Epuck`. Its state is part of the record."""
         self.state: Final = self.core.state
         self.w: Final[_WRegisters] = self.core.w
         self.stop_on_fault = True
@@ -74,31 +73,28 @@ class Machine(Contents, BySource):
         self.resets: Final[list[tuple[int, str]]] = []
         """(cycle, cause) of the last resets."""
         self._pc_hooks: Final[dict[int, list[PcHook]]] = {}
-        self._stopped_at: tuple[int, int] | None = None
+        self._last_hook_stop: tuple[int, int] | None = None
+        """PC and cycle at which a hook ended the last run."""
         self._last_reset = LastReset()
         self._interrupt = False
         self._last = 0
         self._cuts: list[int] = []
-        self.scout: Callable[[], bool] | None = None
-        """Called instead of the hooks of a hooked address while what was told before is run again."""
-        self._no_restart: Callable[[], None] | None = None
-        self.evidence: Final = Evidence()
-        """What the last run left for whoever explains a fault."""
-        self.core.exceptions.on_trap = self._trapped
+        self.replay_condition: Callable[[], bool] | None = None
+        """Called instead of the hooks of a hooked address during replay (`Events.quiet`)."""
+        self.diagnose: Callable[[Stop], Stop] | None = None
+        """Called with every stop that may be a firmware fault; returns the stop to report."""
+        self._restart_hook: Callable[[], None] | None = None
+        self.checkpoints: Final = RunCheckpoints()
+        """States of the last run that fault diagnosis replays from."""
+        self.core.exceptions.on_trap = self._on_trap
         self._clock: Final = (
             self.record.u64,
             self.state.at["cpu.cycle"],
             self.events.deadline_index,
             self.state.at["cpu.mode"],
         )
-        """What `run_until` looks at first: the view of the record, indices of the cycle, the deadline and the mode."""
-        if strict:
-            if engine not in ("auto", "plain"):
-                raise ValueError(f"a strict run needs the plain engine, not {engine!r}")
-            from emu.debug import strict as watching
-
-            engine = "plain"
-            self.strict = watching.Strict(self, watching.reserve(self.record, chip.data["ram"].end))
+        """Hot state of `run_until`: the 64-bit view of the record, and the indices of cycle, deadline and mode."""
+        self.memory_observer = observer(self) if observer is not None else None
         self.runner = make_engine(engine, self.core, self._pc_hooks)
         self.reset("POR")
 
@@ -114,12 +110,12 @@ class Machine(Contents, BySource):
 
     @property
     def is_asleep(self) -> bool:
-        """Whether the CPU stands in Idle or Sleep."""
+        """Whether the CPU is in Idle or Sleep mode."""
         return self.state.mode != RUN
 
     @property
     def hz(self) -> Fraction:
-        """Instruction cycles per second (Fcy) at the present clock setting: 14,745,600 on an e-puck."""
+        """Instruction cycles per second (Fcy) at the current clock setting: 14,745,600 on an e-puck."""
         return Fraction(self.peripherals.fcy)
 
     @property
@@ -128,7 +124,7 @@ class Machine(Contents, BySource):
         return self.peripherals.seconds(self.cycle)
 
     def cycles_in(self, seconds: float | Fraction) -> int:
-        """Whole cycles in so many seconds at the present clock setting, at least 1."""
+        """Whole cycles in `seconds` at the current clock setting, at least 1."""
         return max(1, int(Fraction(seconds) * self.hz))
 
     @property
@@ -141,8 +137,8 @@ class Machine(Contents, BySource):
         self.state.pc = address & PC_MASK
         self.state.stall = 0
 
-    def _connect(self, wires: Wires) -> None:
-        """The few lines between the CPU and the devices."""
+    def _connect(self, wires: CpuSignals) -> None:
+        """Connect the signals between the CPU and the peripherals."""
         sequencer = self.core.sequencer
         power = sequencer.power
         wires.reset = self._device_reset
@@ -151,31 +147,35 @@ class Machine(Contents, BySource):
         wires.trap = self.core.traps.request_flag
         wires.run = lambda cycles: self.run(cycles=cycles)
         wires.end_run = self.interrupt
-        power.wires.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
-        power.wires.power = self._power
-        power.wires.idling, power.wires.clearing = self.peripherals.watchdog.idling, self.peripherals.watchdog.clearing
-        power.wires.restart = self.peripherals.oscillator.wake_tcy
-        power.wires.can_wake = lambda: self.peripherals.watchdog.is_enabled
-        power.wires.interrupted = lambda: self._interrupt
+        power.signals.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
+        power.signals.power = self._on_power_change
+        power.signals.idling, power.signals.clearing = (
+            self.peripherals.watchdog.idling,
+            self.peripherals.watchdog.clearing,
+        )
+        power.signals.restart = self.peripherals.oscillator.wake_tcy
+        power.signals.can_wake = lambda: self.peripherals.watchdog.is_enabled
+        power.signals.interrupted = lambda: self._interrupt
 
-    def _power(self, mode: int, cycle: int) -> None:
-        """The CPU stops after `cycle` - 1, or runs again from `cycle`."""
+    def _on_power_change(self, mode: int, cycle: int) -> None:
+        """Stop or resume the peripherals' clocks: the CPU sleeps after `cycle` - 1, or wakes at `cycle`."""
         if mode == RUN:
             self.peripherals.wake(cycle)
         else:
             self.peripherals.sleep(mode, cycle - 1)
 
     def _device_reset(self, cause: str) -> None:
-        """A peripheral resets the chip in the middle of whatever goes on."""
+        """Raise DeviceReset for a reset that a peripheral requests during an instruction or event."""
         raise DeviceReset(cause, f"reset by {cause}", fault=False)
 
     # Running
 
     def run_until(self, cycle: int) -> Stop | None:
-        """Run to the first instruction boundary at or after `cycle`; None if nothing stopped the run before."""
+        """Run to the first instruction boundary at or after `cycle`. Return the stop that ended the run earlier, or
+        None."""
         u64, now, deadline, mode = self._clock
         if u64[now] < cycle < u64[deadline] < NEVER and self.record.u16[mode] != RUN and not self._interrupt:
-            u64[now] = u64[self.events.now_index] = cycle  # asleep, and nothing is due before `cycle`
+            u64[now] = u64[self.events.now_index] = cycle  # the CPU sleeps, and no event is due before `cycle`
             return None
         state, sequencer, engine, hooks = self.state, self.core.sequencer, self.runner, self._pc_hooks
         stop = None
@@ -188,34 +188,37 @@ class Machine(Contents, BySource):
                 elif state.cycle >= cycle or self._interrupt:
                     break
                 elif state.pc in hooks:
-                    stop = self._hit()
+                    stop = self._call_hooks()
                     if stop is None:
                         engine.run(cycle)
                 else:
                     engine.run(cycle)
             except Breakpoint as word:
-                stop = self._explained(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
+                stop = self._diagnosed(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
             except DeviceReset as reset:
                 stop = self._reset_by(reset)
             except Violation as what:
-                stop = self._explained(Stop("fault", what.pc, state.cycle, str(what)))
+                stop = self._diagnosed(Stop("fault", what.pc, state.cycle, str(what)))
             if self._interrupt:
                 break
         if self._interrupt:
             self._interrupt = False
             stop = stop or self.stopped("interrupted")
-        return self._arrive() or stop
+        return self._sync_devices() or stop
 
     def run_past(self, first: int, period: int, last: int, cuts: list[int]) -> Stop | None:
-        """As `run_until(last)`, and `cuts` gets the cycle of the first boundary at or after `first`, `first` + `period`
-        and so on: where runs to each of them would have ended. `end_at_cut` ends it earlier."""
+        """Run to cycle `last` as `run_until` does, and append the end of every period to `cuts`.
+
+        The end of a period is the first instruction boundary at or after `first`, `first` + `period` and so on.
+        `end_at_cut` ends the run earlier.
+        """
         self._last, self._cuts, runner, began = last, cuts, self.runner, len(cuts)
         while True:
             limit = first + period * (len(cuts) - began)
             runner.pass_limits(period, self._last)
             try:
                 stop = self.run_until(min(limit, self._last))
-            finally:  # a callback may raise: later runs have limits of their own
+            finally:  # a callback may raise; the limits belong to this run only
                 runner.pass_limits(0, 0)
                 cuts += runner.passed()
             now = self.state.cycle
@@ -227,33 +230,35 @@ class Machine(Contents, BySource):
                 return None
 
     def lend(self, run: Run) -> Native | None:
-        """Let `run` run native code from now on, for who runs many machines at once (emu/system/native_handle.py).
-        None for an engine
-        that has none. It may end a `run_past` later than was asked by moving `Native.last`."""
+        """Return the handle by which another native program runs this machine (emu/system/native_handle.py).
+
+        From now on `run` executes the native code. It may extend a `run_past` by moving `Native.last`. Returns None for
+        an engine without native code.
+        """
         return self.runner.lend(run)
 
     def end_at_cut(self) -> None:
-        """Let the `run_past` in which this is called end at its next cut, or before."""
+        """Make the current `run_past` end at its next cut at the latest."""
         self._last = 0
         self.runner.pass_limits(0, 0)
 
     def cuts_so_far(self) -> list[int]:
-        """What a `run_past` in which this is called has found up to here."""
+        """Return the cuts that the current `run_past` has found so far."""
         self._cuts += self.runner.passed()
         return self._cuts
 
     def run(
         self,
         cycles: int | None = None,
-        until: Callable[[], bool] | Place | None = None,
+        until: Callable[[], bool] | Location | None = None,
         *,
         seconds: float | Fraction | None = None,
     ) -> Stop:
-        """Run until something stops the machine: at most `cycles` Tcy or `seconds` of simulated time.
+        """Run until a stop, for at most `cycles` Tcy or `seconds` of simulated time.
 
-        `until` is the name of a function or label, a program address (the run ends with reason "until" at the next
-        arrival there), or a condition tested between instructions (slow). Raises KeyError for an unknown name,
-        ValueError for both limits.
+        `until` names a function or label, or is a program address: the run ends with reason "until" when the PC next
+        reaches it. It may also be a condition, which is tested after every instruction and therefore slow. Raises
+        KeyError for an unknown name, ValueError if both limits are given.
         """
         if seconds is not None:
             if cycles is not None:
@@ -268,7 +273,7 @@ class Machine(Contents, BySource):
         while self.cycle < limit:
             if self.cycle >= checkpoint:
                 checkpoint = self.cycle + CHECKPOINT_CYCLES
-                self.evidence.look(self.cycle, self.record.snapshot())
+                self.checkpoints.take(self.cycle, self.record.snapshot())
             stop = self.step()
             if stop is not None:
                 return stop
@@ -277,16 +282,16 @@ class Machine(Contents, BySource):
         return self.stopped("limit")
 
     def advance(self, cycle: int) -> Stop | None:
-        """As `run_until`, and able to tell what led to a fault: it remembers where it was now and then."""
+        """Run as `run_until` does, and take checkpoints from which a fault can be diagnosed."""
         while True:
-            self.evidence.look(self.cycle, self.record.snapshot())
+            self.checkpoints.take(self.cycle, self.record.snapshot())
             stop = self.run_until(min(cycle, self.cycle + CHECKPOINT_CYCLES))
-            self.evidence.ended = self.record.snapshot()
+            self.checkpoints.end = self.record.snapshot()
             if stop is not None or self.cycle >= cycle:
                 return stop
 
     def _run_to(self, address: int, limit: int) -> Stop:
-        """Run to the next arrival at a program address."""
+        """Run until the PC next reaches `address`, at most to cycle `limit`."""
         start = self.cycle
         remove = self.hook_pc(address, lambda: self.cycle > start)
         try:
@@ -298,9 +303,9 @@ class Machine(Contents, BySource):
         return self.stopped("until") if stop.reason == "breakpoint" and stop.pc == address else stop
 
     def step(self) -> Stop | None:
-        """One instruction, after whatever is to be done at the boundary before it; None if nothing stopped it.
+        """Run one instruction, and first all that is due at the boundary before it. Return a stop, or None.
 
-        A sleeping CPU sleeps until something wakes it.
+        A sleeping CPU sleeps until an event wakes it.
         """
         state = self.state
         stop = None
@@ -308,30 +313,32 @@ class Machine(Contents, BySource):
             if not self.core.sequencer.boundary(NEVER):
                 stop = self.stopped("halt")
             else:
-                stop = self._hit() if state.pc in self._pc_hooks else None
+                stop = self._call_hooks() if state.pc in self._pc_hooks else None
                 if stop is None:
                     self.core.sequencer.execute()
         except Breakpoint as word:
-            stop = self._explained(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
+            stop = self._diagnosed(Stop("breakpoint", state.pc - 2, state.cycle, str(word)))
         except DeviceReset as reset:
             stop = self._reset_by(reset)
         except Violation as what:
-            stop = self._explained(Stop("fault", what.pc, state.cycle, str(what)))
-        return self._arrive() or stop
+            stop = self._diagnosed(Stop("fault", what.pc, state.cycle, str(what)))
+        return self._sync_devices() or stop
 
-    def approach(self, limit: int) -> Stop | None:
-        """Do what is due before the next instruction, as `step` does first: events, exception entry, sleep up to
-        cycle `limit`. Afterwards `pc` and `cycle` are those of the instruction `step` will run."""
+    def service_boundary(self, limit: int) -> Stop | None:
+        """Handle all that is due before the next instruction: events, exception entry, sleep up to cycle `limit`.
+
+        Afterwards `pc` and `cycle` are those of the instruction that `step` runs. Return a stop, or None.
+        """
         try:
             return None if self.core.sequencer.boundary(limit) else self.stopped("halt")
         except DeviceReset as reset:
             return self._reset_by(reset)
 
-    def _arrive(self) -> Stop | None:
-        """Bring the devices to the present cycle, for whoever looks at the machine between runs.
+    def _sync_devices(self) -> Stop | None:
+        """Bring the peripherals to the current cycle, so that callers see their state between runs.
 
-        What is due in the very cycle a sleeping CPU has got to is left for the next run: cutting a run in two must
-        not show, not even in the cycle in which nothing is left to happen.
+        Events due in the very cycle that a sleeping CPU has reached are left to the next run. Dividing a run must have
+        no visible effect, also in a cycle after which no event follows.
         """
         u64, now, _, mode = self._clock
         cycle = u64[now]
@@ -340,53 +347,54 @@ class Machine(Contents, BySource):
         except DeviceReset as reset:
             return self._reset_by(reset)
         u64[self.events.now_index] = cycle
-        self.peripherals.tell()
+        self.peripherals.deliver_uart_output()
         return None
 
     def interrupt(self) -> None:
-        """Make the current run end at its next boundary (signal handlers)."""
+        """End the current run at its next boundary. May be called from a signal handler."""
         self._interrupt = True
         self.events.kick()
 
     def stopped(self, reason: str, detail: str = "") -> Stop:
-        """A `Stop` for the present state; a firmware that sleeps where it must not is a fault."""
+        """Return a `Stop` for the current state, diagnosed if the CPU sleeps."""
         stop = Stop(reason, self.pc, self.cycle, detail)
-        return self._explained(stop) if reason in ("halt", "limit") and self.is_asleep else stop
+        return self._diagnosed(stop) if reason in ("halt", "limit") and self.is_asleep else stop
 
-    def _explained(self, stop: Stop) -> Stop:
-        """`stop` with its fault, if it is one and there is an image to tell by."""
-        if self.image is None or self.events.quiet:
+    def _diagnosed(self, stop: Stop) -> Stop:
+        """Return `stop` as `diagnose` classifies it. Replays, and machines without an image, are not diagnosed."""
+        if self.diagnose is None or self.image is None or self.events.quiet:
             return stop
-        from emu.machine.fault_report import explained  # most runs end well
+        return self.diagnose(stop)
 
-        return explained(self, stop)
-
-    def _trapped(self, vector: Vector) -> None:
-        """A trap is about to be entered: handlers that never come back say little, so keep what there was."""
+    def _on_trap(self, vector: Vector) -> None:
+        """Keep the state before a trap is entered: a handler that never returns destroys the evidence."""
         if not self.events.quiet:
-            self.evidence.trap = (vector, self.record.snapshot(), self.evidence.began)
+            self.checkpoints.trap = (vector, self.record.snapshot(), self.checkpoints.start)
 
-    def _hit(self) -> Stop | None:
-        """Call the hooks of the present PC; a `Stop` if one of them wants it, at most once per arrival."""
+    def _call_hooks(self) -> Stop | None:
+        """Call the hooks of the current PC. Return a `Stop` if one requests it, at most once per arrival."""
         here = (self.state.pc, self.state.cycle)
-        if self._stopped_at == here:
-            self._stopped_at = None
+        if self._last_hook_stop == here:
+            self._last_hook_stop = None
             return None
         if self.events.quiet:
-            return self.stopped("breakpoint") if self.scout is not None and self.scout() else None
+            return self.stopped("breakpoint") if self.replay_condition is not None and self.replay_condition() else None
         hit = False
         for hook in list(self._pc_hooks[self.state.pc]):
             hit = bool(hook()) or hit
         if not hit:
             return None
-        self._stopped_at = here
-        if self._restarted():
-            return self._explained(self.stopped("fault", RESTART))
+        self._last_hook_stop = here
+        if self._has_restarted():
+            return self._diagnosed(self.stopped("fault", RESTART))
         return self.stopped("breakpoint")
 
-    def _restarted(self) -> bool:
-        """Whether the program is at address 0 without a reset. Behind one it is still the same cycle, or the clock has
-        started up meanwhile and no W register has been written."""
+    def _has_restarted(self) -> bool:
+        """Whether the PC has reached address 0 without a reset.
+
+        Right after a reset the cycle is still that of the reset, or the clock has started up in the meantime and no W
+        register has been written.
+        """
         if not self.stop_on_fault or self.state.pc or self.state.initialised == W15_INITIALISED:
             return False
         return self.resets[-1][0] != self.cycle
@@ -402,8 +410,8 @@ class Machine(Contents, BySource):
         if cause == "POR":
             ram = self.chip.data["ram"]
             self.record.bytes[ram.start : ram.end] = bytes(ram.size)
-            if self.strict is not None:
-                self.strict.power_on()
+            if self.memory_observer is not None:
+                self.memory_observer.on_power_on()
         self.core.reset()
         self.peripherals.reset(cause)
         self.events.kick()
@@ -411,26 +419,26 @@ class Machine(Contents, BySource):
         del self.resets[:-RESETS_KEPT]
 
     def _reset_by(self, reset: DeviceReset) -> Stop | None:
-        """Carry out a reset the core or a device asked for; a fault, or a loop of resets, ends the run."""
-        culprit = self.pc
-        self.evidence.reset = self.record.snapshot() if reset.fault and not self.events.quiet else None
+        """Perform a reset that the core or a peripheral requested. A fault, or a loop of resets, ends the run."""
+        origin = self.pc
+        self.checkpoints.reset = self.record.snapshot() if reset.fault and not self.events.quiet else None
         if reset.fault:
             self.state.cycle += 1
         self.reset(reset.cause)
-        self._last_reset = last = following(self._last_reset, reset.cause, culprit, self.cycle)
+        self._last_reset = last = next_reset(self._last_reset, reset.cause, origin, self.cycle)
         loop = not last.repeats
         if not self.stop_on_fault or not (reset.fault or loop):
             return None
         detail = reset.detail if reset.fault else f"reset loop: {reset.detail}, {RESET_LOOP} times in a row"
-        return self._explained(Stop("fault", culprit, self.cycle, detail))
+        return self._diagnosed(Stop("fault", origin, self.cycle, detail))
 
     # Memory
 
     def load(self, image: Image) -> None:
-        """Put an image into program memory and reset as after power-on.
+        """Write an image into program memory and perform a power-on reset.
 
-        Configuration words the image leaves out are those of the board (a bare chip: watchdog off). Its symbols become
-        names for `read`, `write`, `peek` and `poke`.
+        The board supplies configuration words that the image omits (a bare chip: watchdog off). The image's symbols
+        become names for `read`, `write`, `peek` and `poke`.
         """
         self.image = image
         self.program.erase()
@@ -443,60 +451,65 @@ class Machine(Contents, BySource):
                 for index, word in enumerate(block.words):
                     self.program.put(block.base + 2 * index, word)
         self.reset("POR")
-        if self._no_restart is None:
-            self._no_restart = self.hook_pc(0, self._restarted)
+        if self._restart_hook is None:
+            self._restart_hook = self.hook_pc(0, self._has_restarted)
 
     # State
 
     def snapshot(self) -> bytes:
-        """A copy of the whole state. Whoever continues from it looks for work first: the deadline is derived data, and
-        so is when a request that is held back becomes acceptable, which is known to who has looked since.
+        """Return a copy of the whole state. Equal machines give equal copies in every engine.
 
-        Equal machines give equal copies whatever their engines: what waits to be told is told first.
+        Pending callbacks are delivered first. Derived data are normalised: the deadline, and the cycle at which a
+        deferred interrupt request becomes acceptable. A run that continues from the copy computes them again.
         """
         self.pins.flush()
-        self.peripherals.tell()
-        self.peripherals.settle()
+        self.peripherals.deliver_uart_output()
+        self.peripherals.synchronize()
         self.core.exceptions.forget()
         self.events.kick()
         return self.record.snapshot()
 
     def restore(self, state: bytes) -> None:
-        """Continue from a snapshot of an equally wired machine, whatever engine made it. Raises ValueError."""
-        self.put_back(state)
-        self._stopped_at = None
-        self.evidence.trap = None
+        """Continue from a snapshot of an equally wired machine with any engine. Raises ValueError for another size."""
+        self.restore_record(state)
+        self._last_hook_stop = None
+        self.checkpoints.trap = None
 
-    def put_back(self, state: bytes) -> None:
-        """The record alone, of this very machine and run; what else `restore` forgets is kept. Raises ValueError."""
+    def restore_record(self, state: bytes) -> None:
+        """Restore the record only, from a snapshot of this machine. Raises ValueError for another size.
+
+        The host-side state that `restore` clears is kept.
+        """
         flash = self.program.flash.tobytes()
         self.record.restore(state)
         if self.program.flash.tobytes() != flash:
             self.program.announce_all()
         self.peripherals.restored()
 
-    def hold(self) -> Callable[[], None]:
-        """Note what is not in the record; returns how to put it back as it was."""
-        stopped_at, last_reset, interrupt, resets = (
-            self._stopped_at, self._last_reset, self._interrupt, list(self.resets),
+    def save_host_state(self) -> Callable[[], None]:
+        """Save the state that is not in the record. Return a function that restores it."""
+        hook_stop, last_reset, interrupt, resets = (
+            self._last_hook_stop, self._last_reset, self._interrupt, list(self.resets),
         )  # fmt: skip
-        waiting = [(uart.line.backlog, list(uart.line.backlog)) for uart in self.uart.values()]
+        backlogs = [(uart.line.backlog, list(uart.line.backlog)) for uart in self.uart.values()]
 
-        def put_back() -> None:
-            self._stopped_at, self._last_reset, self._interrupt = stopped_at, last_reset, interrupt
+        def restore() -> None:
+            self._last_hook_stop, self._last_reset, self._interrupt = hook_stop, last_reset, interrupt
             self.resets[:] = resets
-            for backlog, frames in waiting:
+            for backlog, frames in backlogs:
                 backlog.clear()
                 backlog.extend(frames)
 
-        return put_back
+        return restore
 
     # Hooks
 
-    def hook_pc(self, place: Place, hook: PcHook) -> Callable[[], None]:
-        """Call `hook` before the instruction at `place`, the name of a function or label or a program address; a true
-        result stops the run. Returns how to remove it. Raises KeyError for an unknown name, ValueError for an odd
-        address."""
+    def hook_pc(self, place: Location, hook: PcHook) -> Callable[[], None]:
+        """Call `hook` before the instruction at `place`: a function, a label or a program address.
+
+        A true result stops the run. Returns a function that removes the hook. Raises KeyError for an unknown name,
+        ValueError for an odd address.
+        """
         address = self.program_address(place)
         self._pc_hooks.setdefault(address, []).append(hook)
         self.runner.forget()

@@ -1,14 +1,14 @@
-"""What a machine holds, for whoever looks at it or changes it from outside: places by name, memory, access hooks.
+"""Access to the memory and registers of a machine by name and by address, and hooks on register accesses.
 
-What enters: names of the loaded image and the chip, addresses, values. What leaves: numbers and bytes. Nothing here
-runs an instruction.
+Inputs: names of the loaded image and the chip, addresses, values. Outputs: numbers and bytes. No function of this
+module runs an instruction.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 from emu.chips.chip import Chip
 from emu.dspic30f.core import Core
@@ -18,22 +18,29 @@ from emu.dspic30f.state.state import PC_MASK
 from emu.image.model import Image
 from emu.system.bus import Tap, tap
 
-if TYPE_CHECKING:
-    from emu.debug.strict import Strict
-
-Place = str | int
+Location = str | int
 """A name of the loaded image or chip, or an address."""
 SfrHook = Callable[[bool, int], object]
 
 
-class Contents:
-    """Memory and registers of one chip by name and by address."""
+class MemoryObserver(Protocol):
+    """Observer of changes that no instruction makes."""
+
+    def on_power_on(self) -> None:
+        """Handle a power-on reset: RAM is uninitialised."""
+
+    def on_external_write(self, address: int, size: int) -> None:
+        """Handle a write of `size` bytes at data address `address` by a caller of `poke`."""
+
+
+class StateAccess:
+    """Access to the memory and registers of one chip by name and by address."""
 
     chip: Chip
     core: Core
     runner: Engine
     image: Image | None
-    """What was loaded last."""
+    """The loaded image."""
 
     def __init__(self, chip: Chip, core: Core) -> None:
         self.chip = chip
@@ -42,14 +49,13 @@ class Contents:
         self.record: Final = core.record
         self.program: Final = core.program
         self.image = None
-        self.strict: Strict | None = None
-        """Who watches every access, in strict runs."""
+        self.memory_observer: MemoryObserver | None = None
         self._sfr_hooks: Final[dict[int, Tap]] = {}
 
-    def program_address(self, place: Place) -> int:
-        """Program address of a function or label of the loaded image by name, or the address itself.
+    def program_address(self, place: Location) -> int:
+        """Return the program address of a function or label of the loaded image, or check an address.
 
-        Raises KeyError for a name that is none, ValueError for an address at which no instruction can start.
+        Raises KeyError for an unknown name, ValueError for an address at which no instruction can start.
         """
         if isinstance(place, str):
             symbol = self.image.symbols.find(place) if self.image is not None else None
@@ -57,12 +63,14 @@ class Contents:
                 raise KeyError(f"there is no function or label {place!r}")
             return symbol.address
         if place & 1 or not 0 <= place <= PC_MASK:
-            raise ValueError(f"{place:#x} is no program address: they are even, 0 to {PC_MASK:#x}")
+            raise ValueError(f"{place:#x} is no program address: expected an even number, 0 to {PC_MASK:#x}")
         return place
 
-    def address_of(self, place: Place) -> int:
-        """Data address of a register (`U1STA`, `W3`) or of a variable of the loaded image by name, or the address
-        itself. Raises KeyError for an unknown name."""
+    def address_of(self, place: Location) -> int:
+        """Return the data address of a register (`U1STA`, `W3`) or variable by name. An address is returned unchanged.
+
+        Raises KeyError for an unknown name.
+        """
         if not isinstance(place, str):
             return place
         sfr = self.chip.sfrs.get(place) or self.chip.sfrs.get(re.sub(r"^[Ww](?=\d+$)", "WREG", place))
@@ -73,39 +81,39 @@ class Contents:
             raise KeyError(f"there is no register or variable {place!r}")
         return symbol.address
 
-    def read(self, place: Place, size: int = 2) -> int:
-        """Data space as an instruction reads it, a byte or an aligned word, side effects included.
+    def read(self, place: Location, size: int = 2) -> int:
+        """Read a byte or an aligned word of data space as an instruction does, with side effects.
 
         Raises ValueError for another size or an odd word address, KeyError for an unknown name.
         """
         return self.core.data.read(self._accessed(place, size), size)
 
-    def write(self, place: Place, value: int, size: int = 2) -> None:
-        """Data space as an instruction writes it, a byte or an aligned word, side effects included.
+    def write(self, place: Location, value: int, size: int = 2) -> None:
+        """Write a byte or an aligned word of data space as an instruction does, with side effects.
 
         Raises as `read`.
         """
         self.core.data.write(self._accessed(place, size), value, size)
 
-    def _accessed(self, place: Place, size: int) -> int:
+    def _accessed(self, place: Location, size: int) -> int:
         address = self.address_of(place)
         if size not in (1, 2) or address & (size - 1):
             raise ValueError(f"an instruction accesses a byte or an aligned word, not {size} bytes at {address:#06x}")
         return address
 
-    def peek(self, place: Place, size: int = 2) -> int:
-        """The unsigned little-endian number in the `size` bytes from `place` in data space, without side effects.
+    def peek(self, place: Location, size: int = 2) -> int:
+        """Return the unsigned little-endian number in `size` bytes of data space, without side effects.
 
-        `place` is a register (`U1STA`, `W3`), a variable, or any address; from 0x8000 constants in the PSV window.
-        Raises KeyError for an unknown name, ValueError where nothing is implemented or for less than one byte.
+        `place` is a register (`U1STA`, `W3`), a variable, or any address; from 0x8000 on it lies in the PSV window.
+        Raises KeyError for an unknown name, ValueError for unimplemented addresses or less than one byte.
         """
         address = self.address_of(place)
         if size == 2 and not address & 1 and 0 <= address < self.record.data_end:
             return self.bus.peek(address) if address < self.bus.end else self.record.u16[address >> 1]
         return int.from_bytes(self.peek_bytes(address, size), "little")
 
-    def peek_bytes(self, place: Place, size: int) -> bytes:
-        """`size` bytes from `place` in data space, without side effects. Raises as `peek`."""
+    def peek_bytes(self, place: Location, size: int) -> bytes:
+        """Return `size` bytes of data space from `place`, without side effects. Raises as `peek`."""
         address = self.address_of(place)
         end = address + size
         if size < 1 or address < 0 or (end > self.record.data_end and (address < WINDOW or end > 2 * WINDOW)):
@@ -123,26 +131,27 @@ class Contents:
             return self.record.u16[address >> 1]
         return self.program.word(self.record.u16[self.core.state.at["PSVPAG"]] << 15 | address & 0x7FFE) & 0xFFFF
 
-    def poke(self, place: Place, value: int, size: int = 2) -> None:
-        """Set the `size` bytes stored from `place` in data space to the low bytes of `value`, telling nobody.
+    def poke(self, place: Location, value: int, size: int = 2) -> None:
+        """Store the low `size` bytes of `value` at `place` in data space, without side effects and hooks.
 
-        Raises as `peek`; constants in program memory cannot be set.
+        Raises as `peek`. Constants in program memory cannot be changed.
         """
         address = self.address_of(place)
         if size < 1 or not 0 <= address <= self.record.data_end - size:
             raise ValueError(f"no {size} bytes of data space at {address:#06x}: it ends at {self.record.data_end:#x}")
-        if self.strict is not None:
-            self.strict.written(address, size)
+        if self.memory_observer is not None:
+            self.memory_observer.on_external_write(address, size)
         self.record.bytes[address : address + size] = (value & (1 << 8 * size) - 1).to_bytes(size, "little")
 
-    def hook_sfr(self, place: Place, hook: SfrHook) -> Callable[[], None]:
-        """Call hook(is_write, word) after every access of an instruction to a register. Returns how to remove it.
+    def hook_sfr(self, place: Location, hook: SfrHook) -> Callable[[], None]:
+        """Call hook(is_write, word) after every access of an instruction to a register.
 
-        Raises KeyError for an unknown name, ValueError for an address that is no register.
+        Returns a function that removes the hook. Raises KeyError for an unknown name, ValueError for an address that
+        is no register.
         """
         address = self.address_of(place)
         if not 0 <= address < self.bus.end:
-            raise ValueError(f"{place!r} is no register: they lie below {self.bus.end:#x}")
+            raise ValueError(f"{place!r} is no register: registers lie below {self.bus.end:#x}")
         word = address >> 1
         if word not in self._sfr_hooks:
             self._sfr_hooks[word] = tap(self.bus, word)

@@ -1,73 +1,72 @@
-"""Why a run ended, and what is kept while it goes on to explain that."""
+"""Why a run ended, and the checkpoints a run keeps for the diagnosis of faults."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from emu.chips.chip import Vector
-
-if TYPE_CHECKING:
-    from emu.machine.fault_report import Fault
+from emu.machine.fault import Fault
 
 REASONS: Final = ("limit", "breakpoint", "halt", "fault", "until", "interrupted")
 CHECKPOINT_CYCLES: Final = 1 << 23
-"""A run remembers where it was at least this often, to be able to go back when something goes wrong (half a second)."""
+"""Longest interval between two checkpoints of a run, in Tcy (half a second of an e-puck)."""
 RESETS_KEPT: Final = 16
 """Length of `Machine.resets`."""
 RESET_LOOP: Final = 8
-"""Equal resets in a row, each within RESET_LOOP_CYCLES of the last, that count as a fault."""
+"""Number of equal resets in a row, each within RESET_LOOP_CYCLES of the last, that is a fault."""
 RESET_LOOP_CYCLES: Final = 1_000_000
 
 
 class LastReset(NamedTuple):
-    """The reset before: its cause, the PC it came from, its cycle, and how many equal ones in a row it ended."""
+    """The last reset: its cause, the PC of its origin, its cycle, and the number of equal resets in a row."""
 
     cause: str = ""
-    culprit: int = 0
+    origin: int = 0
     cycle: int = 0
     repeats: int = 0
-    """0 instead of RESET_LOOP."""
+    """Counted modulo RESET_LOOP: 0 marks a reset loop."""
 
 
-def following(last: LastReset, cause: str, culprit: int, cycle: int) -> LastReset:
-    """The device was reset again."""
-    soon = (last.cause, last.culprit) == (cause, culprit) and cycle - last.cycle < RESET_LOOP_CYCLES
-    return LastReset(cause, culprit, cycle, (last.repeats + 1 if soon else 1) % RESET_LOOP)
+def next_reset(last: LastReset, cause: str, origin: int, cycle: int) -> LastReset:
+    """Return the record of a new reset, counted as a repetition of `last` if both are equal and close in time."""
+    repeated = (last.cause, last.origin) == (cause, origin) and cycle - last.cycle < RESET_LOOP_CYCLES
+    return LastReset(cause, origin, cycle, (last.repeats + 1 if repeated else 1) % RESET_LOOP)
 
 
 @dataclass(slots=True)
-class Evidence:
-    """What a fault is explained with: states of the record, kept as the run goes on."""
+class RunCheckpoints:
+    """Snapshots of the record taken during a run. Fault diagnosis replays the run from them."""
 
-    began: bytes | None = None
-    """A while ago; nothing has come from outside since."""
-    middle: tuple[int, bytes] | None = None
-    """Less long ago: cycle and state. It becomes `began` when that has grown old."""
-    ended: bytes | None = None
-    """Where `advance` ended; a machine that begins elsewhere has been changed from outside."""
+    start: bytes | None = None
+    """An older state; the machine has received no input since."""
+    recent: tuple[int, bytes] | None = None
+    """Cycle and state of a later checkpoint. It becomes `start` when it is older than CHECKPOINT_CYCLES."""
+    end: bytes | None = None
+    """State at the end of the last `advance`. A run that begins with another state has received input."""
     trap: tuple[Vector, bytes, bytes | None] | None = None
-    """The trap entered last: its vector, the state just before, and what `began` was then."""
+    """The last trap: its vector, the state just before it, and the value of `start` at that time."""
     reset: bytes | None = None
-    """Just before the reset for a fault that ended the run."""
+    """State just before the reset for a fault that ended the run."""
 
-    def look(self, cycle: int, state: bytes) -> None:
-        """A run is about to go on from `state`, that of `cycle`."""
-        if state != self.ended:
-            self.began, self.middle = state, (cycle, state)
-        elif self.middle is None or cycle - self.middle[0] >= CHECKPOINT_CYCLES:
-            self.began, self.middle = self.middle[1] if self.middle else state, (cycle, state)
+    def take(self, cycle: int, state: bytes) -> None:
+        """Record that a run continues from `state` at `cycle`."""
+        if state != self.end:
+            self.start, self.recent = state, (cycle, state)
+        elif self.recent is None or cycle - self.recent[0] >= CHECKPOINT_CYCLES:
+            self.start, self.recent = self.recent[1] if self.recent else state, (cycle, state)
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Why and where a run ended. `pc` is the next instruction, of a debugger word that word."""
+    """Why and where a run ended. `pc` is the next instruction, or the debugger word that ended the run."""
 
     reason: str
-    """One of REASONS: "limit" (of cycles or time), "breakpoint" (a hook said stop, or a debugger word), "halt" (asleep,
-    and nothing will ever wake it), "fault" (the firmware went wrong), "until", "interrupted"."""
+    """One of REASONS: "limit" (of cycles or time), "breakpoint" (a hook or a debugger word), "halt" (the CPU sleeps and
+    no event can wake it), "fault" (the firmware failed), "until" (the requested place or condition), "interrupted"."""
     pc: int
     cycle: int
     detail: str = ""
+    """Cause of a fault, or the text of a debugger word."""
     fault: Fault | None = None
-    """With reason "fault" and an image loaded: what went wrong, where, in which thread, and how it came to that."""
+    """The diagnosis of a fault (`emu.debug.fault_report`), if one is attached to the machine and an image is loaded."""

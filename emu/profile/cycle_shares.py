@@ -11,13 +11,15 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
+from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from emu.debug.inspector import Inspector
 from emu.dspic30f.cycle_accounting import Ledger
 from emu.image.model import Image
-from emu.profile.call_graph import CallEdge, CallGraph, CallEvent
+from emu.profile.call_graph import CallEdge, CallEvent, CallGraph
 
 if TYPE_CHECKING:
     from emu.machine.machine import Machine
@@ -112,6 +114,10 @@ class Profiler:
         self.hz: Final = machine.hz
         """Cycles in a second."""
 
+    @cached_property
+    def _inspector(self) -> Inspector:
+        return Inspector(self._machine)
+
     def run(self, until: int, skip: int = 0) -> Profile:
         """Run to cycle `until`, and count from cycle `skip` on; ends earlier with whatever stops the machine."""
         machine, ledger, entry = self._machine, self._ledger, self._machine.pc
@@ -183,7 +189,7 @@ class Profiler:
         """The functions around an instruction, inlined ones too, as the debug information has them."""
         known = self._inside.get(pc)
         if known is None:
-            function = self._machine.inside.debug.function(pc)
+            function = self._inspector.debug.function(pc)
             scopes = function.chain(pc) if function is not None else []
             known = self._inside[pc] = frozenset(scope.name for scope in scopes if scope.kind != "block")
         return known

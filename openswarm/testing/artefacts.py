@@ -11,9 +11,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final, TextIO
 
-from emu.debug.replay import aside
+from emu.debug.fault_report import state_report
+from emu.debug.replay import sandboxed
 from emu.instruments.vcd import WaveformRecorder
-from emu.machine.fault_report import standing
 from openswarm.testing.robot import Robot
 
 STRETCH_MS: Final = 50
@@ -23,7 +23,7 @@ STRETCH_MS: Final = 50
 def write(robot: Robot, folder: Path) -> str:
     """Write everything about `robot` into `folder`; returns the text of the report."""
     folder.mkdir(parents=True, exist_ok=True)
-    report = str(robot.fault) if robot.fault is not None else standing(robot.machine, "the test failed;").report()
+    report = str(robot.fault) if robot.fault is not None else state_report(robot.machine, "the test failed;").report()
     (folder / "report.txt").write_text(report.replace("firmware fault: the test", "the test") + "\n", encoding="utf-8")
     for number, line in robot.uarts.items():
         if line.said:
@@ -37,8 +37,8 @@ def write(robot: Robot, folder: Path) -> str:
 def _waves(robot: Robot, stream: TextIO) -> None:
     """The last stretch, run again aside from the last state that was kept on the way."""
     machine = robot.machine
-    end, began = machine.cycle, machine.evidence.began
-    with aside(machine, began):
+    end, began = machine.cycle, machine.checkpoints.start
+    with sandboxed(machine, began):
         machine.run_until(end - machine.cycles_in(STRETCH_MS / 1000))
         waves = WaveformRecorder(machine, stream, again=True)
         waves.advance(end)

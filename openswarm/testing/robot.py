@@ -85,9 +85,9 @@ class Measured:
     def coverage(self, file: str) -> float:
         """Share of the lines with code of a source file, given by the end of its name, that were run. Raises
         ValueError if no code comes from it."""
-        image, ran, all_lines = self._robot.machine.inside.image, set(), set()
+        image, ran, all_lines = self._robot.machine.inspector.image, set(), set()
         for row in image.lines.rows:
-            if row.line and Path(row.file).match(file) and self._robot.machine.inside.is_code(row.start):
+            if row.line and Path(row.file).match(file) and self._robot.machine.inspector.is_code(row.start):
                 all_lines.add(row.line)
                 if self.profile.addresses.get(self._profiler.row_of(row.start)):
                     ran.add(row.line)

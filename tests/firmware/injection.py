@@ -284,12 +284,12 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
     machine.write("IFS0", machine.peek("IFS0") | T2IF | T3IF * step | T1IF * tick)
     machine.write("IFS1", machine.peek("IFS1") | INT1IF | INT2IF)
     saved = _registers(machine)
-    machine.approach(NEVER)
+    machine.service_boundary(NEVER)
     while machine.pc != stage.leaf:
         assert machine.cycle - at <= RECOGNISED, "the interrupt of IPL 6 was held back"
         machine.step()
         saved = _registers(machine)
-        machine.approach(NEVER)
+        machine.service_boundary(NEVER)
     raised, is_first, periods = 1, True, 1
     while (stop := machine.run_until(at + DEVICE_PERIOD * periods)) is None or machine.pc != stage.end:
         if stop is None:
@@ -304,7 +304,7 @@ def _inject(stage: Stage, base: Base, later: int, calls: int) -> None:
             now = _registers(machine)
             assert now == saved, f"registers {saved} became {now}"
             seen.compared += 1
-            machine.approach(NEVER)
+            machine.service_boundary(NEVER)
             is_first = machine.pc != saved[0]  # another interrupt is next; otherwise the code goes on
     assert machine.peek("leaf") == leaf + 1
     if step:

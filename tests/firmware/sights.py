@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from emu.api import Machine
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.camera.pixels import decode
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 FCY = 14_745_600
 AHEAD = 12
@@ -31,9 +31,9 @@ IDLE_STRIDE = 61
 
 
 def start(path: Path, picture: np.ndarray, ipl_slip: int = 0) -> Machine:
-    """The sights firmware at the beginning of a round, camera programmed,, interp engine."""
+    """The sights firmware at the beginning of a round, camera programmed."""
     image = load_image(path)
-    machine = Machine(image.chip, engine="interp", ipl_slip=ipl_slip, board=partial(Epuck, selector=3))
+    machine = Machine(image.chip, engine="auto", ipl_slip=ipl_slip, board=partial(Epuck, selector=3))
     machine.load(image)
     machine.board.camera.show(picture)
     begin = place(machine, "round_begin")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import emu
-from emu.debug.inspector import Inside
+from emu.debug.inspector import Inspector
 from emu.debug.threads import Threads
 from tests.firmware.conftest import TARGET_APPS, Build
 
@@ -48,7 +48,7 @@ def test_a_store_into_another_threads_stack_is_a_fault_if_strict(image: Build) -
 def test_threads_are_listed_with_stacks_and_what_they_wait_for(image: Build) -> None:
     machine = emu.load(image("culprit", TARGET_APPS))
     machine.run(seconds=0.0234)
-    threads = {thread.pid: thread for thread in Threads(Inside(machine)).all()}
+    threads = {thread.pid: thread for thread in Threads(Inspector(machine)).all()}
     assert {pid: thread.name for pid, thread in threads.items()} == {0: "main", 1: "steady", 2: "worker"}
     for pid in (1, 2):
         thread = threads[pid]
@@ -58,5 +58,5 @@ def test_threads_are_listed_with_stacks_and_what_they_wait_for(image: Build) -> 
         assert thread.used is not None
         assert 20 <= thread.used <= thread.stack[1] - thread.stack[0] <= 128
     before = machine.snapshot()
-    Threads(Inside(machine)).all()
+    Threads(Inspector(machine)).all()
     assert machine.snapshot() == before

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from emu.api import Machine
 from emu.boards.epuck.analog import RESPONSE, reflection_at
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.camera.pixels import decode
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 from tests.firmware.conftest import Build
 
 FCY = 14_745_600
@@ -102,7 +102,7 @@ def test_the_remote_control_starts_and_stops(image: Build, program: str) -> None
 
 
 def test_the_bare_program_has_nothing_of_the_kernel(image: Build) -> None:
-    """experiment.md §4: its map contains no kernel object."""
+    """experiment-contract.md §4: its map contains no kernel object."""
     symbols = load_image(image("clustering-bare")).symbols
     for name in ("_Sys_Init_Kernel", "_Sys_Send_Event", "_os_memory", "_os_running", "_hal_yield"):
         assert symbols.find(name) is None, name
@@ -130,7 +130,7 @@ def test_every_pixel_is_right(image: Build, program: str, sensor: str) -> None:
     assert np.array_equal(captured(machine), window(noise()))
 
 
-@pytest.mark.parametrize("engine", ["interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_reads_come_16_to_18_tcy_behind_href(image: Build, engine: str) -> None:
     """epuck.md §7.5, kernel.md §4: whatever the kernel does, with motors and 1 ms events running; 1,600,000 Tcy apart
     frame by frame (9.216 frames/s, openswarm-original.md §5.5)."""
@@ -329,7 +329,7 @@ def test_ambient_light_does_not_change_the_distance(image: Build) -> None:
 def test_engines_agree_to_the_bit(image: Build, program: str) -> None:
     """Issue 6, Must show 6: registers, memory, devices and robot after frames, a change of scene and a remote key."""
     states = []
-    for engine in ("interp", "jit"):
+    for engine in ("plain", "jit"):
         machine = robot(image(program), engine=engine, selector=START)
         machine.board.camera.show(noise())
         machine.run(cycles=3_456_789)

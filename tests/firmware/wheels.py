@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+from emu.api import Machine
 from emu.boards.epuck.board import Epuck
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 FCY = 14_745_600
 FASTEST = 129

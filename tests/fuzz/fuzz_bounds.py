@@ -77,7 +77,7 @@ def _follow(machine: emu.Machine, main: int, handler: int | None) -> dict[str, S
     start, away = machine.cycle, 0
     while True:
         before = machine.pc, machine.cycle, machine.w[15]
-        if machine.approach(NEVER) is not None or machine.cycle - start > CYCLES:
+        if machine.service_boundary(NEVER) is not None or machine.cycle - start > CYCLES:
             return "it runs too long"
         if machine.pc != before[0]:
             if inside is None and machine.pc == handler:

@@ -105,7 +105,7 @@ def program(seed: int) -> tuple[str, list[Function]]:
 def checked(image: Path, functions: list[Function], exact: bool, tally: Counter[str]) -> None:
     """Step through every function and compare. Raises AssertionError."""
     machine = emu.load(image, board=None)
-    starts = {row.start: row.line for row in machine.inside.image.lines.rows}
+    starts = {row.start: row.line for row in machine.inspector.image.lines.rows}
     called = called_of(image, functions)
     for function in functions:
         # calls of a function without effects may have become their results; the linker may have dropped it then
@@ -121,7 +121,7 @@ def checked(image: Path, functions: list[Function], exact: bool, tally: Counter[
         entry = machine.w[15]
         while machine.w[15] >= entry - 4:
             line = starts.get(machine.pc)
-            if line in lines and line != last and machine.inside.name_of(machine.pc) == function.name:
+            if line in lines and line != last and machine.inspector.function_name(machine.pc) == function.name:
                 last = line
                 if exact:
                     expected_line, state = visits.pop(0)
@@ -141,7 +141,7 @@ def called_of(image: Path, functions: list[Function]) -> set[str]:
     machine = emu.load(image, board=None)
     called: set[str] = set()
     for one in functions:
-        if machine.inside.image.symbols.find(one.name) is not None:
+        if machine.inspector.image.symbols.find(one.name) is not None:
             machine.hook_pc(one.name, partial(called.add, one.name))
     machine.run()
     return called
@@ -151,16 +151,16 @@ def compare(machine: emu.Machine, expected: dict[str, set[int]], may_lack: bool,
     """Variables of the innermost frame against the values they may have."""
     frame = machine.backtrace()[0]
     for name, values in expected.items():
-        variable = machine.inside.variable(name, frame)
-        assert variable is not None, f"{name} is not known at {machine.inside.where(machine.pc)}"
+        variable = machine.inspector.variable(name, frame)
+        assert variable is not None, f"{name} is not known at {machine.inspector.where(machine.pc)}"
         try:
-            value = machine.inside.value(variable, frame).get()
+            value = machine.inspector.value(variable, frame).get()
         except Unavailable as why:
             if not may_lack:
-                raise AssertionError(f"{name} at {machine.inside.where(machine.pc)}: {why}") from None
+                raise AssertionError(f"{name} at {machine.inspector.where(machine.pc)}: {why}") from None
             tally["without value"] += 1
             continue
-        where = machine.inside.where(machine.pc)
+        where = machine.inspector.where(machine.pc)
         assert may_lack or value in values, f"{name} is shown as {value} at {where}, not {sorted(values)}"
         tally["values" if value in values else "others"] += 1
 

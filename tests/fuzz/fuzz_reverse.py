@@ -46,9 +46,9 @@ def hashed(machine: emu.Machine) -> bytes:
 def kinds_of(machine: emu.Machine, before: tuple[int, int, bytes], handlers: set[int]) -> set[str]:
     """What the step from `before` (PC, depth of the stack, I2C registers) was."""
     found = set()
-    where = machine.inside.image.lines
-    entered = machine.inside.start_of(machine.pc) in handlers and machine.w[15] >= before[1] + 4
-    if entered and machine.inside.start_of(before[0]) != machine.inside.start_of(machine.pc):
+    where = machine.inspector.image.lines
+    entered = machine.inspector.function_start(machine.pc) in handlers and machine.w[15] >= before[1] + 4
+    if entered and machine.inspector.function_start(before[0]) != machine.inspector.function_start(machine.pc):
         found.add("interrupts")
     if i2c(machine) != before[2]:
         found.add("i2c")
@@ -73,7 +73,7 @@ def walk(image: Path, selector: int, seed: int, tally: Counter[str]) -> None:
     """One walk. Raises AssertionError."""
     rng = random.Random(seed)
     program = image_at(image)
-    engine = rng.choice(["jit", "jit", "interp"])
+    engine = rng.choice(["jit", "jit", "plain"])
     machine = emu.Machine(program.chip, engine=engine, board=partial(Epuck, selector=selector))
     machine.load(program)
     picture = np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)

@@ -32,7 +32,7 @@ from emu.debug.expressions.arithmetic import (
     whole,
 )
 from emu.debug.expressions.type_names import TypeNameError, type_name
-from emu.debug.inspector import Frame, Inside, Value
+from emu.debug.inspector import Frame, Inspector, Value
 
 TOKEN: Final = re.compile(
     r"\s*(?:((?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?[fFlL]?|\d+[eE][-+]?\d+[fFlL]?)|((?:0[xX][0-9a-fA-F]+|0[bB][01]+|\d+)[uUlL]*)"
@@ -70,9 +70,9 @@ def tokens(text: str) -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
-def evaluate(inside: Inside, text: str, frame: Frame | None = None) -> Value | int | float:
+def evaluate(inspector: Inspector, text: str, frame: Frame | None = None) -> Value | int | float:
     """What `text` means in `frame`. Raises ExpressionError, locate.Unavailable."""
-    parser = _Parser(inside, text, frame)
+    parser = _Parser(inspector, text, frame)
     result = parser.expression(0)
     if parser.at < len(parser.tokens):
         raise ExpressionError(f"{text!r}: {parser.tokens[parser.at][1]!r} is too much")
@@ -88,8 +88,8 @@ def number_of(result: Value | int | float) -> Any:
 class _Parser:
     """Precedence climbing; values are computed on the way, but for what C does not evaluate."""
 
-    def __init__(self, inside: Inside, text: str, frame: Frame | None) -> None:
-        self.inside: Final = inside
+    def __init__(self, inspector: Inspector, text: str, frame: Frame | None) -> None:
+        self.inspector: Final = inspector
         self.text: Final = text
         self.frame: Final = frame
         self.tokens: Final = tokens(text)
@@ -182,7 +182,7 @@ class _Parser:
 
     def _typed(self, kind: Type, name: str = "", bits: tuple[int, int] | None = None) -> Value:
         """A place that is not known, as nothing is evaluated."""
-        return Value(kind, (Piece("gone", 0),), self.inside.view(self.frame), name, bits)
+        return Value(kind, (Piece("gone", 0),), self.inspector.view(self.frame), name, bits)
 
     def _computed(self, sign: str, left: Any, right: Any) -> Any:
         one, other = self._decayed(left), self._decayed(right)
@@ -194,7 +194,7 @@ class _Parser:
                 if not _points(other):
                     distance = self._whole(sign, self._number(other)) * step
                     address = self._read(one) + (distance if sign == "+" else -distance)
-                    return _constant(one.type, address & 0xFFFF, self.inside)
+                    return _constant(one.type, address & 0xFFFF, self.inspector)
                 if sign == "-":
                     return computed("/", Number(self._read(one) - self._read(other)), Number(step))
             return computed(sign, self._number(one), self._number(other))
@@ -208,7 +208,7 @@ class _Parser:
             if not self.evaluates:
                 return self._typed(pointer)
             if value.address is not None:
-                return _constant(pointer, value.address, self.inside)
+                return _constant(pointer, value.address, self.inspector)
         return value
 
     def _number(self, value: Any) -> Number:
@@ -267,7 +267,7 @@ class _Parser:
     def _type_called(self, name: str) -> Type | None:
         """What the program calls so, where it is no variable."""
         unit = self.frame.scopes[0].unit if self.frame is not None and self.frame.scopes else -1
-        return None if self.inside.variable(name, self.frame) is not None else self.inside.debug.type(name, unit)
+        return None if self.inspector.variable(name, self.frame) is not None else self.inspector.debug.type(name, unit)
 
     def _size(self) -> Number:
         """What stands behind `sizeof`, which is not evaluated."""
@@ -290,7 +290,7 @@ class _Parser:
             return self._refused(f"what is {one.type if isinstance(one, Value) else 'a number'} is no {kind}")
         try:
             plain = self._read(one) if isinstance(one, Value) else one.value
-            return _constant(kind, converted(plain, kind), self.inside)
+            return _constant(kind, converted(plain, kind), self.inspector)
         except ValueError as error:
             return self._refused(error)
 
@@ -299,7 +299,7 @@ class _Parser:
             return self._typed(Type("pointer", size=2, target=value.type))
         if not isinstance(value, Value) or value.address is None or value.bits is not None:
             return self._refused("that has no address")
-        return _constant(Type("pointer", size=2, target=value.type), value.address, self.inside)
+        return _constant(Type("pointer", size=2, target=value.type), value.address, self.inspector)
 
     def postfix(self) -> Any:
         value = self.primary()
@@ -319,13 +319,13 @@ class _Parser:
 
     def _part(self, value: Any, part: str | int) -> Value | Number:
         if isinstance(value, Number) and isinstance(value.value, int) and part == 0:
-            return Value(UNSIGNED[2], (Piece("memory", value.value & 0xFFFF),), self.inside.view(self.frame), "")
+            return Value(UNSIGNED[2], (Piece("memory", value.value & 0xFFFF),), self.inspector.view(self.frame), "")
         if not isinstance(value, Value):
             return self._refused("a number has no parts")
-        sfr = self.inside.image.chip.sfrs.get(value.name) if isinstance(part, str) else None
+        sfr = self.inspector.image.chip.sfrs.get(value.name) if isinstance(part, str) else None
         if sfr is not None and part in sfr.fields:
             lsb, width = sfr.fields[str(part)]
-            return Value(value.type, value.pieces, self.inside.view(self.frame), str(part), (width, lsb))
+            return Value(value.type, value.pieces, self.inspector.view(self.frame), str(part), (width, lsb))
         if not isinstance(part, str) and (target := value.type.bare.target) is not None:
             if target.bare.kind in ("void", "function"):
                 return self._refused(f"what a {value.type} points to has no value")
@@ -363,7 +363,7 @@ class _Parser:
 
     def _fraction(self, text: str) -> Number:
         """Of the program's own `double`, if it has one: compilers may make it as short as a float."""
-        kind = FLOAT if text[-1] in "fF" else self.inside.debug.type("double") or FLOATING
+        kind = FLOAT if text[-1] in "fF" else self.inspector.debug.type("double") or FLOATING
         return Number(float(converted(float(text.rstrip("fFlL")), kind)), kind)
 
     def _literal(self, text: str) -> Number:
@@ -391,28 +391,28 @@ class _Parser:
         return Number(code - 256 if code >= 128 else code)
 
     def named(self, name: str) -> Any:
-        inside = self.inside
-        variable = inside.variable(name, self.frame) if not name.startswith("$") else None
+        inspector = self.inspector
+        variable = inspector.variable(name, self.frame) if not name.startswith("$") else None
         if variable is not None:
-            return inside.value(variable, self.frame) if self.evaluates else self._typed(variable.type, name)
+            return inspector.value(variable, self.frame) if self.evaluates else self._typed(variable.type, name)
         bare = name.removeprefix("$")
         register = re.fullmatch(r"[Ww](\d|1[0-5])", bare)
-        sfr = inside.image.chip.sfrs.get(bare.removesuffix("bits"))
-        symbol = inside.symbol(name) if not name.startswith("$") and not register and sfr is None else None
+        sfr = inspector.image.chip.sfrs.get(bare.removesuffix("bits"))
+        symbol = inspector.symbol(name) if not name.startswith("$") and not register and sfr is None else None
         if symbol is not None:
             return symbol
-        if name in inside.debug.constants:
-            return whole(inside.debug.constants[name], may_be_unsigned=True)
+        if name in inspector.debug.constants:
+            return whole(inspector.debug.constants[name], may_be_unsigned=True)
         if register is not None:
-            return Value(UNSIGNED[2], (Piece("register", int(register[1])),), inside.view(self.frame), bare)
+            return Value(UNSIGNED[2], (Piece("register", int(register[1])),), inspector.view(self.frame), bare)
         if sfr is not None:
             place = (Piece("memory", sfr.address),)
-            return Value(UNSIGNED[sfr.size], place, inside.view(self.frame), bare.removesuffix("bits"))
+            return Value(UNSIGNED[sfr.size], place, inspector.view(self.frame), bare.removesuffix("bits"))
         if bare.lower() == "pc":
-            return Number(self.frame.pc if self.frame is not None else inside.machine.pc, UNSIGNED[4])
+            return Number(self.frame.pc if self.frame is not None else inspector.machine.pc, UNSIGNED[4])
         if bare == "cycle":
-            return Number(inside.machine.cycle, UNSIGNED[8])
-        function = inside.image.symbols.find(name)
+            return Number(inspector.machine.cycle, UNSIGNED[8])
+        function = inspector.image.symbols.find(name)
         if function is not None:
             return Number(function.address, UNSIGNED[4])
         if self.forgives:
@@ -424,6 +424,6 @@ def _points(value: Any) -> bool:
     return isinstance(value, Value) and value.type.bare.kind == "pointer"
 
 
-def _constant(kind: Type, number: int | float, inside: Inside) -> Value:
+def _constant(kind: Type, number: int | float, inspector: Inspector) -> Value:
     """A value that has no place."""
-    return Value(kind, (Piece("value", 0, data=encode(kind, number)),), inside.view())
+    return Value(kind, (Piece("value", 0, data=encode(kind, number)),), inspector.view())

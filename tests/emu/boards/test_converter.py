@@ -7,9 +7,9 @@ from functools import partial
 
 import pytest
 
+from emu.api import Machine
 from emu.boards.epuck.board import Epuck
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 SETTLED = 3_000
 """Tcy until the program has read its variables."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from emu.api import Machine
 from emu.boards.epuck.board import Epuck
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 LAST_WORD = 0x7FFFFE
 BUSY_TCY = 29_491

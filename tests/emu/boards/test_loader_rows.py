@@ -9,10 +9,10 @@ import random
 
 import pytest
 
+from emu.api import Machine
 from emu.dspic30f.engines import NAMES
 from emu.dspic30f.isa.text import parse
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 FIRST_ROW, ROWS, ROW_WORDS = 0x8000, 6, 32
 EEPROM_ROW, EEPROM_WORDS = 0x7FF020, 16

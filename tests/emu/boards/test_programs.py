@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from emu.api import Machine
 from emu.boards.epuck.analog import RESPONSE
 from emu.boards.epuck.board import Epuck
 from emu.boards.epuck.camera.pixels import decode
 from emu.boards.epuck.stimulus import parse
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 FCY = 14_745_600
 

@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
+from emu.api import Machine
 from emu.boards.epuck.board import Epuck
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 
 FCY = 14_745_600
 

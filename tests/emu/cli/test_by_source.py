@@ -191,7 +191,7 @@ def test_what_is_set_is_had_back_and_nothing_else_changes(machine, expression, v
      ("*(void *)0x800", "has no value"), ("sizeof robot.place.mode", "bit field has no size"),
      ("sizeof(void)", "size of void is not known"), ("(int)(1e308 * 10)", "inf is no whole"),
      ("(int[0])1", "number of elements"), ("sizeof nobody", "nothing called 'nobody'"), ("(int)" * 99 + "1", "inside"),
-     ("5", "names no place")],
+     ("5", "names no object")],
 )  # fmt: skip
 def test_what_means_nothing_is_refused(machine, expression, words):
     with pytest.raises(ValueError, match=re.escape(words)):
@@ -231,7 +231,7 @@ def test_who_is_interrupted_has_what_it_had_just_before(build):
     """Also where a variable changes its place at that very instruction: there the frame does not wait for a call."""
     machine = emu.load(build("-Os", source=INTERRUPTED), board=None)
     machine.run(until="main")
-    inside = machine.inside
+    inside = machine.inspector
 
     def locals_of(frame):
         return [(one.name, shown(one, frame)) for one in inside.variables(frame)]
@@ -267,7 +267,7 @@ def test_locals_of_every_frame_at_O0(build):
     assert [frame.function for frame in frames] == ["printf", *["inner"] * 4, "main", "_resetPRI"]
     wide = 100000
     for depth, frame in zip(range(3, -1, -1), reversed(frames[1:5]), strict=True):
-        known = {one.name: machine.inside.value(one, frame).get() for one in machine.inside.variables(frame)}
+        known = {one.name: machine.inspector.value(one, frame).get() for one in machine.inspector.variables(frame)}
         assert known["depth"] == depth
         assert known["local"] == 2 * depth
         assert known["wide"] == wide
@@ -277,7 +277,7 @@ def test_locals_of_every_frame_at_O0(build):
 def test_a_local_is_right_or_optimised_out(build):
     machine = emu.load(build("-Os"))
     machine.run(until="inner")
-    start = machine.inside.debug.function(machine.pc)
+    start = machine.inspector.debug.function(machine.pc)
     known = 0
     for _step in range(8):
         for name, values in (("depth", {3, 2}), ("wide", {100000, 100007}), ("local", {6, 4})):
@@ -285,7 +285,7 @@ def test_a_local_is_right_or_optimised_out(build):
                 assert machine.var(name) in values
                 known += 1
         machine.step()
-        assert machine.inside.debug.function(machine.pc) is start
+        assert machine.inspector.debug.function(machine.pc) is start
     assert known >= 4  # the parameters, at least before the first call
 
 
@@ -341,7 +341,7 @@ int main(void) { U1BRG = 7; U1MODE = 0x8000; U1STA = 0x400; PR1 = 9999; IEC0bits
 """
 
 
-@pytest.mark.parametrize("engine", ["jit", "interp", "plain"])
+@pytest.mark.parametrize("engine", ["jit", "plain"])
 def test_expect_stops_at_the_byte_in_a_firmware_that_sleeps(build, engine):
     """Native code went on to the end of the time."""
     machine = emu.load(build("-Os", source=SLEEPER), engine=engine)

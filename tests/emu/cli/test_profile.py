@@ -10,9 +10,9 @@ from collections import Counter, defaultdict
 
 import pytest
 
+from emu.api import Machine
 from emu.cli import main
 from emu.image.loader import load_image
-from emu.machine.machine import Machine
 from emu.profile.cycle_shares import Profiler
 from toolchain.driver.driver import main as compile_program
 
@@ -116,7 +116,7 @@ def stepped(image, until: int):
     functions, levels, idle, calls = Counter(), Counter(), 0, Counter()
     while machine.cycle < until:
         cycle, pc, asleep = machine.cycle, machine.pc, machine.is_asleep
-        machine.approach(until)
+        machine.service_boundary(until)
         entry = machine.cycle - cycle
         if asleep:
             entry = min(entry, 3) if machine.pc != pc else 0  # from the first cycle awake to the handler

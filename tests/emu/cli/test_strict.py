@@ -13,10 +13,10 @@ MISTAKES = {
     "char *volatile p; int main(void) { return p[3]; }": "null pointer: reading 1 byte at 0x0003",
     "struct s { int a[20], b; } *volatile p; int main(void) { p->b = 1; return 0; }": "writing 2 bytes at 0x0028",
     "int f(int n) { int a[4]; if (n) { a[2] = 1; } return a[2]; } volatile int z; int main(void) { return f(z); }":
-        "which nobody has written",
+        "uninitialised read of 2 bytes",
     "int f(void) { volatile int a[8]; a[7] = 1; return a[7]; } int g(void) { volatile int b[8]; return b[7]; }"
-    "int main(void) { f(); return g(); }": "which nobody has written",
-    "int kept __attribute__((persistent)); int main(void) { return kept; }": "(kept), which nobody has written",
+    "int main(void) { f(); return g(); }": "uninitialised read of 2 bytes",
+    "int kept __attribute__((persistent)); int main(void) { return kept; }": "uninitialised read of 2 bytes at 0x0802 (kept)",
 }  # fmt: skip
 RIGHT = """
 #include <stdio.h>

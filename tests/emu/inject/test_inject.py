@@ -10,13 +10,13 @@ from types import SimpleNamespace
 
 import pytest
 
+from emu.api import Machine
 from emu.cli import main
 from emu.image.loader import load_image
 from emu.inject.campaign import CampaignError, read
 from emu.inject.faults import KINDS, Fault, choose, do
 from emu.inject.report import summary
 from emu.inject.trial import OUTCOMES, Trials
-from emu.machine.machine import Machine
 from toolchain.driver.driver import main as compile_program
 
 SOURCE = """
@@ -120,7 +120,7 @@ def test_every_fault_does_what_it_says(firmware):
     assert machine.program.word(start) == word ^ 1 << 20
     do(Fault(0, "flash", 0, start, 20), machine)
     pc, cycle = machine.pc, machine.cycle
-    assert do(Fault(0, "skip", 0, 0, 0), machine) == f"the instruction at {machine.inside.where(pc)}"
+    assert do(Fault(0, "skip", 0, 0, 0), machine) == f"the instruction at {machine.inspector.where(pc)}"
     assert (machine.pc > pc, machine.cycle) == (True, cycle)
     assert do(Fault(0, "uart", 0, 1, 0), machine) == "no byte for UART1 was on its way"
     machine.uart[1].feed(b"ab")

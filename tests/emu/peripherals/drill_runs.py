@@ -73,7 +73,7 @@ class Crew:
             machine.stop_on_fault = False
             for port in machine.uart:
                 machine.uart[port].on_byte = lambda byte, cycle, p=port, h=heard: h.append((p, byte, cycle))
-            self.clean.append((machine.snapshot(), machine.hold()))
+            self.clean.append((machine.snapshot(), machine.save_host_state()))
 
     @property
     def regions(self) -> int:
@@ -94,12 +94,12 @@ class Crew:
 
     def keep(self) -> list[Kept]:
         """All machines as they are now."""
-        return [(machine.snapshot(), machine.hold()) for machine in self.machines]
+        return [(machine.snapshot(), machine.save_host_state()) for machine in self.machines]
 
     def back(self, kept: list[Kept]) -> None:
         """All machines as they were."""
         for machine, heard, (state, put_back) in zip(self.machines, self.heard, kept, strict=True):
-            machine.put_back(state)
+            machine.restore_record(state)
             put_back()
             heard.clear()
 

@@ -234,6 +234,6 @@ def test_flag_leads_through_its_own_vector(name, alternate):
         if machine.pc == 0x300:
             break
         machine.step()
-        machine.approach(machine.cycle + 1)
+        machine.service_boundary(machine.cycle + 1)
     assert machine.pc == 0x300
     assert machine.state.ipl == 3

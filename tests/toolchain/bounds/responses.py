@@ -70,7 +70,7 @@ def _run(machine: emu.Machine, entries: dict[int, list[tuple[str, int]]], cycles
     ended: dict[str, int] = {}
     open_: list[tuple[int, str]] = []
     while machine.cycle < limit:
-        stop = machine.approach(NEVER)
+        stop = machine.service_boundary(NEVER)
         if stop is not None and stop.reason == "halt":
             break  # it stands still, and nothing comes any more
         assert stop is None, stop

@@ -20,7 +20,7 @@ from tests.toolchain.lower.test_debug import dwarf_of
 from tests.toolchain.test_exec import FOLDER, cases_of
 
 SP, RCOUNT, RETURN_ADDRESS = 15, 16, 37
-RCOUNT_AT = 0x36  # sfr.csv
+RCOUNT_AT = 0x36  # registers.csv
 PC_MASK = 0x7FFFFE
 DEEPEST = 40
 STEPS = 12_000
@@ -167,13 +167,13 @@ def _registers(machine: Machine) -> tuple[int, ...]:
 
 def walked(image: Path) -> tuple[int, int]:
     """Walk a program from `main` on; how many instructions and frames were held against what happened."""
-    machine, table = emu.load(image, engine="interp"), Table(image)
+    machine, table = emu.load(image, engine="auto"), Table(image)
     machine.run(until="main", cycles=1_000_000)
     calls: list[Call] = []
     instructions = frames = 0
     for _ in range(STEPS):
         pc, registers = machine.pc, _registers(machine)
-        machine.approach(machine.cycle + 1)
+        machine.service_boundary(machine.cycle + 1)
         while (
             registers[SP] != machine.w[SP]
         ):  # an exception, and perhaps another before its handler's first instruction

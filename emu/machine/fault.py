@@ -1,0 +1,99 @@
+"""Report of a firmware fault as plain data: cause, place, thread, call stack and last branches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from typing import Any, Final
+
+MAX_FRAMES_SHOWN: Final = 12
+"""Entries of the call stack in the text of a report."""
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """A taken branch or exception entry: control passed from the instruction at `source` to `target`."""
+
+    source: int
+    target: int
+    cycle: int
+    """Cycle in which the instruction at `source` began."""
+    kind: str
+    """"branch" or "exception"."""
+
+
+@dataclass(frozen=True, slots=True)
+class StackEntry:
+    """One entry of the report's call stack."""
+
+    pc: int
+    function: str
+    line: str | None
+    kind: str
+    variables: tuple[tuple[str, str], ...] = ()
+    """Names and values of parameters and locals; only the innermost entries have them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What went wrong and where. `pc` is the faulty instruction, or the best estimate of it."""
+
+    cause: str
+    pc: int
+    cycle: int
+    where: str = ""
+    """`pc` with function and source line."""
+    symbol: str | None = None
+    line: str | None = None
+    thread: str | None = None
+    """`thread 1 (worker)` of an OpenSwarm firmware."""
+    frames: tuple[StackEntry, ...] = ()
+    """The call stack at `pc`, innermost first, through interrupts."""
+    branches: tuple[Branch, ...] = ()
+    """The last branches before the fault, oldest first. Empty unless `run`, `advance` or the command line ran the
+    machine."""
+    branch_texts: tuple[str, ...] = ()
+
+    @property
+    def function(self) -> str | None:
+        """The function that contains `pc`, None outside the program."""
+        return self.frames[0].function if self.frames else None
+
+    def report(self) -> str:
+        """Return the whole report as text lines."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        yield f"firmware fault: {self.cause} at {self.where}" + (f" in {self.thread}" if self.thread else "")
+        for number, frame in enumerate(self.frames[:MAX_FRAMES_SHOWN]):
+            note = f"  <{frame.kind}>" if frame.kind != "call" else ""
+            yield f"  #{number} {frame.function} at {frame.line or f'{frame.pc:#08x}'}{note}"
+            for name, value in frame.variables:
+                yield f"       {name} = {value}"
+        if len(self.frames) > MAX_FRAMES_SHOWN:
+            yield f"  ... and {len(self.frames) - MAX_FRAMES_SHOWN} more"
+        if self.branches:
+            yield "  last branches, newest first:"
+        for _, same in groupby(
+            zip(reversed(self.branches), reversed(self.branch_texts), strict=True),
+            lambda one: (one[0].source, one[0].target),
+        ):
+            times = [text for _, text in same]
+            yield f"    {times[0]}" + (f", {len(times)} times" if len(times) > 1 else "")
+
+    def facts(self) -> dict[str, Any]:
+        """Return the report as JSON-compatible data."""
+        return {
+            "cause": self.cause,
+            "pc": self.pc,
+            "cycle": self.cycle,
+            "symbol": self.symbol,
+            "line": self.line,
+            "thread": self.thread,
+            "frames": [asdict(entry) | {"variables": dict(entry.variables)} for entry in self.frames],
+            "branches": [
+                {"from": one.source, "to": one.target, "cycle": one.cycle, "kind": one.kind, "text": text}
+                for one, text in zip(self.branches, self.branch_texts, strict=True)
+            ],
+        }
