@@ -1,29 +1,11 @@
-"""The chip's tables against each other and against the reference list of registers."""
+"""The chip's tables against each other."""
 
 from __future__ import annotations
-
-import csv
-from pathlib import Path
 
 import pytest
 
 from emu.chips.dspic30f6014a import CONFIG, DSPIC30F6014A, INTERRUPTS, SFRS, VECTORS
 from emu.peripherals.pins import parse_pin
-
-REFERENCE = Path(__file__).resolve().parents[2] / "vectors" / "sfr.csv"
-
-
-def test_registers_agree_with_the_reference_list():
-    """sfr.csv: names, addresses, sizes, resets, masks, fields, ownership."""
-    with REFERENCE.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["name"] for row in rows] == list(SFRS)
-    for row in rows:
-        sfr = SFRS[row["name"]]
-        numbers = (sfr.address, sfr.size, sfr.reset, sfr.mask, sfr.hw_owned, sfr.clear_only)
-        columns = ("address", "size", "reset", "mask", "hw_owned", "clear_only")
-        assert numbers == tuple(int(row[column], 0) for column in columns), sfr.name
-        assert ";".join(f"{n}:{lsb}:{width}" for n, (lsb, width) in sfr.fields.items()) == row["fields"], sfr.name
 
 
 def test_register_words_do_not_overlap():
@@ -34,7 +16,7 @@ def test_register_words_do_not_overlap():
 
 
 def test_fields_lie_inside_the_mask_and_apart():
-    """sfr.csv: `fields` names implemented bits, each bit once."""
+    """`fields` names implemented bits, each bit once."""
     for sfr in SFRS.values():
         seen = 0
         for name, (lsb, width) in sfr.fields.items():
