@@ -69,7 +69,7 @@ def cycles(level: str, folder: Path, names: list[str]) -> dict[str, int]:
     sources = [str(SOURCES / name) for name in ("main.c", "compared.c", "programs.c")]
     if driver.main([level, "-fno-lto", *sources, "-o", str(image)]) != 0:
         raise SystemExit(1)
-    machine = emu.load(image, engine="interp")
+    machine = emu.load(image, engine="auto")
     assert machine.image is not None
     entries = {symbol.address: name for name in names if (symbol := machine.image.symbols.find("_" + name))}
     measured: dict[str, int] = {}

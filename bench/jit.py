@@ -30,7 +30,7 @@ import emu  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
 
 HERE = Path(__file__).parent
-MIPS = 14_745_600  # design §4.2
+MIPS = 14_745_600  # engines.md §4.2
 WARM_UP = 100_000_000
 INTERPRETER_SHARE = 100
 """The interpreter runs this much less."""
@@ -70,12 +70,12 @@ def times_real(target: emu.Machine, cycles: int) -> float:
 
 def measure(image: Path, cycles: int, repeat: int) -> dict[str, float]:
     """Medians of paired runs of one image under both engines."""
-    native, plain = machine(image, "jit"), machine(image, "interp")
+    native, plain = machine(image, "jit"), machine(image, "plain")
     pairs = [(times_real(native, cycles), times_real(plain, cycles // INTERPRETER_SHARE)) for _ in range(repeat)]
     fast = statistics.median(pair[0] for pair in pairs)
     return {
         "jit": fast,
-        "interp": statistics.median(pair[1] for pair in pairs),
+        "plain": statistics.median(pair[1] for pair in pairs),
         "ratio": statistics.median(a / b for a, b in pairs),
     }
 
@@ -198,7 +198,7 @@ def main() -> int:
     for image in ("compute", "kernel", "storm"):
         row = report[image]
         print(
-            f"{image:10}{row['jit']:>9.1f} x {row['interp']:>12.3f} x{row['ratio']:>9.0f}"
+            f"{image:10}{row['jit']:>9.1f} x {row['plain']:>12.3f} x{row['ratio']:>9.0f}"
             f"{row['two']:>11.2f} x{row['cold_s']:>11.2f} s{row['warm_s']:>10.2f} s"
         )
     for name, rate in report["rounds_per_s"].items():

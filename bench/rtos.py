@@ -176,7 +176,7 @@ def build_freertos(checkout: Path, out: Path) -> Image:
 def on_freertos(checkout: Path, folder: Path) -> dict[str, Any]:
     """Cells of FreeRTOS on the emulated dsPIC30F6014A."""
     image = build_freertos(checkout, folder / "freertos.elf")
-    target = Target(image, "rtos_begin", "interp")
+    target = Target(image, "rtos_begin", "auto")
     modules = totals(pieces(image), "module")
     own = {name: size for name, size in modules.items() if not name.endswith("freertos/main.c")}
     kernel = [size for name, size in own.items() if any(name.endswith(str(source)) for source in SOURCES)]

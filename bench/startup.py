@@ -1,8 +1,8 @@
 """How soon the emulator says something, and what asking it to go on costs.
 
 Measures host seconds from process start to the first UART byte: of a small image and of the kernel's Listing 1 (whose
-first line comes at 250 ms), with the objects of earlier runs on disk (design §9: 0.8 s) and without any (4 s); and host
-time per `Machine.run_until` of a sleeping machine that is asked to go one more cycle (design §4.3: 1 µs).
+first line comes at 250 ms), with the objects of earlier runs on disk (engines.md §9: 0.8 s) and without any (4 s); and host
+time per `Machine.run_until` of a sleeping machine that is asked to go one more cycle (engines.md §4.3: 1 µs).
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def main() -> int:
     build = ["make", "-C", str(ROOT / "firmware"), "APP=listing1", f"PYTHON={sys.executable}"]
     subprocess.run(build, check=True, capture_output=True)
     facts = {}
-    for engine in ("interp", "jit"):
+    for engine in ("plain", "jit"):
         times = [first_byte(engine) for _ in range(options.runs + 1)][1:]
         facts[engine] = {
             "first_byte_seconds": min(times),

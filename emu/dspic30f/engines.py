@@ -1,4 +1,4 @@
-"""Engines: ways to run instructions between two boundaries. All give the same state in the same cycle."""
+"""Engines: implementations of the instruction loop between two boundaries. All give the same state in the same cycle."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import Any, Final, Protocol
 
 from emu.dspic30f.core import Core
-from emu.dspic30f.specialised.engine import SpecialisedEngine
 from emu.system.native_handle import Native, Run
 
-NAMES: Final = ("plain", "interp", "jit", "auto")
+NAMES: Final = ("auto", "jit", "plain")
+"""Names for `--engine`; `auto` is the fastest engine that the host supports."""
 
 
 class Engine(Protocol):
-    """What the machine's loop needs."""
+    """Interface between the machine's run loop and an engine."""
 
     name: str
 
@@ -22,26 +22,26 @@ class Engine(Protocol):
         cycle is below `limit`. Raises DeviceReset and Breakpoint as `Sequencer.execute` does."""
 
     def natively(self, limit: int) -> bool:
-        """Boundaries and instructions without Python, as far as possible. False: the boundary at PC is yet to be done,
-        or to be done again."""
+        """Run boundaries and instructions without Python as far as possible. Return False if the boundary at PC has
+        still to be done, or has to be done again."""
 
     def forget(self) -> None:
-        """Hooks have changed: whatever was prepared for them is stale."""
+        """Discard translations because the set of hooked addresses has changed."""
 
     def pass_limits(self, period: int, last: int) -> None:
-        """From now on, a limit that is reached without Python may be passed: the next one is `period` later, `last` at
-        most. 0: no limit is."""
+        """Let native code pass limits without returning: it notes the cycle and continues to the next limit, `period`
+        cycles later and at most at `last`. 0 switches this off."""
 
     def passed(self) -> list[int]:
-        """The first boundaries at or after the limits that were passed since the last call, in Tcy."""
+        """Return the first boundary, in Tcy, at or after each limit that was passed since the last call."""
 
     def lend(self, run: Run) -> Native | None:
-        """From now on `run` is called where native code would be, in `natively`, while nobody counts or measures it; it
-        finds what it needs in the result. None: there is no native code."""
+        """Let `natively` call `run` instead of native code, except while cycles or host time are measured. Return the
+        addresses that `run` needs, or None for an engine without native code."""
 
 
 class PlainEngine:
-    """One instruction at a time through the sequencer."""
+    """Engine that executes one instruction per call through the sequencer."""
 
     name = "plain"
 
@@ -49,36 +49,33 @@ class PlainEngine:
         self._sequencer: Final = core.sequencer
 
     def run(self, limit: int) -> None:
-        """One instruction."""
+        """Execute one instruction."""
         self._sequencer.execute()
 
     def natively(self, limit: int) -> bool:
-        """Nothing is native."""
+        """Return False: this engine has no native code."""
         return False
 
     def forget(self) -> None:
-        """Nothing is prepared."""
+        """Do nothing: this engine keeps no translations."""
 
     def pass_limits(self, period: int, last: int) -> None:
-        """No limit is passed."""
+        """Do nothing: this engine returns at every limit."""
 
     def passed(self) -> list[int]:
-        """None."""
+        """Return an empty list: this engine passes no limit."""
         return []
 
     def lend(self, run: Run) -> None:
-        """There is nothing to lend."""
+        """Return None: this engine has no native code."""
 
 
 def make_engine(name: str, core: Core, pc_hooks: Mapping[int, Any]) -> Engine:
-    """The engine called `name`. Raises ValueError for a name that is not one of NAMES."""
+    """Return the engine called `name`. Raises ValueError for a name that is not one of NAMES."""
     if name not in NAMES:
         raise ValueError(f"there is no engine {name!r}; expected one of {', '.join(NAMES)}")
     if name == "plain":
         return PlainEngine(core)
-    interpreter = SpecialisedEngine(core, pc_hooks)
-    if name == "interp":
-        return interpreter
-    from emu.dspic30f.jit.engine import JitEngine  # only who runs native code pays for the translator
+    from emu.dspic30f.jit.engine import JitEngine  # imported here: the translator is slow to load
 
-    return JitEngine(core, pc_hooks, interpreter)
+    return JitEngine(core, pc_hooks)

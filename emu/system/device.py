@@ -105,7 +105,7 @@ class Irq:
     def request(self) -> None:
         """Set the interrupt flag: it first reads 1 in the cycle of the event that calls this.
 
-        Called from an access hook instead, it counts as raised one cycle after that access (design §4.2).
+        Called from an access hook instead, it counts as raised one cycle after that access (engines.md §4.2).
         """
         if not self._u16[self._word] & self._bit:
             self._u16[self._word] |= self._bit

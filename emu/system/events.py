@@ -1,4 +1,4 @@
-"""The only clock: fixed slots of due cycles in the state record (design §4.2).
+"""The only clock: fixed slots of due cycles in the state record (engines.md §4.2).
 
 Time is one integer, Tcy since power-on. A slot belongs to one (device, purpose); its number, given in the order of
 wiring, breaks ties. No heap and no serial numbers, so a copy of the record is a copy of the schedule.

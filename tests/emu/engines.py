@@ -12,7 +12,6 @@ from emu.dspic30f.engines import NAMES
 from emu.dspic30f.jit.cache import ObjectCache
 from emu.dspic30f.jit.compiler import Compiler
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised.engine import SpecialisedEngine
 from emu.machine.machine import Machine
 
 RAM_START, RAM_END = 0x0800, 0x2800
@@ -109,8 +108,6 @@ class OnMachine:
     def __init__(self, name: str) -> None:
         self.name = name
         self.machine = Machine(engine=name)
-        if isinstance(self.machine.runner, SpecialisedEngine):  # a generated function per instruction, at once
-            self.machine.runner.warm = self.machine.runner.length = 1
         if isinstance(self.machine.runner, JitEngine):  # every instruction compiled before it runs
             self.machine.runner.threshold, self.machine.runner.wait = 1, True
             self.machine.runner.compiler = Compiler(NoCache())

@@ -55,7 +55,7 @@ class Stage:
 
     def __init__(self, path: Path, ipl_slip: int = 0) -> None:
         image = load_image(path)
-        self.machine = Machine(image.chip, engine="interp", board=partial(Epuck), ipl_slip=ipl_slip)
+        self.machine = Machine(image.chip, engine="auto", board=partial(Epuck), ipl_slip=ipl_slip)
         self.machine.load(image)
         self.machine.peripherals.spi[2].exchange = lambda word, _bits: word
         self.places = {n: place(self.machine, n) for n in ("scene_end", "victim_gone", "rested", "checked")}

@@ -181,7 +181,7 @@ int main(void) {
 
 def on_both_engines(folder: Path, ask: Callable[[emu.Machine], str]) -> str:
     """What `ask` gets from a program, the same from the interpreter and from native code."""
-    first, second = (ask(emu.load(folder, engine=engine)) for engine in ("interp", "jit"))
+    first, second = (ask(emu.load(folder, engine=engine)) for engine in ("plain", "jit"))
     assert first == second
     return first
 

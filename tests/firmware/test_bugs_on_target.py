@@ -47,7 +47,7 @@ def test_bug_22_the_kernel_works_at_every_optimisation_level(image: Build, level
 
 def test_bug_16_images_are_not_classified_in_an_interrupt(image: Build) -> None:
     """openswarm-original.md §7, 16: classification stopped stepping, clock and scheduling for milliseconds."""
-    machine = robot(image("clustering"), engine="interp", selector=START)
+    machine = robot(image("clustering"), engine="auto", selector=START)
     stop = machine.run(cycles=FCY, until=place(machine, "on_frame"))
     assert stop.reason == "until"
     assert machine.peek("SR") >> 5 & 7 <= 1, "in a handler, which every device interrupts"

@@ -12,7 +12,7 @@ from emu import Machine
 from tests.firmware.conftest import TARGET_APPS, Build
 
 FCY = 14_745_600
-ENGINE = "interp"
+ENGINE = "auto"
 
 
 def load(path: Path, ipl_slip: int = 0) -> Machine:

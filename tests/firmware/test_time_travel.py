@@ -36,7 +36,7 @@ def walked(
     return history, states, follows
 
 
-@pytest.mark.parametrize("engine", ["jit", "interp"])
+@pytest.mark.parametrize("engine", ["jit", "plain"])
 def test_every_state_is_had_again_to_the_bit(image: Build, engine: str) -> None:
     """Across preemption, interrupts, a camera's frames over I2C and its pixel port, and bytes from outside."""
     machine = emu.load(image("clustering"), engine=engine, board=partial(Epuck, selector=START))
@@ -107,7 +107,7 @@ def test_back_to_a_breakpoint_and_to_the_last_write(image: Build) -> None:
     assert machine.peek("clock_phase").to_bytes(2, "little") == found.old
     machine.step()
     assert machine.peek("clock_phase").to_bytes(2, "little") == found.new != found.old
-    assert machine.inside.name_of(found.pc) == "cpu_clock_isr"
+    assert machine.inspector.function_name(found.pc) == "cpu_clock_isr"
     assert history.run_back([0x17000]) is None
     assert machine.cycle == history.start
     remove()
@@ -133,7 +133,7 @@ def test_the_first_instruction_of_a_handler_is_a_place_to_stand(image: Build) ->
     assert history.step_back()
     assert (machine.cycle, machine.snapshot()) == entered
     assert history.step_back()
-    assert machine.inside.start_of(machine.pc) != handler
+    assert machine.inspector.function_start(machine.pc) != handler
     assert history.step() is None
     assert (machine.cycle, machine.snapshot()) == entered
 

@@ -114,7 +114,7 @@ class OnTheChip:
             return "", f"{stage}: {built.first_error}"
         content = image.read_bytes()
         if content not in self._ran:
-            ran = run(image, CYCLES, engine="interp", native_after=SHORT)
+            ran = run(image, CYCLES, engine="auto", native_after=SHORT)
             self._ran[content] = ("", ran.why) if ran.status is None else (ran.uart.decode("latin-1").strip(), "")
         return self._ran[content]
 

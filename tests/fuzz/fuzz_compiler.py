@@ -79,7 +79,7 @@ class OnTheChip:
 
 def seen_of(image: Path) -> Seen | str:
     """What a run of the image shows, or why it did not end."""
-    machine = emu.load(image, engine="interp")
+    machine = emu.load(image, engine="auto")
     trace: list[str] = []
     for k, name in enumerate(PORTS):
         machine.hook_sfr(name, partial(_note, trace, k))

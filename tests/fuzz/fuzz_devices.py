@@ -22,7 +22,7 @@ from tests.fuzz.seeds import Course, parser  # noqa: E402
 
 def main() -> int:
     course = Course(parser(__doc__), "programs", 150, "random programs")
-    course.parser.add_argument("--engine", choices=("interp", "jit"), help="compared with the plain one (default both)")
+    course.parser.add_argument("--engine", choices=("jit",), help="compared with the plain one")
     course.parser.add_argument("--chip", choices=CHIPS, help="(default: by seed)")
     course.parser.add_argument("--show", action="store_true", help="print the first program and end")
     options = course.parse()
@@ -35,7 +35,7 @@ def main() -> int:
         print(program(course.first, chip(course.first))[0])
         return 0
     touched: Counter[tuple[str, str]] = Counter()
-    engines = [options.engine] if options.engine else ["interp", "jit"]
+    engines = [options.engine] if options.engine else ["jit"]
     for seed in course:
         found = difference(seed, *engines, chip=chip(seed), tally=touched)
         if found is not None:

@@ -27,7 +27,7 @@ PROGRAMS = 20
 
 def main() -> int:
     course = Course(parser(__doc__), "batches", 220, f"batches of {len(ROWS) * CONTEXTS} pairs, {PROGRAMS} programs")
-    course.parser.add_argument("--engine", default="interp", help="compared with the plain one (default %(default)s)")
+    course.parser.add_argument("--engine", default="jit", help="compared with the plain one (default %(default)s)")
     course.parser.add_argument("--chip", choices=CHIPS, default="dsPIC30F6014A", help="(default %(default)s)")
     options = course.parse()
     chip = CHIPS[options.chip]

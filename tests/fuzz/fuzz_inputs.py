@@ -209,7 +209,7 @@ class Bench:
         self.run = folder / "run"
         picture = io.BytesIO()
         Image.new("RGB", (8, 6), (200, 30, 40)).save(picture, "PNG")
-        run = ("emu", "run", str(self.image), "--cycles", "3000", "--engine", "interp", "--uart1", "null")
+        run = ("emu", "run", str(self.image), "--cycles", "3000", "--engine", "plain", "--uart1", "null")
         short = ("--brain", "scripted", "--trials", "1", "--jobs", "1", "--out")
         small = ("--robots", "2", "--objects", "2", "--minutes", "0.005", *short)
         self._must("arena", "run", "clustering", *small, str(self.run))

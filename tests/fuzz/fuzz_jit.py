@@ -3,7 +3,7 @@
 Three campaigns, until their targets are met: `straight` (thousands of distinct instructions per program, in step with
 the plain interpreter, each program also in exact code alone), `wild` (jumps, traps and mode changes at odd places;
 odd seeds on a made-up chip) and
-`long` (loops for millions of instructions, block code beside exact code, a share of it also beside the specialised
+`long` (loops for millions of instructions, block code beside exact code, a share of it also beside the plain
 interpreter). Odd seeds run with ipl_slip 1. With --seconds the targets are out of reach: it ends in time.
 
     python tests/fuzz/fuzz_jit.py                                           # a few minutes

@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 
 from arena.campaign.campaign import Plan, run_one, trial_path  # noqa: E402
 from arena.commands.run import image_for  # noqa: E402
-from arena.debug.session import Remote, Session  # noqa: E402
+from arena.debug.session import DebugSession, RemoteServer  # noqa: E402
 from arena.scene.loader import load_scene  # noqa: E402
 from emu.prompt.client import Client  # noqa: E402
 from tests.fuzz.seeds import Course, parser  # noqa: E402
@@ -63,8 +63,8 @@ def plan_of(swarm: Swarm, seed: int, image_of: Callable[[str], Path]) -> Plan:
 class Walk:
     """One robot in the hands of a client."""
 
-    def __init__(self, session: Session, swarm: Swarm, rng: random.Random, tally: Counter[str]) -> None:
-        self._client = Client(partial(Remote, session), lambda _text: None)
+    def __init__(self, session: DebugSession, swarm: Swarm, rng: random.Random, tally: Counter[str]) -> None:
+        self._client = Client(partial(RemoteServer, session), lambda _text: None)
         self._swarm, self._rng, self._tally = swarm, rng, tally
         self.seen: dict[int, str] = {}
         """What there was to see in the world, by cycle of the robot."""
@@ -151,7 +151,7 @@ def walk(
         alone.mkdir()
         debugged.mkdir()
         run_one(plan, 1, alone)
-        session = Session(plan, robot, debugged, is_recorded=True, every_s=EVERY_S)
+        session = DebugSession(plan, robot, debugged, is_recorded=True, every_s=EVERY_S)
         try:
             made = Walk(session, swarm, rng, tally)
             for _ in range(steps):

@@ -21,9 +21,9 @@ from typing import Any, Final
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from arena.infrared.channel import Ether  # noqa: E402
+from arena.infrared.channel import OpticalChannel  # noqa: E402
 from arena.lockstep.scheduler import LockStep  # noqa: E402
-from arena.robots.firmware_controller import EmulatedBrain  # noqa: E402
+from arena.robots.firmware_controller import FirmwareController  # noqa: E402
 from arena.scene.loader import Scene, load_scene  # noqa: E402
 from arena.world.physics import World  # noqa: E402
 from emu.dspic30f.jit.engine import JitEngine  # noqa: E402
@@ -67,7 +67,7 @@ def scene_of(draw: random.Random) -> Scene:
     return load_scene("clustering").with_values(**values)
 
 
-class Robot(EmulatedBrain):
+class Robot(FirmwareController):
     """One that counts the lines Python paints for it."""
 
     painted = 0
@@ -105,23 +105,23 @@ class Trial:
 
     def run(self, way: str, tally: Counter[str]) -> list[list[Any]]:
         """What is seen at each of its moments."""
-        scene, ether, world = self.scene, Ether.of(self.scene), World(self.scene, self.seed)
+        scene, channel, world = self.scene, OpticalChannel.of(self.scene), World(self.scene, self.seed)
         several = enumerate(zip(self._images, self._selectors, strict=True))
-        robots = [Robot(scene, self.seed, number, image, selector, ether) for number, (image, selector) in several]
+        robots = [Robot(scene, self.seed, number, image, selector, channel) for number, (image, selector) in several]
         for robot in robots:
             assert isinstance(robot.machine.runner, JitEngine)
             robot.machine.runner.wait = self._waits
         lockstep = None
         if way != STEPWISE:
             threads = int(way.split()[0]) if "thread" in way else 1
-            lockstep = LockStep(world, robots, ether, is_native=way != "Python", threads=threads)
+            lockstep = LockStep(world, robots, channel, is_native=way != "Python", threads=threads)
         wheels: list[tuple[float, float]] = []
         seen = []
         for until, what, who, where in self._moments:
             if lockstep is not None:
                 wheels = lockstep.advance(until)
             while world.ticks < until:
-                wheels = [robot.think(world.ticks, world.poses) for robot in robots]
+                wheels = [robot.control_step(world.ticks, world.poses) for robot in robots]
                 world.step(wheels)
             tally["wheels turning"] += sum(map(any, wheels))
             seen.append([until, wheels, *map(partial(look, until, tally), robots), world.poses.values.tolist()])
@@ -143,13 +143,13 @@ class Trial:
         return seen
 
 
-def look(until: int, tally: Counter[str], robot: EmulatedBrain) -> list[Any]:
+def look(until: int, tally: Counter[str], robot: FirmwareController) -> list[Any]:
     """A robot between two quanta; every other time it is not asked, which nobody may notice."""
     machine = robot.machine
     tally["robots asleep"] += machine.is_asleep
     seen = [machine.cycle, machine.pc, hashlib.sha256(machine.record.bytes[:0x2800]).hexdigest()]
     if until % 2:
-        reading, lines, lights = robot.reading(), robot.lines(), robot.lights()
+        reading, lines, lights = robot.reading(), robot.take_lines(), robot.take_led_changes()
         tally["lines heard"] += len(lines)
         tally["changes of LEDs"] += len(lights)
         tally["robots that measure light"] += reading.infrared is not None

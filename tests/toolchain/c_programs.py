@@ -98,6 +98,6 @@ def run_both(folder: Path, level: str, c_text: str, s_text: str) -> int:
     (folder / "b.s").write_text("        .section .text,code\n" + s_text)
     built = build([folder / "a.c", folder / "b.s"], folder / "a.elf", level, "-std=gnu11", "-Wall")
     assert built.status == 0, built.messages
-    ran = run(folder / "a.elf", engine="interp")
+    ran = run(folder / "a.elf", engine="auto")
     assert ran.status is not None, ran
     return ran.status

@@ -61,7 +61,7 @@ class Interpreter:
 
     def begin(self, pc: int, last: int, loads: int, window_extra: int) -> None:
         """Prepare for the instruction at `pc` whose accesses fall in cycle `last`, or `window_extra` cycles later if
-        it reads the PSV window. Of two loads the first is made one cycle earlier (design §4.2)."""
+        it reads the PSV window. Of two loads the first is made one cycle earlier (engines.md §4.2)."""
         self.context = self._modes.context
         self.pc = pc
         self.last = last

@@ -3,7 +3,7 @@
 Time. An instruction that starts in cycle s occupies s..e: a RAW stall first (isa.md §13.2), then its base cycles
 (§13.1), then PSV cycles (§13.3); a taken branch or a skip adds cycles behind its data access. Data accesses fall in e
 (of two, the first in e - 1); devices are brought up to the cycle of an access before it is made, and a write in cycle t
-affects them from t + 1 (design §4.2; UNVERIFIED on silicon).
+affects them from t + 1 (engines.md §4.2; UNVERIFIED on silicon).
 
 Boundaries. Between two instructions, after last cycle e, the engine looks if something is due by e or somebody kicked
 (`Events.deadline` <= e): events fire, then an acceptable exception is entered, handler first in max(c + 4, e + 3)
@@ -223,7 +223,7 @@ class Sequencer:
                 self.events.kick()
             case ClearWatchdog():
                 self.events.arrive(last)
-                self.power.wires.clear_watchdog()
+                self.power.signals.clear_watchdog()
             case Sleep(mode):
                 self.power.stop(IDLE if mode == "idle" else SLEEP, last)
             case Reset():
@@ -243,15 +243,9 @@ class Sequencer:
     def _return(self, flow: Return, second: int) -> int:
         """RETURN, RETLW, RETFIE, whose second cycle is `second`: ends there if an exception can be entered."""
         if flow.kind == "retfie":
-            return self.finish_retfie(flow.target, flow.srl, flow.ipl3, second)
+            self._resume(flow.srl, flow.ipl3)
+            self.events.kick()
         self.state.pc = flow.target
-        return second if self._exception_at(second) else second + 1
-
-    def finish_retfie(self, target: int, srl: int, ipl3: int, second: int) -> int:
-        """Continue at `target` with the popped SR<7:0> and IPL3; returns the last cycle."""
-        self.state.pc = target
-        self._resume(srl, ipl3)
-        self.events.kick()
         return second if self._exception_at(second) else second + 1
 
     def after_retfie(self) -> None:

@@ -29,7 +29,7 @@ class Facts:
     """Data addresses read that are written in the instruction itself."""
     stores: int
     access: int
-    """Cycle of the only or last data access, counted from the instruction's first one (design §4.2)."""
+    """Cycle of the only or last data access, counted from the instruction's first one (engines.md §4.2)."""
     window_cycles: int
     """What a read of the PSV window adds outside of REPEAT (isa.md §13.3)."""
     flow: type | None

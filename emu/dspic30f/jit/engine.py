@@ -1,7 +1,7 @@
 """The native engine: translated regions, found by PC and processor modes, run between two boundaries.
 
 Python only sees what native code hands back: instructions with side effects, events, and addresses that have no code
-yet. Code arrives from the disk cache at once or from the compile process later; until then `cold` runs.
+yet. Code arrives from the disk cache at once or from the compile process later; until then the interpreter runs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from time import perf_counter
-from typing import Any, Final, Protocol
+from typing import Any, Final
 from weakref import WeakValueDictionary
 
 from emu.dspic30f.core import Core
@@ -21,6 +21,7 @@ from emu.dspic30f.isa.builder import Context
 from emu.dspic30f.isa.codec import decode_for_execution
 from emu.dspic30f.isa.facts import facts_of
 from emu.dspic30f.isa.row import Insn
+from emu.dspic30f.jit.cold_runner import ColdRunner
 from emu.dspic30f.jit.compiler import Loaded, shared_compiler
 from emu.dspic30f.jit.exit_reasons import (
     DEADLINE,
@@ -77,16 +78,6 @@ NATIVE_SFRS: Final = {"corcon": "CORCON", "ie0": "IEC0", "ie1": "IEC1", "ie2": "
 Call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 
 
-class Cold(Protocol):
-    """What runs where no native code exists."""
-
-    def run(self, limit: int) -> None:
-        """As `Engine.run`."""
-
-    def forget(self) -> None:
-        """As `Engine.forget`."""
-
-
 @dataclass(eq=False)
 class Code:
     """Native code for one set of processor modes: tables of addresses by program word, and what they came from.
@@ -127,14 +118,13 @@ class Counts:
 
 
 class JitEngine:
-    """`Engine` on native code, with the interpreter `cold` for what has none yet."""
+    """`Engine` on native code, with the interpreter for what has none yet."""
 
     name = "jit"
 
-    def __init__(self, core: Core, pc_hooks: Mapping[int, Any], cold: Cold) -> None:
+    def __init__(self, core: Core, pc_hooks: Mapping[int, Any]) -> None:
         self._core: Final = core
         self._hooks: Final = pc_hooks
-        self._cold: Final = cold
         self.threshold = 4
         """Times an address without code is reached before code is made for it."""
         self.wait = False
@@ -162,7 +152,7 @@ class JitEngine:
         self._lent: Callable[..., Any] | None = None
         self._lent_as: Native | None = None
         self._interpret: Callable[[], None] = core.sequencer.execute
-        self._run_cold: Callable[[int], None] = cold.run
+        self._run_cold: Callable[[int], None] = ColdRunner(core, pc_hooks).run
         self._u64: Final = core.record.u64
         self._now: Final = core.state.at["cpu.cycle"]
         self._edt: Final = core.state.at["cpu.edt"]
@@ -230,7 +220,7 @@ class JitEngine:
         env[BOUNDARY] = 1
         why = native(record, surroundings)
         limit = max(limit, env[LIMIT]) if env[LAST] else limit
-        interrupted = self._core.sequencer.power.wires.interrupted
+        interrupted = self._core.sequencer.power.signals.interrupted
         while before != (cycle := u64[now]) < limit:
             before = cycle
             if why == SERVICE:  # most often some device's event is due
@@ -377,7 +367,6 @@ class JitEngine:
         self._codes.clear()
         self._forget_computed()
         self._key = None
-        self._cold.forget()
 
     def translated(self) -> Iterable[Code]:
         """What was requested so far, for each set of processor modes."""

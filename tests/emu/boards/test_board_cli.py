@@ -92,7 +92,7 @@ def test_screenshot_without_buffer_shows_what_the_sensor_sees(program, scene, tm
     ],
 )
 def test_bad_input_is_refused_in_one_line(program, tmp_path, capfd, arguments, message):
-    """Design §10: status 2, what is wrong, no traceback."""
+    """engines.md §10: status 2, what is wrong, no traceback."""
     script = tmp_path / "events.txt"
     script.write_text("# nothing yet\n1s dance\n")
     names = {"IMAGE": str(program("startup.c")), "SCRIPT": str(script)}

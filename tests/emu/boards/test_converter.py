@@ -44,7 +44,7 @@ def random_settings(generator: random.Random) -> dict[str, int]:
 
 @pytest.mark.parametrize("seed", range(16))
 def test_engines_agree_in_any_setting(program, seed):
-    """Design §4.3: odd half Tcy, channel lists that do not divide the round, emitters that settle, levels that change
+    """engines.md §4.3: odd half Tcy, channel lists that do not divide the round, emitters that settle, levels that change
     between runs, ADCON1 read while it works, Idle."""
     generator = random.Random(seed)
     image, settings = load_image(program("convert.c")), random_settings(generator)

@@ -23,7 +23,7 @@ class Bench(BoardPart):
 
     def __init__(self, chip: Peripherals) -> None:
         super().__init__("bench", chip)
-        chip.fit(crystal=4_000_000, config={"FWDT": WATCHDOG_ON})
+        chip.configure(crystal=4_000_000, config={"FWDT": WATCHDOG_ON})
         self.lit = self.cell("lit")
         chip.pins.watch("RD0", self._edge, lazy=True)
 

@@ -111,7 +111,7 @@ def test_slow_camera_driver_captures_a_grey_picture(start):
 
 @pytest.mark.parametrize("source", ["agenda.c", "sound.c", "sercom.c", "slowcam.c"])
 def test_engines_agree_to_the_bit(program, source):
-    """Design §4.3."""
+    """engines.md §4.3."""
     states = []
     for engine in ("plain", "auto"):
         image = load_image(program(source))

@@ -115,7 +115,7 @@ def test_everyone_who_listens_hears(load, board):
         assert bytes(byte for name, byte in said if name == who) == b"hi!\n"
 
 
-@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_register_hooks_are_many_and_can_be_removed(load, engine):
     machine = load(SPIN.replace("0x800", "{LATB}"), engine=engine, board=None)
     first, second = [], []

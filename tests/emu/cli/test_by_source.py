@@ -324,7 +324,7 @@ def test_expect_goes_on_behind_the_last_match_and_stops_at_the_byte(build):
     assert "".join(letter for letter, _ in ends) == "rea"
     assert machine.cycle >= ends[-1][1] + 10 * 16  # ten bits of 16 Tcy: U1BRG is 0
     assert machine.cycle < ends[-1][1] + 10 * 16 + 20
-    with pytest.raises(ExpectError, match=r"UART1 did not say b'ready' within 5 ms, but 'dy -31057"):
+    with pytest.raises(ExpectError, match=r"UART1 did not send b'ready' within 5 ms; it sent 'dy -31057"):
         machine.uart[1].expect("ready", within=5)
     machine.uart[1].expect("done", within=5)
     with pytest.raises(ExpectError, match="the run ended: halt"):

@@ -179,7 +179,7 @@ int main(void) { PR1 = 1000; IEC0bits.T1IE = 1; T1CON = 0x8000; wait(0); }
     assert any(branch.kind == "exception" for branch in found.branches)
 
 
-@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 def test_engines_and_pieces_tell_the_same(build, engine):
     """However the run is cut and whatever runs it, and the machine stands afterwards as if nobody had looked."""
     path = build(DIVISION)

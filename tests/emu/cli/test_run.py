@@ -64,7 +64,7 @@ def test_exit_code_hands_over_the_status_start_up_code_left(build):
 
 
 def test_a_debugger_word_ends_the_run_with_w0_as_status(build):
-    """Design §10: an XC16 image returns from main into DA4000."""
+    """engines.md §10: an XC16 image returns from main into DA4000."""
     path = build("main:\nmov #7, w0\n.pword 0xDA4000\nreset\n")
     assert emu("run", path).returncode == 0
     done = emu("run", path, "--exit-code")
@@ -92,7 +92,7 @@ def test_a_debugger_word_ends_the_run_with_w0_as_status(build):
     ],
 )
 def test_faults_end_with_status_1_and_name_cause_and_place(build, capfd, source, cause):
-    """Design §10; isa.md §14.4, §14.6."""
+    """engines.md §10; isa.md §14.4, §14.6."""
     path = build(source)
     assert main(["run", path, "--cycles", "100000"]) == 1
     captured = capfd.readouterr().err
@@ -197,7 +197,7 @@ def test_standard_input_reaches_uart1_and_its_end_ends_a_sleeping_firmware(build
 
 
 def test_an_open_input_keeps_a_sleeping_firmware_alive_until_it_is_closed(build):
-    """Design §10: sleeping with an input still open is not the end; end of file makes it one."""
+    """engines.md §10: sleeping with an input still open is not the end; end of file makes it one."""
     process = subprocess.Popen(
         [sys.executable, "-m", "emu", "run", build(ECHO, {"U1RXInterrupt": "receive"})],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT,

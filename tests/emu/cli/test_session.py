@@ -107,7 +107,7 @@ def test_the_documented_example_runs(monkeypatch):
 
 
 def test_names_load_lazily():
-    """Design §2: tools that need only the table or the chip's data pay for nothing else."""
+    """engines.md §2: tools that need only the table or the chip's data pay for nothing else."""
     code = (
         "import sys, emu.chips.dspic30f6014a, emu.image.elf_facts\n"
         "print({'emu.machine.machine', 'numpy'} & set(sys.modules))"

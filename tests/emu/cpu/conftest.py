@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-ENGINES = ("plain", "interp", "jit")
+ENGINES = ("plain", "jit")
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:

@@ -181,7 +181,7 @@ def test_the_alternate_table(engine: str) -> None:
 
 
 def test_a_flag_set_by_software_is_seen_one_cycle_later(engine: str) -> None:
-    """isa.md §14.3, design §4.2: BSET IFS0 in cycle 0, flag first 1 in c = 1; NOP runs in 1; handler in 5."""
+    """isa.md §14.3, engines.md §4.2: BSET IFS0 in cycle 0, flag first 1 in c = 1; NOP runs in 1; handler in 5."""
     rig = Rig(f"bset 0x84, #3\nnop\nend: nop\n{ISR}", engine)
     rig.vector(T1_VECTOR, "isr")
     rig.enable(3, 4)
@@ -263,7 +263,7 @@ def test_multi_cycle_instructions_count_all_their_cycles_against_disi(engine: st
 
 @pytest.mark.parametrize("flag", range(0, 8))
 def test_a_read_in_the_same_cycle_sees_the_flag(engine: str, flag: int) -> None:
-    """design §4.2: events due at t are applied before accesses of t. IFS0 is loaded in cycles 0, 2, 4, 6."""
+    """engines.md §4.2: events due at t are applied before accesses of t. IFS0 is loaded in cycles 0, 2, 4, 6."""
     rig = Rig("\n".join(["mov 0x84, w0\nmov w0, [w14++]"] * 4) + "\nend: nop", engine, w14=RAM)
     rig.interrupt_at(flag)
     rig.machine.poke("IEC0", 0)
@@ -273,7 +273,7 @@ def test_a_read_in_the_same_cycle_sees_the_flag(engine: str, flag: int) -> None:
 
 
 def test_of_two_accesses_the_first_comes_one_cycle_earlier(engine: str) -> None:
-    """design §4.2: MOV.D reads its low word in e - 1. IFS0 and IFS1 by MOV.D in 0..1; both flags rise in 1."""
+    """engines.md §4.2: MOV.D reads its low word in e - 1. IFS0 and IFS1 by MOV.D in 0..1; both flags rise in 1."""
     rig = Rig("mov.d [w1], w2\nend: nop", engine, w1=0x84)
     rig.interrupt_at(1, irq=3)
     rig.interrupt_at(1, irq=16)
@@ -312,14 +312,14 @@ def test_a_request_that_waits_makes_pwrsav_a_nop(engine: str) -> None:
 
 
 def test_sleeping_with_nothing_to_wake_it_halts(engine: str) -> None:
-    """design §10: the run ends."""
+    """engines.md §10: the run ends."""
     rig = Rig("pwrsav #0\nend: nop", engine)
     stop = rig.run(1000)
     assert (stop.reason, stop.pc) == ("halt", rig.labels["end"])
 
 
 def test_idling_beside_a_timer_that_interrupts_nobody_halts(engine: str) -> None:
-    """design §10: nothing is enabled that could wake the CPU, though T1 matches for ever."""
+    """engines.md §10: nothing is enabled that could wake the CPU, though T1 matches for ever."""
     rig = Rig("mov w0, 0x102\nmov w1, 0x104\npwrsav #1\nend: nop", engine, w0=99, w1=0x8000)
     stop = rig.run(20_000_000)
     assert (stop.reason, stop.pc) == ("halt", rig.labels["end"])

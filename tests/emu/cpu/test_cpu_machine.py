@@ -156,7 +156,7 @@ def test_programs_may_rewrite_themselves(engine: str) -> None:
 def test_a_snapshot_of_one_engine_continues_in_another() -> None:
     """engine contract: snapshot and restore are copies, whatever the engine."""
     text = "loop: inc w0, w0\nadd w0, [w1], [w1]\nrepeat #5\nrlc w2, w2\nbra loop"
-    first, second = Rig(text, "plain"), Rig(text, "interp")
+    first, second = Rig(text, "plain"), Rig(text, "jit")
     first.machine.run(101)
     second.machine.restore(first.machine.snapshot())
     first.machine.run(500)

@@ -59,7 +59,7 @@ def test_a_faulting_instruction_writes_nothing_but_completes(engine: str) -> Non
 
 
 def test_a_double_store_that_leaves_memory_writes_neither_word(engine: str) -> None:
-    """isa.md §14.4, design §4.1: all addresses are probed before the first access."""
+    """isa.md §14.4, engines.md §4.1: all addresses are probed before the first access."""
     rig = trapped(engine, "mov.d w2, [w1]", ADDRESS, w1=0x27FE, w2=1)
     rig.cycles_to("trap")
     assert rig.machine.peek(0x27FE) == 0
@@ -249,7 +249,7 @@ def test_the_check_of_pointers_can_be_turned_off(engine: str) -> None:
 
 @pytest.mark.parametrize("word", [0xDA4000, 0xDAC000])
 def test_debugger_words_stop_the_run_and_fall_through(engine: str, word: int) -> None:
-    """isa.md §4.1, design §10."""
+    """isa.md §4.1, engines.md §10."""
     rig = Rig(f"mov #7, w0\nbrk: .word {word}\nend: nop", engine)
     stop = rig.run()
     assert (stop.reason, stop.pc) == ("breakpoint", rig.labels["brk"])

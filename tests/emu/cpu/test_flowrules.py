@@ -131,7 +131,7 @@ def test_an_interrupt_that_the_last_instruction_of_a_loop_enables_comes_behind_i
 
 
 def test_an_event_that_the_last_instruction_of_a_loop_brings_nearer_is_in_time(engine: str) -> None:
-    """Design §4.2: the timer's period is 30 from the first write on, and its interrupt comes when it always does."""
+    """engines.md §4.2: the timer's period is 30 from the first write on, and its interrupt comes when it always does."""
     text = """mov #0x8000, w3
         mov w3, 0x104
         again: mov #1000, w1

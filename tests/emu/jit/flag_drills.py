@@ -26,10 +26,9 @@ from emu.dspic30f.isa.fields import Operands
 from emu.dspic30f.isa.row import Insn, Row
 from emu.dspic30f.isa.table import ROWS
 from emu.dspic30f.jit.engine import JitEngine
-from emu.dspic30f.specialised.engine import SpecialisedEngine
 from emu.machine.machine import Machine
 
-ENGINES: Final = ("plain", "interp", "jit")
+ENGINES: Final = ("plain", "jit")
 FLAGS: Final = ("C", "Z", "OV", "N", "DC")
 DRILLS: Final = 24
 """Of one image."""
@@ -271,8 +270,6 @@ def check(seed: int, tally: Tally, rounds: int = 16) -> str | None:
         machine.reset("POR")
         for address in hooked:
             machine.hook_pc(address, lambda m=machine, s=seen: s.append((m.pc, m.cycle)))  # type: ignore[misc]
-        if isinstance(machine.runner, SpecialisedEngine):
-            machine.runner.warm = 1
         if isinstance(machine.runner, JitEngine):
             machine.runner.threshold, machine.runner.wait = 1, True
             machine.runner.compiler = QuickCompiler(2 if seed % 4 == 1 else 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 import sys
 from pathlib import Path
 
@@ -10,20 +9,17 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from long_runs import CountedInterpreter, check_long
-from random_firmware import load
+from long_runs import check_long
 from straight_body import Shape
 from straight_firmware import straight_firmware
-from twins import Difference, Tally, Watch, advance, check_straight, check_wild, twins
-
-from emu.machine.machine import Machine
+from twins import Difference, RobotObserver, Tally, advance, check_straight, check_wild, twins
 
 SHORT = Shape(instructions=250)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_straight_programs_run_equally_in_blocks_and_in_exact_code(seed: int) -> None:
-    """Design §4.3; most distinct instructions are native, in both kinds of code."""
+    """engines.md §4.3; most distinct instructions are native, in both kinds of code."""
     tally = check_straight(seed, SHORT)
     assert len(tally.seen) > 150
     assert len(tally.native) > 0.8 * len(tally.seen)
@@ -32,7 +28,7 @@ def test_straight_programs_run_equally_in_blocks_and_in_exact_code(seed: int) ->
 
 @pytest.mark.parametrize("seed", range(4))
 def test_wild_programs_run_equally(seed: int) -> None:
-    """Design §4.3, with jumps, traps and mode changes at odd places."""
+    """engines.md §4.3, with jumps, traps and mode changes at odd places."""
     assert check_wild(seed, stops=8).stops == 8
 
 
@@ -53,31 +49,10 @@ def test_interrupts_hit_repeats_loops_and_stalls() -> None:
     assert min(tally.places[place] for place in ("inside REPEAT", "inside DO", "on a return")) > 0
 
 
-def test_the_interpreter_counts_the_instructions_the_plain_one_executes() -> None:
-    """The count is exact, whatever the blocks."""
-    firmware = straight_firmware(5, Shape(instructions=200, periods=(300, 900), loops=(3, 30), calm=True))
-    plain, counted = Machine(engine="plain"), Machine(engine="interp")
-    runner = counted.runner = CountedInterpreter(counted)  # type: ignore[misc]
-    executed, execute = [0], plain.core.sequencer.execute
-
-    def counting() -> None:
-        executed[0] += 1
-        execute()
-
-    plain.core.sequencer.execute = counting  # type: ignore[method-assign]
-    generator = random.Random(1)
-    for machine in (plain, counted):
-        machine.stop_on_fault = False
-        load(machine, firmware)
-    for _ in range(12):
-        advance(plain, counted, generator.randrange(1, 8000), Tally())
-        assert executed == runner.executed
-
-
 def test_a_difference_is_found_and_what_python_ran_does_not_count_as_native() -> None:
     """The checks can fail."""
     plain, native = twins(straight_firmware(1, SHORT), 0, 0)
-    watch = Watch(plain, native)
+    watch = RobotObserver(plain, native)
     advance(plain, native, 500, Tally())
     assert watch.native_now() < set(watch.ran)
     assert all(watch.python[key] <= watch.ran[key] for key in watch.ran)

@@ -22,7 +22,7 @@ from emu.dspic30f.isa.row import Insn
 
 @pytest.mark.parametrize("seed", range(3))
 def test_drills_end_equally_in_every_cycle(seed: int) -> None:
-    """Design §4.3; most instructions are native."""
+    """engines.md §4.3; most instructions are native."""
     tally = Tally()
     assert check(seed, tally) is None
     turns = {all_pairs()[(2 * 24 * seed + turn) % len(all_pairs())] for turn in range(48)}

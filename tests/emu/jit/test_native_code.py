@@ -43,7 +43,7 @@ def pair(firmware: Firmware, ipl_slip: int = 0) -> Iterator[Machine]:
 
 @pytest.mark.parametrize("seed", range(24))
 def test_random_firmware_gives_equal_records_at_random_stops(seed: int) -> None:
-    """Design §4.3: same seed, same bytes, same cycle in both engines."""
+    """engines.md §4.3: same seed, same bytes, same cycle in both engines."""
     plain, native = pair(random_firmware(seed), ipl_slip=seed % 2)
     generator = random.Random(seed)
     for _ in range(10):
@@ -85,7 +85,7 @@ def counting_firmware() -> Firmware:
 
 
 def test_interrupts_are_entered_and_left_without_python() -> None:
-    """Design §4.3: exception entry, RETFIE and acceptance are native."""
+    """engines.md §4.3: exception entry, RETFIE and acceptance are native."""
     plain, native = pair(counting_firmware())
     for machine in (plain, native):
         machine.run(50_000)

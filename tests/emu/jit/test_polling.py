@@ -81,7 +81,7 @@ def loops_of(words: list[int]) -> int:
 
 @pytest.mark.parametrize("words", EMPTY.values(), ids=EMPTY)
 def test_a_loop_that_only_waits_is_empty(words: list[int]) -> None:
-    """Design §4.3: no store, no read that time changes, nothing computed from an iteration's own results."""
+    """engines.md §4.3: no store, no read that time changes, nothing computed from an iteration's own results."""
     assert loops_of(words) == 1
 
 

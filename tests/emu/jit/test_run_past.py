@@ -27,7 +27,7 @@ def machine(engine: str, seed: int) -> Machine:
     return made
 
 
-@pytest.mark.parametrize("engine", ["plain", "interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("seed", range(3))
 def test_cuts_are_where_runs_would_have_ended(engine: str, seed: int) -> None:
     """Random firmware with interrupts, sleep and faults: cut by cut, and in one go."""
@@ -73,7 +73,7 @@ trap: retfie
 """Python sets the flag of OC1, while timer 1 is native code's: some COMPAREs set it while that is being entered."""
 
 
-@pytest.mark.parametrize("engine", ["interp", "jit"])
+@pytest.mark.parametrize("engine", ["plain", "jit"])
 @pytest.mark.parametrize("compare", range(30, 38))
 def test_a_limit_among_exceptions_counts_behind_the_last(engine: str, compare: int) -> None:
     """Entering an exception is itself followed by a boundary: together they are one, wherever the limit falls."""

@@ -18,7 +18,7 @@ REAL, MADE_UP = CHIPS
 
 @pytest.mark.parametrize(("seed", "chip"), [(1, REAL), (2, REAL), (3, MADE_UP)])
 def test_engines_agree_on_drills(seed: int, chip: str) -> None:
-    """Design §4: same state in the same cycle; registers in every way, events in the very cycle of an access."""
+    """engines.md §4: same state in the same cycle; registers in every way, events in the very cycle of an access."""
     tally = Tally()
     assert check(seed, CHIPS[chip], tally, drills=14, rounds=8) is None
     assert tally.programs > 0.9 * 14 * 8

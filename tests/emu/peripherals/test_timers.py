@@ -15,7 +15,7 @@ TON, TSIDL, TGATE, TCS, T32 = 0x8000, 0x2000, 0x40, 0x02, 0x08
 
 @pytest.mark.parametrize(("tckps", "prescale"), [(0, 1), (1, 8), (2, 64), (3, 256)])
 def test_first_count_comes_one_full_prescaled_clock_after_ton(rig, tckps, prescale):
-    """§7 rule 7; a write in cycle t acts from t + 1 (design §4.2)."""
+    """§7 rule 7; a write in cycle t acts from t + 1 (engines.md §4.2)."""
     rig.at(10).write("T1CON", TON | tckps << 4)
     assert rig.at(11 + prescale - 1).read("TMR1") == 0
     assert rig.at(11 + prescale).read("TMR1") == 1

@@ -53,7 +53,7 @@ class LlvmBuilder:
         """Truth of "no event is due up to the access, which waits for so many cycles", for pointers that turn out to
         lead to a register. None: such an access is the interpreter's."""
         self.loads_ahead = 0
-        """Loads that follow the next one of the instruction: each is made a cycle later (design §4.2)."""
+        """Loads that follow the next one of the instruction: each is made a cycle later (engines.md §4.2)."""
         self.several_stores = False
         """Of one instruction: a register's is then the interpreter's, who alone can do all or none."""
         self._slow: str | None = None
@@ -192,7 +192,7 @@ class LlvmBuilder:
         return self._load_pointed(ea, size, in_ram, window, self.now - ahead)
 
     def _in_ram(self, ea: Value, size: int, ptr: int | None) -> Value:
-        """Aligned, in RAM and, for the stack pointer, not above SPLIM: one comparison plus one (design §4.3)."""
+        """Aligned, in RAM and, for the stack pointer, not above SPLIM: one comparison plus one (engines.md §4.3)."""
         first, end = self.around.ram
         half = self.e.let(f"trunc i64 {wide(ea - first)} to i16").text
         if size == 2:

@@ -17,7 +17,7 @@ from emu.dspic30f.isa.row import Insn
 from emu.dspic30f.state.state import PC_MASK
 
 LIMIT: Final = 150
-"""Instructions in a region: compile time per instruction grows behind that (design §4.3, measured)."""
+"""Instructions in a region: compile time per instruction grows behind that (engines.md §4.3, measured)."""
 
 Fetch = Callable[[int], Insn | None]
 """Decoded instruction at a program address; None where nothing legal stands."""

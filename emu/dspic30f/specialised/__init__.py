@@ -1,1 +1,0 @@
-"""The specialised interpreter: Python source generated per stretch of program."""
