@@ -1,4 +1,4 @@
-"""Engines: implementations of the instruction loop between two boundaries. All give the same state in the same cycle."""
+"""Engines: implementations of the instruction loop between two boundaries, with equal states and equal cycles."""
 
 from __future__ import annotations
 

@@ -190,7 +190,7 @@ def compile_test(path: Path, source: str, image: Path, level: str, *more: str) -
 
 def run_test(image: Path, cycles: int) -> Ran:
     """Short runs in the interpreter, long ones as native code."""
-    result = run(image, SHORT, engine="interp")
+    result = run(image, SHORT, engine="auto")
     return run(image, cycles) if result.why.startswith("limit") and cycles > SHORT else result
 
 

@@ -112,7 +112,7 @@ class Bench:
     """A machine with the functions of one batch."""
 
     def __init__(self, image: Path, seed: int) -> None:
-        self.machine = emu.load(image, engine="interp")
+        self.machine = emu.load(image, engine="auto")
         self.machine.run(100_000, until="_main")
         self.rng = random.Random(seed)
         self.top = self.machine.w[15] + STACK_BYTES + 64

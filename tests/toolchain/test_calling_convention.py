@@ -218,7 +218,7 @@ def outcomes(level: str, folder: Path) -> dict[str, int]:
     image = folder / f"rows{level}.elf"
     built = build([main_file, c_file, s_file], image, level, "-std=gnu11", "-Wall", "-Wno-padded")
     assert built.status == 0, built.messages
-    ran = run(image, engine="interp")
+    ran = run(image, engine="auto")
     assert ran.status == 0, ran
     return {name: int(value) for name, value in (line.split() for line in ran.uart.decode().splitlines())}
 

@@ -1,4 +1,4 @@
-"""`python -m toolchain`: commands, exit statuses, messages, and that failures leave no files (design §10)."""
+"""`python -m toolchain`: commands, exit statuses, messages, and that failures leave no files (engines.md §10)."""
 
 import json
 import subprocess
@@ -123,7 +123,7 @@ def test_libraries(files, capsys):
     ],
 )
 def test_bad_input_is_one_clear_message_and_status_2(files, capsys, arguments, message):
-    """design §10: exit 2, no traceback, no output file."""
+    """engines.md §10: exit 2, no traceback, no output file."""
     (files / "bad.s").write_text(" nop\n frob\n")
     (files / "u.s").write_text(".global __reset\n__reset: call _nowhere\n")
     assert main(["as", "u.s", "-o", "undefined.o"]) == 0

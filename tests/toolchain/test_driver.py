@@ -30,13 +30,13 @@ def write(folder: Path, name: str, text: str) -> Path:
 
 
 def test_the_hidden_clang_command_of_the_wheel_exists() -> None:
-    """design §5: the front end is `ziglang`'s clang."""
+    """engines.md §5: the front end is `ziglang`'s clang."""
     said = subprocess.run([*clang_program(), "--version"], capture_output=True, text=True, check=True).stdout
     assert said.startswith("clang version")
 
 
 def test_predefined_macros_are_those_of_the_device(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """abi-elf.md §2.9; no MSP430 macro of the borrowed target may remain (design §5)."""
+    """abi-elf.md §2.9; no MSP430 macro of the borrowed target may remain (engines.md §5)."""
     source = write(tmp_path, "empty.c", "")
     assert driver.main(["-E", "-dM", str(source)]) == 0
     macros = capsys.readouterr().out
@@ -57,7 +57,7 @@ def test_compile_link_and_run(capsys: pytest.CaptureFixture[str], tmp_path: Path
     s = write(tmp_path, "c.s", "\t.section .text,code\n\t.global _c\n_c: mov #2,w0\n\treturn\n")
     image = tmp_path / "x.elf"
     assert cc(capsys, "-Os", "-Wall", a, b, s, "-o", image) == (0, "")
-    assert run(image, engine="interp").status == 42
+    assert run(image, engine="auto").status == 42
 
 
 @pytest.mark.parametrize("flags", [(), ("-flto",), ("-g",)])
@@ -70,7 +70,7 @@ def test_separate_compilation(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert is_object((tmp_path / "a.o").read_bytes()) == (flags != ("-flto",))
     image = tmp_path / "x.elf"
     assert cc(capsys, "-Os", tmp_path / "a.o", tmp_path / "b.o", "-o", image) == (0, "")
-    assert run(image, engine="interp").status == 44
+    assert run(image, engine="auto").status == 44
 
 
 def test_whole_program_and_separate_linking_agree(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_whole_program_and_separate_linking_agree(capsys: pytest.CaptureFixture[
     for flag in ("-flto", "-fno-lto"):
         image = tmp_path / f"x{flag}.elf"
         assert cc(capsys, "-Os", flag, a, b, "-o", image) == (0, "")
-        assert run(image, engine="interp").status == 42
+        assert run(image, engine="auto").status == 42
         sizes.append(image.stat().st_size)
     assert sizes[0] <= sizes[1]
 
@@ -92,7 +92,7 @@ def test_hex_output_equals_the_elf(capsys: pytest.CaptureFixture[str], tmp_path:
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.hex") == (0, "")
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
     assert (tmp_path / "x.hex").read_text().endswith(":00000001ff\n")
-    assert run(tmp_path / "x.hex", engine="interp").status == run(tmp_path / "x.elf", engine="interp").status == 3
+    assert run(tmp_path / "x.hex", engine="auto").status == run(tmp_path / "x.elf", engine="auto").status == 3
 
 
 def test_dependency_file_names_headers_and_output(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -283,7 +283,7 @@ int main(void)
 }
 """)  # fmt: skip
     assert cc(capsys, "-Os", source, "-o", tmp_path / "x.elf") == (0, "")
-    assert run(tmp_path / "x.elf", engine="interp").status == 21
+    assert run(tmp_path / "x.elf", engine="auto").status == 21
 
 
 def test_only_what_is_used_is_linked(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -437,7 +437,7 @@ def test_archives_and_preprocessed_assembly(capsys: pytest.CaptureFixture[str], 
     (tmp_path / "libfg.a").write_bytes(archive_bytes(members))
     main = write(tmp_path, "m.c", "int f(int), g(void); int main(void) { return f(g()); }\n")
     assert cc(capsys, "-Os", main, f"-L{tmp_path}", "-lfg", "-lm", "-o", tmp_path / "x.elf") == (0, "")
-    assert run(tmp_path / "x.elf", engine="interp").status == 42
+    assert run(tmp_path / "x.elf", engine="auto").status == 42
 
 
 def test_linker_options_pass_through(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -454,7 +454,7 @@ def test_linker_options_pass_through(capsys: pytest.CaptureFixture[str], tmp_pat
         tmp_path / "x.elf",
     ]
     assert cc(capsys, *words) == (0, "")
-    assert run(tmp_path / "x.elf", engine="interp").status == 0
+    assert run(tmp_path / "x.elf", engine="auto").status == 0
     assert "heap.o" in (tmp_path / "x.map").read_text()
     assert cc(capsys, "-Os", "-fno-builtin", source, "-o", tmp_path / "y.elf") == (0, "")
-    assert run(tmp_path / "y.elf", engine="interp").status == 1
+    assert run(tmp_path / "y.elf", engine="auto").status == 1

@@ -61,7 +61,7 @@ def results(path: Path, level: str, folder: Path) -> dict[str, str]:
     )
     if built.status != 0:
         return dict.fromkeys(names, f"does not build: {built.first_error}")
-    ran = run(image, CYCLES, engine="interp")
+    ran = run(image, CYCLES, engine="auto")
     outcome = dict.fromkeys(names, f"not run: the program ended before ({ran.why or 'exit ' + str(ran.status)})")
     for line in ran.uart.decode("latin-1").splitlines():
         name, _, failed = line.partition(" ")

@@ -96,7 +96,7 @@ def test_no_bit_of_a_handler_is_lost_wherever_it_comes(level: str, tmp_path: Pat
     (tmp_path / "x.c").write_text(f"#include <dspic30f6014a.h>\n{SHARED}")
     built = build([tmp_path / "x.c"], tmp_path / "x.elf", level)
     assert built.status == 0, built.messages
-    machine = emu.load(tmp_path / "x.elf", engine="interp")
+    machine = emu.load(tmp_path / "x.elf", engine="auto")
     machine.run(until="work", cycles=100_000)
     first, state = machine.cycle, machine.snapshot()
     machine.run(until="done", cycles=100_000)

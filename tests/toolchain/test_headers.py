@@ -47,7 +47,7 @@ int main(void)
     )
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
     assert (built.status, built.messages) == (0, "")
-    assert run(tmp_path / "a.elf", engine="interp").status == 0
+    assert run(tmp_path / "a.elf", engine="auto").status == 0
 
 
 def test_bit_fields_are_where_the_chip_table_says(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_bit_fields_are_where_the_chip_table_says(tmp_path: Path) -> None:
     (tmp_path / "a.c").write_text(f"#include <dspic30f6014a.h>\nint main(void)\n{{\n{body}\n    return 0;\n}}\n")
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall", "-Wno-bitfield-constant-conversion")
     assert (built.status, built.messages) == (0, "")
-    assert run(tmp_path / "a.elf", engine="interp").status == 0
+    assert run(tmp_path / "a.elf", engine="auto").status == 0
 
 
 def test_second_names_of_bits_are_the_same_bits(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_second_names_of_bits_are_the_same_bits(tmp_path: Path) -> None:
     (tmp_path / "a.c").write_text(text)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall")
     assert (built.status, built.messages) == (0, "")
-    assert run(tmp_path / "a.elf", engine="interp").status == 0
+    assert run(tmp_path / "a.elf", engine="auto").status == 0
 
 
 @pytest.mark.parametrize("path", sorted(INCLUDE.glob("*.h")), ids=lambda p: p.name)

@@ -123,7 +123,7 @@ def test_a_loop_that_only_waits_is_not_deleted(level: str, tmp_path: Path) -> No
     source.write_text("int flag; int main(void) { while (!flag) ; return 0; }")
     image = tmp_path / "wait.elf"
     assert build([source], image, level, "-fno-lto").status == 0
-    assert run(image, 10_000, engine="interp").why.startswith("limit")
+    assert run(image, 10_000, engine="auto").why.startswith("limit")
 
 
 def status(text: str, folder: Path, *options: str) -> int | None:
@@ -132,4 +132,4 @@ def status(text: str, folder: Path, *options: str) -> int | None:
     source.write_text(text)
     built = build([source], image, *options)
     assert built.status == 0, built.messages
-    return run(image, 2_000_000, engine="interp").status
+    return run(image, 2_000_000, engine="auto").status

@@ -23,7 +23,7 @@ def status_of(folder: Path, source: str, *options: str) -> int:
     (folder / "main.c").write_text(source)
     image = folder / "main.elf"
     assert driver.main([*options, str(folder / "main.c"), "-o", str(image)]) == 0
-    return run(image, engine="interp").status
+    return run(image, engine="auto").status
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *words: object) -> str:
@@ -261,7 +261,7 @@ def test_names_of_smart_io_link(name: str, tmp_path: Path) -> None:
     )
     image = tmp_path / "main.elf"
     assert driver.main([str(tmp_path / "call.s"), "-o", str(image)]) == 0
-    assert run(image, engine="interp").uart == b"<42>"
+    assert run(image, engine="auto").uart == b"<42>"
 
 
 def test_a_call_with_short_doubles_does_not_link(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -334,7 +334,7 @@ def test_scanf_reads_what_c_says(level: str, tmp_path: Path) -> None:
     (tmp_path / "main.c").write_text(SCANF.replace("\\\\", "\\"))
     image = tmp_path / "main.elf"
     assert driver.main([level, str(tmp_path / "main.c"), "-o", str(image)]) == 0
-    assert run(image, engine="interp").uart.decode() == SCANNED
+    assert run(image, engine="auto").uart.decode() == SCANNED
 
 
 HANDLERS = """
@@ -401,7 +401,7 @@ def test_what_start_up_leaves_alone_has_no_known_first_value(level: str, alone: 
     """)
     image = tmp_path / "main.elf"
     assert driver.main([level, *alone.split(), str(tmp_path / "main.c"), "-o", str(image)]) == 0
-    machine = emu.load(image, engine="interp")
+    machine = emu.load(image, engine="auto")
     for values, seen in (((0x0101, 3, 0x0101, 0x0101), 4), ((0x1234, 7, 0x4321, 0x5678), 8 + 16 + 32 + 64)):
         machine.reset()
         for name, value in zip(("_magic", "_boots", "_kept", "_mine"), values, strict=True):

@@ -63,7 +63,7 @@ def test_a_function_is_read_with_its_blocks_phis_and_forward_references() -> Non
 
 
 def test_dump_of_what_was_read_reads_back_to_the_same_dump() -> None:
-    """design §5: the IR prints and parses."""
+    """engines.md §5: the IR prints and parses."""
     text = dump(read_module(LOOP).functions["sum"])
     assert dump(read_module(text).functions["sum"]) == text
 
@@ -130,7 +130,7 @@ def test_struct_layout_is_xc16s(type_text: str, size: int, offsets: list[int]) -
     ],
 )
 def test_unknown_constructs_are_refused_by_name_with_the_line(line: str, what: str) -> None:
-    """design §5: anything outside the grammar is an error, never a guess."""
+    """engines.md §5: anything outside the grammar is an error, never a guess."""
     with pytest.raises(UnsupportedError) as caught:
         read_module(f"define void @f() {{\n  {line}\n  ret void\n}}\n")
     assert what in str(caught.value)

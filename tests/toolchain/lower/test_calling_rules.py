@@ -20,5 +20,5 @@ def test_c_and_assembly_agree_on_every_rule(level: str, tmp_path: Path) -> None:
     image = tmp_path / "calls.elf"
     built = build([FOLDER / "calls.c", FOLDER / "probe.s"], image, level)
     assert built.status == 0, built.messages
-    ran = run(image, 200_000, engine="interp")
+    ran = run(image, 200_000, engine="auto")
     assert (ran.status, ran.why) == (0, "")

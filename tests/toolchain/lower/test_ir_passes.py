@@ -107,7 +107,7 @@ def outcomes(f: Function, seed: int) -> list[object]:
 @pytest.mark.parametrize("level", ["0", "s", "2"])
 @pytest.mark.parametrize("name", list(PASSES))
 def test_a_pass_keeps_the_meaning_of_every_function(name: str, level: str) -> None:
-    """style.md §2: an optimisation has a slower twin to be compared with."""
+    """An optimised pass agrees with its slower twin."""
     changed = functions(level)
     for seed, (plain, f) in enumerate(zip(functions(level), changed, strict=True)):
         PASSES[name](f)

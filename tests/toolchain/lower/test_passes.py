@@ -28,7 +28,7 @@ int vla(int n) { char buf[n]; for (int i = 0; i < n; i++) buf[i] = i; return buf
 
 @pytest.mark.parametrize("level", ["0", "1", "s", "2"])
 def test_every_ir_pass_leaves_well_formed_legal_functions(level: str) -> None:
-    """style.md §2: a function is checked between passes."""
+    """A function is checked between passes."""
     module = read_module(llvm(SOURCE, level))
     for f in module.functions.values():
         if not f.blocks:

@@ -15,7 +15,7 @@ CASES = [
 
 @pytest.mark.parametrize(("source", "what", "line"), CASES)
 def test_unsupported_constructs_name_themselves_and_their_line(source: str, what: str, line: int) -> None:
-    """design §5."""
+    """engines.md §5."""
     with pytest.raises(UnsupportedError) as caught:
         assembly(source, debug=True)
     assert what in str(caught.value)

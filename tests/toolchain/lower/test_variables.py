@@ -199,7 +199,7 @@ def compare(seed: int, options: tuple[str, ...], folder: Path) -> tuple[int, int
     (folder / "p.c").write_text("\n".join(program.lines) + "\n")
     built = build([folder / "p.c"], folder / "p.elf", "-g", "-w", "-fwrapv", *options)
     assert built.status == 0, built.messages
-    machine = emu.load(folder / "p.elf", engine="interp")
+    machine = emu.load(folder / "p.elf", engine="auto")
     assert machine.image is not None
     reader = Reader(folder / "p.elf", machine)
     entry = machine.image.symbols.find("probe")
@@ -263,7 +263,7 @@ def test_structs_in_registers_and_constants_are_shown(level: str, tmp_path: Path
     (tmp_path / "words.c").write_text(WORDS)
     built = build([tmp_path / "words.c"], tmp_path / "words.elf", "-g", level, "-fno-lto")
     assert built.status == 0, built.messages
-    machine = emu.load(tmp_path / "words.elf", engine="interp")
+    machine = emu.load(tmp_path / "words.elf", engine="auto")
     machine.run(until="main", cycles=1_000_000)
     machine.step()
     assert [machine.value(name).get() for name in ("five", "wide", "big")] == [5, 0x123456789A, 123456]

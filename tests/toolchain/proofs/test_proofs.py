@@ -211,7 +211,7 @@ def compiled(level: str, folder: Path) -> dict[str, list[int]]:
     source, target = folder / f"rules{level}.c", folder / f"rules{level}.elf"
     source.write_text(text + "int main(void) { return all[0] != 0; }\n")
     assert driver.main([level, "-fno-lto", "-w", "-fverify-machine", str(source), "-o", str(target)]) == 0
-    image = emu.load(target, engine="interp").image
+    image = emu.load(target, engine="auto").image
     assert image is not None
     found = {}
     for name in CASES:

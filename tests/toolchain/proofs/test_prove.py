@@ -172,7 +172,7 @@ def test_the_input_of_a_refutation_shows_it_on_the_emulator(tmp_path: Path) -> N
     assert verdict.witness is not None
     file = tmp_path / "larger.elf"
     file.write_bytes(image(made, verdict.witness))
-    machine = emu.load(file, engine="interp")
+    machine = emu.load(file, engine="auto")
     assert machine.run(until="__returned", cycles=1000).reason == "until"
     a, b = (((verdict.witness.registers.get(n, 0) ^ 0x8000) - 0x8000) for n in (0, 1))
     assert machine.w[0] == min(a, b) & 0xFFFF != max(a, b) & 0xFFFF
@@ -187,7 +187,7 @@ def test_memory_of_a_refutation_is_in_the_image(tmp_path: Path) -> None:
     assert verdict.witness is not None
     file = tmp_path / "widened.elf"
     file.write_bytes(image(made, verdict.witness))
-    machine = emu.load(file, engine="interp")
+    machine = emu.load(file, engine="auto")
     assert machine.run(until="__returned", cycles=10_000).reason == "until"
     first, second = (machine.peek(verdict.witness.registers[0] + k & 0xFFFF, 1) for k in (1, 2))
     assert machine.w[0] == ((second ^ 0x80) - 0x80) & 0xFFFF != ((first ^ 0x80) - 0x80) & 0xFFFF

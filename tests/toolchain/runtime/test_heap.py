@@ -64,5 +64,5 @@ def test_aligned_blocks(level: str, tmp_path: Path) -> None:
     (tmp_path / "a.c").write_text(ALIGNED_PROGRAM)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", level, "-Wall", "-Wl,--heap=2000")
     assert built.status == 0, built.messages
-    ran = run(tmp_path / "a.elf", engine="interp")
+    ran = run(tmp_path / "a.elf", engine="auto")
     assert ran.status == 0, ran

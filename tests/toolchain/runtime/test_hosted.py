@@ -125,7 +125,7 @@ def test_standard_input_is_the_first_uart(tmp_path: Path) -> None:
     (tmp_path / "a.c").write_text(INPUT_PROGRAM)
     built = build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os")
     assert built.status == 0, built.messages
-    machine = emu.load(tmp_path / "a.elf", engine="interp")
+    machine = emu.load(tmp_path / "a.elf", engine="auto")
     for byte in INPUT:
         machine.run(cycles=5000)
         machine.uart[1].feed([byte])

@@ -51,7 +51,7 @@ def test_snprintf_fits_into_its_stack_budget(tmp_path: Path) -> None:
     """Measured on the emulator, instruction by instruction."""
     (tmp_path / "a.c").write_text(STACK_PROGRAM)
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os").status == 0
-    assert stack_use(emu.load(tmp_path / "a.elf", engine="interp"), "_snprintf") <= SNPRINTF_STACK
+    assert stack_use(emu.load(tmp_path / "a.elf", engine="auto"), "_snprintf") <= SNPRINTF_STACK
 
 
 def outputs(calls: list[tuple[str, str]], folder: Path) -> list[str]:
@@ -61,7 +61,7 @@ def outputs(calls: list[tuple[str, str]], folder: Path) -> list[str]:
     (folder / "a.c").write_text(FORMAT_PROGRAM.format(values=values, calls=text))
     built = build([folder / "a.c"], folder / "a.elf", "-Os", "-Wall")
     assert built.status == 0, built.messages
-    ran = run(folder / "a.elf", 100_000_000, engine="interp")
+    ran = run(folder / "a.elf", 100_000_000, engine="auto")
     assert ran.status == 0, ran
     return ran.uart.decode().splitlines()
 
@@ -186,4 +186,4 @@ def test_characters_are_counted(tmp_path: Path) -> None:
     """C11 7.21.6.1p8: %n stores as many bytes as its length says, and counts what did not fit, too."""
     (tmp_path / "a.c").write_text(COUNT_PROGRAM)
     assert build([tmp_path / "a.c"], tmp_path / "a.elf", "-Os", "-Wall").status == 0
-    assert run(tmp_path / "a.elf", engine="interp").status == 0
+    assert run(tmp_path / "a.elf", engine="auto").status == 0

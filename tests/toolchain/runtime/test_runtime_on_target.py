@@ -181,7 +181,7 @@ def check(source: str, folder: Path) -> None:
     (folder / "test.c").write_text(source)
     built = build([folder / "test.c"], folder / "test.elf", "-Os", "-Wno-incompatible-library-redeclaration")
     assert built.status == 0, built.messages
-    ran = run(folder / "test.elf", engine="interp")
+    ran = run(folder / "test.elf", engine="auto")
     assert ran.status == 0, (ran, source.split("cases[] = {")[1].split("};")[0].split("}, {")[_case(ran.uart)])
 
 
