@@ -1,1 +1,1 @@
-"""Robots with firmware, or with the same controller in Python, in a world of walls and objects; and its experiment."""
+"""Swarm simulator: robots with firmware, or with a scripted controller, in a world of walls and objects."""

@@ -1,8 +1,7 @@
-"""The command line: `python -m arena COMMAND`; each command is a module of `commands/`.
+"""Command line `python -m arena COMMAND`; each command is a module of `commands/`.
 
-Exit statuses are those of `emu.host.exit_status`; 1 is that something happened to a robot: its firmware stopped, sits
-in a trap
-handler or is silent. Finished trials are kept.
+Exit statuses are those of `emu.host.exit_status`. Status 1 means that a robot had a fault: its firmware stopped, loops
+in a trap handler, or is silent. Finished trials are kept.
 """
 
 from __future__ import annotations
@@ -57,10 +56,10 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
 
 @ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the process's exit status."""
+    """Run one command and return the exit status of the process."""
     parser = argparse.ArgumentParser(
         prog="arena",
-        description="Robots with real firmware in a simulated arena.",
+        description="Run experiments with robots that execute real firmware in a simulated arena.",
         epilog="example: arena run clustering --brain scripted --trials 4 --minutes 10 --out results/scripted-A",
     )
     parser.add_argument("--version", action="version", version=f"arena {version('openswarm')}")
@@ -70,14 +69,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         about = str(one.description).partition("\n")[0]
         commands.add_parser(name, parents=[one], help=about, description=one.description, epilog=one.epilog,
                             formatter_class=argparse.RawDescriptionHelpFormatter, add_help=False)  # fmt: skip
-    commands.add_parser("scenes", help="list the scenes that come along")
-    shells = commands.add_parser("completion", help="print what makes a shell complete these commands",
+    commands.add_parser("scenes", help="list the built-in scenes")
+    shells = commands.add_parser("completion", help="print a completion script for a shell",
                                  description=completion_description("arena"), epilog="example: arena completion bash",
                                  formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
     shells.add_argument("shell", choices=SHELLS)
     try:
         options = parser.parse_args(arguments)
-    except SystemExit as ended:  # --help, or what argparse has told already
+    except SystemExit as ended:  # --help, or an error that argparse has printed
         return ended.code if isinstance(ended.code, int) else BAD_INPUT
     try:
         if options.command == "scenes":
@@ -92,11 +91,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         raise
     except (FolderInUseError, ClusterLostError) as error:
-        print(f"arena: {error}; finished trials are kept, the same command goes on", file=sys.stderr)
+        print(f"arena: {error}; finished trials are kept; run the same command to continue", file=sys.stderr)
         return CANNOT_CONTINUE
     except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
         print(f"arena: {error}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        print("arena: interrupted; finished trials are kept, the same command goes on", file=sys.stderr)
+        print("arena: interrupted; finished trials are kept; run the same command to continue", file=sys.stderr)
         return INTERRUPTED

@@ -1,4 +1,4 @@
-"""Where the command `arena` begins: what it needs beyond the emulator is an extra, and may not be there."""
+"""Entry point of the command `arena`, which works without the packages of the optional extras."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from emu.host.exit_status import BAD_INPUT
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run `arena.cli.main`. A package of an extra that is not installed ends in one line and status 2."""
+    """Run `arena.cli.main`. If a package of an extra is missing, print how to install it and return status 2."""
     try:
         from arena.cli import main as run
 
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def extra_with(module: str) -> str | None:
-    """The extra that brings a module, by this package's own requirements; the arena's own before others."""
+    """Return the extra that requires `module`, preferably `arena`; None if no extra does."""
     package = module.partition(".")[0].replace("_", "-")
     found = [re.search(r"extra *== *[\"'](\w+)", line) for line in requires("openswarm") or ()
              if re.match(rf"{re.escape(package)}\b(?!-)", line.replace("_", "-"))]  # fmt: skip

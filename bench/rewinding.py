@@ -25,7 +25,7 @@ sys.path.insert(0, str(ROOT))
 
 from arena.campaign.campaign import Plan  # noqa: E402
 from arena.commands.run import image_for  # noqa: E402
-from arena.debug.session import Remote, Session  # noqa: E402
+from arena.debug.session import DebugSession, RemoteServer  # noqa: E402
 from arena.scene.loader import FCY, load_scene  # noqa: E402
 from emu.prompt.client import Client  # noqa: E402
 
@@ -35,7 +35,7 @@ ROBOT = 2
 def timed(client: Client, request: str, **arguments: Any) -> float:
     """Host seconds until it stands again."""
     start = time.perf_counter()
-    client.go(request, threadId=1, **arguments)
+    client.resume(request, threadId=1, **arguments)
     return time.perf_counter() - start
 
 
@@ -57,11 +57,11 @@ def measured(minutes: float) -> dict[str, float]:
     plan = Plan(scene, "openswarm", "A", image_for("openswarm"), 1, 60 * minutes + 10, 1)
     found: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
-        session = Session(plan, ROBOT, Path(folder), is_recorded=False)
-        client = Client(partial(Remote, session), lambda _text: None)
+        session = DebugSession(plan, ROBOT, Path(folder), is_recorded=False)
+        client = Client(partial(RemoteServer, session), lambda _text: None)
         client.ask("initialize")
         client.ask("launch", stopOnEntry=True)
-        client.go("configurationDone")
+        client.resume("configurationDone")
 
         def to(seconds: float) -> float:
             return timed(client, "evaluate", expression=f"/goto {round(seconds * FCY)}", context="repl")

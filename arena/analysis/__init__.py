@@ -1,1 +1,1 @@
-"""From records to results: comparisons, statistics, plots and reports. Never touches a world."""
+"""Analysis of recorded trials: comparisons, statistics, plots and reports."""

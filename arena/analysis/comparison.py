@@ -1,4 +1,4 @@
-"""Two runs against each other, seed by seed (experiment.md §5): trials to a table of measures."""
+"""Comparison of two runs, seed by seed, in the measures of their experiment (experiment-contract.md §5)."""
 
 from __future__ import annotations
 
@@ -7,26 +7,27 @@ from typing import Any
 
 import numpy as np
 
-from arena.analysis.statistics import Values, equivalence, exact, remark, signed_rank_p
-from arena.metrics import Course
+from arena.analysis.statistics import Values, equivalence, remark, sign_flip_test, signed_rank_p
+from arena.metrics import MetricSeries
 from arena.trial.record import Trial
 
 NEAR_S = 0.05
-"""A sample this near to the time asked for is at that time: quanta do not divide a second."""
+"""Tolerance, in seconds, between a sample and the requested time: quanta do not divide a second."""
 APART_S = (2.0, 5.0, 10.0)
-"""When robots of the same seed are compared."""
+"""Times, in seconds, at which the positions of robots with equal seeds are compared."""
 MARGIN_PART = 0.10
-"""Of the second run's mean, for measures that declare no margin (experiment.md §5)."""
+"""Default margin of a measure, as a share of the second run's mean (experiment-contract.md §5)."""
 
 
-def courses(trials: list[Trial]) -> dict[int, tuple[Trial, Course]]:
-    """Metrics of each trial by seed."""
-    return {trial.about["seed"]: (trial, trial.course) for trial in trials}
+def courses(trials: list[Trial]) -> dict[int, tuple[Trial, MetricSeries]]:
+    """Return each trial and its metrics by seed."""
+    return {trial.about["seed"]: (trial, trial.series) for trial in trials}
 
 
-def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, Any]:
-    """All measures of the experiment, over the time of the shortest trial. Raises ValueError for fewer than two seeds
-    in common, trials shorter than `at`, or runs of two experiments."""
+def compare_runs(first: list[Trial], second: list[Trial], at: float) -> dict[str, Any]:
+    """Compare all measures of the experiment, over the duration of the shortest trial.
+
+    Raises ValueError for fewer than two common seeds, trials shorter than `at` seconds, or runs of two experiments."""
     experiment = first[0].experiment
     if second[0].experiment != experiment:
         raise ValueError(f"the runs are of two experiments, {experiment.name} and {second[0].experiment.name}")
@@ -42,7 +43,7 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
     for measure in experiment.measures:
         x, y = (np.array([measure.of(pair[side][1], at) for pair in pairs]) for side in (0, 1))
         margin = measure.margin if measure.margin is not None else MARGIN_PART * float(abs(y.mean())) or 1e-9
-        result, added = equivalence(x, y, margin), exact(x, y)
+        result, added = equivalence(x, y, margin), sign_flip_test(x, y)
         rows.append({"measure": measure.label.format(at=at), "first": _spread(x), "second": _spread(y),
                      **asdict(result), "equivalent": result.equivalent, "wilcoxon_p": signed_rank_p(x, y),
                      "pairs": [[float(one), float(other)] for one, other in zip(x, y, strict=True)],
@@ -59,7 +60,7 @@ def compared(first: list[Trial], second: list[Trial], at: float) -> dict[str, An
 
 
 def _apart(pairs: list[Any]) -> list[dict[str, float]]:
-    """Distance in cm between a robot and its twin in the trial of the same seed, over robots and seeds."""
+    """Return the distances in cm between equal robots of trials with equal seeds: median and maximum."""
     found = []
     for seconds in APART_S:
         gaps: list[float] = []
@@ -73,7 +74,7 @@ def _apart(pairs: list[Any]) -> list[dict[str, float]]:
 
 
 def mean_load(trials: list[Trial]) -> float | None:
-    """CPU load averaged over robots, trials and time; None without robots or for scripted brains, which have no CPU."""
+    """Return the CPU load averaged over robots, trials and time; None without robots or for scripted robots."""
     robots = range(trials[0].scene.robots.count)
     if not robots or trials[0].is_scripted:
         return None

@@ -1,5 +1,7 @@
-"""Rows to figures; never touches a world. What is drawn is what the experiment declares; standard deviations are those
-of a sample (ddof = 1), as in the tables."""
+"""Figures of recorded trials: the curves that the experiment declares, snapshots, trajectories and CPU load.
+
+Standard deviations are those of a sample (ddof = 1), as in the tables.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +27,9 @@ NAMES: Final = ("snapshots", "curves", "trajectories", "cpu-load")
 
 
 def draw_all(runs: Runs, folder: Path, form: str, prefix: str = "", names: Sequence[str] = NAMES) -> list[Path]:
-    """The figures of some runs, or those in `names`, into `folder`; the files written. Raises ValueError for runs of
-    several experiments."""
+    """Draw the figures `names` of some runs into `folder`, and return the paths.
+
+    Raises ValueError for runs of several experiments."""
     if len({trials[0].experiment for trials in runs.values()}) > 1:
         raise ValueError("the runs are of several experiments; a figure shows one")
     matplotlib.use("Agg")
@@ -48,7 +51,7 @@ def draw_all(runs: Runs, folder: Path, form: str, prefix: str = "", names: Seque
 
 
 def snapshots(runs: Runs) -> Figure:
-    """The first trial of each run at 0 and 10 min (or its end); the largest group of two or more objects is filled."""
+    """Draw the first trial of each run at 0 and 10 min, or at its end. The largest group of objects is filled."""
     figure = Figure(figsize=(9, 3.6 * len(runs)), layout="constrained")
     axes = figure.subplots(len(runs), len(SNAPSHOTS_S), squeeze=False)
     for row, (name, trials) in zip(axes, runs.items(), strict=True):
@@ -76,7 +79,7 @@ def _arena(axis: Axes, trial: Trial, sample: int) -> None:
 
 
 def frame(axis: Axes, trial: Trial) -> None:
-    """Walls, and a bar that says how long a metre is (half a metre, 10 cm in small arenas)."""
+    """Draw the walls, and a scale bar of 100, 50 or 10 cm."""
     width, height = trial.scene.arena.width_cm, trial.scene.arena.height_cm
     axis.add_patch(Rectangle((0, 0), width, height, fill=False))
     length = next((one for one in (100, 50, 10) if one <= width / 3), 10)
@@ -88,7 +91,7 @@ def frame(axis: Axes, trial: Trial) -> None:
 
 
 def curves(runs: Runs) -> Figure:
-    """Each metric of the experiment over time: mean, standard deviation, 95 % bootstrap band of the mean."""
+    """Draw each metric over time: mean, standard deviation, and 95 % bootstrap band of the mean."""
     experiment = next(iter(runs.values()))[0].experiment
     count = len(experiment.curves)
     figure = Figure(figsize=(5 * count, 4), layout="constrained")
@@ -113,7 +116,7 @@ def curves(runs: Runs) -> Figure:
 
 
 def _band(axis: Axes, name: str, times: Any, values: Any, curve: Curve) -> None:
-    """The deviation is cut off where nothing can be: beyond the best value, and under 0 if nothing is."""
+    """Draw one curve with its bands; clip the deviation at the best value, and at 0 if no value is negative."""
     mean = values.mean(axis=0)
     (line,) = axis.plot(times, mean, label=f"{name} (n = {len(values)})")
     if len(values) < 2:
@@ -128,7 +131,7 @@ def _band(axis: Axes, name: str, times: Any, values: Any, curve: Curve) -> None:
 
 
 def trajectories(runs: Runs) -> Figure:
-    """Paths of the robots in the first trial of each run."""
+    """Draw the paths of the robots in the first trial of each run."""
     figure = Figure(figsize=(5 * len(runs), 4), layout="constrained")
     for axis, (name, trials) in zip(figure.subplots(1, len(runs), squeeze=False)[0], runs.items(), strict=True):
         paths = trials[0].robots
@@ -141,7 +144,7 @@ def trajectories(runs: Runs) -> Figure:
 
 
 def cpu_load(runs: Runs) -> Figure | None:
-    """Share of cycles the CPU was not idle, mean over robots and trials; None if no run has firmware."""
+    """Draw the mean share of cycles in which the CPU was not idle; None if no run has firmware."""
     figure = Figure(figsize=(6, 3.5), layout="constrained")
     axis = figure.subplots()
     for name, trials in runs.items():

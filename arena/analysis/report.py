@@ -1,4 +1,4 @@
-"""Runs to the tables of docs/experiment.md §4, in Markdown. What enters: recorded trials by run; what leaves: text."""
+"""Report of several runs in Markdown: the tables of docs/experiment.md §4."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from arena.analysis.comparison import compared, courses, mean_load
+from arena.analysis.comparison import compare_runs, courses, mean_load
 from arena.analysis.statistics import pairs_needed
 from arena.trial.record import Trial
 
@@ -16,11 +16,11 @@ Runs = Mapping[str, list[Trial]]
 BEGIN: Final = "<!-- results: written by `arena report`; what is between the two marks is replaced -->"
 END: Final = "<!-- end of results -->"
 PAIRS_SHOWN: Final = 20
-"""Of a comparison, in a table; `arena compare --json` has all."""
+"""Pairs of a comparison that a table shows; `arena compare --json` has all."""
 
 
 def by_controller(runs: Runs) -> dict[str, dict[str, list[Trial]]]:
-    """Runs grouped by their controller, in order."""
+    """Group runs by controller, in alphabetical order."""
     groups: dict[str, dict[str, list[Trial]]] = {}
     for name, trials in runs.items():
         groups.setdefault(trials[0].about["controller"], {})[name] = trials
@@ -28,8 +28,10 @@ def by_controller(runs: Runs) -> dict[str, dict[str, list[Trial]]]:
 
 
 def report(runs: Runs, figures: Mapping[str, list[str]], host_s: Mapping[str, float], at: float) -> str:
-    """The text for some runs. `figures` are addresses of pictures by controller, `host_s` seconds a trial took on
-    average, `at` the time in s of the primary measure. Raises ValueError for trials that are too short."""
+    """Return the report of some runs.
+
+    `figures` are paths of pictures by controller, `host_s` the mean host time of a trial in s by run, and `at` the time
+    of the primary measure in s. Raises ValueError for trials that are too short."""
     parts = []
     for controller, group in by_controller(runs).items():
         parts.append(f"### Controller {controller}")
@@ -43,16 +45,16 @@ def report(runs: Runs, figures: Mapping[str, list[str]], host_s: Mapping[str, fl
 
 
 def with_results(document: str, text: str) -> str:
-    """A document with what is between its two marks replaced. Raises ValueError if it has no such place."""
+    """Return a document with the text between its two marks replaced. Raises ValueError without these marks."""
     before, begin, rest = document.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise ValueError(f"the document has no place for results: {BEGIN!r} ... {END!r}")
+        raise ValueError(f"the document has no marks for results: {BEGIN!r} ... {END!r}")
     return f"{before}{BEGIN}\n\n{text}\n{END}{after}"
 
 
 def _runs_table(group: Mapping[str, list[Trial]], host_s: Mapping[str, float], at: float) -> str:
-    """Each measure of the experiment, mean and standard deviation (ddof = 1)."""
+    """Return the table of all measures by run: mean and standard deviation (ddof = 1)."""
     measures = next(iter(group.values()))[0].experiment.measures
     rows = [
         f"| run | n | {' | '.join(one.label.format(at=at) for one in measures)} | CPU load | host s per trial |",
@@ -60,7 +62,7 @@ def _runs_table(group: Mapping[str, list[Trial]], host_s: Mapping[str, float], a
     ]
     for name, trials in group.items():
         done = [one for _, one in courses(trials).values()]
-        cells = [_spread([one.of(course, at) for course in done]) for one in measures]
+        cells = [_spread([one.of(series, at) for series in done]) for one in measures]
         load = mean_load(trials)
         rows.append(f"| {name} | {len(done)} | {' | '.join(cells)} | {'-' if load is None else f'{load:.1%}'} | "
                     f"{host_s[name]:.0f} |")  # fmt: skip
@@ -74,7 +76,7 @@ def _spread(values: list[float]) -> str:
 
 
 def _equivalence_tables(group: Mapping[str, list[Trial]], at: float) -> list[str]:
-    """What was registered, then what was added: exact intervals, every pair, and what limits the comparison."""
+    """Return the registered table of equivalence tests, and the added one: exact intervals, pairs and remarks."""
     registered = [
         "| X - Y, same seeds | measure | difference | 90 % interval | margin | equivalent | Wilcoxon p | pairs for 80 %"
         " power |",
@@ -89,7 +91,7 @@ def _equivalence_tables(group: Mapping[str, list[Trial]], at: float) -> list[str
     for (first, ones), (second, others) in itertools.combinations(group.items(), 2):
         if len(set(courses(ones)) & set(courses(others))) < 2:
             continue
-        for row in compared(ones, others, at)["measures"]:
+        for row in compare_runs(ones, others, at)["measures"]:
             digits = 3 if row["margin"] < 1 else 1
             verdict = "yes" if row["equivalent"] else "not shown"
             registered.append(f"| {first} - {second}, {row['count']} | {row['measure']} | {row['mean']:+.{digits}f} | "

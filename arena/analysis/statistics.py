@@ -1,9 +1,8 @@
-"""Comparing two runs (experiment.md §5): what was registered, and what was added to it later.
+"""Statistics of the comparison of two runs (experiment-contract.md §5): registered tests, and added ones.
 
-Registered: equivalence by two one-sided t tests, Wilcoxon's signed ranks, bootstrap bands. Added, because with few
-pairs that mostly tie a t interval is unsound: the exact test of sign flips and the interval that belongs to it, how
-small its p can become at all, and whether the measure had room to differ. Differences are taken seed by seed; what is
-drawn is seeded.
+Registered: equivalence by two one-sided t tests, Wilcoxon's signed ranks, bootstrap bands. A t interval is unsound for
+few pairs with many ties. Added for this case: the exact sign-flip test with its interval and its smallest possible p,
+and a remark if the measure could not differ. Differences are taken seed by seed; random draws are seeded.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Equivalence:
-    """Mean difference of pairs, its 90 % confidence interval, and whether that lies within +-margin (TOST at 5 %)."""
+    """Equivalence test (TOST at 5 %): mean difference of pairs and its 90 % confidence interval, against +-margin."""
 
     count: int
     mean: float
@@ -32,16 +31,16 @@ class Equivalence:
     high: float
     margin: float
     p: float
-    """The larger p value of the two one-sided tests."""
+    """Larger p value of the two one-sided tests."""
 
     @property
     def equivalent(self) -> bool:
-        """Both one-sided tests reject at 5 %."""
+        """Whether both one-sided tests reject at 5 %."""
         return self.p < 0.05
 
 
 def equivalence(one: Values, other: Values, margin: float) -> Equivalence:
-    """Two one-sided paired t tests. Raises ValueError for fewer than two pairs or unequal lengths."""
+    """Run two one-sided paired t tests. Raises ValueError for fewer than two pairs or unequal lengths."""
     if len(one) != len(other) or len(one) < 2:
         raise ValueError(f"equivalence needs two or more pairs, not {len(one)} and {len(other)} values")
     difference = one - other
@@ -58,8 +57,10 @@ def equivalence(one: Values, other: Values, margin: float) -> Equivalence:
 
 
 def signed_rank_p(one: Values, other: Values) -> float:
-    """Two-sided p of Wilcoxon's signed-rank test: exact up to 25 pairs without ties, else by the normal distribution
-    with ties corrected. Zero differences are dropped; 1.0 if nothing is left."""
+    """Return the two-sided p of Wilcoxon's signed-rank test; 1.0 if all differences are zero.
+
+    The test is exact for at most 25 pairs without ties. Otherwise it uses the normal approximation with a correction
+    for ties. Zero differences are dropped."""
     difference = (one - other)[one != other]
     count = len(difference)
     if not count:
@@ -69,19 +70,20 @@ def signed_rank_p(one: Values, other: Values) -> float:
 
 
 EXACT_PAIRS: Final = 16
-"""Up to so many pairs that differ all sign flips are tried, 65,536; of more a seeded sample."""
+"""Most differing pairs for which all sign flips, 65,536, are tried; more pairs use a seeded sample of flips."""
 DRAWS: Final = 99_999
 
 
 @dataclass(frozen=True)
-class Exact:
-    """The sign-flip test of pairs: under "no difference" every difference could as well have the other sign.
+class SignFlipTest:
+    """Sign-flip test of pairs: under the null hypothesis each difference has either sign with equal probability.
 
-    `differ` pairs are not equal; `p` is two-sided; `least_p` is the smallest that so many pairs could give, 2 over
-    2^differ: where it is not small, a large p says nothing.
-    `low`..`high` is the interval of the mean difference that the test
-    does not reject at 10 %, by Hartigan's typical values (JASA 64, 1969): the means of all subsets of the pairs, of
-    which 5 % are cut off on each side; unlimited where there are too few. It assumes differences symmetric about it.
+    `differ` is the number of unequal pairs and `p` the two-sided p value. `least_p` is the smallest possible p for so
+    many pairs, 2 / 2^differ; if it is not small, a large p is no evidence.
+
+    `low`..`high` is the 90 % interval of the mean difference by Hartigan's typical values (JASA 64, 1969): of the means
+    of all subsets of the pairs, 5 % are cut off on each side. It is unbounded for too few pairs. The method assumes
+    that the differences are symmetric about their centre.
     """
 
     differ: int
@@ -91,11 +93,11 @@ class Exact:
     high: float
 
 
-def exact(one: Values, other: Values, seed: int = 0) -> Exact:
-    """The sign-flip test. Raises ValueError for fewer than two pairs or unequal lengths."""
+def sign_flip_test(one: Values, other: Values, seed: int = 0) -> SignFlipTest:
+    """Run the sign-flip test. Raises ValueError for fewer than two pairs or unequal lengths."""
     if len(one) != len(other) or len(one) < 2:
         raise ValueError(f"a test needs two or more pairs, not {len(one)} and {len(other)} values")
-    difference = np.round(one - other, 12)  # equal sizes are equal, whatever the last bit says
+    difference = np.round(one - other, 12)  # differences of equal size must compare equal in spite of rounding
     moved = difference[difference != 0]
     least = min(2.0 ** (1 - len(moved)), 1.0)
     if not len(moved):
@@ -106,12 +108,12 @@ def exact(one: Values, other: Values, seed: int = 0) -> Exact:
         draws = np.inf if len(moved) <= EXACT_PAIRS else DRAWS
         p = float(permutation_test((moved,), np.mean, permutation_type="samples", vectorized=True, n_resamples=draws,
                                    batch=4096, random_state=seed).pvalue)  # fmt: skip
-    low, high = _typical(difference, seed)
-    return Exact(len(moved), p, least, low, high)
+    low, high = _typical_interval(difference, seed)
+    return SignFlipTest(len(moved), p, least, low, high)
 
 
-def _typical(difference: Values, seed: int) -> tuple[float, float]:
-    """90 % interval by the means of all (or many drawn) subsets of the pairs."""
+def _typical_interval(difference: Values, seed: int) -> tuple[float, float]:
+    """Return the 90 % interval by the means of all subsets of the pairs, or of a seeded sample of subsets."""
     count = len(difference)
     if count <= EXACT_PAIRS:
         subsets = (np.arange(1, 1 << count)[:, None] >> np.arange(count)) & 1
@@ -126,8 +128,8 @@ def _typical(difference: Values, seed: int) -> tuple[float, float]:
 
 
 def remark(one: Values, other: Values, best: float | None, digits: int = 3) -> str:
-    """What has to be known to read a comparison; empty if nothing has. `best` is the value nothing can exceed."""
-    found = exact(one, other)
+    """Return a remark on the limits of a comparison, or an empty string. `best` is the largest possible value."""
+    found = sign_flip_test(one, other)
     full = int(((one == best) & (other == best)).sum()) if best is not None else 0
     words = []
     if full > len(one) / 2:
@@ -140,19 +142,20 @@ def remark(one: Values, other: Values, best: float | None, digits: int = 3) -> s
 
 
 def pairs_needed(deviation: float, margin: float, power: float = 0.8) -> int:
-    """Pairs with which two equal means are found equivalent with probability `power`, by the normal distribution:
-    ((z(95 %) + z((1 + power) / 2)) * deviation / margin)^2, at least 2."""
+    """Return the number of pairs for which the equivalence test of equal means has the given power, at least 2.
+
+    Normal approximation: ((z(95 %) + z((1 + power) / 2)) * deviation / margin)^2."""
     normal = NormalDist()
     z = normal.inv_cdf(0.95) + normal.inv_cdf((1 + power) / 2)
     return max(math.ceil((z * deviation / margin) ** 2), 2)
 
 
 def bootstrap_band(courses: Values, *, share: float = 0.95, draws: int = 1000, seed: int = 0) -> tuple[Values, Values]:
-    """Band of the mean over trials (rows) at each time (columns) by drawing trials with replacement."""
+    """Return the bootstrap band of the mean over trials (rows) at each time (columns)."""
     rng = np.random.default_rng(seed)
     count = len(courses)
     picks = rng.integers(count, size=(draws, count))
     times = np.stack([np.bincount(one, minlength=count) for one in picks])
-    means = times @ courses / count  # how often each trial was drawn, instead of copies of all trials for every draw
+    means = times @ courses / count  # counts of draws need less memory than copies of the trials
     low, high = np.quantile(means, [(1 - share) / 2, (1 + share) / 2], axis=0)
     return low, high

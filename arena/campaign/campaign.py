@@ -1,7 +1,7 @@
-"""Many trials: which are missing, on how many workers, with what progress. What enters: a `Plan`; what leaves: files.
+"""Campaigns: run the missing trials of a `Plan` on several workers, and write one file per trial.
 
-A trial is the unit of work: it depends on its plan and seed alone, so the number of workers cannot show in a file. A
-finished trial is kept; one that was interrupted starts again from its seed (experiment.md §3).
+A trial is the unit of work. It depends on its plan and seed only, so the number of workers does not affect a file. The
+file of a finished trial is kept; an interrupted trial starts again from its seed (experiment-contract.md §3).
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -24,10 +22,9 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from arena.experiments import Experiment, experiment_of
-from arena.infrared.channel import Ether
-from arena.lockstep.processes import Crew
+from arena.infrared.channel import OpticalChannel
 from arena.replay.live_feed import LiveFile, live_path
-from arena.robots.controller import Brain, ScriptedBrain
+from arena.robots.controller import Controller, ScriptedController
 from arena.scene.loader import Scene
 from arena.trial.manifest import MANIFEST, read_manifest, write_manifest
 from arena.trial.record import FolderInUseError, RecordError, write_trial
@@ -36,17 +33,17 @@ from arena.trial.versions import host, versions
 from arena.world.physics import World
 
 Report = Callable[[int, float], None]
-"""report(trial, seconds simulated)."""
+"""Progress callback: number of a trial, and its simulated seconds so far."""
 _queue: Any = None
 
 SELECTOR = {"A": 0, "B": 1}
-"""Position of the robots' switch for a controller: bit 0 chooses B; bit 3 would start the project's own firmware
-without the remote control (firmware/apps/clustering)."""
+"""Position of the robots' rotary switch for each controller. In firmware/apps/clustering bit 0 selects controller B,
+and bit 3 starts the robot without the remote control."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run is. `image` is the firmware, None for scripted brains; `brain` its name for people."""
+    """Definition of a run. `image` is the firmware, None for scripted robots; `brain` is the name it has for users."""
 
     scene: Scene
     brain: str
@@ -56,24 +53,24 @@ class Plan:
     seconds: float
     seed: int
     experiment: Path | None = None
-    """The experiment's file, if it is one's own."""
+    """File of a user's experiment; None for a built-in or installed one."""
     images: tuple[tuple[str, Path | None], ...] = ()
-    """Brains of groups that have their own, by the name the scene has for them."""
+    """Firmware of the groups that name their own in the scene, by this name; None for a scripted group."""
 
     @property
-    def to_do(self) -> Experiment:
-        """What is measured, and who supervises. Raises SceneError."""
+    def loaded_experiment(self) -> Experiment:
+        """The experiment of the run: its metrics and its supervisor. Raises SceneError."""
         return experiment_of(str(self.experiment) if self.experiment is not None else self.scene.experiment)
 
     @property
     def has_firmware(self) -> bool:
-        """Whether any robot is emulated: all of a trial's robots then live in its shorter quantum."""
+        """Whether any robot runs firmware. All robots of the trial then run in the shorter quantum."""
         own = dict(self.images)
         groups = self.scene.groups or (self.scene.group_of(0),)
         return any((own[one.image] if one.image else self.image) is not None for one in groups)
 
     def key(self) -> dict[str, Any]:
-        """What a trial depends on beside its seed: recorded in every file."""
+        """Return everything that a trial depends on except its seed; it is stored in every file."""
         scene = _plain(json.loads(json.dumps(asdict(self.scene))))
         return {
             "scene": scene,
@@ -88,7 +85,7 @@ class Plan:
 
 
 def _plain(value: Any) -> Any:
-    """JSON without nan, which is not equal to itself."""
+    """Replace nan by None in a JSON value, so that equal values compare equal."""
     if isinstance(value, dict):
         return {key: _plain(one) for key, one in value.items()}
     if isinstance(value, list):
@@ -101,8 +98,8 @@ def _digest(path: Path | None) -> str | None:
 
 
 @dataclass(frozen=True)
-class Done:
-    """A trial that is finished: host seconds it took, faults as (robot, seconds, why)."""
+class FinishedTrial:
+    """A finished trial: its number, the host time in s, and the faults as (robot, simulated seconds, cause)."""
 
     trial: int
     host_s: float
@@ -110,58 +107,50 @@ class Done:
 
 
 def trial_path(folder: Path, number: int) -> Path:
-    """File of a trial, counted from 1."""
+    """Return the path of trial `number`, counted from 1."""
     return folder / f"trial-{number:04d}.parquet"
 
 
-def make_brains(plan: Plan, seed: int, robots: Sequence[int], ether: Ether | None) -> list[Brain]:
-    """Brains of some robots. Raises emu.LoadError for an unusable image."""
+def make_controllers(plan: Plan, seed: int, robots: Sequence[int], channel: OpticalChannel | None) -> list[Controller]:
+    """Return the controllers of some robots. Raises emu.LoadError for an unusable image."""
     own = dict(plan.images)
-    return [_brain(plan, own, seed, robot, ether) for robot in robots]
+    return [_controller(plan, own, seed, robot, channel) for robot in robots]
 
 
-def _brain(plan: Plan, own: dict[str, Path | None], seed: int, robot: int, ether: Ether | None) -> Brain:
+def _controller(
+    plan: Plan, own: dict[str, Path | None], seed: int, robot: int, channel: OpticalChannel | None
+) -> Controller:
     group = plan.scene.group_of(robot)
     image = own[group.image] if group.image else plan.image
     controller = group.controller or plan.controller
     if image is None:
-        return ScriptedBrain(plan.scene, seed, robot, controller)
-    from arena.robots.firmware_controller import EmulatedBrain  # the emulator is loaded by those who need it
+        return ScriptedController(plan.scene, seed, robot, controller)
+    from arena.robots.firmware_controller import FirmwareController  # scripted trials do not load the emulator
 
     chosen = plan.scene.start_of(robot).selector
-    return EmulatedBrain(plan.scene, seed, robot, image, SELECTOR[controller] if chosen < 0 else chosen, ether)
+    return FirmwareController(plan.scene, seed, robot, image, SELECTOR[controller] if chosen < 0 else chosen, channel)
 
 
 @contextmanager
-def brains_of(plan: Plan, seed: int, processes: int) -> Iterator[tuple[list[Brain], list[Crew], Ether | None]]:
-    """All brains of a trial, spread over some processes, closed at the end. This one has the fewest robots, because it
-    has the world."""
-    count = plan.scene.robots.count
-    ether = Ether.of(plan.scene) if plan.has_firmware else None
-    bounds = [count * part // processes for part in range(processes + 1)]
-    parts = [range(one, other) for one, other in pairwise(bounds) if other > one]
-    brains: list[Brain] = []
-    crews: list[Crew] = []
+def controllers_of(plan: Plan, seed: int) -> Iterator[tuple[list[Controller], OpticalChannel | None]]:
+    """Yield the controllers of one trial and the optical channel they share; close the controllers at the end."""
+    channel = OpticalChannel.of(plan.scene) if plan.has_firmware else None
+    controllers: list[Controller] = []
     try:
-        for part in parts[1:]:
-            crews.append(Crew(partial(make_brains, plan, seed), part, ether, len(parts)))
-        brains += make_brains(plan, seed, parts[0], ether) if parts else []
-        for crew in crews:
-            brains += crew.brains
-        yield brains, crews, ether
+        controllers += make_controllers(plan, seed, range(plan.scene.robots.count), channel)
+        yield controllers, channel
     finally:
-        for brain in brains:
-            brain.close()
-        for crew in crews:
-            crew.close()
+        for controller in controllers:
+            controller.close()
 
 
 def run_one(
-    plan: Plan, number: int, folder: Path, report: Report | None = None, processes: int = 1,
-    meet: Callable[[World, Sequence[Brain]], None] | None = None, threads: int = 1,
-) -> Done:  # fmt: skip
-    """Run trial `number` (from 1), its robots in `processes` or run by `threads` of this one, and write its file.
-    `meet` is shown world and robots first.
+    plan: Plan, number: int, folder: Path, report: Report | None = None,
+    on_start: Callable[[World, Sequence[Controller]], None] | None = None, threads: int = 1,
+) -> FinishedTrial:  # fmt: skip
+    """Run trial `number` (from 1) with `threads` threads for its robots, and write its file.
+
+    `on_start` is called before the first quantum, with the world and the controllers.
 
     Raises SceneError, RecordError, emu.LoadError."""
     start = time.perf_counter()
@@ -171,25 +160,25 @@ def run_one(
     try:
         progress = None if report is None else (lambda seconds: report(number, seconds))
         on_row = live.write if live is not None else None
-        with brains_of(plan, seed, processes) as (brains, crews, ether):
+        with controllers_of(plan, seed) as (controllers, channel):
             world = World(plan.scene, seed)
-            if meet is not None:
-                meet(world, brains)
-            result = run_trial(plan.scene, seed, brains, plan.seconds, progress, world, on_row, crews, ether,
-                               plan.to_do, threads)  # fmt: skip
+            if on_start is not None:
+                on_start(world, controllers)
+            result = run_trial(plan.scene, seed, controllers, plan.seconds, progress, world, on_row, channel,
+                               plan.loaded_experiment, threads)  # fmt: skip
         about["faults"] = [list(fault) for fault in result.faults]
         write_trial(trial_path(folder, number), result.rows, about)
     finally:
         if live is not None:
             live.close()
-    return Done(number, time.perf_counter() - start, result.faults)
+    return FinishedTrial(number, time.perf_counter() - start, result.faults)
 
 
 @contextmanager
-def claimed(folder: Path) -> Iterator[None]:
-    """A run's folder, for one run at a time; the system gives it free when a run is killed.
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Lock the folder of a run, which is created if missing. The system releases the lock of a killed process.
 
-    Raises FolderInUseError if another run has it, RecordError if it cannot be made."""
+    Raises FolderInUseError if another run holds the lock, RecordError if the folder cannot be created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / ".lock", timeout=0):
@@ -201,10 +190,9 @@ def claimed(folder: Path) -> Iterator[None]:
 
 
 def open_folder(plan: Plan, folder: Path, arguments: list[str]) -> list[int]:
-    """Begin or continue the run in a folder that is `claimed`; numbers of the trials still to do. The manifest
-    keeps the command's `arguments`.
+    """Start or continue a run in a locked folder; return the numbers of the missing trials.
 
-    Raises RecordError if it holds another run.
+    The manifest stores the command's `arguments`. Raises RecordError if the folder holds another run.
     """
     key = plan.key() | {"seed": plan.seed}
     before = read_manifest(folder) if (folder / MANIFEST).exists() else None
@@ -216,53 +204,58 @@ def open_folder(plan: Plan, folder: Path, arguments: list[str]) -> list[int]:
 
 
 def _changed(before: dict[str, Any], now: dict[str, Any]) -> list[str]:
-    """Which parts of two keys differ, in the words of people."""
-    changed = [name for name in now if name != "versions" and before.get(name) != now[name]]
+    """Return names of the parts in which two keys differ."""
+    different = [name for name in now if name != "versions" and before.get(name) != now[name]]
     old, new = before["versions"], now["versions"]
-    return changed + [f"version of {name}" for name in new if old.get(name) != new[name]]
+    return different + [f"version of {name}" for name in new if old.get(name) != new[name]]
 
 
 def run_all(
-    plan: Plan, folder: Path, numbers: list[int], jobs: int, report: Report, done: Callable[[Done], None],
-    processes: int = 1,
-) -> None:  # fmt: skip
-    """Run trials `numbers` on `jobs` workers; 1 = in this process. Where there are fewer trials than that, each gets
-    some threads. With several `processes` trials are run one after the other, their emulated robots spread over them.
-    Raises what a trial raises, after the others of its moment; files of finished trials stay."""
+    plan: Plan,
+    folder: Path,
+    numbers: list[int],
+    jobs: int,
+    report: Report,
+    on_finished: Callable[[FinishedTrial], None],
+) -> None:
+    """Run trials `numbers` on `jobs` worker processes; with 1 job, in this process.
+
+    If there are fewer trials than jobs, each trial gets several threads. Raises the exception of a failed trial; files
+    of finished trials are kept."""
     threads = max(jobs // max(len(numbers), 1), 1)
-    if jobs <= 1 or len(numbers) <= 1 or processes > 1:
+    if jobs <= 1 or len(numbers) <= 1:
         for number in numbers:
-            done(run_one(plan, number, folder, report, processes if plan.has_firmware else 1, threads=threads))
+            on_finished(run_one(plan, number, folder, report, threads=threads))
         return
     context = multiprocessing.get_context("spawn")
     queue: Any = context.Queue()
-    with ProcessPoolExecutor(min(jobs, len(numbers)), context, _begin, (queue,)) as pool:
-        pending = {pool.submit(_work, plan, number, folder, threads) for number in numbers}
+    with ProcessPoolExecutor(min(jobs, len(numbers)), context, _init_worker, (queue,)) as pool:
+        pending = {pool.submit(_run_in_worker, plan, number, folder, threads) for number in numbers}
         try:
             while pending:
                 finished, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
                 while not queue.empty():
                     report(*queue.get())
                 for future in finished:
-                    done(future.result())
+                    on_finished(future.result())
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 
-def _begin(queue: Any) -> None:
+def _init_worker(queue: Any) -> None:
     global _queue
     _queue = queue
     Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
-    """A trial can take minutes: end it when the process that wanted it has been killed."""
+    """End this worker when its parent process has ended, even in the middle of a trial."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
         os._exit(1)
 
 
-def _work(plan: Plan, number: int, folder: Path, threads: int) -> Done:
+def _run_in_worker(plan: Plan, number: int, folder: Path, threads: int) -> FinishedTrial:
     return run_one(plan, number, folder, lambda trial, seconds: _queue.put((trial, seconds)), threads=threads)

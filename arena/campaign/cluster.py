@@ -1,6 +1,7 @@
-"""Trials on the workers of a Dask cluster (optional extra `cluster`). What enters: a plan; what leaves: the same files.
+"""Trials on the workers of a Dask cluster (optional extra `cluster`); the files equal those of a local run.
 
-Workers need this package but no shared disk: the image travels with the plan, the finished file comes back as bytes.
+Workers need this package but no shared disk. The firmware is sent with the plan, and the finished file is returned as
+bytes.
 """
 
 from __future__ import annotations
@@ -14,37 +15,45 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from arena.campaign.campaign import Done, Plan, Report, run_one, trial_path
+from arena.campaign.campaign import FinishedTrial, Plan, Report, run_one, trial_path
 from arena.trial.record import EXPERIMENT, write_bytes
 from arena.trial.versions import versions
 
 
 class ClusterLostError(Exception):
-    """Scheduler or workers went away; the text says which."""
+    """The connection to the scheduler or to workers was lost; the text names the scheduler."""
 
 
 def run_on(
-    scheduler: str, plan: Plan, folder: Path, numbers: list[int], report: Report, done: Callable[[Done], None]
+    scheduler: str,
+    plan: Plan,
+    folder: Path,
+    numbers: list[int],
+    report: Report,
+    on_finished: Callable[[FinishedTrial], None],
 ) -> None:
-    """As `campaign.run_all`, on the workers of the scheduler at an address such as tcp://host:8786. Progress is told
-    per trial. Raises ValueError without Dask or for workers of another version, OSError if nobody answers there,
-    ClusterLostError if scheduler or workers go away meanwhile, and what a trial raises."""
+    """As `campaign.run_all`, on the workers of the scheduler at an address such as tcp://host:8786.
+
+    Progress is reported per trial. Raises ValueError without Dask or for workers of another version, OSError if the
+    scheduler cannot be reached, ClusterLostError if the connection is lost, and what a trial raises."""
     try:
         from distributed import CancelledError, Client, KilledWorker, as_completed
         from distributed.comm.core import CommClosedError
     except ImportError:
         raise ValueError("--scheduler needs Dask: pip install 'openswarm[arena,cluster]'") from None
     sent = replace(plan, image=None, experiment=None, images=())
-    files = Files(_bytes(plan.image), _bytes(plan.experiment), [(name, _bytes(path)) for name, path in plan.images])
+    files = InputFiles(
+        _bytes(plan.image), _bytes(plan.experiment), [(name, _bytes(path)) for name, path in plan.images]
+    )
     lost = (CancelledError, KilledWorker, CommClosedError)
     with _quiet(), Client(scheduler, timeout=10) as client:
-        futures = [client.submit(trial_elsewhere, sent, files, number, versions(), pure=False) for number in numbers]
+        futures = [client.submit(run_remote_trial, sent, files, number, versions(), pure=False) for number in numbers]
         try:
             for future in as_completed(futures):
                 one, data = future.result()
                 write_bytes(trial_path(folder, one.trial), data)
                 report(one.trial, plan.seconds)
-                done(one)
+                on_finished(one)
         except lost as error:
             raise ClusterLostError(f"{scheduler}: lost while trials ran ({type(error).__name__})") from None
         except BaseException:
@@ -54,7 +63,7 @@ def run_on(
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Dask logs at length, with tracebacks, what is told here in one line."""
+    """Suppress the log of Dask, which has tracebacks for errors that the caller reports in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
     logs = [(logging.getLogger(name), logging.getLogger(name).level) for name in names]
     for log, _ in logs:
@@ -66,8 +75,8 @@ def _quiet() -> Iterator[None]:
             log.setLevel(level)
 
 
-class Files(NamedTuple):
-    """What travels with a plan: firmware of the run, the experiment's file, firmware of groups by name."""
+class InputFiles(NamedTuple):
+    """Contents of the files that a plan refers to: firmware, experiment, and firmware of groups by name."""
 
     image: bytes | None
     experiment: bytes | None
@@ -78,9 +87,10 @@ def _bytes(path: Path | None) -> bytes | None:
     return path.read_bytes() if path is not None else None
 
 
-def trial_elsewhere(plan: Plan, files: Files, number: int, wanted: dict[str, str]) -> tuple[Done, bytes]:
-    """One trial in a folder of its own: what it was, and its file. Raises ValueError if this worker is of another
-    version: its records could differ from those of the others."""
+def run_remote_trial(plan: Plan, files: InputFiles, number: int, wanted: dict[str, str]) -> tuple[FinishedTrial, bytes]:
+    """Run one trial on a worker, in a temporary folder; return its description and its file.
+
+    Raises ValueError if the versions of this worker are not `wanted`, because its records could differ."""
     own = versions()
     other = [f"{name} {own.get(name)} instead of {wanted[name]}" for name in wanted if own.get(name) != wanted[name]]
     if other:
@@ -88,15 +98,15 @@ def trial_elsewhere(plan: Plan, files: Files, number: int, wanted: dict[str, str
     with tempfile.TemporaryDirectory(prefix="arena-") as name:
         folder = Path(name)
 
-        def kept(label: str, data: bytes | None) -> Path | None:
+        def stored(label: str, data: bytes | None) -> Path | None:
             if data is None:
                 return None
-            path = folder / label  # the loader tells ELF from HEX by content
+            path = folder / label  # the loader recognises ELF and HEX by content
             path.write_bytes(data)
             return path
 
-        images = [(group, kept(f"firmware-{place}", data)) for place, (group, data) in enumerate(files.images)]
-        plan = replace(plan, image=kept("firmware", files.image), experiment=kept(EXPERIMENT, files.experiment),
+        images = [(group, stored(f"firmware-{place}", data)) for place, (group, data) in enumerate(files.images)]
+        plan = replace(plan, image=stored("firmware", files.image), experiment=stored(EXPERIMENT, files.experiment),
                        images=tuple(images))  # fmt: skip
         one = run_one(plan, number, folder)
         return one, trial_path(folder, number).read_bytes()

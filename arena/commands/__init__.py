@@ -1,1 +1,1 @@
-"""One module per command, each with `parser()` and `run(options)`."""
+"""Commands of `arena`: one module each, with `parser()` and `run(options)`."""

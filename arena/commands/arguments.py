@@ -1,4 +1,4 @@
-"""Numbers on the command line, checked where they are read: a wrong one ends in a usage message and exit status 2."""
+"""Types of command-line arguments; an invalid value ends the command with a usage message and exit status 2."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 
 
 def count(text: str) -> int:
-    """A whole number, 1 or more."""
+    """Parse a whole number of 1 or more."""
     return _whole(text, 1)
 
 
 def count_or_none(text: str) -> int:
-    """A whole number, 0 or more."""
+    """Parse a whole number of 0 or more."""
     return _whole(text, 0)
 
 
@@ -22,24 +22,29 @@ def _whole(text: str, least: int) -> int:
     except ValueError:
         value = least - 1
     if value < least:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a whole number, {least} or more")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number of {least} or more")
     return value
 
 
 def duration(text: str) -> float:
-    """A time or a factor: positive and no more than 1e7, four months in seconds."""
+    """Parse a time in s or min, or a factor: a positive number of at most 1e7."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not 0 < value <= 1e7:
-        raise argparse.ArgumentTypeError(f"{text!r} must be positive, 1e7 at most")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a positive number of at most 1e7")
     return value
 
 
+def removed_processes(_text: str) -> int:
+    """Refuse `--processes`, an option that no longer exists."""
+    raise argparse.ArgumentTypeError("the option no longer exists: use `--jobs N` for threads of one trial")
+
+
 def port(text: str) -> int:
-    """A TCP port, 0 = any."""
+    """Parse a TCP port; 0 is any free port."""
     value = _whole(text, 0)
     if value > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} must be 0 to 65535")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a port from 0 to 65535")
     return value

@@ -1,4 +1,4 @@
-"""`arena bundle FILE RUN...`: a study as one file; `arena verify FILE`: computes its trials again and compares."""
+"""`arena bundle FILE RUN...`: pack a study into one file. `arena verify FILE`: run its trials again and compare."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import asdict
 from pathlib import Path
 
 from arena.campaign import bundle
-from arena.commands.arguments import count, count_or_none
+from arena.commands.arguments import count, count_or_none, removed_processes
 from arena.trial.json_numbers import json_text
 
 DIFFERENT = 1
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of `bundle`."""
+    """Return the parser of the options of `bundle`."""
     made = argparse.ArgumentParser(
-        description="put runs with everything they were made from into one file, and print its hash",
+        description="pack runs with their firmware, experiments and manifests into one file, and print its hash",
         epilog="example: arena bundle study.zip results/openswarm-A results/bare-A",
     )
-    made.add_argument("bundle", type=Path, metavar="FILE")
-    made.add_argument("--light", action="store_true", help="hashes instead of records: verify works, replay does not")
-    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
+    made.add_argument("bundle", type=Path, metavar="FILE", help="zip archive to write")
+    made.add_argument("--light", action="store_true", help="store hashes instead of records: can be verified only")
+    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the file. Raises RecordError."""
+    """Write the bundle and print its size in MB and its SHA-256. Raises RecordError."""
     digest = bundle.pack(options.runs, options.bundle, options.light)
     size = options.bundle.stat().st_size / 1e6
     print(f"{options.bundle}: {size:.2f} MB, SHA-256 {digest}")
@@ -34,43 +34,49 @@ def run(options: argparse.Namespace) -> int:
 
 
 def verify_parser() -> argparse.ArgumentParser:
-    """Options of `verify`."""
+    """Return the parser of the options of `verify`."""
     made = argparse.ArgumentParser(
-        description="check a bundle's files and compute some of its trials again; exit status 1 if one differs",
+        description="check the files of a bundle and run some of its trials again; exit status 1 if a result differs",
         epilog="example: arena verify study.zip --trials 1",
     )
-    made.add_argument("bundle", type=Path, metavar="FILE")
+    made.add_argument("bundle", type=Path, metavar="FILE", help="bundle to verify")
     made.add_argument(
-        "--trials", type=count_or_none, default=1, metavar="N", help="of each run, the first N (default 1)"
+        "--trials",
+        type=count_or_none,
+        default=1,
+        metavar="N",
+        help="run the first N trials of each run again (default 1)",
     )
-    made.add_argument("--number", type=count, action="append", metavar="N", help="this trial of each run that has it")
-    made.add_argument("--strict", action="store_true", help="versions must be the same too: equal to the byte")
-    made.add_argument("--processes", type=count, default=1, metavar="N", help="as for `arena run` (default 1)")
-    made.add_argument("--json", action="store_true")
+    made.add_argument(
+        "--number", type=count, action="append", metavar="N", help="run trial N of each run again; repeatable"
+    )
+    made.add_argument("--strict", action="store_true", help="require equal bytes, and so equal versions")
+    made.add_argument("--processes", type=removed_processes, help=argparse.SUPPRESS)
+    made.add_argument("--json", action="store_true", help="print JSON")
     return made
 
 
 def verify(options: argparse.Namespace) -> int:
-    """0 if every trial is equal. Raises RecordError, SceneError."""
+    """Print the result of each repeated trial; exit status 1 if one differs. Raises RecordError, SceneError."""
 
     def chosen(numbers: list[int]) -> list[int]:
         return [one for one in numbers if one in options.number] if options.number else numbers[: options.trials]
 
     status, checks = 0, []
-    for one in bundle.verify(options.bundle, chosen, options.processes):
+    for one in bundle.verify(options.bundle, chosen):
         good = one.equal and not (options.strict and one.versions)
         status = status if good else DIFFERENT
         checks.append(asdict(one))
         if not options.json:
-            print(_said(one))
+            print(_result_line(one))
     if options.json:
         print(json_text({"equal": status == 0, "trials": checks}))
     else:
-        print(f"{len(checks)} trials computed again, all files as their hashes say")
+        print(f"{len(checks)} trials run again; all files match their hashes")
     return status
 
 
-def _said(one: bundle.Check) -> str:
+def _result_line(one: bundle.Check) -> str:
     place = f"{one.run}, trial {one.number}"
     if one.equal and not one.versions:
         return f"{place}: equal to the byte"

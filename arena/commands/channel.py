@@ -1,4 +1,4 @@
-"""`arena channel`: infrared light between robots beside the published table, and how far it reaches by angle."""
+"""`arena channel`: compare the infrared amplitude between two robots with the published table, and draw its range."""
 
 from __future__ import annotations
 
@@ -10,55 +10,62 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from arena.commands.run import changed
+from arena.commands.run import with_overrides
 from arena.infrared.propagation import PUBLISHED, Optics, amplitude, distance_of
 from arena.scene.loader import Scene, load_scene
 from arena.trial.json_numbers import json_text
 from arena.world.physics import Poses
 
 THRESHOLDS: Final = (10.0, 2.0)
-"""Counts whose reach is drawn: libIrcom detects from 10 on (swarmcom.md §3); 2 are one deviation of plausible noise."""
+"""Amplitudes in ADC counts whose range is drawn.
+
+The detection threshold of libIrcom is 10 (swarmcom.md §3); 2 is one standard deviation of plausible noise."""
 BEST_DEG: Final = 31.5
-"""Between two neighbouring emitters, where a robot shines brightest with the usual beams."""
+"""Direction between two neighbouring emitters: the brightest one with the default beams."""
 NEAR_CM: Final = 10.0
-"""Where everybody gets something."""
+"""Distance at which receivers in all directions have a signal."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
-        description="print the amplitude of infrared light between two robots beside the published one, and draw it",
+        description="print the infrared amplitude between two robots beside the published values, and draw it",
         epilog="example: arena channel --figure docs/figures/infrared-channel.png",
     )
-    made.add_argument("scene", nargs="?", default="clustering", help="whose [infrared] holds (default %(default)s)")
+    made.add_argument(
+        "scene", nargs="?", default="clustering", help="scene with the [infrared] section (default %(default)s)"
+    )
     made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
-    made.add_argument("--figure", type=Path, metavar="FILE", help="a PNG, SVG or PDF to draw")
-    made.add_argument("--json", action="store_true")
+    made.add_argument(
+        "--figure", type=Path, metavar="FILE", help="draw amplitude and range into this PNG, SVG or PDF file"
+    )
+    made.add_argument("--json", action="store_true", help="print JSON")
     return made
 
 
-def received(optics: Optics, distance_cm: float, sender_deg: float, receiver_deg: float) -> float:
-    """Counts on the strongest sensor of one robot when another lights all emitters: directions of the line between
-    their centres, clockwise from the sender's and the receiver's front."""
+def received_counts(optics: Optics, distance_cm: float, sender_deg: float, receiver_deg: float) -> float:
+    """Return the ADC counts of a robot's strongest sensor while another robot lights all its emitters.
+
+    The angles are the directions of the other robot, clockwise from the front of sender and receiver."""
     poses = Poses([(0.0, 0.0, math.radians(receiver_deg)), (distance_cm, 0.0, math.pi + math.radians(sender_deg))], [])
     return max((sum(one.counts) * max(one.shares) for one in optics.signals(poses, 0, [1])), default=0.0)
 
 
 def reach(optics: Optics, counts: float, sender_deg: float) -> float:
-    """cm at which a receiver with a sensor right in the direction still gets so much."""
-    share = received(optics, NEAR_CM, sender_deg, 90.0) / amplitude(NEAR_CM)
+    """Return the distance in cm at which a sensor that faces the sender receives `counts`."""
+    share = received_counts(optics, NEAR_CM, sender_deg, 90.0) / amplitude(NEAR_CM)
     return distance_of(counts / share) if share else 0.0
 
 
 def draw(optics: Optics) -> Figure:
-    """Amplitude by distance, and reach by direction."""
+    """Draw the amplitude by distance, and the range by direction."""
     figure = Figure(figsize=(10, 4.4), layout="constrained")
     left, right = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="polar")
     distances = np.arange(7.4, 60, 0.1)
     left.semilogy(*zip(*PUBLISHED, strict=True), "o", color="k", markersize=4, label="published (libIrcom)")
     for name, sender, receiver in (("brightest direction", BEST_DEG, 90.0), ("front to front", 0.0, 0.0),
                                    ("from behind", 180.0, 90.0)):  # fmt: skip
-        left.semilogy(distances, [received(optics, one, sender, receiver) for one in distances], label=name)
+        left.semilogy(distances, [received_counts(optics, one, sender, receiver) for one in distances], label=name)
     left.axhline(THRESHOLDS[0], linestyle=":", color="k", linewidth=1)
     left.set(xlabel="distance of the centres (cm)", ylabel="counts between dark and lit", ylim=(0.5, 5000))
     left.legend(fontsize=8)
@@ -74,10 +81,10 @@ def draw(optics: Optics) -> Figure:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the table; raises SceneError, OSError."""
-    setting = changed(load_scene(options.scene), options.set).infrared
+    """Print the table of amplitudes in ADC counts. Raises SceneError, OSError."""
+    setting = with_overrides(load_scene(options.scene), options.set).infrared
     optics = Optics(Scene("channel", infrared=setting))
-    rows = [(distance, counts, received(optics, distance, BEST_DEG, 90.0)) for distance, counts in PUBLISHED]
+    rows = [(distance, counts, received_counts(optics, distance, BEST_DEG, 90.0)) for distance, counts in PUBLISHED]
     errors = [math.log(model / counts) if model else -math.inf for _, counts, model in rows]
     error = math.sqrt(sum(one * one for one in errors) / len(rows))
     if options.figure:

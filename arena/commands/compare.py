@@ -1,32 +1,34 @@
-"""`arena compare X Y`: two runs, seed by seed (experiment.md §5)."""
+"""`arena compare X Y`: compare two runs seed by seed with equivalence tests (experiment-contract.md §5)."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from arena.analysis.comparison import compared
+from arena.analysis.comparison import compare_runs
 from arena.commands.arguments import duration
 from arena.trial.json_numbers import json_text
 from arena.trial.record import trials_in
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
         description="compare two runs by equivalence tests",
         epilog="example: arena compare results/clustering-openswarm-A results/clustering-bare-A",
     )
     made.add_argument("first", type=Path, metavar="X", help="folder of a run")
-    made.add_argument("second", type=Path, metavar="Y")
-    made.add_argument("--at", type=duration, default=600.0, metavar="S", help="time of the share (default 600 s)")
-    made.add_argument("--json", action="store_true")
+    made.add_argument("second", type=Path, metavar="Y", help="folder of another run")
+    made.add_argument(
+        "--at", type=duration, default=600.0, metavar="S", help="simulated time of the measures (default 600 s)"
+    )
+    made.add_argument("--json", action="store_true", help="print JSON")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the table. Raises RecordError, ValueError."""
-    result = compared(trials_in(options.first), trials_in(options.second), options.at)
+    """Print the comparison of all measures. Raises RecordError, ValueError."""
+    result = compare_runs(trials_in(options.first), trials_in(options.second), options.at)
     if options.json:
         print(json_text(result))
         return 0

@@ -1,4 +1,4 @@
-"""`arena debug SCENE --robot N`: a debugger on one robot of a trial; the whole world stands with it."""
+"""`arena debug SCENE --robot N`: debug one robot of a trial; the whole world pauses with it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from arena.campaign.campaign import Plan, claimed, open_folder, trial_path
+from arena.campaign.campaign import Plan, locked_folder, open_folder, trial_path
 from arena.commands.arguments import count_or_none, port
-from arena.commands.run import add_plan, kept, planned
-from arena.debug.controlled_robot import GivenUpError
-from arena.debug.session import Remote, Session
+from arena.commands.run import add_plan, copy_inputs, plan_from
+from arena.debug.controlled_robot import TrialAbortedError
+from arena.debug.session import DebugSession, RemoteServer
 from arena.trial.manifest import note_host_time
 from arena.trial.record import RecordError
 from emu.dap.wire import Wire, wire_over
@@ -22,85 +22,89 @@ from emu.host.exit_status import DONE
 from emu.prompt.reader import Prompt
 
 DESCRIPTION: Final = """\
-debug one robot of a trial, the whole world stands with it
+debug one robot of a trial; the whole world pauses with it
 
-A server of the Debug Adapter Protocol on standard input and output, or on a TCP port of this machine (see `emu debug
---help`). Where the robot stops all stand; it steps, goes on and goes back with all others (/world shows them): from
-moments that are kept, or by running the trial again up to there. Launch arguments: stopOnEntry, sourceRoots. With
---tui, a prompt here instead (see the same).
+Serves the Debug Adapter Protocol on standard input and output, or on a TCP port of this machine (see `emu debug
+--help`). When the robot stops, the whole world pauses. All robots step, continue and rewind together; /world shows
+their state. A rewind resumes a checkpoint, or runs the trial again from its seed. Launch arguments: stopOnEntry,
+sourceRoots. With --tui, the debugger has a prompt in the terminal instead.
 
-With --out the trial is recorded, to the byte as `arena run --trials 1` does it, and cannot be changed by the debugger;
-a client that disconnects lets it go on to its end, one that terminates ends it without a record."""
+With --out the trial is recorded, equal to the byte to `arena run --trials 1`, and the debugger cannot change it. After
+`disconnect` the trial continues to its end; `terminate` ends it without a record."""
 EXAMPLE: Final = "example: arena debug clustering --robot 2 --port 4711    or    arena debug clustering --robot 2 --tui"
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(description=DESCRIPTION, epilog=EXAMPLE)
     add_plan(made)
-    made.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="which one, from 0")
-    made.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: a free one)")
-    made.add_argument("--tui", action="store_true", help="debug in the terminal, or by a script on standard input")
-    made.add_argument("--out", type=Path, metavar="FOLDER", help="record the trial there")
+    made.add_argument("--robot", type=count_or_none, required=True, metavar="N", help="number of the robot, from 0")
+    made.add_argument("--port", type=port, metavar="N", help="serve one client on 127.0.0.1:N (0: any free port)")
+    made.add_argument("--tui", action="store_true", help="debug at a prompt, or with a script on standard input")
+    made.add_argument("--out", type=Path, metavar="FOLDER", help="record the trial in this folder")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status 0, 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
+    """Run the trial with the debugger; exit status 1 if a robot had a fault.
+
+    Raises SceneError, RecordError, LoadError, ValueError."""
     if options.tui and options.port is not None:
-        raise ValueError("--port is for editors, --tui is not")
-    plan = planned(options, 1)
+        raise ValueError("--port and --tui exclude each other")
+    plan = plan_from(options, 1)
     if not 0 <= options.robot < plan.scene.robots.count:
         raise ValueError(f"--robot {options.robot}: the scene has robots 0 to {plan.scene.robots.count - 1}")
     if options.out is None:
         with tempfile.TemporaryDirectory() as folder:
-            return debugged(plan, Path(folder), options)
-    with claimed(options.out):
+            return debug_trial(plan, Path(folder), options)
+    with locked_folder(options.out):
         if not open_folder(plan, options.out, sys.argv[1:]):
-            raise RecordError(f"{options.out}: the trial is there already; choose another --out")
-        return debugged(kept(plan, options.out), options.out, options)
+            raise RecordError(f"{options.out}: already contains the trial; choose another --out")
+        return debug_trial(copy_inputs(plan, options.out), options.out, options)
 
 
-def debugged(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
-    """Run the trial with a debugger on its robot."""
-    session = Session(plan, options.robot, folder, is_recorded=options.out is not None)
+def debug_trial(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
+    """Run the trial with a debugger on one robot; return the exit status."""
+    session = DebugSession(plan, options.robot, folder, is_recorded=options.out is not None)
     status = DONE
     try:
         if session.is_over:
-            print(f"arena debug: robot {options.robot} got no power before the trial was over", file=sys.stderr)
+            print(
+                f"arena debug: robot {options.robot} was not switched on before the end of the trial", file=sys.stderr
+            )
         elif options.tui:
-            status = Prompt("arena debug", partial(Remote, session)).serve({}, sys.stdin)
+            status = Prompt("arena debug", partial(RemoteServer, session)).serve({}, sys.stdin)
         else:
-            served(session, options.port)
+            serve_client(session, options.port)
         session.finish()
-    except GivenUpError:
-        told = "nothing is recorded"
-        if options.out is not None and session.done is not None:
-            recorded(session, folder)
-            told = "it was recorded before it went back"
-        print(f"arena debug: the trial was ended, {told}", file=sys.stderr)
+    except TrialAbortedError:
+        outcome = "no record was written"
+        if options.out is not None and session.finished is not None:
+            report_record(session, folder)
+            outcome = "it had been recorded before the last rewind"
+        print(f"arena debug: the trial was ended; {outcome}", file=sys.stderr)
         return status
     finally:
         session.close()
     if options.out is not None:
-        recorded(session, folder)
+        report_record(session, folder)
     return max(status, 1 if session.has_fault else DONE)
 
 
-def recorded(session: Session, folder: Path) -> None:
-    """Tell where, and keep the time it took."""
-    assert session.done is not None
-    note_host_time(folder, session.done.trial, session.done.host_s, session.done.faults)
+def report_record(session: DebugSession, folder: Path) -> None:
+    """Print the path of the record, and store the host time in the manifest."""
+    assert session.finished is not None
+    note_host_time(folder, session.finished.trial, session.finished.host_s, session.finished.faults)
     print(f"arena debug: {trial_path(folder, 1)}", file=sys.stderr)
 
 
-def served(session: Session, port: int | None) -> None:
-    """Serve one client."""
+def serve_client(session: DebugSession, port: int | None) -> None:
+    """Serve one client on `port`, or on standard input and output if `port` is None."""
     if port is None:
-        out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
+        out, sys.stdout = sys.stdout.buffer, sys.stderr  # only protocol messages may reach the client
         wire = Wire(sys.stdin.fileno(), out)
         try:
-            attend(session, wire)
+            relay(session, wire)
         finally:
             wire.close()
         return
@@ -108,11 +112,11 @@ def served(session: Session, port: int | None) -> None:
         print(f"arena debug: listening on 127.0.0.1:{listening.getsockname()[1]}", file=sys.stderr, flush=True)
         connection, _ = listening.accept()
     with wire_over(connection) as wire:
-        attend(session, wire)
+        relay(session, wire)
 
 
-def attend(session: Session, wire: Wire) -> None:
-    """Until the client has left; what was wrong with what it sent is told."""
-    session.attend(wire)
+def relay(session: DebugSession, wire: Wire) -> None:
+    """Relay messages until the client disconnects; report a malformed message."""
+    session.relay(wire)
     if wire.problem:
-        print(f"arena debug: the client sent what is no message: {wire.problem}", file=sys.stderr, flush=True)
+        print(f"arena debug: malformed message from the client: {wire.problem}", file=sys.stderr, flush=True)

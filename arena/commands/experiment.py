@@ -1,4 +1,4 @@
-"""`arena experiment SCENE`: every arm of the registered comparison and its report, by one command."""
+"""`arena experiment SCENE`: run every arm of the registered comparison and write its report."""
 
 from __future__ import annotations
 
@@ -9,40 +9,58 @@ from pathlib import Path
 from arena.commands import report
 from arena.commands import run as single
 from arena.commands.arguments import count, count_or_none, duration
-from arena.robots.reactive import CONTROLLERS
+from arena.robots.reactive import SPEED_TABLES
 
 EXAMPLE = "example: arena experiment clustering --document docs/experiment.md --figures docs/figures"
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
-        description="run all brains and controllers against each other, then report; what is finished is kept",
+        description="run all combinations of brains and controllers, then write the report; finished trials are kept",
         epilog=EXAMPLE,
     )
-    made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
-    made.add_argument("--brains", default="openswarm,bare", metavar="B1,B2", help="default openswarm,bare")
-    made.add_argument("--controllers", default="AB", help="default AB")
-    made.add_argument("--trials", type=count, default=10, metavar="N", help="per brain and controller (default 10)")
-    made.add_argument("--minutes", type=duration, default=15.0, metavar="M", help="simulated, per trial (default 15)")
+    made.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
+    made.add_argument(
+        "--brains", default="openswarm,bare", metavar="B1,B2", help="firmware to compare (default openswarm,bare)"
+    )
+    made.add_argument("--controllers", default="AB", help="speed tables to compare (default AB)")
+    made.add_argument(
+        "--trials", type=count, default=10, metavar="N", help="trials per brain and controller (default 10)"
+    )
+    made.add_argument(
+        "--minutes", type=duration, default=15.0, metavar="M", help="simulated minutes per trial (default 15)"
+    )
     made.add_argument(
         "--twins", type=count_or_none, default=100, metavar="N", help="scripted trials per controller (default 100)"
     )
-    made.add_argument("--twin-minutes", type=duration, default=10.0, metavar="M", help="of a scripted one (default 10)")
-    made.add_argument("--at", type=duration, default=600.0, metavar="S", help="time of the share (default 600 s)")
-    made.add_argument("--seed", type=count_or_none, default=1)
-    made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes")
+    made.add_argument(
+        "--twin-minutes",
+        type=duration,
+        default=10.0,
+        metavar="M",
+        help="simulated minutes per scripted trial (default 10)",
+    )
+    made.add_argument(
+        "--at", type=duration, default=600.0, metavar="S", help="simulated time of the measures (default 600 s)"
+    )
+    made.add_argument("--seed", type=count_or_none, default=1, help="seed of the first trial (default 1)")
+    made.add_argument(
+        "--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="worker processes (default: all cores)"
+    )
     made.add_argument("--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead")
-    made.add_argument("--out", type=Path, default=Path("results"), metavar="FOLDER")
-    made.add_argument("--document", type=Path, metavar="FILE", help="replace its results; default: standard output")
-    made.add_argument("--figures", type=Path, metavar="FOLDER")
+    made.add_argument("--out", type=Path, default=Path("results"), metavar="FOLDER", help="default results")
+    made.add_argument(
+        "--document", type=Path, metavar="FILE", help="replace the results in this document; default: standard output"
+    )
+    made.add_argument("--figures", type=Path, metavar="FOLDER", help="draw the figures into this folder")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status of the worst run. Raises as `run` and `report`."""
-    if not options.controllers or set(options.controllers) - set(CONTROLLERS):
-        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(CONTROLLERS)}")
+    """Run all arms and the report; return the highest exit status. Raises as `run` and `report`."""
+    if not options.controllers or set(options.controllers) - set(SPEED_TABLES):
+        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(SPEED_TABLES)}")
     if options.trials < 2:
         raise ValueError("--trials must be 2 or more for a comparison")
     arms = [(brain, options.trials, options.minutes) for brain in options.brains.split(",")]

@@ -1,4 +1,4 @@
-"""`arena plot FOLDER...`: figures from recorded trials."""
+"""`arena plot FOLDER...`: draw figures from recorded trials."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from arena.trial.record import Trial, trials_in
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
         description="draw snapshots, clustering over time, trajectories and CPU load",
         epilog="example: arena plot results/clustering-openswarm-A results/clustering-bare-A --out figures",
     )
-    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
-    made.add_argument("--out", type=Path, default=Path("figures"), metavar="FOLDER")
+    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
+    made.add_argument("--out", type=Path, default=Path("figures"), metavar="FOLDER", help="default figures")
     made.add_argument("--film", type=count_or_none, metavar="ROBOT",
-                      help="draw, and print as a log, what one robot of the first trial saw and did")  # fmt: skip
-    made.add_argument("--format", default="png", choices=("png", "svg", "pdf"))
+                      help="draw the filmstrip of one robot of the first trial, and print its log")  # fmt: skip
+    made.add_argument("--format", default="png", choices=("png", "svg", "pdf"), help="default png")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the figures and name them. Raises RecordError, OSError."""
+    """Write the figures and print their paths. Raises RecordError, OSError."""
     runs = {folder.name: trials_in(folder) for folder in options.runs}
     options.out.mkdir(parents=True, exist_ok=True)
     if options.film is not None:
-        return _film(runs, options)
+        return _draw_filmstrips(runs, options)
     for path in plots.draw_all(runs, options.out, options.format):
         print(path)
     return 0
 
 
-def _film(runs: dict[str, list[Trial]], options: argparse.Namespace) -> int:
+def _draw_filmstrips(runs: dict[str, list[Trial]], options: argparse.Namespace) -> int:
     for name, trials in runs.items():
         robots = trials[0].scene.robots.count
         if not 0 <= options.film < robots:
             raise ValueError(f"--film {options.film}: {name} has robots 0 to {robots - 1}")
         path = options.out / f"{name}-film.{options.format}"
-        filmstrip.film(trials[0], options.film).savefig(path, dpi=100)
-        print("\n".join(filmstrip.log(trials[0], options.film)))
+        filmstrip.draw_filmstrip(trials[0], options.film).savefig(path, dpi=100)
+        print("\n".join(filmstrip.log_lines(trials[0], options.film)))
         print(path)
     return 0

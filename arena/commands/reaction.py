@@ -1,4 +1,7 @@
-"""`arena reaction`: how long firmware takes from a frame to the wheels, and frames it misses (experiment.md §4)."""
+"""`arena reaction`: measure the time from a camera frame to the new wheel speed, and count missed frames.
+
+The measurement is defined in experiment-contract.md §4.
+"""
 
 from __future__ import annotations
 
@@ -14,52 +17,55 @@ import emu
 from arena.camera.appearance import COLOURS, NOTHING, OBJECT, ROBOT
 from arena.commands.arguments import count, count_or_none
 from arena.robots.images import image_for
-from arena.robots.reactive import CONTROLLERS
+from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import FCY
 from arena.trial.json_numbers import json_text
 from emu.boards.epuck.board import Epuck
 
 SPEED_WORDS: Final = {"openswarm": "stepper_left", "bare": "left.0"}
-"""The word in which the project's own applications keep how fast the left wheel is to turn; the compiler keeps a
-structure nobody points to in pieces."""
+"""Word of each application that holds the speed of the left wheel.
+
+The compiler splits a structure without pointers to it into one symbol per member."""
 POLL_TCY: Final = 74
-"""How often it is looked at: 5 us."""
+"""Cycles between two reads of the word: 5 µs."""
 OK_AT_TCY: Final = FCY
-"""When the remote control's key is pressed."""
+"""Cycle at which the remote control's key is pressed."""
 FRAME_TCY: Final = 1000
-"""How often it is looked whether the last line of a frame has come: less than its capture takes."""
+"""Cycles between two checks for the last line of a frame; shorter than the capture of a line."""
 _ROWS: Final = 480
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
         description="measure the time from the last line of a frame to the new wheel speed, and missed frames",
         epilog="example: arena reaction --brain openswarm --brain bare --frames 300",
     )
-    made.add_argument("--brain", action="append", help="openswarm, bare, or an ELF file (default both of ours)")
-    made.add_argument("--word", metavar="SYMBOL", help="of other firmware: the word that holds the left wheel's speed")
-    made.add_argument("--controller", default="A", choices=sorted(CONTROLLERS))
-    made.add_argument("--frames", type=count, default=300, metavar="N")
-    made.add_argument("--seed", type=count_or_none, default=1)
-    made.add_argument("--json", action="store_true")
+    made.add_argument(
+        "--brain", action="append", help="openswarm, bare, or an ELF file; repeatable (default: openswarm and bare)"
+    )
+    made.add_argument("--word", metavar="SYMBOL", help="word that holds the left wheel's speed, for other firmware")
+    made.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
+    made.add_argument("--frames", type=count, default=300, metavar="N", help="frames to measure (default 300)")
+    made.add_argument("--seed", type=count_or_none, default=1, help="seed of the pictures (default 1)")
+    made.add_argument("--json", action="store_true", help="print JSON")
     return made
 
 
-class Show:
-    """A picture that changes before every frame: all object, all robot or all wall, never twice the same."""
+class AlternatingPicture:
+    """Picture in one colour, of an object, a robot or the wall, which changes before every frame."""
 
     def __init__(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
         self._last_row = _ROWS
         self.kind = NOTHING
         self.frames = 0
-        """Frames of which a line was read."""
+        """Number of frames of which at least one line was read."""
         self.lines: list[int] = []
-        """Cycles at which HREF rose for the lines read of the present frame."""
+        """Cycles of the rising edges of HREF for the lines read of the present frame."""
 
     def pixels(self, y: int, columns: NDArray[np.intp], cycle: int) -> NDArray[np.uint8]:
-        """As `Camera.sample` wants it."""
+        """Return the pixels of line `y`; a callback for `Camera.sample`."""
         if y <= self._last_row:
             others = [kind for kind in (NOTHING, OBJECT, ROBOT) if kind != self.kind]
             self.kind = others[int(self._rng.integers(2))]
@@ -71,20 +77,20 @@ class Show:
 
 
 def reaction(image: Path, word: str, selector: int, frames: int, seed: int) -> dict[str, Any]:
-    """Latencies in us from the rise of the last line's HREF to the change of `word`; frames read and missed.
+    """Return latencies in µs from the rising HREF of the last line to the change of `word`, and missed frames.
 
-    Raises emu.LoadError for an unusable image, ValueError if it has no such word or never moves.
+    Raises emu.LoadError for an unusable image, ValueError if `word` does not exist or never changes.
     """
     machine = emu.load(image, board=partial(Epuck, camera="PO6030K", selector=selector, seed=seed))
     machine.board.remote.press("ok", cycle=OK_AT_TCY)
-    show = Show(seed)
+    show = AlternatingPicture(seed)
     machine.board.camera.sample(show.pixels)
     try:
         machine.peek(word)
     except (KeyError, ValueError) as error:
-        raise ValueError(f"{image}: no word {word!r} to watch: {error}") from None
+        raise ValueError(f"{image}: cannot read the word {word!r}: {error}") from None
     _run(machine, 2 * OK_AT_TCY)
-    frame_tcy = machine.board.camera.scan.course.frame_tcy
+    frame_tcy = machine.board.camera.scan.series.frame_tcy
     begin, first = machine.cycle, show.frames
     waits: list[float] = []
     end = begin + frames * frame_tcy
@@ -121,7 +127,7 @@ def _run(machine: emu.Machine, cycle: int) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Raises ValueError, LoadError."""
+    """Print a table of latencies per brain. Raises ValueError, LoadError."""
     selector = 0 if options.controller == "A" else 1
     results = {}
     for brain in options.brain or list(SPEED_WORDS):
@@ -129,7 +135,7 @@ def run(options: argparse.Namespace) -> int:
         if image is None:
             raise ValueError(f"--brain {brain} has no firmware")
         if word is None:
-            raise ValueError(f"--brain {brain}: --word names the word that holds the left wheel's speed")
+            raise ValueError(f"--brain {brain}: name the word that holds the left wheel's speed with --word")
         results[Path(brain).stem] = reaction(image, word, selector, options.frames, options.seed)
     if options.json:
         print(json_text(results))

@@ -1,4 +1,4 @@
-"""`arena replay TRIAL`: a page that plays a trial without a server, a film, or a page that follows a running trial."""
+"""`arena replay TRIAL`: write a page or a video of a trial, or serve a page that follows a running trial."""
 
 from __future__ import annotations
 
@@ -10,38 +10,52 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 from arena.commands.arguments import count, duration, port
-from arena.replay.http import HERE, Answer
+from arena.replay.http import LOOPBACK, RequestHandler
 from arena.replay.live_feed import Follower
 from arena.replay.page import page
-from arena.replay.video import write_movie
+from arena.replay.video import write_video
 from arena.trial.record import RecordError, read_trial, write_text
 from emu.host.files import is_standard
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
-        description="make an HTML page that plays a trial, or a film of it, or follow a running one",
+        description="write an HTML page or a video of a trial, or serve a page that follows a running trial",
         epilog="examples: arena replay results/clustering-scripted-A/trial-0001.parquet --out trial.html\n"
         "          arena replay results/clustering-scripted-A/trial-0001.parquet --export trial.gif --speed 60\n"
         "          arena replay results/clustering-openswarm-A --live",
     )
-    made.add_argument("trial", type=Path, metavar="TRIAL", help="a trial-NNNN.parquet; with --live the run's folder")
-    made.add_argument("--out", type=Path, metavar="FILE", help="default: the trial's name with .html")
-    made.add_argument("--export", type=Path, metavar="FILE", help="write a film instead: .gif, or .mp4 with ffmpeg")
-    made.add_argument("--speed", type=duration, default=30.0, metavar="X", help="of a film, x real time (default 30)")
-    made.add_argument("--seconds", type=float, metavar="S", help="of a film, simulated time (default: the whole trial)")
-    made.add_argument("--live", action="store_true", help="serve a page that follows a trial of a run that goes on")
-    made.add_argument("--number", type=count, metavar="N", help="with --live: the trial (default: the newest)")
-    made.add_argument("--port", type=port, default=8765, metavar="P", help="with --live (default 8765, 0 = any)")
+    made.add_argument(
+        "trial", type=Path, metavar="TRIAL", help="file trial-NNNN.parquet; with --live the folder of the run"
+    )
+    made.add_argument("--out", type=Path, metavar="FILE", help="page to write (default: name of the trial with .html)")
+    made.add_argument("--export", type=Path, metavar="FILE", help="write a video instead: .gif, or .mp4 with ffmpeg")
+    made.add_argument(
+        "--speed",
+        type=duration,
+        default=30.0,
+        metavar="X",
+        help="speed of the video as a multiple of real time (default 30)",
+    )
+    made.add_argument(
+        "--seconds", type=float, metavar="S", help="simulated time that the video shows (default: the whole trial)"
+    )
+    made.add_argument("--live", action="store_true", help="serve a page that follows a running trial")
+    made.add_argument(
+        "--number", type=count, metavar="N", help="with --live: number of the trial (default: the newest)"
+    )
+    made.add_argument(
+        "--port", type=port, default=8765, metavar="P", help="with --live: TCP port (default 8765, 0: any free port)"
+    )
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the page or film and name it. Raises RecordError, ValueError, OSError."""
+    """Write the page or video and print its path. Raises RecordError, ValueError, OSError."""
     if options.live:
         with server(Follower(options.trial, options.number), options.port) as serving:
-            print(f"http://{HERE}:{serving.server_port}/ (Ctrl-C ends)", flush=True)
+            print(f"http://{LOOPBACK}:{serving.server_port}/ (Ctrl-C ends)", flush=True)
             with suppress(KeyboardInterrupt):
                 serving.serve_forever()
         return 0
@@ -51,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     beside = options.trial if is_standard(options.trial) else options.trial.with_suffix(".html")
     out: Path = options.export or options.out or beside
     if options.export is not None:
-        write_movie(trial, out, options.speed, options.seconds)
+        write_video(trial, out, options.speed, options.seconds)
     else:
         write_text(out, page(trial))
     if not is_standard(out):
@@ -60,17 +74,17 @@ def run(options: argparse.Namespace) -> int:
 
 
 def server(follower: Follower, port: int) -> ThreadingHTTPServer:
-    """A server for this machine alone: `/` is the page, `/more?from=N` the samples from N on."""
-    return ThreadingHTTPServer((HERE, port), partial(_Answer, follower))
+    """Return a server on the loopback address: `/` is the page, `/more?from=N` the samples from number N on."""
+    return ThreadingHTTPServer((LOOPBACK, port), partial(_LiveHandler, follower))
 
 
-class _Answer(Answer):
+class _LiveHandler(RequestHandler):
     def __init__(self, follower: Follower, *arguments: object) -> None:
         self._follower = follower
         super().__init__(*arguments)  # type: ignore[arg-type]
 
     def do_GET(self) -> None:
-        """One request; what cannot be answered is 404, a record that cannot be read 503."""
+        """Handle a GET request. An unknown path is status 404; a record that cannot be read is status 503."""
         place = urlsplit(self.path)
         first = parse_qs(place.query).get("from", ["0"])[0]
         try:
@@ -79,6 +93,6 @@ class _Answer(Answer):
             elif place.path == "/more" and first.isdecimal():
                 self.send_json(self._follower.more(int(first)))
             else:
-                self.send_words(404, "there are / and /more?from=N")
+                self.send_error_text(404, "no such path; expected / or /more?from=N")
         except RecordError as error:
-            self.send_words(503, str(error))
+            self.send_error_text(503, str(error))

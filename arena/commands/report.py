@@ -1,4 +1,4 @@
-"""`arena report FOLDER...`: tables and figures of some runs, into a document if one is named."""
+"""`arena report FOLDER...`: write tables and figures of runs as Markdown, to standard output or into a document."""
 
 from __future__ import annotations
 
@@ -16,24 +16,30 @@ from arena.trial.record import trials_in, write_text
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
-        description="write tables and figures of some runs as Markdown, by controller",
+        description="write tables and figures of runs as Markdown, grouped by controller",
         epilog="example: arena report results/openswarm-A results/bare-A results/openswarm-B results/bare-B "
         "--document docs/experiment.md --figures docs/figures",
     )
-    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER")
-    made.add_argument("--document", type=Path, metavar="FILE", help="replace its results; default: standard output")
-    made.add_argument("--at", type=duration, default=600.0, metavar="S", help="time of the share (default 600 s)")
-    made.add_argument("--figures", type=Path, metavar="FOLDER", help="draw snapshots, curves and CPU load here")
+    made.add_argument("runs", nargs="+", type=Path, metavar="FOLDER", help="folder of a run")
+    made.add_argument(
+        "--document", type=Path, metavar="FILE", help="replace the results in this document; default: standard output"
+    )
+    made.add_argument(
+        "--at", type=duration, default=600.0, metavar="S", help="simulated time of the measures (default 600 s)"
+    )
+    made.add_argument(
+        "--figures", type=Path, metavar="FOLDER", help="draw snapshots, curves and CPU load into this folder"
+    )
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Raises RecordError, ValueError, OSError."""
+    """Write the report. Raises RecordError, ValueError, OSError."""
     runs = {folder.name: trials_in(folder) for folder in options.runs}
     if len(runs) < len(options.runs):
-        raise ValueError("two of the folders have the same name; tables need different ones")
+        raise ValueError("two of the folders have the same name; the tables need distinct names")
     home = options.document.parent if options.document is not None else Path()
     figures: dict[str, list[str]] = {}
     if options.figures is not None:
@@ -52,6 +58,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _host_s(folder: Path) -> float:
-    """Seconds a trial took on average; nan if nobody noted it."""
+    """Return the mean host time of a trial in s; nan if the manifest has none."""
     noted = read_manifest(folder)["host"]
     return float(np.mean([one["host_s"] for one in noted])) if noted else float("nan")

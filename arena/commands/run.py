@@ -1,4 +1,4 @@
-"""`arena run SCENE`: trials of one brain and controller into a folder."""
+"""`arena run SCENE`: run trials of one brain and controller into a folder."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arena.campaign.campaign import Done, Plan, claimed, open_folder, run_all
-from arena.commands.arguments import count, count_or_none, duration
-from arena.commands.progress import Told
+from arena.campaign.campaign import FinishedTrial, Plan, locked_folder, open_folder, run_all
+from arena.commands.arguments import count, count_or_none, duration, removed_processes
+from arena.commands.progress import ProgressDisplay
 from arena.experiments import experiment_file
 from arena.robots.images import image_for
-from arena.robots.reactive import CONTROLLERS
+from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import Scene, load_scene, scripted
 from arena.trial.json_numbers import json_text
 from arena.trial.manifest import note_host_time
@@ -26,53 +26,64 @@ EXAMPLE = "example: arena run clustering --brain openswarm --controller A --tria
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(description="run trials; finished ones are kept and skipped", epilog=EXAMPLE)
-    made.add_argument("--trials", type=count, default=10, metavar="N")
+    made.add_argument("--trials", type=count, default=10, metavar="N", help="number of trials (default 10)")
     add_plan(made)
     made.add_argument(
         "--jobs",
         type=count,
         default=os.cpu_count() or 1,
         metavar="N",
-        help="cores to use (default all): trials at a time, threads of one where there are fewer trials",
+        help="cores to use (default: all): concurrent trials, or threads of one trial if there are fewer trials",
     )
     made.add_argument(
         "--processes",
-        type=count,
-        default=1,
-        metavar="N",
-        help="run one trial after the other, its robots in N processes (default 1): see arena/README.md",
+        type=removed_processes,
+        help=argparse.SUPPRESS,
     )
     made.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, for example tcp://host:8786"
     )
     made.add_argument("--out", type=Path, metavar="FOLDER", help="default results/SCENE-BRAIN-CONTROLLER")
-    made.add_argument("--json", action="store_true", help="results as JSON on standard output")
+    made.add_argument("--json", action="store_true", help="print the results as JSON")
     return made
 
 
 def add_plan(made: argparse.ArgumentParser) -> None:
-    """Options that say what a trial is."""
-    made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
+    """Add the options that define a trial."""
+    made.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
     made.add_argument("--brain", default="openswarm", help="openswarm (default), bare, scripted, or an ELF or HEX file")
-    made.add_argument("--controller", default="A", choices=sorted(CONTROLLERS), help="table of speeds (default A)")
-    made.add_argument("--minutes", type=duration, default=15.0, metavar="M", help="simulated, per trial (default 15)")
-    made.add_argument("--robots", type=count_or_none, metavar="N", help="instead of the scene's number")
-    made.add_argument("--objects", type=count_or_none, metavar="N", help="instead of the scene's number")
-    made.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="change a scene value")
-    made.add_argument("--seed", type=count_or_none, default=1, help="of the first trial, then counted on (default 1)")
-    made.add_argument("--cache", type=use_cache, metavar="DIR", help="keep images and native code there")
+    made.add_argument("--controller", default="A", choices=sorted(SPEED_TABLES), help="table of speeds (default A)")
+    made.add_argument(
+        "--minutes", type=duration, default=15.0, metavar="M", help="simulated minutes per trial (default 15)"
+    )
+    made.add_argument("--robots", type=count_or_none, metavar="N", help="number of robots, instead of the scene's")
+    made.add_argument("--objects", type=count_or_none, metavar="N", help="number of objects, instead of the scene's")
+    made.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.KEY=VALUE",
+        help="change a value of the scene; repeatable",
+    )
+    made.add_argument(
+        "--seed",
+        type=count_or_none,
+        default=1,
+        help="seed of the first trial; each next trial has the next seed (default 1)",
+    )
+    made.add_argument("--cache", type=use_cache, metavar="DIR", help="folder of the cache for firmware and native code")
 
 
-def changed(scene: Scene, settings: list[str], robots: int | None = None, objects: int | None = None) -> Scene:
-    """A scene with command-line values. Raises SceneError, ValueError."""
+def with_overrides(scene: Scene, settings: list[str], robots: int | None = None, objects: int | None = None) -> Scene:
+    """Return a scene with values from the command line. Raises SceneError, ValueError."""
     values: dict[str, Any] = {}
     for setting in settings:
         place, equals, text = setting.partition("=")
         if not equals or place.count(".") != 1:
             raise ValueError(f"--set {setting!r}: expected SECTION.KEY=VALUE, for example camera.range_cm=200")
-        values[place.strip().replace(".", "__")] = parsed(text.strip())
+        values[place.strip().replace(".", "__")] = parse_value(text.strip())
     if robots is not None:
         values["robots__count"] = robots
     if objects is not None:
@@ -80,8 +91,8 @@ def changed(scene: Scene, settings: list[str], robots: int | None = None, object
     return scene.with_values(**values)
 
 
-def parsed(text: str) -> bool | int | float | str:
-    """A number or a truth value if it is one."""
+def parse_value(text: str) -> bool | int | float | str:
+    """Parse `text` as a truth value or number; return other text, and `inf`, unchanged."""
     if text in ("true", "false"):
         return text == "true"
     for kind in (int, float):
@@ -93,13 +104,13 @@ def parsed(text: str) -> bool | int | float | str:
 
 
 def folder_name(text: str) -> str:
-    """A text as part of a folder's name: no letter that means something to a file system."""
+    """Return `text` as part of a folder's name, without characters that are special to a file system."""
     return re.sub("[^A-Za-z0-9.,=+_-]+", "-", text.lower()).strip("-.")
 
 
-def planned(options: argparse.Namespace, trials: int) -> Plan:
-    """What the options of `add_plan` ask for. Raises SceneError, LoadError, ValueError."""
-    scene = changed(load_scene(options.scene), options.set, options.robots, options.objects)
+def plan_from(options: argparse.Namespace, trials: int) -> Plan:
+    """Return the plan that the options of `add_plan` define. Raises SceneError, LoadError, ValueError."""
+    scene = with_overrides(load_scene(options.scene), options.set, options.robots, options.objects)
     home = Path(options.scene).parent
     image = image_for(options.brain) if not scene.groups or any(not one.image for one in scene.groups) else None
     images = tuple((one, image_for(one, home)) for one in dict.fromkeys(group.image for group in scene.groups) if one)
@@ -109,8 +120,10 @@ def planned(options: argparse.Namespace, trials: int) -> Plan:
     return plan if plan.has_firmware else replace(plan, scene=scripted(scene))
 
 
-def kept(plan: Plan, folder: Path) -> Plan:
-    """The plan with everything it needs in the folder: what it came from may be built anew meanwhile."""
+def copy_inputs(plan: Plan, folder: Path) -> Plan:
+    """Copy firmware and experiment of a plan into the folder; return the plan of the copies.
+
+    The originals may be rebuilt while the trials run."""
     if plan.experiment is not None:
         write_bytes(folder / EXPERIMENT, plan.experiment.read_bytes())
         plan = replace(plan, experiment=folder / EXPERIMENT)
@@ -124,17 +137,19 @@ def kept(plan: Plan, folder: Path) -> Plan:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status 1 if something happened to a robot. Raises SceneError, RecordError, LoadError, ValueError."""
-    made = carried_out(options)
+    """Run the missing trials and print the results; exit status 1 if a robot had a fault.
+
+    Raises SceneError, RecordError, LoadError, ValueError."""
+    made = run_missing_trials(options)
     if options.json:
         print(json_text({"folder": str(made.folder), "trials": list(map(summary, made.trials)), "new": made.new}))
     else:
-        say(made)
+        print_result(made)
     return 1 if made.faults else 0
 
 
-class Made(NamedTuple):
-    """What a run has left: all its trials, of which so many are new, and whether something happened to a robot."""
+class RunResult(NamedTuple):
+    """Result of a run: all its trials, the number of new ones, and whether a robot had a fault."""
 
     folder: Path
     trials: list[Trial]
@@ -142,60 +157,58 @@ class Made(NamedTuple):
     faults: bool
 
 
-def say(made: Made) -> None:
-    """A line per trial, and how many there are."""
-    print("\n".join(map(told, made.trials)))
+def print_result(made: RunResult) -> None:
+    """Print a line per trial and the number of trials."""
+    print("\n".join(map(result_line, made.trials)))
     print(f"{len(made.trials)} trials in {made.folder}")
 
 
-def carried_out(options: argparse.Namespace) -> Made:
-    """Run what is missing. Raises as `run`."""
-    plan = planned(options, options.trials)
+def run_missing_trials(options: argparse.Namespace) -> RunResult:
+    """Run the missing trials and return all. Raises as `run`."""
+    plan = plan_from(options, options.trials)
     folder = options.out or Path("results") / f"{plan.scene.name}-{plan.brain}-{options.controller}"
-    with claimed(folder):
+    with locked_folder(folder):
         missing = open_folder(plan, folder, sys.argv[1:])
-        plan = kept(plan, folder)
-        faults = with_progress(plan, folder, missing, options.jobs, options.scheduler, options.processes)
+        plan = copy_inputs(plan, folder)
+        faults = run_with_progress(plan, folder, missing, options.jobs, options.scheduler)
     wanted = {f"trial-{number:04d}.parquet" for number in range(1, options.trials + 1)}
     trials = [trial for trial in trials_in(folder) if trial.path.name in wanted]
-    return Made(folder, trials, len(missing), bool(faults))
+    return RunResult(folder, trials, len(missing), bool(faults))
 
 
 def summary(trial: Trial) -> dict[str, Any]:
-    """The numbers of one trial at its end: every curve's last value and every measure."""
-    done, end = trial.course, float(trial.times[-1])
+    """Return the last value of every curve and every measure of one trial."""
+    done, end = trial.series, float(trial.times[-1])
     curves = {one.name: done.last(one.name) for one in trial.experiment.curves}
     measures = {one.name: one.of(done, end) for one in trial.experiment.measures}
     about = {"trial": trial.path.stem, "seed": trial.about["seed"], "seconds": end, "faults": trial.about["faults"]}
     return curves | measures | about
 
 
-def told(trial: Trial) -> str:
-    """The same in words."""
-    done, curves = trial.course, trial.experiment.curves
+def result_line(trial: Trial) -> str:
+    """Return the last value of every curve of one trial as a line of text."""
+    done, curves = trial.series, trial.experiment.curves
     values = ", ".join(f"{one.label} {one.shown(done.last(one.name))}" for one in curves)
     return f"{trial.path.stem}: seed {trial.about['seed']}, after {trial.times[-1]:g} s: {values}"
 
 
-def with_progress(
-    plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None, processes: int = 1
-) -> bool:
-    """Run what is missing, on workers here or on those of a Dask scheduler; true if something happened to a robot."""
+def run_with_progress(plan: Plan, folder: Path, missing: list[int], jobs: int, scheduler: str | None = None) -> bool:
+    """Run trials on local workers or on a Dask cluster; return whether a robot had a fault."""
     stopped = False
-    with Told(len(missing), plan.seconds) as telling:
+    with ProgressDisplay(len(missing), plan.seconds) as display:
 
-        def done(one: Done) -> None:
+        def done(one: FinishedTrial) -> None:
             nonlocal stopped
-            telling.finished(one.trial, one.host_s)
+            display.complete(one.trial, one.host_s)
             note_host_time(folder, one.trial, one.host_s, one.faults)
             for robot, seconds, why in one.faults:
                 stopped = True
-                telling.line(f"trial {one.trial}, {seconds:.1f} s: robot {robot} {why}")
+                display.print(f"trial {one.trial}, {seconds:.1f} s: robot {robot} {why}")
 
         if scheduler is not None and missing:
             from arena.campaign.cluster import run_on
 
-            run_on(scheduler, plan, folder, missing, telling.reached, done)
+            run_on(scheduler, plan, folder, missing, display.update, done)
         else:
-            run_all(plan, folder, missing, jobs, telling.reached, done, processes)
+            run_all(plan, folder, missing, jobs, display.update, done)
     return stopped

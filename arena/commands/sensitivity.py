@@ -1,5 +1,5 @@
-"""`arena sensitivity SCENE`: one scene value after the other away from the registered one, with scripted brains
-(experiment.md §5)."""
+"""`arena sensitivity SCENE`: vary one registered scene value at a time, with scripted robots
+(experiment-contract.md §5)."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any, Final
 import numpy as np
 
 from arena.analysis.comparison import courses
-from arena.campaign.campaign import Plan, claimed, open_folder
+from arena.campaign.campaign import Plan, locked_folder, open_folder
 from arena.commands.arguments import count, count_or_none, duration
-from arena.commands.run import changed, folder_name, with_progress
+from arena.commands.run import folder_name, run_with_progress, with_overrides
 from arena.experiments import experiment_file, experiment_of
-from arena.robots.reactive import CONTROLLERS
+from arena.robots.reactive import SPEED_TABLES
 from arena.scene.loader import load_scene, scripted
 from arena.trial.json_numbers import json_text
 from arena.trial.record import EXPERIMENT, trials_in, write_bytes, write_text
@@ -41,32 +41,41 @@ VARIANTS: Final = {
     "misses 10 % of frames": ["camera.false_negative=0.1"],
     "invents objects in 10 %": ["camera.false_positive=0.1"],
 }
-"""Ranges of docs/experiment.md §2. At -0.38 degrees, four rows, the window's second row shows robots to 135 cm."""
+"""Variants within the ranges of docs/experiment.md §2. A pitch of -0.38 degrees shifts the picture by four rows; the
+second row of the window then shows robots up to 135 cm away."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
-        description="vary one value at a time with scripted brains and print the experiment's first metric",
+        description="vary one scene value at a time with scripted robots and print the experiment's first metric",
         epilog="example: arena sensitivity clustering --trials 10 --minutes 10 --save results/sensitivity.md",
     )
-    made.add_argument("scene", metavar="SCENE", help="name (arena scenes) or TOML file")
-    made.add_argument("--controllers", default="AB", help="default AB")
-    made.add_argument("--trials", type=count, default=10, metavar="N")
-    made.add_argument("--minutes", type=duration, default=10.0, metavar="M")
-    made.add_argument("--seed", type=count_or_none, default=1)
-    made.add_argument("--only", action="append", metavar="TEXT", help="only variants whose name contains this")
-    made.add_argument("--jobs", type=count, default=os.cpu_count() or 1, metavar="N")
-    made.add_argument("--out", type=Path, default=Path("results/sensitivity"), metavar="FOLDER")
-    made.add_argument("--save", type=Path, metavar="FILE", help="write the table as Markdown too")
-    made.add_argument("--json", action="store_true")
+    made.add_argument("scene", metavar="SCENE", help="name of a scene (see `arena scenes`) or TOML file")
+    made.add_argument("--controllers", default="AB", help="speed tables to vary (default AB)")
+    made.add_argument("--trials", type=count, default=10, metavar="N", help="trials per variant (default 10)")
+    made.add_argument(
+        "--minutes", type=duration, default=10.0, metavar="M", help="simulated minutes per trial (default 10)"
+    )
+    made.add_argument("--seed", type=count_or_none, default=1, help="seed of the first trial (default 1)")
+    made.add_argument(
+        "--only", action="append", metavar="TEXT", help="run only variants whose names contain TEXT; repeatable"
+    )
+    made.add_argument(
+        "--jobs", type=count, default=os.cpu_count() or 1, metavar="N", help="cores to use (default: all)"
+    )
+    made.add_argument(
+        "--out", type=Path, default=Path("results/sensitivity"), metavar="FOLDER", help="default results/sensitivity"
+    )
+    made.add_argument("--save", type=Path, metavar="FILE", help="also write the table to a Markdown file")
+    made.add_argument("--json", action="store_true", help="print JSON")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Raises SceneError, RecordError, ValueError."""
-    if not options.controllers or set(options.controllers) - set(CONTROLLERS):
-        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(CONTROLLERS)}")
+    """Run all variants and print the table. Raises SceneError, RecordError, ValueError."""
+    if not options.controllers or set(options.controllers) - set(SPEED_TABLES):
+        raise ValueError(f"--controllers {options.controllers}: expected some of {''.join(SPEED_TABLES)}")
     wanted = [name for name in VARIANTS if not options.only or any(text in name for text in options.only)]
     if not wanted:
         raise ValueError(f"--only {options.only}: no such variant; known: {'; '.join(VARIANTS)}")
@@ -74,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
     for name in wanted:
         row: dict[str, Any] = {"variant": name}
         for controller in options.controllers:
-            row[controller] = _ends(options, name, controller)
+            row[controller] = _final_values(options, name, controller)
         rows.append(row)
     text = _markdown(rows, options)
     if options.save is not None:
@@ -83,16 +92,16 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _ends(options: argparse.Namespace, name: str, controller: str) -> list[float]:
-    """The experiment's first metric at the end of each trial."""
-    scene = scripted(changed(load_scene(options.scene), VARIANTS[name]))
+def _final_values(options: argparse.Namespace, name: str, controller: str) -> list[float]:
+    """Return the experiment's first metric at the end of each trial."""
+    scene = scripted(with_overrides(load_scene(options.scene), VARIANTS[name]))
     own = experiment_file(scene.experiment, Path(options.scene).parent)
     plan = Plan(scene, "scripted", controller, None, options.trials, 60 * options.minutes, options.seed, own)
     folder = options.out / f"{folder_name(name)}-{controller}"
-    with claimed(folder):
+    with locked_folder(folder):
         if own is not None:
             write_bytes(folder / EXPERIMENT, own.read_bytes())
-        with_progress(plan, folder, open_folder(plan, folder, sys.argv[1:]), options.jobs)
+        run_with_progress(plan, folder, open_folder(plan, folder, sys.argv[1:]), options.jobs)
     trials = [trial for trial in trials_in(folder) if trial.about["seed"] < options.seed + options.trials]
     metric = trials[0].experiment.curves[0].name
     return [one.last(metric) for _, one in courses(trials).values()]
@@ -102,7 +111,7 @@ def _markdown(rows: list[dict[str, Any]], options: argparse.Namespace) -> str:
     metric = experiment_of(load_scene(options.scene).experiment, Path(options.scene).parent).curves[0].label
     lines = [
         f"{metric[0].upper()}{metric[1:]} after {60 * options.minutes:g} s, mean ± sd of n = {options.trials} (seeds "
-        f"{options.seed} to {options.seed + options.trials - 1}), scripted brains:",
+        f"{options.seed} to {options.seed + options.trials - 1}), scripted controllers:",
         "",
         f"| variant | {' | '.join(options.controllers)} |",
         f"|---|{'---|' * len(options.controllers)}",

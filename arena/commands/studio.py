@@ -1,7 +1,7 @@
-"""`arena studio SCENE`: a page in the browser in which a trial runs, stands, goes back, and is taken in hand.
+"""`arena studio SCENE`: interactive trial in a browser page: run, pause, step, rewind, move robots, inspect firmware.
 
-The server listens on this machine alone. Every request must bring the token of the page's address and come from the
-page itself: other pages in the same browser, and names that lead here, are refused.
+The server listens on the loopback address only. Every request must carry the token of the page's address and come from
+the page itself. Requests of other pages in the same browser, or under other host names, are refused.
 """
 
 from __future__ import annotations
@@ -18,40 +18,40 @@ from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
 from arena.commands.arguments import port
-from arena.commands.run import add_plan, planned
-from arena.replay.http import HERE, Answer
+from arena.commands.run import add_plan, plan_from
+from arena.replay.http import LOOPBACK, RequestHandler
 from arena.replay.page import page
 from arena.scene.loader import FCY
 from arena.studio.process import Call, Studio
-from arena.studio.session import RefusedError
+from arena.studio.session import CommandRefusedError
 
 EXAMPLE: Final = "example: arena studio clustering --controller A --seed 3"
 LIMIT: Final = 1 << 16
-"""Bytes of a request's body."""
+"""Largest size of a request's body, in bytes."""
 HEADER: Final = "X-Studio-Token"
-DEEDS: Final[dict[str, dict[str, type]]] = {
-    "go": {"pace": float}, "stand": {}, "step": {"quanta": int}, "back": {"tick": int},
-    "move": {"kind": str, "number": int, "x": float, "y": float}, "tell": {"robot": int, "text": str},
-    "stop_at": {"robot": int, "place": str}, "debug": {"robot": int},
+COMMANDS: Final[dict[str, dict[str, type]]] = {
+    "run": {"pace": float}, "pause": {}, "step": {"quanta": int}, "rewind": {"tick": int},
+    "move": {"kind": str, "number": int, "x": float, "y": float}, "send": {"robot": int, "text": str},
+    "toggle_breakpoint": {"robot": int, "place": str}, "debug": {"robot": int},
 }  # fmt: skip
-"""What can be asked for, methods of `InHand`, and the parameters it takes."""
+"""Commands of the page, which are methods of `TrialSession`, and the types of their parameters."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command."""
+    """Return the parser of the command's options."""
     made = argparse.ArgumentParser(
-        description="run one trial in a page of the browser: pause, step, go back, move things, look into a robot",
+        description="run one trial in a browser page: pause, step, rewind, move robots and objects, inspect firmware",
         epilog=EXAMPLE,
     )
     add_plan(made)
-    made.add_argument("--port", type=port, default=8766, metavar="P", help="default 8766, 0 = any")
-    made.add_argument("--open", action="store_true", help="open the page in the browser")
+    made.add_argument("--port", type=port, default=8766, metavar="P", help="TCP port (default 8766, 0: any free port)")
+    made.add_argument("--open", action="store_true", help="open the page in the default browser")
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve until Ctrl-C. Raises SceneError, LoadError, ValueError, OSError."""
-    plan = planned(options, 1)
+    """Serve the page until Ctrl-C. Raises SceneError, LoadError, ValueError, OSError."""
+    plan = plan_from(options, 1)
     studio = Studio(plan, plan.seed)
     try:
         with server(studio, options.port) as serving:
@@ -65,112 +65,114 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-class Serving(ThreadingHTTPServer):
-    """The server of one studio."""
+class StudioServer(ThreadingHTTPServer):
+    """HTTP server of one studio, with a random token that its page must send."""
 
     daemon_threads = True
 
     def __init__(self, studio: Studio, port: int) -> None:
         self.studio: Final = studio
         self.token: Final = secrets.token_urlsafe(16)
-        super().__init__((HERE, port), _Answer)
-        self.hosts: Final = (f"{HERE}:{self.server_port}", f"localhost:{self.server_port}")
+        super().__init__((LOOPBACK, port), _StudioHandler)
+        self.hosts: Final = (f"{LOOPBACK}:{self.server_port}", f"localhost:{self.server_port}")
         self.address: Final = f"http://{self.hosts[0]}/?token={self.token}"
 
 
-def server(studio: Studio, port: int) -> Serving:
-    """A server for this machine alone."""
-    return Serving(studio, port)
+def server(studio: Studio, port: int) -> StudioServer:
+    """Return a server of `studio` on the loopback address; port 0 is any free port."""
+    return StudioServer(studio, port)
 
 
-class _Answer(Answer):
-    server: Serving
+class _StudioHandler(RequestHandler):
+    server: StudioServer
 
     def do_GET(self) -> None:
-        """The page, samples, and what is inside a robot."""
+        """Handle a GET request: the page, samples, the state of a robot, or the digest of the trial."""
         place = urlsplit(self.path)
         query = {name: values[0] for name, values in parse_qs(place.query).items()}
-        if not self._may_ask(query.get("token", "") if place.path == "/" else self.headers.get(HEADER, "")):
+        if not self._is_authorised(query.get("token", "") if place.path == "/" else self.headers.get(HEADER, "")):
             return
         studio = self.server.studio
         try:
             if place.path == "/":
-                trial, now = studio.ask_all(Call("trial"), Call("now"))
+                trial, now = studio.ask_all(Call("trial"), Call("status"))
                 quantum = trial.scene.clock.quantum_tcy / FCY
                 control = {"token": self.server.token, "header": HEADER, "now": now, "quantum": quantum}
                 self.send_page(page(trial, studio=control))
             elif place.path == "/more":
-                first, epoch = _whole(query.get("from")), _whole(query.get("epoch"))
+                first, epoch = _parse_count(query.get("from")), _parse_count(query.get("epoch"))
                 self.send_json(studio.ask("more", first=first, epoch=epoch))
-            elif place.path == "/inside":
-                robot = _whole(query.get("robot"))
-                self.send_json(studio.ask("inside", robot=robot))
+            elif place.path == "/inspect":
+                robot = _parse_count(query.get("robot"))
+                self.send_json(studio.ask("inspect", robot=robot))
             elif place.path == "/digest":
-                state, now = studio.ask_all(Call("digest"), Call("now"))
+                state, now = studio.ask_all(Call("digest"), Call("status"))
                 self.send_json({"digest": state, "tick": now["tick"]})
             else:
-                self.send_words(404, "there are /, /more?from=N&epoch=E, /inside?robot=N, /digest and /do")
-        except RefusedError as error:
-            self.send_words(409, str(error))
+                self.send_error_text(
+                    404, "no such path; expected /, /more?from=N&epoch=E, /inspect?robot=N, /digest or /do"
+                )
+        except CommandRefusedError as error:
+            self.send_error_text(409, str(error))
 
     def do_POST(self) -> None:
-        """Something is to be done."""
-        if not self._may_ask(self.headers.get(HEADER, "")):
+        """Handle a POST request: execute one command."""
+        if not self._is_authorised(self.headers.get(HEADER, "")):
             return
         studio = self.server.studio
         try:
             if urlsplit(self.path).path != "/do":
-                raise RefusedError("what is to be done goes to /do")
-            name, arguments = _deed(self._body())
-            self.send_json(studio.ask_all(Call(name, (), arguments), Call("now"))[1])
-        except RefusedError as error:
-            self.send_words(409, str(error))
+                raise CommandRefusedError("commands must be sent to /do")
+            name, arguments = _parse_command(self._body())
+            self.send_json(studio.ask_all(Call(name, (), arguments), Call("status"))[1])
+        except CommandRefusedError as error:
+            self.send_error_text(409, str(error))
 
-    def _may_ask(self, token: str) -> bool:
-        """Whether the request is the page's own; if not it has been answered."""
+    def _is_authorised(self, token: str) -> bool:
+        """Whether the request comes from the studio's page; otherwise, send an error."""
         origin = self.headers.get("Origin")
         strange = self.headers.get("Host") not in self.server.hosts or (
             origin is not None and origin.removeprefix("http://") not in self.server.hosts
         )
         if strange or not hmac.compare_digest(token.encode(), self.server.token.encode()):
-            why = "this page is for its own address only" if strange else "the address lacks its token"
-            self.send_words(403, f"{why}; use the one that `arena studio` printed")
+            why = "the page works at its own address only" if strange else "the token is missing or wrong"
+            self.send_error_text(403, f"{why}; use the address that `arena studio` printed")
             return False
         return True
 
     def _body(self) -> Any:
-        length = _whole(self.headers.get("Content-Length"))
+        length = _parse_count(self.headers.get("Content-Length"))
         if length > LIMIT:
-            raise RefusedError(f"a request of {length} bytes; expected {LIMIT} at most")
+            raise CommandRefusedError(f"request of {length} bytes; expected at most {LIMIT}")
         try:
             return json.loads(self.rfile.read(length))
         except (ValueError, RecursionError):
-            raise RefusedError("the request is no JSON") from None
+            raise CommandRefusedError("the request is not valid JSON") from None
 
 
-def _whole(text: str | None) -> int:
+def _parse_count(text: str | None) -> int:
     if text is None or not text.isascii() or not text.isdecimal() or len(text) > 15:
-        raise RefusedError(f"{text!r}: expected a whole number")
+        raise CommandRefusedError(f"{text!r}: expected a whole number")
     return int(text)
 
 
-def _deed(request: Any) -> tuple[str, dict[str, Any]]:
-    """Name and arguments, of the types that are wanted. Raises RefusedError."""
+def _parse_command(request: Any) -> tuple[str, dict[str, Any]]:
+    """Return name and arguments of a command. Raises CommandRefusedError if a name or type is wrong."""
     name = request.get("do") if isinstance(request, dict) else None
-    if not isinstance(name, str) or name not in DEEDS:
-        raise RefusedError(f'expected an object with "do", one of {", ".join(DEEDS)}')
-    wanted = DEEDS[name]
+    if not isinstance(name, str) or name not in COMMANDS:
+        raise CommandRefusedError(f'expected an object with "do", one of {", ".join(COMMANDS)}')
+    wanted = COMMANDS[name]
     given = {key: value for key, value in request.items() if key != "do"}
     if set(given) != set(wanted):
-        raise RefusedError(f"{name}: expected {', '.join(wanted) or 'nothing more'}")
-    return name, {key: _typed(name, key, given[key], kind) for key, kind in wanted.items()}
+        raise CommandRefusedError(f"{name}: expected {', '.join(wanted) or 'no parameters'}")
+    return name, {key: _convert(name, key, given[key], kind) for key, kind in wanted.items()}
 
 
-def _typed(name: str, key: str, value: Any, kind: type) -> Any:
-    """`value` as a `kind`; whole numbers are numbers, and no number is beyond all bounds."""
+def _convert(name: str, key: str, value: Any, kind: type) -> Any:
+    """Return `value` as a `kind`. A float may be given as a whole number; magnitudes of 1e15 or more are refused."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e15
     if kind is float and is_number and math.isfinite(value):
         return float(value)
     if (kind is int and is_number and isinstance(value, int)) or (kind is str and isinstance(value, str)):
         return value
-    raise RefusedError(f"{name}: {key} is {value!r:.40}; expected {'text' if kind is str else 'a number'}")
+    raise CommandRefusedError(f"{name}: {key} is {value!r:.40}; expected {'text' if kind is str else 'a number'}")

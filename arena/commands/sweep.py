@@ -1,4 +1,4 @@
-"""`arena sweep SCENE --vary SECTION.KEY=V1,V2 ...`: a run for every combination of values, and a table."""
+"""`arena sweep SCENE --vary SECTION.KEY=V1,V2 ...`: run every combination of scene values and print a table."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ EXAMPLE = "example: arena sweep clustering --brain scripted --vary camera.range_
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of `run`, and the grid."""
+    """Return the parser of the options of `run` and the grid of values."""
     made = single.parser()
-    made.description, made.epilog = "run a grid of scene values", EXAMPLE
-    made.add_argument("--vary", action="append", default=[], required=True, metavar="SECTION.KEY=V1,V2,...")
+    made.description, made.epilog = "run every combination of the given scene values and print a table", EXAMPLE
+    made.add_argument("--vary", action="append", default=[], required=True, metavar="SECTION.KEY=V1,V2,...",
+                      help="scene value and its alternatives; repeatable")  # fmt: skip
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status of the worst run. Raises as `run`."""
+    """Run the grid and print the table; return the highest exit status. Raises as `run`."""
     axes = []
     for axis in options.vary:
         place, equals, values = axis.partition("=")
@@ -40,13 +41,13 @@ def run(options: argparse.Namespace) -> int:
     for settings in itertools.product(*axes):
         quiet.set = [*options.set, *settings]
         quiet.out = base / "-".join(map(single.folder_name, settings))
-        made = single.carried_out(quiet)
+        made = single.run_missing_trials(quiet)
         status, trials = max(status, int(made.faults)), trials_in(quiet.out)
         if not options.json:
-            single.say(made)
+            single.print_result(made)
         done = [one for _, one in courses(trials).values()]
         curves = trials[0].experiment.curves
-        ends = {one.name: [course.last(one.name) for course in done] for one in curves}
+        ends = {one.name: [series.last(one.name) for series in done] for one in curves}
         spreads = {name: {"mean": float(np.mean(values)), "sd": float(np.std(values, ddof=min(1, len(done) - 1)))}
                    for name, values in ends.items()}  # fmt: skip
         rows.append({"values": settings, "n": len(done), "metrics": spreads})

@@ -1,8 +1,8 @@
-"""A robot of a studio's trial in the hands of a debugger: a server of the Debug Adapter Protocol on a port of this
-machine, from the present moment on, for one client.
+"""Debugger on one robot of a running studio trial: a Debug Adapter Protocol server on a TCP port, for one client.
 
-While the client looks, the world stands, and the studio still answers whoever looks at its page (`idle`). The past of
-the robot can be looked at from that moment on; changed is the present only, since the others have seen what came of it.
+The debugger starts at the present time of the trial. While the client inspects the robot, the world is paused, and the
+studio continues to execute commands (`poll`). The client can go back to the time at which the debugger was attached. It
+can change the robot in the present only, because the other robots have already reacted to its past.
 """
 
 from __future__ import annotations
@@ -13,90 +13,92 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Final
 
-from arena.debug.controlled_robot import Debugged, Recording
-from arena.replay.http import HERE
+from arena.debug.controlled_robot import ControlledRobot, RobotHistory
+from arena.replay.http import LOOPBACK
 from emu.dap.server import Server
 from emu.dap.wire import Message, Wire, wire_over
 from emu.machine.machine import Machine
 
-LOOK_S: Final = 0.01
-"""How long the studio may wait for somebody before it is looked whether the client has said something."""
+POLL_S: Final = 0.01
+"""Longest time, in seconds, that the studio waits for commands between two looks at the client's messages."""
 PAST: Final = "this is the past, and the other robots have seen what came of it: go back to the present to change it"
 
 
-class _Present(Recording):
-    """A robot's history whose present alone can be changed."""
+class _PresentOnlyHistory(RobotHistory):
+    """History of a robot that can be changed in its present only."""
 
     @property
-    def frozen(self) -> str:
+    def read_only_reason(self) -> str:
         return PAST if self.is_past else ""
 
 
-class _Inbox(SimpleQueue[Message | None]):
-    """Messages of a client, waited for as the studio waits for what it is asked. Nothing more comes once it has
-    `ended`."""
+class _PollingInbox(SimpleQueue[Message | None]):
+    """Messages of a client. The studio executes commands while `get` waits; None once the studio wants the robot."""
 
-    def __init__(self, wire: Wire, idle: Callable[[float], bool]) -> None:
-        self._from: Final = wire.inbox
-        self._idle: Final = idle
+    def __init__(self, wire: Wire, poll: Callable[[float], bool]) -> None:
+        self._source: Final = wire.inbox
+        self._poll: Final = poll
 
     def empty(self) -> bool:
-        return self._from.empty() and self._idle(0)
+        return self._source.empty() and self._poll(0)
 
     def get(self, block: bool = True, timeout: float | None = None) -> Message | None:
-        while self._idle(LOOK_S):
+        while self._poll(POLL_S):
             with suppress(Empty):
-                return self._from.get_nowait()
+                return self._source.get_nowait()
         return None
 
 
-class _Channel:
-    """A wire whose inbox lets the studio live."""
+class _PollingChannel:
+    """Channel to a client during whose waits the studio executes commands."""
 
-    def __init__(self, wire: Wire, idle: Callable[[float], bool]) -> None:
-        self.inbox: Final = _Inbox(wire, idle)
+    def __init__(self, wire: Wire, poll: Callable[[float], bool]) -> None:
+        self.inbox: Final = _PollingInbox(wire, poll)
         self.send: Final = wire.send
 
 
-class Handed(Debugged):
-    """Robot number `robot`, given to whoever connects to `port`. `idle(s)` answers what the studio is asked for
-    within so many seconds; false: it is time to give the robot back. Raises OSError if there is no port."""
+class AttachedRobot(ControlledRobot):
+    """Robot number `robot` of a studio trial, controlled by the client that connects to `port`.
 
-    def __init__(self, robot: int, idle: Callable[[float], bool]) -> None:
-        super().__init__(robot, lambda _debugged: self._serve(), keeps=False)
+    `poll(s)` executes commands of the studio for at most `s` seconds; it returns false to detach the debugger. Raises
+    OSError if no TCP port is available.
+    """
+
+    def __init__(self, robot: int, poll: Callable[[float], bool]) -> None:
+        super().__init__(robot, lambda _controlled: self._serve(), is_recorded=False)
         self.robot: Final = robot
-        self._idle: Final = idle
-        self._listening: Final = socket.create_server((HERE, 0))
-        self._listening.setblocking(False)
-        self.port: Final[int] = self._listening.getsockname()[1]
-        self.is_met = False
-        """A client is there."""
-        self.is_back = False
-        """The robot was given back."""
+        self._poll: Final = poll
+        self._listener: Final = socket.create_server((LOOPBACK, 0))
+        self._listener.setblocking(False)
+        self.port: Final[int] = self._listener.getsockname()[1]
+        self.is_connected = False
+        """Whether a client has connected."""
+        self.is_closed = False
+        """Whether the debugger has been detached."""
 
-    def record(self, machine: Machine) -> Recording:
-        """As of any debugged robot, but that the trial is not begun again for it."""
-        self._recording = _Present(self, machine)
-        return self._recording
+    def record(self, machine: Machine) -> RobotHistory:
+        """Create the history of the robot; the world cannot go back with it."""
+        self._history = _PresentOnlyHistory(self, machine)
+        return self._history
 
     def _serve(self) -> bool:
         try:
-            while self._idle(LOOK_S):
+            while self._poll(POLL_S):
                 with suppress(BlockingIOError):
-                    connection, _ = self._listening.accept()
+                    connection, _ = self._listener.accept()
                     break
             else:
                 return True
-            self._listening.close()
+            self._listener.close()
             connection.setblocking(True)
-            self.is_met = True
+            self.is_connected = True
             with wire_over(connection) as wire:
-                Server(_Channel(wire, self._idle), lambda _arguments: self.machine, self.record).serve()
+                Server(_PollingChannel(wire, self._poll), lambda _arguments: self.machine, self.record).serve()
         finally:
             self.close()
         return True
 
     def close(self) -> None:
-        """Nobody can connect any more."""
-        self.is_back = True
-        self._listening.close()
+        """Detach the debugger: refuse further connections."""
+        self.is_closed = True
+        self._listener.close()

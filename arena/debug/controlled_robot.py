@@ -1,158 +1,78 @@
-"""A debugger on one robot of a trial: while it stands, the whole world does; nothing that is recorded can tell.
+"""Debugger control of one robot of a trial: the whole world pauses with the robot, and the record is unaffected.
 
-Two greenlets: the trial's, in which the robot lives, and the debugger's. The robot's machine runs forward only in the
-trial's, from cut to cut, so what it looks at comes from the world as always; in between the debugger decides how far.
-What the robot has been shown is kept (`Shown`), so that its past is run again in the debugger's greenlet without the
-world, which stays where it is until somebody looks at it, or changes what has been: then the trial leaves by an
-exception, is run again from its seed up to the cycle in which the robot stands, and the debugger goes on with the new
-robots, which are the old ones to the bit.
+Two greenlets take part: the trial's, in which the robot runs, and the debugger's. The machine runs forward only in the
+trial's greenlet, at most to the next end of a quantum, so all its inputs come from the world as usual. Between two such
+runs the debugger decides how far the machine may run.
+
+The inputs of the robot are logged (`InputLog`). The debugger's greenlet can therefore run the past of the robot again
+without the world, which stays in the present. If the user inspects the world of the past, or changes the past,
+`ReplayRequired` aborts the trial. The trial then runs again from its seed to the cycle of the robot. The new robots
+equal the old ones to the bit, and the debugger continues with them.
 """
 
 from __future__ import annotations
 
-from array import array
-from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import Any, Final
 
-import numpy as np
 from greenlet import getcurrent, greenlet
-from numpy.typing import NDArray
 
-from arena.robots.controller import Brain
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.debug.input_log import InputLog
+from arena.robots.controller import Controller
+from arena.robots.firmware_controller import FirmwareController
 from arena.trial.snapshot import seen
 from arena.world.physics import World
-from emu.debug.history import History, place
+from emu.debug.history import History, position
 from emu.machine.machine import Machine
 from emu.machine.stops import Stop
 
-SENSORS: Final = range(8, 16)
-"""Channels of the infrared sensors."""
 OVER: Final = "the trial is over"
 
 
-class GivenUpError(Exception):
-    """Whoever debugs wants the trial to end."""
+class TrialAbortedError(Exception):
+    """The debugger client has ended the trial before its end."""
 
 
-class AnewError(Exception):
-    """Whoever debugs wants the trial to be run again."""
+class ReplayRequired(Exception):
+    """The trial must run again from its seed, because the debugger has gone back to an earlier cycle."""
 
 
-class _Levels:
-    """Levels of sensors by cycle and channel, and the light around the robot at each: about 20 bytes for one."""
+class RobotHistory(History):
+    """History of a robot: its past runs in the machine alone, its present together with the world."""
 
-    def __init__(self) -> None:
-        self._cycles: Final = array("q")
-        self._channels: Final = array("B")
-        self._levels: Final = array("q")
-        self._which: Final = array("L")
-        self._lights: Final[list[bytes]] = []
-        """Each that was different from the one before."""
-
-    def add(self, cycle: int, channel: int, level: int, light: bytes) -> None:
-        """The latest. What was later than that has never been."""
-        while self._cycles and self._cycles[-1] > cycle:
-            for column in (self._cycles, self._channels, self._levels, self._which):
-                column.pop()
-        if not self._lights or self._lights[-1] != light:
-            self._lights.append(light)
-        self._cycles.append(cycle)
-        self._channels.append(channel)
-        self._levels.append(level)
-        self._which.append(len(self._lights) - 1)
-
-    def find(self, cycle: int, channel: int) -> tuple[int, bytes] | None:
-        """Level and light, if there was one."""
-        for at in range(bisect_left(self._cycles, cycle), bisect_right(self._cycles, cycle)):
-            if self._channels[at] == channel:
-                return self._levels[at], self._lights[self._which[at]]
-        return None
-
-
-class Shown:
-    """What a robot has been shown of the world, by cycle; told again when its past is run again."""
-
-    def __init__(self, machine: Machine) -> None:
-        self.keeps = True
-        """False: what is shown from now on is not run again."""
-        self._events: Final = machine.events
-        self._ir: Final = machine.board.ir
-        self._lines: Final[dict[int, NDArray[np.uint8]]] = {}
-        self._levels: Final = _Levels()
-        camera, sources = machine.board.camera, machine.board.chip.adc.source
-        camera.sample(partial(self._pixels, camera.sampled))
-        for channel in SENSORS:
-            sources[channel] = partial(self._level, channel, sources[channel])
-
-    def _pixels(
-        self, ask: Callable[[int, NDArray[np.intp], int], NDArray[np.uint8]], y: int, columns: NDArray[np.intp],
-        cycle: int,
-    ) -> NDArray[np.uint8]:  # fmt: skip
-        if self._events.quiet:
-            shown = self._lines.get(cycle)
-            return shown if shown is not None else np.zeros((len(columns), 3), np.uint8)  # a way it never went
-        shown = ask(y, columns, cycle)
-        if self.keeps:
-            self._lines[cycle] = shown
-        return shown
-
-    def _level(self, channel: int, ask: Callable[[int], int], cycle: int) -> int:
-        """A sensor's level; what the board keeps of the light around it changes with the answer."""
-        lights = self._ir.reflection, self._ir.ambient
-        if self._events.quiet:
-            found = self._levels.find(cycle, channel)
-            if found is None:  # a way it never went
-                return 0
-            level, light = found
-            half = len(light) // 2
-            for around, kept in zip(lights, (light[:half], light[half:]), strict=True):
-                around[:] = memoryview(kept).cast("B").cast(around.format)
-            return level
-        level = ask(cycle)
-        if self.keeps:
-            self._levels.add(cycle, channel, level, b"".join(around.tobytes() for around in lights))
-        return level
-
-
-class Recording(History):
-    """A robot's history: its past by itself, its present with the world."""
-
-    def __init__(self, debugged: Debugged, machine: Machine) -> None:
+    def __init__(self, controlled: ControlledRobot, machine: Machine) -> None:
         super().__init__(machine)
-        self._debugged: Final = debugged
+        self._controlled: Final = controlled
 
     @property
-    def frozen(self) -> str:
-        return self._debugged.frozen
+    def read_only_reason(self) -> str:
+        return self._controlled.read_only_reason
 
-    def parted(self) -> None:
-        """The robot is left alone until `met`."""
-        self._ended = self.machine.snapshot()
+    def suspend(self) -> None:
+        """Remember the state of the machine: the trial runs without the debugger until `resume`."""
+        self._last_state = self.machine.snapshot()
         self.end = self.machine.cycle
 
-    def met(self) -> None:
-        """Something may have been done to it meanwhile."""
-        self._notice()
+    def resume(self) -> None:
+        """Record what the trial has changed in the machine since `suspend`."""
+        self._detect_change()
 
-    def _run_on(self, cycle: int) -> Stop | None:
+    def _advance_present(self, cycle: int) -> Stop | None:
         machine, stop = self.machine, None
         while stop is None and machine.cycle < cycle:
-            stop = self._debugged.live(lambda limit: machine.run_until(min(cycle, limit)))
+            stop = self._controlled.run_in_trial(lambda limit: machine.run_until(min(cycle, limit)))
         return stop
 
-    def _step_on(self) -> Stop | None:
-        """A sleep is slept from cut to cut."""
+    def _step_present(self) -> Stop | None:
+        """Step once in the present; a sleeping CPU sleeps on over the ends of quanta until an interrupt wakes it."""
         machine, stepped = self.machine, False
-        before = place(machine)
+        before = position(machine)
 
-        def one(limit: int) -> Stop | None:
+        def step(limit: int) -> Stop | None:
             nonlocal stepped
-            stop = machine.approach(limit)
-            entered = stepped = place(machine) != before
+            stop = machine.service_boundary(limit)
+            entered = stepped = position(machine) != before
             if entered or stop is not None or machine.cycle >= limit:
                 return stop or machine.run_until(machine.cycle if entered else limit)
             stepped = True
@@ -160,125 +80,132 @@ class Recording(History):
 
         stop = None
         while stop is None and not stepped:
-            stop = self._debugged.live(one)
+            stop = self._controlled.run_in_trial(step)
         return stop
 
     @contextmanager
-    def _silence(self) -> Iterator[None]:
-        self.machine.pins.flush()  # what waits to be told is told while it counts
-        with self.machine.board.motors.unremembered(), super()._silence():
+    def _replaying(self) -> Iterator[None]:
+        self.machine.pins.flush()  # pending pin changes belong to the present and must be reported in it
+        with self.machine.board.motors.history_paused(), super()._replaying():
             yield
 
 
-class Debugged:
-    """Robot number `robot` of a trial, run as `debugger` says: called in a greenlet of its own when the robot gets
-    power, it makes a recording by `record`, and whether it comes back true the trial goes on without it. With `keeps`
-    the trial is recorded, and must not be changed.
+class ControlledRobot:
+    """Robot number `robot` of a trial, controlled by `debugger`; the `RobotControl` of its firmware controller.
 
-    Whoever runs the trial lets it `meet` world and robots first, and begins it again when that ends in AnewError.
+    `debugger` is called in a greenlet of its own when the robot is switched on. It creates a history with `record`. If
+    it returns true, the trial continues without it; if it returns false, `TrialAbortedError` ends the trial. With
+    `is_recorded` the trial is recorded, and the debugger must not change it.
+
+    The runner of the trial calls `attach` with world and robots first. When the trial ends in `ReplayRequired`, the
+    runner starts it again.
     """
 
-    def __init__(self, robot: int, debugger: Callable[[Debugged], bool], keeps: bool) -> None:
-        self.keeps: Final = keeps
-        self.frozen: Final = "the trial is being recorded: leave out --out to change it" if keeps else ""
-        self._number: Final = robot
-        self._debugger: Final = greenlet(lambda _begins: debugger(self))
+    def __init__(self, robot: int, debugger: Callable[[ControlledRobot], bool], is_recorded: bool) -> None:
+        self.is_recorded: Final = is_recorded
+        self.read_only_reason: Final = "the trial is being recorded: omit --out to change it" if is_recorded else ""
+        self._robot: Final = robot
+        self._debugger: Final = greenlet(lambda _first_stop: debugger(self))
 
-    def meet(self, world: World, brains: Sequence[Brain]) -> None:
-        """A trial begins, for the first time or again. Raises ValueError if the robot has no firmware."""
-        brain = brains[self._number]
-        if not isinstance(brain, EmulatedBrain):
-            raise ValueError(f"--robot {self._number}: it has no firmware, its brain is scripted")
-        self._world, self._brains = world, brains
-        self._let_run_natively(False)
-        self.machine = brain.machine
-        self._shown = Shown(self.machine)
+    def attach(self, world: World, controllers: Sequence[Controller]) -> None:
+        """Take control of the robot in a new or repeated trial. Raises ValueError if the robot has no firmware."""
+        controller = controllers[self._robot]
+        if not isinstance(controller, FirmwareController):
+            raise ValueError(f"--robot {self._robot}: it has no firmware, its brain is scripted")
+        self._world, self._controllers, self._controller = world, controllers, controller
+        self._set_native(False)
+        self.machine = controller.machine
+        self._inputs = InputLog(self.machine)
         self._trial: greenlet | None = None
-        """Where the trial goes on; none before the robot gets power."""
+        """Greenlet of the trial; None before the robot is switched on."""
         self._is_over = False
-        self._recording: Recording | None = None
+        self._history: RobotHistory | None = None
         self._last = self._limit = 0
         self._cuts: list[int] = []
-        self._ended: Stop | None = None
-        self._plain = self.machine.run_past
-        machine = vars(self.machine)
-        machine["run_past"], machine["end_at_cut"] = self._run_past, self._end_at_cut
-        machine["cuts_so_far"] = lambda: self._cuts
+        self._final_stop: Stop | None = None
+        """Stop after which the robot does not run again, for example a fault."""
+        controller.control = self
 
-    # In the debugger's greenlet
+    # Called in the debugger's greenlet
 
-    def record(self, machine: Machine) -> Recording:
-        """The recording of what the debugger does."""
-        self._recording = Recording(self, machine)
-        self._recording.around = self
-        return self._recording
+    def record(self, machine: Machine) -> RobotHistory:
+        """Create the history in which the debugger moves."""
+        self._history = RobotHistory(self, machine)
+        self._history.environment = self
+        return self._history
 
-    def live(self, act: Callable[[int], Stop | None]) -> Stop | None:
-        """Let the robot do `act(limit)` in its own greenlet, and the world follow."""
+    def run_in_trial(self, act: Callable[[int], Stop | None]) -> Stop | None:
+        """Call `act(limit)` in the trial's greenlet, then let the world follow. Return the stop, if there was one."""
         if self._is_over or self._trial is None:
             return Stop("limit", self.machine.pc, self.machine.cycle, OVER)
         stop: Stop | None = self._trial.switch(act)
         return stop
 
     @property
-    def keeps_moments(self) -> bool:
-        """As `Around.keeps_moments`."""
+    def has_checkpoints(self) -> bool:
+        """As `Environment.has_checkpoints`."""
         return False
 
-    def anew(self, cycle: int, left: Any) -> Machine:
-        """The trial begins again; the robot as it gets power."""
+    def rewind(self, cycle: int, session_state: Any) -> Machine:
+        """Run the trial again from its seed; return the new machine of the robot when it is switched on."""
         assert self._trial is not None
-        self._trial.switch(_begin_again)
+        self._trial.switch(_request_replay)
         return self.machine
 
-    def pass_by(self, near: int | None = None) -> None:
-        """As `Around.pass_by`: nothing is kept."""
+    def offer_checkpoint(self, near: int | None = None) -> None:
+        """As `Environment.offer_checkpoint`: takes no checkpoint."""
 
     @property
     def is_over(self) -> bool:
-        """Whether the trial is."""
+        """Whether the trial is over."""
         return self._is_over
 
     @property
-    def is_left(self) -> bool:
-        """Whether the debugger has left."""
+    def is_detached(self) -> bool:
+        """Whether the debugger has detached from the robot."""
         return bool(self._debugger.dead)
 
-    def seen(self) -> list[tuple[str, str]]:
-        """Where everything is, and what the robots are at."""
-        return seen(self._world, self._brains, self._number)
+    def describe(self) -> list[tuple[str, str]]:
+        """Return names and values that describe the world and its robots."""
+        return seen(self._world, self._controllers, self._robot)
 
-    # In the trial's greenlets
+    # Called in the trial's greenlets
 
-    def over(self) -> bool:
-        """The trial is over: what is left is to look at the robot, and back. Whether the debugger has ever seen it.
-        Raises AnewError."""
+    def finish(self) -> bool:
+        """Let the debugger inspect the robot after the end of the trial; return whether it ever had the robot.
+
+        Raises ReplayRequired if the debugger goes back to an earlier cycle."""
         self._is_over = True
-        if self._recording is not None:
-            self._recording.met()
+        if self._history is not None:
+            self._history.resume()
         if self._debugger and not self._debugger.dead:
             self._trial = self._debugger.parent = getcurrent()
             self._debugger.switch(Stop("limit", self.machine.pc, self.machine.cycle, OVER))
             if not self._debugger.dead:
-                raise AnewError
-        return self.is_left
+                raise ReplayRequired
+        return self.is_detached
 
-    def _let_run_natively(self, is_native: bool) -> None:
-        """Whether compiled code runs all robots, or Python does (`EmulatedBrain.is_native`)."""
-        for brain in self._brains:
-            if isinstance(brain, EmulatedBrain):
-                brain.is_native = is_native
+    def _set_native(self, is_native: bool) -> None:
+        """Select whether native code or Python runs the robots (`FirmwareController.is_native`)."""
+        for controller in self._controllers:
+            if isinstance(controller, FirmwareController):
+                controller.is_native = is_native
 
-    def _end_at_cut(self) -> None:
+    def end_at_cut(self) -> None:
+        """As `RobotControl.end_at_cut`."""
         self._last = min(self._last, self._limit)
 
-    def _run_past(self, first: int, period: int, last: int, cuts: list[int]) -> Stop | None:
-        """As `Machine.run_past`, in steps of the debugger's."""
+    def cuts_so_far(self) -> list[int]:
+        """As `RobotControl.cuts_so_far`."""
+        return self._cuts
+
+    def run_past(self, first: int, period: int, last: int, cuts: list[int]) -> Stop | None:
+        """As `RobotControl.run_past`, in steps that the debugger chooses."""
         machine, began = self.machine, len(cuts)
         self._trial, self._cuts, self._last = getcurrent(), cuts, last
         self._debugger.parent = self._trial
-        if self._recording is not None:
-            self._recording.met()
+        if self._history is not None:
+            self._history.resume()
         stop = None
         while True:
             self._limit = first + period * (len(cuts) - began)
@@ -287,32 +214,31 @@ class Debugged:
                 continue
             if stop is None and machine.cycle >= self._last:
                 break
-            ended = stop is not None and not (stop.reason == "breakpoint" and not stop.detail)
+            is_final = stop is not None and not (stop.reason == "breakpoint" and not stop.detail)
             act = self._debugger.switch(stop)
             if self._debugger.dead:
                 self._release(act)
-                return stop if ended else self._plain(self._limit, period, self._last, cuts)
-            if act is _begin_again:
-                raise AnewError
-            if ended:
-                self._ended = stop
+                return stop if is_final else machine.run_past(self._limit, period, self._last, cuts)
+            if act is _request_replay:
+                raise ReplayRequired
+            if is_final:
+                self._final_stop = stop
                 break
             stop = act(min(self._limit, self._last))
             machine.pins.flush()
-        if self._recording is not None:
-            self._recording.parted()
-        return self._ended
+        if self._history is not None:
+            self._history.suspend()
+        return self._final_stop
 
-    def _release(self, goes_on: bool) -> None:
-        """The debugger has left."""
-        self._let_run_natively(True)
-        for name in ("run_past", "end_at_cut", "cuts_so_far"):
-            del vars(self.machine)[name]
-        self._recording, self._shown.keeps = None, False
-        if not goes_on:
-            raise GivenUpError
+    def _release(self, continues: bool) -> None:
+        """Return the control to the machine after the debugger has detached; abort the trial unless it `continues`."""
+        self._set_native(True)
+        self._controller.control = self.machine
+        self._history, self._inputs.is_recording = None, False
+        if not continues:
+            raise TrialAbortedError
 
 
-def _begin_again(_limit: int) -> Stop | None:
-    """What the debugger's greenlet says instead of what the robot is to do."""
-    raise AnewError
+def _request_replay(_limit: int) -> Stop | None:
+    """Marker that the debugger's greenlet passes instead of a run: the trial must run again."""
+    raise ReplayRequired

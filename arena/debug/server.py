@@ -1,8 +1,19 @@
-"""A trial with a debugger on one of its robots, in a process of its own that can be copied: the moments of it.
+"""Process of a trial with a debugger on one of its robots; forks checkpoints to which the whole trial can go back.
 
-In: a plan, messages of the Debug Adapter Protocol on a line. Out: answers and, between them, lines to copies of this
-process, asleep at moments to which the whole trial can go back (moments.py). Whoever holds the other end
-(debugsession.py) keeps them; a copy that is woken goes on with what the session has left to it, and this process ends.
+The process exchanges tagged tuples with the client's process (`arena/debug/session.py`) over a pipe. Protocol messages
+of the client arrive as they are.
+
+| sent | meaning |
+|---|---|
+| `ready`, `waits` count | the server was started; it waits for a message and has received `count` |
+| `says` message | message of the Debug Adapter Protocol for the client |
+| `checkpoint` cycle, with a pipe | a checkpoint was forked at this cycle of the robot |
+| `rewind` cycle, count | the trial must go back; the reply `(True,)` announces that a checkpoint will continue |
+| `leaves` state, messages | state and unread messages for this checkpoint; the process ends |
+| `left`, `alive` | the client has disconnected; the trial continues without it |
+| `recorded` trial, `over` fault, had robot, `failed` error | end of the trial |
+
+A checkpoint blocks until it receives `("fork",)`, which asks for a fork of itself, or `("resume", state, count)`.
 """
 
 from __future__ import annotations
@@ -17,179 +28,190 @@ from queue import SimpleQueue
 from typing import Any, Final
 
 from arena.campaign.campaign import Plan, run_one
-from arena.debug.controlled_robot import AnewError, Debugged
+from arena.debug.controlled_robot import ControlledRobot, ReplayRequired
 from arena.scene.loader import FCY
-from arena.trial.checkpoints import CAN_COPY, Copies, GoneError, Line
+from arena.trial.checkpoints import CAN_COPY, PipeClosedError, PipeEnd, ProcessForker
 from emu.dap.server import Server
 from emu.dap.wire import Message
-from emu.debug.environment import WokenError
+from emu.debug.environment import CheckpointResumedError
 from emu.machine.machine import Machine
 
 NEAR: Final = FCY // 10
-"""Cycles before the time to which the trial goes back: a moment is kept there, so that the next step back is quick."""
-OF_ONE_ROBOT: Final = ("board", "selector", "camera", "engine", "strict")
-"""Launch arguments that `emu debug` has and a trial has not."""
+"""Cycles before the target of a rewind at which a checkpoint is forked, so that the next step back is fast."""
+SINGLE_ROBOT_ARGUMENTS: Final = ("board", "selector", "camera", "engine", "strict")
+"""Launch arguments of `emu debug` that a robot of a trial does not have."""
 
 
-class _Inbox(SimpleQueue[Message | None]):
-    """Messages that come along a line."""
+class _PipeInbox(SimpleQueue[Message | None]):
+    """Messages of the client that arrive on a pipe."""
 
-    def __init__(self, line: Line) -> None:
-        self.line = line
-        self.taken = 0
-        """Messages that have been taken out so far."""
-        self._untaken: deque[Message | None] = deque()
+    def __init__(self, pipe: PipeEnd) -> None:
+        self.pipe = pipe
+        self.count = 0
+        """Messages that `get` has returned."""
+        self._pending: deque[Message | None] = deque()
 
     def empty(self) -> bool:
-        return not self._untaken and not self.line.is_ready(0)
+        return not self._pending and not self.pipe.is_ready(0)
 
     def get(self, block: bool = True, timeout: float | None = None) -> Message | None:
         if self.empty():
-            self.line.send(("waits", self.taken))
-        message: Message | None = self._untaken.popleft() if self._untaken else self.line.receive()[0]
-        self.taken += 1
+            self.pipe.send(("waits", self.count))
+        message: Message | None = self._pending.popleft() if self._pending else self.pipe.receive()[0]
+        self.count += 1
         return message
 
     def decision(self) -> Any:
-        """What is told next that is no message; those wait."""
-        while not isinstance(told := self.line.receive()[0], tuple):
-            self._untaken.append(told)
-        return told
+        """Return the next tuple from the pipe; queue the messages that arrive before it."""
+        while not isinstance(received := self.pipe.receive()[0], tuple):
+            self._pending.append(received)
+        return received
 
-    def left(self) -> list[Message | None]:
-        """Those that wait."""
-        return [*self._untaken]
+    def pending(self) -> list[Message | None]:
+        """Return the messages that `get` has not returned."""
+        return [*self._pending]
 
 
-class _Channel:
-    """What the server talks over."""
+class _PipeChannel:
+    """Channel of the protocol server: the client is at the other end of a pipe."""
 
-    def __init__(self, line: Line) -> None:
-        self.inbox: Final = _Inbox(line)
+    def __init__(self, pipe: PipeEnd) -> None:
+        self.inbox: Final = _PipeInbox(pipe)
 
     def send(self, message: Message) -> None:
-        """To the client."""
-        self.inbox.line.send(("says", message))
+        """Send a message to the client."""
+        self.inbox.pipe.send(("says", message))
 
 
-class Kept(Debugged):
-    """Robot number `robot` of a trial, debugged by who is at the other end of `line`."""
+class CheckpointedRobot(ControlledRobot):
+    """Robot number `robot` of a trial, controlled by the client at the other end of `pipe`.
 
-    def __init__(self, robot: int, line: Line, is_recorded: bool, every_s: float) -> None:
-        super().__init__(robot, lambda _debugged: self._serve(), keeps=is_recorded)
-        self.channel: Final = _Channel(line)
-        self._every: Final = every_s * FCY
-        self._copies: Final = Copies()
-        self._kept_at: int | None = None
-        """Cycle of the robot at the last moment that was kept."""
+    A checkpoint of the process is forked every `every_s` simulated seconds.
+    """
 
-    def tell(self, *what: Any, end: Line | None = None) -> None:
-        """To the other end. Raises GoneError."""
-        self.channel.inbox.line.send(what, end)
+    def __init__(self, robot: int, pipe: PipeEnd, is_recorded: bool, every_s: float) -> None:
+        super().__init__(robot, lambda _controlled: self._serve(), is_recorded)
+        self.channel: Final = _PipeChannel(pipe)
+        self._interval: Final = every_s * FCY
+        self._forker: Final = ProcessForker()
+        self._checkpoint_cycle: int | None = None
+        """Cycle of the robot at the last checkpoint."""
+
+    def send(self, *what: Any, end: PipeEnd | None = None) -> None:
+        """Send a tuple to the client's process. Raises PipeClosedError."""
+        self.channel.inbox.pipe.send(what, end)
 
     def _serve(self) -> bool:
-        self.tell("ready")
-        server = Server(self.channel, self._launched, self.record)
+        self.send("ready")
+        server = Server(self.channel, self._launch, self.record)
         server.serve()
-        self.tell("left")
-        return self.keeps and not server.ends_all
+        self.send("left")
+        return self.is_recorded and not server.terminate_debuggee
 
-    def _launched(self, arguments: dict[str, Any]) -> Machine:
-        for name in OF_ONE_ROBOT:
+    def _launch(self, arguments: dict[str, Any]) -> Machine:
+        for name in SINGLE_ROBOT_ARGUMENTS:
             if name in arguments:
                 raise ValueError(f"`{name}` is for a robot alone; in a swarm the scene says it: --set KEY=VALUE")
         return self.machine
 
     @property
-    def keeps_moments(self) -> bool:
-        """As `Around.keeps_moments`."""
+    def has_checkpoints(self) -> bool:
+        """As `Environment.has_checkpoints`."""
         return CAN_COPY
 
-    def pass_by(self, near: int | None = None) -> None:
-        """As `Around.pass_by`. Once the trial is over nothing more is kept: its end is near."""
-        cycle, last = self.machine.cycle, self._kept_at
-        is_due = last is None or cycle - last >= self._every
+    def offer_checkpoint(self, near: int | None = None) -> None:
+        """As `Environment.offer_checkpoint`. After the end of the trial the last checkpoint is near enough."""
+        cycle, last = self.machine.cycle, self._checkpoint_cycle
+        is_due = last is None or cycle - last >= self._interval
         if near is not None and last is not None and not is_due:
             is_due = near - cycle <= NEAR < (cycle - last) // 2
         if is_due and CAN_COPY and not self.is_over:
-            self._kept_at = cycle
-            self._keep()
+            self._checkpoint_cycle = cycle
+            self._checkpoint()
 
-    def anew(self, cycle: int, left: Any) -> Machine:
-        """A copy of this process takes over, if there is one; otherwise the trial begins again."""
+    def rewind(self, cycle: int, session_state: Any) -> Machine:
+        """End this process in favour of a checkpoint; without a checkpoint, run the trial again from its seed."""
         inbox = self.channel.inbox
-        self.tell("back", cycle, inbox.taken)
-        (is_woken,) = inbox.decision()
-        if is_woken:
-            self.tell("leaves", left, inbox.left())
+        self.send("rewind", cycle, inbox.count)
+        (has_checkpoint,) = inbox.decision()
+        if has_checkpoint:
+            self.send("leaves", session_state, inbox.pending())
             os._exit(0)
-        self._kept_at = None
-        return super().anew(cycle, left)
+        self._checkpoint_cycle = None
+        return super().rewind(cycle, session_state)
 
-    def _keep(self) -> None:
-        """Copy this process. In the copy, sleep until it is told to copy itself or go on: then WokenError is raised."""
-        line, is_copy = self._copied()
-        if not is_copy:
-            if line is not None:
-                self.tell("kept", self.machine.cycle, end=line)
-                line.drop()
+    def _checkpoint(self) -> None:
+        """Fork a checkpoint. The checkpoint blocks until it is resumed; then it raises WokenError."""
+        pipe, is_fork = self._fork()
+        if not is_fork:
+            if pipe is not None:
+                self.send("checkpoint", self.machine.cycle, end=pipe)
+                pipe.drop()
             return
-        assert line is not None
-        self.channel.inbox.line.drop()
+        assert pipe is not None
+        self.channel.inbox.pipe.drop()
         try:
-            while True:
-                word, *told = line.receive()[0]
-                if word == "go on":
-                    break
-                again, is_copy = self._copied()
-                if is_copy:
-                    assert again is not None
-                    line.drop()
-                    line = again
-                    continue
-                line.send(again is not None, again)
-                if again is not None:
-                    again.drop()
-        except GoneError:
-            os._exit(0)  # nobody will go back to here; what this process would clean up is not its own
-        left, self.channel.inbox.taken = told
-        self.channel.inbox.line = line
-        raise WokenError(left)
+            pipe, state, count = self._await_resume(pipe)
+        except PipeClosedError:
+            os._exit(0)  # the checkpoint was discarded; a forked process must not run the exit handlers of its parent
+        self.channel.inbox.count, self.channel.inbox.pipe = count, pipe
+        raise CheckpointResumedError(state)
 
-    def _copied(self) -> tuple[Line | None, bool]:
+    def _await_resume(self, pipe: PipeEnd) -> tuple[PipeEnd, Any, int]:
+        """Block in a checkpoint until it is resumed, forking it on request.
+
+        Return its pipe, the state of the session, and the number of messages that the session has received."""
+        while True:
+            command, *arguments = pipe.receive()[0]
+            if command == "resume":
+                state, count = arguments
+                return pipe, state, count
+            other, is_fork = self._fork()
+            if is_fork:
+                assert other is not None
+                pipe.drop()
+                pipe = other
+                continue
+            pipe.send(other is not None, other)
+            if other is not None:
+                other.drop()
+
+    def _fork(self) -> tuple[PipeEnd | None, bool]:
         try:
-            return self._copies.make()
+            return self._forker.make()
         except OSError:
             return None, False
 
 
 def serve(end: socket.socket, plan: Plan, robot: int, folder: Path, is_recorded: bool, every_s: float) -> None:
-    """Run `plan`'s trial into `folder`, one of its robots in the hands of who is at the other end of a line. The last
-    that is told is what it raised, or that it is over."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who debugs
-    debugged = Kept(robot, Line(end), is_recorded, every_s)
-    with suppress(GoneError):
+    """Run the trial of `plan` into `folder` with a debugger on `robot`, whose client is at the other end of a pipe.
+
+    The last tuple sent is `over`, or `failed` with the exception that ended the trial."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the client's process handles Ctrl-C
+    controlled = CheckpointedRobot(robot, PipeEnd(end), is_recorded, every_s)
+    with suppress(PipeClosedError):
         try:
-            debugged.tell("over", *_ran(debugged, plan, folder))
-        except GoneError:
+            controlled.send("over", *_run(controlled, plan, folder))
+        except PipeClosedError:
             raise
         except Exception as error:
-            debugged.tell("failed", error)
-    os._exit(0)  # what a copy would clean up is not its own
+            controlled.send("failed", error)
+    os._exit(0)  # a forked process must not run the exit handlers of its parent
 
 
-def _ran(debugged: Kept, plan: Plan, folder: Path) -> tuple[bool, bool]:
-    """Run it until it is over and the debugger has left; whether something happened to a robot, and whether the
-    debugger has ever had its own."""
+def _run(controlled: CheckpointedRobot, plan: Plan, folder: Path) -> tuple[bool, bool]:
+    """Run the trial until it is over and the debugger has detached.
+
+    Return whether a robot had a fault, and whether the debugger ever had its robot."""
 
     def progress(_trial: int, _seconds: float) -> None:
-        if debugged.is_left:
-            debugged.tell("lives")  # to notice that nobody waits for it any more
+        if controlled.is_detached:
+            controlled.send("alive")  # raises PipeClosedError when the client's process has ended
 
     while True:
         try:
-            done = run_one(plan, 1, folder, progress, meet=debugged.meet)
-            debugged.tell("recorded", done)
-            return bool(done.faults), debugged.over()
-        except AnewError:
+            finished = run_one(plan, 1, folder, progress, on_start=controlled.attach)
+            controlled.send("recorded", finished)
+            return bool(finished.faults), controlled.finish()
+        except ReplayRequired:
             continue

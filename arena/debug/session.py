@@ -1,7 +1,7 @@
-"""A debugged trial as seen by who debugs: its process, the moments of it that are kept, and the messages in between.
+"""Client side of a debugged trial: its process, its checkpoints, and the messages between client and server.
 
-Back means: wake the copy of the process that sleeps at the latest moment before, tell it what the session has left, and
-talk to it from now on. Without one the trial begins again from its seed, where it is.
+A rewind resumes the checkpoint with the latest time before its target. The process that had run further hands over the
+state of the session and ends. Without a checkpoint, the trial runs again from its seed in the same process.
 """
 
 from __future__ import annotations
@@ -11,172 +11,180 @@ from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, Final
 
-from arena.campaign.campaign import Done, Plan
+from arena.campaign.campaign import FinishedTrial, Plan
 from arena.debug.server import serve
 from arena.scene.loader import FCY
-from arena.trial.checkpoints import EVERY_S, PATIENCE_S, GoneError, Moment, Moments, context, line
+from arena.trial.checkpoints import EVERY_S, PATIENCE_S, Checkpoint, CheckpointPool, PipeClosedError, context, pipe
 from arena.trial.record import RecordError
 from emu.dap.wire import Channel, Message, Wire
 
-LOOK_S: Final = 0.05
-"""For which what the trial says is waited for before it is looked whether the user wants it to stand."""
+POLL_S: Final = 0.05
+"""Longest time, in seconds, between two looks at the client's inbox while the server is busy."""
 
 
-class Session:
-    """`plan`'s trial, recorded in `folder` if `is_recorded`, when its `robot` has got power; or it is over. A
-    moment is kept every so many simulated seconds. `close` ends it.
+class DebugSession:
+    """Trial of `plan` with a debugger on `robot`; in `folder` it is recorded if `is_recorded`.
 
-    Raises what making the trial raises: SceneError, emu.LoadError, ValueError for a robot without firmware.
+    The constructor returns when the robot is switched on, or the trial is over. A checkpoint is forked every `every_s`
+    simulated seconds. `close` ends the trial.
+
+    Raises what creating the trial raises: SceneError, emu.LoadError, ValueError for a robot without firmware.
     """
 
     def __init__(self, plan: Plan, robot: int, folder: Path, is_recorded: bool, every_s: float = EVERY_S) -> None:
         self._lock: Final = Lock()
-        self._moments: Final = Moments()
-        self._line, there = line()
+        self._checkpoints: Final = CheckpointPool()
+        self._pipe, there = pipe()
         arguments = there.end, plan, robot, folder, is_recorded, every_s
         self._process: Final = context().Process(target=serve, args=arguments, daemon=True)
         self._process.start()
         there.drop()
         self._sent = 0
         """Messages of the client so far."""
-        self.done: Done | None = None
-        """The trial, once it was over for the first time."""
-        self.is_over = self.is_left = False
-        """The trial has ended for good; nobody debugs it any more."""
-        self.has_fault = self.had_robot = False
-        """Something happened to a robot; the debugger has had its own."""
+        self.finished: FinishedTrial | None = None
+        """The trial, after its first end; a rewind may follow."""
+        self.is_over = False
+        """Whether the trial has ended for good."""
+        self.is_detached = False
+        """Whether the debugger has detached from the robot."""
+        self.has_fault = False
+        """Whether a robot had a fault."""
+        self.had_robot = False
+        """Whether the debugger ever had its robot."""
         try:
-            while not self.is_over and self.hear() != ("ready",):
+            while not self.is_over and self.receive() != ("ready",):
                 pass
         except BaseException:
             self.close()
             raise
 
-    def tell(self, message: Message | None) -> None:
-        """What the client says; None if it has gone."""
-        with self._lock, suppress(GoneError):
-            self._line.send(message)
+    def send(self, message: Message | None) -> None:
+        """Send a message of the client to the server; None if the client has disconnected."""
+        with self._lock, suppress(PipeClosedError):
+            self._pipe.send(message)
             self._sent += 1
 
-    def hear(self) -> tuple[Any, ...]:
-        """What the trial tells next: a word and what belongs to it. Raises what has ended it, RecordError if its
-        process was killed."""
+    def receive(self) -> tuple[Any, ...]:
+        """Process and return the next tuple from the trial's process (see `arena/debug/server.py`).
+
+        Raises the exception that ended the trial, and RecordError if its process was killed."""
         try:
-            told, end = self._line.receive()
-            match told:
-                case ("kept", cycle):
+            received, end = self._pipe.receive()
+            match received:
+                case ("checkpoint", cycle):
                     assert end is not None
-                    self._moments.add(Moment(cycle, cycle / FCY, end))
-                case ("back", cycle, taken):
-                    self._back(cycle, taken)
-                case ("recorded", done):
-                    self.done = self.done or done
+                    self._checkpoints.add(Checkpoint(cycle, cycle / FCY, end))
+                case ("rewind", cycle, count):
+                    self._rewind(cycle, count)
+                case ("recorded", finished):
+                    self.finished = self.finished or finished
                 case ("left",):
-                    self.is_left = True
+                    self.is_detached = True
                 case ("over", has_fault, had_robot):
-                    self.is_left = self.is_over = True
+                    self.is_detached = self.is_over = True
                     self.has_fault, self.had_robot = has_fault, had_robot
                 case ("failed", error):
-                    self.is_left = self.is_over = True
+                    self.is_detached = self.is_over = True
                     raise error
-        except GoneError:
-            raise RecordError("the process of the trial has ended before it was told to") from None
-        return tuple(told)
+        except PipeClosedError:
+            raise RecordError("the process of the trial ended unexpectedly") from None
+        return tuple(received)
 
-    def attend(self, wire: Wire) -> None:
-        """Carry messages between a client and the trial until the client has left."""
+    def relay(self, wire: Wire) -> None:
+        """Relay messages between a client and the server until the client disconnects."""
 
-        def carry() -> None:
+        def forward() -> None:
             while (message := wire.inbox.get()) is not None:
-                self.tell(message)
-            self.tell(None)
+                self.send(message)
+            self.send(None)
 
-        Thread(target=carry, daemon=True).start()
-        while not self.is_left:
-            word, *told = self.hear()
+        Thread(target=forward, daemon=True).start()
+        while not self.is_detached:
+            word, *rest = self.receive()
             if word == "says":
-                wire.send(told[0])
+                wire.send(rest[0])
 
     def finish(self) -> None:
-        """Let the trial go on to its end without a debugger."""
+        """Run the trial to its end without a debugger."""
         while not self.is_over:
-            self.hear()
+            self.receive()
 
     def close(self) -> None:
-        """End the trial."""
-        self._moments.forget(-1)
-        self._line.close()
+        """End the trial and its process."""
+        self._checkpoints.forget(-1)
+        self._pipe.close()
         self._process.join(PATIENCE_S)
 
     @property
     def process_id(self) -> int:
-        """Of the process in which the trial began; it ends when a copy of it takes over."""
+        """Process in which the trial was started; it ends when a checkpoint continues instead."""
         assert self._process.pid is not None
         return self._process.pid
 
     @property
-    def kept(self) -> int:
-        """Moments that can be gone back to at once."""
-        return len(self._moments)
+    def checkpoint_count(self) -> int:
+        """Number of checkpoints that exist now."""
+        return len(self._checkpoints)
 
-    def has_taken(self, count: int) -> bool:
-        """Whether that is how many messages it was sent."""
+    def has_received(self, count: int) -> bool:
+        """Whether `count` is the number of messages that the client has sent."""
         return count == self._sent
 
     def is_ready(self, wait: float) -> bool:
-        """Whether it has something to tell, or has so within so many seconds."""
-        return self._line.is_ready(wait)
+        """Whether a tuple from the trial's process has arrived, or arrives within `wait` seconds."""
+        return self._pipe.is_ready(wait)
 
-    def _back(self, cycle: int, taken: int) -> None:
-        """It is to go on from a moment before `cycle`, having taken so many messages."""
-        self._moments.forget(cycle)
-        while (moment := self._moments.before(cycle)) is not None:
-            self._moments.pop(moment)
-            with suppress(GoneError):
-                moment.line.send(("copy",))
-                again = moment.line.receive()[1]
-                if again is not None:
-                    self._moments.add(moment._replace(line=again))
+    def _rewind(self, cycle: int, count: int) -> None:
+        """Continue from the latest checkpoint before `cycle`; the server has received `count` messages."""
+        self._checkpoints.forget(cycle)
+        while (checkpoint := self._checkpoints.before(cycle)) is not None:
+            self._checkpoints.pop(checkpoint)
+            with suppress(PipeClosedError):
+                checkpoint.pipe.send(("fork",))
+                fork = checkpoint.pipe.receive()[1]
+                if fork is not None:
+                    self._checkpoints.add(checkpoint._replace(pipe=fork))
                 break
         with self._lock:
-            self._line.send((moment is not None,))
-            if moment is None:
+            self._pipe.send((checkpoint is not None,))
+            if checkpoint is None:
                 return
-            (_, left, untaken), _ = self._line.receive()
-            gone, self._line = self._line, moment.line
-            self._line.send(("go on", left, taken))
-            for message in untaken:
-                self._line.send(message)
-        gone.close()
+            (_, state, pending), _ = self._pipe.receive()
+            abandoned, self._pipe = self._pipe, checkpoint.pipe
+            self._pipe.send(("resume", state, count))
+            for message in pending:
+                self._pipe.send(message)
+        abandoned.close()
 
 
-class Remote:
-    """The server of a session's trial, for a client here that waits for its answers (`emu.prompt`)."""
+class RemoteServer:
+    """Server of a session's trial for a client in this process that waits for each response (`emu.prompt`)."""
 
-    def __init__(self, session: Session, client: Channel) -> None:
+    def __init__(self, session: DebugSession, client: Channel) -> None:
         self._session: Final = session
         self._client: Final = client
 
     @property
     def is_over(self) -> bool:
-        """The client has left."""
-        return self._session.is_left
+        """Whether the client has disconnected."""
+        return self._session.is_detached
 
-    def answer(self, message: Message) -> None:
-        """Respond to one request; comes back when the machine stands again. What the client puts into its inbox
-        meanwhile is sent too."""
+    def handle_request(self, message: Message) -> None:
+        """Send one request and return when the machine is paused again.
+
+        Messages that the client puts into its inbox meanwhile are sent too."""
         session, inbox = self._session, self._client.inbox
-        session.tell(message)
-        while not session.is_left:
-            if not session.is_ready(LOOK_S):
+        session.send(message)
+        while not session.is_detached:
+            if not session.is_ready(POLL_S):
                 while not inbox.empty():
-                    session.tell(inbox.get())
+                    session.send(inbox.get())
                 continue
-            word, *told = session.hear()
+            word, *rest = session.receive()
             if word == "says":
-                self._client.send(told[0])
-            elif word == "waits" and session.has_taken(told[0]):
+                self._client.send(rest[0])
+            elif word == "waits" and session.has_received(rest[0]):
                 return
 
-    def leave(self) -> None:
-        """It gives the robot back by itself."""
+    def release(self) -> None:
+        """Do nothing: the server detaches from the robot by itself."""

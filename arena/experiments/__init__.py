@@ -1,9 +1,10 @@
-"""Experiments: what is measured, and what a supervisor does. What enters: a name or the path of a Python file; what
-leaves: an `Experiment`, which drives run, compare, plot, report and replay.
+"""Experiments: the metrics of a trial, and the functions of its supervisor.
 
-A file defines `metrics(sample)` and, where it wants them, `CURVES`, `MEASURES`, `PUBLISHED`, `groups(scene, objects)`,
-and of a supervisor `init(world)`, `step(world)`, `done(world)`. `clustering.py` here is an example with everything but
-a supervisor. Modules of the entry point `openswarm.experiments` are found by their name.
+`experiment_of` loads an experiment by name, or from the path of a Python file. The file must define `metrics(sample)`
+and `CURVES`. It may define `MEASURES`, `PUBLISHED`, `groups(scene, objects)`, and the functions of a supervisor:
+`init(world)`, `step(world)` and `done(world)`. `builtin/clustering.py` is an example without a supervisor,
+`builtin/foraging.py` one with a supervisor. Installed packages register modules under the entry point
+`openswarm.experiments`.
 """
 
 from __future__ import annotations
@@ -23,19 +24,21 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from arena.metrics import Course
+from arena.metrics import MetricSeries
 from arena.scene.loader import Scene, SceneError
 
 FOLDER: Final = Path(__file__).parent / "builtin"
 PLAIN: Final = "plain"
-"""What scenes are measured by that name no experiment."""
+"""Experiment of scenes that do not name one."""
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A metric over time. `scale` turns it into `unit` for people; `best` is the value nothing can exceed;
-    `reference` a published value and where it is from, drawn as a line."""
+    """Definition of a metric over time.
+
+    `scale` converts a value to `unit`. `best` is the largest possible value. `reference` is a published value and its
+    source, which figures show as a line."""
 
     name: str
     label: str
@@ -45,7 +48,7 @@ class Curve:
     reference: tuple[float, str] | None = None
 
     def shown(self, value: float) -> str:
-        """A value in its unit."""
+        """Return a value as text in its unit."""
         scaled = value * self.scale
         digits = 0 if abs(scaled) >= 100 or self.unit == "%" else 1 if abs(scaled) >= 10 else 2
         return f"{scaled:.{digits}f}{f' {self.unit}' if self.unit else ''}"
@@ -53,19 +56,20 @@ class Curve:
 
 @dataclass(frozen=True)
 class Measure:
-    """One number of a trial: `of(course, at)`, `at` the time in s that was asked for. Two runs are equivalent in it if
-    they differ by less than `margin`, None: by less than 10 % of the second run's mean."""
+    """Definition of one number per trial: `of(series, at)`, where `at` is the requested time in s.
+
+    Two runs are equivalent if they differ by less than `margin`; None stands for 10 % of the second run's mean."""
 
     name: str
     label: str
-    of: Callable[[Course, float], float]
+    of: Callable[[MetricSeries, float], float]
     margin: float | None = None
     best: float | None = None
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One moment of a trial: robots n x 3 (cm, cm, rad), objects n x 2 (cm), what the supervisor noted."""
+    """One sample of a trial: robots n x 3 (cm, cm, rad), objects n x 2 (cm), and the supervisor's numbers."""
 
     t: float
     robots: Floats
@@ -74,8 +78,8 @@ class Sample:
     noted: Mapping[str, float]
 
 
-class Said(NamedTuple):
-    """A line that a robot wrote to UART1; its first byte began to leave after `seconds` of the trial."""
+class UartLine(NamedTuple):
+    """A line that a robot sent on UART1; transmission of the first byte started at `seconds`."""
 
     robot: int
     seconds: float
@@ -83,20 +87,20 @@ class Said(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Moments:
-    """All samples of a trial at once: `robots` is samples x n x 3, `objects` samples x n x 2."""
+class TrialSamples:
+    """All samples of a trial: `robots` is samples x n x 3 (cm, cm, rad), `objects` samples x n x 2 (cm)."""
 
     times: Floats
     robots: Floats
     objects: Floats
     scene: Scene
     noted: Mapping[str, Floats]
-    said: Sequence[Said] = ()
-    """What robots wrote to UART1, in its order."""
+    uart_lines: Sequence[UartLine] = ()
+    """Lines that the robots sent on UART1, in order of time."""
 
 
 def _nothing(_world: Any) -> None:
-    """A supervisor that lets things happen."""
+    """Do nothing: default of `init` and `step`."""
 
 
 def _never(_world: Any) -> bool:
@@ -109,57 +113,54 @@ def _alone(_scene: Scene, objects: Floats) -> list[int]:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is measured, and what a supervisor does. `groups` tells which objects belong together, for their colours."""
+    """Metrics of a trial, and the functions of its supervisor.
+
+    `groups` returns a group number per object, by which pages and figures colour the objects."""
 
     name: str
     curves: tuple[Curve, ...]
     measures: tuple[Measure, ...]
-    all_curves: Callable[[Moments], Mapping[str, Floats]]
+    all_curves: Callable[[TrialSamples], Mapping[str, Floats]]
     published: str = ""
     groups: Callable[[Scene, Floats], list[int]] = _alone
     init: Callable[[Any], None] = _nothing
     step: Callable[[Any], None] = _nothing
     done: Callable[[Any], bool] = _never
     digest: str = field(default="", compare=False)
-    """SHA-256 of the file, if it does not come along with the arena."""
+    """SHA-256 of the file; empty for a built-in experiment."""
 
     @property
     def has_supervisor(self) -> bool:
-        """Whether anything is done during a trial."""
+        """Whether the experiment defines a function of a supervisor."""
         return (self.init, self.step, self.done) != (_nothing, _nothing, _never)
 
     @property
     def has_groups(self) -> bool:
-        """Whether objects can belong together."""
+        """Whether the experiment groups objects."""
         return self.groups is not _alone
 
-    def course(self, moments: Moments) -> Course:
-        """The metrics of a trial over time. Raises SceneError if the experiment fails or returns something else."""
+    def series(self, samples: TrialSamples) -> MetricSeries:
+        """Return the metrics of a trial over time. Raises SceneError if the experiment fails."""
         try:
-            found = self.all_curves(moments)
+            found = self.all_curves(samples)
             values = {one.name: np.asarray(found[one.name], dtype=float) for one in self.curves}
         except (Exception, SystemExit) as error:
             raise SceneError(f"experiment {self.name}: metrics: {type(error).__name__}: {error}") from error
-        wrong = [name for name, one in values.items() if one.shape != moments.times.shape]
+        wrong = [name for name, one in values.items() if one.shape != samples.times.shape]
         if wrong:
             raise SceneError(f"experiment {self.name}: metrics {', '.join(wrong)}: expected one number per sample")
-        return Course(moments.times, values)
-
-    def curve(self, name: str) -> Curve:
-        """A curve by its name. Raises KeyError."""
-        return next(one for one in self.curves if one.name == name)
+        return MetricSeries(samples.times, values)
 
 
 def experiment_of(name: str, folder: Path = Path()) -> Experiment:
-    """The experiment of that name, or of the Python file at a path (relative to `folder`). Raises SceneError."""
+    """Return the experiment called `name`, or of the Python file `name` relative to `folder`. Raises SceneError."""
     if name.endswith(".py"):
         return _of_file((folder / name).resolve())
     return _of_name(name)
 
 
 def experiment_file(name: str, folder: Path) -> Path | None:
-    """The file of an experiment that does not come along; None for one that does. Raises SceneError as
-    `experiment_of`."""
+    """Return the file of a user's experiment; None for a built-in or installed one. Raises SceneError."""
     experiment_of(name, folder)
     return (folder / name).resolve() if name.endswith(".py") else None
 
@@ -173,16 +174,16 @@ def _of_name(name: str) -> Experiment:
             module = point.load()
             return _experiment(name, module, _digest(Path(str(module.__file__))))
     known = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem[0] != "_")
-    raise SceneError(f"there is no experiment {name!r}; known: {', '.join(known)}, or the path of a .py file")
+    raise SceneError(f"unknown experiment {name!r}; known: {', '.join(known)}, or the path of a .py file")
 
 
 @cache
 def _of_file(path: Path) -> Experiment:
     spec = importlib.util.spec_from_file_location(f"arena_experiment_{_name(path)}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise SceneError(f"{path}: there is no such experiment file")
+        raise SceneError(f"{path}: no such experiment file")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[module.__name__] = module  # dataclasses look their module up
+    sys.modules[module.__name__] = module  # dataclasses look up their module here
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
@@ -200,7 +201,7 @@ def _digest(path: Path) -> str:
 
 
 def _line_in(path: Path, error: BaseException) -> int | None:
-    """The last line of the file that led to an error."""
+    """Return the last line of the file in the traceback of an error; None if the file is not in it."""
     line, trace = None, error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == str(path):
@@ -213,12 +214,10 @@ def _experiment(name: str, module: ModuleType, digest: str) -> Experiment:
     metrics: Any = getattr(module, "metrics", None)
     whole = getattr(module, "all_curves", None)
     if whole is None and not callable(metrics):
-        raise SceneError(
-            f"{module.__file__}: an experiment needs a function metrics(sample), which returns numbers by name"
-        )
+        raise SceneError(f"{module.__file__}: an experiment must define metrics(sample), which returns numbers by name")
     curves = tuple(getattr(module, "CURVES", ()))
     if not curves:
-        raise SceneError(f"{module.__file__}: CURVES names the metrics: CURVES = [Curve('name', 'what people read')]")
+        raise SceneError(f"{module.__file__}: an experiment must define its metrics: CURVES = [Curve('name', 'label')]")
     measures = tuple(getattr(module, "MEASURES", ())) or tuple(map(_at, curves))
     hooks = {hook: getattr(module, hook) for hook in ("groups", "init", "step", "done") if hasattr(module, hook)}
     return Experiment(name, curves, measures, whole or _one_by_one(metrics), getattr(module, "PUBLISHED", ""),
@@ -226,15 +225,15 @@ def _experiment(name: str, module: ModuleType, digest: str) -> Experiment:
 
 
 def _at(curve: Curve) -> Measure:
-    """A curve's value at the time asked for."""
-    return Measure(curve.name, f"{curve.label} at {{at:g}} s", lambda course, at: course.at(at, curve.name),
+    """Return the default measure of a curve: its value at the requested time."""
+    return Measure(curve.name, f"{curve.label} at {{at:g}} s", lambda series, at: series.at(at, curve.name),
                    best=curve.best)  # fmt: skip
 
 
-def _one_by_one(metrics: Callable[[Sample], Mapping[str, float]]) -> Callable[[Moments], Mapping[str, Floats]]:
-    """All curves by asking for each sample."""
+def _one_by_one(metrics: Callable[[Sample], Mapping[str, float]]) -> Callable[[TrialSamples], Mapping[str, Floats]]:
+    """Return a function that calls `metrics` for each sample and collects the curves."""
 
-    def curves(all_of: Moments) -> Mapping[str, Floats]:
+    def curves(all_of: TrialSamples) -> Mapping[str, Floats]:
         found: dict[str, list[float]] = {}
         for index, t in enumerate(all_of.times):
             noted = {name: float(values[index]) for name, values in all_of.noted.items()}
@@ -247,5 +246,5 @@ def _one_by_one(metrics: Callable[[Sample], Mapping[str, float]]) -> Callable[[M
 
 
 def names(experiments: Sequence[Experiment]) -> str:
-    """Of several, for people."""
+    """Return the names of some experiments, separated by commas."""
     return ", ".join(sorted({one.name for one in experiments}))

@@ -1,7 +1,7 @@
-"""What a supervisor of an experiment may do: look, move things, tell robots something, note numbers, end a trial.
+"""Supervisor of a trial: reads and changes the world, sends messages to robots, records numbers, ends the trial.
 
-An experiment's `init`, `step` and `done` get a `Stage`. Everything it does belongs to the trial: the same seed gives
-the same bytes, for any number of processes.
+The functions `init`, `step` and `done` of an experiment receive a `Supervisor`. Its actions are part of the trial, and
+equal seeds give equal records.
 """
 
 from __future__ import annotations
@@ -13,74 +13,78 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arena.experiments import Experiment
-from arena.robots.controller import Brain
+from arena.robots.controller import Controller
 from arena.scene.loader import Scene, SceneError
 from arena.world.physics import STREAM_EXPERIMENT, World, generator
 
 STEP_S: Final = 0.1
-"""Between two calls of `step`, at the end of the nearest quantum."""
+"""Simulated seconds between two calls of `step`, each at the end of the nearest quantum."""
 T = TypeVar("T")
 
 
-class Stage:
-    """A running trial in the hands of its supervisor. `rng` is its own; `memory` is for what it wants to keep."""
+class Supervisor:
+    """Access of an experiment to its running trial.
 
-    def __init__(self, world: World, brains: Sequence[Brain], seed: int) -> None:
+    `rng` is a random generator for the experiment, and `memory` holds its own state."""
+
+    def __init__(self, world: World, controllers: Sequence[Controller], seed: int) -> None:
         self._world: Final = world
-        self._brains: Final = brains
+        self._controllers: Final = controllers
         self.rng: Final = generator(seed, STREAM_EXPERIMENT)
         self.memory: Final[dict[str, Any]] = {}
         self.noted: Final[dict[str, float]] = {}
-        """Numbers by name, recorded with every sample as columns `n_NAME`."""
+        """Numbers by name; every sample of the record stores them as columns `n_NAME`."""
 
     @property
     def scene(self) -> Scene:
-        """What the trial is made in."""
+        """Scene of the trial."""
         return self._world.scene
 
     @property
     def seconds(self) -> float:
-        """Time since the start."""
+        """Simulated seconds since the start."""
         return self._world.seconds
 
     @property
     def ticks(self) -> int:
-        """Quanta that are over."""
+        """Number of completed quanta."""
         return self._world.ticks
 
     def seconds_at(self, tick: int) -> float:
-        """Time after so many quanta."""
+        """Return the simulated seconds after `tick` quanta."""
         return self._world.seconds_at(tick)
 
     @property
     def robots(self) -> NDArray[np.float64]:
-        """n x 3: cm, cm, rad."""
+        """Poses of the robots, n x 3: x and y in cm, heading in rad."""
         return np.array(self._world.poses.robots, dtype=float).reshape(-1, 3)
 
     @property
     def objects(self) -> NDArray[np.float64]:
-        """n x 2, cm."""
+        """Centres of the objects, n x 2, in cm."""
         return self._world.object_places()
 
     def note(self, name: str, value: float) -> None:
-        """Set a number. Raises SceneError for a name that was not noted in `init`: a record's columns do not grow."""
+        """Record a number under a name.
+
+        Raises SceneError for a name that `init` has not noted, because the columns of a record are fixed."""
         if self._world.ticks and name not in self.noted:
-            raise SceneError(f"note {name!r}: names are noted in init first")
+            raise SceneError(f"note {name!r}: init must note every name first")
         self.noted[name] = float(value)
 
     def move_object(self, number: int, x_cm: float, y_cm: float) -> None:
-        """Put an object somewhere else, at rest. Raises SceneError outside the walls, IndexError for one not there."""
+        """Place an object at rest at a position. Raises SceneError outside the walls, IndexError for a wrong number."""
         self._check(x_cm, y_cm)
         self._world.move(self._world.objects[number], x_cm, y_cm)
 
     def move_robot(self, number: int, x_cm: float, y_cm: float, heading: float | None = None) -> None:
-        """Put a robot somewhere else, as a hand would; heading in rad. Raises as `move_object`."""
+        """Place a robot at a position, with `heading` in rad if given. Raises as `move_object`."""
         self._check(x_cm, y_cm)
         self._world.move(self._world.robots[number], x_cm, y_cm, heading)
 
     def tell(self, robot: int, text: str) -> None:
-        """Send a robot something by Bluetooth. A script does not listen."""
-        self._brains[robot].tell(text.encode("latin-1"))
+        """Send text to a robot by Bluetooth. A scripted robot ignores it."""
+        self._controllers[robot].feed_uart(text.encode("latin-1"))
 
     def _check(self, x: float, y: float) -> None:
         arena = self.scene.arena
@@ -88,31 +92,31 @@ class Stage:
             raise SceneError(f"({x:g}, {y:g}) cm is outside the walls")
 
 
-class Supervised:
-    """An experiment's supervisor at work on a stage; does nothing where there is none."""
+class SupervisorHooks:
+    """Calls the supervisor functions of an experiment at their times; does nothing without such functions."""
 
-    def __init__(self, experiment: Experiment | None, stage: Stage) -> None:
+    def __init__(self, experiment: Experiment | None, supervisor: Supervisor) -> None:
         self._experiment: Final = experiment if experiment is not None and experiment.has_supervisor else None
-        self.stage: Final = stage
+        self.supervisor: Final = supervisor
         self._steps = 1
         if self._experiment is not None:
             self._call("init", self._experiment.init)
 
     def is_due(self, tick: int) -> bool:
-        """Whether there is something to do after so many quanta."""
-        return self._experiment is not None and self.stage.seconds_at(tick) >= self._steps * STEP_S - 1e-9
+        """Whether `step` is due after `tick` quanta."""
+        return self._experiment is not None and self.supervisor.seconds_at(tick) >= self._steps * STEP_S - 1e-9
 
-    def is_over(self) -> bool:
-        """After a quantum: step if it is time to; whether the trial is done."""
-        if self._experiment is None or not self.is_due(self.stage.ticks):
+    def step(self) -> bool:
+        """Call `step` and `done` if they are due after the present quantum; return whether the trial is done."""
+        if self._experiment is None or not self.is_due(self.supervisor.ticks):
             return False
         self._steps += 1
         self._call("step", self._experiment.step)
         return bool(self._call("done", self._experiment.done))
 
-    def _call(self, name: str, hook: Callable[[Stage], T]) -> T:
+    def _call(self, name: str, hook: Callable[[Supervisor], T]) -> T:
         try:
-            return hook(self.stage)
+            return hook(self.supervisor)
         except SceneError:
             raise
         except (Exception, SystemExit) as error:

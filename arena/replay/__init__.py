@@ -1,1 +1,1 @@
-"""Recorded and running trials for people: replay page, video, filmstrip, live feed and their HTTP server."""
+"""Presentation of recorded and running trials: replay page, video, filmstrip, live feed and HTTP request handler."""

@@ -1,7 +1,4 @@
-"""One robot's way through a trial as a strip of pictures, and as a log: what its camera shows, how its wheels turn.
-
-What enters: a recorded trial; what leaves: a figure and lines of text. `arena plot --film` writes both.
-"""
+"""Filmstrip of one robot of a recorded trial: pictures and a log of its camera and wheels (`arena plot --film`)."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 
 from arena.camera.appearance import COLOURS, NAMES, OBJECT, ROBOT, WALL
 from arena.camera.reference import WINDOW_COLUMNS
-from arena.replay.page import samples_of
+from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
 from arena.scene import dimensions
 from arena.trial.record import Trial
@@ -23,15 +20,17 @@ from arena.trial.record import Trial
 PICTURES: Final = 6
 LINES: Final = 20
 VIEW_CM: Final = 60.0
-"""Half of a picture's side."""
+"""Half of the side of a picture, in cm."""
 CHANGE_CM_S: Final = 2.0
-"""Wheels that differ by more have another command: one step more or less in the 10 ms they are counted over is 1.28."""
+"""Least difference of wheel speeds, in cm/s, that counts as a new command.
+
+One step more or less in the 10 ms in which steps are counted is 1.28 cm/s."""
 _FACES: Final = {OBJECT: "tab:red", ROBOT: "tab:green"}
 
 
-def changes(trial: Trial, robot: int) -> list[int]:
-    """Samples at which the wheels have begun to turn differently, by the smoothed command of both wheels."""
-    speeds = wheels(trial, robot)
+def command_changes(trial: Trial, robot: int) -> list[int]:
+    """Return the samples at which the commanded speed of a wheel changes."""
+    speeds = wheel_speeds(trial, robot)
     found = [0]
     for sample in range(1, len(speeds)):
         if np.abs(speeds[sample] - speeds[found[-1]]).max() > CHANGE_CM_S:
@@ -39,14 +38,16 @@ def changes(trial: Trial, robot: int) -> list[int]:
     return found
 
 
-def wheels(trial: Trial, robot: int) -> NDArray[np.float64]:
-    """Commanded speeds, samples x (left, right), cm/s."""
+def wheel_speeds(trial: Trial, robot: int) -> NDArray[np.float64]:
+    """Return the commanded speeds in cm/s: samples x (left, right)."""
     return np.column_stack([trial.columns[f"r{robot}_left"], trial.columns[f"r{robot}_right"]])
 
 
-def shown(strip: bytes) -> str:
-    """What a camera strip shows where the firmware's sensor looks: the first of object, robot, wall that any of its
-    columns is nearest to in colour."""
+def strip_content(strip: bytes) -> str:
+    """Return what a camera strip shows in the window of the firmware's sensor.
+
+    Each column counts as the class of the nearest colour. The result is the first of object, robot and wall that a
+    column shows."""
     if not strip:
         return "nothing yet"
     pixels = np.frombuffer(strip, np.uint8).reshape(-1, 3).astype(int)
@@ -58,22 +59,23 @@ def shown(strip: bytes) -> str:
     return next((NAMES[kind] for kind in kinds if kind in seen), "nothing yet")
 
 
-def log(trial: Trial, robot: int) -> list[str]:
-    """A line per change, at most LINES: time, what the camera's line shows, wheel speeds in mm/s, front LED."""
-    speeds = wheels(trial, robot)
+def log_lines(trial: Trial, robot: int) -> list[str]:
+    """Return at most LINES lines, one per change of command: time, camera, wheel speeds in mm/s, front LED."""
+    speeds = wheel_speeds(trial, robot)
     lines = []
-    for sample in changes(trial, robot)[:LINES]:
+    for sample in command_changes(trial, robot)[:LINES]:
         left, right = 10 * speeds[sample]
         leds = int(trial.columns[f"r{robot}_leds"][sample])
-        lines.append(f"{trial.times[sample]:7.2f} s  camera {shown(trial.columns[f'r{robot}_strip'][sample]):11}  "
+        content = strip_content(trial.columns[f"r{robot}_strip"][sample])
+        lines.append(f"{trial.times[sample]:7.2f} s  camera {content:11}  "
                      f"wheels {left:4.0f} {right:4.0f} mm/s  front LED {'on' if leds >> 8 & 1 else 'off'}")  # fmt: skip
     return lines
 
 
-def film(trial: Trial, robot: int) -> Figure:
-    """Pictures from above around the robot at its first changes, with the line its camera sent below each."""
-    chosen = changes(trial, robot)[:PICTURES]
-    data = samples_of(trial)
+def draw_filmstrip(trial: Trial, robot: int) -> Figure:
+    """Draw the surroundings of the robot at its first changes of command, each with its camera line."""
+    chosen = command_changes(trial, robot)[:PICTURES]
+    data = sample_data(trial)
     figure = Figure(figsize=(2.2 * PICTURES, 3.0), layout="constrained")
     grid = figure.subplots(2, PICTURES, squeeze=False, height_ratios=(6, 1))
     for column in range(PICTURES):
@@ -86,7 +88,7 @@ def film(trial: Trial, robot: int) -> Figure:
             continue
         sample = chosen[column]
         _from_above(above, trial, data, robot, sample)
-        left, right = 10 * wheels(trial, robot)[sample]
+        left, right = 10 * wheel_speeds(trial, robot)[sample]
         above.set_title(f"{trial.times[sample]:.1f} s: {left:.0f}, {right:.0f} mm/s", fontsize=8)
         strip = np.frombuffer(base64.b64decode(data["robots"][robot]["strip"][sample]), np.uint8)
         below.imshow(strip.reshape(1, -1, 3) if strip.size else np.zeros((1, STRIP_PIXELS, 3), np.uint8), aspect="auto")

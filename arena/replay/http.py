@@ -1,4 +1,4 @@
-"""How the pages' servers answer: one response at a time, to this machine alone, without a word on the terminal."""
+"""HTTP request handler of the page servers: replies to this machine only, without messages on the terminal."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any, Final
 
 from arena.trial.json_numbers import json_text
 
-HERE: Final = "127.0.0.1"
-"""The only address that is listened on."""
+LOOPBACK: Final = "127.0.0.1"
+"""The only address on which the servers listen."""
 
 
-class Answer(BaseHTTPRequestHandler):
-    """One request."""
+class RequestHandler(BaseHTTPRequestHandler):
+    """Base class of the handlers of HTTP requests."""
 
     def send(self, status: int, kind: str, text: str) -> None:
-        """The whole response; a browser that has gone to another page meanwhile does not matter."""
+        """Send a response of media type `kind`; ignore that the browser has closed the connection."""
         body = text.encode()
         with suppress(ConnectionError):
             self.send_response(status)
@@ -27,16 +27,16 @@ class Answer(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def send_page(self, text: str) -> None:
-        """A page."""
+        """Send an HTML page."""
         self.send(200, "text/html; charset=utf-8", text)
 
     def send_json(self, value: Any) -> None:
-        """A value."""
+        """Send a value as JSON."""
         self.send(200, "application/json", json_text(value))
 
-    def send_words(self, status: int, words: str) -> None:
-        """Why it is not what was asked for."""
-        self.send(status, "text/plain", words)
+    def send_error_text(self, status: int, text: str) -> None:
+        """Send an error status with its reason as plain text."""
+        self.send(status, "text/plain", text)
 
     def log_message(self, form: str, *arguments: object) -> None:
-        """Quiet."""
+        """Suppress the log line that the base class writes for each request."""

@@ -1,6 +1,6 @@
-"""A trial that is still going on: rows in a file beside its place, one JSON line each, and whoever follows them.
+"""Live feed of a running trial: a file with one JSON line per row, and a reader for the live page.
 
-The file is there only while the trial runs. Nothing depends on it: a disk too full for it does not stop the trial.
+The file exists only while the trial runs. A failed write, for example on a full disk, does not stop the trial.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from typing import Any, BinaryIO
 
 from filelock import FileLock, Timeout
 
-from arena.replay.page import page, samples_of
+from arena.replay.page import page, sample_data
 from arena.trial.record import RecordError, Trial, checked, read_trial
 
 
 def live_path(folder: Path, number: int) -> Path:
-    """Where the rows of a running trial are, counted from 1."""
+    """Return the path of the live file of trial `number`, counted from 1."""
     return folder / f"trial-{number:04d}.live"
 
 
 def _lock(path: Path) -> FileLock:
-    """Held while a trial runs: the system gives it free when its process is killed."""
+    """Return the lock that the writer holds; the system releases the lock of a killed process."""
     return FileLock(path.with_name(path.name + ".lock"), timeout=0, thread_local=False)
 
 
 class LiveFile:
-    """Writes: first what the trial is, then its rows."""
+    """Writer of a live file: first the metadata of the trial, then its rows."""
 
     def __init__(self, path: Path, about: dict[str, Any]) -> None:
         self._path = path
         self._file: BinaryIO | None = None
         self._end_at = 0
-        """Where the next row begins. Behind it is only what a process wrote that was further than this copy of it."""
+        """Offset of the next row. After a rewind, later bytes are rows of the process that had run further."""
         self._lock = _lock(path)
         with suppress(OSError, Timeout):
             self._lock.acquire()
@@ -42,7 +42,7 @@ class LiveFile:
         self.write(about)
 
     def write(self, row: dict[str, Any]) -> None:
-        """One line; after the first that fails no more are tried."""
+        """Write one line; do nothing after a write has failed."""
         if self._file is None:
             return
         try:
@@ -55,7 +55,7 @@ class LiveFile:
             self._end()
 
     def close(self) -> None:
-        """The trial is over, one way or the other."""
+        """Delete the file and release its lock, at the end of the trial or after an exception."""
         self._end()
         held = self._lock.is_locked
         self._lock.release()
@@ -72,7 +72,9 @@ class LiveFile:
 
 
 class Follower:
-    """Reads what there is of a trial of a run: the newest running one, or `number`. Raises RecordError if none is."""
+    """Reader of the rows of a running trial: number `number`, or the newest one.
+
+    Raises RecordError if no such trial is running."""
 
     def __init__(self, folder: Path, number: int | None = None) -> None:
         running = [live_path(folder, number)] if number is not None else list(folder.glob("trial-*.live"))
@@ -86,16 +88,15 @@ class Follower:
         self._finished: Trial | None = None
 
     def page(self) -> str:
-        """A page with all samples so far, which asks for more."""
+        """Return a page with all samples so far, which polls for new ones."""
         self._catch_up()
         return page(self._trial(0), live=True)
 
     def more(self, first: int) -> dict[str, Any]:
-        """Samples from `first` on. `state`: running, done, or gone (the run was ended before the trial was done, by
-        whatever means)."""
+        """Return the samples from number `first` on, and the state: `running`, `done`, or `aborted` before the end."""
         state = self._catch_up()
         samples = len(self._finished.times) if self._finished is not None else len(self._rows)
-        found = samples_of(self._trial(first)) if samples > first else {}
+        found = sample_data(self._trial(first)) if samples > first else {}
         return found | {"state": state}
 
     def _catch_up(self) -> str:
@@ -108,7 +109,7 @@ class Follower:
         except OSError:
             whole = self._path.with_suffix(".parquet")
             if not whole.exists():
-                return "gone"
+                return "aborted"
             self._finished = read_trial(whole)
             return "done"
         complete = text[: text.rfind("\n") + 1]
@@ -118,26 +119,26 @@ class Follower:
                 self._about = checked(self._path, json.loads(line))
             else:
                 self._rows.append(_decoded(json.loads(line)))
-        return "running" if self._is_written() else "gone"
+        return "running" if self._is_written() else "aborted"
 
     def _is_written(self) -> bool:
-        """Whether the process that writes the file is still alive, or has just finished it."""
+        """Whether the writer of the file is still running, or has just finished the trial."""
         try:
             with _lock(self._path):
                 return not self._path.exists() or self._path.with_suffix(".parquet").exists()
         except Timeout:
             return True
         except OSError:
-            return True  # a folder one may not write to: nothing can be told
+            return True  # without write access to the folder the lock cannot be tested
 
     def _trial(self, first: int) -> Trial:
-        """The samples from `first` on."""
+        """Return the samples from number `first` on as a trial."""
         whole = self._finished
         if whole is not None:
             return Trial(whole.path, {name: values[first:] for name, values in whole.columns.items()}, whole.about)
         rows = self._rows[first:]
         if not rows:
-            raise RecordError(f"{self._path}: nothing is recorded yet; try again in a moment")
+            raise RecordError(f"{self._path}: no sample is recorded yet; try again in a moment")
         return Trial(self._path, {name: [row[name] for row in rows] for name in rows[0]}, self._about)
 
 

@@ -1,7 +1,7 @@
-"""A trial as one HTML page that opens from disk: top view, play, scrub, speed, LEDs, camera strips, clusters, log.
+"""Replay page: one HTML file that shows a trial from above, with LEDs, camera strips, curves, clusters and log.
 
-The page's data is a JSON block (`id="trial"`) of the very values of the record; `page.html` draws it. A page that
-follows a running trial asks its server (`live.py`) for more of the same.
+The data is a JSON block (`id="trial"`) with the values of the record; `page.html` draws it. The page of a running trial
+polls its server for new samples (`arena/replay/live_feed.py`, `arena/commands/studio.py`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from arena.camera.appearance import colours_of
-from arena.camera.renderer import Sight
+from arena.camera.renderer import Renderer
 from arena.robots.controller import STRIP_COLUMNS, STRIP_PIXELS
 from arena.scene import dimensions
 from arena.scene.loader import Scene
@@ -29,15 +29,17 @@ _STRIP: Final = np.arange(STRIP_PIXELS) * len(STRIP_COLUMNS) // STRIP_PIXELS + S
 
 
 def page(trial: Trial, live: bool = False, studio: dict[str, Any] | None = None) -> str:
-    """The page's text; `live`: it asks where it came from for more; `studio`: what it needs to take the trial in hand
-    there (commands/studio.py)."""
-    data = head_of(trial) | samples_of(trial) | {"live": live, "studio": studio}
+    """Return the text of the page of a trial.
+
+    With `live` the page polls its server for new samples. `studio` holds the data with which it sends commands
+    (arena/commands/studio.py)."""
+    data = trial_data(trial) | sample_data(trial) | {"live": live, "studio": studio}
     text = json_text(data, separators=(",", ":")).replace("</", "<\\/")
     return TEMPLATE.read_text(encoding="utf-8").replace(PLACE, text)
 
 
-def head_of(trial: Trial) -> dict[str, Any]:
-    """What does not change during a trial."""
+def trial_data(trial: Trial) -> dict[str, Any]:
+    """Return the data of a trial that do not change with time; lengths in cm."""
     about = trial.about
     return {
         "title": f"{trial.scene.name}, {about['brain']}, controller {about['controller']}, seed {about['seed']}",
@@ -66,7 +68,7 @@ def head_of(trial: Trial) -> dict[str, Any]:
 
 
 def _css(colour: str) -> str:
-    """A colour as a camera shows it is dark: brightened for the eye."""
+    """Return a colour of the scene for CSS. Named colours are brightened: as a camera shows them they are dark."""
     red, green, blue = NAMED.get(colour) or tuple(bytes.fromhex(colour[1:]))
     brightest = max(red, green, blue, 1)
     gain = min(230 / brightest, 2.2) if colour in NAMED else 1.0
@@ -83,10 +85,10 @@ def _lamps(scene: Scene) -> list[dict[str, float]]:
     return lamps + ([{"x": scene.light.lamp_x_cm, "y": scene.light.lamp_y_cm}] if scene.light.lamp_counts else [])
 
 
-def samples_of(trial: Trial) -> dict[str, Any]:
-    """What there is per sample, as arrays over the samples, and the faults so far."""
+def sample_data(trial: Trial) -> dict[str, Any]:
+    """Return the data per sample as arrays over the samples, and the faults so far."""
     columns, objects = trial.columns, trial.objects
-    done = trial.course
+    done = trial.series
     robots = []
     for robot, (seen, strips) in enumerate(_views(trial)):
         keys = ("x", "y", "heading", "left", "right", "leds", "load")
@@ -106,8 +108,10 @@ def samples_of(trial: Trial) -> dict[str, Any]:
 
 
 def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
-    """Per robot: what its sensor's window shows, and the camera's strips. A brain that keeps its sensor to itself is
-    shown what stands before it at that moment; a script, which has no camera, gets a strip in perfect colours."""
+    """Return per robot the readings of its line-of-sight sensor and its camera strips.
+
+    If the firmware does not report its sensor, the reading is computed from the poses. A scripted robot has no camera;
+    its strip is rendered in noise-free colours."""
     scene = trial.scene
     colours = colours_of(scene)
     seed = trial.about["seed"]
@@ -118,15 +122,15 @@ def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     for robot in range(count):
         seen, strips = list(map(int, trial.columns[f"r{robot}_seen"])), list(trial.columns[f"r{robot}_strip"])
         is_script = not any(strips)
-        sight = Sight(scene, robot, traits_of(scene, seed, robot))
+        renderer = Renderer(scene, robot, traits_of(scene, seed, robot))
         for sample, (places, things) in enumerate(zip(robots, objects, strict=True)):
             if seen[sample] >= 0 and not is_script:
                 continue
             poses = Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(places)], things)
-            sight.look(poses)
+            renderer.look(poses)
             if seen[sample] < 0:
-                seen[sample] = sight.sensor()
+                seen[sample] = renderer.sensor()
             if is_script:
-                strips[sample] = colours[sight.classes(_MIDDLE_ROW, _STRIP)].tobytes()
+                strips[sample] = colours[renderer.classes(_MIDDLE_ROW, _STRIP)].tobytes()
         views.append((seen, strips))
     return views

@@ -1,4 +1,4 @@
-"""A trial as a film: GIF by Pillow alone, MP4 by an ffmpeg that is installed or came with `imageio-ffmpeg`."""
+"""Video of a trial: GIF with Pillow, MP4 with an installed ffmpeg or the one of `imageio-ffmpeg`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any, Final
 from PIL import Image, ImageDraw
 
 from arena.camera.appearance import COLOURS
-from arena.replay.page import samples_of
+from arena.replay.page import sample_data
 from arena.robots.controller import STRIP_PIXELS
 from arena.scene import dimensions
 from arena.scene.loader import Scene
@@ -25,9 +25,9 @@ from emu.host.files import atomic_file
 SCALE: Final = 1.6
 """Pixels per cm."""
 FRAMES_PER_S: Final = 12.5
-"""Of the film: GIF counts in hundredths of a second, 8 per frame."""
+"""Frame rate of the video; a frame lasts 8 of the hundredths of a second in which GIF counts."""
 LIMIT: Final = 20_000
-"""Frames; more is a mistake in --speed."""
+"""Most frames of a video; more frames are probably a mistake in --speed."""
 _LINE: Final = 14
 _PIXEL: Final = 6
 _INK, _PAPER, _PALE = (34, 34, 34), (255, 255, 255), (221, 221, 221)
@@ -35,18 +35,20 @@ _SEEN: Final = ((187, 187, 187), (204, 0, 0), (0, 136, 0))
 _CLUSTERS: Final = ((230, 140, 60), (110, 170, 230), (190, 130, 220), (240, 210, 80), (120, 200, 150), (230, 130, 160))
 
 
-def write_movie(trial: Trial, path: Path, speed: float, seconds: float | None = None) -> None:
-    """Write the film. Raises ValueError for a name that is neither .gif nor .mp4, no speed, or no ffmpeg; RecordError
-    if it cannot be written. No half of a film is left."""
+def write_video(trial: Trial, path: Path, speed: float, seconds: float | None = None) -> None:
+    """Write a video at `speed` times real time, of the first `seconds` simulated seconds.
+
+    An incomplete file is deleted. Raises ValueError for a name that is neither .gif nor .mp4, a wrong speed or
+    duration, or a missing ffmpeg; RecordError if the file cannot be written."""
     kind = path.suffix.lower()
     if kind not in (".gif", ".mp4"):
-        raise ValueError(f"--export {path}: a film is a .gif or a .mp4")
+        raise ValueError(f"--export {path}: expected a name that ends in .gif or .mp4")
     end = float(trial.times[-1]) if seconds is None else min(seconds, float(trial.times[-1]))
     if not speed > 0 or not end >= 0:
-        raise ValueError("--speed must be positive, --seconds not negative")
+        raise ValueError("--speed must be positive, --seconds must not be negative")
     count = int(end / speed * FRAMES_PER_S) + 1
     if count > LIMIT:
-        raise ValueError(f"--speed {speed:g} makes {count} frames of {end:g} s; the limit is {LIMIT}")
+        raise ValueError(f"--speed {speed:g} makes {count} frames of {end:g} s; the limit is {LIMIT} frames")
     pictures = frames(trial, [frame / FRAMES_PER_S * speed for frame in range(count)])
     try:
         with atomic_file(path) as part:
@@ -59,18 +61,18 @@ def write_movie(trial: Trial, path: Path, speed: float, seconds: float | None = 
 
 
 def frames(trial: Trial, times: list[float]) -> Iterator[Image.Image]:
-    """A picture for each time in s: arena from above, the robots' camera strips below, time and share."""
-    data = samples_of(trial)
+    """Yield a picture for each time in s: arena from above, time and metrics, camera strips."""
+    data = sample_data(trial)
     metrics = trial.experiment.curves[:2]
     sample = 0
     for time in times:
         while sample + 1 < len(data["t"]) and data["t"][sample + 1] <= time + 1e-3:
             sample += 1
-        said = "   ".join(f"{one.label} {one.shown(data['curves'][one.name][sample])}" for one in metrics)
-        yield _frame(trial.scene, data, sample, said)
+        caption = "   ".join(f"{one.label} {one.shown(data['curves'][one.name][sample])}" for one in metrics)
+        yield _frame(trial.scene, data, sample, caption)
 
 
-def _frame(scene: Scene, data: dict[str, Any], sample: int, said: str) -> Image.Image:
+def _frame(scene: Scene, data: dict[str, Any], sample: int, caption: str) -> Image.Image:
     width, height = round(scene.arena.width_cm * SCALE), round(scene.arena.height_cm * SCALE)
     rows = len(data["robots"])
     total = height + _LINE * (rows + 1) + 4
@@ -92,14 +94,14 @@ def _frame(scene: Scene, data: dict[str, Any], sample: int, said: str) -> Image.
         tip = (x + 9 * math.cos(heading)) * SCALE, height - (y + 9 * math.sin(heading)) * SCALE
         draw.line((x * SCALE, height - y * SCALE, *tip), fill=_INK, width=2)
         draw.text((x * SCALE + 8, height - y * SCALE - 14), str(number), fill=_INK)
-    draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   {said}", fill=_INK)
+    draw.text((4, height + 2), f"{data['t'][sample]:6.1f} s   {caption}", fill=_INK)
     for number in range(rows):
         _strip(draw, number, data["robots"][number], sample, height + _LINE * (number + 1) + 2)
     return image
 
 
 def _strip(draw: ImageDraw.ImageDraw, number: int, robot: dict[str, Any], sample: int, y: int) -> None:
-    """What the robot's camera sent, left to right, and which LEDs are on."""
+    """Draw the camera strip of one robot, left to right, and the names of its lit LEDs."""
     strip = base64.b64decode(robot["strip"][sample])
     draw.text((4, y), str(number), fill=_INK)
     for place in range(len(strip) // 3):
@@ -111,8 +113,7 @@ def _strip(draw: ImageDraw.ImageDraw, number: int, robot: dict[str, Any], sample
 
 
 def _palette() -> list[tuple[int, int, int]]:
-    """Every colour that is drawn, those that the things in the arena have for a camera, and ramps between them for
-    noise and smoothed edges: all frames have the same colours."""
+    """Return the palette of all frames: drawn colours, colours of the camera, and ramps for noise and smooth edges."""
     drawn = [_INK, _PAPER, _PALE, *_SEEN, *_CLUSTERS, *(tuple(map(int, colour)) for colour in COLOURS)]
     ramps = [(grey, grey, grey) for grey in range(0, 256, 8)]
     ramps += [(level, level // 6, level // 6) for level in range(8, 256, 8)]
@@ -141,9 +142,9 @@ def _mp4(pictures: Iterator[Image.Image], part: Path) -> None:
             for picture in pictures:
                 encoder.stdin.write(picture.tobytes())
             encoder.stdin.close()
-        said = encoder.stderr.read().decode(errors="replace").strip()
+        caption = encoder.stderr.read().decode(errors="replace").strip()
     if encoder.returncode:
-        raise RecordError(f"{part}: ffmpeg failed: {said}")
+        raise RecordError(f"{part}: ffmpeg failed: {caption}")
 
 
 def _ffmpeg() -> str:
@@ -152,5 +153,5 @@ def _ffmpeg() -> str:
         with suppress(ImportError):
             found = str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())
     if found is None:
-        raise ValueError("an .mp4 needs ffmpeg (Debian package ffmpeg, or pip install imageio-ffmpeg); .gif does not")
+        raise ValueError(".mp4 needs ffmpeg (Debian package ffmpeg, or pip install imageio-ffmpeg); .gif does not")
     return found

@@ -1,7 +1,7 @@
-"""A trial in a process of its own, told by others what to do, and the moments of it that are kept to go back to.
+"""Client of a `TrialSession`: starts its process, sends commands and keeps its checkpoints.
 
-In: a plan, a seed, and what is asked for (`ask` from any thread): methods of `InHand`. Back means: wake the copy of the
-process that sleeps at the latest moment before, and let it do again what is missing; without one, from the seed.
+A rewind resumes the checkpoint with the latest time before its target, and the checkpoint replays the missing part.
+Without a checkpoint, the session replays the trial from its seed.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from threading import Lock
 from typing import Any, Final, NamedTuple
 
 from arena.campaign.campaign import Plan
-from arena.studio.session import RefusedError, serve
-from arena.trial.checkpoints import PATIENCE_S, GoneError, Line, Moment, Moments, context, line
+from arena.studio.session import CommandRefusedError, serve
+from arena.trial.checkpoints import PATIENCE_S, Checkpoint, CheckpointPool, PipeClosedError, PipeEnd, context, pipe
 
 
 class Call(NamedTuple):
-    """A method of `InHand` that is wanted, and its arguments."""
+    """A command for the session: the name of a method of `TrialSession`, and its arguments."""
 
     name: str
     arguments: tuple[Any, ...] = ()
@@ -25,90 +25,94 @@ class Call(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """What came of some calls, and when that was."""
+    """Results of a batch of commands, the pipe that came with them, and the time of the trial at the reply."""
 
     results: list[Any]
-    end: Line | None
+    end: PipeEnd | None
     tick: int
     seconds: float
-    may_keep: bool
+    allows_checkpoint: bool
 
 
 class Studio:
-    """`plan`'s trial number `seed`, standing at its beginning. `close` ends it.
+    """Process that runs trial `seed` of `plan`, paused at its start. All methods may be called from any thread.
 
-    Raises what making the trial raises: SceneError, emu.LoadError.
+    Raises SceneError or emu.LoadError if the trial cannot be created.
     """
 
     def __init__(self, plan: Plan, seed: int) -> None:
         self._lock: Final = Lock()
-        self._moments: Final = Moments()
-        self._line, there = line()
+        self._checkpoints: Final = CheckpointPool()
+        self._pipe, there = pipe()
         self._process: Final = context().Process(target=serve, args=(there.end, plan, seed), daemon=True)
         self._process.start()
         there.drop()
-        self._heard(self._line)
+        self._receive(self._pipe)
 
     def ask(self, name: str, *arguments: Any, **named: Any) -> Any:
-        """The result of a method of `InHand`, at the next moment at which the world stands between two quanta, or one
-        of its robots at a breakpoint. Raises what it raises, RefusedError if the studio is closed."""
+        """Execute one command and return its result.
+
+        The session executes it between two quanta, or while a robot is at a breakpoint. Raises what the command raises,
+        and CommandRefusedError if the studio is closed."""
         return self.ask_all(Call(name, arguments, named))[0]
 
     def ask_all(self, *calls: Call) -> list[Any]:
-        """The results of some, between which nothing else happens."""
+        """Execute several commands without another one in between, and return their results."""
         with self._lock:
             try:
-                reply = (calls[0].name == "back" and self._woken(calls)) or self._told(self._line, calls)
-                if reply.may_keep and self._moments.is_due(reply.seconds):
-                    self._keep()
-            except GoneError:
-                raise RefusedError("the studio is closed") from None
+                reply = (calls[0].name == "rewind" and self._resume_checkpoint(calls)) or self._send(self._pipe, calls)
+                if reply.allows_checkpoint and self._checkpoints.is_due(reply.seconds):
+                    self._take_checkpoint()
+            except PipeClosedError:
+                raise CommandRefusedError("the studio is closed") from None
             return reply.results
 
     def close(self) -> None:
-        """End the trial."""
+        """End the trial and its process."""
         with self._lock:
-            self._moments.forget(-1)
-            self._line.close()
+            self._checkpoints.forget(-1)
+            self._pipe.close()
             self._process.join(PATIENCE_S)
 
     @property
-    def kept(self) -> int:
-        """Moments that can be gone back to at once."""
-        return len(self._moments)
+    def checkpoint_count(self) -> int:
+        """Number of checkpoints that exist now."""
+        return len(self._checkpoints)
 
-    def _told(self, to: Line, calls: Sequence[Call]) -> Reply:
+    def _send(self, to: PipeEnd, calls: Sequence[Call]) -> Reply:
         to.send([tuple(call) for call in calls])
-        return self._heard(to)
+        return self._receive(to)
 
-    def _heard(self, whom: Line) -> Reply:
-        (error, *about), end = whom.receive()
+    def _receive(self, source: PipeEnd) -> Reply:
+        (error, *about), end = source.receive()
         if error is not None:
             raise error
         return Reply(about[0], end, *about[1])
 
-    def _keep(self) -> None:
-        reply = self._told(self._line, [Call("keep")])
+    def _take_checkpoint(self) -> None:
+        reply = self._send(self._pipe, [Call("checkpoint")])
         if reply.end is not None:
-            self._moments.add(Moment(reply.tick, reply.seconds, reply.end))
+            self._checkpoints.add(Checkpoint(reply.tick, reply.seconds, reply.end))
 
-    def _woken(self, calls: Sequence[Call]) -> Reply | None:
-        """What comes of calls that begin with `back`, if a moment before is kept; none: they are yet to be done."""
-        goal = (*calls[0].arguments, *calls[0].named.values())[0]
-        (state,) = self._told(self._line, [Call("leave", (goal,))]).results
+    def _resume_checkpoint(self, calls: Sequence[Call]) -> Reply | None:
+        """Execute `calls`, of which the first is `rewind`, in the latest checkpoint before the target.
+
+        Return None, without executing them, if the target is not in the past or there is no checkpoint."""
+        target = (*calls[0].arguments, *calls[0].named.values())[0]
+        (state,) = self._send(self._pipe, [Call("rewind_state", (target,))]).results
         if state is None:
-            return None  # it is yet to come
-        self._moments.forget(goal)
-        while (moment := self._moments.before(goal)) is not None:
-            self._moments.pop(moment)
-            with suppress(GoneError):
-                again = self._told(moment.line, [Call("keep", (state,))])
+            return None
+        self._checkpoints.forget(target)
+        while (checkpoint := self._checkpoints.before(target)) is not None:
+            self._checkpoints.pop(checkpoint)
+            with suppress(PipeClosedError):
+                reply = self._send(checkpoint.pipe, [Call("checkpoint", (state,))])
                 break
         else:
             return None
-        left, self._line = self._line, moment.line
-        left.close()
-        if again.end is not None:
-            self._moments.add(moment._replace(line=again.end))
-        reply = self._told(self._line, calls[1:])
+        abandoned, self._pipe = self._pipe, checkpoint.pipe
+        abandoned.close()
+        if reply.end is not None:
+            self._checkpoints.add(checkpoint._replace(pipe=reply.end))
+        reply = self._send(self._pipe, calls[1:])
         return reply._replace(results=[None, *reply.results])

@@ -1,8 +1,8 @@
-"""A trial in somebody's hands: it runs, stands, goes on by single quanta and back, while robots and things are moved.
+"""Interactive trial: runs, pauses, steps by quanta and rewinds; the user can move robots and objects.
 
-In: a plan, a seed, and what is asked for on a line to another process. Out: rows as they come, the present moment, and
-what one robot is doing inside. Everything that is done to the world is kept with its quantum, so a trial that is made
-again from its seed, or from a copy of this process (moments.py), comes to the same state, to the byte.
+The session runs in a process of its own and executes the commands that arrive on a pipe (`arena/studio/process.py`). It
+records every action on the world with its quantum. A trial that starts again from its seed, or continues from a
+checkpoint of this process, replays these actions and reaches the same state to the byte.
 """
 
 from __future__ import annotations
@@ -17,405 +17,438 @@ from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from arena.campaign.campaign import Plan, brains_of
-from arena.debug.attach import Handed
-from arena.replay.page import samples_of
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.campaign.campaign import Plan, controllers_of
+from arena.debug.attach import AttachedRobot
+from arena.replay.page import sample_data
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import SceneError
-from arena.trial.checkpoints import CAN_COPY, Copies, GoneError, Line
+from arena.trial.checkpoints import CAN_COPY, PipeClosedError, PipeEnd, ProcessForker
 from arena.trial.record import Trial
 from arena.trial.snapshot import digest, place_of
-from arena.trial.trial import Running
+from arena.trial.trial import RunningTrial
 
-IDLE_S: Final = 0.05
-"""For which a trial that stands waits before it looks whether it is to end."""
-FRAMES: Final = 12
-"""Frames of a call stack that are told."""
-
-
-class RefusedError(ValueError):
-    """What was asked for cannot be done now, or not at all."""
+POLL_S: Final = 0.05
+"""Longest time, in seconds, between two looks of a paused trial at its pipe."""
+MAX_FRAMES: Final = 12
+"""Frames of a call stack that `inspect` returns."""
 
 
-class Deed(NamedTuple):
-    """What somebody did between two quanta, so that it can be done again: a method of `Stage`."""
+class CommandRefusedError(ValueError):
+    """The session cannot execute a command in its present state, or the command is invalid."""
+
+
+class Action(NamedTuple):
+    """A change of the world between two quanta, which can be replayed: a method of `Supervisor` and its arguments."""
 
     tick: int
     name: str
     arguments: tuple[Any, ...]
 
-    def do(self, running: Running) -> None:
-        getattr(running.stage, self.name)(*self.arguments)
-        running.touched()
+    def apply(self, running: RunningTrial) -> None:
+        """Apply the action to a trial."""
+        getattr(running.supervisor, self.name)(*self.arguments)
+        running.refresh_poses()
 
 
-def serve(end: socket.socket, plan: Plan, seed: int) -> None:
-    """`plan`'s trial number `seed` at the other end of a line, until that is closed. The first answer is what making
-    the trial raised, if anything."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who asks
-    with suppress(GoneError):
-        InHand(plan, seed, Line(end)).live()
-    os._exit(0)  # what a copy would clean up is not its own
+class RewindState(NamedTuple):
+    """What a checkpoint must know to continue in place of this process: actions, breakpoints, epoch and target."""
 
-
-class State(NamedTuple):
-    """What was done until a moment that is to come again, and what is wanted then."""
-
-    deeds: list[Deed]
-    breaks: list[tuple[int, str]]
+    actions: list[Action]
+    breakpoints: list[tuple[int, str]]
     epoch: int
     tick: int
 
 
-class InHand:
-    """`plan`'s trial number `seed`, told what to do on `line`."""
+def serve(end: socket.socket, plan: Plan, seed: int) -> None:
+    """Run trial `seed` of `plan` under the commands of a pipe until the pipe is closed.
 
-    def __init__(self, plan: Plan, seed: int, line: Line) -> None:
+    The first reply is empty, or carries the exception with which creating the trial failed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
+    with suppress(PipeClosedError):
+        TrialSession(plan, seed, PipeEnd(end)).serve()
+    os._exit(0)  # a forked process must not run the exit handlers of its parent
+
+
+class TrialSession:
+    """Trial `seed` of `plan`, controlled by commands from `pipe`. Commands are the public methods of the class."""
+
+    def __init__(self, plan: Plan, seed: int, pipe: PipeEnd) -> None:
         self._plan: Final = plan
         self._seed: Final = seed
-        self._line = line
-        self._copies: Final = Copies()
-        self._deeds: list[Deed] = []
-        self._again: deque[Deed] = deque()
-        self._goal: int | None = None
-        self._returned = False
-        """The robot that was given to a debugger is wanted back."""
+        self._pipe = pipe
+        self._forker: Final = ProcessForker()
+        self._actions: list[Action] = []
+        self._replay: deque[Action] = deque()
+        """Actions that a rewind has yet to replay."""
+        self._target: int | None = None
+        """Quantum at which the trial pauses; None while it is paused."""
         self._pace = 1.0
-        self._breaks: dict[tuple[int, str], Callable[[], None]] = {}
-        self._held = ""
-        self._broken = ""
-        self._hold = False
-        self._handed: Handed | None = None
-        self._is_altered = False
-        """A debugger may have changed what would not be changed again."""
-        self._ended = False
+        self._breakpoints: dict[tuple[int, str], Callable[[], None]] = {}
+        self._hit = ""
+        """Description of the breakpoint at which the trial is paused."""
+        self._is_held = False
+        """Whether the trial must stay at the breakpoint."""
+        self._failure = ""
+        """Message of the exception that has stopped the trial."""
+        self._attached: AttachedRobot | None = None
+        self._is_detach_requested = False
+        self._is_modified = False
+        """Whether a debugger may have changed the trial in a way that a replay does not repeat."""
+        self._is_closed = False
         self.epoch = 0
-        """How often the trial was begun anew: samples of another one are not those of this."""
+        """Number of times the trial was started; samples of another epoch are not those of this one."""
 
-    # -- what can be asked for ---------------------------------------------------------------------------------------
+    # -- commands ----------------------------------------------------------------------------------------------------
 
-    def go(self, pace: float = 1.0) -> None:
-        """Run until told otherwise, at most `pace` times as fast as real time. Leaves a breakpoint."""
+    def run(self, pace: float = 1.0) -> None:
+        """Run to the end or until `pause`, at most `pace` times as fast as real time; continue from a breakpoint."""
         if not pace > 0:
-            raise RefusedError(f"{pace} times as fast as real time: expected a positive number")
-        self._able()
-        if not self._held:
-            self._own()
-        self._pace, self._hold = pace, False
-        self._goal = self._running.quanta
+            raise CommandRefusedError(f"{pace} times as fast as real time: expected a positive number")
+        self._require_no_failure()
+        if not self._hit:
+            self._require_no_debugger()
+        self._pace, self._is_held = pace, False
+        self._target = self._running.quanta
 
-    def stand(self) -> None:
-        """Stand still at the end of this quantum. On the way back, what was done later is forgotten."""
-        self._own()
-        self._goal = None
-        self._forget(self._running.world.ticks)
+    def pause(self) -> None:
+        """Pause at the end of the present quantum. A rewind ends there, and later actions are discarded."""
+        self._require_no_debugger()
+        self._target = None
+        self._discard_after(self._running.world.ticks)
 
     def step(self, quanta: int = 1) -> None:
-        """Let some quanta be over."""
-        self._free()
-        self._able()
+        """Run for `quanta` quanta and pause."""
+        self._require_between_quanta()
+        self._require_no_failure()
         if quanta < 1:
-            raise RefusedError(f"{quanta} quanta: expected 1 or more")
-        self._forget(self._running.world.ticks)
-        self._pace, self._goal = 0.0, min(self._running.world.ticks + quanta, self._running.quanta)
+            raise CommandRefusedError(f"{quanta} quanta: expected 1 or more")
+        self._discard_after(self._running.world.ticks)
+        self._pace, self._target = 0.0, min(self._running.world.ticks + quanta, self._running.quanta)
 
-    def back(self, tick: int) -> None:
-        """Back, or forth, to the moment at which `tick` quanta were over: by beginning anew with the same seed, doing
-        again what was done until then. What was done later is forgotten."""
-        self._may_go_to(tick)
-        self._forget(tick)
+    def rewind(self, tick: int) -> None:
+        """Go to the end of quantum `tick`, discarding later actions. An earlier quantum is reached by a replay from the
+        seed."""
+        self._require_target(tick)
+        self._discard_after(tick)
         if tick < self._running.world.ticks:
-            self._begin()
-            self._again = deque(self._deeds)
-            self._do_again()
-        self._pace, self._goal = 0.0, tick
+            self._start_trial()
+            self._replay = deque(self._actions)
+            self._replay_due_actions()
+        self._pace, self._target = 0.0, tick
 
-    def leave(self, tick: int) -> State | None:
-        """What a copy of this process must know that is to go on to `tick` in its place; none if that is yet to
-        come."""
-        self._may_go_to(tick)
+    def rewind_state(self, tick: int) -> RewindState | None:
+        """Return what a checkpoint needs to continue to `tick`; None if `tick` is not in the past."""
+        self._require_target(tick)
         if tick >= self._running.world.ticks:
             return None
-        return State([one for one in self._deeds if one.tick <= tick], list(self._breaks), self.epoch + 1, tick)
+        actions = [action for action in self._actions if action.tick <= tick]
+        return RewindState(actions, list(self._breakpoints), self.epoch + 1, tick)
 
-    def keep(self, state: State | None = None) -> Line | None:
-        """A line to a copy of this process, which sleeps until it is told to `keep` itself and go on with `state`; none
-        if there is no room for one."""
+    def checkpoint(self, state: RewindState | None = None) -> PipeEnd | None:
+        """Fork a checkpoint of this process and return a pipe to it; None if the system cannot fork.
+
+        The fork blocks until it receives this command. It then forks a checkpoint in turn, and continues with `state`.
+        """
         while True:
             try:
-                line, is_copy = self._copies.make()
+                pipe, is_fork = self._forker.make()
             except OSError:
-                line, is_copy = None, False
-            if not is_copy:
+                pipe, is_fork = None, False
+            if not is_fork:
                 if state is not None:
-                    self._take_over(state)
-                return line
-            assert line is not None
-            self._line.drop()
-            self._line = line
-            ((_, (state,), _),), _ = self._line.receive()
+                    self._restore(state)
+                return pipe
+            assert pipe is not None
+            self._pipe.drop()
+            self._pipe = pipe
+            ((_, (state,), _),), _ = self._pipe.receive()
 
     def move(self, kind: str, number: int, x: float, y: float) -> None:
-        """Put a robot or an object somewhere else; cm."""
-        self._free()
+        """Place robot or object `number` at (x, y), in cm."""
+        self._require_between_quanta()
         if kind not in ("robot", "object"):
-            raise RefusedError(f"{kind!r} cannot be moved; expected robot or object")
+            raise CommandRefusedError(f"{kind!r} cannot be moved; expected robot or object")
         if not 0 <= number < len(getattr(self._running.world, f"{kind}s")):
-            raise RefusedError(f"there is no {kind} {number}")
-        self._do(f"move_{kind}", number, x, y)
+            raise CommandRefusedError(f"there is no {kind} {number}")
+        self._act(f"move_{kind}", number, x, y)
 
-    def tell(self, robot: int, text: str) -> None:
-        """Send a robot something by Bluetooth."""
-        self._free()
-        self._brain(robot)
+    def send(self, robot: int, text: str) -> None:
+        """Send `text` to a robot by Bluetooth."""
+        self._require_between_quanta()
+        self._controller(robot)
         try:
             text.encode("latin-1")
         except UnicodeEncodeError:
-            raise RefusedError("Bluetooth carries bytes: letters of Latin-1 only") from None
-        self._do("tell", robot, text)
+            raise CommandRefusedError("Bluetooth carries bytes: use Latin-1 characters only") from None
+        self._act("tell", robot, text)
 
-    def stop_at(self, robot: int, place: str) -> None:
-        """Let the whole world stand still when a robot comes to a function, until `go`; again = no more."""
-        machine = self._emulated(robot).machine
+    def toggle_breakpoint(self, robot: int, place: str) -> None:
+        """Set a breakpoint at a function of one robot, or delete it. The whole world pauses at a breakpoint."""
+        machine = self._firmware_controller(robot).machine
         key = robot, place
-        if key in self._breaks:
-            self._breaks.pop(key)()
+        if key in self._breakpoints:
+            self._breakpoints.pop(key)()
             return
         try:
-            self._breaks[key] = machine.hook_pc(place, lambda *_: self._stands_at(robot, place))
+            self._breakpoints[key] = machine.hook_pc(place, lambda *_: self._on_breakpoint(robot, place))
         except (KeyError, ValueError) as error:
-            raise RefusedError(f"robot {robot}: {error.args[0]}") from None
+            raise CommandRefusedError(f"robot {robot}: {error.args[0]}") from None
 
     def debug(self, robot: int) -> None:
-        """Give a robot to a debugger, or take it back: `now` says on which port of this machine one client is served.
-        The world moves only as the client lets the robot move; then it stands. What a debugger changes in a robot is
-        not done again on the way back."""
-        if self._handed is not None and not self._held:
-            self._returned = True
-            return
-        self._free()
-        self._able()
-        if self._running.is_over:
-            raise RefusedError("the trial is over")
-        if self._emulated(robot).has_stopped:
-            raise RefusedError(f"robot {robot}: its firmware has stopped; go back first")
-        self._forget(self._running.world.ticks)
-        self._returned = False
-        try:
-            self._handed = Handed(robot, self._idle)
-        except OSError as error:
-            raise RefusedError(f"no port for a debugger: {error.strerror}") from None
-        self._handed.meet(self._running.world, self._running.brains)
-        self._pace, self._goal = 0.0, self._running.quanta
+        """Attach a debugger to a robot, or detach it; `status` names the TCP port that serves one client.
 
-    def now(self) -> dict[str, Any]:
-        """The present moment: cm, rad, s."""
-        world, handed = self._running.world, self._handed
+        While a client is attached, the world moves only as far as the client lets the robot run. A rewind does not
+        repeat what the client has changed."""
+        if self._attached is not None and not self._hit:
+            self._is_detach_requested = True
+            return
+        self._require_between_quanta()
+        self._require_no_failure()
+        if self._running.is_over:
+            raise CommandRefusedError("the trial is over")
+        if self._firmware_controller(robot).has_stopped:
+            raise CommandRefusedError(f"robot {robot}: its firmware has stopped; rewind first")
+        self._discard_after(self._running.world.ticks)
+        self._is_detach_requested = False
+        try:
+            self._attached = AttachedRobot(robot, self._poll)
+        except OSError as error:
+            raise CommandRefusedError(f"no port for a debugger: {error.strerror}") from None
+        self._attached.attach(self._running.world, self._running.controllers)
+        self._pace, self._target = 0.0, self._running.quanta
+
+    def status(self) -> dict[str, Any]:
+        """Return the present state of the trial; lengths in cm, angles in rad, times in s."""
+        world, attached = self._running.world, self._attached
         return {
             "tick": world.ticks, "t": world.seconds, "epoch": self.epoch, "quanta": self._running.quanta,
-            "robots": world.poses.robots, "objects": world.poses.objects, "held": self._held,
-            "breaks": [f"{robot} {place}" for robot, place in self._breaks],
-            "debugger": {"robot": handed.robot, "port": handed.port, "is_met": handed.is_met} if handed else None,
-            "state": f"cannot go on: {self._broken}" if self._broken
-                     else "at a breakpoint" if self._held else "in a debugger" if handed
-                     else "over" if self._running.is_over
-                     else "standing" if self._goal is None else "going back" if self._again else "running",
+            "robots": world.poses.robots, "objects": world.poses.objects, "hit": self._hit,
+            "breakpoints": [f"{robot} {place}" for robot, place in self._breakpoints],
+            "debugger": {"robot": attached.robot, "port": attached.port, "is_connected": attached.is_connected}
+                        if attached else None,
+            "state": self._state(),
         }  # fmt: skip
 
+    def _state(self) -> str:
+        """Return the state of the trial as the page shows it."""
+        if self._failure:
+            return f"failed: {self._failure}"
+        if self._hit:
+            return "at a breakpoint"
+        if self._attached:
+            return "in a debugger"
+        if self._running.is_over:
+            return "over"
+        if self._target is None:
+            return "paused"
+        return "rewinding" if self._replay else "running"
+
     def more(self, first: int, epoch: int) -> dict[str, Any]:
-        """Samples from `first` on, or all if those are of another epoch, and `now`."""
+        """Return `status` and the samples from number `first` on; all samples if `epoch` is not the present epoch."""
         columns = self._running.result.rows.columns
         begin = first if epoch == self.epoch else 0
-        about = self._about | {"faults": [list(fault) for fault in self._running.result.faults]}
+        about = self._metadata | {"faults": [list(fault) for fault in self._running.result.faults]}
         found: dict[str, Any] = {}
         if begin < len(columns["t"]):
             rows = {name: values[begin:] for name, values in columns.items()}
-            found = samples_of(Trial(Path("studio"), rows, about))
-        return found | {"from": begin, "now": self.now()}
+            found = sample_data(Trial(Path("studio"), rows, about))
+        return found | {"from": begin, "now": self.status()}
 
     def trial(self) -> Trial:
-        """What is recorded so far."""
+        """Return the samples so far as a trial."""
         faults = [list(fault) for fault in self._running.result.faults]
         columns = {name: list(values) for name, values in self._running.result.rows.columns.items()}
-        return Trial(Path("studio"), columns, self._about | {"faults": faults})
+        return Trial(Path("studio"), columns, self._metadata | {"faults": faults})
 
-    def inside(self, robot: int) -> dict[str, Any]:
-        """What one robot is doing: registers, call stack, threads. A script has nothing inside."""
-        brain = self._brain(robot)
-        if not isinstance(brain, EmulatedBrain):
+    def inspect(self, robot: int) -> dict[str, Any]:
+        """Return registers, call stack and threads of one robot; a scripted robot has none."""
+        controller = self._controller(robot)
+        if not isinstance(controller, FirmwareController):
             return {"robot": robot, "script": True}
-        machine = brain.machine
+        machine = controller.machine
         return {
             "robot": robot, "pc": machine.pc, "place": place_of(machine), "cycle": machine.cycle,
             "sr": machine.peek("SR"),
             "asleep": machine.is_asleep, "w": [machine.peek(f"W{n}") for n in range(16)],
-            "frames": [str(frame) for frame in machine.backtrace()[:FRAMES]],
+            "frames": [str(frame) for frame in machine.backtrace()[:MAX_FRAMES]],
             "threads": [{"name": one.name, "pid": one.pid, "state": one.state, "used": one.used,
                          "size": one.stack and one.stack[1] - one.stack[0]} for one in machine.threads()],
         }  # fmt: skip
 
     def digest(self) -> str:
-        """SHA-256 of everything that lives: bodies with their speeds, and every machine's whole state."""
-        return digest(self._running.world, self._running.brains)
+        """Return the SHA-256 of the whole state: all bodies with their speeds, and all machines."""
+        return digest(self._running.world, self._running.controllers)
 
-    # -- life --------------------------------------------------------------------------------------------------------
+    # -- main loop ---------------------------------------------------------------------------------------------------
 
-    def live(self) -> None:
-        """Until the line is closed. Raises GoneError if that was before there was a trial."""
-        self._made: AbstractContextManager[Any] | None = None
+    def serve(self) -> None:
+        """Execute commands and run the trial until the pipe is closed.
+
+        Raises PipeClosedError if the pipe is closed before the trial exists."""
+        self._controllers_context: AbstractContextManager[Any] | None = None
         try:
-            self._begin()
+            self._start_trial()
         except Exception as error:
-            self._line.send((error,))
+            self._pipe.send((error,))
             return
         self._reply([])
-        while not self._ended:
-            if self._goal is None or self._running.is_over or self._running.world.ticks >= self._goal:
-                self._goal = None
-                self._answer(IDLE_S)
+        while not self._is_closed:
+            if self._target is None or self._running.is_over or self._running.world.ticks >= self._target:
+                self._target = None
+                self._execute_commands(POLL_S)
             else:
                 try:
-                    self._go_on()
-                except Exception as error:  # a supervisor's, most often: the moment before can still be looked at
-                    self._goal, self._broken = None, f"{error}"
-        self._close()
+                    self._advance()
+                except Exception as error:  # usually from a supervisor; the state before it can still be inspected
+                    self._target, self._failure = None, f"{error}"
+        self._close_controllers()
 
-    def _go_on(self) -> None:
-        """To the next sample, or where something is to be done, no faster than wanted."""
-        assert self._goal is not None
-        running, start, before = self._running, time.monotonic(), self._running.world.seconds
-        if self._handed is not None:
-            running.go_on(running.world.ticks + 1)
-            if running.is_over:
-                self._handed.over()
-                self._handed.close()
-            if self._handed.is_back:
-                self._is_altered |= self._handed.is_met
-                self._handed, self._goal = None, None
+    def _advance(self) -> None:
+        """Run to the next sample, action or target, no faster than the pace."""
+        if self._attached is not None:
+            self._advance_attached(self._attached)
             return
-        running.go_on(min(self._goal, self._again[0].tick) if self._again else self._goal)
-        self._do_again()
-        self._answer(0)
-        while self._pace and not self._ended and self._goal is not None:
+        assert self._target is not None
+        running, start, before = self._running, time.monotonic(), self._running.world.seconds
+        running.advance(min(self._target, self._replay[0].tick) if self._replay else self._target)
+        self._replay_due_actions()
+        self._execute_commands(0)
+        while self._pace and not self._is_closed and self._target is not None:
             left = (running.world.seconds - before) / self._pace - (time.monotonic() - start)
             if left <= 0:
                 break
-            self._answer(min(left, IDLE_S))
+            self._execute_commands(min(left, POLL_S))
 
-    def _answer(self, wait: float) -> None:
-        """Do what is asked for; wait for it so many seconds at most."""
+    def _advance_attached(self, attached: AttachedRobot) -> None:
+        """Run one quantum under the debugger; detach it at the end of the trial or on request."""
+        running = self._running
+        running.advance(running.world.ticks + 1)
+        if running.is_over:
+            attached.finish()
+            attached.close()
+        if attached.is_closed:
+            self._is_modified |= attached.is_connected
+            self._attached, self._target = None, None
+
+    def _execute_commands(self, wait: float) -> None:
+        """Execute the next batch of commands and reply; wait at most `wait` seconds for it."""
         try:
-            if not self._line.is_ready(wait):
+            if not self._pipe.is_ready(wait):
                 return
-            calls, _ = self._line.receive()
+            calls, _ = self._pipe.receive()
             try:
                 results = [getattr(self, name)(*arguments, **named) for name, arguments, named in calls]
-            except GoneError:
+            except PipeClosedError:
                 raise
             except Exception as error:
-                self._line.send((error,))
+                self._pipe.send((error,))
                 return
             self._reply(results)
-        except GoneError:
-            self._ended, self._hold = True, False
+        except PipeClosedError:
+            self._is_closed, self._is_held = True, False
 
     def _reply(self, results: list[Any]) -> None:
-        end = results[0] if results and isinstance(results[0], Line) else None
-        world, plain = self._running.world, not (self._held or self._handed or self._broken or self._is_altered)
-        about = world.ticks, world.seconds, CAN_COPY and plain
-        self._line.send((None, [] if end else results, about), end)
+        """Send the results of a batch, the present time, and whether a checkpoint may be taken now."""
+        end = results[0] if results and isinstance(results[0], PipeEnd) else None
+        world = self._running.world
+        is_plain = not (self._hit or self._attached or self._failure or self._is_modified)
+        self._pipe.send((None, [] if end else results, (world.ticks, world.seconds, CAN_COPY and is_plain)), end)
         if end is not None:
             end.drop()
 
-    def _idle(self, wait: float) -> bool:
-        """Answer while a debugger has a robot; whether it may keep it."""
-        self._answer(wait)
-        return not (self._ended or self._returned)
+    def _poll(self, wait: float) -> bool:
+        """Execute commands while a debugger has a robot; return whether the debugger may keep it."""
+        self._execute_commands(wait)
+        return not (self._is_closed or self._is_detach_requested)
 
-    def _begin(self) -> None:
-        self._close()
-        self._broken, self._is_altered = "", False
-        made = brains_of(self._plan, self._seed, 1)
-        brains, _, ether = made.__enter__()
-        self._made = made
+    def _start_trial(self) -> None:
+        """Start the trial from its seed, with the breakpoints that are set."""
+        self._close_controllers()
+        self._failure, self._is_modified = "", False
+        context = controllers_of(self._plan, self._seed)
+        controllers, channel = context.__enter__()
+        self._controllers_context = context
         plan = self._plan
-        self._running = Running(plan.scene, self._seed, brains, plan.seconds, ether=ether, experiment=plan.to_do)
-        self._about: dict[str, Any] = plan.key() | {"seed": self._seed}
+        self._running = RunningTrial(
+            plan.scene, self._seed, controllers, plan.seconds, channel=channel, experiment=plan.loaded_experiment
+        )
+        self._metadata: dict[str, Any] = plan.key() | {"seed": self._seed}
         self.epoch += 1
-        again, self._breaks = list(self._breaks), {}
-        for robot, place in again:
-            self.stop_at(robot, place)
+        breakpoints, self._breakpoints = list(self._breakpoints), {}
+        for robot, place in breakpoints:
+            self.toggle_breakpoint(robot, place)
 
-    def _close(self) -> None:
-        if self._made is not None:
-            self._made.__exit__(None, None, None)
-            self._made = None
+    def _close_controllers(self) -> None:
+        if self._controllers_context is not None:
+            self._controllers_context.__exit__(None, None, None)
+            self._controllers_context = None
 
-    def _take_over(self, state: State) -> None:
-        """Go on in the place of a process that was further."""
-        done = len(self._deeds) - len(self._again)
-        self._deeds, self._again = state.deeds, deque(state.deeds[done:])
-        self.epoch, self._pace, self._goal = state.epoch, 0.0, state.tick
-        gone, new = set(self._breaks) - set(state.breaks), [one for one in state.breaks if one not in self._breaks]
-        for robot, place in (*gone, *new):
-            self.stop_at(robot, place)
-        self._do_again()
+    def _restore(self, state: RewindState) -> None:
+        """Continue, in a checkpoint, in place of a process that had run further."""
+        applied = len(self._actions) - len(self._replay)
+        self._actions, self._replay = state.actions, deque(state.actions[applied:])
+        self.epoch, self._pace, self._target = state.epoch, 0.0, state.tick
+        deleted = set(self._breakpoints) - set(state.breakpoints)
+        added = [one for one in state.breakpoints if one not in self._breakpoints]
+        for robot, place in (*deleted, *added):
+            self.toggle_breakpoint(robot, place)
+        self._replay_due_actions()
 
-    def _do(self, name: str, *arguments: Any) -> None:
-        """Do something to the world, and keep it. Raises RefusedError where the scene has no room for it."""
-        if self._again:
-            raise RefusedError("the trial is on its way back; let it stand first")
-        deed = Deed(self._running.world.ticks, name, arguments)
+    def _act(self, name: str, *arguments: Any) -> None:
+        """Apply and record an action. Raises CommandRefusedError if the scene does not permit it."""
+        if self._replay:
+            raise CommandRefusedError("the trial is rewinding; pause it first")
+        action = Action(self._running.world.ticks, name, arguments)
         try:
-            deed.do(self._running)
+            action.apply(self._running)
         except SceneError as error:
-            raise RefusedError(str(error)) from None
-        self._deeds.append(deed)
+            raise CommandRefusedError(str(error)) from None
+        self._actions.append(action)
 
-    def _forget(self, tick: int) -> None:
-        """What was done after `tick` quanta was never done."""
-        self._deeds = [deed for deed in self._deeds if deed.tick <= tick]
-        self._again = deque(deed for deed in self._again if deed.tick <= tick)
+    def _discard_after(self, tick: int) -> None:
+        """Discard the actions that come after `tick` quanta."""
+        self._actions = [action for action in self._actions if action.tick <= tick]
+        self._replay = deque(action for action in self._replay if action.tick <= tick)
 
-    def _do_again(self) -> None:
-        while self._again and self._again[0].tick <= self._running.world.ticks:
-            self._again.popleft().do(self._running)
+    def _replay_due_actions(self) -> None:
+        while self._replay and self._replay[0].tick <= self._running.world.ticks:
+            self._replay.popleft().apply(self._running)
 
-    def _stands_at(self, robot: int, place: str) -> bool:
-        """A robot has come to a breakpoint, in the middle of a quantum: whatever is asked for now is answered here."""
-        if self._again or self._ended or self._emulated(robot).machine.events.quiet:
+    def _on_breakpoint(self, robot: int, place: str) -> bool:
+        """Execute commands while a robot is at a breakpoint, in the middle of a quantum, until `run` continues it."""
+        if self._replay or self._is_closed or self._firmware_controller(robot).machine.events.quiet:
             return False
-        self._held, self._hold = f"robot {robot} is at {place}", True
-        while self._hold:
-            self._answer(IDLE_S)
-        self._held = ""
+        self._hit, self._is_held = f"robot {robot} is at {place}", True
+        while self._is_held:
+            self._execute_commands(POLL_S)
+        self._hit = ""
         return False
 
-    def _may_go_to(self, tick: int) -> None:
-        self._free()
+    def _require_target(self, tick: int) -> None:
+        self._require_between_quanta()
         if not 0 <= tick <= self._running.quanta:
-            raise RefusedError(f"quantum {tick}: the trial has those from 0 to {self._running.quanta}")
+            raise CommandRefusedError(f"quantum {tick}: expected 0 to {self._running.quanta}")
 
-    def _free(self) -> None:
-        if self._held:
-            raise RefusedError(f"{self._held}; let it go on first")
-        self._own()
+    def _require_between_quanta(self) -> None:
+        if self._hit:
+            raise CommandRefusedError(f"{self._hit}; run the trial first")
+        self._require_no_debugger()
 
-    def _own(self) -> None:
-        if self._handed is not None:
-            raise RefusedError(f"a debugger has robot {self._handed.robot}; let it leave first")
+    def _require_no_debugger(self) -> None:
+        if self._attached is not None:
+            raise CommandRefusedError(f"robot {self._attached.robot} is in a debugger; detach the debugger first")
 
-    def _able(self) -> None:
-        if self._broken:
-            raise RefusedError(f"the trial cannot go on ({self._broken}); go back first")
+    def _require_no_failure(self) -> None:
+        if self._failure:
+            raise CommandRefusedError(f"the trial has failed ({self._failure}); rewind first")
 
-    def _brain(self, robot: int) -> Any:
-        if not 0 <= robot < len(self._running.brains):
-            raise RefusedError(f"there is no robot {robot}")
-        return self._running.brains[robot]
+    def _controller(self, robot: int) -> Any:
+        if not 0 <= robot < len(self._running.controllers):
+            raise CommandRefusedError(f"there is no robot {robot}")
+        return self._running.controllers[robot]
 
-    def _emulated(self, robot: int) -> EmulatedBrain:
-        brain = self._brain(robot)
-        if not isinstance(brain, EmulatedBrain):
-            raise RefusedError(f"robot {robot} is a script: it has no firmware to stop in")
-        return brain
+    def _firmware_controller(self, robot: int) -> FirmwareController:
+        controller = self._controller(robot)
+        if not isinstance(controller, FirmwareController):
+            raise CommandRefusedError(f"robot {robot} is scripted: it has no firmware")
+        return controller

@@ -30,11 +30,11 @@ SHOWN_MS: Final = 3000
 def ready(studio: Studio) -> None:
     """Forty seconds on, at a breakpoint."""
     studio.ask("step", QUANTA)
-    while studio.ask("now")["state"] != "standing":
+    while studio.ask("status")["state"] != "paused":
         time.sleep(0.1)
-    studio.ask("stop_at", ROBOT, PLACE)
-    studio.ask("go", 1.0)
-    while not studio.ask("now")["held"]:
+    studio.ask("toggle_breakpoint", ROBOT, PLACE)
+    studio.ask("run", 1.0)
+    while not studio.ask("status")["hit"]:
         time.sleep(0.1)
 
 

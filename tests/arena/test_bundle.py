@@ -104,7 +104,7 @@ def test_a_light_bundle_says_as_much(
     contents["files"]["script/trial-0001.json"] = hashlib.sha256(b"[]").hexdigest()
     change["bundle.json"] = json.dumps(contents).encode()
     assert main(["verify", str(rewritten(light, tmp_path / "changed.zip", change))]) == 2
-    assert "is no digest of a trial" in capsys.readouterr().err
+    assert "not the digest of a trial" in capsys.readouterr().err
 
 
 def test_a_record_that_is_not_what_the_plan_gives_is_found(
@@ -147,9 +147,9 @@ def test_changed_files_and_archives_that_are_none_are_refused(packed: Path, tmp_
     evil = contents["files"] | {"../evil": "0" * 64}
     cases = {
         "its hash differs": {"script/manifest.json": b"{}"},
-        "holds other files": {"script/more.txt": b"more"},
-        "is no file of a run": {"bundle.json": json.dumps({"files": evil}).encode(), "../evil": b"x"},
-        "is no bundle": {"bundle.json": b"[]"},
+        "its files differ from the list": {"script/more.txt": b"more"},
+        "is not a file of a run": {"bundle.json": json.dumps({"files": evil}).encode(), "../evil": b"x"},
+        "not a bundle": {"bundle.json": b"[]"},
     }
     for words, change in cases.items():
         path = rewritten(packed, tmp_path / "changed.zip", change)
@@ -173,8 +173,8 @@ def test_only_runs_can_be_packed(study: Path, tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ({"seconds": "6"}, "seconds is '6'; expected float"), ({"seconds": -1.0}, "seconds: -1.0 is none"),
-    ({"seed": "x"}, "seed is 'x'; expected int"), ({"controller": "Z"}, "controller: 'Z' is none"),
+    ({"seconds": "6"}, "seconds is '6'; expected float"), ({"seconds": -1.0}, "seconds: invalid value -1.0"),
+    ({"seed": "x"}, "seed is 'x'; expected int"), ({"controller": "Z"}, "controller: invalid value 'Z'"),
     ({"controller": ["A"]}, "manifest.json: "), ({"brain": None}, "brain is None; expected str"),
 ])  # fmt: skip
 def test_a_manifest_that_is_no_plan_is_refused(

@@ -11,34 +11,39 @@ import numpy as np
 import pytest
 
 from arena.cli import main
-from arena.experiments import Moments, Said, experiment_of
-from arena.experiments.spoken import alive, apart, last_said, settled_at
-from arena.metrics import Course
-from arena.robots.controller import switched_on
+from arena.experiments import TrialSamples, UartLine, experiment_of
+from arena.experiments.uart_values import alive, apart, last_values, settled_at
+from arena.metrics import MetricSeries
+from arena.robots.controller import power_on_cycle
 from arena.scene.loader import FCY, load_scene
 from arena.trial.record import Trial, read_trial
 
 NAN = math.nan
 
 
-def moments(scene: str, seconds: list[float], said: list[Said]) -> Moments:
-    """Of a trial in which robots stood about and said something."""
+def samples(scene: str, seconds: list[float], lines: list[UartLine]) -> TrialSamples:
+    """Of a trial in which robots stand still and send `lines`."""
     places = np.zeros((len(seconds), load_scene(scene).robots.count, 3))
-    return Moments(np.array(seconds), places, places[:, :0, :2], load_scene(scene), {}, said)
+    return TrialSamples(np.array(seconds), places, places[:, :0, :2], load_scene(scene), {}, lines)
 
 
 def test_what_robots_said_last_is_known_at_every_sample() -> None:
-    """From the sample on that follows; other words and lines that are no number are passed over."""
-    said = [Said(1, 0.2, "clock 7"), Said(1, 0.9, "clock x"), Said(1, 1.4, "clock 9"), Said(0, 1.5, "leader 9")]
-    numbers, seconds = last_said(moments("clocks", [0.0, 1.0, 2.0], said), "clock")
+    """From the sample on that follows; other words, and lines without a number, are ignored."""
+    lines = [
+        UartLine(1, 0.2, "clock 7"),
+        UartLine(1, 0.9, "clock x"),
+        UartLine(1, 1.4, "clock 9"),
+        UartLine(0, 1.5, "leader 9"),
+    ]
+    numbers, seconds = last_values(samples("clocks", [0.0, 1.0, 2.0], lines), "clock")
     assert np.array_equal(numbers[:, 1], [NAN, 7, 9], equal_nan=True)
     assert np.array_equal(seconds[:, 1], [NAN, 0.2, 1.4], equal_nan=True)
     assert np.isnan(numbers[:, 0]).all()
 
 
 def test_the_dead_do_not_count() -> None:
-    """start.off of the scene; a robot alive that has said nothing leaves the difference open."""
-    living = alive(moments("clocks", [0.0, 2.5, 2.75, 3.25], []))
+    """start.off of the scene; a robot alive that has lines nothing leaves the difference open."""
+    living = alive(samples("clocks", [0.0, 2.5, 2.75, 3.25], []))
     assert living.sum(axis=1).tolist() == [5, 5, 4, 3]
     values = np.array([[1.0, 4.0, 100.0], [1.0, 4.0, NAN]])
     assert apart(values, np.array([[True, True, False]] * 2)).tolist() == [3.0, 3.0]
@@ -47,21 +52,21 @@ def test_the_dead_do_not_count() -> None:
 
 def test_agreement_counts_from_when_it_lasts() -> None:
     """A sample that breaks it begins anew; what does not hold at the end is nan."""
-    course = Course(np.array([0.0, 1.0, 2.0, 3.0]), {})
-    assert settled_at(course, np.array([True, False, True, True])) == 2.0
-    assert settled_at(course, np.full(4, True)) == 0.0
-    assert math.isnan(settled_at(course, np.array([True, True, True, False])))
+    series = MetricSeries(np.array([0.0, 1.0, 2.0, 3.0]), {})
+    assert settled_at(series, np.array([True, False, True, True])) == 2.0
+    assert settled_at(series, np.full(4, True)) == 0.0
+    assert math.isnan(settled_at(series, np.array([True, True, True, False])))
 
 
 def test_clocks_are_compared_with_the_arenas_time() -> None:
     """Three that live agree at 3.3 s, and are 5 ms later against true time at 4 s."""
-    said = [Said(robot, 1.0, f"clock {1500 + robot}") for robot in range(3)] + [Said(3, 1.0, "clock 1600")]
-    said += [Said(4, 1.0, "clock 1500"), Said(3, 3.2, "clock 3700")]
-    said += [Said(robot, 3.6, "clock 4105") for robot in (2, 3, 4)]
-    course = experiment_of("clocks").course(moments("clocks", [0.0, 2.0, 3.3, 4.0], said))
-    assert course.curves["apart"][1] == pytest.approx(100)
-    assert course.curves["apart"][2:] == pytest.approx([2, 0])
-    assert course.curves["drift"][2:] == pytest.approx([0, 4], abs=0.7)
+    lines = [UartLine(robot, 1.0, f"clock {1500 + robot}") for robot in range(3)] + [UartLine(3, 1.0, "clock 1600")]
+    lines += [UartLine(4, 1.0, "clock 1500"), UartLine(3, 3.2, "clock 3700")]
+    lines += [UartLine(robot, 3.6, "clock 4105") for robot in (2, 3, 4)]
+    series = experiment_of("clocks").series(samples("clocks", [0.0, 2.0, 3.3, 4.0], lines))
+    assert series.curves["apart"][1] == pytest.approx(100)
+    assert series.curves["apart"][2:] == pytest.approx([2, 0])
+    assert series.curves["drift"][2:] == pytest.approx([0, 4], abs=0.7)
 
 
 def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
@@ -79,75 +84,89 @@ def trial(tmp_path: Path, scene: str, seconds: float, *words: str) -> Trial:
 def test_three_clocks_come_together(tmp_path: Path) -> None:
     """0.12 s apart when they begin, they agree to a part of it; a third of all messages is lost."""
     made = trial(tmp_path, "clocks", 3.0, "--set", "start.spread_tcy=4423680")
-    begun = [switched_on(made.scene, 1, robot) / FCY for robot in range(3)]
+    begun = [power_on_cycle(made.scene, 1, robot) / FCY for robot in range(3)]
     assert max(begun) - min(begun) > 0.1
-    assert made.course.last("apart") < 50
+    assert made.series.last("apart") < 50
 
 
 def test_a_leader_is_one_who_lives() -> None:
     """Who follows the dead, or a rank that nobody has, does not count; a rank drawn anew replaces the one before."""
-    said = [Said(robot, 0.2, f"rank {10 - robot}") for robot in range(5)]
-    said += [Said(robot, 0.4, "leader 10") for robot in range(5)]
-    said += [Said(4, 4.5, "rank 20"), Said(4, 4.5, "leader 20"), Said(3, 4.6, "leader 77"), Said(2, 4.6, "leader 20")]
-    course = experiment_of("leader").course(moments("leader", [0.0, 1.0, 2.8, 5.0], said))
-    assert course.curves["following"].tolist() == [0.0, 1.0, 0.0, 2 / 4]
-    assert course.curves["leaders"].tolist() == [0, 1, 0, 1]
+    lines = [UartLine(robot, 0.2, f"rank {10 - robot}") for robot in range(5)]
+    lines += [UartLine(robot, 0.4, "leader 10") for robot in range(5)]
+    lines += [
+        UartLine(4, 4.5, "rank 20"),
+        UartLine(4, 4.5, "leader 20"),
+        UartLine(3, 4.6, "leader 77"),
+        UartLine(2, 4.6, "leader 20"),
+    ]
+    series = experiment_of("leader").series(samples("leader", [0.0, 1.0, 2.8, 5.0], lines))
+    assert series.curves["following"].tolist() == [0.0, 1.0, 0.0, 2 / 4]
+    assert series.curves["leaders"].tolist() == [0, 1, 0, 1]
 
 
 def test_three_robots_elect_one(tmp_path: Path) -> None:
     """The one whose selector says so."""
     made = trial(tmp_path, "leader", 2.0, "--set", "start.spread_tcy=1474560")
-    assert made.course.last("following") == 1.0
-    word, rank = made.moments.said[-1].text.split()
+    assert made.series.last("following") == 1.0
+    word, rank = made.samples.uart_lines[-1].text.split()
     assert word == "leader"
     assert int(rank) >> 11 == 2
 
 
 def test_who_has_stopped_says_so_and_stands() -> None:
     """The dead do not count; the difference is known once all stand."""
-    said = [Said(robot, 3.0 + robot / 100, f"halt {robot}") for robot in (2, 3)] + [Said(4, 3.35, "halt 4")]
-    seen = moments("halt", [0.0, 2.9, 3.1, 3.2, 3.3, 3.5], said)
+    lines = [UartLine(robot, 3.0 + robot / 100, f"halt {robot}") for robot in (2, 3)] + [UartLine(4, 3.35, "halt 4")]
+    seen = samples("halt", [0.0, 2.9, 3.1, 3.2, 3.3, 3.5], lines)
     seen.robots[:, 3, 0] = [0.0, 3.0, 4.0, 4.0, 4.0, 4.0]
-    course = experiment_of("halt").course(seen)
-    assert course.curves["standing"].tolist() == pytest.approx([0, 0, 1 / 4, 2 / 4, 2 / 3, 1])
-    assert np.isnan(course.curves["between"][:-1]).all()
-    assert course.last("between") == pytest.approx(0.33)
+    series = experiment_of("halt").series(seen)
+    assert series.curves["standing"].tolist() == pytest.approx([0, 0, 1 / 4, 2 / 4, 2 / 3, 1])
+    assert np.isnan(series.curves["between"][:-1]).all()
+    assert series.last("between") == pytest.approx(0.33)
 
 
 def test_three_robots_stop_together(tmp_path: Path) -> None:
     """One of them knows when; without messages the others cannot (docs/swarm.md)."""
-    assert trial(tmp_path, "halt", 4.5).course.last("between") < 0.1
+    assert trial(tmp_path, "halt", 4.5).series.last("between") < 0.1
 
 
 def test_a_mean_is_that_of_those_who_live() -> None:
-    """Hundredths against the values that robots say they have; the error is unknown until all have said something."""
-    said = [Said(robot, 0.5, f"value {robot}") for robot in range(5)]
-    said += [Said(robot, 0.6, "mean 200") for robot in range(4)] + [Said(4, 1.6, "mean 250")]
-    said += [Said(robot, 3.2, "mean 300") for robot in (2, 3)]
-    course = experiment_of("average").course(moments("average", [0.0, 1.0, 2.0, 3.5], said))
-    assert np.isnan(course.curves["error"][:2]).all()
-    assert course.curves["error"][2:] == pytest.approx([0.5, 0.5])
-    assert course.curves["typical"][2:] == pytest.approx([0.1, 0.5 / 3])
+    """Hundredths against the values that robots say they have; the error is unknown until all have lines something."""
+    lines = [UartLine(robot, 0.5, f"value {robot}") for robot in range(5)]
+    lines += [UartLine(robot, 0.6, "mean 200") for robot in range(4)] + [UartLine(4, 1.6, "mean 250")]
+    lines += [UartLine(robot, 3.2, "mean 300") for robot in (2, 3)]
+    series = experiment_of("average").series(samples("average", [0.0, 1.0, 2.0, 3.5], lines))
+    assert np.isnan(series.curves["error"][:2]).all()
+    assert series.curves["error"][2:] == pytest.approx([0.5, 0.5])
+    assert series.curves["typical"][2:] == pytest.approx([0.1, 0.5 / 3])
 
 
 def test_robots_agree_on_a_mean(tmp_path: Path) -> None:
     """Of 15, 9 and 2; the first to say so is right."""
     made = trial(tmp_path, "average", 1.5, "--set", "infrared.lost_share=0")
-    assert any(one.text == "mean 867" for one in made.moments.said)
+    assert any(one.text == "mean 867" for one in made.samples.uart_lines)
 
 
 def test_who_knows_the_answer_knows_that_all_is_done() -> None:
     """A wrong answer is none, and the dead do not count."""
-    said = [Said(robot, 0.5, "done 8") for robot in range(5)] + [Said(0, 1.1, "best 52527"), Said(0, 1.1, "done 32")]
-    said += [Said(2, 2.6, f"best {best}") for best in (9, 52527)] + [Said(2, 2.6, "done 32"), Said(3, 2.6, "done 32")]
-    course = experiment_of("search").course(moments("search", [0.0, 1.0, 1.25, 3.0], said))
-    assert course.curves["done"] == pytest.approx([0, 0.25, (4 * 0.25 + 1) / 5, (0.25 + 1 + 1) / 3])
-    assert course.curves["right"] == pytest.approx([0, 0, 1 / 5, 1 / 3])
+    lines = [UartLine(robot, 0.5, "done 8") for robot in range(5)] + [
+        UartLine(0, 1.1, "best 52527"),
+        UartLine(0, 1.1, "done 32"),
+    ]
+    lines += [UartLine(2, 2.6, f"best {best}") for best in (9, 52527)] + [
+        UartLine(2, 2.6, "done 32"),
+        UartLine(3, 2.6, "done 32"),
+    ]
+    series = experiment_of("search").series(samples("search", [0.0, 1.0, 1.25, 3.0], lines))
+    assert series.curves["done"] == pytest.approx([0, 0.25, (4 * 0.25 + 1) / 5, (0.25 + 1 + 1) / 3])
+    assert series.curves["right"] == pytest.approx([0, 0, 1 / 5, 1 / 3])
 
 
 def test_robots_share_a_search(tmp_path: Path) -> None:
     """Somebody hears of parts of others at once, more than it has done itself."""
     made = trial(tmp_path, "search", 1.5, "--set", "infrared.lost_share=0")
-    done = [[int(one.text.split()[1]) for one in made.moments.said if (one.robot, one.text[:4]) == (robot, "done")]
-            for robot in range(3)]  # fmt: skip
-    assert max(after - before for said in done for before, after in pairwise(said)) >= 2
+    lines = made.samples.uart_lines
+    done = [
+        [int(one.text.split()[1]) for one in lines if (one.robot, one.text[:4]) == (robot, "done")]
+        for robot in range(3)
+    ]
+    assert max(after - before for counts in done for before, after in pairwise(counts)) >= 2

@@ -13,7 +13,7 @@ import pytest
 
 from arena.campaign.campaign import Plan, run_one
 from arena.cli import main
-from arena.debug.controlled_robot import Debugged
+from arena.debug.controlled_robot import ControlledRobot
 from arena.scene.loader import load_scene
 from tests.emu.dap.client import PATIENCE, ROOT, Client
 from tests.firmware.conftest import built_once
@@ -204,7 +204,7 @@ def test_what_a_robot_was_shown_makes_its_past_the_same_to_the_bit(
     plan = Plan(load_scene("avoidance"), "avoidance", "A", None, 1, 1.0, 3, None, (("avoidance", image),))
     rng, met = random.Random(4), []
 
-    def debugger(debugged: Debugged) -> bool:
+    def debugger(debugged: ControlledRobot) -> bool:
         history = debugged.record(debugged.machine)
         states = {}
         for _ in range(40):
@@ -218,8 +218,8 @@ def test_what_a_robot_was_shown_makes_its_past_the_same_to_the_bit(
         met.append(debugged.machine.snapshot() == states[end])
         return True
 
-    robot = Debugged(1, debugger, keeps=True)
-    run_one(plan, 1, tmp_path, meet=robot.meet)
-    assert robot.over()
+    robot = ControlledRobot(1, debugger, is_recorded=True)
+    run_one(plan, 1, tmp_path, on_start=robot.attach)
+    assert robot.finish()
     assert len(met) == 21
     assert all(met)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from arena.cli import main
-from arena.experiments import Moments, experiment_of
+from arena.experiments import TrialSamples, experiment_of
 from arena.experiments.builtin.foraging import init, step
-from arena.experiments.supervisor import Stage
-from arena.robots.controller import ScriptedBrain
+from arena.experiments.supervisor import Supervisor
+from arena.robots.controller import ScriptedController
 from arena.scene.loader import Scene, SceneError, load_scene, scripted
 from arena.trial.record import read_trial
 from arena.trial.trial import run_trial
@@ -118,7 +118,7 @@ def test_a_new_experiment_needs_a_scene_a_metric_and_some_c(tmp_path: Path, caps
     assert done.returncode == 0, done.stderr
     path = run(tmp_path, "--brain", str(tmp_path / "build" / "firmware.elf"), "--set", "start.remote=")
     assert "distance of the two robots" in capsys.readouterr().out
-    apart = read_trial(path).course.curves["apart"]
+    apart = read_trial(path).series.curves["apart"]
     assert apart[0] == pytest.approx(30)
     assert 7.3 < apart[-1] < 20
     assert main(["plot", str(path.parent), "--out", str(tmp_path / "figures")]) == 0
@@ -132,9 +132,9 @@ def test_the_experiments_file_is_kept_and_belongs_to_the_run(
 ) -> None:
     """Changed afterwards it does not change what was measured; going on with another one is refused."""
     path = run(tmp_path)
-    before = read_trial(path).course.curves["apart"]
+    before = read_trial(path).series.curves["apart"]
     (tmp_path / "mine.py").write_text(METRIC.replace("** 0.5", "** 0.5 + 1000"))
-    assert (read_trial(path).course.curves["apart"] == before).all()
+    assert (read_trial(path).series.curves["apart"] == before).all()
     assert (path.parent / "experiment.py").read_text() == METRIC
     run(tmp_path, metric=METRIC + "\n", status=2)
     assert "different experiment_sha256" in capsys.readouterr().err
@@ -159,13 +159,13 @@ def test_a_supervisor_moves_things_notes_numbers_and_ends_the_trial(tmp_path: Pa
     [
         ("def metrics(:", "mine.py:1: SyntaxError"),
         ("x = 1\nimport nowhere", "mine.py:2: ModuleNotFoundError"),
-        ("CURVES = []", "an experiment needs a function metrics(sample)"),
-        ("def metrics(sample): return {}", "CURVES names the metrics"),
+        ("CURVES = []", "an experiment must define metrics(sample)"),
+        ("def metrics(sample): return {}", "an experiment must define its metrics"),
         (METRIC.replace('"apart":', '"other":'), "metrics: KeyError: 'apart'"),
         (METRIC.replace("sample.robots", "sample.nothing"), "metrics: AttributeError"),
         (METRIC + "\ndef step(stage): stage.move_object(9, 1, 1)\n", "step: IndexError"),
         (METRIC + "\ndef step(stage): stage.move_object(0, -1, 1)\n", "(-1, 1) cm is outside the walls"),
-        (METRIC + "\ndef step(stage): stage.note('late', 1)\n", "names are noted in init first"),
+        (METRIC + "\ndef step(stage): stage.note('late', 1)\n", "init must note every name first"),
         (METRIC + "\ndef init(stage): 1 / 0\n", "init: ZeroDivisionError: division by zero"),
         ("import sys\nsys.exit(3)\n", "mine.py:2: SystemExit: 3"),
         (METRIC + "\ndef step(stage): raise SystemExit(5)\n", "step: SystemExit: 5"),
@@ -184,7 +184,7 @@ def test_what_is_wrong_with_an_experiment_is_said_in_one_line(
 def test_experiments_that_are_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By name and by file."""
     run(tmp_path, scene=SCENE.replace("mine.py", "nothing"), status=2)
-    assert "there is no experiment 'nothing'; known: aggregation, average, avoidance, clocks, " in (
+    assert "unknown experiment 'nothing'; known: aggregation, average, avoidance, clocks, " in (
         capsys.readouterr().err
     )
     run(tmp_path, scene=SCENE.replace("mine.py", "lost.py"), status=2)
@@ -201,7 +201,7 @@ def test_the_shipped_experiments_run_with_their_firmware(name: str, tmp_path: Pa
     assert main(["run", name, "--trials", "1", "--minutes", "0.05", "--jobs", "2", "--out", str(out)]) == 0
     trial = read_trial(out / "trial-0001.parquet")
     assert np.abs(trial.robots[-1] - trial.robots[0]).max() > 2
-    for values in trial.course.curves.values():
+    for values in trial.series.curves.values():
         assert np.isfinite(values).all()
     assert main(["plot", str(out), "--out", str(tmp_path)]) == 0
     assert (tmp_path / "curves.png").stat().st_size > 5000
@@ -222,14 +222,14 @@ def test_foraging_counts_food_that_came_from_outside_to_the_nest() -> None:
     scene = load_scene("foraging")
     food = [(150.0, 30.0 + 18 * n) for n in range(6)]
     world = World.of(scene, 1, [(100, 20, 0.0), (100, 60, 0.0), (100, 120, 0.0)], food)
-    brains = [Listener() for _ in range(3)]
-    stage = Stage(world, brains, 1)  # type: ignore[arg-type]
+    controllers = [Listener() for _ in range(3)]
+    stage = Supervisor(world, controllers, 1)  # type: ignore[arg-type]
     init(stage)
     step(stage)
     assert stage.noted == {"delivered": 0, "carrying": 0}
     stage.move_robot(1, 150 - 7.0, 66)
     step(stage)
-    assert brains[1].heard == [b"food\n"]
+    assert controllers[1].heard == [b"food\n"]
     assert stage.noted["carrying"] == 1
     grown = stage.objects[2]
     assert math.dist(grown, (150, 66)) > 10
@@ -237,10 +237,10 @@ def test_foraging_counts_food_that_came_from_outside_to_the_nest() -> None:
     stage.move_robot(1, 45, 75)
     step(stage)
     step(stage)
-    assert brains[1].heard == [b"food\n", b"nest\n"]
+    assert controllers[1].heard == [b"food\n", b"nest\n"]
     assert stage.noted == {"delivered": 1, "carrying": 0}
-    assert not brains[0].heard
-    assert not brains[2].heard
+    assert not controllers[0].heard
+    assert not controllers[2].heard
 
 
 def test_aggregation_measures_robots(tmp_path: Path) -> None:
@@ -248,9 +248,11 @@ def test_aggregation_measures_robots(tmp_path: Path) -> None:
     experiment, scene = experiment_of("aggregation"), load_scene("aggregation")
     near = np.array([(20.0 * 0.37 * n, 0.0, 0.0) for n in range(8)])
     far = np.array([(30.0 * n, 0.0, 0.0) for n in range(8)])
-    course = experiment.course(Moments(np.array([0.0, 1.0]), np.stack([far, near]), np.zeros((2, 0, 2)), scene, {}))
-    assert course.curves["cluster"].tolist() == [1 / 8, 1.0]
-    assert course.curves["dispersion"][1] < course.curves["dispersion"][0] / 10
+    series = experiment.series(
+        TrialSamples(np.array([0.0, 1.0]), np.stack([far, near]), np.zeros((2, 0, 2)), scene, {})
+    )
+    assert series.curves["cluster"].tolist() == [1 / 8, 1.0]
+    assert series.curves["dispersion"][1] < series.curves["dispersion"][0] / 10
 
 
 def test_a_trial_without_supervisor_is_the_one_it_was() -> None:
@@ -258,13 +260,13 @@ def test_a_trial_without_supervisor_is_the_one_it_was() -> None:
     scene: Scene = scripted(load_scene("clustering"))
     rows = []
     for experiment in (None, experiment_of("clustering")):
-        brains = [ScriptedBrain(scene, 1, robot, "A") for robot in range(5)]
-        rows.append(run_trial(scene, 1, brains, 3.0, experiment=experiment).rows.columns)
+        controllers = [ScriptedController(scene, 1, robot, "A") for robot in range(5)]
+        rows.append(run_trial(scene, 1, controllers, 3.0, experiment=experiment).rows.columns)
     assert rows[0] == rows[1]
 
 
 def test_names_of_experiments_are_checked() -> None:
     """No module of anything else is taken for one."""
     for name in ("os", "__init__", "Plain", "a.b", ""):
-        with pytest.raises(SceneError, match="there is no experiment"):
+        with pytest.raises(SceneError, match="unknown experiment"):
             experiment_of(name)

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from arena.campaign.campaign import Plan, brains_of
+from arena.campaign.campaign import Plan, controllers_of
 from arena.studio.process import Studio
-from arena.studio.session import RefusedError
+from arena.studio.session import CommandRefusedError
 from arena.trial.trial import run_trial
 from tests.arena.browser import needs_browser
 from tests.arena.test_studio import browsed, do, scene_of, scripted_plan, serving, settled, studio_of
@@ -39,7 +39,7 @@ class Connected(Client):
 def given(studio: Studio, robot: int) -> Connected:
     """A client that has a robot, which stands."""
     studio.ask("debug", robot)
-    client = Connected(studio.ask("now")["debugger"]["port"])
+    client = Connected(studio.ask("status")["debugger"]["port"])
     client.ask("initialize", adapterID="openswarm")
     client.ask("attach", stopOnEntry=True)
     client.ask("configurationDone")
@@ -50,23 +50,23 @@ def given(studio: Studio, robot: int) -> Connected:
 def test_a_robot_is_debugged_from_the_present_on(clustering_image: Path) -> None:
     """Breakpoint, a step back, what is refused meanwhile; left alone, the trial is recorded as ever."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
-    with brains_of(plan, 3, 1) as (brains, _, ether):
-        whole = run_trial(plan.scene, 3, brains, SECONDS, ether=ether, experiment=plan.to_do)
+    with controllers_of(plan, 3) as (controllers, channel):
+        whole = run_trial(plan.scene, 3, controllers, SECONDS, channel=channel, experiment=plan.loaded_experiment)
     with studio_of(plan) as studio:
         do(studio, "step", 1100)
         client = given(studio, 1)
-        now = studio.ask("now")
+        now = studio.ask("status")
         assert (now["tick"], now["state"]) == (1100, "in a debugger")
-        assert (now["debugger"]["robot"], now["debugger"]["is_met"]) == (1, True)
-        for act in (("go",), ("stand",), ("step",), ("back", 0)):
-            with pytest.raises(RefusedError, match="a debugger has robot 1; let it leave first"):
+        assert (now["debugger"]["robot"], now["debugger"]["is_connected"]) == (1, True)
+        for act in (("run",), ("pause",), ("step",), ("rewind", 0)):
+            with pytest.raises(CommandRefusedError, match="robot 1 is in a debugger; detach the debugger first"):
                 studio.ask(*act)
-        assert studio.ask("inside", 1)["pc"] == int(client.top()["instructionPointerReference"], 16)
+        assert studio.ask("inspect", 1)["pc"] == int(client.top()["instructionPointerReference"], 16)
         client.ask("setFunctionBreakpoints", breakpoints=[{"name": "Sys_Send_Event"}])
         client.send("continue", threadId=1)
         assert client.event("stopped")["reason"] == "breakpoint"
         assert client.top()["name"].startswith("Sys_Send_Event")
-        assert studio.ask("now")["tick"] >= 1100
+        assert studio.ask("status")["tick"] >= 1100
         client.send("stepBack", threadId=1, granularity="instruction")
         client.event("stopped")
         refused = client.asked("evaluate", expression="W0 = 1", context="repl")
@@ -74,10 +74,10 @@ def test_a_robot_is_debugged_from_the_present_on(clustering_image: Path) -> None
         assert "the other robots have seen what came of it" in refused["message"]
         client.ask("disconnect")
         assert settled(studio)["debugger"] is None
-        studio.ask("go", 1000.0)
+        studio.ask("run", 1000.0)
         settled(studio, "over")
         assert studio.ask("trial").columns == whole.rows.columns
-        with pytest.raises(RefusedError, match="the trial is over"):
+        with pytest.raises(CommandRefusedError, match="the trial is over"):
             studio.ask("debug", 0)
 
 
@@ -86,7 +86,7 @@ def test_a_robot_is_taken_back_whether_a_client_came_or_not(clustering_image: Pa
     with studio_of(plan) as studio:
         do(studio, "step", 200)
         studio.ask("debug", 0)
-        assert studio.ask("now")["debugger"]["is_met"] is False
+        assert studio.ask("status")["debugger"]["is_connected"] is False
         assert do(studio, "debug", 0)["debugger"] is None
         given(studio, 1)
         assert do(studio, "debug", 1)["debugger"] is None
@@ -94,25 +94,25 @@ def test_a_robot_is_taken_back_whether_a_client_came_or_not(clustering_image: Pa
 
 
 def test_a_script_is_not_debugged() -> None:
-    with studio_of(scripted_plan()) as studio, pytest.raises(RefusedError, match="robot 0 is a script"):
+    with studio_of(scripted_plan()) as studio, pytest.raises(CommandRefusedError, match="robot 0 is scripted"):
         studio.ask("debug", 0)
 
 
 PROBE = """<pre id="result"></pre><script>
 const found = {}, rest = ms => new Promise(done => setTimeout(done, ms));
-const until = async seen => { while (!seen()) { await ask("inside?robot=0"); await rest(10); } };
+const until = async seen => { while (!seen()) { await ask("inspect?robot=0"); await rest(10); } };
 const word = id => el(id).textContent;
 (async () => {
   found.button = word("debug");
-  el("debug").click(); await until(() => word("refused")); found.nobody = word("refused");
+  el("debug").click(); await until(() => word("error")); found.nobody = word("error");
   choose(1); el("debug").click(); await until(() => d.studio.now.debugger);
-  found.waits = word("standing"); found.port = d.studio.now.debugger.port; found.back = word("debug");
-  await until(() => d.studio.now.debugger.is_met && word("inside").includes("Sys_Send_Event"));
-  found.has = word("standing"); found.inside = word("inside");
-  el("quantum").click(); await until(() => word("refused")); found.refused = word("refused");
-  el("debug").click(); await until(() => !d.studio.now.debugger); found.given = word("standing");
+  found.waits = word("status"); found.port = d.studio.now.debugger.port; found.back = word("debug");
+  await until(() => d.studio.now.debugger.is_connected && word("inspector").includes("Sys_Send_Event"));
+  found.has = word("status"); found.inside = word("inspector");
+  el("step").click(); await until(() => word("error")); found.refused = word("error");
+  el("debug").click(); await until(() => !d.studio.now.debugger); found.given = word("status");
   found.tick = d.studio.now.tick; found.again = word("debug");
-  el("quantum").click(); await until(() => d.studio.now.tick > found.tick); found.stepped = d.studio.now.tick;
+  el("step").click(); await until(() => d.studio.now.tick > found.tick); found.stepped = d.studio.now.tick;
   document.getElementById("result").textContent = JSON.stringify(found);
   window.setTimeout = () => 0;           // nothing more is due: the browser need not wait
 })().catch(error => { document.getElementById("result").textContent = JSON.stringify({error: error.stack}); });
@@ -130,7 +130,7 @@ def test_the_page_gives_a_robot_to_a_debugger_and_takes_it_back(
         do(studio, "step", 1100)
 
         def debugs() -> None:
-            while (handed := studio.ask("now")["debugger"]) is None:
+            while (handed := studio.ask("status")["debugger"]) is None:
                 time.sleep(0.05)
             client = Connected(handed["port"])
             client.ask("initialize", adapterID="openswarm")
@@ -140,12 +140,12 @@ def test_the_page_gives_a_robot_to_a_debugger_and_takes_it_back(
 
         threading.Thread(target=debugs, daemon=True).start()
         found = browsed(one, PROBE, tmp_path, monkeypatch)
-    assert (found["button"], found["nobody"]) == ("Debug the robot", "choose a robot first")
-    assert found["back"] == "Take the robot back"
+    assert (found["button"], found["nobody"]) == ("Attach debugger", "select a robot first")
+    assert found["back"] == "Detach debugger"
     assert found["waits"].endswith(f"waits for a client of the Debug Adapter Protocol on 127.0.0.1:{found['port']}")
     assert found["has"].startswith("in a debugger, quantum 1")
     assert "robot 1 has a client" in found["has"]
     assert "Sys_Send_Event" in found["inside"].splitlines()[0]
-    assert found["refused"] == "a debugger has robot 1; let it leave first"
-    assert found["given"].startswith("standing, quantum")
-    assert (found["again"], found["stepped"]) == ("Debug the robot", found["tick"] + 1)
+    assert found["refused"] == "robot 1 is in a debugger; detach the debugger first"
+    assert found["given"].startswith("paused, quantum")
+    assert (found["again"], found["stepped"]) == ("Attach debugger", found["tick"] + 1)

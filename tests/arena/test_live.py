@@ -21,8 +21,8 @@ from arena.campaign.campaign import Plan, run_one, trial_path
 from arena.cli import main
 from arena.commands.replay import server
 from arena.replay.live_feed import Follower, LiveFile, live_path
-from arena.replay.page import samples_of
-from arena.robots.controller import ScriptedBrain
+from arena.replay.page import sample_data
+from arena.robots.controller import ScriptedController
 from arena.scene.loader import load_scene, scripted
 from arena.trial.record import RecordError, read_trial, write_trial
 from arena.trial.trial import Rows, run_trial
@@ -44,7 +44,7 @@ def recorded() -> tuple[dict[str, Any], list[dict[str, Any]]]:
     scene = scripted(load_scene("clustering").with_values(robots__count=2))
     plan = Plan(scene, "scripted", "A", None, 1, 6.0, 1)
     rows: list[dict[str, Any]] = []
-    run_trial(scene, 1, [ScriptedBrain(scene, 1, robot, "A") for robot in range(2)], 6.0, on_row=rows.append)
+    run_trial(scene, 1, [ScriptedController(scene, 1, robot, "A") for robot in range(2)], 6.0, on_row=rows.append)
     for row in rows:
         row["r0_strip"] = bytes(range(60))
     return plan.key() | {"seed": 1, "faults": []}, rows
@@ -86,7 +86,7 @@ def test_a_follower_gets_the_samples_of_the_finished_file_piece_by_piece(
     rest = follower.more(4)
     assert rest["state"] == "done"
     assert not live_path(tmp_path, 1).exists()
-    whole = samples_of(read_trial(trial_path(tmp_path, 1)))
+    whole = sample_data(read_trial(trial_path(tmp_path, 1)))
     assert first["t"] + rest["t"] == whole["t"]
     assert first["robots"][0]["strip"] + rest["robots"][0]["strip"] == whole["robots"][0]["strip"]
     assert first["objects"] + rest["objects"] == whole["objects"]
@@ -99,7 +99,7 @@ def test_a_run_that_is_ended_is_told(tmp_path: Path, recorded: tuple[dict[str, A
     live.write(rows[0])
     follower = Follower(tmp_path)
     live.close()
-    assert follower.more(0) == {"state": "gone"}
+    assert follower.more(0) == {"state": "aborted"}
     with pytest.raises(RecordError, match="no trial is running here"):
         Follower(tmp_path)
 
@@ -125,7 +125,7 @@ def test_a_trial_with_firmware_can_be_followed_while_it_runs(talking_image: Path
     run_one(plan, 1, tmp_path, lambda _trial, _seconds: seen.append(Follower(tmp_path).more(0)))
     assert [len(one["t"]) for one in seen] == [3, 5, 7]
     assert {one["state"] for one in seen} == {"running"}
-    whole = samples_of(read_trial(trial_path(tmp_path, 1)))
+    whole = sample_data(read_trial(trial_path(tmp_path, 1)))
     assert seen[-1]["t"] == whole["t"]
     assert seen[-1]["log"] == whole["log"]
     assert [line["text"] for row in whole["log"] for line in row] == ["hi"]

@@ -70,7 +70,7 @@ def test_a_gif_keeps_the_colours_of_clusters(trial: Path, tmp_path: Path) -> Non
         met = record.columns[f"o0_{axis}"] + away
         met[0] = record.columns[f"o1_{axis}"][0]
         record.columns[f"o1_{axis}"] = met
-    video.write_movie(record, tmp_path / "met.gif", 4.0)
+    video.write_video(record, tmp_path / "met.gif", 4.0)
     with Image.open(tmp_path / "met.gif") as film:
         film.seek(film.n_frames - 1)
         x, y = record.objects[-1][1]
@@ -96,7 +96,7 @@ def test_without_ffmpeg_an_mp4_is_refused_with_what_to_install(
     monkeypatch.setattr(video.shutil, "which", lambda _name: None)
     monkeypatch.setitem(video.__dict__, "importlib", _NothingInstalled())
     assert main(["replay", str(trial), "--export", str(tmp_path / "a.mp4")]) == 2
-    assert "an .mp4 needs ffmpeg" in capsys.readouterr().err
+    assert ".mp4 needs ffmpeg" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
@@ -109,7 +109,7 @@ class _NothingInstalled:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--export", "film.avi"], "a film is a .gif or a .mp4"),
+        (["--export", "film.avi"], "expected a name that ends in .gif or .mp4"),
         (["--export", "film.gif", "--speed", "0"], "must be positive, 1e7 at most"),
         (["--export", "film.gif", "--speed", "1e-4"], "the limit is 20000"),
         (["--export", "nowhere/film.gif"], "cannot be written"),

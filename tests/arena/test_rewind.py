@@ -19,7 +19,7 @@ from arena.cli import main
 from arena.debug import server
 from arena.debug import session as debugsession
 from arena.debug.controlled_robot import OVER
-from arena.debug.session import Remote, Session
+from arena.debug.session import DebugSession, RemoteServer
 from arena.replay.live_feed import live_path
 from arena.trial import checkpoints
 from emu.dap.wire import Message
@@ -40,12 +40,12 @@ def image_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 class Debugger(Client):
     """A client of a session that keeps events and says nothing."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: DebugSession) -> None:
         self.events: list[tuple[str, Any]] = []
-        super().__init__(partial(Remote, session), lambda text: self.events.append(("said", text)))
+        super().__init__(partial(RemoteServer, session), lambda text: self.events.append(("said", text)))
         self.ask("initialize", clientID="test", supportsInvalidatedEvent=True)
         self.ask("launch", stopOnEntry=True)
-        self.go("configurationDone")
+        self.resume("configurationDone")
 
     def send(self, message: Message) -> None:
         if message["type"] == "event":
@@ -62,13 +62,13 @@ class Debugger(Client):
 
     def to(self, cycle: int) -> str:
         """Go to a cycle; the world there."""
-        assert self.go("evaluate", expression=f"/goto {cycle}", context="repl")["reason"] == "goto"
+        assert self.resume("evaluate", expression=f"/goto {cycle}", context="repl")["reason"] == "goto"
         return self.told("/world")
 
 
 @contextmanager
-def session_of(plan: Plan, folder: Path, **how: Any) -> Iterator[tuple[Session, Debugger]]:
-    session = Session(plan, 1, folder, **{"is_recorded": False} | how)
+def session_of(plan: Plan, folder: Path, **how: Any) -> Iterator[tuple[DebugSession, Debugger]]:
+    session = DebugSession(plan, 1, folder, **{"is_recorded": False} | how)
     try:
         yield session, Debugger(session)
     finally:
@@ -117,13 +117,13 @@ def test_without_its_moments_a_trial_begins_again(tmp_path: Path, image_of: Call
     """Not more are kept than so many; the same worlds from the seed when they are lost."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path, every_s=0.03) as (session, debugger):
         seen = {cycle: debugger.to(cycle) for cycle in (3_000_000, 6_000_000, 9_000_000)}
-        assert session.kept == checkpoints.KEPT
+        assert session.checkpoint_count == checkpoints.KEPT
         assert debugger.to(6_000_000) == seen[6_000_000]
         assert not [text for kind, text in debugger.events if kind == "said" and "run again" in text]
-        session._moments.forget(-1)
+        session._checkpoints.forget(-1)
         assert debugger.to(3_000_000) == seen[3_000_000]
         assert [text for kind, text in debugger.events if kind == "said" and "run again" in text]
-        assert session.kept > 0, "they are kept on the way"
+        assert session.checkpoint_count > 0, "they are kept on the way"
         assert debugger.to(9_000_000) == seen[9_000_000]
         assert debugger.to(2_999_000) != debugger.to(3_000_001)
 
@@ -149,7 +149,7 @@ def test_what_was_changed_is_changed_again_on_the_way_from_a_moment(
         assert debugger.to(8_000_000) != changed
         debugger.to(999_999)
         assert debugger.to(4_000_000) == plain
-        assert session.kept > 1
+        assert session.checkpoint_count > 1
 
 
 @needs_copies
@@ -167,12 +167,12 @@ def test_rows_of_a_trial_that_goes_back_are_written_once(tmp_path: Path, image_o
 def test_the_end_is_met_again(tmp_path: Path, image_of: Callable[[str], Path]) -> None:
     """With what the last sample did to the robot: it looked how far the motors had come."""
     with session_of(plan_of(FEW, 7, image_of), tmp_path) as (_, debugger):
-        halt = debugger.go("continue", threadId=1)
+        halt = debugger.resume("continue", threadId=1)
         assert halt["description"] == OVER
         end, cycle = debugger.told("/world"), debugger.cycle
         assert debugger.to(cycle) == end
         assert debugger.to(cycle - 500_000) != end
-        assert debugger.go("continue", threadId=1)["description"] == OVER
+        assert debugger.resume("continue", threadId=1)["description"] == OVER
         assert debugger.told("/world") == end
 
 
@@ -187,17 +187,17 @@ def test_where_no_moments_are_kept_the_world_follows_who_looks(
         assert debugger.told("T1CON.TCKPS = 2") == "2"
         second = debugger.to(5_000_000)
         for _ in range(2):
-            debugger.go("evaluate", expression="/goto 3000000", context="repl")
+            debugger.resume("evaluate", expression="/goto 3000000", context="repl")
             assert "before the present" in debugger.told("/time")
             assert not [kind for kind, _ in debugger.events if kind == "invalidated"]
         assert debugger.told("/world") != first, "what was changed is"
         assert [kind for kind, _ in debugger.events if kind == "invalidated"]
         assert "before the present" not in debugger.told("/time")
         assert debugger.to(5_000_000) == second
-        debugger.go("evaluate", expression="/goto 2000000", context="repl")
+        debugger.resume("evaluate", expression="/goto 2000000", context="repl")
         assert debugger.told("T1CON.TCKPS = 1") == "1"
         assert debugger.to(3_000_000) != first
-        assert session.kept == 0
+        assert session.checkpoint_count == 0
 
 
 @needs_copies
@@ -208,16 +208,16 @@ def test_it_can_be_told_to_stand_on_the_way_back(tmp_path: Path, image_of: Calla
         early = debugger.to(10_000_000)
         debugger.to(200_000_000)
         pause: Message = {"type": "request", "seq": 0, "command": "pause"}
-        hear = session.hear
+        hear = session.receive
 
         def heard() -> tuple[Any, ...]:
             told = hear()
-            if told[0] == "back":
+            if told[0] == "rewind":
                 debugger.inbox.put(pause)
             return told
 
-        session.hear = heard  # type: ignore[method-assign]
-        halt = debugger.go("evaluate", expression="/goto 199000000", context="repl")
+        session.receive = heard  # type: ignore[method-assign]
+        halt = debugger.resume("evaluate", expression="/goto 199000000", context="repl")
         assert (halt["reason"], halt["description"]) == ("pause", "on the way back")
         assert debugger.cycle < 199_000_000
         assert debugger.to(10_000_000) == early

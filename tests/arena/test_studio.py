@@ -20,13 +20,13 @@ from typing import Any
 
 import pytest
 
-from arena.campaign.campaign import Plan, brains_of
+from arena.campaign.campaign import Plan, controllers_of
 from arena.commands import studio as command
-from arena.commands.studio import HEADER, Serving, server
-from arena.robots.controller import ScriptedBrain
+from arena.commands.studio import HEADER, StudioServer, server
+from arena.robots.controller import ScriptedController
 from arena.scene.loader import Scene, load_scene, scripted
 from arena.studio.process import Call, Studio
-from arena.studio.session import RefusedError
+from arena.studio.session import CommandRefusedError
 from arena.trial import checkpoints
 from arena.trial.trial import run_trial
 from tests.arena.browser import BROWSER, needs_browser
@@ -53,10 +53,10 @@ def studio_of(plan: Plan) -> Iterator[Studio]:
         made.close()
 
 
-def settled(studio: Studio, state: str = "standing") -> dict[str, Any]:
+def settled(studio: Studio, state: str = "paused") -> dict[str, Any]:
     """`now`, once the trial is in a state."""
     for _ in range(1200):
-        now = studio.ask("now")
+        now = studio.ask("status")
         if now["state"] in (state, "over"):
             return now
         time.sleep(0.05)
@@ -71,12 +71,12 @@ def do(studio: Studio, name: str, *arguments: Any) -> dict[str, Any]:
 def test_a_trial_that_was_stopped_and_stepped_is_recorded_as_any_other() -> None:
     """However it is cut, the rows are those of `run_trial`."""
     plan = scripted_plan()
-    whole = run_trial(plan.scene, 3, [ScriptedBrain(plan.scene, 3, robot, "A") for robot in range(2)], SECONDS,
-                      experiment=plan.to_do)  # fmt: skip
+    whole = run_trial(plan.scene, 3, [ScriptedController(plan.scene, 3, robot, "A") for robot in range(2)], SECONDS,
+                      experiment=plan.loaded_experiment)  # fmt: skip
     with studio_of(plan) as studio:
         for quanta in (1, 7, 100, 33):
             do(studio, "step", quanta)
-        studio.ask("go", 1000.0)
+        studio.ask("run", 1000.0)
         assert settled(studio, "over")["state"] == "over"
         assert studio.ask("trial").columns == whole.rows.columns
 
@@ -94,7 +94,7 @@ def test_going_back_leads_to_the_first_pass_to_the_byte(clustering_image: Path) 
         studio.ask("move", "robot", 0, 50.0, 50.0)
         assert do(studio, "step", 1)["tick"] == here["tick"] + 4
         assert studio.ask("digest") != first
-        again = do(studio, "back", here["tick"])
+        again = do(studio, "rewind", here["tick"])
         assert (again["tick"], again["epoch"]) == (here["tick"], here["epoch"] + 1)
         assert studio.ask("digest") == first
         assert studio.ask("trial").columns == rows
@@ -103,7 +103,7 @@ def test_going_back_leads_to_the_first_pass_to_the_byte(clustering_image: Path) 
 
 def on_the_way_back(studio: Studio, goal: int, name: str, *arguments: Any) -> None:
     """Begin to go back to `goal`, and do something before anything of that has been done again."""
-    studio.ask_all(Call("back", (goal,)), Call(name, arguments))
+    studio.ask_all(Call("rewind", (goal,)), Call(name, arguments))
 
 
 def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
@@ -124,10 +124,10 @@ def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
 
     with studio_of(plan) as studio:
         moved(studio)
-        with pytest.raises(RefusedError, match="on its way back; let it stand first"):
+        with pytest.raises(CommandRefusedError, match="rewinding; pause it first"):
             on_the_way_back(studio, 400, "move", "object", 0, 50.0, 50.0)
         settled(studio)
-        on_the_way_back(studio, 390, "stand")
+        on_the_way_back(studio, 390, "pause")
         do(studio, "step", 400)
         assert studio.ask("digest") == last
     with studio_of(plan) as studio:
@@ -139,7 +139,7 @@ def test_what_is_done_on_the_way_back_is_done_in_order() -> None:
         assert studio.ask("digest") == last
     with studio_of(plan) as studio:
         moved(studio)
-        on_the_way_back(studio, 400, "back", 10)
+        on_the_way_back(studio, 400, "rewind", 10)
         assert settled(studio)["tick"] == 10
         do(studio, "step", 390)
         assert studio.ask("digest") == last, "what was done later is forgotten"
@@ -151,8 +151,8 @@ def test_kept_moments_lead_to_the_first_pass_to_the_byte(
 ) -> None:
     """A thing moved after each moment that is kept: from there on as from the seed. What is gone back behind is no
     longer kept, what was moved then is not moved again, breakpoints stay, nobody is left at the end."""
-    ended, close = [], checkpoints.Line.close
-    monkeypatch.setattr(checkpoints.Line, "close", lambda line: ended.append(close(line)))
+    ended, close = [], checkpoints.PipeEnd.close
+    monkeypatch.setattr(checkpoints.PipeEnd, "close", lambda line: ended.append(close(line)))
     monkeypatch.setattr(checkpoints, "EVERY_S", 1e9)
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
     with studio_of(plan) as studio:
@@ -161,39 +161,39 @@ def test_kept_moments_lead_to_the_first_pass_to_the_byte(
             tick = do(studio, "step", quanta)["tick"]
             with monkeypatch.context() as now:
                 now.setattr(checkpoints, "EVERY_S", 0.0)
-                studio.ask("now")
+                studio.ask("status")
             studio.ask("move", "object", 1, 100.0 + tick / 50, 120.0)
             seen[tick] = studio.ask("digest"), studio.ask("trial").columns
         do(studio, "step", 10)
-        studio.ask("stop_at", 1, "main")
+        studio.ask("toggle_breakpoint", 1, "main")
         for tick, kept in ((1200, 4), (1150, 3), (1000, 2), (1000, 2)):
-            begun = studio.ask("now")
-            now = do(studio, "back", tick)
-            assert (now["tick"], studio.kept, now["breaks"]) == (tick, kept, ["1 main"])
+            begun = studio.ask("status")
+            now = do(studio, "rewind", tick)
+            assert (now["tick"], studio.checkpoint_count, now["breakpoints"]) == (tick, kept, ["1 main"])
             assert now["epoch"] == begun["epoch"] + (tick < begun["tick"])
             if tick in seen:
                 assert (studio.ask("digest"), studio.ask("trial").columns) == seen[tick]
         do(studio, "step", 100)
         assert studio.ask("digest") != seen[1100][0], "what was moved then is forgotten"
-        studio.ask("stop_at", 1, "Sys_Send_Event")
-        assert do(studio, "back", 900)["breaks"] == ["1 main", "1 Sys_Send_Event"]
+        studio.ask("toggle_breakpoint", 1, "Sys_Send_Event")
+        assert do(studio, "rewind", 900)["breakpoints"] == ["1 main", "1 Sys_Send_Event"]
         assert studio.ask("digest") == seen[900][0]
-        studio.ask("go", 1000.0)
-        assert settled(studio, "at a breakpoint")["held"] == "robot 1 is at Sys_Send_Event"
+        studio.ask("run", 1000.0)
+        assert settled(studio, "at a breakpoint")["hit"] == "robot 1 is at Sys_Send_Event"
     assert len(ended) == 9
     assert all(ended), "four moments, four that were left for one, and the last"
 
 
 def test_moments_are_kept_more_coarsely_the_older_they_are() -> None:
     """At most so many; those that go are closed."""
-    kept, lines = checkpoints.Moments(), []
+    kept, lines = checkpoints.CheckpointPool(), []
     for ten in range(1, 61):
         assert kept.is_due(10.0 * ten)
         assert not kept.is_due(10.0 * ten - 1)
-        here, there = checkpoints.line()
+        here, there = checkpoints.pipe()
         there.drop()
         lines.append(here)
-        kept.add(checkpoints.Moment(ten * 1000, 10.0 * ten, here))
+        kept.add(checkpoints.Checkpoint(ten * 1000, 10.0 * ten, here))
     assert len(kept) == checkpoints.KEPT
     assert sum(line.fileno() >= 0 for line in lines) == checkpoints.KEPT
     times = [moment.seconds for moment in (kept.before(tick) for tick in range(0, 60001, 500)) if moment is not None]
@@ -205,26 +205,26 @@ def test_moments_are_kept_more_coarsely_the_older_they_are() -> None:
 def test_a_breakpoint_holds_the_whole_world(clustering_image: Path) -> None:
     """Nobody moves while a robot stands; what is inside it can be read; afterwards all is as without it."""
     plan = Plan(scene_of(2, 4), "openswarm", "A", clustering_image, 1, SECONDS, 3)
-    with brains_of(plan, 3, 1) as (brains, _, ether):
-        whole = run_trial(plan.scene, 3, brains, SECONDS, ether=ether, experiment=plan.to_do)
+    with controllers_of(plan, 3) as (controllers, channel):
+        whole = run_trial(plan.scene, 3, controllers, SECONDS, channel=channel, experiment=plan.loaded_experiment)
     with studio_of(plan) as studio:
         do(studio, "step", 1100)
-        studio.ask("stop_at", 1, "Sys_Send_Event")
-        with pytest.raises(RefusedError, match="robot 0"):
-            studio.ask("stop_at", 0, "no_such_function")
-        studio.ask("go", 1000.0)
+        studio.ask("toggle_breakpoint", 1, "Sys_Send_Event")
+        with pytest.raises(CommandRefusedError, match="robot 0"):
+            studio.ask("toggle_breakpoint", 0, "no_such_function")
+        studio.ask("run", 1000.0)
         now = settled(studio, "at a breakpoint")
-        assert now["held"] == "robot 1 is at Sys_Send_Event"
-        inside = studio.ask("inside", 1)
+        assert now["hit"] == "robot 1 is at Sys_Send_Event"
+        inside = studio.ask("inspect", 1)
         assert inside["place"] == "_Sys_Send_Event"
         assert any("Sys_Send_Event" in frame for frame in inside["frames"])
         assert len(inside["w"]) == 16
-        with pytest.raises(RefusedError, match="let it go on first"):
+        with pytest.raises(CommandRefusedError, match="run the trial first"):
             studio.ask("move", "object", 0, 50.0, 50.0)
         time.sleep(0.2)
-        assert studio.ask("now")["tick"] == now["tick"]
-        studio.ask("stop_at", 1, "Sys_Send_Event")
-        studio.ask("go", 1000.0)
+        assert studio.ask("status")["tick"] == now["tick"]
+        studio.ask("toggle_breakpoint", 1, "Sys_Send_Event")
+        studio.ask("run", 1000.0)
         settled(studio, "over")
         assert studio.ask("trial").columns == whole.rows.columns
 
@@ -234,9 +234,9 @@ def test_what_is_told_arrives(assembled: Callable[[str], Path]) -> None:
     plan = Plan(scene_of(1, 0), "echo", "A", assembled(ECHO), 1, SECONDS, 1)
     with studio_of(plan) as studio:
         do(studio, "step", 100)
-        studio.ask("tell", 0, "hello\r")
-        with pytest.raises(RefusedError, match="Latin-1"):
-            studio.ask("tell", 0, "\u20ac")
+        studio.ask("send", 0, "hello\r")
+        with pytest.raises(CommandRefusedError, match="Latin-1"):
+            studio.ask("send", 0, "\u20ac")
         do(studio, "step", 500)
         assert [line["text"] for row in studio.ask("trial").columns["log"] for line in row] == ["hello"]
 
@@ -247,15 +247,15 @@ def test_a_supervisor_that_fails_leaves_the_moment_before(tmp_path: Path) -> Non
     own.write_text(FAILING)
     plan = Plan(scripted(scene_of(2, 4)), "scripted", "A", None, 1, SECONDS, 3, own)
     with studio_of(plan) as studio:
-        studio.ask("go", 1000.0)
-        while (now := studio.ask("now"))["state"] == "running":
+        studio.ask("run", 1000.0)
+        while (now := studio.ask("status"))["state"] == "running":
             time.sleep(0.05)
-        assert now["state"].startswith("cannot go on: ")
+        assert now["state"].startswith("failed: ")
         assert "ouch" in now["state"]
         assert now["t"] == pytest.approx(1.1, abs=0.02)
-        with pytest.raises(RefusedError, match="go back first"):
+        with pytest.raises(CommandRefusedError, match="rewind first"):
             studio.ask("step", 1)
-        assert do(studio, "back", 50)["tick"] == 50
+        assert do(studio, "rewind", 50)["tick"] == 50
 
 
 FAILING = """
@@ -278,14 +278,14 @@ def step(world):
 
 
 @contextmanager
-def serving(plan: Plan | None = None) -> Iterator[Serving]:
+def serving(plan: Plan | None = None) -> Iterator[StudioServer]:
     with studio_of(plan or scripted_plan()) as studio, server(studio, 0) as one:
         threading.Thread(target=one.serve_forever, daemon=True).start()
         yield one
         one.shutdown()
 
 
-def asked(one: Serving, path: str, body: bytes | None = None, **headers: str) -> tuple[int, str]:
+def asked(one: StudioServer, path: str, body: bytes | None = None, **headers: str) -> tuple[int, str]:
     given = {HEADER: one.token} | {name.replace("_", "-"): value for name, value in headers.items()}
     request = urllib.request.Request(f"http://{one.hosts[0]}{path}", body, given)
     try:
@@ -306,7 +306,7 @@ def test_strangers_are_refused() -> None:
                         {"Host": f"example.org:{one.server_port}"}):  # fmt: skip
             status, text = asked(one, "/do", step, **strange)
             assert status == 403, strange
-            assert text.endswith("use the one that `arena studio` printed")
+            assert text.endswith("use the address that `arena studio` printed")
         assert json.loads(asked(one, "/more?from=0&epoch=1")[1])["now"]["tick"] == 0
         status, text = asked(one, "/do", step, Origin=f"http://{one.hosts[1]}")
         assert (status, json.loads(text)["state"]) == (200, "running")
@@ -315,23 +315,23 @@ def test_strangers_are_refused() -> None:
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        (b"{", "no JSON"),
-        (b"[" * 5000, "no JSON"),
+        (b"{", "not valid JSON"),
+        (b"[" * 5000, "not valid JSON"),
         (b"[]", "expected an object"),
         (b'{"do": "__init__"}', "expected an object"),
-        (b'{"do": "go"}', "go: expected pace"),
-        (b'{"do": "go", "pace": 0}', "expected a positive number"),
-        (b'{"do": "go", "pace": NaN}', "pace is nan"),
+        (b'{"do": "run"}', "run: expected pace"),
+        (b'{"do": "run", "pace": 0}', "expected a positive number"),
+        (b'{"do": "run", "pace": NaN}', "pace is nan"),
         (b'{"do": "step", "quanta": true}', "quanta is True"),
         (b'{"do": "step", "quanta": 1.5}', "quanta is 1.5"),
-        (b'{"do": "back", "tick": -1}', "quantum -1"),
-        (b'{"do": "back", "tick": 1e400}', "tick is inf"),
+        (b'{"do": "rewind", "tick": -1}', "quantum -1"),
+        (b'{"do": "rewind", "tick": 1e400}', "tick is inf"),
         (b'{"do": "move", "kind": "wall", "number": 0, "x": 1, "y": 1}', "cannot be moved"),
         (b'{"do": "move", "kind": "robot", "number": 9, "x": 1, "y": 1}', "there is no robot 9"),
         (b'{"do": "move", "kind": "robot", "number": 0, "x": 1e9, "y": 1}', "outside the walls"),
-        (b'{"do": "tell", "robot": -1, "text": ""}', "there is no robot -1"),
-        (b'{"do": "stop_at", "robot": 0, "place": "main"}', "robot 0 is a script"),
-        (b'{"do": "stand", "more": 1}', "expected nothing more"),
+        (b'{"do": "send", "robot": -1, "text": ""}', "there is no robot -1"),
+        (b'{"do": "toggle_breakpoint", "robot": 0, "place": "main"}', "robot 0 is scripted"),
+        (b'{"do": "pause", "more": 1}', "expected no parameters"),
     ],
 )
 def test_bad_requests_are_told_in_one_line(body: bytes, said: str) -> None:
@@ -340,9 +340,9 @@ def test_bad_requests_are_told_in_one_line(body: bytes, said: str) -> None:
         status, text = asked(one, "/do", body)
         assert (status, text.count("\n")) == (409, 0)
         assert said in text
-        assert asked(one, "/inside?robot=7")[0] == asked(one, "/more?from=-1&epoch=1")[0] == 409
+        assert asked(one, "/inspect?robot=7")[0] == asked(one, "/more?from=-1&epoch=1")[0] == 409
         assert asked(one, "/elsewhere")[0] == 404
-        assert json.loads(asked(one, "/inside?robot=1")[1]) == {"robot": 1, "script": True}
+        assert json.loads(asked(one, "/inspect?robot=1")[1]) == {"robot": 1, "script": True}
 
 
 def test_the_command_ends_with_ctrl_c() -> None:
@@ -365,13 +365,13 @@ def test_the_command_ends_with_ctrl_c() -> None:
 
 PROBE = """<pre id="result"></pre><script>
 const found = {}, rest = ms => new Promise(done => setTimeout(done, ms));
-const until = async seen => { while (!seen()) { await ask("inside?robot=0"); await rest(10); } };
-const still = async () => { await rest(100); await until(() => d.studio.now.state === "standing"); };
+const until = async seen => { while (!seen()) { await ask("inspect?robot=0"); await rest(10); } };
+const still = async () => { await rest(100); await until(() => d.studio.now.state === "paused"); };
 (async () => {
   found.first = d.studio.now.tick;
-  el("quantum").click(); await until(() => d.studio.now.tick); await still(); found.stepped = d.studio.now.tick;
-  el("speed").value = "4"; el("go").click(); await until(() => d.studio.now.tick > 11);
-  el("go").click(); await still();
+  el("step").click(); await until(() => d.studio.now.tick); await still(); found.stepped = d.studio.now.tick;
+  el("speed").value = "4"; el("run").click(); await until(() => d.studio.now.tick > 11);
+  el("run").click(); await still();
   found.ran = d.studio.now.tick; found.before = (await ask("digest")).digest;
   const [x, y] = d.studio.now.objects[0], at = (x, y) => ({offsetX: X(x), offsetY: Y(y)});
   canvas.onpointerdown(at(x, y)); canvas.onpointermove(at(200, 150));
@@ -379,12 +379,12 @@ const still = async () => { await rest(100); await until(() => d.studio.now.stat
   do found.moved = (await ask("digest")).digest; while (found.moved === found.before);
   found.dragged = d.studio.now.objects[0];
   await act({do: "step", quanta: 20}); await still();
-  await act({do: "back", tick: found.ran}); await still();
+  await act({do: "rewind", tick: found.ran}); await still();
   found.backTick = d.studio.now.tick; found.back = (await ask("digest")).digest;
-  choose(1); await until(() => el("inside").textContent); found.inside = el("inside").textContent;
-  el("stopat").value = "main"; el("stopat").dispatchEvent(new Event("change"));
-  await until(() => el("refused").textContent);
-  found.refused = el("refused").textContent; found.samples = d.t.length;
+  choose(1); await until(() => el("inspector").textContent); found.inside = el("inspector").textContent;
+  el("breakpoint").value = "main"; el("breakpoint").dispatchEvent(new Event("change"));
+  await until(() => el("error").textContent);
+  found.refused = el("error").textContent; found.samples = d.t.length;
   document.getElementById("result").textContent = JSON.stringify(found);
   window.setTimeout = () => 0;           // nothing more is due: the browser need not wait
 })().catch(error => { document.getElementById("result").textContent = JSON.stringify({error: error.stack}); });
@@ -401,11 +401,11 @@ def test_the_page_takes_the_trial_in_hand(tmp_path: Path, monkeypatch: pytest.Mo
     assert found["backTick"] == found["ran"]
     assert found["dragged"] == pytest.approx([200, 150], abs=1.5)
     assert found["before"] != found["moved"] == found["back"]
-    assert found["inside"] == "a script: nothing is inside"
-    assert "robot 1 is a script" in found["refused"]
+    assert found["inside"] == "scripted robot: no firmware"
+    assert "robot 1 is scripted" in found["refused"]
 
 
-def browsed(one: Serving, probe: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def browsed(one: StudioServer, probe: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """What the studio's page found out when it ended in a probe. Timers do not wait for the clock, requests do."""
     plain = command.page
     monkeypatch.setattr(command, "page", lambda *given, **more: plain(*given, **more).replace("</html>", probe))

@@ -70,7 +70,7 @@ class Walk:
         """What there was to see in the world, by cycle of the robot."""
         self._client.ask("initialize", clientID="walk")
         self._client.ask("launch", stopOnEntry=True)
-        self._client.go("configurationDone")
+        self._client.resume("configurationDone")
         self._look()
 
     def _told(self, text: str) -> str:
@@ -90,7 +90,7 @@ class Walk:
 
     def _go(self, kind: str, request: str, **arguments: Any) -> None:
         self._tally[kind] += 1
-        self._client.go(request, threadId=1, **arguments)
+        self._client.resume(request, threadId=1, **arguments)
 
     def _console(self, kind: str, text: str) -> None:
         self._go(kind, "evaluate", expression=text, context="repl")

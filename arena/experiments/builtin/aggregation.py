@@ -1,4 +1,4 @@
-"""Aggregation: how near to each other robots have come, and how many belong to the largest group."""
+"""Aggregation: share of the robots in the largest group, and dispersion of the robots."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Moments
+from arena.experiments import Curve, Floats, TrialSamples
 from arena.metrics import compactnesses, largest_shares
 from arena.scene import dimensions
 
@@ -15,10 +15,10 @@ CURVES = [
     Curve("dispersion", "dispersion of the robots, sum of squared distances to their centre / 4 r²"),
 ]
 REACH_CM = 4 * dimensions.ROBOT_RADIUS
-"""Robots nearer than this belong together: no other fits between them, as for objects (epuck.md §8)."""
+"""Centre distance below which two robots are adjacent: no other robot fits between them (epuck.md §8)."""
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """Both at every sample; the dispersion is Eq. (2) of the clustering experiment, of robots."""
-    places = np.ascontiguousarray(moments.robots[:, :, :2])
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return both metrics at every sample; the dispersion is Eq. (2) of the clustering experiment, for robots."""
+    places = np.ascontiguousarray(samples.robots[:, :, :2])
     return {"cluster": largest_shares(places, REACH_CM), "dispersion": compactnesses(places, dimensions.ROBOT_RADIUS)}

@@ -1,4 +1,4 @@
-"""Consensus: how far what robots take for the mean (`mean HUNDREDTHS`) is from the mean of those alive (`value N`)."""
+"""Consensus: error of the mean that robots report (`mean HUNDREDTHS`) against the mean of their values (`value N`)."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Measure, Moments
-from arena.experiments.spoken import alive, last_said, settled_at
-from arena.metrics import Course
+from arena.experiments import Curve, Floats, Measure, TrialSamples
+from arena.experiments.uart_values import alive, last_values, settled_at
+from arena.metrics import MetricSeries
 
 AGREED = 0.05
-"""Chosen: in the scene, any robot that is left out or should be moves the mean by more."""
+"""Chosen tolerance: in the scene, one robot too many or too few changes the mean by more."""
 
 CURVES = [
     Curve("error", "greatest error of a robot's mean"),
@@ -19,19 +19,19 @@ CURVES = [
 ]
 
 
-def _agreed_at(course: Course, until: float) -> float:
-    return settled_at(course.until(until), course.curves["error"] <= AGREED)
+def _agreed_at(series: MetricSeries, until: float) -> float:
+    return settled_at(series.until(until), series.curves["error"] <= AGREED)
 
 
 MEASURES = [
-    Measure("error", "greatest error at {at:g} s", lambda course, at: course.at(at, "error")),
+    Measure("error", "greatest error at {at:g} s", lambda series, at: series.at(at, "error")),
     Measure("agreed", f"s after which no mean is wrong by more than {AGREED:g}", _agreed_at),
 ]
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """Errors are those of robots that are alive; nan while one of them has said nothing."""
-    means, values, living = last_said(moments, "mean")[0] / 100, last_said(moments, "value")[0], alive(moments)
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return the errors of the robots that are switched on; nan until all of them have reported."""
+    means, values, living = last_values(samples, "mean")[0] / 100, last_values(samples, "value")[0], alive(samples)
     worst, typical = np.full((2, len(means)), np.nan)
     for sample, lives in enumerate(living):
         if lives.any():

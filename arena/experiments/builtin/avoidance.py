@@ -1,4 +1,4 @@
-"""Obstacle avoidance: do robots keep moving, and how near do they come to what is in their way?"""
+"""Obstacle avoidance: smallest gap between a robot and anything else, and share of the floor visited."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Moments
+from arena.experiments import Curve, Floats, TrialSamples
 from arena.scene import dimensions, geometry
 from arena.scene.loader import Scene
 from arena.scene.schema import Obstacle
@@ -19,13 +19,13 @@ CURVES = [
 SQUARE_CM = 20.0
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """Both at every sample; squares count once a robot's centre has been in them."""
-    squares = _squares(moments.scene)
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return both metrics at every sample; a square counts as visited once a robot's centre has been in it."""
+    squares = _squares(samples.scene)
     visited: set[tuple[int, int]] = set()
     gaps, covered = [], []
-    for robots in moments.robots[:, :, :2]:
-        gaps.append(_gap(moments.scene, robots))
+    for robots in samples.robots[:, :, :2]:
+        gaps.append(_gap(samples.scene, robots))
         visited |= {(int(x // SQUARE_CM), int(y // SQUARE_CM)) for x, y in robots.tolist()} & squares
         covered.append(len(visited) / max(len(squares), 1))
     return {"gap": np.array(gaps), "covered": np.array(covered)}
@@ -51,7 +51,7 @@ def _gap(scene: Scene, robots: Floats) -> float:
 
 
 def _squares(scene: Scene) -> set[tuple[int, int]]:
-    """Squares whose middle is neither outside the walls nor in an obstacle."""
+    """Return the squares of the floor whose centre is inside the walls and outside all obstacles."""
     arena = scene.arena
     found = set()
     for column in range(math.ceil(arena.width_cm / SQUARE_CM)):

@@ -1,4 +1,4 @@
-"""Clocks that agree: what robots that are alive take for the time (`clock MS`) against the arena's true time."""
+"""Clock synchronisation: time that robots report (`clock MS`) against the simulated time."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Measure, Moments
-from arena.experiments.spoken import alive, apart, last_said, settled_at
-from arena.metrics import Course
+from arena.experiments import Curve, Floats, Measure, TrialSamples
+from arena.experiments.uart_values import alive, apart, last_values, settled_at
+from arena.metrics import MetricSeries
 
 AGREED_MS = 20.0
-"""Chosen: a fifth of the time a message takes."""
+"""Chosen tolerance: a fifth of the duration of a message."""
 
 CURVES = [
     Curve("apart", "greatest difference between two clocks", "ms"),
@@ -19,25 +19,27 @@ CURVES = [
 ]
 
 
-def _agreed_at(course: Course, until: float) -> float:
-    return settled_at(course.until(until), course.curves["apart"] <= AGREED_MS)
+def _agreed_at(series: MetricSeries, until: float) -> float:
+    return settled_at(series.until(until), series.curves["apart"] <= AGREED_MS)
 
 
 MEASURES = [
-    Measure("apart", "greatest difference of clocks at {at:g} s, ms", lambda course, at: course.at(at, "apart")),
-    Measure("drift", "clocks less true time at {at:g} s, ms", lambda course, at: course.at(at, "drift")),
+    Measure("apart", "greatest difference of clocks at {at:g} s, ms", lambda series, at: series.at(at, "apart")),
+    Measure("drift", "clocks less true time at {at:g} s, ms", lambda series, at: series.at(at, "drift")),
     Measure("agreed", f"s after which all stayed within {AGREED_MS:g} ms", _agreed_at),
 ]
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """Each clock's lead on the arena's time is known when it is said, and holds until it is said again."""
-    clocks, seconds = last_said(moments, "clock")
-    leads, living = clocks - 1000 * seconds, alive(moments)
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return range and drift of the clocks; the offset of a clock is known at a report and held until the next one."""
+    clocks, seconds = last_values(samples, "clock")
+    leads, living = clocks - 1000 * seconds, alive(samples)
     differ = apart(leads, living)
     sums, count = np.where(living, leads, 0.0).sum(axis=1), np.maximum(living.sum(axis=1), 1)
     means = sums / count
-    apart_at = np.flatnonzero(~(differ <= AGREED_MS))  # until then somebody may know better and not have said so
+    apart_at = np.flatnonzero(
+        ~(differ <= AGREED_MS)
+    )  # until then a robot may have a better time without having reported it
     begin = int(apart_at[-1]) + 1 if len(apart_at) else 0
     drift = np.full(len(means), np.nan)
     drift[begin:] = means[begin:] - means[begin : begin + 1]

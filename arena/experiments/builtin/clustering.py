@@ -1,4 +1,4 @@
-"""Object clustering (docs/experiment.md): how many objects are in the largest cluster, how compact they lie."""
+"""Object clustering (docs/experiment.md): share of the objects in the largest cluster, and compactness."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Measure, Moments
-from arena.metrics import Course, clusters, compactnesses, largest_shares, reach_of
+from arena.experiments import Curve, Floats, Measure, TrialSamples
+from arena.metrics import MetricSeries, clusters, compactnesses, largest_shares, reach_of
 from arena.scene.loader import Scene
 
 PUBLISHED = "86.5 % after 600 s: ten trials with real robots, reported for ref. [10], not for either run here"
@@ -19,12 +19,12 @@ CURVES = [
     Curve("compactness", "compactness u, Eq. (2)"),
 ]
 MARGIN = 0.10
-"""10 points (experiment.md §5)."""
+"""Margin of equivalence: 10 percentage points (experiment-contract.md §5)."""
 
 
-def _until_80(course: Course, _at: float) -> float:
-    reached = course.first("share", 0.8)
-    return float(course.times[-1]) if np.isnan(reached) else reached
+def _until_80(series: MetricSeries, _at: float) -> float:
+    reached = series.first("share", 0.8)
+    return float(series.times[-1]) if np.isnan(reached) else reached
 
 
 MEASURES = [
@@ -35,16 +35,16 @@ MEASURES = [
 ]
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """At every sample."""
-    objects = moments.scene.objects
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return all metrics at every sample."""
+    objects = samples.scene.objects
     return {
-        "share": largest_shares(moments.objects, reach_of("4r", objects.radius_cm)),
-        "share_12cm": largest_shares(moments.objects, reach_of("12cm", objects.radius_cm)),
-        "compactness": compactnesses(moments.objects, objects.radius_cm),
+        "share": largest_shares(samples.objects, reach_of("4r", objects.radius_cm)),
+        "share_12cm": largest_shares(samples.objects, reach_of("12cm", objects.radius_cm)),
+        "compactness": compactnesses(samples.objects, objects.radius_cm),
     }
 
 
 def groups(scene: Scene, objects: Floats) -> list[int]:
-    """The clusters."""
+    """Return the cluster number of each object."""
     return clusters(objects, reach_of("4r", scene.objects.radius_cm))

@@ -1,7 +1,7 @@
-"""Foraging: robots that touch food are told so, and that they have reached the nest; food grows again elsewhere.
+"""Foraging: food carried to the nest. Food that a robot has taken appears again elsewhere.
 
-The supervisor stands for what a gripper and a floor sensor would do: the robot has neither. Everything it does goes
-through the robot's Bluetooth link.
+The supervisor replaces a gripper and a floor sensor, which the robot does not have. It sends the robot a Bluetooth
+message when the robot touches food or reaches the nest.
 """
 
 from __future__ import annotations
@@ -14,57 +14,57 @@ from arena.scene import dimensions
 from arena.scene.loader import Scene
 
 if TYPE_CHECKING:
-    from arena.experiments.supervisor import Stage
+    from arena.experiments.supervisor import Supervisor
 
 CURVES = [
     Curve("delivered", "food carried to the nest", "pieces"),
     Curve("carrying", "robots that carry food", "%", 100, 1.0),
 ]
 TOUCH_CM = 0.5
-"""Gap up to which food counts as touched."""
+"""Largest gap at which a robot touches food."""
 CLEAR_CM = 8.0
-"""Food grows where nothing is nearer than this, and not in the nest."""
+"""Least free distance around a new piece of food, and between it and the nest."""
 TRIES = 500
 
 
-def init(stage: Stage) -> None:
-    """Nobody carries anything yet."""
-    stage.memory["loaded"] = set()
-    stage.note("delivered", 0)
-    stage.note("carrying", 0)
+def init(supervisor: Supervisor) -> None:
+    """Start without loaded robots."""
+    supervisor.memory["loaded"] = set()
+    supervisor.note("delivered", 0)
+    supervisor.note("carrying", 0)
 
 
-def step(stage: Stage) -> None:
-    """Ten times a second: who has touched food, who is in the nest?"""
-    loaded, objects = stage.memory["loaded"], stage.objects
-    x_nest, y_nest, radius = _nest(stage.scene)
-    for robot, (x, y, _) in enumerate(stage.robots.tolist()):
+def step(supervisor: Supervisor) -> None:
+    """Load robots that touch food, unload robots in the nest, and send them messages."""
+    loaded, objects = supervisor.memory["loaded"], supervisor.objects
+    x_nest, y_nest, radius = _nest(supervisor.scene)
+    for robot, (x, y, _) in enumerate(supervisor.robots.tolist()):
         if robot in loaded:
             if math.hypot(x - x_nest, y - y_nest) < radius:
                 loaded.discard(robot)
-                stage.note("delivered", stage.noted["delivered"] + 1)
-                stage.tell(robot, "nest\n")
+                supervisor.note("delivered", supervisor.noted["delivered"] + 1)
+                supervisor.tell(robot, "nest\n")
             continue
         for number, (ox, oy) in enumerate(objects.tolist()):
-            reach = dimensions.ROBOT_RADIUS + stage.scene.kind_of(number).radius_cm + TOUCH_CM
+            reach = dimensions.ROBOT_RADIUS + supervisor.scene.kind_of(number).radius_cm + TOUCH_CM
             if math.hypot(x - ox, y - oy) < reach:
                 loaded.add(robot)
-                _regrow(stage, number)
-                objects = stage.objects
-                stage.tell(robot, "food\n")
+                _regrow(supervisor, number)
+                objects = supervisor.objects
+                supervisor.tell(robot, "food\n")
                 break
-    stage.note("carrying", len(loaded))
+    supervisor.note("carrying", len(loaded))
 
 
-def _regrow(stage: Stage, number: int) -> None:
-    """Elsewhere, where there is room."""
-    arena, (x_nest, y_nest, radius) = stage.scene.arena, _nest(stage.scene)
+def _regrow(supervisor: Supervisor, number: int) -> None:
+    """Move a piece of food to a random free position."""
+    arena, (x_nest, y_nest, radius) = supervisor.scene.arena, _nest(supervisor.scene)
     for _ in range(TRIES):
-        x, y = (stage.rng.uniform(0.05, 0.95, 2) * (arena.width_cm, arena.height_cm)).tolist()
-        things = [*stage.robots[:, :2].tolist(), *stage.objects.tolist()]
+        x, y = (supervisor.rng.uniform(0.05, 0.95, 2) * (arena.width_cm, arena.height_cm)).tolist()
+        things = [*supervisor.robots[:, :2].tolist(), *supervisor.objects.tolist()]
         is_free = all(math.hypot(x - ox, y - oy) > 2 * CLEAR_CM for ox, oy in things)
         if is_free and math.hypot(x - x_nest, y - y_nest) > radius + CLEAR_CM:
-            stage.move_object(number, x, y)
+            supervisor.move_object(number, x, y)
             return
 
 
@@ -74,6 +74,6 @@ def _nest(scene: Scene) -> tuple[float, float, float]:
 
 
 def metrics(sample: Sample) -> dict[str, float]:
-    """What the supervisor noted."""
+    """Return the numbers of the supervisor."""
     robots = max(len(sample.robots), 1)
     return {"delivered": sample.noted["delivered"], "carrying": sample.noted["carrying"] / robots}

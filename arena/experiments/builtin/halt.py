@@ -1,4 +1,4 @@
-"""Stopping together: how many robots that are alive stand still as they were told, and how long after the first."""
+"""Simultaneous stop: share of the robots that have stopped, and time between the first and the last stop."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Measure, Moments
-from arena.experiments.spoken import alive, apart, last_said
-from arena.metrics import Course
+from arena.experiments import Curve, Floats, Measure, TrialSamples
+from arena.experiments.uart_values import alive, apart, last_values
+from arena.metrics import MetricSeries
 
 STILL_CM, STILL_RAD = 0.1, 0.04
-"""Per sample: chosen far below what a robot drives or turns in 0.1 s (0.4 cm, 0.15 rad)."""
+"""Motion per sample that counts as rest; a robot drives 0.4 cm or turns 0.15 rad in 0.1 s."""
 TOGETHER_S = 1.0
 
 CURVES = [
@@ -20,25 +20,25 @@ CURVES = [
 ]
 
 
-def _together(course: Course, until: float) -> float:
-    """Seconds between the first stop and the last; nan unless all stand, within `TOGETHER_S`."""
-    between = course.at(until, "between")
+def _together(series: MetricSeries, until: float) -> float:
+    """Return the seconds between first and last stop; nan unless all have stopped within `TOGETHER_S`."""
+    between = series.at(until, "between")
     return between if between <= TOGETHER_S else float("nan")
 
 
 MEASURES = [
-    Measure("standing", "share that stands at {at:g} s", lambda course, at: course.at(at, "standing")),
+    Measure("standing", "share that stands at {at:g} s", lambda series, at: series.at(at, "standing")),
     Measure("together", f"s between first and last stop, if all stopped within {TOGETHER_S:g} s", _together),
 ]
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """A robot has stopped if it says so (`halt MS`) and stands since the sample before."""
-    _, halted = last_said(moments, "halt")
-    steps = np.abs(np.diff(moments.robots, axis=0, prepend=moments.robots[:1]))
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return both metrics; a robot has stopped if it has reported it (`halt MS`) and is at rest."""
+    _, halted = last_values(samples, "halt")
+    steps = np.abs(np.diff(samples.robots, axis=0, prepend=samples.robots[:1]))
     moves = (np.hypot(steps[:, :, 0], steps[:, :, 1]) > STILL_CM) | (steps[:, :, 2] > STILL_RAD)
     stands = ~np.isnan(halted) & ~moves
-    living = alive(moments)
+    living = alive(samples)
     share = (stands & living).sum(axis=1) / np.maximum(living.sum(axis=1), 1)
     between = np.where(share == 1.0, apart(halted, living), np.nan)
     return {"standing": share, "between": between}

@@ -1,4 +1,4 @@
-"""Election: how many robots that are alive follow the same robot (`leader RANK`), and it is alive."""
+"""Leader election: share of the robots that follow the same living robot (`leader RANK`)."""
 
 from __future__ import annotations
 
@@ -6,32 +6,32 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Measure, Moments
-from arena.experiments.spoken import alive, last_said, settled_at
-from arena.metrics import Course
+from arena.experiments import Curve, Floats, Measure, TrialSamples
+from arena.experiments.uart_values import alive, last_values, settled_at
+from arena.metrics import MetricSeries
 
 CURVES = [
     Curve("following", "robots that follow the leader most of them follow, if it is alive", "%", 100, 1.0),
     Curve("leaders", "robots that take themselves for the leader"),
 ]
-EVERYBODY = 1.0
+ALL = 1.0
 
 
-def _elected(course: Course, until: float) -> float:
-    return settled_at(course.until(until), course.curves["following"] >= EVERYBODY)
+def _elected(series: MetricSeries, until: float) -> float:
+    return settled_at(series.until(until), series.curves["following"] >= ALL)
 
 
 MEASURES = [
-    Measure("following", "share behind one leader at {at:g} s", lambda course, at: course.at(at, "following")),
+    Measure("following", "share behind one leader at {at:g} s", lambda series, at: series.at(at, "following")),
     Measure("elected", "s after which all follow one living leader until {at:g} s", _elected),
 ]
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """A leader is known by the rank it says it has (`rank N`); a rank that is said later replaces the one before."""
-    said, _ = last_said(moments, "leader")
-    all_ranks, _ = last_said(moments, "rank")
-    living = alive(moments)
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return both metrics; the leader is identified by the rank that it last reported (`rank N`)."""
+    said, _ = last_values(samples, "leader")
+    all_ranks, _ = last_values(samples, "rank")
+    living = alive(samples)
     following, leaders = np.zeros(len(said)), np.zeros(len(said))
     for sample, (names, ranks, lives) in enumerate(zip(said, all_ranks, living, strict=True)):
         here = {ranks[robot] for robot in np.flatnonzero(lives)}

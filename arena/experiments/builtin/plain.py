@@ -1,4 +1,4 @@
-"""What can be said of any robots: how far they are from each other, and how far they have come."""
+"""Default experiment: distance between the robots, and distance travelled."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Moments
+from arena.experiments import Curve, Floats, TrialSamples
 
 CURVES = [
     Curve("spread", "mean distance of the robots from their centre", "cm"),
@@ -14,9 +14,9 @@ CURVES = [
 ]
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """Both at every sample; the way is that between samples in straight lines."""
-    places = moments.robots[:, :, :2]
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return both metrics at every sample; the path between two samples counts as a straight line."""
+    places = samples.robots[:, :, :2]
     if not places.shape[1]:
         return {"spread": np.zeros(len(places)), "travelled": np.zeros(len(places))}
     away = np.sqrt(((places - places.mean(axis=1, keepdims=True)) ** 2).sum(axis=2)).mean(axis=1)

@@ -1,4 +1,4 @@
-"""A shared search: how many parts robots know to be done (`done N`), who knows all and the right answer (`best N`)."""
+"""Shared search: parts that robots know to be done (`done N`), and share with the right answer (`best N`)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arena.experiments import Curve, Floats, Measure, Moments
-from arena.experiments.spoken import alive, last_said, settled_at
-from arena.metrics import Course
+from arena.experiments import Curve, Floats, Measure, TrialSamples
+from arena.experiments.uart_values import alive, last_values, settled_at
+from arena.metrics import MetricSeries
 
 PARTS = 32
 ANSWER = 52_527
-"""Of all numbers below 2^16 it takes the most steps to 1, 339 (OEIS A006877 and A006878)."""
+"""Number below 2^16 with the most Collatz steps to 1, which are 339 (OEIS A006877 and A006878)."""
 
 CURVES = [
     Curve("done", "parts that a robot knows to be done, mean", "%", 100, 1.0),
@@ -20,19 +20,19 @@ CURVES = [
 ]
 
 
-def _found(course: Course, until: float) -> float:
-    return settled_at(course.until(until), course.curves["right"] == 1.0)
+def _found(series: MetricSeries, until: float) -> float:
+    return settled_at(series.until(until), series.curves["right"] == 1.0)
 
 
 MEASURES = [
-    Measure("right", "share that knows the answer at {at:g} s", lambda course, at: course.at(at, "right")),
+    Measure("right", "share that knows the answer at {at:g} s", lambda series, at: series.at(at, "right")),
     Measure("found", "s after which all that live know the answer", _found),
 ]
 
 
-def all_curves(moments: Moments) -> Mapping[str, Floats]:
-    """Of the robots that are alive."""
-    done, best, living = last_said(moments, "done")[0], last_said(moments, "best")[0], alive(moments)
+def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
+    """Return both metrics over the robots that are switched on."""
+    done, best, living = last_values(samples, "done")[0], last_values(samples, "best")[0], alive(samples)
     count = np.maximum(living.sum(axis=1), 1)
     shares = np.where(living, np.nan_to_num(done), 0).sum(axis=1) / PARTS / count
     right = (living & (done == PARTS) & (best == ANSWER)).sum(axis=1) / count
