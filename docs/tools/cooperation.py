@@ -24,7 +24,7 @@ LOG = {"apart"}
 def table(name: str, trials: list[Trial]) -> None:
     experiment = experiment_of(name)
     settled = next(one for one in experiment.measures if one.name == SETTLED[name])
-    times = np.array([settled.of(one.course, float(one.times[-1])) for one in trials])
+    times = np.array([settled.of(one.series, float(one.times[-1])) for one in trials])
     done = times[~np.isnan(times)]
     seeds = [one.about["seed"] for one, time in zip(trials, times, strict=True) if np.isnan(time)]
     print(f"{len(done)} of {len(trials)} trials settled; not: seeds {seeds or 'none'}")
@@ -32,7 +32,7 @@ def table(name: str, trials: list[Trial]) -> None:
         label = settled.label.format(at=float(trials[0].times[-1]))
         print(f"{label}: median {np.median(done):.3g}, {done.min():.3g} to {done.max():.3g}")
     for curve in experiment.curves:
-        last = curve.scale * np.array([one.course.last(curve.name) for one in trials])
+        last = curve.scale * np.array([one.series.last(curve.name) for one in trials])
         least, middle, most = np.nanpercentile(last, [0, 50, 100])
         print(f"{curve.label}, at the end: median {middle:.1f}, {least:.1f} to {most:.1f}")
 
@@ -48,7 +48,7 @@ def draw(path: Path, name: str, trials: list[Trial]) -> None:
     samples = min(len(one.times) for one in trials)
     times = trials[0].times[:samples]
     for axis, curve in zip(axes[0], curves, strict=True):
-        values = curve.scale * np.array([one.course.curves[curve.name][:samples] for one in trials])
+        values = curve.scale * np.array([one.series.curves[curve.name][:samples] for one in trials])
         known = ~np.isnan(values).all(axis=0)
         for low, high in ((5, 95), (25, 75)):
             bounds = np.nanpercentile(values[:, known], [low, high], axis=0)

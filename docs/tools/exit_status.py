@@ -1,4 +1,4 @@
-"""Writes docs/exit-status.md from the one place in the code: `python docs/tools/exit_status.py`."""
+"""Writes docs/exit-status.md from `emu/host/exit_status.py`: `python docs/tools/exit_status.py`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from emu.host.exit_status import table
 PAGE = Path(__file__).parents[1] / "exit-status.md"
 TEXT = f"""# Exit statuses
 
-Of `emu`, `toolchain`, `dspic-*`, `arena` and `openswarm`; written by `python docs/tools/exit_status.py` from `emu/host/exit_status.py`.
+Exit statuses of `emu`, `toolchain`, `dspic-*`, `arena` and `openswarm`. `python docs/tools/exit_status.py` writes this
+page from `emu/host/exit_status.py`.
 
 {table()}
 

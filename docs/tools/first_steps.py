@@ -1,8 +1,8 @@
-"""Plays the sessions of docs/first-steps.md as a newcomer would: from the wheel, in an empty folder and HOME.
+"""Runs the sessions of docs/first-steps.md as a newcomer would: from the wheel, in an empty folder and HOME.
 
-`python docs/tools/first_steps.py` puts the present output behind the commands; `--check` writes nothing and ends with status 1
-and the difference if they say something else now. Numbers do not count there: they belong to kernel and compiler, and
-others watch over them. `--keep FOLDER` works there.
+`python docs/tools/first_steps.py` stores the present output behind each command of the page. `--check` writes nothing
+and ends with status 1 and a diff if the output differs. Numbers are not compared: baselines and bench gate them.
+`--keep FOLDER` works in FOLDER and keeps it.
 
 The wheel goes into an environment of its own that shares only the dependencies with the present one, so nothing is
 downloaded. Afterwards nothing may have been written beside the project and the cache.
@@ -122,8 +122,8 @@ def main() -> int:
     if not wanted.check:
         PAGE.write_text(new, encoding="utf-8")
         return 0
-    told = [NUMBERS.sub("", text).splitlines() for text in (old, new)]
-    difference = list(difflib.unified_diff(*told, "docs/first-steps.md", "now", lineterm="", n=1))
+    lines = [NUMBERS.sub("", text).splitlines() for text in (old, new)]
+    difference = list(difflib.unified_diff(*lines, "docs/first-steps.md", "now", lineterm="", n=1))
     for line in difference:
         print(line)
     return 1 if difference else 0

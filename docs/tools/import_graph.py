@@ -1,9 +1,6 @@
-"""Draws who imports whom, from the code: `python docs/tools/import_graph.py` writes docs/figures/architecture-*.svg.
+"""Draws the import graph of each package from the code: `python docs/tools/import_graph.py FOLDER`.
 
-One picture per package. A box is a module, or a package with its number of modules; it stands above everything it
-imports, so that imports point down. A line is drawn where no longer way says the same (transitive reduction). With
-`--check` nothing is written and the exit status is 1 if a picture is not what the code says. What leaves: pictures
-that depend on nothing but the code.
+`docs/tools/site.py` calls `page` for the site. A circle of imports is an error, type imports included.
 """
 
 from __future__ import annotations
@@ -18,10 +15,9 @@ from typing import Final
 import grimp
 
 ROOT: Final = Path(__file__).resolve().parents[2]
-FIGURES: Final = ROOT / "docs" / "figures"
 PACKAGES: Final = ("emu", "toolchain", "arena")
 STARTS: Final = frozenset({"__main__"})
-"""Modules nobody needs to see: they call another one."""
+"""Modules that only call another one; they are not drawn."""
 
 Graph = dict[str, set[str]]
 
@@ -37,8 +33,8 @@ STYLE: Final = """
 
 
 def imports_of(package: str) -> Graph:
-    """What each part of a package imports of the others. Imports for type checkers alone do not count."""
-    graph = grimp.build_graph(package, exclude_type_checking_imports=True)
+    """Return, for each part of a package, the other parts it imports; type imports count."""
+    graph = grimp.build_graph(package, exclude_type_checking_imports=False)
     parts = {name.split(".")[1] for name in graph.modules if "." in name} - STARTS
     wanted: Graph = {part: set() for part in parts}
     for importer in graph.modules:
@@ -50,12 +46,12 @@ def imports_of(package: str) -> Graph:
 
 
 def heights(graph: Graph) -> dict[str, int]:
-    """Longest way of each part down to one that imports nothing. Raises ValueError for a circle."""
+    """Return the longest path of each part down to a part without imports. Raises ValueError for a circle."""
     found: dict[str, int] = {}
 
     def height(part: str, above: tuple[str, ...]) -> int:
         if part in above:
-            raise ValueError(f"imports go round: {' > '.join((*above, part))}")
+            raise ValueError(f"circular imports: {' > '.join((*above, part))}")
         if part not in found:
             found[part] = max((height(other, (*above, part)) + 1 for other in sorted(graph[part])), default=0)
         return found[part]
@@ -66,7 +62,7 @@ def heights(graph: Graph) -> dict[str, int]:
 
 
 def reduced(graph: Graph) -> Graph:
-    """The same without lines that a longer way implies."""
+    """Return the graph without edges that a longer path implies (transitive reduction)."""
     below: Graph = {}
 
     def reach(part: str) -> set[str]:
@@ -79,7 +75,7 @@ def reduced(graph: Graph) -> Graph:
 
 
 def rows_of(graph: Graph) -> list[list[str]]:
-    """Parts from top to bottom, each near those that import it; a row that is too wide is broken."""
+    """Return the rows of boxes from top to bottom; each box is near its importers, and wide rows are broken."""
     level = heights(graph)
     users = {part: [one for one in sorted(graph) if part in graph[one]] for part in graph}
     place: dict[str, float] = {}
@@ -105,7 +101,7 @@ def width_of(parts: list[str]) -> float:
 
 
 def drawn(package: str) -> str:
-    """The picture, as SVG."""
+    """Return the picture of a package as SVG."""
     graph = imports_of(package)
     rows = rows_of(graph)
     centre: dict[str, tuple[float, float]] = {}
@@ -126,7 +122,7 @@ def drawn(package: str) -> str:
             lines.append(f'<path d="M{x:.1f} {start}C{x:.1f} {middle:.1f} {to_x:.1f} {middle:.1f} {to_x:.1f} {to_y}"/>')
     size = f'width="{WIDEST}" height="{MARGIN + len(rows) * ROW}"'
     box = f'viewBox="0 0 {WIDEST} {MARGIN + len(rows) * ROW}"'
-    title = f"<title>Who imports whom in {package}: what stands higher imports what stands lower</title>"
+    title = f"<title>Imports of {package}: each box imports boxes below it</title>"
     body = "\n".join(
         (title, f"<style>{STYLE}</style>", '<rect width="100%" height="100%" fill="#fff"/>', *lines, *boxes)
     )
@@ -134,7 +130,7 @@ def drawn(package: str) -> str:
 
 
 def _box(package: str, part: str, left: float, top: float, width: float) -> str:
-    """One part, with what its first sentence says as a tool tip."""
+    """Return the box of one part, with the first sentence of its docstring as tool tip."""
     folder = ROOT / package / part
     count = len(list(folder.rglob("*.py"))) if folder.is_dir() else 0
     middle = left + width / 2
@@ -147,24 +143,33 @@ def _box(package: str, part: str, left: float, top: float, width: float) -> str:
 
 
 def sentence_of(module: str) -> str:
-    """The first line of a module's docstring."""
+    """Return the first line of a module's docstring."""
     spec = find_spec(module)
     assert spec is not None
     assert spec.origin is not None
     return (ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or module).splitlines()[0]
 
 
-def main() -> int:
-    status = 0
+def page(folder: Path) -> str:
+    """Write one picture per package into `folder` and return a Markdown page that shows them."""
+    parts = ["# Import graph\n\nFor contributors: which module or package imports which. Drawn from the code; "
+             "type imports count. A line that a longer path implies is left out.\n"]  # fmt: skip
     for package in PACKAGES:
-        target = FIGURES / f"architecture-{package}.svg"
-        picture = drawn(package)
-        if "--check" not in sys.argv:
-            target.write_text(picture, encoding="utf-8")
-        elif not target.exists() or target.read_text(encoding="utf-8") != picture:
-            print(f"{target.relative_to(ROOT)}: the code is another one; python docs/tools/import_graph.py", file=sys.stderr)
-            status = 1
-    return status
+        picture = folder / f"imports-{package}.svg"
+        picture.write_text(drawn(package), encoding="utf-8")
+        parts.append(f"## {package}\n\n![Modules of {package}, each above what it imports]({picture.name})\n")
+    return "\n".join(parts)
+
+
+def main() -> int:
+    """Write page and pictures into the folder that the command line names and return the exit status."""
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        print("usage: python docs/tools/import_graph.py FOLDER", file=sys.stderr)
+        return 2
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "imports.md").write_text(page(folder), encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":

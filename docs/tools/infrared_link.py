@@ -17,9 +17,9 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from arena.infrared.channel import Ether
+from arena.infrared.channel import OpticalChannel
 from arena.infrared.propagation import amplitude
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.firmware_controller import FirmwareController
 from arena.robots.images import image_for
 from arena.scene.loader import FCY, load_scene
 from arena.world.physics import Poses
@@ -79,15 +79,15 @@ def measure(job: Job) -> Found:
     robots = len(poses.robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": job.noise}
     scene = load_scene("clustering").with_values(**values)
-    ether = Ether.of(scene)
+    channel = OpticalChannel.of(scene)
     image = image_for("chatter")
     assert image is not None
     selectors = [0 if number < job.senders else SILENT for number in range(robots)]
-    brains = [EmulatedBrain(scene, 1, number, image, selectors[number], ether) for number in range(robots)]
+    controllers = [FirmwareController(scene, 1, number, image, selectors[number], channel) for number in range(robots)]
     for tick in range(math.ceil((WARM_S + job.seconds) * FCY / scene.clock.quantum_tcy)):
-        for brain in brains:
-            brain.think(tick, poses)
-    machines = [brain.machine for brain in brains]
+        for controller in controllers:
+            controller.control_step(tick, poses)
+    machines = [controller.machine for controller in controllers]
     senders = machines[: job.senders]
     sent = [_word(machine, "infrared_statistics") - BEACONS for machine in senders]
     numbers = [_word(machine, "infrared_number") for machine in senders]

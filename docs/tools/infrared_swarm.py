@@ -16,9 +16,9 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
-from arena.infrared.channel import Ether
+from arena.infrared.channel import OpticalChannel
 from arena.infrared.propagation import Optics
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.robots.firmware_controller import FirmwareController
 from arena.robots.images import image_for
 from arena.scene.loader import FCY, load_scene
 from arena.world.physics import Poses
@@ -75,14 +75,14 @@ def measure(robots: int, seconds: float, noise: float) -> Found:
     poses = grid(robots)
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise}
     scene = load_scene("clustering").with_values(**values)
-    ether = Ether.of(scene)
+    channel = OpticalChannel.of(scene)
     image = image_for("chatter")
     assert image is not None
-    brains = [EmulatedBrain(scene, 1, number, image, SELECTOR, ether) for number in range(robots)]
+    controllers = [FirmwareController(scene, 1, number, image, SELECTOR, channel) for number in range(robots)]
     for tick in range(math.ceil((WARM_S + seconds) * FCY / scene.clock.quantum_tcy)):
-        for brain in brains:
-            brain.think(tick, poses)
-    machines = [brain.machine for brain in brains]
+        for controller in controllers:
+            controller.control_step(tick, poses)
+    machines = [controller.machine for controller in controllers]
     clocks, numbers = ([word(one, name) for one in machines] for name in ("now_ms", "infrared_number"))
     sent = [word(one, "mine") - _bytes(one, "queue_length", 1)[0] for one in machines]
     optics = Optics(scene)

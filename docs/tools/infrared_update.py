@@ -20,8 +20,8 @@ from pathlib import Path
 
 from infrared_swarm import grid, word
 
-from arena.infrared.channel import Ether
-from arena.robots.firmware_controller import EmulatedBrain
+from arena.infrared.channel import OpticalChannel
+from arena.robots.firmware_controller import FirmwareController
 from arena.scene.loader import FCY, load_scene
 from emu.host import paths
 from emu.image.loader import load_image
@@ -77,19 +77,19 @@ def measure(image: Path, robots: int, lost: float, most: float, noise: float) ->
     values = {"robots__count": robots, "objects__count": 0, "infrared__noise_counts": noise,
               "infrared__lost_share": lost}  # fmt: skip
     scene = load_scene("clustering").with_values(**values)
-    ether = Ether.of(scene)
-    brains = [EmulatedBrain(scene, 1, one, image, 0 if one else VERSION, ether) for one in range(robots)]
+    channel = OpticalChannel.of(scene)
+    controllers = [FirmwareController(scene, 1, one, image, 0 if one else VERSION, channel) for one in range(robots)]
     has, calls = dict[int, float](), dict[int, float]()
     for tick in itertools.count(1):
-        for brain in brains:
-            brain.think(tick - 1, poses)
+        for controller in controllers:
+            controller.control_step(tick - 1, poses)
         if tick % LOOK_TICKS:
             continue
         seconds = tick * scene.clock.quantum_tcy / FCY
-        for one, brain in enumerate(brains):
-            if word(brain.machine, "have") == VERSION:
+        for one, controller in enumerate(controllers):
+            if word(controller.machine, "have") == VERSION:
                 has.setdefault(one, seconds)
-            if one in has and calls_it(brain.machine):
+            if one in has and calls_it(controller.machine):
                 calls.setdefault(one, seconds)
         if len(calls) == robots or seconds >= most:
             break

@@ -1,7 +1,7 @@
-"""Records a session at the debugger's prompt: `python docs/tools/prompt_sessions.py` writes docs/figures/swarm-session.svg.
+"""Records a session of the debugger's prompt as docs/figures/swarm-session.svg.
 
-`arena debug` runs on a pseudo terminal; each line is typed when the prompt is there, and the picture is what the
-terminal has got. A dumb terminal, so that no line is drawn twice.
+Usage: `python docs/tools/prompt_sessions.py`. `arena debug` runs on a pseudo terminal, and each line is typed when the
+prompt appears. The terminal type is `dumb`, so that no line is drawn twice.
 """
 
 from __future__ import annotations

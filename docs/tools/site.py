@@ -1,8 +1,8 @@
 """Builds the documentation site: `python docs/tools/site.py [--out build/site]`, with the extra `docs`.
 
-The site is every Markdown file of the repository at its own place, so that links work on GitHub and here alike, and
-pages made now: what `--help` says, the Python interfaces by their docstrings, the kernel's headers. MkDocs builds it
-strictly: a warning is a failure.
+The site holds every Markdown file of the repository at its own path, so links work on GitHub and here alike. Generated
+pages are added: the output of `--help`, the Python interfaces from docstrings, the import graph and the kernel's
+headers. MkDocs builds in strict mode: a warning is a failure.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import import_graph
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ("emu", "toolchain", "arena", "openswarm")
@@ -34,18 +36,18 @@ MODULES = (
     "arena.metrics",
     "arena.trial.record",
 )
-"""What people import."""
+"""Public modules, documented from their docstrings."""
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 
 
 def tracked() -> list[str]:
-    """Every file git knows."""
+    """Return every tracked file."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     return [name for name in listed.split("\0") if name and (ROOT / name).is_file()]
 
 
 def copied(source: Path) -> None:
-    """The repository's pages and what they point to, at their own places below `source`."""
+    """Copy the repository's pages and the files they link to, at their own paths below `source`."""
     for name in tracked():
         path = ROOT / name
         if path.suffix != ".md" or name.startswith("openswarm/template"):
@@ -62,19 +64,19 @@ def copied(source: Path) -> None:
 
 
 def with_pages(text: str, page: Path) -> str:
-    """The text of a page with links to folders as links to their READMEs."""
+    """Return the text of a page with links to folders replaced by links to their READMEs."""
     return LINK.sub(lambda found: found[1] + to_page(page, found[2]) + found[3], text)
 
 
 def to_page(page: Path, target: str) -> str:
-    """A link to a folder as one to its README."""
+    """Return a link to a folder as a link to its README; any other link unchanged."""
     place, hash_, anchor = target.partition("#")
     is_folder = place and ":" not in place and (page.parent / place).is_dir()
     return f"{place.rstrip('/')}/README.md{hash_}{anchor}" if is_folder else target
 
 
 def help_of(program: str) -> str:
-    """A page with what a program and each of its commands say about themselves."""
+    """Return a page with the `--help` output of a program and each of its commands."""
 
     def said(*words: str) -> str:
         done = subprocess.run(
@@ -90,7 +92,7 @@ def help_of(program: str) -> str:
 
 
 def reference(source: Path) -> None:
-    """The pages that are made."""
+    """Write the generated pages."""
     folder = source / "reference"
     folder.mkdir()
     for program in PROGRAMS:
@@ -98,10 +100,11 @@ def reference(source: Path) -> None:
     options = "    options:\n      heading_level: 3\n      show_root_heading: false\n"
     python = "".join(f"## {name}\n\n::: {name}\n{options}\n" for name in MODULES)
     (folder / "python.md").write_text(f"# Python interfaces\n\n{python}", encoding="utf-8")
+    (folder / "imports.md").write_text(import_graph.page(folder), encoding="utf-8")
     headers = ["# Headers of the kernel\n\nEach function has its contract in the line above it.\n"]
     for path in sorted((ROOT / "firmware/openswarm/include").glob("*.h")):
         headers.append(f"## {path.name}\n\n```c\n{path.read_text(encoding='utf-8')}```\n")
-    (folder / "kernel.md").write_text("\n".join(headers), encoding="utf-8")
+    (folder / "headers.md").write_text("\n".join(headers), encoding="utf-8")
 
 
 def main() -> int:

@@ -1,8 +1,8 @@
-"""Runs the commands of docs/tour.md again and puts their present output behind them: `python docs/tools/tour.py`.
+"""Runs the commands of docs/tour.md again and stores their present output on the page: `python docs/tools/tour.py`.
 
-A block that begins with `$ ` is a session: every line that begins so is a command, run by a shell in the checkout, and
-what follows is its output, both streams. A line `...` stands for what is left out: as many lines are kept before it and
-behind it as there were. With --check nothing is written; the status is 1 if a command failed to run.
+A block that begins with `$ ` is a session: a shell in the checkout runs every line that begins so, and both output
+streams follow it. A line `...` stands for omitted lines; the page keeps as many lines before and after it as it had.
+With --check nothing is written, and the status is 1 if a command failed to run.
 """
 
 from __future__ import annotations
