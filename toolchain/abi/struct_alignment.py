@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import re
 
+from toolchain.ir.lex import UNALIGNED_RUN
+
 LAYOUT_FLAGS = ["-Xclang", "-fdump-record-layouts"]
-ATTRIBUTE = '"unaligned-run"'
 ODD = {3, 5, 6, 7}
 
 SIZE = re.compile(r"\[sizeof=(\d+),")
@@ -26,9 +27,9 @@ BYVAL = re.compile(rb"byval\(%([\w.$-]+)\)")
 
 
 def mark(ir: bytes, dump: str) -> bytes:
-    """IR text in which `byval` of every such record is followed by ATTRIBUTE; `dump` is what clang printed."""
+    """IR text in which `byval` of every such record is followed by UNALIGNED_RUN; `dump` is what clang printed."""
     loose = unaligned_types(dump) if b"byval(" in ir else set()
-    return BYVAL.sub(lambda m: m[0] + b" " + ATTRIBUTE.encode() if m[1].decode() in loose else m[0], ir)
+    return BYVAL.sub(lambda m: m[0] + b" " + UNALIGNED_RUN.encode() if m[1].decode() in loose else m[0], ir)
 
 
 def unaligned_types(dump: str) -> set[str]:

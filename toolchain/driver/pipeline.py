@@ -268,7 +268,7 @@ def frame_variables(f: Function, m: MFunction) -> list[tuple[str, int]]:
 
 def named_places(f: Function, m: MFunction) -> dict[str, int]:
     """Offsets from W15 at entry of the variables and struct parameters that lie in the frame, by their IR names."""
-    slots = [(str(i.extra["source"]), i) for i in f.blocks[0].instrs if i.op == "slot" and "source" in i.extra]
+    slots = [(i.extra["source"], i) for i in f.blocks[0].instrs if i.op == "slot" and "source" in i.extra]
     named = [*slots, *((a.name, a) for a in f.args)]
     return {name: offset_of(m, m.slot_of[id(value)]) for name, value in named if id(value) in m.slot_of}
 

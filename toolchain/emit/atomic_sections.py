@@ -16,7 +16,7 @@ def run(m: MFunction) -> None:
     """Fill in every `hold`. Raises AssertionError when a `release` is missing or too far."""
     for number, b in enumerate(m.blocks):
         for k, mi in enumerate(b.insts):
-            if mi.op == "hold":
+            if mi.op == "begin_atomic":
                 mi.args = [Imm(_cycles(m, number, k + 1))]
 
 
@@ -28,9 +28,10 @@ def _cycles(m: MFunction, number: int, at: int) -> int:
     while total <= LIMIT:
         following = ""
         for mi in b.insts[at:]:
-            if mi.op == "release":
+            if mi.op == "end_atomic":
                 return total
-            assert mi.op not in ("bra", "ret", "call", "callr", "hold"), f"{m.name}: {mi!r} in an atomic sequence"
+            ends = ("bra", "ret", "call", "callr", "begin_atomic")
+            assert mi.op not in ends, f"{m.name}: {mi!r} in an atomic section"
             if mi.op == "jump":
                 following = str(mi.args[0])
             total += FLOW if mi.op == "jump" or mi.op in SKIPS else _at_most(mi)

@@ -226,7 +226,7 @@ class Emitter:
         if place is not None:  # no more
             self.lines.append(f'# 0 "{place[0]}"')
 
-    def _hold(self, mi: MI) -> None:
+    def _begin_atomic(self, mi: MI) -> None:
         """DISI for the sequence behind it, unless a longer one is under way (`holds`)."""
         cycles, end = mi.args[0], self.fresh()
         assert isinstance(cycles, Imm)
@@ -237,7 +237,7 @@ class Emitter:
         self._out(f"disi #{cycles.value}")
         self.lines.append(f"{end}:")
 
-    def _release(self, mi: MI) -> None:
+    def _end_atomic(self, mi: MI) -> None:
         """Nothing."""
 
     def _clear_pair(self, mi: MI) -> None:
@@ -280,8 +280,8 @@ SPECIAL: dict[str, Callable[[Emitter, MI], None]] = {
     "asm": Emitter._asm,
     "borrow": Emitter._borrow,
     "clrd": Emitter._clear_pair,
-    "hold": Emitter._hold,
-    "release": Emitter._release,
+    "begin_atomic": Emitter._begin_atomic,
+    "end_atomic": Emitter._end_atomic,
     "text": Emitter._plain_text,
     "movlow": Emitter._low_move,
     "iorlow": Emitter._low_logic,

@@ -11,7 +11,6 @@ from toolchain.ir.model import (
     ConstZero,
     Function,
     GlobalRef,
-    InlineAsm,
     Module,
     UnsupportedError,
     Value,
@@ -70,7 +69,7 @@ _ACCUMULATOR = re.compile(
 
 def accumulators(f: Function) -> tuple[str, ...]:
     """Registers of the accumulators that inline assembly of an interrupt function names: saved like `save(...)`."""
-    texts = [str(a.text) for b in f.blocks for i in b.instrs if isinstance(a := i.extra.get("asm"), InlineAsm)]
+    texts = [i.extra["asm"].text for b in f.blocks for i in b.instrs if "asm" in i.extra]
     named = sorted({found.upper() for text in texts for found in _ACCUMULATOR.findall(text)})
     return tuple(f"_ACC{name}{part}" for name in named for part in "LHU")
 

@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
-from toolchain.ir.model import I1, I8, I16, VOID, Block, ConstInt, GlobalRef, Instr, Type, Undef, Value, int_type
+from typing import Unpack
+
+from toolchain.ir.model import (
+    I1,
+    I8,
+    I16,
+    VOID,
+    Block,
+    ConstInt,
+    GlobalRef,
+    Instr,
+    InstrExtra,
+    Type,
+    Undef,
+    Value,
+    int_type,
+)
 
 COMMUTATIVE = frozenset(("add", "mul", "and", "or", "xor"))
 
@@ -66,7 +82,7 @@ class Builder:
         self.block = block
         self.line: str | None = None
 
-    def emit(self, op: str, t: Type, args: list[Value], **extra: object) -> Instr:
+    def emit(self, op: str, t: Type, args: list[Value], **extra: Unpack[InstrExtra]) -> Instr:
         """Append an instruction without folding."""
         i = Instr(op, t, args)
         i.line = self.line

@@ -136,7 +136,6 @@ class Dumper:
                 return self._call(i)
             case "extractvalue" | "insertvalue":
                 indices = i.extra["indices"]
-                assert isinstance(indices, list)
                 return f"{i.op} " + ", ".join([*(self.typed(a) for a in args), *map(str, indices)])
             case (
                 "zext"
@@ -172,7 +171,6 @@ class Dumper:
 
     def _switch(self, i: Instr) -> str:
         cases = i.extra["cases"]
-        assert isinstance(cases, list)
         t = i.args[0].type
         rows = " ".join(f"{t} {k}, label %{quoted(b)}" for k, b in zip(cases, i.blocks[1:], strict=True))
         return f"switch {self.typed(i.args[0])}, label %{quoted(i.blocks[0])} [ {rows} ]"
@@ -181,7 +179,7 @@ class Dumper:
         attrs = i.extra.get("attrs")
         words = []
         for k, a in enumerate(i.args[:-1]):
-            given = attrs[k] if isinstance(attrs, list) else {}
+            given = attrs[k] if attrs is not None else {}
             text = "".join(f" {n}({v})" for n, v in given.items() if n in ("byval", "sret"))
             text += f" align {given['align']}" if "align" in given else ""
             words.append(f"{a.type}{text} {self.value(a)}")

@@ -32,6 +32,7 @@ CASTS = {
     "bitcast", "addrspacecast", "ptrtoaddr",
 }  # fmt: skip
 TYPED_ATTRS = {"byval", "sret", "byref", "inalloca", "preallocated", "elementtype"}
+UNALIGNED_RUN = '"unaligned-run"'  # string attribute that abi.struct_alignment adds
 PAREN_ATTRS = {"dereferenceable", "dereferenceable_or_null", "captures", "initializes", "range", "memory", "nofpclass",
                "allocsize", "vscale_range"}  # fmt: skip
 

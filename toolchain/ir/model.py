@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import TypedDict
 
 
 class UnsupportedError(Exception):
@@ -67,7 +68,7 @@ I1, I8, I16, I32, I64 = (_INTS[n] for n in (1, 8, 16, 32, 64))
 
 
 def int_type(bits: int) -> Type:
-    """The integer type of that many bits, 1..272; the reader admits up to 128 (design §5)."""
+    """The integer type of that many bits, 1..272; the reader admits up to 128 (engines.md §5)."""
     found = _INTS.get(bits)
     if found is None:
         raise UnsupportedError(f"integer type i{bits}: wider than {MAX_INT_BITS} bits")
@@ -236,12 +237,22 @@ class MetaRef(Value):
         self.ref = ref
 
 
+class ParameterAttributes(TypedDict, total=False):
+    """Attributes of a parameter or argument that the compiler uses."""
+
+    byval: Type
+    sret: Type
+    elementtype: Type
+    align: int
+    unaligned_run: bool  # of a struct passed by value: abi.struct_alignment
+
+
 class Arg(Value):
     """Function parameter."""
 
     __slots__ = ("attrs", "index", "name")
 
-    def __init__(self, type_: Type, name: str, index: int, attrs: dict[str, object]) -> None:
+    def __init__(self, type_: Type, name: str, index: int, attrs: ParameterAttributes) -> None:
         super().__init__(type_)
         self.name = name
         self.index = index
@@ -263,6 +274,38 @@ class InlineAsm(Value):
         self.sideeffect = sideeffect
 
 
+class InstrExtra(TypedDict, total=False):
+    """Fields that only some operations have."""
+
+    pred: str  # icmp, fcmp
+    type: Type  # getelementptr: source element type; alloca: type of the object
+    align: int  # load, store, alloca
+    ordering: str  # atomic load and store, fence, cmpxchg, atomicrmw
+    kind: str  # atomicrmw: its operation
+    indices: list[int]  # extractvalue, insertvalue
+    cases: list[int]  # switch: one value per successor after the default
+    assign: str  # store: DIAssignID that links it to a debug record
+    attrs: list[ParameterAttributes]  # call, asm: attributes of every argument
+    vararg: bool  # call: the callee is variadic
+    fixed: int  # call of a variadic function: number of its named parameters
+    tail: str  # call: "tail", "musttail", "notail" or ""
+    flags: set[str]  # call: words after the arguments, such as attribute groups
+    results: list[Type]  # call and asm with several results: their legal types
+    index: int  # callresult, asmresult: number of the result
+    divides: str  # call of a division function: the operation it replaced
+    other: Instr  # division: the `divother` that takes its second result
+    signed: bool  # mulhigh
+    asm: InlineAsm  # asm
+    name: str  # builtin: its C name
+    size: int  # slot: bytes
+    source: str  # slot: name of the alloca it was
+    count: int  # blockcopy, blockfill: number of units
+    unit: int  # blockcopy, blockfill: bytes of a unit, 1 or 2
+    address: bool  # entryword: the frame address instead of the return address
+    argument: Arg  # argword: the struct parameter
+    word: int  # argword: number of the word in it
+
+
 class Instr(Value):
     """One instruction; itself the value it defines.
 
@@ -280,7 +323,7 @@ class Instr(Value):
         self.args = args
         self.name = name
         self.blocks: list[str] = []
-        self.extra: dict[str, object] = {}
+        self.extra: InstrExtra = {}
         self.volatile = False
         self.line: str | None = None  # !dbg metadata reference
 
@@ -290,7 +333,7 @@ class Instr(Value):
     @property
     def pred(self) -> str:
         """Predicate of icmp and fcmp."""
-        return str(self.extra["pred"])
+        return self.extra["pred"]
 
 
 @dataclass(slots=True)

@@ -155,7 +155,7 @@ class Reader(InstrReader):
             elif word not in IGNORED_WORDS:
                 break
             c.next()
-        ret_attrs = self._attrs(c)
+        self._attrs(c)
         ret = self.type_no_func(c)
         name = name_of(c.next())
         c.expect("(")
@@ -172,7 +172,7 @@ class Reader(InstrReader):
             c.accept(",")
         f = Function(name, ret, args, vararg, linkage)
         groups = []
-        flags = {f"ret:{a}" for a in ret_attrs}
+        flags: set[str] = set()
         while c.peek() not in ("", "{"):
             word = c.next()
             if word.startswith("#"):

@@ -13,6 +13,7 @@ from .model import (
     GlobalRef,
     Instr,
     MetaRef,
+    ParameterAttributes,
     Type,
     Value,
 )
@@ -283,7 +284,7 @@ class InstrReader(ValueReader):
         callee = self.value(c, PTR)
         c.expect("(")
         args: list[Value] = []
-        attrs: list[dict[str, object]] = []
+        attrs: list[ParameterAttributes] = []
         while not c.accept(")"):
             at = self._type1(c)
             if at.kind == "meta":

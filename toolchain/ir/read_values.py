@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import struct
 
-from .lex import BINARY, CASTS, FAST_FLAGS, PARAM_WORDS, PAREN_ATTRS, TYPED_ATTRS, Cursor, name_of, unquote
+from .lex import (
+    BINARY,
+    CASTS,
+    FAST_FLAGS,
+    PARAM_WORDS,
+    PAREN_ATTRS,
+    TYPED_ATTRS,
+    UNALIGNED_RUN,
+    Cursor,
+    name_of,
+    unquote,
+)
 from .model import (
     I1,
     LABEL,
@@ -22,6 +33,7 @@ from .model import (
     InlineAsm,
     Instr,
     MetaRef,
+    ParameterAttributes,
     Type,
     Undef,
     Value,
@@ -236,15 +248,21 @@ class ValueReader:
                 found = self.forward[name] = Instr("forward", t, [], name)
         return found
 
-    def _attrs(self, c: Cursor) -> dict[str, object]:
+    def _attrs(self, c: Cursor) -> ParameterAttributes:
         """Parameter or result attributes at the cursor."""
-        attrs: dict[str, object] = {}
+        attrs: ParameterAttributes = {}
         while True:
             word = c.peek()
             if word in TYPED_ATTRS:
                 c.next()
                 c.expect("(")
-                attrs[word] = self.type(c)
+                t = self.type(c)
+                if word == "byval":
+                    attrs["byval"] = t
+                elif word == "sret":
+                    attrs["sret"] = t
+                elif word == "elementtype":
+                    attrs["elementtype"] = t
                 c.expect(")")
             elif word == "align":
                 c.next()
@@ -254,7 +272,8 @@ class ValueReader:
                 c.skip_parens()
             elif word in PARAM_WORDS or word.startswith('"'):
                 c.next()
-                attrs[word] = True
+                if word == UNALIGNED_RUN:
+                    attrs["unaligned_run"] = True
                 if c.accept("="):
                     c.next()
             else:

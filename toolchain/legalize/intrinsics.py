@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from emu.dspic30f.isa.debug import PLAIN_TRAP
 from toolchain.ir.build import const, legal_type
 from toolchain.ir.model import I1, I8, I16, I32, VOID, ConstInt, GlobalRef, Instr, UnsupportedError, Value, int_type
-from toolchain.legalize import mathlib
+from toolchain.legalize import mathlib, softfloat
+from toolchain.legalize.context import LegalResult
+from toolchain.legalize.memory import MemoryLegalizer
 
-if TYPE_CHECKING:
-    from toolchain.legalize.legalize import Legalizer
-
-Result = Value | list[Value] | None
 INLINE_COPY_UNITS = 0x4000  # REPEAT counts 14 bits (isa.md §5.7)
 
 
-def expand(lz: Legalizer, i: Instr, name: str) -> Result:
+def expand(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """Translate one intrinsic call. Raises UnsupportedError for intrinsics not in the table."""
     base = name[len("llvm.") :]
     for prefix, handler in FAMILIES:
@@ -26,17 +23,17 @@ def expand(lz: Legalizer, i: Instr, name: str) -> Result:
     return mathlib.expand(lz, i, base)
 
 
-def _nothing(lz: Legalizer, i: Instr, name: str) -> Result:
+def _nothing(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """Hints: lifetime, assume, prefetch. No code."""
     return None
 
 
-def _first(lz: Legalizer, i: Instr, name: str) -> Result:
+def _first(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """Intrinsics whose value is their first operand."""
-    return lz.use(i.args[0])
+    return lz.legal(i.args[0])
 
 
-def _minmax(lz: Legalizer, i: Instr, name: str) -> Result:
+def _minmax(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     signed = name[0] == "s"
     extend = lz.sign_extended if signed else lz.zero_extended
     a, b = extend(i.args[0]), extend(i.args[1])
@@ -44,7 +41,7 @@ def _minmax(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.select(lz.b.icmp(pred, a, b), a, b)
 
 
-def _compare3(lz: Legalizer, i: Instr, name: str) -> Result:
+def _compare3(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """scmp / ucmp: -1, 0 or 1."""
     signed = name[0] == "s"
     extend = lz.sign_extended if signed else lz.zero_extended
@@ -55,13 +52,13 @@ def _compare3(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.binary("sub", more, less)
 
 
-def _abs(lz: Legalizer, i: Instr, name: str) -> Result:
+def _abs(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     a = lz.sign_extended(i.args[0])
     zero = const(a.type, 0)
     return lz.b.select(lz.b.icmp("slt", a, zero), lz.b.binary("sub", zero, a), a)
 
 
-def _overflow(lz: Legalizer, i: Instr, name: str) -> Result:
+def _overflow(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """{s,u}{add,sub,mul}.with.overflow -> [result, flag]."""
     signed, op, bits = name[0] == "s", name[1:4], i.args[0].type.bits
     extend = lz.sign_extended if signed else lz.zero_extended
@@ -69,7 +66,7 @@ def _overflow(lz: Legalizer, i: Instr, name: str) -> Result:
     return list(_checked(lz, op, signed, bits, a, b))
 
 
-def _checked(lz: Legalizer, op: str, signed: bool, bits: int, a: Value, b: Value) -> tuple[Value, Value]:
+def _checked(lz: MemoryLegalizer, op: str, signed: bool, bits: int, a: Value, b: Value) -> tuple[Value, Value]:
     """Result and overflow flag of an operation on operands extended from `bits`."""
     t = a.type
     if op == "mul" or bits != t.bits:
@@ -93,7 +90,7 @@ def _checked(lz: Legalizer, op: str, signed: bool, bits: int, a: Value, b: Value
     return result, lz.b.icmp("slt", both, const(t, 0))
 
 
-def _saturating(lz: Legalizer, i: Instr, name: str) -> Result:
+def _saturating(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     signed, op, bits = name[0] == "s", name[1:4], i.type.bits
     if op == "shl":
         raise UnsupportedError(f"intrinsic llvm.{name}")
@@ -107,7 +104,7 @@ def _saturating(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.select(over, lz.b.select(lz.b.icmp("slt", a, const(t, 0)), low, high), result)
 
 
-def _funnel(lz: Legalizer, i: Instr, name: str) -> Result:
+def _funnel(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """fshl / fshr: the double-width value a:b shifted by n modulo the width."""
     bits = i.type.bits
     a, b, n = lz.zero_extended(i.args[0]), lz.zero_extended(i.args[1]), lz.zero_extended(i.args[2])
@@ -130,7 +127,7 @@ def _funnel(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.binary("or", high, lz.b.binary("lshr", b, n))
 
 
-def _count_zeros(lz: Legalizer, i: Instr, name: str) -> Result:
+def _count_zeros(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """ctlz / cttz word by word with FF1L / FF1R (isa.md §6.4), which give 1-based positions and 0 for none."""
     bits = i.type.bits
     leading = name.startswith("ctlz")
@@ -150,7 +147,7 @@ def _count_zeros(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.cast("trunc" if t.bits < 16 else "zext", result, t)
 
 
-def _popcount(lz: Legalizer, i: Instr, name: str) -> Result:
+def _popcount(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """Sum over the words; each by the run-time function (abi-elf.md §2.8)."""
     v = lz.zero_extended(i.args[0])
     t = v.type
@@ -165,8 +162,8 @@ def _popcount(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.cast("trunc" if t.bits < 16 else "zext", total, t)
 
 
-def _bswap(lz: Legalizer, i: Instr, name: str) -> Result:
-    v = lz.use(i.args[0])
+def _bswap(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+    v = lz.legal(i.args[0])
     t, words = v.type, i.type.bits // 16
     if i.type.bits % 16:
         raise UnsupportedError(f"byte swap of i{i.type.bits}")
@@ -179,12 +176,12 @@ def _bswap(lz: Legalizer, i: Instr, name: str) -> Result:
     return result
 
 
-def _bitreverse(lz: Legalizer, i: Instr, name: str) -> Result:
+def _bitreverse(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """Swap ever larger groups of bits."""
     bits = i.type.bits
     if bits & (bits - 1):
         raise UnsupportedError(f"bit reversal of i{bits}")
-    v: Value = lz.use(i.args[0])
+    v: Value = lz.legal(i.args[0])
     t, step = v.type, 1
     while step < bits:
         mask = sum(((1 << step) - 1) << k for k in range(0, bits, 2 * step))
@@ -194,14 +191,13 @@ def _bitreverse(lz: Legalizer, i: Instr, name: str) -> Result:
     return v
 
 
-def _memory(lz: Legalizer, i: Instr, name: str) -> Result:
+def _memory(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """memcpy memmove memset: REPEAT forms for constant sizes, library calls otherwise."""
-    dst, src, size = (lz.use(a) for a in i.args[:3])
+    dst, src, size = (lz.legal(a) for a in i.args[:3])
     if size.type.bits != 16:
         size = lz.b.cast("trunc" if size.type.bits > 16 else "zext", size, I16)
     kind = name[:6]
     attrs = i.extra["attrs"]
-    assert isinstance(attrs, list)
     if isinstance(size, ConstInt) and size.value == 0:
         return None
     even = lz.even(dst, attrs[0].get("align", 1))
@@ -222,7 +218,7 @@ def _memory(lz: Legalizer, i: Instr, name: str) -> Result:
     return None
 
 
-def _fill(lz: Legalizer, dst: Value, value: Value, size: int, unit: int) -> None:
+def _fill(lz: MemoryLegalizer, dst: Value, value: Value, size: int, unit: int) -> None:
     if unit == 2:
         value = (
             const(I16, value.value * 0x101)
@@ -232,26 +228,26 @@ def _fill(lz: Legalizer, dst: Value, value: Value, size: int, unit: int) -> None
     lz.b.emit("blockfill", VOID, [dst, value], count=size // unit, unit=unit)
 
 
-def _va_start(lz: Legalizer, i: Instr, name: str) -> Result:
-    lz.b.store(lz.b.emit("vastart", I16, []), lz.use(i.args[0]))
+def _va_start(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+    lz.b.store(lz.b.emit("vastart", I16, []), lz.legal(i.args[0]))
     return None
 
 
-def _va_copy(lz: Legalizer, i: Instr, name: str) -> Result:
-    lz.b.store(lz.b.load(I16, lz.use(i.args[1])), lz.use(i.args[0]))
+def _va_copy(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+    lz.b.store(lz.b.load(I16, lz.legal(i.args[1])), lz.legal(i.args[0]))
     return None
 
 
-def _stacksave(lz: Legalizer, i: Instr, name: str) -> Result:
+def _stacksave(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     return lz.b.emit("getsp", I16, [])
 
 
-def _stackrestore(lz: Legalizer, i: Instr, name: str) -> Result:
-    lz.b.emit("setsp", VOID, [lz.use(i.args[0])])
+def _stackrestore(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+    lz.b.emit("setsp", VOID, [lz.legal(i.args[0])])
     return None
 
 
-def _entry_word(lz: Legalizer, i: Instr, name: str) -> Result:
+def _entry_word(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """__builtin_return_address / frame_address of this function; outer levels are unknown: 0, as GCC allows."""
     level = i.args[0]
     if not isinstance(level, ConstInt) or level.value:
@@ -259,32 +255,32 @@ def _entry_word(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.emit("entryword", I16, [], address=name.startswith("frame"))
 
 
-def _fmuladd(lz: Legalizer, i: Instr, name: str) -> Result:
+def _fmuladd(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """Not fused: two roundings, as XC16 does."""
-    a, b, c = (lz.use(x) for x in i.args[:3])
+    a, b, c = (lz.legal(x) for x in i.args[:3])
     mode = "sf" if a.type.bits == 32 else "df"
     return lz.b.call(f"__add{mode}3", a.type, [lz.b.call(f"__mul{mode}3", a.type, [a, b]), c])
 
 
-def _fabs(lz: Legalizer, i: Instr, name: str) -> Result:
-    a = lz.use(i.args[0])
+def _fabs(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+    a = lz.legal(i.args[0])
     return lz.b.binary("and", a, const(a.type, (1 << (a.type.bits - 1)) - 1))
 
 
-def _copysign(lz: Legalizer, i: Instr, name: str) -> Result:
-    a, s = lz.use(i.args[0]), lz.use(i.args[1])
+def _copysign(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
+    a, s = lz.legal(i.args[0]), lz.legal(i.args[1])
     sign = 1 << (a.type.bits - 1)
     return lz.b.binary("or", lz.b.binary("and", a, const(a.type, sign - 1)), lz.b.binary("and", s, const(a.type, sign)))
 
 
-def _round_to_int(lz: Legalizer, i: Instr, name: str) -> Result:
+def _round_to_int(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     stem = name.split(".")[0]
-    return lz.b.call(stem + ("f" if i.args[0].type.bits == 32 else ""), legal_type(i.type), [lz.use(i.args[0])])
+    return lz.b.call(stem + ("f" if i.args[0].type.bits == 32 else ""), legal_type(i.type), [lz.legal(i.args[0])])
 
 
-def _fpclass(lz: Legalizer, i: Instr, name: str) -> Result:
+def _fpclass(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """llvm.is.fpclass: the mask bits in LangRef order, decided on the raw bits."""
-    a, mask = lz.use(i.args[0]), i.args[1]
+    a, mask = lz.legal(i.args[0]), i.args[1]
     assert isinstance(mask, ConstInt)
     t, bits = a.type, a.type.bits
     fraction = 23 if bits == 32 else 52
@@ -311,14 +307,12 @@ def _fpclass(lz: Legalizer, i: Instr, name: str) -> Result:
     return result
 
 
-def _fptoint_sat(lz: Legalizer, i: Instr, name: str) -> Result:
+def _fptoint_sat(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """The run-time conversions already saturate at 32 and 64 bits (abi-elf.md §2.8); narrower results are clamped."""
     signed = name.startswith("fptosi")
-    from toolchain.legalize import softfloat
-
     bits = i.type.bits
     wide = int_type(64 if bits > 32 else 32)
-    v = softfloat.to_int(lz.b, lz.use(i.args[0]), signed, wide)
+    v = softfloat.to_int(lz.b, lz.legal(i.args[0]), signed, wide)
     if bits < wide.bits:
         low, high = (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) if signed else (0, (1 << bits) - 1)
         k = "s" if signed else "u"
@@ -328,7 +322,7 @@ def _fptoint_sat(lz: Legalizer, i: Instr, name: str) -> Result:
     return lz.b.cast("trunc", v, legal_type(i.type))
 
 
-def _trap(lz: Legalizer, i: Instr, name: str) -> Result:
+def _trap(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     """Stop: the software breakpoint word, then a reset (abi-elf.md §3.3, as the default interrupt handler).
 
     Behind them, where nothing runs, the number of the check that failed tells a debugger that this is no ordinary end.
@@ -342,25 +336,25 @@ def _trap(lz: Legalizer, i: Instr, name: str) -> Result:
     return None
 
 
-def _object_size(lz: Legalizer, i: Instr, name: str) -> Result:
+def _object_size(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     flag = i.args[1]
     assert isinstance(flag, ConstInt)
     return const(legal_type(i.type), 0 if flag.value else -1)
 
 
-def _constant_p(lz: Legalizer, i: Instr, name: str) -> Result:
+def _constant_p(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     return const(I1, isinstance(i.args[0], ConstInt | GlobalRef))
 
 
-def _powi(lz: Legalizer, i: Instr, name: str) -> Result:
+def _powi(lz: MemoryLegalizer, i: Instr, name: str) -> LegalResult:
     suffix = "f" if i.type.bits == 32 else ""
     mode = "sf" if i.type.bits == 32 else "df"
     n = lz.b.cast("sext", lz.sign_extended(i.args[1]), I32)
     exponent = lz.b.call(f"__floatsi{mode}", legal_type(i.type), [n])
-    return lz.b.call("pow" + suffix, legal_type(i.type), [lz.use(i.args[0]), exponent])
+    return lz.b.call("pow" + suffix, legal_type(i.type), [lz.legal(i.args[0]), exponent])
 
 
-FAMILIES: list[tuple[str, Callable[[Legalizer, Instr, str], Result]]] = [
+FAMILIES: list[tuple[str, Callable[[MemoryLegalizer, Instr, str], LegalResult]]] = [
     *((n, _nothing) for n in ("lifetime.start", "lifetime.end", "assume", "prefetch", "donothing", "va_end",
       "invariant", "clear_cache",
                               "sideeffect", "experimental.noalias.scope.decl", "pseudoprobe", "fake.use")),

@@ -8,6 +8,7 @@ the next legal container with undefined upper bits, which are cleared or sign-fi
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Unpack
 
 from toolchain.abi.target import ARGUMENT_REGISTERS
 from toolchain.ir.build import Builder, const, legal_type
@@ -16,23 +17,25 @@ from toolchain.ir.model import (
     I1,
     I8,
     I16,
-    I64,
     VOID,
     Arg,
+    Block,
     ConstInt,
     Function,
     GlobalRef,
     InlineAsm,
     Instr,
+    InstrExtra,
     Module,
+    ParameterAttributes,
     Type,
     Undef,
     UnsupportedError,
     Value,
     int_type,
 )
-from toolchain.legalize import intrinsics, softfloat, vectors
-from toolchain.legalize.base import AGGREGATES, leaves_of
+from toolchain.legalize import intrinsics, packing, softfloat, vectors
+from toolchain.legalize.context import AGGREGATES, LegalResult, leaves_of
 from toolchain.legalize.memory import ATOMIC_CALLS, MemoryLegalizer
 
 SIGNED_OPS = frozenset(("sdiv", "srem", "ashr"))
@@ -44,53 +47,70 @@ LIBGCC_MODE = {32: "si", 64: "di", 128: "ti"}
 class Legalizer(MemoryLegalizer):
     """Arithmetic, control flow and calls; the table of handlers."""
 
-    result_at: Arg | None = None  # where a result goes that registers cannot hold
+    result_address: Arg | None = None  # parameter with the address of a result that registers cannot hold
 
     # -- entry --------------------------------------------------------------------------------------------------------
 
     def run(self) -> None:
         """Rewrite the function in place."""
         f = self.function
-        old_args, f.args = f.args, []
-        if vectors.is_wide(f.ret):
-            self.result_at = Arg(I16, "result", 0, {})
-            f.args.append(self.result_at)
-            f.ret = VOID
-        for a in old_args:
-            packed = a.type.kind == "vector" and not vectors.is_wide(a.type)
-            passed = [vectors.packed_type(a.type)] if packed else [t for t, _ in leaves_of(a.type)]
-            leaves = [Arg(legal_type(t), a.name, a.index, a.attrs) for t in passed]
-            f.args += leaves
-            if a.type.kind in AGGREGATES and not packed:
-                self.parts[id(a)] = list(leaves)
-            else:
-                self.values[id(a)] = leaves[0]
-        entry = True
-        for block in reverse_postorder(f):  # definitions before uses, whatever the textual order
+        parameters = f.args
+        self._legalize_parameters(parameters)
+        order = reverse_postorder(f)  # definitions before uses, whatever the textual order
+        for block in order:
             self.b = Builder(self.begin(block.name))
-            if entry:
-                entry = False
-                for a in old_args:
-                    if a.type.kind == "vector" and id(a) in self.values:
-                        self.parts[id(a)] = vectors.unpack(self, self.values.pop(id(a)), a.type)
-                    elif id(a) in self.values:
-                        self.values[id(a)] = self.argument(a)
-            for i in block.instrs:
-                self.b.line = i.line
-                try:
-                    self.instr(i)
-                except UnsupportedError as e:
-                    raise UnsupportedError(e.what, e.where or self.where(i.line) or f.name) from e
-            self.tail[block.name] = self.b.block.name
-        for phi, args, leaf in self.fixups:
-            phi.args = [self.use(a) if leaf is None else self.fields(a)[leaf] for a in args]
-            phi.blocks = [self.tail[n] for n in phi.blocks]
+            if block is order[0]:
+                self._normalise_parameters(parameters)
+            self._translate_block(block)
+            self.last_block[block.name] = self.b.block.name
+        self._complete_phis()
         for record in f.dbg_records:
             if record.value is not None and not isinstance(record.value, ConstInt):
                 record.value = self.values.get(id(record.value))
         f.ret = legal_type(f.ret)
         made = {b.name: b for b in self.blocks}
         f.blocks = [made[b.name] for b in f.blocks]
+
+    def _legalize_parameters(self, parameters: list[Arg]) -> None:
+        """Replace the function's parameters by legal ones: one per scalar, one for a vector that registers hold."""
+        f = self.function
+        f.args = []
+        if vectors.is_wide(f.ret):
+            self.result_address = Arg(I16, "result", 0, {})
+            f.args.append(self.result_address)
+            f.ret = VOID
+        for a in parameters:
+            packed = a.type.kind == "vector" and not vectors.is_wide(a.type)
+            types = [packing.packed_type(a.type)] if packed else [t for t, _ in leaves_of(a.type)]
+            leaves = [Arg(legal_type(t), a.name, a.index, a.attrs) for t in types]
+            f.args += leaves
+            if a.type.kind in AGGREGATES and not packed:
+                self.aggregates[id(a)] = list(leaves)
+            else:
+                self.values[id(a)] = leaves[0]
+
+    def _normalise_parameters(self, parameters: list[Arg]) -> None:
+        """Build the entry code: unpack vectors, clean the values of type i1."""
+        for a in parameters:
+            if a.type.kind == "vector" and id(a) in self.values:
+                self.aggregates[id(a)] = packing.unpack(self.b, self.values.pop(id(a)), a.type)
+            elif id(a) in self.values:
+                self.values[id(a)] = self.argument(a)
+
+    def _translate_block(self, block: Block) -> None:
+        """Translate the instructions of one block; errors get their source position."""
+        for i in block.instrs:
+            self.b.line = i.line
+            try:
+                self.instr(i)
+            except UnsupportedError as e:
+                raise UnsupportedError(e.what, e.where or self.locate(i.line) or self.function.name) from e
+
+    def _complete_phis(self) -> None:
+        """Give every new phi its operands, which all exist by now, and the names of the new blocks."""
+        for phi, args, leaf in self.pending_phis:
+            phi.args = [self.legal(a) if leaf is None else self.legal_leaves(a)[leaf] for a in args]
+            phi.blocks = [self.last_block[n] for n in phi.blocks]
 
     def argument(self, old: Arg) -> Value:
         """i1 and odd widths arrive with undefined upper bits (abi-elf.md §2.2): make i1 clean."""
@@ -105,14 +125,14 @@ class Legalizer(MemoryLegalizer):
     def instr(self, i: Instr) -> None:
         """Translate one instruction and record its value."""
         lanes = vectors.lane_count(i)
-        result = vectors.expand(self, i, lanes) if lanes else self.translate(i)
+        result = vectors.expand(self, i, lanes, self.translate) if lanes else self.translate(i)
         if isinstance(result, list):
-            self.parts[id(i)] = result
+            self.aggregates[id(i)] = result
         elif result is not None:
             self.values[id(i)] = result
             self.alive.append(i)
 
-    def translate(self, i: Instr) -> Value | list[Value] | None:
+    def translate(self, i: Instr) -> LegalResult:
         """Translate one instruction without recording its value."""
         handler = HANDLERS.get(i.op)
         if handler is None:
@@ -122,23 +142,15 @@ class Legalizer(MemoryLegalizer):
     def binary(self, i: Instr) -> Value:
         op, t = i.op, i.type
         if t.kind == "float":
-            return softfloat.binary(self.b, op, t.bits, self.use(i.args[0]), self.use(i.args[1]))
+            return softfloat.binary(self.b, op, t.bits, self.legal(i.args[0]), self.legal(i.args[1]))
         extend = self.sign_extended if op in SIGNED_OPS else self.zero_extended
         if op in ("shl", "lshr", "ashr"):
-            a = self.use(i.args[0]) if op == "shl" else extend(i.args[0])
+            a = self.legal(i.args[0]) if op == "shl" else extend(i.args[0])
             return self.b.binary(op, a, self.zero_extended(i.args[1]))
         if op in CLEAN_OPS:
             return self.divide(op, extend(i.args[0]), extend(i.args[1]))
-        a, b = self.use(i.args[0]), self.use(i.args[1])
+        a, b = self.legal(i.args[0]), self.legal(i.args[1])
         return self.multiply(a, b) if op == "mul" else self.b.binary(op, a, b)
-
-    def multiply(self, a: Value, b: Value) -> Value:
-        """Products up to 48 bits and by constants stay; wider ones are calls (64 bits) or schoolbook sums."""
-        product = self.b.binary("mul", a, b)
-        if a.type is I64 and isinstance(product, Instr) and product is self.b.block.instrs[-1] and product.op == "mul":
-            self.b.block.instrs.pop()
-            return self.b.call("__muldi3", I64, [a, b])
-        return product
 
     def divide(self, op: str, a: Value, b: Value) -> Value:
         """8 and 16 bits use the DIV instruction, wider ones the run-time library."""
@@ -163,7 +175,7 @@ class Legalizer(MemoryLegalizer):
         return self.b.cast("trunc", wide, a.type)
 
     def fneg(self, i: Instr) -> Value:
-        a = self.use(i.args[0])
+        a = self.legal(i.args[0])
         return self.b.binary("xor", a, const(a.type, 1 << (a.type.bits - 1)))
 
     def icmp(self, i: Instr) -> Value:
@@ -172,21 +184,22 @@ class Legalizer(MemoryLegalizer):
         return self.b.icmp(i.pred, a, b)
 
     def fcmp(self, i: Instr) -> Value:
-        return softfloat.compare(self.b, i.pred, i.args[0].type.bits, self.use(i.args[0]), self.use(i.args[1]))
+        return softfloat.compare(self.b, i.pred, i.args[0].type.bits, self.legal(i.args[0]), self.legal(i.args[1]))
 
-    def select(self, i: Instr) -> Value | list[Value]:
+    def select(self, i: Instr) -> LegalResult:
         if i.type.kind in AGGREGATES:
-            c = self.use(i.args[0])
-            return [self.b.select(c, a, b) for a, b in zip(self.fields(i.args[1]), self.fields(i.args[2]), strict=True)]
-        return self.b.select(self.use(i.args[0]), self.use(i.args[1]), self.use(i.args[2]))
+            c = self.legal(i.args[0])
+            pairs = zip(self.legal_leaves(i.args[1]), self.legal_leaves(i.args[2]), strict=True)
+            return [self.b.select(c, a, b) for a, b in pairs]
+        return self.b.select(self.legal(i.args[0]), self.legal(i.args[1]), self.legal(i.args[2]))
 
-    def freeze(self, i: Instr) -> Value | list[Value]:
+    def freeze(self, i: Instr) -> LegalResult:
         if i.type.kind in AGGREGATES:
-            return [const(p.type, 0) if isinstance(p, Undef) else p for p in self.fields(i.args[0])]
-        a = self.use(i.args[0])
+            return [const(p.type, 0) if isinstance(p, Undef) else p for p in self.legal_leaves(i.args[0])]
+        a = self.legal(i.args[0])
         return const(a.type, 0) if isinstance(a, Undef) else a
 
-    def cast(self, i: Instr) -> Value | list[Value]:
+    def cast(self, i: Instr) -> LegalResult:
         a, t = i.args[0], i.type
         if i.op == "bitcast" and "vector" in (a.type.kind, t.kind):
             return vectors.bitcast(self, i)
@@ -197,12 +210,12 @@ class Legalizer(MemoryLegalizer):
             case "sext":
                 return self.b.cast("sext", self.sign_extended(a), target)
             case "trunc":
-                low = self.b.cast("trunc", self.use(a), legal_type(t) if t.bits > 1 else self.use(a).type)
+                low = self.b.cast("trunc", self.legal(a), legal_type(t) if t.bits > 1 else self.legal(a).type)
                 return self.to_bool(low) if t.bits == 1 else low
             case "bitcast" | "addrspacecast":
-                return self.use(a)
+                return self.legal(a)
             case "ptrtoint" | "ptrtoaddr" | "inttoptr":
-                value = self.zero_extended(a) if i.op == "inttoptr" else self.use(a)
+                value = self.zero_extended(a) if i.op == "inttoptr" else self.legal(a)
                 low = self.b.cast("trunc" if target.bits < value.type.bits else "zext", value, target)
                 return self.to_bool(low) if t.bits == 1 else low
         signed = i.op in ("sitofp", "fptosi")
@@ -211,26 +224,26 @@ class Legalizer(MemoryLegalizer):
                 self.b, self.sign_extended(a) if signed else self.zero_extended(a), signed, t.bits
             )
         if i.op in ("fptosi", "fptoui"):
-            low = softfloat.to_int(self.b, self.use(a), signed, target if t.bits > 1 else I8)
+            low = softfloat.to_int(self.b, self.legal(a), signed, target if t.bits > 1 else I8)
             return self.to_bool(low) if t.bits == 1 else low
-        return self.b.call("__extendsfdf2" if i.op == "fpext" else "__truncdfsf2", target, [self.use(a)])
+        return self.b.call("__extendsfdf2" if i.op == "fpext" else "__truncdfsf2", target, [self.legal(a)])
 
     # -- control flow -------------------------------------------------------------------------------------------------
 
-    def phi(self, i: Instr) -> Value | list[Value]:
+    def phi(self, i: Instr) -> LegalResult:
         aggregate = i.type.kind in AGGREGATES
         leaves = [t for t, _ in leaves_of(i.type)] if aggregate else [i.type]
         made = [self.b.emit("phi", legal_type(t), []) for t in leaves]
         for number, new in enumerate(made):
             new.blocks = list(i.blocks)
-            self.fixups.append((new, i.args, number if aggregate else None))
+            self.pending_phis.append((new, i.args, number if aggregate else None))
         return list(made) if aggregate else made[0]
 
     def br(self, i: Instr) -> None:
         if not i.args:
             self.jump("br", [], i.blocks)
             return
-        c = self.use(i.args[0])
+        c = self.legal(i.args[0])
         if isinstance(c, ConstInt | Undef):
             taken = 0 if isinstance(c, ConstInt) and c.value else 1
             dead = i.blocks[1 - taken]
@@ -251,14 +264,14 @@ class Legalizer(MemoryLegalizer):
                     keep = [k for k, n in enumerate(phi.blocks) if n != here]
                     phi.args[:] = [phi.args[k] for k in keep]
                     phi.blocks[:] = [phi.blocks[k] for k in keep]
-        for new, old, _ in self.fixups:
+        for new, old, _ in self.pending_phis:
             if new in next((b.instrs for b in self.blocks if b.name == target), []):
                 keep = [k for k, n in enumerate(new.blocks) if n != here]
                 if len(old) == len(new.blocks):
                     old[:] = [old[k] for k in keep]
                 new.blocks = [new.blocks[k] for k in keep]
 
-    def jump(self, op: str, args: list[Value], targets: list[str], **extra: object) -> None:
+    def jump(self, op: str, args: list[Value], targets: list[str], **extra: Unpack[InstrExtra]) -> None:
         self.b.emit(op, VOID, args, **extra).blocks = list(targets)
 
     def switch(self, i: Instr) -> None:
@@ -268,11 +281,11 @@ class Legalizer(MemoryLegalizer):
         self.jump("switch", [v], i.blocks, cases=i.extra["cases"])
 
     def indirectbr(self, i: Instr) -> None:
-        self.jump("indirectbr", [self.use(i.args[0])], i.blocks)
+        self.jump("indirectbr", [self.legal(i.args[0])], i.blocks)
 
     def ret(self, i: Instr) -> None:
-        if self.result_at is not None:
-            self.store_aggregate(i.args[0], self.result_at, 2, False)
+        if self.result_address is not None:
+            self.store_aggregate(i.args[0], self.result_address, 2, False)
             self.jump("ret", [], [])
             return
         values = [v for a in i.args for v in self.passed(a)]
@@ -288,11 +301,11 @@ class Legalizer(MemoryLegalizer):
 
     # -- calls --------------------------------------------------------------------------------------------------------
 
-    def call(self, i: Instr) -> Value | list[Value] | None:
+    def call(self, i: Instr) -> LegalResult:
         callee = i.args[-1]
         if isinstance(callee, GlobalRef):
             if callee.name.startswith("llvm.") and i.type.kind == "vector":
-                return vectors.intrinsic(self, i)
+                return vectors.intrinsic(self, i, self.call)
             if callee.name.startswith("llvm."):
                 return intrinsics.expand(self, i, callee.name)
             if callee.name.startswith("__builtin_"):
@@ -302,31 +315,29 @@ class Legalizer(MemoryLegalizer):
         if isinstance(callee, InlineAsm):
             return self.inline_asm(i, callee)
         args: list[Value] = []
-        attrs: list[object] = []
-        given = i.extra["attrs"]
-        assert isinstance(given, list)
-        for a, attr in zip(i.args[:-1], given, strict=True):
+        attrs: list[ParameterAttributes] = []
+        for a, attr in zip(i.args[:-1], i.extra["attrs"], strict=True):
             parts = self.passed(a)
             args += parts
             attrs += [attr] * len(parts)
         if vectors.is_wide(i.type):
             return vectors.call(self, i, args, attrs)
         leaves = [legal_type(t) for t, _ in leaves_of(i.type)] if i.type.kind in ("struct", "array") else []
-        result = vectors.packed_type(i.type) if i.type.kind == "vector" else legal_type(i.type)
-        new = self.b.emit("call", leaves[0] if leaves else result, [*args, self.use(callee)])
+        result = packing.packed_type(i.type) if i.type.kind == "vector" else legal_type(i.type)
+        new = self.b.emit("call", leaves[0] if leaves else result, [*args, self.legal(callee)])
         new.extra = {"attrs": attrs, "vararg": i.extra["vararg"], "fixed": i.extra["fixed"], "tail": i.extra["tail"]}
         if leaves:
             new.extra["results"] = leaves
             return [new, *(self.b.emit("callresult", t, [new], index=k) for k, t in enumerate(leaves) if k)]
         if i.type.kind == "vector":
-            return vectors.unpack(self, new, i.type)
+            return packing.unpack(self.b, new, i.type)
         return self.clean_result(i.type, new)
 
     def passed(self, a: Value) -> list[Value]:
         """The values an argument or result travels as."""
         if a.type.kind == "vector" and not vectors.is_wide(a.type):
-            return [vectors.pack(self, a)]
-        return self.fields(a) if a.type.kind in AGGREGATES else [self.use(a)]
+            return [self.packed(a)]
+        return self.legal_leaves(a) if a.type.kind in AGGREGATES else [self.legal(a)]
 
     def clean_result(self, t: Type, new: Value) -> Value | None:
         """i1 results come with undefined upper bits (abi-elf.md §2.3)."""
@@ -336,11 +347,11 @@ class Legalizer(MemoryLegalizer):
         return new if t is not VOID else None
 
     def builtin(self, i: Instr, name: str) -> Value | None:
-        new = self.b.emit("builtin", legal_type(i.type), [self.use(a) for a in i.args[:-1]], name=name)
+        new = self.b.emit("builtin", legal_type(i.type), [self.legal(a) for a in i.args[:-1]], name=name)
         return new if i.type is not VOID else None
 
-    def inline_asm(self, i: Instr, asm: InlineAsm) -> Value | list[Value] | None:
-        args = [self.use(a) for a in i.args[:-1]]
+    def inline_asm(self, i: Instr, asm: InlineAsm) -> LegalResult:
+        args = [self.legal(a) for a in i.args[:-1]]
         attrs = i.extra["attrs"]
         if i.type is VOID or i.type.kind == "void":
             self.b.emit("asm", VOID, args, asm=asm, attrs=attrs, results=[])
@@ -355,7 +366,7 @@ class Legalizer(MemoryLegalizer):
         return values if i.type.kind == "struct" else values[0]
 
 
-HANDLERS: dict[str, Callable[[Legalizer, Instr], Value | list[Value] | None]] = {
+HANDLERS: dict[str, Callable[[Legalizer, Instr], LegalResult]] = {
     **dict.fromkeys(
         ("add", "sub", "mul", "udiv", "sdiv", "urem", "srem", "and", "or", "xor", "shl", "lshr", "ashr", "fadd", "fsub",
          "fmul", "fdiv", "frem"),
@@ -394,6 +405,6 @@ HANDLERS: dict[str, Callable[[Legalizer, Instr], Value | list[Value] | None]] = 
 }  # fmt: skip
 
 
-def legalize(module: Module, function: Function, where: Callable[[str | None], str]) -> None:
-    """Rewrite one function definition in place. `where` turns a !dbg reference into "file:line"."""
-    Legalizer(module, function, where).run()
+def legalize(module: Module, function: Function, locate: Callable[[str | None], str]) -> None:
+    """Rewrite one function definition in place. `locate` turns a !dbg reference into "file:line"."""
+    Legalizer(module, function, locate).run()

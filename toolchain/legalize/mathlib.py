@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from toolchain.ir.build import legal_type
-from toolchain.ir.model import Instr, UnsupportedError, Value, size_of
-
-if TYPE_CHECKING:
-    from toolchain.legalize.legalize import Legalizer
+from toolchain.ir.model import Instr, UnsupportedError, size_of
+from toolchain.legalize.context import LegalResult
+from toolchain.legalize.memory import MemoryLegalizer
 
 SAME_NAME = {
     "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "exp2", "log", "log2",
@@ -19,11 +16,11 @@ RENAMED = {"minnum": "fmin", "maxnum": "fmax", "minimumnum": "fmin", "maximumnum
 TWO_RESULTS = {"modf", "frexp"}  # the second one through a pointer
 
 
-def expand(lz: Legalizer, i: Instr, base: str) -> Value | list[Value]:
+def expand(lz: MemoryLegalizer, i: Instr, base: str) -> LegalResult:
     """Call the function behind `llvm.BASE`. Raises UnsupportedError when there is none."""
     stem = base.split(".")[0]
     suffix = "f" if i.args[0].type.bits == 32 else ""
-    args = [lz.use(a) for a in i.args[:-1]]
+    args = [lz.legal(a) for a in i.args[:-1]]
     if stem in TWO_RESULTS:
         first, second = i.type.elems
         slot = lz.frame_slot(size_of(second))

@@ -20,21 +20,20 @@ from toolchain.ir.model import (
     store_size,
     struct_offsets,
 )
-from toolchain.legalize.base import AGGREGATES, LegalizerBase, leaves_of
+from toolchain.legalize.context import AGGREGATES, LegalizationContext, leaves_of
 
 ATOMIC_CALLS = {"__atomic_load", "__atomic_store", "__atomic_exchange", "__atomic_compare_exchange"}
 
 
-class MemoryLegalizer(LegalizerBase):
-    """Everything that touches memory."""
+class MemoryLegalizer(LegalizationContext):
+    """Handlers of instructions that address or access memory."""
 
     # -- memory -------------------------------------------------------------------------------------------------------
 
     def gep(self, i: Instr) -> Value:
         """Address arithmetic: base + scaled indices + one constant."""
         t = i.extra["type"]
-        assert isinstance(t, Type)
-        address, offset = self.use(i.args[0]), 0
+        address, offset = self.legal(i.args[0]), 0
         for k, index in enumerate(i.args[1:]):
             if k and t.kind == "struct":
                 assert isinstance(index, ConstInt)
@@ -47,7 +46,7 @@ class MemoryLegalizer(LegalizerBase):
             if isinstance(index, ConstInt):
                 offset += index.signed * stride
                 continue
-            scaled = self.use(index)
+            scaled = self.legal(index)
             if scaled.type.bits < 16:
                 scaled = self.b.cast("sext", self.sign_extended(index), I16)
             elif scaled.type.bits > 16:
@@ -59,11 +58,9 @@ class MemoryLegalizer(LegalizerBase):
     def alloca(self, i: Instr) -> Value:
         """Fixed-size objects become frame slots, others move the stack pointer."""
         t = i.extra["type"]
-        assert isinstance(t, Type)
         size = size_of(t)
-        count = self.use(i.args[0]) if i.args else const(I16, 1)
+        count = self.legal(i.args[0]) if i.args else const(I16, 1)
         align = i.extra.get("align", 1)
-        assert isinstance(align, int)
         slack = align if align > 2 else 0
         if isinstance(count, ConstInt) and (self.blocks[0] is self.b.block):
             return self.aligned(self.b.emit("slot", I16, [], size=size * count.value + slack, source=i.name), slack)
@@ -102,9 +99,8 @@ class MemoryLegalizer(LegalizerBase):
         return isinstance(p, Instr) and p.op in ("slot", "dynalloca") and not offset & 1
 
     def load(self, i: Instr) -> Value | list[Value]:
-        p = self.use(i.args[0])
+        p = self.legal(i.args[0])
         align = i.extra.get("align", 2)
-        assert isinstance(align, int)
         if i.type.kind in AGGREGATES:
             return self.load_aggregate(i.type, p, align, i.volatile)
         t, size, even = legal_type(i.type), store_size(i.type), self.even(p, align)
@@ -121,9 +117,9 @@ class MemoryLegalizer(LegalizerBase):
             return self.load_bits(t, size, p, even, True)
         if even and size == 4:
             return self.b.emit("loadpair", t, [p])
-        self.hold()
+        self.begin_atomic()
         value = self.load_bits(t, size, p, even, True)
-        self.release()
+        self.end_atomic()
         return value
 
     def load_bits(self, t: Type, size: int, p: Value, even: bool, volatile: bool) -> Value:
@@ -143,15 +139,14 @@ class MemoryLegalizer(LegalizerBase):
         return value
 
     def store(self, i: Instr) -> None:
-        v, p = i.args[0], self.use(i.args[1])
+        v, p = i.args[0], self.legal(i.args[1])
         align = i.extra.get("align", 2)
-        assert isinstance(align, int)
         if v.type.kind in AGGREGATES:
             self.store_aggregate(v, p, align, i.volatile)
             return
         if isinstance(v, Undef) and not i.volatile:
             return
-        value = self.b.cast("zext", self.use(v), I8) if v.type.bits == 1 else self.zero_extended(v)
+        value = self.b.cast("zext", self.legal(v), I8) if v.type.bits == 1 else self.zero_extended(v)
         size, even = store_size(v.type), self.even(p, align)
         if "ordering" in i.extra:
             self.store_at_once(value, size, p, even)
@@ -165,9 +160,9 @@ class MemoryLegalizer(LegalizerBase):
         elif even and size == 4:
             self.b.emit("storepair", VOID, [value, p])
         else:
-            self.hold()
+            self.begin_atomic()
             self.store_bits(value, size, p, even, True)
-            self.release()
+            self.end_atomic()
 
     def store_bits(self, v: Value, size: int, p: Value, even: bool, volatile: bool) -> None:
         """Store the low `size` bytes of a legal value."""
@@ -181,12 +176,13 @@ class MemoryLegalizer(LegalizerBase):
             part = self.b.cast("trunc", self.b.shift("lshr", v, at * 8) if at else v, I16 if step == 2 else I8)
             self.b.store(part, self.b.add(p, at), volatile)
 
-    def hold(self) -> None:
-        """From here to `release`, interrupts of priority 1-6 wait (isa.md §12). No calls and branches in between."""
-        self.b.emit("builtin", VOID, [], name="__builtin_hold")
+    def begin_atomic(self) -> None:
+        """Start an atomic section: DISI delays interrupts of priority 1-6 (isa.md §12). It has no calls or branches."""
+        self.b.emit("builtin", VOID, [], name="__builtin_begin_atomic")
 
-    def release(self) -> None:
-        self.b.emit("builtin", VOID, [], name="__builtin_release")
+    def end_atomic(self) -> None:
+        """End the atomic section."""
+        self.b.emit("builtin", VOID, [], name="__builtin_end_atomic")
 
     def load_aggregate(self, whole: Type, p: Value, align: int, volatile: bool) -> list[Value]:
         out = []
@@ -197,7 +193,7 @@ class MemoryLegalizer(LegalizerBase):
         return out
 
     def store_aggregate(self, v: Value, p: Value, align: int, volatile: bool) -> None:
-        for (t, at), part in zip(leaves_of(v.type), self.fields(v), strict=True):
+        for (t, at), part in zip(leaves_of(v.type), self.legal_leaves(v), strict=True):
             q = self.b.add(p, at)
             self.store_bits(part, store_size(t), q, self.even(q, 1 if at & 1 else align), volatile)
 
@@ -205,7 +201,7 @@ class MemoryLegalizer(LegalizerBase):
         """Step the pointer down by the rounded size, then read (abi-elf.md §2.4)."""
         if i.type.kind not in ("int", "float", "ptr"):
             raise UnsupportedError(f"va_arg of type {i.type}")
-        pp = self.use(i.args[0])
+        pp = self.legal(i.args[0])
         size = (store_size(i.type) + 1) // 2 * 2
         p = self.b.add(self.b.load(I16, pp), -size)
         self.b.store(p, pp)
@@ -217,13 +213,13 @@ class MemoryLegalizer(LegalizerBase):
     def atomicrmw(self, i: Instr) -> Value:
         """Read, modify, write with interrupts of priority 1-6 held off for the length of the sequence."""
         kind = str(i.extra["kind"])
-        p, v = self.use(i.args[0]), self.use(i.args[1])
+        p, v = self.legal(i.args[0]), self.legal(i.args[1])
         t = legal_type(i.type)
-        self.hold()
+        self.begin_atomic()
         old = self.b.load(t, p, True)
         new = self.modified(kind, t, old, v)
         self.b.store(new, p, True)
-        self.release()
+        self.end_atomic()
         return old
 
     def modified(self, kind: str, t: Type, old: Value, v: Value) -> Value:
@@ -240,18 +236,18 @@ class MemoryLegalizer(LegalizerBase):
         raise UnsupportedError(f"atomicrmw {kind}")
 
     def cmpxchg(self, i: Instr) -> list[Value]:
-        p, expected, new = (self.use(a) for a in i.args)
+        p, expected, new = (self.legal(a) for a in i.args)
         t = legal_type(i.args[1].type)
-        self.hold()
+        self.begin_atomic()
         old = self.b.load(t, p, True)
         same = self.b.icmp("eq", old, expected)
         self.b.store(self.b.select(same, new, old), p, True)
-        self.release()
+        self.end_atomic()
         return [old, same]
 
     def atomic_call(self, i: Instr, name: str) -> Value | None:
         """Calls of GCC's generic atomic functions, which the front end makes for objects declared _Atomic."""
-        size, p, *operands = (self.use(a) for a in i.args[:-2])
+        size, p, *operands = (self.legal(a) for a in i.args[:-2])
         assert isinstance(size, ConstInt)
         n = size.value
         t = I8 if n == 1 else int_type(8 * n)
@@ -266,19 +262,19 @@ class MemoryLegalizer(LegalizerBase):
             self.store_at_once(new, n, p, even)
             return None
         if name == "__atomic_exchange":
-            self.hold()
+            self.begin_atomic()
             old = self.load_bits(t, n, p, even, True)
             self.store_bits(new, n, p, even, True)
-            self.release()
+            self.end_atomic()
             self.store_bits(old, n, operands[1], self.even(operands[1], 1), False)
             return None
         where = operands[0]
         expected = self.load_bits(t, n, where, self.even(where, 1), False)
-        self.hold()
+        self.begin_atomic()
         old = self.load_bits(t, n, p, even, True)
         same = self.b.icmp("eq", old, expected)
         self.store_bits(self.b.select(same, new, old), n, p, even, True)
-        self.release()
+        self.end_atomic()
         self.store_bits(old, n, where, self.even(where, 1), False)  # when they were equal, what is there already
         return same
 

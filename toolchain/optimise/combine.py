@@ -222,8 +222,6 @@ def block_steps(f: Function) -> None:
     for b in f.blocks:
         for block in [i for i in b.instrs if i.op in ("blockcopy", "blockfill")]:
             count, unit = block.extra["count"], block.extra["unit"]
-            assert isinstance(count, int)
-            assert isinstance(unit, int)
             size, at = count * unit, b.instrs.index(block)
             for step in [i for i in b.instrs[at:] if i.op == "add" and i.args[0] in block.args[:2]]:
                 if isinstance(step.args[1], ConstInt) and step.args[1].signed == size:

@@ -4,7 +4,7 @@
     i == n as the exit  ->  n - i == 0, which the decrement's own flags answer
     i == max(n, start)  ->  i >= n: the middle end's trip count of `i < n`
 
-Needs: legal IR. Touches loops with one entry. The middle end leaves this to us (design §5: it runs no LSR).
+Needs: legal IR. Touches loops with one entry. The middle end leaves this to us (engines.md §5: it runs no LSR).
 """
 
 from __future__ import annotations

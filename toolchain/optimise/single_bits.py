@@ -21,7 +21,7 @@ from toolchain.abi.target import NEAR_END
 from toolchain.ir.cfg import dead_code, new_branch, predecessors
 from toolchain.ir.model import I1, VOID, Block, ConstInt, Function, GlobalRef, Instr, Value
 from toolchain.optimise.combine import users_of
-from toolchain.select.values import MEMORY_BARRIERS
+from toolchain.select.state import MEMORY_BARRIERS
 
 Near = Callable[[str], bool]
 Change = tuple[Instr, str, int]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from toolchain.ir.model import Value
+from toolchain.ir.model import ParameterAttributes, Value
 from toolchain.proof.asm_statements import Shape
 from toolchain.proof.memory import Memory
 from toolchain.proof.terms import Term
@@ -23,7 +23,7 @@ class Event:
     """Of an access or a call through a pointer a 16-bit term; of another call its name; of assembly its text."""
     size: int = 0
     value: Any = None
-    arguments: list[tuple[Value, Any, dict[str, object]]] = field(default_factory=list)
+    arguments: list[tuple[Value, Any, ParameterAttributes]] = field(default_factory=list)
     named: int | None = None
     memory: Memory | None = None
     """What must have been written before: of a call, and next to a barrier of the compiler."""

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.ir.model import I1, ConstInt, Instr, Value
 from toolchain.mir.mir import Imm, Mem
+from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CARRY_OP, COMMUTES, REGISTER_OP, ImmRule, immediate_rule
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
-
-
 from toolchain.select.shifts import fill
+from toolchain.select.state import words_of
 
 
-def _words(v: Value) -> int:
-    return max(1, v.type.bits // 16)
-
-
-def select_binary(s: Selector, i: Instr) -> None:
+def select_binary(s: SelectionContext, i: Instr) -> None:
     """One word: rule table, then register form with a folded load. Several words: a carry chain."""
     if _into_low_byte(s, i):
         return
-    if _words(i) > 1:
+    if words_of(i) > 1:
         _wide_binary(s, i)
         return
     a, b = i.args
@@ -55,7 +45,7 @@ def select_binary(s: Selector, i: Instr) -> None:
     s.emit(op, s.reg(a), right, d, byte=byte)
 
 
-def _into_low_byte(s: Selector, i: Instr) -> bool:
+def _into_low_byte(s: SelectionContext, i: Instr) -> bool:
     """a | b and a ^ b for a byte b: only the low byte changes, so b is not extended."""
     if i.op not in ("or", "xor") or i.type.bits < 16:
         return False
@@ -75,7 +65,7 @@ def _into_low_byte(s: Selector, i: Instr) -> bool:
     return False
 
 
-def _file_logic(s: Selector, i: Instr, a: Value, b: ConstInt, d: int, byte: bool) -> bool:
+def _file_logic(s: SelectionContext, i: Instr, a: Value, b: ConstInt, d: int, byte: bool) -> bool:
     """near object op constant, through W0: one word less than loading both (abi-elf.md §8.1, bit-field writes)."""
     if i.op not in ("and", "or", "xor") or immediate_rule(i.op, b.value, i.type.bits) is not None:
         return False
@@ -88,7 +78,7 @@ def _file_logic(s: Selector, i: Instr, a: Value, b: ConstInt, d: int, byte: bool
     return True
 
 
-def _reverse_subtract(s: Selector, i: Instr, a: ConstInt, d: int, byte: bool) -> None:
+def _reverse_subtract(s: SelectionContext, i: Instr, a: ConstInt, d: int, byte: bool) -> None:
     """constant - b."""
     right = s.source(i.args[1], i)
     if a.value == 0:
@@ -101,7 +91,7 @@ def _reverse_subtract(s: Selector, i: Instr, a: ConstInt, d: int, byte: bool) ->
         s.emit("sub", s.reg(a), right, d, byte=byte)
 
 
-def apply_immediate(s: Selector, op: str, a: Value, k: int, d: int, byte: bool, user: Instr | None) -> None:
+def apply_immediate(s: SelectionContext, op: str, a: Value, k: int, d: int, byte: bool, user: Instr | None) -> None:
     """d = a op k by the first fitting rule; the constant goes to a register otherwise."""
     rule = immediate_rule(op, k, 8 if byte else 16)
     if rule is not None and rule.form == "unary" and user is not None and rule.op != "ze":
@@ -110,7 +100,7 @@ def apply_immediate(s: Selector, op: str, a: Value, k: int, d: int, byte: bool, 
     apply_rule(s, rule, op, s.reg(a), k, d, byte)
 
 
-def apply_rule(s: Selector, rule: ImmRule | None, op: str, a: int, k: int, d: int, byte: bool) -> None:
+def apply_rule(s: SelectionContext, rule: ImmRule | None, op: str, a: int, k: int, d: int, byte: bool) -> None:
     """d = a op k for a register a."""
     if rule is None:
         t = s.temp()
@@ -130,7 +120,7 @@ def apply_rule(s: Selector, rule: ImmRule | None, op: str, a: int, k: int, d: in
             s.emit(rule.op, d, literal, byte=byte)
 
 
-def _wide_binary(s: Selector, i: Instr) -> None:
+def _wide_binary(s: SelectionContext, i: Instr) -> None:
     """Word by word; add and sub carry. Constant words use literals; words that change nothing are copies."""
     a, b = i.args
     d = s.value_regs(i)
@@ -161,16 +151,16 @@ def _known_zero_words(v: Value) -> set[int]:
     """Words of a value that are certainly 0: the upper part of a zext, the lower part of a shift by whole words."""
     if isinstance(v, Instr):
         if v.op == "zext":
-            return set(range(_words(v.args[0]), _words(v)))
+            return set(range(words_of(v.args[0]), words_of(v)))
         if v.op == "shl" and isinstance(v.args[1], ConstInt):
             inner = _known_zero_words(v.args[0])
             n = v.args[1].value // 16
             lost = {k + n for k in inner} if v.args[1].value % 16 == 0 else set()
-            return {k for k in set(range(n)) | lost if k < _words(v)}
+            return {k for k in set(range(n)) | lost if k < words_of(v)}
     return set()
 
 
-def _wide_reverse(s: Selector, i: Instr, a: ConstInt) -> None:
+def _wide_reverse(s: SelectionContext, i: Instr, a: ConstInt) -> None:
     right, d = s.regs(i.args[1]), s.value_regs(i)
     for k, (y, r) in enumerate(zip(right, d, strict=True)):
         word = a.value >> 16 * k & 0xFFFF
@@ -183,7 +173,7 @@ def _wide_reverse(s: Selector, i: Instr, a: ConstInt) -> None:
             s.emit(op, y, t, r)
 
 
-def _wide_immediate(s: Selector, op: str, a: tuple[int, ...], value: int, d: tuple[int, ...]) -> None:
+def _wide_immediate(s: SelectionContext, op: str, a: tuple[int, ...], value: int, d: tuple[int, ...]) -> None:
     """Wide operation with a constant."""
     words = [value >> 16 * k & 0xFFFF for k in range(len(a))]
     if op in ("add", "sub"):
@@ -200,7 +190,7 @@ def _wide_immediate(s: Selector, op: str, a: tuple[int, ...], value: int, d: tup
             apply_rule(s, immediate_rule(op, k, 16), op, x, k, r, False)
 
 
-def _wide_add_immediate(s: Selector, op: str, a: tuple[int, ...], words: list[int], d: tuple[int, ...]) -> None:
+def _wide_add_immediate(s: SelectionContext, op: str, a: tuple[int, ...], words: list[int], d: tuple[int, ...]) -> None:
     """Add or subtract a constant, choosing the direction with more short literals; leading zero words are copies."""
     value = sum(w << 16 * k for k, w in enumerate(words))
     bits = 16 * len(words)
@@ -226,16 +216,16 @@ def _wide_add_immediate(s: Selector, op: str, a: tuple[int, ...], words: list[in
         carry = True
 
 
-def select_extend(s: Selector, i: Instr) -> None:
+def select_extend(s: SelectionContext, i: Instr) -> None:
     """zext and sext. Words of the source are shared, not copied."""
     v, signed = i.args[0], i.op == "sext"
     d = s.value_regs(i)
     if s.is_leaf(v):
         for k, r in enumerate(d):
-            if k < _words(v):
+            if k < words_of(v):
                 s.load_leaf(v, k, r)
             else:
-                fill(s, "ashr" if signed else "lshr", d[_words(v) - 1], r)
+                fill(s, "ashr" if signed else "lshr", d[words_of(v) - 1], r)
         if v.type.bits == 8:
             s.emit("se" if signed else "ze", d[0], d[0])
         return
@@ -253,7 +243,7 @@ def select_extend(s: Selector, i: Instr) -> None:
         low = 1
     else:
         s.value_regs(v)
-        low = _words(v)
+        low = words_of(v)
     for k in range(low, len(d)):
         if signed and k > low:
             s.copy(d[low], d[k])
@@ -261,25 +251,25 @@ def select_extend(s: Selector, i: Instr) -> None:
             fill(s, "ashr" if signed else "lshr", d[low - 1], d[k])
 
 
-def _byte_source(s: Selector, v: Value, i: Instr) -> int | Mem:
+def _byte_source(s: SelectionContext, v: Value, i: Instr) -> int | Mem:
     operand = s.source(v, i)
     assert isinstance(operand, int | Mem)
     return operand
 
 
-def select_unary(s: Selector, i: Instr) -> None:
+def select_unary(s: SelectionContext, i: Instr) -> None:
     """ff1l, ff1r."""
     s.emit(i.op, s.source(i.args[0], i), s.result(i))
 
 
-def select_swap(s: Selector, i: Instr) -> None:
+def select_swap(s: SelectionContext, i: Instr) -> None:
     """SWAP works in place."""
     d = s.result(i)
     s.copy(s.reg(i.args[0]), d)
     s.emit("swap", d)
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Handler] = {
     **dict.fromkeys(("add", "sub", "and", "or", "xor"), select_binary),
     "zext": select_extend,
     "sext": select_extend,

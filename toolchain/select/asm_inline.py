@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from toolchain.frontend.asm_constraints import CLASSES, MARK
-from toolchain.ir.model import ConstInt, GlobalRef, InlineAsm, Instr, Type, UnsupportedError, Value, size_of
+from toolchain.ir.model import ConstInt, GlobalRef, Instr, Type, UnsupportedError, Value, size_of
 from toolchain.mir.mir import FIRST_VIRTUAL, MI, Imm, Mem, Operand, opaque
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
+from toolchain.select.context import SelectionContext
 
 # The front end knows MSP430 register names only; r0-r3 have other names there.
 REGISTER_NAMES = {"pc": 0, "sp": 1, "sr": 2, "cg": 3, "fp": 4, **{f"r{n}": n for n in range(16)}}
@@ -92,12 +89,10 @@ def _split(text: str) -> list[str]:
 class AsmBuilder:
     """Collects operands of one statement. Registers get a role each; memory and immediates are text in place."""
 
-    def __init__(self, s: Selector, i: Instr) -> None:
+    def __init__(self, s: SelectionContext, i: Instr) -> None:
         self.s = s
         self.i = i
-        asm = i.extra["asm"]
-        assert isinstance(asm, InlineAsm)
-        self.asm = asm
+        self.asm = i.extra["asm"]
         self.operands: list[Operand] = []
         self.roles: list[str] = []
         self.late: list[int] = []
@@ -112,7 +107,6 @@ class AsmBuilder:
         constraints, clobbers = _parse(self.asm.constraints)
         _place(constraints, clobbers, self.asm.text)
         results = self.i.extra["results"]
-        assert isinstance(results, list)
         inputs = list(self.i.args)
         result_at = 0
         early = False
@@ -261,14 +255,10 @@ class AsmBuilder:
 
 def element(asm: Instr, k: int) -> Type:
     """Type of the object that argument `k`, an address, stands for."""
-    attributes = asm.extra.get("attrs")
-    assert isinstance(attributes, list)
-    t = attributes[k]["elementtype"]
-    assert isinstance(t, Type)
-    return t
+    return asm.extra["attrs"][k]["elementtype"]
 
 
-def result_registers(s: Selector, asm: Instr, index: int, words: int) -> tuple[int, ...]:
+def result_registers(s: SelectionContext, asm: Instr, index: int, words: int) -> tuple[int, ...]:
     """Registers of the second and later results of a statement."""
     for user in s.users.get(id(asm), ()):
         if user.op == "asmresult" and user.extra["index"] == index:
@@ -276,10 +266,10 @@ def result_registers(s: Selector, asm: Instr, index: int, words: int) -> tuple[i
     return tuple(s.temp() for _ in range(words))
 
 
-def select_asm(s: Selector, i: Instr) -> None:
+def select_asm(s: SelectionContext, i: Instr) -> None:
     """Emit one statement with its operand copies."""
     AsmBuilder(s, i).run()
 
 
-def select_asmresult(s: Selector, i: Instr) -> None:
+def select_asmresult(s: SelectionContext, i: Instr) -> None:
     """Nothing: the statement writes its results itself."""

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.ir.model import ConstInt, Instr, Value
 from toolchain.mir.mir import Imm, Mem
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
+from toolchain.select.context import Handler, SelectionContext
 
 INLINE_WORDS = 3  # copies and fills of up to this many units are written out
 
 
-def _pointer(s: Selector, p: Value, size: int, block: Instr) -> tuple[int, int | None]:
+def _pointer(s: SelectionContext, p: Value, size: int, block: Instr) -> tuple[int, int | None]:
     """A private copy of a pointer, to be advanced, and the register of p + size that it goes to in the end, if somebody
     wants that behind the operation on a block. Until then that register has no value, which a debugger should know."""
     r = s.temp()
@@ -29,7 +24,7 @@ def _pointer(s: Selector, p: Value, size: int, block: Instr) -> tuple[int, int |
     return r, s.value_regs(step)[0]
 
 
-def _step_behind(s: Selector, p: Value, size: int, block: Instr) -> Instr | None:
+def _step_behind(s: SelectionContext, p: Value, size: int, block: Instr) -> Instr | None:
     """p + size of this block, not emitted yet, whose register is read behind `block` only."""
     _, at = s.position[id(block)]
     for step in s.users.get(id(p), ()):
@@ -48,11 +43,9 @@ def _modes(count: int, behind: int | None) -> list[str]:
     return ["++"] * (count - 1) + ["ind" if behind is None else "++"]
 
 
-def select_blockcopy(s: Selector, i: Instr) -> None:
+def select_blockcopy(s: SelectionContext, i: Instr) -> None:
     """MOV [Ws++],[Wd++], under REPEAT when long (isa.md §15)."""
     count, unit = i.extra["count"], i.extra["unit"]
-    assert isinstance(count, int)
-    assert isinstance(unit, int)
     (dest, dest_end), (source, source_end) = (_pointer(s, p, count * unit, i) for p in i.args[:2])
     byte = unit == 1
     if count <= INLINE_WORDS:
@@ -65,11 +58,9 @@ def select_blockcopy(s: Selector, i: Instr) -> None:
             s.copy(r, end)
 
 
-def select_blockfill(s: Selector, i: Instr) -> None:
+def select_blockfill(s: SelectionContext, i: Instr) -> None:
     """CLR [Wd++] or MOV Ws,[Wd++], under REPEAT when long."""
     count, unit = i.extra["count"], i.extra["unit"]
-    assert isinstance(count, int)
-    assert isinstance(unit, int)
     value, byte = i.args[1], unit == 1
     zero = isinstance(value, ConstInt) and value.value == 0
     source = None if zero else s.reg(value)
@@ -88,7 +79,7 @@ def select_blockfill(s: Selector, i: Instr) -> None:
         s.copy(dest, end)
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Handler] = {
     "blockcopy": select_blockcopy,
     "blockfill": select_blockfill,
 }

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from emu.dspic30f.isa.debug import FAILED_CHECK, HALT
 from toolchain.abi.names import symbol
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, UnsupportedError
 from toolchain.mir.mir import Imm, Mem, opaque
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
+from toolchain.select.context import Handler, SelectionContext
 
 
 def _constant(i: Instr, k: int, limit: int) -> int:
@@ -21,34 +16,34 @@ def _constant(i: Instr, k: int, limit: int) -> int:
     return v.value
 
 
-def _disi(s: Selector, i: Instr) -> None:
+def _disi(s: SelectionContext, i: Instr) -> None:
     s.emit("disi", Imm(_constant(i, 0, 0x3FFF)))
 
 
-def _hold(s: Selector, i: Instr) -> None:
-    s.emit("hold").also_defs = (0,)
+def _begin_atomic(s: SelectionContext, i: Instr) -> None:
+    s.emit("begin_atomic").also_defs = (0,)
 
 
-def _release(s: Selector, i: Instr) -> None:
-    s.emit("release")
+def _end_atomic(s: SelectionContext, i: Instr) -> None:
+    s.emit("end_atomic")
 
 
-def _text(*lines: str) -> Callable[[Selector, Instr], None]:
-    def expand(s: Selector, i: Instr) -> None:
+def _text(*lines: str) -> Handler:
+    def expand(s: SelectionContext, i: Instr) -> None:
         for line in lines:
             s.emit("text", line)
 
     return expand
 
 
-def _pwrsav(s: Selector, i: Instr) -> None:
+def _pwrsav(s: SelectionContext, i: Instr) -> None:
     s.emit("text", f"pwrsav #{_constant(i, 0, 1)}")
 
 
-def _osccon(byte: str, keys: tuple[int, int]) -> Callable[[Selector, Instr], None]:
+def _osccon(byte: str, keys: tuple[int, int]) -> Handler:
     """Key, key, value as three consecutive byte writes through a register, so that no instruction comes between."""
 
-    def expand(s: Selector, i: Instr) -> None:
+    def expand(s: SelectionContext, i: Instr) -> None:
         value = s.reg(i.args[0])
         pointer, first, second = s.temp(), s.temp(), s.temp()
         s.emit("mov", Imm("_OSCCON" if byte == "L" else "_OSCCON+1"), pointer)
@@ -61,7 +56,7 @@ def _osccon(byte: str, keys: tuple[int, int]) -> Callable[[Selector, Instr], Non
     return expand
 
 
-def _write_nvm(s: Selector, i: Instr) -> None:
+def _write_nvm(s: SelectionContext, i: Instr) -> None:
     """NVMKEY = 0x55, 0xAA, then WR; two NOPs follow (abi-elf.md §2.9)."""
     for key in (0x55, 0xAA):
         r = s.temp()
@@ -73,22 +68,22 @@ def _write_nvm(s: Selector, i: Instr) -> None:
     _text("bset _NVMCON,#15", "nop", "nop")(s, i)
 
 
-def _table_read(op: str, byte: bool) -> Callable[[Selector, Instr], None]:
-    def expand(s: Selector, i: Instr) -> None:
+def _table_read(op: str, byte: bool) -> Handler:
+    def expand(s: SelectionContext, i: Instr) -> None:
         s.emit(op, Mem("ind", s.reg(i.args[0])), s.value_regs(i)[0], byte=byte)
 
     return expand
 
 
-def _table_write(op: str, byte: bool) -> Callable[[Selector, Instr], None]:
-    def expand(s: Selector, i: Instr) -> None:
+def _table_write(op: str, byte: bool) -> Handler:
+    def expand(s: SelectionContext, i: Instr) -> None:
         s.emit(op, s.reg(i.args[1]), Mem("ind", s.reg(i.args[0])), byte=byte)
 
     return expand
 
 
-def _address_part(operator: str) -> Callable[[Selector, Instr], None]:
-    def expand(s: Selector, i: Instr) -> None:
+def _address_part(operator: str) -> Handler:
+    def expand(s: SelectionContext, i: Instr) -> None:
         v = i.args[0]
         if not isinstance(v, GlobalRef):
             raise UnsupportedError(f"{i.extra['name']}: the argument must be the address of an object or function")
@@ -99,8 +94,8 @@ def _address_part(operator: str) -> Callable[[Selector, Instr], None]:
     return expand
 
 
-def _multiply(kind: str) -> Callable[[Selector, Instr], None]:
-    def expand(s: Selector, i: Instr) -> None:
+def _multiply(kind: str) -> Handler:
+    def expand(s: SelectionContext, i: Instr) -> None:
         low, high = s.value_regs(i)
         p = s.m.new_pair()
         s.emit(f"mul.{kind}", s.reg(i.args[0]), s.reg(i.args[1]), p)
@@ -109,10 +104,10 @@ def _multiply(kind: str) -> Callable[[Selector, Instr], None]:
     return expand
 
 
-def _divide(op: str, result: int) -> Callable[[Selector, Instr], None]:
+def _divide(op: str, result: int) -> Handler:
     """32 by 16 bits: REPEAT #17, DIV.SD or DIV.UD."""
 
-    def expand(s: Selector, i: Instr) -> None:
+    def expand(s: SelectionContext, i: Instr) -> None:
         low, high = s.regs(i.args[0])
         n = s.reg(i.args[1])
         p = s.m.new_pair()
@@ -125,11 +120,11 @@ def _divide(op: str, result: int) -> Callable[[Selector, Instr], None]:
     return expand
 
 
-def _bit_toggle(s: Selector, i: Instr) -> None:
+def _bit_toggle(s: SelectionContext, i: Instr) -> None:
     s.emit("btg", Mem("ind", s.reg(i.args[0])), Imm(_constant(i, 1, 15)))
 
 
-def _get_isr_state(s: Selector, i: Instr) -> None:
+def _get_isr_state(s: SelectionContext, i: Instr) -> None:
     """SR.IPL, bits 7-5."""
     r, t = s.temp(), s.temp()
     mi = s.emit("asm", r)
@@ -139,7 +134,7 @@ def _get_isr_state(s: Selector, i: Instr) -> None:
     s.emit("and", t, Imm(7), s.value_regs(i)[0])
 
 
-def _set_isr_state(s: Selector, i: Instr) -> None:
+def _set_isr_state(s: SelectionContext, i: Instr) -> None:
     """SR.IPL = argument; flags in the low bits are scratch."""
     r = s.temp()
     s.emit("sl", s.reg(i.args[0]), Imm(5), r)
@@ -149,15 +144,15 @@ def _set_isr_state(s: Selector, i: Instr) -> None:
     mi.text = "mov.b WREG,_SR"
 
 
-def _failed_check(s: Selector, i: Instr) -> None:
+def _failed_check(s: SelectionContext, i: Instr) -> None:
     for line in (f".pword {HALT:#08x}", "reset", f".pword {FAILED_CHECK | _constant(i, 0, 0xFF):#08x}"):
         s.emit("text", line)
 
 
-BUILTINS: dict[str, Callable[[Selector, Instr], None]] = {
+BUILTINS: dict[str, Handler] = {
     "disi": _disi,
-    "hold": _hold,
-    "release": _release,
+    "begin_atomic": _begin_atomic,
+    "end_atomic": _end_atomic,
     "nop": _text("nop"),
     "clrwdt": _text("clrwdt"),
     "pwrsav": _pwrsav,
@@ -193,9 +188,9 @@ BUILTINS: dict[str, Callable[[Selector, Instr], None]] = {
 }
 
 
-def select_builtin(s: Selector, i: Instr) -> None:
+def select_builtin(s: SelectionContext, i: Instr) -> None:
     """Expand one builtin in place. Raises UnsupportedError for unknown names."""
-    name = str(i.extra["name"]).removeprefix("__builtin_")
+    name = i.extra["name"].removeprefix("__builtin_")
     handler = BUILTINS.get(name)
     if handler is None:
         raise UnsupportedError(f"builtin function __builtin_{name}")

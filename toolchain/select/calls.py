@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.abi.arguments import Place, Shape, place_arguments, scalar_shape, struct_shape
 from toolchain.abi.names import symbol
-from toolchain.abi.struct_alignment import ATTRIBUTE
 from toolchain.abi.target import CALLER_SAVED, RETURN_ADDRESS_BYTES, SP
-from toolchain.ir.model import Arg, ConstInt, Function, GlobalRef, Instr, Type, Undef, Value, align_of, size_of
+from toolchain.ir.model import (
+    Arg,
+    ConstInt,
+    Function,
+    GlobalRef,
+    Instr,
+    ParameterAttributes,
+    Type,
+    Undef,
+    Value,
+    align_of,
+    size_of,
+)
 from toolchain.mir.mir import Imm, Mem, Slot
 from toolchain.select import asm_inline, builtins
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
+from toolchain.select.context import Handler, SelectionContext
 
 BLOCK_PUSH_WORDS = 5
 
 
-def _byval(attrs: dict[str, object]) -> Type | None:
+def shape_of(v: Value, attrs: ParameterAttributes) -> Shape:
+    """Shape of an argument or parameter with these attributes."""
     t = attrs.get("byval")
-    return t if isinstance(t, Type) else None
-
-
-def shape_of(v: Value, attrs: dict[str, object]) -> Shape:
-    """What placement needs to know of an argument or parameter with such attributes."""
-    t = _byval(attrs)
     if t is None:
         return scalar_shape(v.type)
-    align = attrs.get("align", 0)
-    assert isinstance(align, int)
-    return struct_shape(t, align, ATTRIBUTE in attrs)
+    return struct_shape(t, attrs.get("align", 0), attrs.get("unaligned_run", False))
 
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -40,7 +39,7 @@ def shape_of(v: Value, attrs: dict[str, object]) -> Shape:
 
 def is_struct(a: Arg) -> bool:
     """Whether a parameter is the address of a copy the caller makes."""
-    return _byval(a.attrs) is not None
+    return "byval" in a.attrs
 
 
 def parameter_places(f: Function) -> list[Place]:
@@ -48,14 +47,14 @@ def parameter_places(f: Function) -> list[Place]:
     return place_arguments([shape_of(a, a.attrs) for a in f.args], len(f.args) if f.vararg else None)
 
 
-def incoming(s: Selector) -> None:
+def incoming(s: SelectionContext) -> None:
     """Decide where every parameter lives before any code is selected."""
     f = s.f
     s.places = parameter_places(f)
     read = [i.extra["argument"] for i in f.blocks[0].instrs if i.op == "argword"]
     low = RETURN_ADDRESS_BYTES
     for a, place in zip(f.args, s.places, strict=True):
-        t = _byval(a.attrs)
+        t = a.attrs.get("byval")
         if place.stack:
             low = max(low, place.stack)
             slot = s.new_slot(2 * place.words, -place.stack)
@@ -67,7 +66,7 @@ def incoming(s: Selector) -> None:
     s.variadic_anchor = s.new_slot(2, -low) if f.vararg else 0
 
 
-def receive(s: Selector) -> None:
+def receive(s: SelectionContext) -> None:
     """Entry code: parameters from registers and stack to virtual registers or their slots."""
     late: list[tuple[Arg, Place]] = []
     for a, place in zip(s.f.args, s.places, strict=True):
@@ -80,7 +79,7 @@ def receive(s: Selector) -> None:
         elif is_struct(a):
             for word in s.f.blocks[0].instrs:
                 if word.op == "argword" and word.extra["argument"] is a and id(word) in s.needed:
-                    s.copy(place.register + int(str(word.extra["word"])), s.value_regs(word)[0])
+                    s.copy(place.register + word.extra["word"], s.value_regs(word)[0])
         elif id(a) in s.needed:
             for k, r in enumerate(s.value_regs(a)):
                 s.copy(place.register + k, r)
@@ -94,14 +93,12 @@ def receive(s: Selector) -> None:
 # calls
 
 
-def select_call(s: Selector, i: Instr) -> None:
+def select_call(s: SelectionContext, i: Instr) -> None:
     """Stack arguments last to first, then register arguments, the call, the result."""
     callee = i.args[-1]
     args = i.args[:-1]
     attrs = i.extra["attrs"]
-    assert isinstance(attrs, list)
     named = i.extra["fixed"] if i.extra.get("vararg") else None
-    assert named is None or isinstance(named, int)
     places = place_arguments([shape_of(a, k) for a, k in zip(args, attrs, strict=True)], named)
     target: int | str
     target = symbol(s.module, callee.name) if isinstance(callee, GlobalRef) else s.reg(callee)
@@ -116,7 +113,7 @@ def select_call(s: Selector, i: Instr) -> None:
     _take_results(s, i)
 
 
-def _take_results(s: Selector, i: Instr) -> None:
+def _take_results(s: SelectionContext, i: Instr) -> None:
     """Copy the result registers; the parts of an aggregate follow one another from W0."""
     results = i.extra.get("results")
     if not results:
@@ -124,7 +121,6 @@ def _take_results(s: Selector, i: Instr) -> None:
             for k, r in enumerate(s.value_regs(i)):
                 s.copy(k, r)
         return
-    assert isinstance(results, list)
     at = 0
     users = {u.extra["index"]: u for u in s.users.get(id(i), ()) if u.op == "callresult"}
     for k, t in enumerate(results):
@@ -136,12 +132,14 @@ def _take_results(s: Selector, i: Instr) -> None:
         at += words
 
 
-def _push_stack_arguments(s: Selector, args: list[Value], attrs: list[dict[str, object]], places: list[Place]) -> int:
+def _push_stack_arguments(
+    s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], places: list[Place]
+) -> int:
     """Push in descending distance; returns the bytes pushed."""
     pushed = 0
     for k in sorted((k for k in range(len(args)) if places[k].stack), key=lambda k: -places[k].stack):
         v = args[k]
-        t = _byval(attrs[k])
+        t = attrs[k].get("byval")
         if t is not None:
             _push_struct(s, v, t)
         elif s.is_leaf(v):
@@ -157,7 +155,7 @@ def _push_stack_arguments(s: Selector, args: list[Value], attrs: list[dict[str, 
     return pushed
 
 
-def _push_struct(s: Selector, v: Value, t: Type) -> None:
+def _push_struct(s: SelectionContext, v: Value, t: Type) -> None:
     words = (size_of(t) + 1) // 2
     if align_of(t) == 2 and words >= BLOCK_PUSH_WORDS:
         source = s.temp()
@@ -175,7 +173,7 @@ def _push_struct(s: Selector, v: Value, t: Type) -> None:
         s.emit("mov", r, Mem("++", SP))
 
 
-def _struct_words(s: Selector, v: Value, t: Type) -> list[int]:
+def _struct_words(s: SelectionContext, v: Value, t: Type) -> list[int]:
     """Registers with the words of a struct in memory; the padding byte of an odd size is not read."""
     base, size = s.reg(v), size_of(t)
     out = []
@@ -198,7 +196,7 @@ def _struct_words(s: Selector, v: Value, t: Type) -> list[int]:
 
 
 def _load_register_arguments(
-    s: Selector, args: list[Value], attrs: list[dict[str, object]], places: list[Place]
+    s: SelectionContext, args: list[Value], attrs: list[ParameterAttributes], places: list[Place]
 ) -> list[int]:
     """Copies into W0-W7; everything that needs work is computed before the first copy."""
     moves: list[tuple[int, int]] = []
@@ -210,7 +208,7 @@ def _load_register_arguments(
         if isinstance(v, Undef):
             continue
         used += range(place.register, place.register + place.words)
-        t = _byval(a)
+        t = a.get("byval")
         if t is not None:
             moves += [(r, place.register + k) for k, r in enumerate(_struct_words(s, v, t))]
         elif s.is_leaf(v):
@@ -224,7 +222,7 @@ def _load_register_arguments(
     return used
 
 
-def select_ret(s: Selector, i: Instr) -> None:
+def select_ret(s: SelectionContext, i: Instr) -> None:
     """Result in W0.. (abi-elf.md §2.3)."""
     at = 0
     used: list[int] = []
@@ -244,21 +242,21 @@ def select_ret(s: Selector, i: Instr) -> None:
     s.emit("ret").also_uses = tuple(used)
 
 
-def select_entryword(s: Selector, i: Instr) -> None:
+def select_entryword(s: SelectionContext, i: Instr) -> None:
     """Return address (first word) or frame address of this function."""
     slot = s.new_slot(2, -RETURN_ADDRESS_BYTES)
     s.emit("lea" if i.extra["address"] else "mov", Slot(slot), s.value_regs(i)[0])
 
 
-def select_argword(s: Selector, i: Instr) -> None:
+def select_argword(s: SelectionContext, i: Instr) -> None:
     """Nothing: the entry code puts the word into its register."""
 
 
-def select_callresult(s: Selector, i: Instr) -> None:
+def select_callresult(s: SelectionContext, i: Instr) -> None:
     """Nothing: the call copies all parts of its result."""
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Handler] = {
     "call": select_call,
     "ret": select_ret,
     "callresult": select_callresult,

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.abi.target import LIT10_BYTE_MAX, LIT10_MAX
 from toolchain.ir.build import SWAPPED
 from toolchain.ir.model import I1, ConstInt, Instr, Undef, Value
 from toolchain.mir.mir import CC_INVERSE, MI, Imm
+from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CONDITION
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
 
 # Comparisons with 0 that CP0 answers, N being the sign because CP0 clears OV (isa.md §6.1).
 ZERO_CONDITION = {"eq": "z", "ne": "nz", "slt": "n", "sge": "nn", "sgt": "gt", "sle": "le", "ugt": "nz", "ule": "z"}
@@ -26,7 +21,7 @@ COUNTED = (
 )
 
 
-def condition(s: Selector, c: Value, user: Instr) -> str:
+def condition(s: SelectionContext, c: Value, user: Instr) -> str:
     """Emit a comparison for the truth of `c` and return the branch condition."""
     if isinstance(c, Instr) and c.op == "icmp" and s.same_block(c):
         step = _countdown(s, c) if user.op == "br" else None
@@ -44,7 +39,7 @@ def condition(s: Selector, c: Value, user: Instr) -> str:
     return "nz"
 
 
-def _countdown(s: Selector, c: Instr) -> Instr | None:
+def _countdown(s: SelectionContext, c: Instr) -> Instr | None:
     """y = x - 1 of this block, wanted only after it, for a test of x against 0 or 1."""
     x, against = c.args
     if not isinstance(against, ConstInt) or against.value > 1 or c.pred not in COUNTED[against.value]:
@@ -59,7 +54,7 @@ def _countdown(s: Selector, c: Instr) -> Instr | None:
     return None
 
 
-def compare(s: Selector, c: Instr, at: Instr) -> str:
+def compare(s: SelectionContext, c: Instr, at: Instr) -> str:
     """CP or a relative of it, emitted at `at`; returns the condition under which the icmp holds.
 
     A comparison may be repeated at several users, so loads fold into it only when it has one.
@@ -84,7 +79,7 @@ def compare(s: Selector, c: Instr, at: Instr) -> str:
     return CONDITION[pred]
 
 
-def _compare_constant(s: Selector, a: Value, b: ConstInt, pred: str, byte: bool, fold: Instr | None) -> str:
+def _compare_constant(s: SelectionContext, a: Value, b: ConstInt, pred: str, byte: bool, fold: Instr | None) -> str:
     k, bits = b.value, max(b.type.bits, 8)
     ones = (1 << bits) - 1
     if pred in ("slt", "sge") and k == 1:
@@ -116,7 +111,7 @@ def _compare_constant(s: Selector, a: Value, b: ConstInt, pred: str, byte: bool,
     return CONDITION[pred]
 
 
-def _subtract(s: Selector, a: int, k: int, bits: int, t: int) -> bool:
+def _subtract(s: SelectionContext, a: int, k: int, bits: int, t: int) -> bool:
     """The flags of a - k by a two-address instruction, which spoils t, a copy of a, and needs no register for k."""
     negative = -k & ((1 << bits) - 1)
     most = LIT10_BYTE_MAX if bits == 8 else LIT10_MAX
@@ -127,7 +122,7 @@ def _subtract(s: Selector, a: int, k: int, bits: int, t: int) -> bool:
     return True
 
 
-def _compare_zero(s: Selector, a: Value, pred: str, byte: bool, fold: Instr | None) -> str:
+def _compare_zero(s: SelectionContext, a: Value, pred: str, byte: bool, fold: Instr | None) -> str:
     """Against 0: bit tests, near objects, CP0."""
     if fold is None:
         s.emit("cp0", s.reg(a), byte=byte)
@@ -142,12 +137,12 @@ def _compare_zero(s: Selector, a: Value, pred: str, byte: bool, fold: Instr | No
     return ZERO_CONDITION[pred]
 
 
-def _is_mask(s: Selector, a: Value) -> bool:
+def _is_mask(s: SelectionContext, a: Value) -> bool:
     """x & constant, with no other user."""
     return isinstance(a, Instr) and a.op == "and" and s.single_use(a) and isinstance(a.args[1], ConstInt)
 
 
-def _test_bits(s: Selector, a: Instr, at: Instr) -> bool:
+def _test_bits(s: SelectionContext, a: Instr, at: Instr) -> bool:
     """BTST for one bit of a register or near object."""
     mask = a.args[1]
     assert isinstance(mask, ConstInt)
@@ -162,7 +157,7 @@ def _test_bits(s: Selector, a: Instr, at: Instr) -> bool:
     return False
 
 
-def _compare_wide(s: Selector, a: Value, b: Value, pred: str) -> str:
+def _compare_wide(s: SelectionContext, a: Value, b: Value, pred: str) -> str:
     """Several words: CP, then CPB; Z is sticky (isa.md §6.1)."""
     left = s.regs(a)
     if isinstance(b, ConstInt):
@@ -188,7 +183,7 @@ def _compare_wide(s: Selector, a: Value, b: Value, pred: str) -> str:
     return CONDITION[pred]
 
 
-def _or_words(s: Selector, words: tuple[int, ...]) -> None:
+def _or_words(s: SelectionContext, words: tuple[int, ...]) -> None:
     """Z says whether all words are 0."""
     total = words[0]
     for x in words[1:]:
@@ -197,7 +192,7 @@ def _or_words(s: Selector, words: tuple[int, ...]) -> None:
         total = t
 
 
-def select_icmp(s: Selector, i: Instr) -> None:
+def select_icmp(s: SelectionContext, i: Instr) -> None:
     """A truth value: by the carry where it answers, else 1 unless the condition fails."""
     d = s.result(i)
     a, b = i.args
@@ -221,7 +216,7 @@ def select_icmp(s: Selector, i: Instr) -> None:
     s.emit("clr", d).pred = True
 
 
-def _from_carry(s: Selector, cc: str, d: int) -> None:
+def _from_carry(s: SelectionContext, cc: str, d: int) -> None:
     """d = C, or d = !C as the negated borrow of d - d."""
     if cc == "c":
         zero = s.temp()
@@ -240,7 +235,7 @@ def _skippable(mi: MI, cc: str) -> bool:
     return mi.op == "cp" and cc in ("z", "nz", "lt", "gt") and all(isinstance(a, int) for a in mi.args)
 
 
-def _sign_bit(s: Selector, a: Value, d: int) -> None:
+def _sign_bit(s: SelectionContext, a: Value, d: int) -> None:
     """a < 0 as 0 or 1."""
     top = s.regs(a)[-1]
     if a.type.bits == 8:
@@ -250,4 +245,4 @@ def _sign_bit(s: Selector, a: Value, d: int) -> None:
     s.emit("lsr", top, Imm(15), d)
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {"icmp": select_icmp}
+HANDLERS: dict[str, Handler] = {"icmp": select_icmp}

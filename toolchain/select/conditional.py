@@ -6,24 +6,19 @@ what makes it the other stands under the skip: a move, a constant, or the operat
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.ir.model import ConstInt, Instr, Undef, Value
 from toolchain.mir.mir import CC_INVERSE, MI, Imm
 from toolchain.select.arith import apply_rule
 from toolchain.select.compare import condition
+from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import CARRY_OP, REGISTER_OP, immediate_rule
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
 
 CONDITIONAL = frozenset(("add", "sub", "and", "or", "xor"))
 # Operation on the first word, operation on those behind it, order of the words.
 SHIFT_BY_ONE = {"shl": ("sl1", "rlc", 1), "lshr": ("lsr1", "rrc", -1), "ashr": ("asr1", "rrc", -1)}
 
 
-def select_select(s: Selector, i: Instr) -> None:
+def select_select(s: SelectionContext, i: Instr) -> None:
     """`i`, and those right before it that hang on the same condition."""
     if _undefined(s, i):
         return
@@ -45,7 +40,7 @@ def select_select(s: Selector, i: Instr) -> None:
     s.out += bodies
 
 
-def _undefined(s: Selector, i: Instr) -> bool:
+def _undefined(s: SelectionContext, i: Instr) -> bool:
     """A select with a value nobody defined is its other value."""
     _, a, b = i.args
     if not isinstance(a, Undef) and not isinstance(b, Undef):
@@ -54,7 +49,7 @@ def _undefined(s: Selector, i: Instr) -> bool:
     return True
 
 
-def _assign(s: Selector, v: Value, d: tuple[int, ...]) -> None:
+def _assign(s: SelectionContext, v: Value, d: tuple[int, ...]) -> None:
     """d = v, as copies or constant loads."""
     if s.is_leaf(v):
         for k, r in enumerate(d):
@@ -64,7 +59,7 @@ def _assign(s: Selector, v: Value, d: tuple[int, ...]) -> None:
             s.copy(x, r)
 
 
-def _group(s: Selector, i: Instr) -> list[Instr]:
+def _group(s: SelectionContext, i: Instr) -> list[Instr]:
     """`i` and the wanted selects right before it with its condition and none of its values; they are taken along."""
     group = [i]
     for j in reversed(s.block.instrs[: s.block.instrs.index(i)]):
@@ -83,7 +78,7 @@ def _starts_from(i: Instr, when: bool) -> tuple[Value, Value]:
     return (i.args[2], i.args[1]) if when else (i.args[1], i.args[2])
 
 
-def _cost(s: Selector, i: Instr, when: bool) -> int:
+def _cost(s: SelectionContext, i: Instr, when: bool) -> int:
     """In quarter words, to compare both ways to make a select."""
     base, other = _starts_from(i, when)
     cost = 1 if when else 0
@@ -110,7 +105,7 @@ def _strict(i: Instr, skip: str) -> str:
     return skip
 
 
-def _alternative(s: Selector, i: Instr, when: bool, shifted: bool) -> list[MI]:
+def _alternative(s: SelectionContext, i: Instr, when: bool, shifted: bool) -> list[MI]:
     """Emit the start of a select; returns what makes it the other value."""
     base, other = _starts_from(i, when)
     d = s.value_regs(i)
@@ -130,7 +125,7 @@ def _alternative(s: Selector, i: Instr, when: bool, shifted: bool) -> list[MI]:
 # operations under the skip
 
 
-def _operation(s: Selector, i: Instr, base: Value, other: Value) -> Instr | None:
+def _operation(s: SelectionContext, i: Instr, base: Value, other: Value) -> Instr | None:
     """`other` if it is base op x or 0 - base and nobody else wants it, so that it can stand under the skip."""
     if not isinstance(other, Instr) or other.op not in CONDITIONAL or not s.single_use(other):
         return None
@@ -142,7 +137,7 @@ def _operation(s: Selector, i: Instr, base: Value, other: Value) -> Instr | None
     return other if a is base else None
 
 
-def _operate(s: Selector, operation: Instr, base: Value, d: tuple[int, ...], shifted: bool) -> list[MI]:
+def _operate(s: SelectionContext, operation: Instr, base: Value, d: tuple[int, ...], shifted: bool) -> list[MI]:
     """Emit d = base; returns d = d op x. Constants without an immediate form are loaded in front."""
     byte = base.type.bits == 8
     s.folded.add(id(operation))
@@ -168,7 +163,7 @@ def _operate(s: Selector, operation: Instr, base: Value, d: tuple[int, ...], shi
     return body
 
 
-def _operand(s: Selector, op: str, x: Value, k: int, byte: bool) -> int | ConstInt:
+def _operand(s: SelectionContext, op: str, x: Value, k: int, byte: bool) -> int | ConstInt:
     """Word k of the second operand: a register, or a constant that `_apply` needs no register for."""
     if not isinstance(x, ConstInt):
         return s.leaf_word(x, k) if s.is_leaf(x) else s.value_regs(x)[k]
@@ -185,7 +180,7 @@ def _changes_nothing(op: str, word: ConstInt) -> bool:
     return word.type.bits > 16 and op in ("and", "or", "xor") and word.value == (0xFFFF if op == "and" else 0)
 
 
-def _apply(s: Selector, op: str, operand: int | ConstInt, r: int, k: int, byte: bool) -> None:
+def _apply(s: SelectionContext, op: str, operand: int | ConstInt, r: int, k: int, byte: bool) -> None:
     """r = r op operand, for word k of a value."""
     name = (CARRY_OP if k else REGISTER_OP)[op]
     if isinstance(operand, int):
@@ -203,7 +198,7 @@ def _apply(s: Selector, op: str, operand: int | ConstInt, r: int, k: int, byte: 
 # the bit that a shift loses
 
 
-def _shifted_out(s: Selector, i: Instr, when: bool) -> str | None:
+def _shifted_out(s: SelectionContext, i: Instr, when: bool) -> str | None:
     """The condition by the carry, when a select starts from x shifted by one and asks for the bit that leaves x."""
     base, other = _starts_from(i, when)
     operation, c = _operation(s, i, base, other), i.args[0]
@@ -232,11 +227,11 @@ def _only_bit(masked: Value, x: Value, bit: int) -> bool:
     return same and isinstance(mask, ConstInt) and mask.value == 1 << bit
 
 
-def _shift_out(s: Selector, base: Instr, d: tuple[int, ...]) -> None:
+def _shift_out(s: SelectionContext, base: Instr, d: tuple[int, ...]) -> None:
     """d = x shifted by one, the lost bit in the carry."""
     first, rest, order = SHIFT_BY_ONE[base.op]
     for k, (source, r) in enumerate(list(zip(s.value_regs(base.args[0]), d, strict=True))[::order]):
         s.emit(rest if k else first, source, r)
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {"select": select_select}
+HANDLERS: dict[str, Handler] = {"select": select_select}

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.ir.model import ConstInt, Instr, Value
 from toolchain.mir.mir import File, Imm, Mem, Operand, Slot
+from toolchain.select.context import Handler, SelectionContext
 from toolchain.select.rules import COMMUTES, FILE_BINARY, FILE_CARRY, FILE_UNARY, REGISTER_OP, immediate_rule
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
+from toolchain.select.state import words_of
 
 
-def _words(v: Value) -> int:
-    return max(1, v.type.bits // 16)
-
-
-def move_in(s: Selector, source: Operand, d: int, byte: bool) -> None:
+def move_in(s: SelectionContext, source: Operand, d: int, byte: bool) -> None:
     """d = memory operand. Near bytes pass through W0 (isa.md §3.3)."""
     if byte and isinstance(source, File):
         s.emit("mov", source, 0, byte=True)
@@ -26,7 +18,7 @@ def move_in(s: Selector, source: Operand, d: int, byte: bool) -> None:
         s.emit("mov", source, d, byte=byte)
 
 
-def move_out(s: Selector, r: int, dest: Operand, byte: bool) -> None:
+def move_out(s: SelectionContext, r: int, dest: Operand, byte: bool) -> None:
     """memory operand = r."""
     if byte and isinstance(dest, File):
         s.emit("mov", r, 0)
@@ -35,7 +27,7 @@ def move_out(s: Selector, r: int, dest: Operand, byte: bool) -> None:
         s.emit("mov", r, dest, byte=byte)
 
 
-def select_load(s: Selector, i: Instr) -> None:
+def select_load(s: SelectionContext, i: Instr) -> None:
     """One MOV a word, low word first. A dead volatile load still reads."""
     d = s.value_regs(i)
     p, byte, number = i.args[0], i.type.bits == 8, s.access_number(i)
@@ -46,7 +38,7 @@ def select_load(s: Selector, i: Instr) -> None:
         s.emit("mov", operand, r)
 
 
-def select_loadpair(s: Selector, i: Instr) -> None:
+def select_loadpair(s: SelectionContext, i: Instr) -> None:
     """Two words in one instruction, which no interrupt divides."""
     low, high = s.value_regs(i)
     pair = s.m.new_pair()
@@ -54,7 +46,7 @@ def select_loadpair(s: Selector, i: Instr) -> None:
     s.emit("split", low, high, pair)
 
 
-def select_storepair(s: Selector, i: Instr) -> None:
+def select_storepair(s: SelectionContext, i: Instr) -> None:
     """The same for a store."""
     low, high = s.regs(i.args[0])
     pair = s.m.new_pair()
@@ -62,7 +54,7 @@ def select_storepair(s: Selector, i: Instr) -> None:
     s.emit("movd", pair, Mem("ind", s.reg(i.args[1]), 0, s.access_number(i)))
 
 
-def _run(s: Selector, p: Value, count: int, number: int) -> list[Operand]:
+def _run(s: SelectionContext, p: Value, count: int, number: int) -> list[Operand]:
     """Operands of `count` consecutive words at p."""
     first = s.address(p, False, 0, count, number)
     if isinstance(first, Mem):
@@ -77,16 +69,16 @@ def _run(s: Selector, p: Value, count: int, number: int) -> list[Operand]:
     return [first, *(s.address(p, False, 2 * k, count, number) for k in range(1, count))]
 
 
-def select_store(s: Selector, i: Instr) -> None:
+def select_store(s: SelectionContext, i: Instr) -> None:
     """Read-modify-write forms first, then constants with CLR and SETM, then plain moves, low word first."""
     v, p = i.args
     if _store_modified(s, i):
         return
     byte, number = v.type.bits == 8, s.access_number(i)
-    if _words(v) == 1:
+    if words_of(v) == 1:
         _store_word(s, v, s.address(p, byte, volatile=number), byte)
         return
-    operands = _run(s, p, _words(v), number)
+    operands = _run(s, p, words_of(v), number)
     registers = None if s.is_leaf(v) else s.regs(v)
     for k, operand in enumerate(operands):
         if isinstance(v, ConstInt):
@@ -95,14 +87,14 @@ def select_store(s: Selector, i: Instr) -> None:
             s.emit("mov", registers[k] if registers is not None else s.leaf_word(v, k), operand)
 
 
-def _store_word(s: Selector, v: Value, operand: Operand, byte: bool) -> None:
+def _store_word(s: SelectionContext, v: Value, operand: Operand, byte: bool) -> None:
     if isinstance(v, ConstInt):
         _store_constant(s, v.value, operand, byte)
         return
     move_out(s, s.reg(v), operand, byte)
 
 
-def _store_constant(s: Selector, k: int, operand: Operand, byte: bool) -> None:
+def _store_constant(s: SelectionContext, k: int, operand: Operand, byte: bool) -> None:
     """CLR and SETM reach memory directly where the form exists (isa.md §5.1)."""
     ones = 0xFF if byte else 0xFFFF
     if k in (0, ones):
@@ -122,7 +114,7 @@ def _store_constant(s: Selector, k: int, operand: Operand, byte: bool) -> None:
 # read-modify-write
 
 
-def _store_modified(s: Selector, i: Instr) -> bool:
+def _store_modified(s: SelectionContext, i: Instr) -> bool:
     """store (load p op x), p as one instruction on memory, when nothing else needs the values."""
     op, p = i.args
     if isinstance(op, Instr) and op.type.bits > 16:
@@ -146,7 +138,7 @@ def _store_modified(s: Selector, i: Instr) -> bool:
     return False
 
 
-def _load_of(s: Selector, v: Value, p: Value, store: Instr) -> Instr | None:
+def _load_of(s: SelectionContext, v: Value, p: Value, store: Instr) -> Instr | None:
     """The load behind `v` when it reads where the store writes and may move to it."""
     load = s.foldable_load(v, store)
     if load is None or load.volatile != store.volatile:
@@ -163,7 +155,7 @@ def _load_of(s: Selector, v: Value, p: Value, store: Instr) -> Instr | None:
     return None
 
 
-def _target(s: Selector, p: Value, byte: bool, load: Instr) -> File | Mem | None:
+def _target(s: SelectionContext, p: Value, byte: bool, load: Instr) -> File | Mem | None:
     """Near address or [Wn] for a read-modify-write; None when only MOV reaches it. A volatile one has the number of its
     load; its store has the next."""
     number = s.access_number(load)
@@ -182,7 +174,7 @@ def _target(s: Selector, p: Value, byte: bool, load: Instr) -> File | Mem | None
     return None
 
 
-def _modify_constant(s: Selector, op: Instr, b: ConstInt, load: Instr, p: Value, byte: bool) -> bool:
+def _modify_constant(s: SelectionContext, op: Instr, b: ConstInt, load: Instr, p: Value, byte: bool) -> bool:
     name, k, bits = op.op, b.value, op.type.bits
     if name == "sub":
         name, k = "add", -k & ((1 << bits) - 1)
@@ -231,7 +223,7 @@ def _single_bit(name: str, k: int, bits: int) -> tuple[str, int] | None:
     return None
 
 
-def _modify_register(s: Selector, op: Instr, b: Value, load: Instr, p: Value, byte: bool) -> bool:
+def _modify_register(s: SelectionContext, op: Instr, b: Value, load: Instr, p: Value, byte: bool) -> bool:
     target = _target(s, p, byte, load)
     if target is None:
         return False
@@ -246,7 +238,7 @@ def _modify_register(s: Selector, op: Instr, b: Value, load: Instr, p: Value, by
     return True
 
 
-def _modify_wide(s: Selector, store: Instr, op: Instr, p: Value) -> bool:
+def _modify_wide(s: SelectionContext, store: Instr, op: Instr, p: Value) -> bool:
     """Several words in near memory: word by word through W0, the carry running along. CLR and MOV keep the carry.
 
     Volatile words are all read before the first is written, as the source says."""
@@ -259,7 +251,7 @@ def _modify_wide(s: Selector, store: Instr, op: Instr, p: Value) -> bool:
         load = _load_of(s, a, p, store)
     if load is None or not s.is_leaf(s.decompose(p)[0]) or id(s.decompose(p)[0]) in s.slots:
         return False
-    targets = [s.address(p, False, 2 * k, _words(op)) for k in range(_words(op))]
+    targets = [s.address(p, False, 2 * k, words_of(op)) for k in range(words_of(op))]
     if not all(isinstance(t, File) and t.near for t in targets) or (s.is_leaf(b) and not isinstance(b, ConstInt)):
         return False
     s.folded.add(id(load))
@@ -287,7 +279,7 @@ def _modify_wide(s: Selector, store: Instr, op: Instr, p: Value) -> bool:
 # the stack pointer
 
 
-def select_dynalloca(s: Selector, i: Instr) -> None:
+def select_dynalloca(s: SelectionContext, i: Instr) -> None:
     """The block starts at W15, which moves up by the rounded size (abi-elf.md §2.4)."""
     s.m.dynamic_stack = True
     d, t, u = s.value_regs(i)[0], s.temp(), s.temp()
@@ -300,24 +292,24 @@ def select_dynalloca(s: Selector, i: Instr) -> None:
     s.emit("setsp", top)
 
 
-def select_getsp(s: Selector, i: Instr) -> None:
+def select_getsp(s: SelectionContext, i: Instr) -> None:
     """llvm.stacksave."""
     s.m.dynamic_stack = True
     s.emit("mov", 15, s.value_regs(i)[0])
 
 
-def select_setsp(s: Selector, i: Instr) -> None:
+def select_setsp(s: SelectionContext, i: Instr) -> None:
     """llvm.stackrestore."""
     s.m.dynamic_stack = True
     s.emit("setsp", s.reg(i.args[0]))
 
 
-def select_vastart(s: Selector, i: Instr) -> None:
+def select_vastart(s: SelectionContext, i: Instr) -> None:
     """Address of the last named argument (abi-elf.md §2.4)."""
     s.emit("lea", Slot(s.variadic_anchor), s.value_regs(i)[0])
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Handler] = {
     "load": select_load,
     "loadpair": select_loadpair,
     "storepair": select_storepair,

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.ir.model import ConstInt, Instr, Value
 from toolchain.mir.mir import Imm, Mem
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
-
-
-def _words(v: Value) -> int:
-    return max(1, v.type.bits // 16)
+from toolchain.select.context import Handler, SelectionContext
+from toolchain.select.state import words_of
 
 
 def _extension_kind(v: Value) -> tuple[str, Value] | None:
@@ -23,9 +15,9 @@ def _extension_kind(v: Value) -> tuple[str, Value] | None:
     return None
 
 
-def select_mul(s: Selector, i: Instr) -> None:
+def select_mul(s: SelectionContext, i: Instr) -> None:
     """One word: low half of a product. 32 bits of two extended words: one MUL. Else sums of partial products."""
-    if _words(i) == 1:
+    if words_of(i) == 1:
         _mul_word(s, i)
         return
     a, b = i.args
@@ -39,7 +31,7 @@ def select_mul(s: Selector, i: Instr) -> None:
     _mul_wide(s, i, ka, kb)
 
 
-def _signed_word(s: Selector, i: Instr) -> tuple[Value, int] | None:
+def _signed_word(s: SelectionContext, i: Instr) -> tuple[Value, int] | None:
     """(factor of two words, register of the other) of a product with a signed word or a small negative constant."""
     for a, b in (i.args, i.args[::-1]):
         kind = _extension_kind(b)
@@ -52,7 +44,7 @@ def _signed_word(s: Selector, i: Instr) -> tuple[Value, int] | None:
     return None
 
 
-def _mul_signed(s: Selector, i: Instr, a: Value, b: int) -> None:
+def _mul_signed(s: SelectionContext, i: Instr, a: Value, b: int) -> None:
     """(h * 2^16 + l) * b is l * b in full, unsigned by signed, with the low word of h * b added to its upper word."""
     d = s.value_regs(i)
     words = s.regs(a)
@@ -69,7 +61,7 @@ def _fits(b: Value, kind: str) -> bool:
     return isinstance(b, ConstInt) and (b.value <= 0xFFFF or (kind == "s" and -0x8000 <= b.signed < 0))
 
 
-def _pair(s: Selector, kind: str, a: int, b: int | Imm | Mem) -> tuple[int, int]:
+def _pair(s: SelectionContext, kind: str, a: int, b: int | Imm | Mem) -> tuple[int, int]:
     """MUL.kind a, b -> fresh (low, high) registers."""
     p = s.m.new_pair()
     s.emit(f"mul.{kind}", a, b, p)
@@ -79,13 +71,13 @@ def _pair(s: Selector, kind: str, a: int, b: int | Imm | Mem) -> tuple[int, int]
     return low, high
 
 
-def _product(s: Selector, kind: str, a: int, b: int | Imm | Mem, low: int, high: int) -> None:
+def _product(s: SelectionContext, kind: str, a: int, b: int | Imm | Mem, low: int, high: int) -> None:
     p = s.m.new_pair()
     s.emit(f"mul.{kind}", a, b, p)
     s.emit("split", low, high, p)
 
 
-def _mul_word(s: Selector, i: Instr) -> None:
+def _mul_word(s: SelectionContext, i: Instr) -> None:
     a, b = i.args
     right: int | Imm | Mem
     if isinstance(b, ConstInt):
@@ -103,7 +95,7 @@ def _mul_word(s: Selector, i: Instr) -> None:
     s.emit("splitlo", s.result(i), p)
 
 
-def _narrow_reg(s: Selector, kind: str, v: Value) -> int:
+def _narrow_reg(s: SelectionContext, kind: str, v: Value) -> int:
     """The 16-bit register of an extended value; bytes are extended first."""
     if v.type.bits == 16:
         return s.reg(v)
@@ -112,14 +104,14 @@ def _narrow_reg(s: Selector, kind: str, v: Value) -> int:
     return r
 
 
-def _extended_load(s: Selector, v: Value, i: Instr) -> Instr | None:
+def _extended_load(s: SelectionContext, v: Value, i: Instr) -> Instr | None:
     """The load of a word behind an extension that nobody else wants, if it may move to the product."""
     if not isinstance(v, Instr) or not s.single_use(v) or id(v) in s.wanted or v.args[0].type.bits != 16:
         return None
     return s.foldable_load(v.args[0], i)
 
 
-def _mul_extended(s: Selector, i: Instr, ka: tuple[str, Value], kb: tuple[str, Value] | None) -> None:
+def _mul_extended(s: SelectionContext, i: Instr, ka: tuple[str, Value], kb: tuple[str, Value] | None) -> None:
     low, high = s.value_regs(i)
     a, b = i.args
     if kb is not None:
@@ -140,9 +132,9 @@ def _mul_extended(s: Selector, i: Instr, ka: tuple[str, Value], kb: tuple[str, V
     _product(s, ka[0] + ("u" if b.value <= 0xFFFF else "s"), x, t, low, high)
 
 
-def _mul_wide(s: Selector, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str, Value] | None) -> None:
+def _mul_wide(s: SelectionContext, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str, Value] | None) -> None:
     """Schoolbook product modulo 2^bits. Words known to be zero are skipped."""
-    n = _words(i)
+    n = words_of(i)
     a, b = s.regs(i.args[0]), s.regs(i.args[1])
     d = s.value_regs(i)
     zero_a, zero_b = _zero_words(i.args[0], ka), _zero_words(i.args[1], kb)
@@ -169,13 +161,13 @@ def _mul_wide(s: Selector, i: Instr, ka: tuple[str, Value] | None, kb: tuple[str
 
 def _zero_words(v: Value, kind: tuple[str, Value] | None) -> set[int]:
     if isinstance(v, ConstInt):
-        return {k for k in range(_words(v)) if not v.value >> 16 * k & 0xFFFF}
+        return {k for k in range(words_of(v)) if not v.value >> 16 * k & 0xFFFF}
     if isinstance(v, Instr) and v.op == "zext":
-        return set(range(max(1, v.args[0].type.bits // 16), _words(v)))
+        return set(range(max(1, v.args[0].type.bits // 16), words_of(v)))
     return set()
 
 
-def _accumulate(s: Selector, total: list[int | None], k: int, low: int, high: int | None) -> None:
+def _accumulate(s: SelectionContext, total: list[int | None], k: int, low: int, high: int | None) -> None:
     """total += (high:low) << 16k, with the carry running to the top."""
     parts = [low] if high is None else [low, high]
     carry = False
@@ -208,7 +200,7 @@ def _accumulate(s: Selector, total: list[int | None], k: int, low: int, high: in
         at += 1
 
 
-def select_mulhigh(s: Selector, i: Instr) -> None:
+def select_mulhigh(s: SelectionContext, i: Instr) -> None:
     """Upper two words of a product of two words by a constant of two words without sign.
 
     x * y + z fits into two words for words x, y, z, so the first carry ends one word up. MUL leaves the flags alone."""
@@ -236,7 +228,7 @@ def select_mulhigh(s: Selector, i: Instr) -> None:
     s.emit("addc", sums[4], Imm(0), d[1])
 
 
-def select_divide(s: Selector, i: Instr) -> None:
+def select_divide(s: SelectionContext, i: Instr) -> None:
     """16-bit DIV under REPEAT #17: quotient in W0, remainder in W1 (isa.md §6.7). The divisor must survive them."""
     signed = i.op in ("sdiv", "srem")
     m, n = s.reg(i.args[0]), s.reg(i.args[1])
@@ -251,13 +243,13 @@ def select_divide(s: Selector, i: Instr) -> None:
         s.copy(0 if quotient else 1, s.result(i))
 
 
-def select_divother(s: Selector, i: Instr) -> None:
+def select_divother(s: SelectionContext, i: Instr) -> None:
     """The second result of a division: the division itself copies it out."""
     s.value_regs(i)
     s.needed.add(id(i.args[0]))
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Handler] = {
     "mul": select_mul,
     "mulhigh": select_mulhigh,
     **dict.fromkeys(("udiv", "sdiv", "urem", "srem"), select_divide),

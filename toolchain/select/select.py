@@ -14,10 +14,10 @@ from toolchain.ir.cfg import loop_depths, predecessors
 from toolchain.ir.model import ConstInt, DbgRecord, Instr, Undef, UnsupportedError, Value
 from toolchain.mir.mir import CONSTANT, GONE, MI, MBlock, MFunction
 from toolchain.select import arith, block_copies, calls, compare, conditional, memory, multiply, shifts
-from toolchain.select.address import AddressSelector
+from toolchain.select.context import SelectionContext
 
 
-class Selector(AddressSelector):
+class Selector(SelectionContext):
     """Drives the walk over blocks; terminators and phis."""
 
     # -- function -----------------------------------------------------------------------------------------------------
@@ -95,12 +95,8 @@ class Selector(AddressSelector):
         """Emit one instruction if its effect or its value is wanted."""
         if id(i) in self.folded:
             return
-        if i.op in EFFECTS or i.volatile or id(i) in self.needed:
-            SELECT[i.op](self, i)
-
-    def result(self, i: Instr) -> int:
-        """Register of a one-word result."""
-        return self.value_regs(i)[0]
+        if i.op in SIDE_EFFECTS or i.volatile or id(i) in self.needed:
+            HANDLERS[i.op](self, i)
 
     # -- terminators --------------------------------------------------------------------------------------------------
 
@@ -187,11 +183,11 @@ def select_cast_alias(s: Selector, i: Instr) -> None:
         s.value_regs(i)
 
 
-EFFECTS = frozenset((
+SIDE_EFFECTS = frozenset((
     "store", "loadpair", "storepair", "call", "asm", "builtin", "blockcopy", "blockfill", "setsp", "dynalloca", "br",
     "brtable", "indirectbr", "ret", "unreachable",
 ))  # fmt: skip
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Callable[[Selector, Instr], None]] = {
     "br": select_br,
     "brtable": select_brtable,
     "indirectbr": select_indirectbr,
@@ -200,12 +196,12 @@ SELECT: dict[str, Callable[[Selector, Instr], None]] = {
     "slot": select_nothing,
     "trunc": select_cast_alias,
     "bits": select_cast_alias,
-    **arith.SELECT,
-    **multiply.SELECT,
-    **shifts.SELECT,
-    **conditional.SELECT,
-    **compare.SELECT,
-    **memory.SELECT,
-    **block_copies.SELECT,
-    **calls.SELECT,
+    **arith.HANDLERS,
+    **multiply.HANDLERS,
+    **shifts.HANDLERS,
+    **conditional.HANDLERS,
+    **compare.HANDLERS,
+    **memory.HANDLERS,
+    **block_copies.HANDLERS,
+    **calls.HANDLERS,
 }

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
-
 from toolchain.ir.model import ConstInt, Instr, Value
 from toolchain.mir.mir import MI, Imm, OpInfo
-
-if TYPE_CHECKING:
-    from toolchain.select.select import Selector
-
+from toolchain.select.context import Handler, SelectionContext
+from toolchain.select.state import words_of
 
 MULTIPLIED = 4  # MUL has literals below 32
 
 
-def _words(v: Value) -> int:
-    return max(1, v.type.bits // 16)
-
-
-def select_shift(s: Selector, i: Instr) -> None:
+def select_shift(s: SelectionContext, i: Instr) -> None:
     """shl lshr ashr by constants or variables, any width."""
     a, n = i.args
     if isinstance(n, ConstInt):
-        if _words(i) == 1:
+        if words_of(i) == 1:
             _shift_word(s, i, n.value)
         else:
             _shift_wide_constant(s, i.op, s.regs(a), n.value, s.value_regs(i))
-    elif _words(i) == 1:
+    elif words_of(i) == 1:
         _shift_word_variable(s, i)
     elif _low_word_suffices(s, i):
         s.emit("sl", s.regs(a)[0], s.regs(n)[0], s.value_regs(i)[0])
@@ -38,14 +29,14 @@ def select_shift(s: Selector, i: Instr) -> None:
 SHIFT_OP = {"shl": "sl", "lshr": "lsr", "ashr": "asr"}
 
 
-def _extended_byte(s: Selector, v: Value, signed: bool, user: Instr) -> int:
+def _extended_byte(s: SelectionContext, v: Value, signed: bool, user: Instr) -> int:
     """A byte value extended to a word."""
     r = s.temp()
     s.emit("se" if signed else "ze", s.source(v, user), r)
     return r
 
 
-def _shift_word(s: Selector, i: Instr, n: int) -> None:
+def _shift_word(s: SelectionContext, i: Instr, n: int) -> None:
     d, byte = s.result(i), i.type.bits == 8
     if n >= i.type.bits:
         s.emit("clr", d)
@@ -63,21 +54,21 @@ def _shift_word(s: Selector, i: Instr, n: int) -> None:
     s.emit(SHIFT_OP[i.op], s.reg(i.args[0]), Imm(n), d)
 
 
-def _shift_word_variable(s: Selector, i: Instr) -> None:
+def _shift_word_variable(s: SelectionContext, i: Instr) -> None:
     """Native for words; the count uses its low 5 bits, counts of 16 and more are undefined in the IR."""
     d, byte = s.result(i), i.type.bits == 8
     a = _extended_byte(s, i.args[0], i.op == "ashr", i) if byte and i.op != "shl" else s.reg(i.args[0])
     s.emit(SHIFT_OP[i.op], a, s.reg(i.args[1]), d)
 
 
-def _low_word_suffices(s: Selector, i: Instr) -> bool:
+def _low_word_suffices(s: SelectionContext, i: Instr) -> bool:
     """Whether two words go left and only the lower is read: SL gives 0 for the counts of 16 to 31 (isa.md §6.3)."""
-    if i.op != "shl" or _words(i) != 2:
+    if i.op != "shl" or words_of(i) != 2:
         return False
-    return all(user.op == "trunc" and _words(user) == 1 for user in s.users[id(i)])
+    return all(user.op == "trunc" and words_of(user) == 1 for user in s.users[id(i)])
 
 
-def _shift_wide_constant(s: Selector, op: str, a: tuple[int, ...], n: int, d: tuple[int, ...]) -> None:
+def _shift_wide_constant(s: SelectionContext, op: str, a: tuple[int, ...], n: int, d: tuple[int, ...]) -> None:
     """Whole words move; the rest is shifted with neighbours' bits brought in."""
     count = len(a)
     jump, bits = n // 16, n % 16
@@ -112,7 +103,7 @@ def _shift_wide_constant(s: Selector, op: str, a: tuple[int, ...], n: int, d: tu
                 _combine(s, "lsr", a[k + jump], bits, "sl", a[k + jump + 1], d[k])
 
 
-def _shift_by_product(s: Selector, a: tuple[int, ...], bits: int, d: tuple[int, ...]) -> None:
+def _shift_by_product(s: SelectionContext, a: tuple[int, ...], bits: int, d: tuple[int, ...]) -> None:
     """The product of the low word and 2^bits has the bits that cross over in its upper word."""
     upper, crossing, p = s.temp(), s.temp(), s.m.new_pair()
     s.emit("sl", a[1], Imm(bits), upper)
@@ -121,7 +112,7 @@ def _shift_by_product(s: Selector, a: tuple[int, ...], bits: int, d: tuple[int, 
     s.emit("ior", crossing, upper, d[1])
 
 
-def _shift_by_byte(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
+def _shift_by_byte(s: SelectionContext, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
     """The low byte of the upper word takes the place of the low byte of the lower, then both bytes change places."""
     s.copy(a[0], d[0])
     s.emit("movlow", a[1], d[0], byte=True)
@@ -129,7 +120,7 @@ def _shift_by_byte(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...])
     s.emit(SHIFT_OP[op], a[1], Imm(8), d[1])
 
 
-def _combine(s: Selector, op: str, main: int, bits: int, other_op: str, other: int, d: int) -> None:
+def _combine(s: SelectionContext, op: str, main: int, bits: int, other_op: str, other: int, d: int) -> None:
     """d = main shifted by bits | neighbour shifted the other way."""
     x, y = s.temp(), s.temp()
     s.emit(op, main, Imm(bits), x)
@@ -137,7 +128,7 @@ def _combine(s: Selector, op: str, main: int, bits: int, other_op: str, other: i
     s.emit("ior", x, y, d)
 
 
-def fill(s: Selector, op: str, top: int, d: int) -> None:
+def fill(s: SelectionContext, op: str, top: int, d: int) -> None:
     """Word above the value: zero or sign."""
     if op == "ashr":
         s.emit("asr", top, Imm(15), d)
@@ -145,7 +136,7 @@ def fill(s: Selector, op: str, top: int, d: int) -> None:
         s.emit("clr", d)
 
 
-def _move_words(s: Selector, op: str, a: tuple[int, ...], jump: int, d: tuple[int, ...]) -> None:
+def _move_words(s: SelectionContext, op: str, a: tuple[int, ...], jump: int, d: tuple[int, ...]) -> None:
     count = len(a)
     for k in range(count):
         source = k - jump if op == "shl" else k + jump
@@ -157,7 +148,7 @@ def _move_words(s: Selector, op: str, a: tuple[int, ...], jump: int, d: tuple[in
             fill(s, op, a[count - 1], d[k])
 
 
-def _shift_by_one(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
+def _shift_by_one(s: SelectionContext, op: str, a: tuple[int, ...], d: tuple[int, ...]) -> None:
     """Through the carry: SL/RLC upward, LSR or ASR/RRC downward (abi-elf.md §8.1)."""
     if op == "shl":
         for k in range(len(a)):
@@ -168,7 +159,7 @@ def _shift_by_one(s: Selector, op: str, a: tuple[int, ...], d: tuple[int, ...]) 
         s.emit(("asr1" if op == "ashr" else "lsr1") if k == top else "rrc", a[k], d[k])
 
 
-def _shift_wide_variable(s: Selector, i: Instr) -> None:
+def _shift_wide_variable(s: SelectionContext, i: Instr) -> None:
     """A loop of one-bit shifts on copies (abi-elf.md §8.1: 5 words for 32 bits)."""
     d = s.value_regs(i)
     a = s.regs(i.args[0])
@@ -182,6 +173,6 @@ def _shift_wide_variable(s: Selector, i: Instr) -> None:
     s.out.append(mi)
 
 
-SELECT: dict[str, Callable[[Selector, Instr], None]] = {
+HANDLERS: dict[str, Handler] = {
     **dict.fromkeys(("shl", "lshr", "ashr"), select_shift),
 }

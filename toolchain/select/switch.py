@@ -32,7 +32,6 @@ class SwitchLowering:
     def run(self) -> list[Block]:
         """Rewrite; returns the added blocks in layout order."""
         cases = self.switch.extra["cases"]
-        assert isinstance(cases, list)
         pairs = sorted(zip(cases, self.switch.blocks[1:], strict=True))
         pairs = [(k, t) for k, t in pairs if t != self.default]
         if self.value.type.bits > 16 and pairs:

@@ -11,7 +11,7 @@ from toolchain.verify.error import fail
 LEAVE = {"bra", "jump", "jumpr", "brtable", "ret", "tailcall"}
 LAST = LEAVE - {"bra"}
 LONG = {"call", "tailcall", "jumpr", "repmov", "repclr", "repfill", "div.s", "div.u", "div.sd", "div.ud", "asm",
-        "text", "shiftloop", "brtable", "lea", "hold"}  # fmt: skip
+        "text", "shiftloop", "brtable", "lea", "begin_atomic"}  # fmt: skip
 
 
 def check(m: MFunction, allocated: bool, known: Collection[str] = (), same_layout: bool = False) -> None:

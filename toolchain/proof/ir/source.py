@@ -19,6 +19,7 @@ from toolchain.ir.model import (
     GlobalRef,
     InlineAsm,
     Instr,
+    ParameterAttributes,
     Type,
     Value,
     size_of,
@@ -359,7 +360,7 @@ class Evaluator(Operands):
         return pointer
 
     def called(
-        self, path: Path, target: Any, values: list[Value], attributes: list[dict[str, object]] | None = None
+        self, path: Path, target: Any, values: list[Value], attributes: list[ParameterAttributes] | None = None
     ) -> Event:
         """A call of something that may change whatever others can reach."""
         attributes = attributes or [{} for _ in values]

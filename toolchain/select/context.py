@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from toolchain.abi.sections import is_near
 from toolchain.abi.target import BYTE_OFFSET, WORD_OFFSET
 from toolchain.ir.model import ConstInt, GlobalRef, Instr, Value
 from toolchain.mir.mir import File, Imm, Mem, Operand, Slot
-from toolchain.select.values import ValueSelector
+from toolchain.select.state import SelectionState
 
 
-class AddressSelector(ValueSelector):
-    """Adds operands in memory."""
+class SelectionContext(SelectionState):
+    """Selection state with operands in memory: what the handlers of instructions work with."""
 
     # -- addresses ----------------------------------------------------------------------------------------------------
 
@@ -158,3 +160,7 @@ class AddressSelector(ValueSelector):
             return operand
         del self.out[mark:]
         return None
+
+
+Handler = Callable[[SelectionContext, Instr], None]
+"""Selects one instruction. Every module of handlers has a table HANDLERS by opcode; `select` assembles them."""

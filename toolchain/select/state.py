@@ -33,7 +33,7 @@ MEMORY_BARRIERS = frozenset(
 )
 
 
-class ValueSelector:
+class SelectionState:
     """State of one function's selection."""
 
     def __init__(self, module: Module, f: Function, for_size: bool, taken: set[str]) -> None:
@@ -81,7 +81,6 @@ class ValueSelector:
                         self.users.setdefault(id(a), []).append(i)
                 if i.op == "slot":
                     size = i.extra["size"]
-                    assert isinstance(size, int)
                     self.slots[id(i)] = self.new_slot(size)
                     total += size
         self.far_frame = total > FAR_FRAME_BYTES
@@ -176,6 +175,10 @@ class ValueSelector:
     def reg(self, v: Value) -> int:
         """Register of a one-word value."""
         return self.regs(v)[0]
+
+    def result(self, i: Instr) -> int:
+        """Register of a one-word result."""
+        return self.value_regs(i)[0]
 
     def leaf_word(self, v: Value, k: int) -> int:
         """Load word k of a constant, symbol or frame address into a fresh register."""

@@ -1,4 +1,4 @@
-"""State and operands of legalisation: how an old value is looked up as legal ones."""
+"""State of the legalisation of one function, and the legal values of its operands."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from toolchain.ir.build import Builder, const, legal_type
 from toolchain.ir.model import (
     I1,
     I16,
+    I64,
     Block,
     BlockAddress,
     ConstAgg,
@@ -27,39 +28,41 @@ from toolchain.ir.model import (
     size_of,
     struct_offsets,
 )
-from toolchain.legalize import vectors
+from toolchain.legalize import packing
 from toolchain.legalize.lanes import Lane
 
 AGGREGATES = ("struct", "array", "vector")
+LegalResult = Value | list[Value] | None
+"""Legal form of one instruction: a value, the leaves of an aggregate, or None if it has no value."""
 
 
-class LegalizerBase:
-    """State for one function. `values` maps old values to legal ones; aggregates map to lists of legal values."""
+class LegalizationContext:
+    """State for one function. `values` maps old values to legal ones; `aggregates` maps them to their legal leaves."""
 
-    def __init__(self, module: Module, function: Function, where: Callable[[str | None], str]) -> None:
+    def __init__(self, module: Module, function: Function, locate: Callable[[str | None], str]) -> None:
         self.module = module
         self.function = function
-        self.where = where
+        self.locate = locate  # !dbg reference -> "file:line"
         self.values: dict[int, Value] = {}
-        self.parts: dict[int, list[Value]] = {}
+        self.aggregates: dict[int, list[Value]] = {}
         self.blocks: list[Block] = []
-        self.tail: dict[str, str] = {}  # old block name -> name of the new block that holds its terminator
-        self.fixups: list[tuple[Instr, list[Value], int | None]] = []  # phi, old operands, leaf of an aggregate
-        self.b = Builder(Block(""))  # where instructions go; set per block
+        self.last_block: dict[str, str] = {}  # old block name -> name of the new block that holds its terminator
+        self.pending_phis: list[tuple[Instr, list[Value], int | None]] = []  # phi, old operands, leaf of an aggregate
+        self.b = Builder(Block(""))  # appends to the current block
         self.alive: list[object] = []  # keeps ids in `values` unique while the map lives
 
     def begin(self, name: str) -> Block:
-        """Start a new block; instructions go there from now on."""
+        """Add a new block to the function."""
         block = Block(name)
         self.blocks.append(block)
         return block
 
     # -- operands -----------------------------------------------------------------------------------------------------
 
-    def use(self, v: Value) -> Value:
-        """The legal value that stands for an operand."""
+    def legal(self, v: Value) -> Value:
+        """The legal value of a scalar operand. Raises UnsupportedError for kinds of operands that have none."""
         if isinstance(v, Lane):
-            return self.fields(v.source)[v.index]
+            return self.legal_leaves(v.source)[v.index]
         found = self.values.get(id(v))
         if found is not None:
             return found
@@ -74,14 +77,14 @@ class LegalizerBase:
         if isinstance(v, InlineAsm):
             return v
         if isinstance(v, ConstExpr):
-            return self.const_expr(v)
-        if isinstance(v, MetaRef):  # what clang calls llvm.read_register with
+            return self.constant_expression(v)
+        if isinstance(v, MetaRef):  # operand of llvm.read_register
             raise UnsupportedError("a global variable in a register: only A and B, the accumulators, can be one")
         raise UnsupportedError(f"operand {v!r} of type {v.type}")
 
-    def const_expr(self, v: ConstExpr) -> Value:
-        """A constant expression computed in place."""
-        args = [self.use(a) for a in v.args]
+    def constant_expression(self, v: ConstExpr) -> Value:
+        """Build the computation of a constant expression at the current position."""
+        args = [self.legal(a) for a in v.args]
         if v.op in ("ptrtoint", "inttoptr", "trunc", "zext", "sext", "bitcast", "addrspacecast", "ptrtoaddr"):
             t = legal_type(v.type)
             return self.b.cast(
@@ -91,21 +94,21 @@ class LegalizerBase:
 
     def zero_extended(self, v: Value) -> Value:
         """Legal value with the bits above the original width cleared."""
-        new, bits = self.use(v), v.type.bits
+        new, bits = self.legal(v), v.type.bits
         if v.type.kind == "ptr" or new.type.bits == bits:
             return new
         return self.b.binary("and", new, const(new.type, (1 << bits) - 1))
 
     def sign_extended(self, v: Value) -> Value:
         """Legal value with the bits above the original width filled with the sign."""
-        new, bits = self.use(v), v.type.bits
+        new, bits = self.legal(v), v.type.bits
         if v.type.kind == "ptr" or new.type.bits == bits:
             return new
         pad = new.type.bits - bits
         return self.b.shift("ashr", self.b.shift("shl", new, pad), pad)
 
     def to_bool(self, v: Value) -> Value:
-        """Bit 0 of a value as a clean i1."""
+        """Bit 0 of a legal value as an i1."""
         if isinstance(v, ConstInt):
             return const(I1, v.value & 1)
         if v.type is I1:
@@ -116,9 +119,9 @@ class LegalizerBase:
 
     # -- aggregates in registers --------------------------------------------------------------------------------------
 
-    def fields(self, v: Value) -> list[Value]:
-        """Leaves of a first-class aggregate, in memory order."""
-        found = self.parts.get(id(v))
+    def legal_leaves(self, v: Value) -> list[Value]:
+        """Legal values of the scalar members of an aggregate operand, in memory order."""
+        found = self.aggregates.get(id(v))
         if found is not None:
             return found
         leaves = leaves_of(v.type)
@@ -128,33 +131,49 @@ class LegalizerBase:
             return [const(legal_type(t), 0) for t, _ in leaves]
         if isinstance(v, ConstAgg):
             return [
-                self.use(x) if x.type.bits else y for x in v.elems for y in ([x] if x.type.bits else self.fields(x))
+                self.legal(x) if x.type.bits else y
+                for x in v.elems
+                for y in ([x] if x.type.bits else self.legal_leaves(x))
             ]
         if isinstance(v, ConstExpr) and v.op == "bitcast" and v.type.kind == "vector":
-            lanes = vectors.bitcast(self, Instr("bitcast", v.type, v.args))
-            assert isinstance(lanes, list)
-            return lanes
+            return self.bitcast_to_vector(v.args[0], v.type)
         raise UnsupportedError(f"aggregate operand of type {v.type}")
 
-    def extractvalue(self, i: Instr) -> Value | list[Value]:
-        indices = i.extra["indices"]
-        assert isinstance(indices, list)
-        first, count = leaf_range(i.args[0].type, indices)
-        parts = self.fields(i.args[0])[first : first + count]
+    def bitcast_to_vector(self, source: Value, t: Type) -> list[Value]:
+        """Lanes of the vector type `t` with the bits of a scalar or vector operand, first lane lowest."""
+        if source.type.kind == "vector":
+            return packing.regroup(self.b, self.legal_leaves(source), source.type, t)
+        return packing.unpack(self.b, self.legal(source), t)
+
+    def packed(self, v: Value) -> Value:
+        """A vector operand as one integer, first lane lowest."""
+        return packing.pack(self.b, self.legal_leaves(v), v.type)
+
+    def extractvalue(self, i: Instr) -> LegalResult:
+        first, count = leaf_range(i.args[0].type, i.extra["indices"])
+        parts = self.legal_leaves(i.args[0])[first : first + count]
         return parts if i.type.kind in AGGREGATES else parts[0]
 
-    def insertvalue(self, i: Instr) -> list[Value]:
-        indices = i.extra["indices"]
-        assert isinstance(indices, list)
-        first, count = leaf_range(i.type, indices)
-        parts = list(self.fields(i.args[0]))
+    def insertvalue(self, i: Instr) -> LegalResult:
+        first, count = leaf_range(i.type, i.extra["indices"])
+        parts = list(self.legal_leaves(i.args[0]))
         v = i.args[1]
-        parts[first : first + count] = self.fields(v) if v.type.kind in AGGREGATES else [self.use(v)]
+        parts[first : first + count] = self.legal_leaves(v) if v.type.kind in AGGREGATES else [self.legal(v)]
         return parts
+
+    # -- arithmetic that several handlers build -----------------------------------------------------------------------
+
+    def multiply(self, a: Value, b: Value) -> Value:
+        """Build a product of legal values; a product of 64 bits that is not a shift is a run-time library call."""
+        product = self.b.binary("mul", a, b)
+        if a.type is I64 and isinstance(product, Instr) and product is self.b.block.instrs[-1] and product.op == "mul":
+            self.b.block.instrs.pop()
+            return self.b.call("__muldi3", I64, [a, b])
+        return product
 
 
 def leaves_of(t: Type, at: int = 0) -> list[tuple[Type, int]]:
-    """Scalar members of an aggregate with their offsets."""
+    """Scalar members of an aggregate with their byte offsets, the aggregate starting at `at`."""
     if t.kind in ("array", "vector"):
         step = size_of(t.elems[0])
         return [leaf for k in range(t.count) for leaf in leaves_of(t.elems[0], at + k * step)]
@@ -165,7 +184,7 @@ def leaves_of(t: Type, at: int = 0) -> list[tuple[Type, int]]:
 
 
 def leaf_range(t: Type, indices: list[int]) -> tuple[int, int]:
-    """Position of a member among the leaves, and how many leaves it has."""
+    """Number of the first leaf of the member that `indices` select, and how many leaves the member has."""
     first = 0
     for n in indices:
         members = [t.elems[0]] * t.count if t.kind != "struct" else list(t.elems)
