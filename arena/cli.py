@@ -57,6 +57,36 @@ COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argpa
 @ignore_unread_output
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return the exit status of the process."""
+    parser, commands = _parser()
+    try:
+        options = parser.parse_args(arguments)
+    except SystemExit as ended:  # --help, or an error that argparse has printed
+        return ended.code if isinstance(ended.code, int) else BAD_INPUT
+    try:
+        if options.command == "scenes":
+            for name in scenes():
+                print(f"{name:20} {load_scene(name).description}")
+            return DONE
+        if options.command == "completion":
+            descriptions = {name: (one, one.description or "") for name, one in commands.items()}
+            print(script("arena", descriptions, options.shell))
+            return DONE
+        return COMMANDS[options.command][1](options)
+    except BrokenPipeError:
+        raise
+    except (FolderInUseError, ClusterLostError) as error:
+        print(f"arena: {error}; finished trials are kept; run the same command to continue", file=sys.stderr)
+        return CANNOT_CONTINUE
+    except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
+        print(f"arena: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("arena: interrupted; finished trials are kept; run the same command to continue", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+    """Return the parser of the command line, and the parsers of its commands by name."""
     parser = argparse.ArgumentParser(
         prog="arena",
         description="Run experiments with robots that execute real firmware in a simulated arena.",
@@ -74,28 +104,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
                                  description=completion_description("arena"), epilog="example: arena completion bash",
                                  formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
     shells.add_argument("shell", choices=SHELLS)
-    try:
-        options = parser.parse_args(arguments)
-    except SystemExit as ended:  # --help, or an error that argparse has printed
-        return ended.code if isinstance(ended.code, int) else BAD_INPUT
-    try:
-        if options.command == "scenes":
-            for name in scenes():
-                print(f"{name:20} {load_scene(name).description}")
-            return DONE
-        if options.command == "completion":
-            print(script("arena", {name: (one, one.description or "") for name, one in commands.choices.items()},
-                         options.shell))  # fmt: skip
-            return DONE
-        return COMMANDS[options.command][1](options)
-    except BrokenPipeError:
-        raise
-    except (FolderInUseError, ClusterLostError) as error:
-        print(f"arena: {error}; finished trials are kept; run the same command to continue", file=sys.stderr)
-        return CANNOT_CONTINUE
-    except (SceneError, RecordError, emu.LoadError, ValueError, OSError) as error:
-        print(f"arena: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        print("arena: interrupted; finished trials are kept; run the same command to continue", file=sys.stderr)
-        return INTERRUPTED
+    return parser, commands.choices

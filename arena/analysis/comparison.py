@@ -19,7 +19,7 @@ MARGIN_PART = 0.10
 """Default margin of a measure, as a share of the second run's mean (experiment-contract.md §5)."""
 
 
-def courses(trials: list[Trial]) -> dict[int, tuple[Trial, MetricSeries]]:
+def series_by_seed(trials: list[Trial]) -> dict[int, tuple[Trial, MetricSeries]]:
     """Return each trial and its metrics by seed."""
     return {trial.about["seed"]: (trial, trial.series) for trial in trials}
 
@@ -31,7 +31,7 @@ def compare_runs(first: list[Trial], second: list[Trial], at: float) -> dict[str
     experiment = first[0].experiment
     if second[0].experiment != experiment:
         raise ValueError(f"the runs are of two experiments, {experiment.name} and {second[0].experiment.name}")
-    ones, others = courses(first), courses(second)
+    ones, others = series_by_seed(first), series_by_seed(second)
     seeds = sorted(set(ones) & set(others))
     if len(seeds) < 2:
         raise ValueError(f"the runs have {len(seeds)} seeds in common; a comparison needs two or more")
@@ -54,12 +54,12 @@ def compare_runs(first: list[Trial], second: list[Trial], at: float) -> dict[str
         "at": at,
         "measures": rows,
         "cpu_load": loads,
-        "apart": _apart(pairs),
+        "apart": _distances(pairs),
         "published": experiment.published,
     }
 
 
-def _apart(pairs: list[Any]) -> list[dict[str, float]]:
+def _distances(pairs: list[Any]) -> list[dict[str, float]]:
     """Return the distances in cm between equal robots of trials with equal seeds: median and maximum."""
     found = []
     for seconds in APART_S:

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from arena.analysis.comparison import courses
+from arena.analysis.comparison import series_by_seed
 from arena.analysis.statistics import bootstrap_band
 from arena.experiments import Curve
 from arena.scene import dimensions
@@ -98,7 +98,7 @@ def curves(runs: Runs) -> Figure:
     axes = figure.subplots(1, count, squeeze=False)[0]
     for number, (axis, curve) in enumerate(zip(axes, experiment.curves, strict=True)):
         for name, trials in runs.items():
-            done = [one for _, one in courses(trials).values()]
+            done = [one for _, one in series_by_seed(trials).values()]
             samples = min(len(one.times) for one in done)
             values = curve.scale * np.array([one.curves[curve.name][:samples] for one in done])
             _band(axis, name, done[0].times[:samples], values, curve)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from arena.analysis.comparison import compare_runs, courses, mean_load
+from arena.analysis.comparison import compare_runs, mean_load, series_by_seed
 from arena.analysis.statistics import pairs_needed
 from arena.trial.record import Trial
 
@@ -61,7 +61,7 @@ def _runs_table(group: Mapping[str, list[Trial]], host_s: Mapping[str, float], a
         "|---" * (len(measures) + 4) + "|",
     ]
     for name, trials in group.items():
-        done = [one for _, one in courses(trials).values()]
+        done = [one for _, one in series_by_seed(trials).values()]
         cells = [_spread([one.of(series, at) for series in done]) for one in measures]
         load = mean_load(trials)
         rows.append(f"| {name} | {len(done)} | {' | '.join(cells)} | {'-' if load is None else f'{load:.1%}'} | "
@@ -89,7 +89,7 @@ def _equivalence_tables(group: Mapping[str, list[Trial]], at: float) -> list[str
         "|---|---|---|---|---|---|---|",
     ]
     for (first, ones), (second, others) in itertools.combinations(group.items(), 2):
-        if len(set(courses(ones)) & set(courses(others))) < 2:
+        if len(set(series_by_seed(ones)) & set(series_by_seed(others))) < 2:
             continue
         for row in compare_runs(ones, others, at)["measures"]:
             digits = 3 if row["margin"] < 1 else 1

@@ -8,15 +8,15 @@ import math
 
 def count(text: str) -> int:
     """Parse a whole number of 1 or more."""
-    return _whole(text, 1)
+    return _parse_whole(text, 1)
 
 
 def count_or_none(text: str) -> int:
     """Parse a whole number of 0 or more."""
-    return _whole(text, 0)
+    return _parse_whole(text, 0)
 
 
-def _whole(text: str, least: int) -> int:
+def _parse_whole(text: str, least: int) -> int:
     try:
         value = int(text)
     except ValueError:
@@ -44,7 +44,7 @@ def removed_processes(_text: str) -> int:
 
 def port(text: str) -> int:
     """Parse a TCP port; 0 is any free port."""
-    value = _whole(text, 0)
+    value = _parse_whole(text, 0)
     if value > 65535:
         raise argparse.ArgumentTypeError(f"{text!r}: expected a port from 0 to 65535")
     return value

@@ -89,28 +89,15 @@ def reaction(image: Path, word: str, selector: int, frames: int, seed: int) -> d
         machine.peek(word)
     except (KeyError, ValueError) as error:
         raise ValueError(f"{image}: cannot read the word {word!r}: {error}") from None
-    _run(machine, 2 * OK_AT_TCY)
-    frame_tcy = machine.board.camera.scan.series.frame_tcy
+    _run_until(machine, 2 * OK_AT_TCY)
+    frame_tcy = machine.board.camera.scan.timing.frame_tcy
     begin, first = machine.cycle, show.frames
-    waits: list[float] = []
-    end = begin + frames * frame_tcy
-    lines = 0
-    while machine.cycle < end:
-        frame = show.frames
-        while machine.cycle < end and (show.frames == frame or len(show.lines) < lines):
-            _run(machine, machine.cycle + FRAME_TCY)
-        before = machine.peek(word)
-        while machine.cycle < end and machine.peek(word) == before:
-            _run(machine, machine.cycle + POLL_TCY)
-        if machine.cycle < end:
-            waits.append((machine.cycle - show.lines[-1]) / FCY * 1e6)
-            lines = len(show.lines)
-    if not waits:
+    times = np.array(_latencies(machine, show, word, begin + frames * frame_tcy))
+    if not len(times):
         raise ValueError(f"{image}: {word} never changes")
     sent = (machine.cycle - begin) // frame_tcy
-    times = np.array(waits)
     return {
-        "changes": len(waits),
+        "changes": len(times),
         "median_us": float(np.median(times)),
         "p99_us": float(np.quantile(times, 0.99)),
         "max_us": float(times.max()),
@@ -120,7 +107,24 @@ def reaction(image: Path, word: str, selector: int, frames: int, seed: int) -> d
     }
 
 
-def _run(machine: emu.Machine, cycle: int) -> None:
+def _latencies(machine: emu.Machine, show: AlternatingPicture, word: str, end: int) -> list[float]:
+    """Run to cycle `end`; return the time in µs from the last line of a frame to each change of `word`."""
+    found: list[float] = []
+    lines = 0
+    while machine.cycle < end:
+        frame = show.frames
+        while machine.cycle < end and (show.frames == frame or len(show.lines) < lines):
+            _run_until(machine, machine.cycle + FRAME_TCY)
+        before = machine.peek(word)
+        while machine.cycle < end and machine.peek(word) == before:
+            _run_until(machine, machine.cycle + POLL_TCY)
+        if machine.cycle < end:
+            found.append((machine.cycle - show.lines[-1]) / FCY * 1e6)
+            lines = len(show.lines)
+    return found
+
+
+def _run_until(machine: emu.Machine, cycle: int) -> None:
     stop = machine.run_until(cycle)
     if stop is not None:
         raise ValueError(f"the firmware stopped: {stop.reason} at {stop.pc:#08x}: {stop.detail}")

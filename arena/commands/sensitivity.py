@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from arena.analysis.comparison import courses
+from arena.analysis.comparison import series_by_seed
 from arena.campaign.campaign import Plan, locked_folder, open_folder
 from arena.commands.arguments import count, count_or_none, duration
 from arena.commands.run import folder_name, run_with_progress, with_overrides
@@ -104,7 +104,7 @@ def _final_values(options: argparse.Namespace, name: str, controller: str) -> li
         run_with_progress(plan, folder, open_folder(plan, folder, sys.argv[1:]), options.jobs)
     trials = [trial for trial in trials_in(folder) if trial.about["seed"] < options.seed + options.trials]
     metric = trials[0].experiment.curves[0].name
-    return [one.last(metric) for _, one in courses(trials).values()]
+    return [one.last(metric) for _, one in series_by_seed(trials).values()]
 
 
 def _markdown(rows: list[dict[str, Any]], options: argparse.Namespace) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from arena.analysis.comparison import courses
+from arena.analysis.comparison import series_by_seed
 from arena.commands import run as single
 from arena.trial.json_numbers import json_text
 from arena.trial.record import trials_in
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
         status, trials = max(status, int(made.faults)), trials_in(quiet.out)
         if not options.json:
             single.print_result(made)
-        done = [one for _, one in courses(trials).values()]
+        done = [one for _, one in series_by_seed(trials).values()]
         curves = trials[0].experiment.curves
         ends = {one.name: [series.last(one.name) for series in done] for one in curves}
         spreads = {name: {"mean": float(np.mean(values)), "sd": float(np.std(values, ddof=min(1, len(done) - 1)))}

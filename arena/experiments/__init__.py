@@ -99,7 +99,7 @@ class TrialSamples:
     """Lines that the robots sent on UART1, in order of time."""
 
 
-def _nothing(_world: Any) -> None:
+def _do_nothing(_world: Any) -> None:
     """Do nothing: default of `init` and `step`."""
 
 
@@ -107,7 +107,7 @@ def _never(_world: Any) -> bool:
     return False
 
 
-def _alone(_scene: Scene, objects: Floats) -> list[int]:
+def _no_groups(_scene: Scene, objects: Floats) -> list[int]:
     return list(range(len(objects)))
 
 
@@ -122,9 +122,9 @@ class Experiment:
     measures: tuple[Measure, ...]
     all_curves: Callable[[TrialSamples], Mapping[str, Floats]]
     published: str = ""
-    groups: Callable[[Scene, Floats], list[int]] = _alone
-    init: Callable[[Any], None] = _nothing
-    step: Callable[[Any], None] = _nothing
+    groups: Callable[[Scene, Floats], list[int]] = _no_groups
+    init: Callable[[Any], None] = _do_nothing
+    step: Callable[[Any], None] = _do_nothing
     done: Callable[[Any], bool] = _never
     digest: str = field(default="", compare=False)
     """SHA-256 of the file; empty for a built-in experiment."""
@@ -132,12 +132,12 @@ class Experiment:
     @property
     def has_supervisor(self) -> bool:
         """Whether the experiment defines a function of a supervisor."""
-        return (self.init, self.step, self.done) != (_nothing, _nothing, _never)
+        return (self.init, self.step, self.done) != (_do_nothing, _do_nothing, _never)
 
     @property
     def has_groups(self) -> bool:
         """Whether the experiment groups objects."""
-        return self.groups is not _alone
+        return self.groups is not _no_groups
 
     def series(self, samples: TrialSamples) -> MetricSeries:
         """Return the metrics of a trial over time. Raises SceneError if the experiment fails."""
@@ -155,8 +155,8 @@ class Experiment:
 def experiment_of(name: str, folder: Path = Path()) -> Experiment:
     """Return the experiment called `name`, or of the Python file `name` relative to `folder`. Raises SceneError."""
     if name.endswith(".py"):
-        return _of_file((folder / name).resolve())
-    return _of_name(name)
+        return _load_file((folder / name).resolve())
+    return _load_by_name(name)
 
 
 def experiment_file(name: str, folder: Path) -> Path | None:
@@ -166,20 +166,20 @@ def experiment_file(name: str, folder: Path) -> Path | None:
 
 
 @cache
-def _of_name(name: str) -> Experiment:
+def _load_by_name(name: str) -> Experiment:
     if re.fullmatch("[a-z][a-z_]*", name) and (FOLDER / f"{name}.py").is_file():
-        return _experiment(name, importlib.import_module(f"arena.experiments.builtin.{name}"), "")
+        return _experiment_from(name, importlib.import_module(f"arena.experiments.builtin.{name}"), "")
     for point in entry_points(group="openswarm.experiments"):
         if point.name == name:
             module = point.load()
-            return _experiment(name, module, _digest(Path(str(module.__file__))))
+            return _experiment_from(name, module, _digest(Path(str(module.__file__))))
     known = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem[0] != "_")
     raise SceneError(f"unknown experiment {name!r}; known: {', '.join(known)}, or the path of a .py file")
 
 
 @cache
-def _of_file(path: Path) -> Experiment:
-    spec = importlib.util.spec_from_file_location(f"arena_experiment_{_name(path)}", path)
+def _load_file(path: Path) -> Experiment:
+    spec = importlib.util.spec_from_file_location(f"arena_experiment_{_module_name(path)}", path)
     if spec is None or spec.loader is None or not path.is_file():
         raise SceneError(f"{path}: no such experiment file")
     module = importlib.util.module_from_spec(spec)
@@ -189,10 +189,10 @@ def _of_file(path: Path) -> Experiment:
     except (Exception, SystemExit) as error:
         line = getattr(error, "lineno", None) or _line_in(path, error)
         raise SceneError(f"{path}:{line or 1}: {type(error).__name__}: {error}") from None
-    return _experiment(path.stem, module, _digest(path))
+    return _experiment_from(path.stem, module, _digest(path))
 
 
-def _name(path: Path) -> str:
+def _module_name(path: Path) -> str:
     return re.sub(r"\W", "_", str(path))
 
 
@@ -210,7 +210,7 @@ def _line_in(path: Path, error: BaseException) -> int | None:
     return line
 
 
-def _experiment(name: str, module: ModuleType, digest: str) -> Experiment:
+def _experiment_from(name: str, module: ModuleType, digest: str) -> Experiment:
     metrics: Any = getattr(module, "metrics", None)
     whole = getattr(module, "all_curves", None)
     if whole is None and not callable(metrics):
@@ -218,19 +218,21 @@ def _experiment(name: str, module: ModuleType, digest: str) -> Experiment:
     curves = tuple(getattr(module, "CURVES", ()))
     if not curves:
         raise SceneError(f"{module.__file__}: an experiment must define its metrics: CURVES = [Curve('name', 'label')]")
-    measures = tuple(getattr(module, "MEASURES", ())) or tuple(map(_at, curves))
+    measures = tuple(getattr(module, "MEASURES", ())) or tuple(map(_default_measure, curves))
     hooks = {hook: getattr(module, hook) for hook in ("groups", "init", "step", "done") if hasattr(module, hook)}
-    return Experiment(name, curves, measures, whole or _one_by_one(metrics), getattr(module, "PUBLISHED", ""),
+    return Experiment(name, curves, measures, whole or _curves_by_sample(metrics), getattr(module, "PUBLISHED", ""),
                       digest=digest, **hooks)  # fmt: skip
 
 
-def _at(curve: Curve) -> Measure:
+def _default_measure(curve: Curve) -> Measure:
     """Return the default measure of a curve: its value at the requested time."""
     return Measure(curve.name, f"{curve.label} at {{at:g}} s", lambda series, at: series.at(at, curve.name),
                    best=curve.best)  # fmt: skip
 
 
-def _one_by_one(metrics: Callable[[Sample], Mapping[str, float]]) -> Callable[[TrialSamples], Mapping[str, Floats]]:
+def _curves_by_sample(
+    metrics: Callable[[Sample], Mapping[str, float]],
+) -> Callable[[TrialSamples], Mapping[str, Floats]]:
     """Return a function that calls `metrics` for each sample and collects the curves."""
 
     def curves(all_of: TrialSamples) -> Mapping[str, Floats]:

@@ -88,9 +88,9 @@ def _lamps(scene: Scene) -> list[dict[str, float]]:
 def sample_data(trial: Trial) -> dict[str, Any]:
     """Return the data per sample as arrays over the samples, and the faults so far."""
     columns, objects = trial.columns, trial.objects
-    done = trial.series
+    series = trial.series
     robots = []
-    for robot, (seen, strips) in enumerate(_views(trial)):
+    for robot, (seen, strips) in enumerate(_camera_views(trial)):
         keys = ("x", "y", "heading", "left", "right", "leds", "load")
         robots.append({key: np.asarray(columns[f"r{robot}_{key}"]).tolist() for key in keys})
         robots[-1] |= {"seen": seen, "strip": [base64.b64encode(strip).decode() for strip in strips]}
@@ -99,7 +99,7 @@ def sample_data(trial: Trial) -> dict[str, Any]:
         "robots": robots,
         "objects": objects.tolist(),
         "clusters": [trial.experiment.groups(trial.scene, places) for places in objects],
-        "curves": {name: values.tolist() for name, values in done.curves.items()},
+        "curves": {name: values.tolist() for name, values in series.curves.items()},
         "log": columns["log"],
         "lights": columns["lights"],
         "messages": columns["messages"] if trial.scene.bluetooth.links else [[] for _ in trial.times],
@@ -107,7 +107,7 @@ def sample_data(trial: Trial) -> dict[str, Any]:
     }
 
 
-def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
+def _camera_views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
     """Return per robot the readings of its line-of-sight sensor and its camera strips.
 
     If the firmware does not report its sensor, the reading is computed from the poses. A scripted robot has no camera;
@@ -127,10 +127,10 @@ def _views(trial: Trial) -> list[tuple[list[int], list[bytes]]]:
             if seen[sample] >= 0 and not is_script:
                 continue
             poses = Poses([(x, y, float(headings[i][sample])) for i, (x, y) in enumerate(places)], things)
-            renderer.look(poses)
+            renderer.set_viewpoint(poses)
             if seen[sample] < 0:
-                seen[sample] = renderer.sensor()
+                seen[sample] = renderer.line_of_sight()
             if is_script:
-                strips[sample] = colours[renderer.classes(_MIDDLE_ROW, _STRIP)].tobytes()
+                strips[sample] = colours[renderer.classify_row(_MIDDLE_ROW, _STRIP)].tobytes()
         views.append((seen, strips))
     return views

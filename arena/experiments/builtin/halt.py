@@ -37,8 +37,8 @@ def all_curves(samples: TrialSamples) -> Mapping[str, Floats]:
     _, halted = last_values(samples, "halt")
     steps = np.abs(np.diff(samples.robots, axis=0, prepend=samples.robots[:1]))
     moves = (np.hypot(steps[:, :, 0], steps[:, :, 1]) > STILL_CM) | (steps[:, :, 2] > STILL_RAD)
-    stands = ~np.isnan(halted) & ~moves
+    stopped = ~np.isnan(halted) & ~moves
     living = alive(samples)
-    share = (stands & living).sum(axis=1) / np.maximum(living.sum(axis=1), 1)
+    share = (stopped & living).sum(axis=1) / np.maximum(living.sum(axis=1), 1)
     between = np.where(share == 1.0, apart(halted, living), np.nan)
     return {"standing": share, "between": between}
