@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 DESCRIPTION: Final = """\
 Debug firmware from an editor: a server of the Debug Adapter Protocol on standard input and output, or on a TCP port
-of this machine. With --tui, debug it here: a prompt with completion and history; `help` there lists its commands.
-Without a terminal, standard input is a script of such commands, one a line; the first that fails ends it:
+of this machine. With --tui, debug it in the terminal: a prompt with completion and history; its command `help` lists
+all commands. Without a terminal, standard input is a script with one command per line; the first error ends it:
 
     printf 'break add if a == 3\\nrun\\nbacktrace\\n' | emu debug --tui firmware.elf
 
@@ -31,7 +31,7 @@ Breakpoints in sources, functions, instructions and data, with conditions, hit c
 line and instruction, forward and back; OpenSwarm's threads; locals, statics, registers, SFRs by bit field; memory;
 disassembly. In the console: expressions of C, assignments, and /help.
 
-Exit status: 0 the client has left, the user has, or the script is at its end; 1 it ended at a firmware fault, 2 bad
+Exit status: 0 the client, the user or the script has ended the session; 1 the script ended at a firmware fault; 2 bad
 input."""
 
 
@@ -39,22 +39,26 @@ def parser() -> Parser:
     made = Parser("debug", DESCRIPTION, "emu debug --port 4711    or    emu debug --tui firmware.elf --selector 3")
     made.add_argument("--port", metavar="N", type=port, help="serve clients one by one on 127.0.0.1:N (0: a free one)")
     made.add_argument("--once", action="store_true", help="with --port: end after the first client")
-    made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file here; what follows is for that")
+    made.add_argument("--tui", metavar="IMAGE", help="debug this ELF file in the terminal, with the options below")
     made.add_argument("--engine", default="auto", help="auto, jit or plain (default auto)")
-    made.add_argument("--strict", action="store_true", help="faults of what the hardware lets pass, as for `emu run`")
+    made.add_argument(
+        "--strict",
+        action="store_true",
+        help="strict mode as for `emu run`: null pointers and uninitialised reads are faults",
+    )
     add_board_options(made)
     return made
 
 
 def run(options: argparse.Namespace) -> int:
-    """Exit status as DESCRIPTION says."""
+    """Run the command and return the exit status of DESCRIPTION."""
     if options.tui is not None:
         return _prompted(options)
     from emu.dap.wire import Wire, wire_over
 
     _refuse_options_of_the_prompt(options)
     if options.port is None:
-        out, sys.stdout = sys.stdout.buffer, sys.stderr  # nothing else may reach the client
+        out, sys.stdout = sys.stdout.buffer, sys.stderr  # only protocol messages may reach the client
         wire = Wire(sys.stdin.fileno(), out)
         try:
             return _serve(wire)
@@ -76,32 +80,32 @@ def _prompted(options: argparse.Namespace) -> int:
     from emu.prompt.reader import Prompt
 
     if options.port is not None or options.once:
-        raise CommandError("--port and --once are for editors, --tui is not")
+        raise CommandError("--port and --once cannot be used with --tui")
     machine = emu.load(options.tui, board=board_of(options), engine=options.engine, strict=options.strict)
     set_up(machine, options)
     return Prompt("emu debug", lambda client: Server(client, lambda _launch: machine)).serve({}, sys.stdin)
 
 
 def _refuse_options_of_the_prompt(options: argparse.Namespace) -> None:
-    """An editor's launch configuration says them. Raises CommandError."""
+    """Raise CommandError for options that belong in an editor's launch configuration."""
     made = parser()
     for name in ("engine", "strict", "board", "crystal", "selector", "camera", "sensor", "stimulus"):
         if getattr(options, name) != made.get_default(name):
-            raise CommandError(f"--{name} is for --tui; an editor's launch configuration has `{name}`")
+            raise CommandError(f"--{name} needs --tui; for an editor, set `{name}` in the launch configuration")
 
 
 def _serve(wire: Wire) -> int:
-    """Exit status for this client."""
+    """Serve one client and return the exit status."""
     from emu.dap.server import Server
 
     Server(wire, machine_of).serve()
     if wire.problem:
-        print(f"emu debug: the client sent what is no message: {wire.problem}", file=sys.stderr, flush=True)
+        print(f"emu debug: invalid message from the client: {wire.problem}", file=sys.stderr, flush=True)
     return BAD_INPUT if wire.problem else DONE
 
 
 def machine_of(arguments: dict[str, Any]) -> Machine:
-    """A machine as the launch arguments say. Raises ValueError."""
+    """Return a machine for the launch arguments. Raises ValueError."""
     import emu
 
     program = arguments.get("program")

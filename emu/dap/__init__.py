@@ -1,1 +1,1 @@
-"""A server of the Debug Adapter Protocol: editors debug emulated firmware through it."""
+"""Debug Adapter Protocol server, through which editors debug emulated firmware."""

@@ -1,37 +1,37 @@
-"""Requests that say where a run is to end: breakpoints at lines, functions, instructions, data and faults."""
+"""Requests that set breakpoints: at lines, functions, instructions, data and faults."""
 
 from __future__ import annotations
 
 from typing import Any, Final
 
-from emu.dap.breakpoints import Breakpoint, bad_hit_condition
+from emu.dap.breakpoints import Breakpoint, hit_condition_error
 from emu.dap.debuggee import STACK_POINTER
-from emu.dap.state_requests import Looking
+from emu.dap.state_requests import StateRequests
 from emu.dap.variables import Row
 from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value
 
 ACCESSES: Final = ("read", "write", "readWrite")
-"""What a data breakpoint may wait for."""
+"""Accesses at which a data breakpoint can stop."""
 
 
-class Stopping(Looking):
-    """Answers by `_do_` and the request's name, as `Looking` does."""
+class BreakpointRequests(StateRequests):
+    """Handlers of breakpoint requests: methods `_do_` followed by the name of the request."""
 
     _last_id = 0
-    """Of the breakpoint that was made last."""
+    """Number of the last breakpoint."""
 
-    def _breakpoint(self, wanted: Row, kind: str, places: tuple[int, ...], **more: Any) -> Breakpoint:
+    def _breakpoint(self, requested: Row, kind: str, addresses: tuple[int, ...], **more: Any) -> Breakpoint:
         self._last_id += 1
-        hit = str(wanted.get("hitCondition") or "")
+        hit = str(requested.get("hitCondition") or "")
         made = Breakpoint(
-            self._last_id, kind, places, str(wanted.get("condition") or ""), hit,
-            str(wanted.get("logMessage") or ""), more.pop("size", 0), more.pop("access", "write"),
+            self._last_id, kind, addresses, str(requested.get("condition") or ""), hit,
+            str(requested.get("logMessage") or ""), more.pop("size", 0), more.pop("access", "write"),
         )  # fmt: skip
         missing = more.pop("problem", "there is no code")
-        problem = bad_hit_condition(hit) or ("" if places else missing)
+        problem = hit_condition_error(hit) or ("" if addresses else missing)
         if problem:
-            made.places = ()
+            made.addresses = ()
         made.facts = {"id": made.id, "verified": not problem} | ({"message": problem} if problem else {}) | more
         return made
 
@@ -41,15 +41,15 @@ class Stopping(Looking):
 
     def _do_setBreakpoints(self, arguments: Row) -> Row:
         path = str(arguments["source"].get("path", arguments["source"].get("name", "")))
-        wanted = arguments.get("breakpoints") or [{"line": line} for line in arguments.get("lines", [])]
+        requested = arguments.get("breakpoints") or [{"line": line} for line in arguments.get("lines", [])]
         made = []
-        for one in wanted:
-            line, places = self._sources.places(path, int(one["line"]))
+        for one in requested:
+            line, addresses = self._sources.addresses(path, int(one["line"]))
             more: Row = {"line": line or one["line"], "source": {"path": path}}
-            if places:
-                more["instructionReference"] = f"{places[0]:#08x}"
-            problem = "no code of this program comes from here"
-            made.append(self._breakpoint(one, "source", places, problem=problem, **more))
+            if addresses:
+                more["instructionReference"] = f"{addresses[0]:#08x}"
+            problem = "the program has no code at or after this line"
+            made.append(self._breakpoint(one, "source", addresses, problem=problem, **more))
         return self._set(f"source {path}", made)
 
     def _do_setFunctionBreakpoints(self, arguments: Row) -> Row:
@@ -57,10 +57,10 @@ class Stopping(Looking):
         for one in arguments["breakpoints"]:
             try:
                 start = self._debuggee.machine.program_address(one["name"])
-                places: tuple[int, ...] = (self._debuggee.inspector.prologue_end(start),)
+                addresses: tuple[int, ...] = (self._debuggee.inspector.prologue_end(start),)
             except KeyError:
-                places = ()
-            made.append(self._breakpoint(one, "function", places, problem=f"there is no function {one['name']}"))
+                addresses = ()
+            made.append(self._breakpoint(one, "function", addresses, problem=f"there is no function {one['name']}"))
         return self._set("function", made)
 
     def _do_setInstructionBreakpoints(self, arguments: Row) -> Row:
@@ -86,7 +86,7 @@ class Stopping(Looking):
             address = value.address if isinstance(value, Value) else None
             size = size or (value.type.bytes if isinstance(value, Value) else 0)
         if address is None:
-            return {"dataId": None, "description": "it is not in memory"}
+            return {"dataId": None, "description": "the object is not in memory"}
         if problem := self._not_in_memory(address, size):
             return {"dataId": None, "description": problem}
         entries = [one.raw.entry for one in self._debuggee.frames() if one.raw.entry is not None]
@@ -100,7 +100,7 @@ class Stopping(Looking):
         }
 
     def _not_in_memory(self, address: int, size: int) -> str:
-        """What is wrong with a stretch of data space, empty if nothing is."""
+        """Return why a range of data space is invalid, empty if it is valid."""
         try:
             self._debuggee.machine.peek_bytes(address, size)
         except ValueError as error:
@@ -110,8 +110,8 @@ class Stopping(Looking):
     def _named(self, arguments: Row) -> Any:
         reference = arguments.get("variablesReference")
         if reference:
-            return self._sights.find(int(reference), str(arguments["name"]))
-        frame = self._sights.frame(arguments.get("frameId"))
+            return self._references.find(int(reference), str(arguments["name"]))
+        frame = self._references.frame(arguments.get("frameId"))
         return evaluate(self._debuggee.inspector, str(arguments["name"]), frame)
 
     def _do_setDataBreakpoints(self, arguments: Row) -> Row:
@@ -121,9 +121,9 @@ class Stopping(Looking):
             access = one.get("accessType") or "write"
             problem = self._not_in_memory(int(address, 16), int(size))
             if access not in ACCESSES:
-                problem = f"{access!r} is none of {', '.join(ACCESSES)}"
-            places = () if problem else (int(address, 16),)
-            made.append(self._breakpoint(one, "data", places, size=int(size), access=access, problem=problem))
+                problem = f"expected one of {', '.join(ACCESSES)}, not {access!r}"
+            addresses = () if problem else (int(address, 16),)
+            made.append(self._breakpoint(one, "data", addresses, size=int(size), access=access, problem=problem))
         return self._set("data", made)
 
     def _do_breakpointLocations(self, arguments: Row) -> Row:

@@ -1,4 +1,4 @@
-"""Breakpoints of all kinds: where they are, when they count, what they say."""
+"""Breakpoints of all kinds: addresses, conditions, hit counts and log messages."""
 
 from __future__ import annotations
 
@@ -23,53 +23,54 @@ COMPARE: Final[dict[str, Callable[[int, int], bool]]] = {
 }
 IN_MESSAGE: Final = re.compile(r"\{([^{}]*)\}")
 
-SAME: Final = ("kind", "places", "condition", "hit_condition", "message", "size", "access")
+DEFINING_FIELDS: Final = ("kind", "addresses", "condition", "hit_condition", "message", "size", "access")
 
 
 @dataclass(eq=False, slots=True)
 class Breakpoint:
-    """One entry of a client's list. `places`: program addresses, or the first data address of a data breakpoint."""
+    """One breakpoint of a client. `addresses` are program addresses; a data breakpoint has the first data address."""
 
     id: int
     kind: str
     """"source", "function", "instruction" or "data"."""
-    places: tuple[int, ...]
+    addresses: tuple[int, ...]
     condition: str = ""
     hit_condition: str = ""
     message: str = ""
     size: int = 0
     access: str = "write"
-    """Of a data breakpoint: "read", "write" or "readWrite"."""
+    """Access that a data breakpoint observes: "read", "write" or "readWrite"."""
     hits: int = 0
     facts: dict[str, Any] = field(default_factory=dict)
-    """What the client was told about it."""
+    """The breakpoint as reported to the client."""
 
-    def is_as(self, other: Breakpoint) -> bool:
-        """Whether it is the same one, told again."""
-        return all(getattr(self, name) == getattr(other, name) for name in SAME)
+    def is_same(self, other: Breakpoint) -> bool:
+        """Whether the client has set the same breakpoint again."""
+        return all(getattr(self, name) == getattr(other, name) for name in DEFINING_FIELDS)
 
-    def stops(self, inspector: Inspector, say: Callable[[str], None]) -> bool:
-        """Whether a run ends here, now that it has come by. A condition that means nothing ends it, and says why."""
+    def should_stop(self, inspector: Inspector, write_output: Callable[[str], None]) -> bool:
+        """Count an arrival and return whether the run stops here. An invalid condition stops the run and is
+        reported."""
         if self.condition:
             try:
                 frames = inspector.frames()
                 if not number_of(evaluate(inspector, self.condition, frames[0] if frames else None)):
                     return False
             except (ExpressionError, Unavailable) as error:
-                say(f"condition {self.condition!r}: {error}\n")
+                write_output(f"condition {self.condition!r}: {error}\n")
                 return True
         self.hits += 1
         match = HIT.fullmatch(self.hit_condition) if self.hit_condition else None
         if match is not None and not COMPARE[match[1] or "=="](self.hits, int(match[2])):
             return False
         if self.message:
-            say(filled(inspector, self.message) + "\n")
+            write_output(formatted_message(inspector, self.message) + "\n")
             return False
         return True
 
 
-def filled(inspector: Inspector, message: str) -> str:
-    """A log message with the values of the expressions in braces."""
+def formatted_message(inspector: Inspector, message: str) -> str:
+    """Return a log message in which values replace the expressions in braces."""
     frames = inspector.frames()
 
     def value(match: re.Match[str]) -> str:
@@ -82,6 +83,6 @@ def filled(inspector: Inspector, message: str) -> str:
     return IN_MESSAGE.sub(value, message)
 
 
-def bad_hit_condition(text: str) -> str:
-    """What is wrong with a hit condition, empty if nothing is."""
-    return "" if not text or HIT.fullmatch(text) else f"{text!r} is none of N, ==N, >N, >=N, <N, <=N, %N"
+def hit_condition_error(text: str) -> str:
+    """Return why a hit condition is invalid, empty if it is valid."""
+    return "" if not text or HIT.fullmatch(text) else f"expected N, ==N, >N, >=N, <N, <=N or %N, not {text!r}"

@@ -1,4 +1,5 @@
-"""What a client changes in a machine that stands, as a record: it can be changed again in another that stands there."""
+"""Changes that a client makes to a paused machine, as records. They can be repeated in another machine in that
+state."""
 
 from __future__ import annotations
 
@@ -11,15 +12,15 @@ from emu.debug.inspector import Frame, Inspector, Value
 
 
 class Change(Protocol):
-    """Holds plain values only, so it can be told to another process."""
+    """A change as plain values, so that it can be sent to another process."""
 
-    def do(self, inspector: Inspector) -> None:
-        """Change it there. Raises locate.Unavailable, ValueError, TypeError."""
+    def apply(self, inspector: Inspector) -> None:
+        """Apply the change to the inspector's machine. Raises Unavailable, ValueError, TypeError."""
 
 
 @dataclass(frozen=True, slots=True)
-class Assigned:
-    """A place of the program got a value."""
+class Assignment:
+    """Assignment to an object of the program."""
 
     type: Type
     pieces: tuple[Piece, ...]
@@ -28,23 +29,23 @@ class Assigned:
     bits: tuple[int, int] | None
     number: Any
 
-    def do(self, inspector: Inspector) -> None:
-        """As `Change.do`."""
+    def apply(self, inspector: Inspector) -> None:
+        """Apply the change as `Change.apply` specifies."""
         Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits).set(self.number)
 
 
 @dataclass(frozen=True, slots=True)
-class Poked:
-    """Bytes of data space were written."""
+class MemoryWrite:
+    """Write of bytes to data space."""
 
     address: int
     data: bytes
 
-    def do(self, inspector: Inspector) -> None:
-        """As `Change.do`."""
+    def apply(self, inspector: Inspector) -> None:
+        """Apply the change as `Change.apply` specifies."""
         inspector.machine.poke(self.address, int.from_bytes(self.data, "little"), len(self.data))
 
 
-def assigned(place: Value, number: Any) -> Assigned:
-    """`place` gets `number`, wherever the machine stands as it does here."""
-    return Assigned(place.type, place.pieces, place.frame, place.name, place.bits, number)
+def assignment(place: Value, number: Any) -> Assignment:
+    """Return the assignment of `number` to `place`, applicable in every machine in the same state."""
+    return Assignment(place.type, place.pieces, place.frame, place.name, place.bits, number)

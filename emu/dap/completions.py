@@ -1,4 +1,4 @@
-"""Names that an unfinished expression or command may go on with."""
+"""Completion of expressions and console commands."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from emu.dap.console import WORDS
+from emu.dap.console import COMMANDS
 from emu.debug.dwarf.location import Unavailable
 from emu.debug.expressions.expression import ExpressionError, evaluate
 from emu.debug.inspector import Frame, Inspector, Value
 
 LAST: Final = re.compile(r"(?:([A-Za-z_$][\w.\[\]>-]*?)(?:\.|->))?([A-Za-z_$]?\w*)$")
-"""What stands before the last point or arrow, if there is one, and the beginning of a name."""
+"""The expression before the last dot or arrow, if there is one, and the beginning of a name."""
 MOST: Final = 500
 Name = tuple[str, str]
-"""A name and its kind in the protocol's words."""
+"""A name and its kind as the protocol defines it."""
 
 
 def completions(inspector: Inspector, frame: Frame | None, text: str) -> tuple[list[Name], int]:
-    """What `text` may go on with, sorted, and how many of its last letters that replaces."""
+    """Return the sorted completions of `text`, and the number of its last characters that they replace."""
     if text.startswith("/") and " " not in text:
-        return [(f"/{word}", "keyword") for word in WORDS if word.startswith(text[1:])], len(text)
+        return [(f"/{word}", "keyword") for word in COMMANDS if word.startswith(text[1:])], len(text)
     match = LAST.search(text)
     whole, begun = (match[1], match[2]) if match is not None else (None, "")
     names = _members(inspector, frame, whole) if whole else _all(inspector, frame)
@@ -44,7 +44,7 @@ def _members(inspector: Inspector, frame: Frame | None, whole: str) -> Iterator[
 
 
 def _all(inspector: Inspector, frame: Frame | None) -> Iterator[Name]:
-    """Later ones win."""
+    """Yield all names. A later name replaces an earlier one that is equal."""
     symbols = (one for one in inspector.image.symbols.all if one.names_content)
     for one in symbols:
         yield one.name.removeprefix("_"), "function" if one.space == "code" else "variable"

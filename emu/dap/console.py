@@ -1,31 +1,31 @@
-"""Commands of a debug console that begin with a slash: time, threads, going somewhere else in time."""
+"""Console commands that begin with a slash: time, threads, and moves through time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Final
 
-from emu.dap.debuggee import Debuggee, Halt
+from emu.dap.debuggee import Debuggee, StopEvent
 from emu.debug.dwarf.location import address_of
 from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value
 from emu.debug.threads import Thread
 
-WORDS: Final = {
-    "time": "              cycle, seconds, how far in the past",
-    "goto": " CYCLE        go to a cycle of the recording, or run on to one behind it",
-    "cycle": " [N]         run for N cycles, one if N is left out; an instruction is not divided",
-    "lastwrite": " PLACE   go back to the instruction that changed a place last",
-    "reverse-step": "      go back to the line before, also to the last of a function that has come back",
+COMMANDS: Final = {
+    "time": "              show cycle, seconds, and the distance to the present",
+    "goto": " CYCLE        go to a cycle of the recording, or run on to a later one",
+    "cycle": " [N]         run for N cycles (default 1), at least to the end of an instruction",
+    "lastwrite": " PLACE   go back to the last instruction that changed PLACE",
+    "reverse-step": "      go back to the previous line, also of a called function",
     "reverse-finish": "    go back to the call of this function, or to before the interrupt",
-    "threads": "           OpenSwarm's threads with stack use",
-    "world": "             what is around the machine: the other robots of a trial, at this very time",
+    "threads": "           show the threads of OpenSwarm with stack use",
+    "world": "             show the state of the trial around the robot",
 }
-HELP: Final = "an expression of C; NAME = VALUE; or\n" + "".join(f"/{word}{text}\n" for word, text in WORDS.items())
+HELP: Final = "an expression of C; NAME = VALUE; or\n" + "".join(f"/{word}{text}\n" for word, text in COMMANDS.items())
 
 
-def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
-    """What a command says, or how the machine is to move. Raises ValueError, ExpressionError."""
+def console_command(target: Debuggee, text: str) -> str | Callable[[], StopEvent]:
+    """Return the output of a command, or the function that moves the machine. Raises ValueError, ExpressionError."""
     word, _, rest = text.partition(" ")
     machine, history = target.machine, target.history
     if word == "time":
@@ -35,14 +35,14 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
         return "\n".join(f"{one}: {one.state}{_stack(one)}" for one in target.threads()) or "there are no threads"
     if word == "goto":
         cycle = _count(rest)
-        return lambda: target.go_to(cycle)
+        return lambda: target.goto(cycle)
     if word == "cycle":
         count = _count(rest or "1")
-        return lambda: target.go_to(machine.cycle + count)
+        return lambda: target.goto(machine.cycle + count)
     if word == "reverse-step":
-        return target.back_into
+        return target.reverse_step_into
     if word == "reverse-finish":
-        return target.back_out
+        return target.reverse_finish
     if word == "lastwrite":
         frames = target.frames()
         place = evaluate(target.inspector, rest, frames[0] if frames else None)
@@ -55,7 +55,7 @@ def command(target: Debuggee, text: str) -> str | Callable[[], Halt]:
 
 
 def _stack(thread: Thread) -> str:
-    """Its use, if it has a stack of its own."""
+    """Return the stack use of a thread as text, empty if it has no stack of its own."""
     if thread.stack is None or thread.used is None:
         return ""
     return f", stack {thread.used} of {thread.stack[1] - thread.stack[0]} bytes used"
@@ -68,8 +68,10 @@ def _count(text: str) -> int:
         raise ValueError(f"expected a number of cycles, not {text!r}") from None
 
 
-def _last_write(target: Debuggee, address: int, size: int) -> Halt:
+def _last_write(target: Debuggee, address: int, size: int) -> StopEvent:
     found = target.history.last_write(address, size)
     if found is None:
-        return Halt("goto", "nothing has changed it since the recording began")
-    return Halt("goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {target.inspector.where(found.pc)}")
+        return StopEvent("goto", "no instruction of the recording has changed it")
+    return StopEvent(
+        "goto", f"last write: {found.old.hex()} -> {found.new.hex()} at {target.inspector.where(found.pc)}"
+    )

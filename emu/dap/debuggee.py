@@ -1,7 +1,7 @@
-"""The machine being debugged: goes on and back, by instruction, line and function and to breakpoints.
+"""Execution control of the debugged machine: run and step in both directions, breakpoints.
 
-What enters: what a person wants. What leaves: `Halt`s that say why it stopped. Everything is recorded (`History`), so
-each way forward has one back.
+Inputs: commands of a user. Outputs: `StopEvent`s with the reason of each stop. A `History` records every run, so every
+movement forward can be reversed.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
-SLICE: Final = 400_000
-"""Cycles between looks at what the client wants."""
-LOOK_STEPS: Final = 2_000
-"""The same in single steps."""
+SLICE_CYCLES: Final = 400_000
+"""Cycles between two checks for requests of the client."""
+POLL_STEPS: Final = 2_000
+"""Single steps between two such checks."""
 STACK_POINTER: Final = 15
-PUSHED: Final = 4
-"""Bytes that entering an interrupt puts on the stack."""
+EXCEPTION_FRAME_BYTES: Final = 4
+"""Bytes that the entry of an interrupt pushes onto the stack."""
 
 
 @dataclass(frozen=True, slots=True)
-class Halt:
-    """Why the machine stands, in the protocol's words."""
+class StopEvent:
+    """Why the machine is paused, with the reasons that the protocol defines."""
 
     reason: str
     description: str = ""
@@ -44,116 +44,127 @@ class Halt:
 
 
 class Debuggee:
-    """Drives `machine`. `wanted()` tells whether somebody wants it to stand; `say(text)` gets log messages."""
+    """Controls `machine`.
+
+    `is_stop_requested()` says whether the client has requested a pause. `write_output(text)` prints log messages.
+    """
 
     def __init__(
-        self, machine: Machine, wanted: Callable[[], bool], say: Callable[[str], None], history: History
+        self,
+        machine: Machine,
+        is_stop_requested: Callable[[], bool],
+        write_output: Callable[[str], None],
+        history: History,
     ) -> None:
         self.machine: Final = machine
         self.inspector: Final = Inspector(machine)
         self.history: Final = history
         self.breakpoints: Final[dict[str, list[Breakpoint]]] = {}
-        """By kind and, for those in sources, file."""
+        """Breakpoints by kind, and for source breakpoints by file."""
         self.stops_at_faults = True
-        self._wanted: Final = wanted
-        self._say: Final = say
+        self._is_stop_requested: Final = is_stop_requested
+        self._write_output: Final = write_output
         self._hooks: list[Callable[[], None]] = []
         self._hit: list[int] = []
-        self._extra: tuple[Collection[int], Callable[[], bool]] | None = None
+        self._run_target: tuple[Collection[int], Callable[[], bool]] | None = None
         self._limit: int | None = None
-        """The cycle a run ends at."""
+        """Cycle at which the run ends."""
 
     # Breakpoints
 
-    def set_breakpoints(self, key: str, wanted: list[Breakpoint]) -> None:
-        """Replace one list. A breakpoint that was in it goes on counting its hits."""
-        for one in wanted:
-            one.hits = next((old.hits for old in self.breakpoints.get(key, []) if old.is_as(one)), 0)
-        self.breakpoints[key] = wanted
-        self._rehook()
+    def set_breakpoints(self, key: str, breakpoints: list[Breakpoint]) -> None:
+        """Replace one list of breakpoints. A breakpoint that remains keeps its hit count."""
+        for one in breakpoints:
+            one.hits = next((old.hits for old in self.breakpoints.get(key, []) if old.is_same(one)), 0)
+        self.breakpoints[key] = breakpoints
+        self._update_hooks()
 
     def all(self) -> list[Breakpoint]:
-        """Every breakpoint."""
+        """Return all breakpoints."""
         return [one for some in self.breakpoints.values() for one in some]
 
-    def _places(self) -> set[int]:
-        """Instructions that have a breakpoint."""
-        return {place for one in self.all() if one.kind != "data" for place in one.places}
+    def _breakpoint_addresses(self) -> set[int]:
+        """Return the program addresses of all breakpoints."""
+        return {place for one in self.all() if one.kind != "data" for place in one.addresses}
 
-    def _rehook(self) -> None:
+    def _update_hooks(self) -> None:
         for remove in self._hooks:
             remove()
-        places = self._places()
-        if self._extra is not None:
-            places |= set(self._extra[0])
-        self._hooks = [self.machine.hook_pc(place, self._arrived) for place in sorted(places)]
+        addresses = self._breakpoint_addresses()
+        if self._run_target is not None:
+            addresses |= set(self._run_target[0])
+        self._hooks = [self.machine.hook_pc(place, self._is_breakpoint_hit) for place in sorted(addresses)]
 
-    def _arrived(self) -> bool:
-        """The machine is about to run a hooked instruction."""
+    def _is_breakpoint_hit(self) -> bool:
+        """Record which breakpoints at the current PC are hit, and return whether the run stops."""
         pc = self.machine.pc
         self._hit = [
             one.id
             for one in self.all()
-            if one.kind != "data" and pc in one.places and one.stops(self.inspector, self._say)
+            if one.kind != "data" and pc in one.addresses and one.should_stop(self.inspector, self._write_output)
         ]
-        extra = self._extra is not None and pc in self._extra[0] and self._extra[1]()
+        extra = self._run_target is not None and pc in self._run_target[0] and self._run_target[1]()
         return bool(self._hit) or extra
 
     # Forward
 
-    def go_on(self) -> Halt:
-        """Run until something stops it."""
-        halt = self._stepped()
-        if halt is not None:
-            return halt
-        return self._run() or Halt("pause")
+    def resume(self) -> StopEvent:
+        """Run until a stop."""
+        event = self._step()
+        if event is not None:
+            return event
+        return self._run() or StopEvent("pause")
 
-    def _run(self) -> Halt | None:
-        """Run; None if somebody wants it to stand, or it has arrived where `_extra` says."""
-        while not self._wanted() and not self._is_there():
+    def _run(self) -> StopEvent | None:
+        """Run until a stop. Return None at a requested pause and at the target of `run_to`."""
+        while not self._is_stop_requested() and not self._is_limit_reached():
             self._hit = []
             data = [one for one in self.all() if one.kind == "data"]
             if data:
-                halt = self._watched(data)
-                if halt is not None or self._arrived_extra():
-                    return halt
+                event = self._run_with_data_breakpoints(data)
+                if event is not None or self._is_at_target():
+                    return event
                 continue
-            self.machine.replay_condition = self._arrived
+            self.machine.replay_condition = self._is_breakpoint_hit
             try:
-                stop = self.history.advance(min(self.machine.cycle + SLICE, self._limit or sys.maxsize))
+                stop = self.history.advance(min(self.machine.cycle + SLICE_CYCLES, self._limit or sys.maxsize))
             finally:
                 self.machine.replay_condition = None
             if stop is None:
                 continue
             if stop.reason == "breakpoint" and not stop.detail:
-                return Halt("breakpoint", breakpoints=tuple(self._hit)) if self._hit else None
-            halt = self._ended(stop)
-            if halt is not None:
-                return halt
+                return StopEvent("breakpoint", breakpoints=tuple(self._hit)) if self._hit else None
+            event = self._event_of_stop(stop)
+            if event is not None:
+                return event
         return None
 
-    def _is_there(self) -> bool:
+    def _is_limit_reached(self) -> bool:
         return self._limit is not None and self.machine.cycle >= self._limit
 
-    def _arrived_extra(self) -> bool:
-        return self._extra is not None and self.machine.pc in self._extra[0] and self._extra[1]()
+    def _is_at_target(self) -> bool:
+        return self._run_target is not None and self.machine.pc in self._run_target[0] and self._run_target[1]()
 
-    def _ended(self, stop: Stop) -> Halt | None:
+    def _event_of_stop(self, stop: Stop) -> StopEvent | None:
         if stop.fault is not None:
-            return Halt("exception", stop.fault.cause.rstrip(","), stop=stop) if self.stops_at_faults else None
+            return StopEvent("exception", stop.fault.cause.rstrip(","), stop=stop) if self.stops_at_faults else None
         if stop.reason == "breakpoint":
-            return Halt("breakpoint", stop.detail or "breakpoint in the program", stop=stop)
+            return StopEvent("breakpoint", stop.detail or "breakpoint in the program", stop=stop)
         if stop.reason == "halt":
-            return Halt("pause", "the firmware sleeps and nothing will wake it", stop=stop)
-        return Halt("pause", stop.detail or stop.reason, stop=stop)
+            return StopEvent("pause", "the firmware sleeps and no event can wake it", stop=stop)
+        return StopEvent("pause", stop.detail or stop.reason, stop=stop)
 
-    def _stepped(self) -> Halt | None:
-        """One instruction, breakpoints not asked."""
+    def _step(self) -> StopEvent | None:
+        """Run one instruction and ignore breakpoints."""
         stop = self.history.step()
-        return self._ended(stop) if stop is not None and not (stop.reason == "breakpoint" and not stop.detail) else None
+        return (
+            self._event_of_stop(stop)
+            if stop is not None and not (stop.reason == "breakpoint" and not stop.detail)
+            else None
+        )
 
-    def _watched(self, data: list[Breakpoint]) -> Halt | None:
-        """Single steps with an eye on data."""
+    def _run_with_data_breakpoints(self, data: list[Breakpoint]) -> StopEvent | None:
+        """Single-step and check the data breakpoints."""
         machine, space = self.machine, self.machine.core.data
         read, write = space.read, space.write
         touched: list[tuple[str, int, int]] = []
@@ -166,59 +177,61 @@ class Debuggee:
             touched.append(("write", ea, size))
             write(ea, value, size)
 
-        places = self._places()
+        addresses = self._breakpoint_addresses()
         vars(space)["read"], vars(space)["write"] = reads, writes
         try:
-            for _ in range(LOOK_STEPS):
+            for _ in range(POLL_STEPS):
                 touched.clear()
                 pc = machine.pc
-                halt = self._stepped()
-                if halt is not None:
-                    return halt
-                hit = [one for one in data if any(_meets(one, touch) for touch in touched)]
-                ids = [one.id for one in hit if one.stops(self.inspector, self._say)]
+                event = self._step()
+                if event is not None:
+                    return event
+                hit = [one for one in data if any(_is_hit(one, touch) for touch in touched)]
+                ids = [one.id for one in hit if one.should_stop(self.inspector, self._write_output)]
                 if ids:
-                    verb = "/".join(sorted({touch[0] for touch in touched if any(_meets(one, touch) for one in hit)}))
-                    return Halt("data breakpoint", f"{verb} at {self.inspector.where(pc)}", tuple(ids))
-                if machine.pc in places and self._arrived() and self._hit:
-                    return Halt("breakpoint", breakpoints=tuple(self._hit))
-                if self._arrived_extra() or self._is_there():
+                    verb = "/".join(sorted({touch[0] for touch in touched if any(_is_hit(one, touch) for one in hit)}))
+                    return StopEvent("data breakpoint", f"{verb} at {self.inspector.where(pc)}", tuple(ids))
+                if machine.pc in addresses and self._is_breakpoint_hit() and self._hit:
+                    return StopEvent("breakpoint", breakpoints=tuple(self._hit))
+                if self._is_at_target() or self._is_limit_reached():
                     return None
         finally:
             del vars(space)["read"], vars(space)["write"]
         return None
 
-    def run_to(self, places: Collection[int], condition: Callable[[], bool]) -> Halt | None:
-        """Run until one of the addresses is reached and `condition` holds (None), or something else stops it."""
-        self._extra = (places, condition)
-        self._rehook()
+    def run_to(self, addresses: Collection[int], condition: Callable[[], bool]) -> StopEvent | None:
+        """Run to one of the addresses at which `condition` holds and return None; return the event of an earlier
+        stop."""
+        self._run_target = (addresses, condition)
+        self._update_hooks()
         try:
-            halt = self._run()
-            return Halt("pause") if halt is None and not self._arrived_extra() else halt
+            event = self._run()
+            return StopEvent("pause") if event is None and not self._is_at_target() else event
         finally:
-            self._extra = None
-            self._rehook()
+            self._run_target = None
+            self._update_hooks()
 
-    def step_instruction(self) -> Halt:
-        """One instruction."""
-        return self._stepped() or Halt("step")
+    def step_instruction(self) -> StopEvent:
+        """Run one instruction."""
+        return self._step() or StopEvent("step")
 
-    def step_over(self) -> Halt:
-        """One instruction; a call, and an interrupt, as a whole."""
-        return self._one(into=False) or Halt("step")
+    def step_over(self) -> StopEvent:
+        """Run one instruction; a call or an interrupt counts as one."""
+        return self._step_instruction_or_call(into=False) or StopEvent("step")
 
-    def step_line(self, into: bool) -> Halt:
-        """To the next line; into functions that have lines, or over them. Interrupts are run through."""
+    def step_line(self, into: bool) -> StopEvent:
+        """Run to the next line, with `into` also of a called function that has lines. Interrupt handlers run as a
+        whole."""
         frames = self.inspector.frames()
         entry = frames[0].raw.entry if frames else None
         line = self._line()
         has_entered = False
-        for _ in range(LOOK_STEPS * 100):
-            if self._wanted():
-                return Halt("pause")
-            halt = self._one(into)
-            if halt is not None:
-                return halt
+        for _ in range(POLL_STEPS * 100):
+            if self._is_stop_requested():
+                return StopEvent("pause")
+            event = self._step_instruction_or_call(into)
+            if event is not None:
+                return event
             here = self._line()
             top = self.machine.w[STACK_POINTER]
             if here is None:
@@ -228,59 +241,66 @@ class Debuggee:
                 has_entered = True
                 continue
             if entry is not None and top < entry:
-                return Halt("step")
+                return StopEvent("step")
             if (here.file, here.line) != (line and (line.file, line.line)) and here.start == self.machine.pc:
-                return Halt("step")
+                return StopEvent("step")
             if into and (has_entered or self.machine.pc == start):
-                return Halt("step")
-        return Halt("step")
+                return StopEvent("step")
+        return StopEvent("step")
 
-    def _one(self, into: bool) -> Halt | None:
-        """One instruction; a call to what has no lines, or any without `into`, as one; an interrupt not at all."""
+    def _step_instruction_or_call(self, into: bool) -> StopEvent | None:
+        """Run one instruction and skip interrupts. A call counts as one, except with `into` to a function that has
+        lines."""
         machine = self.machine
         pc, top = machine.pc, machine.w[STACK_POINTER]
         insn = decode_for_execution(machine.program.word(pc), machine.program.word(pc + 2))
         calls = insn is not None and facts_of(insn).flow is Call
-        halt = self._stepped()
-        if halt is not None:
-            return halt
-        if self.inspector.is_handler(machine.pc) and machine.w[STACK_POINTER] == top + PUSHED and not calls:
+        event = self._step()
+        if event is not None:
+            return event
+        if (
+            self.inspector.is_handler(machine.pc)
+            and machine.w[STACK_POINTER] == top + EXCEPTION_FRAME_BYTES
+            and not calls
+        ):
             return self.run_to([pc], lambda: machine.w[STACK_POINTER] == top)
         if calls and insn is not None and not (into and self._line() is not None):
-            back = pc + 2 * insn.words
-            return self.run_to([back], lambda: machine.w[STACK_POINTER] == top)
+            return_pc = pc + 2 * insn.words
+            return self.run_to([return_pc], lambda: machine.w[STACK_POINTER] == top)
         return None
 
-    def step_out(self) -> Halt:
-        """To where the function goes back to."""
+    def step_out(self) -> StopEvent:
+        """Run to the return of the current function."""
         frames = [one for one in self.inspector.frames() if one.kind != "inlined"]
         if len(frames) < 2 or frames[0].raw.entry is None:
-            return Halt("step", "there is no caller")
+            return StopEvent("step", "there is no caller")
         top = frames[0].raw.entry - 4
-        return self.run_to([frames[1].pc], lambda: self.machine.w[STACK_POINTER] == top) or Halt("step")
+        return self.run_to([frames[1].pc], lambda: self.machine.w[STACK_POINTER] == top) or StopEvent("step")
 
-    def go_to(self, cycle: int) -> Halt:
-        """To a cycle of the recording, or on to one behind it, unless something stops it before."""
+    def goto(self, cycle: int) -> StopEvent:
+        """Go to a cycle of the recording, or run on to a later cycle unless another stop comes first."""
         history = self.history
         if cycle <= history.end:
             history.seek(max(cycle, history.start))
-            return Halt("goto")
+            return StopEvent("goto")
         self._limit = cycle
         try:
-            hooked = not self.machine.is_asleep and self.machine.pc in self._places()
-            halt = (self._stepped() if hooked else None) or self._run()
+            hooked = not self.machine.is_asleep and self.machine.pc in self._breakpoint_addresses()
+            event = (self._step() if hooked else None) or self._run()
         finally:
             self._limit = None
-        return halt or Halt("goto" if self.machine.cycle >= cycle else "pause")
+        return event or StopEvent("goto" if self.machine.cycle >= cycle else "pause")
 
-    def arrive(self, cycle: int, pass_by: Callable[[], None] = lambda: None) -> bool:
-        """Run on to a cycle, whatever is on the way, unless somebody wants it to stand; whether it is there. `pass_by`
-        is called now and then."""
+    def run_to_cycle(self, cycle: int, offer_checkpoint: Callable[[], None] = lambda: None) -> bool:
+        """Run to a cycle past all breakpoints, and return whether the machine got there before a pause was requested.
+
+        `offer_checkpoint` is called between slices of the run.
+        """
         machine, before = self.machine, -1
-        while machine.cycle < cycle and machine.cycle > before and not self._wanted():
+        while machine.cycle < cycle and machine.cycle > before and not self._is_stop_requested():
             before = machine.cycle
-            pass_by()
-            self.history.advance(min(before + SLICE, cycle))
+            offer_checkpoint()
+            self.history.advance(min(before + SLICE_CYCLES, cycle))
         return machine.cycle >= cycle
 
     def _line(self) -> Line | None:
@@ -288,38 +308,38 @@ class Debuggee:
 
     # Back
 
-    def back_instruction(self) -> Halt:
-        """One instruction back."""
-        return Halt("step") if self.history.step_back() else START
+    def reverse_step_instruction(self) -> StopEvent:
+        """Go back by one instruction."""
+        return StopEvent("step") if self.history.step_back() else START_OF_RECORDING
 
-    def back_line(self) -> Halt:
-        """To the start of the line before, in this function or its caller."""
+    def reverse_step_line(self) -> StopEvent:
+        """Go back to the start of the previous line of this function or its caller."""
         start = self.inspector.function_start(self.machine.pc)
         line = self._line()
-        if line is not None and line.start != self.machine.pc:  # inside a line its own start comes first
+        if line is not None and line.start != self.machine.pc:  # from inside a line, the start of that line comes first
             line = Line(-1, -1, line.file, -line.line)
-        for positions in self.history.before():
+        for positions in self.history.earlier_steps():
             for at, (cycle, pc) in reversed(list(enumerate(positions))):
                 here = self.inspector.image.lines.find(pc)
                 begins = here is not None and here.start == pc and self.inspector.function_start(pc) == start
                 if begins and (line is None or here is None or (here.file, here.line) != (line.file, line.line)):
                     self.history.seek(cycle)
-                    return Halt("step")
+                    return StopEvent("step")
                 if pc == start and at:
                     self.history.seek(positions[at - 1][0])
-                    return Halt("step")
+                    return StopEvent("step")
         self.history.seek(self.history.start)
-        return START
+        return START_OF_RECORDING
 
-    def back_into(self) -> Halt:
-        """To the start of the line before, in whatever function that was; interrupts are passed by."""
+    def reverse_step_into(self) -> StopEvent:
+        """Go back to the start of the previous line in any function. Interrupts are skipped."""
         now, line, depth = self.machine.pc, self._line(), len(self._interrupts())
         here = (
             (line.file, line.line, self.inspector.function_start(now))
             if line is not None and line.start == now
             else None
         )
-        for positions in self.history.before():
+        for positions in self.history.earlier_steps():
             at = len(positions)
             while at:
                 at -= 1
@@ -330,81 +350,81 @@ class Debuggee:
                 self.history.seek(cycle)
                 handlers = self._interrupts()
                 if len(handlers) <= depth:
-                    return Halt("step")
+                    return StopEvent("step")
                 while at and positions[at][1] != handlers[0]:
                     at -= 1
         self.history.seek(self.history.start)
-        return START
+        return START_OF_RECORDING
 
     def _interrupts(self) -> list[int | None]:
-        """Where the handlers begin in which the machine stands, innermost first."""
+        """Return the entries of the active interrupt handlers, innermost first."""
         return [self.inspector.function_start(one.raw.pc) for one in self.inspector.frames() if one.kind == "interrupt"]
 
-    def back_out(self) -> Halt:
-        """To the call of this function, or to before the interrupt."""
+    def reverse_finish(self) -> StopEvent:
+        """Go back to the call of the current function, or to before the interrupt."""
         frame = next((one for one in self.inspector.frames() if one.kind != "inlined"), None)
         start = self.inspector.function_start(self.machine.pc)
         if frame is None or frame.raw.entry is None or start is None:
-            return Halt("step", "there is no caller")
+            return StopEvent("step", "there is no caller")
         machine, entry = self.machine, frame.raw.entry
         if machine.pc != start or machine.w[STACK_POINTER] != entry:
             self.history.run_back([start], lambda: machine.w[STACK_POINTER] == entry)
-        return self.back_instruction()
+        return self.reverse_step_instruction()
 
-    def back(self) -> Halt:
-        """Back to the last breakpoint; data breakpoints to the last write."""
-        places = self._places()
+    def reverse_continue(self) -> StopEvent:
+        """Go back to the last breakpoint, or to the last write that a data breakpoint observes."""
+        addresses = self._breakpoint_addresses()
         now = self.machine.cycle
-        found: list[tuple[int, Halt]] = []
-        if self.history.run_back(places, self._arrived) is not None:
-            found.append((self.machine.cycle, Halt("breakpoint", breakpoints=tuple(self._hit))))
+        found: list[tuple[int, StopEvent]] = []
+        if self.history.run_back(addresses, self._is_breakpoint_hit) is not None:
+            found.append((self.machine.cycle, StopEvent("breakpoint", breakpoints=tuple(self._hit))))
         for one in self.all():
             if one.kind == "data" and one.access != "read":
                 self.history.seek(now)
-                written = self.history.last_write(one.places[0], one.size)
+                written = self.history.last_write(one.addresses[0], one.size)
                 if written is not None:
                     text = f"write at {self.inspector.where(written.pc)}: {written.old.hex()} -> {written.new.hex()}"
-                    found.append((written.cycle, Halt("data breakpoint", text, (one.id,))))
+                    found.append((written.cycle, StopEvent("data breakpoint", text, (one.id,))))
         if not found:
             self.history.seek(self.history.start)
-            return START
-        cycle, halt = max(found, key=lambda one: one[0])
+            return START_OF_RECORDING
+        cycle, event = max(found, key=lambda one: one[0])
         self.history.seek(cycle)
-        return halt
+        return event
 
-    def restart(self) -> Halt:
-        """Back to where the recording began."""
+    def restart(self) -> StopEvent:
+        """Go back to the start of the recording."""
         self.history.seek(self.history.start)
-        return Halt("entry")
+        return StopEvent("entry")
 
-    def stop_at(self, breakpoints: Mapping[str, list[Breakpoint]], stops_at_faults: bool) -> None:
-        """Let what stopped another machine stop this one, and nothing else, hits counted."""
+    def install_breakpoints(self, breakpoints: Mapping[str, list[Breakpoint]], stops_at_faults: bool) -> None:
+        """Replace all breakpoints by those of another session, with their hit counts."""
         self.breakpoints.clear()
         self.breakpoints.update(breakpoints)
         self.stops_at_faults = stops_at_faults
-        self._rehook()
+        self._update_hooks()
 
-    def leave(self) -> None:
-        """Give the machine back as it would be without a debugger: in the present, with no breakpoint."""
+    def release(self) -> None:
+        """Restore the machine to its state without a debugger: in the present, without breakpoints."""
         self.breakpoints.clear()
-        self._rehook()
+        self._update_hooks()
         self.history.seek(self.history.end)
 
-    # What there is to see
+    # State
 
     def threads(self) -> list[Thread]:
-        """OpenSwarm's threads; empty for other firmware."""
+        """Return the threads of OpenSwarm; empty for other firmware."""
         return Threads(self.inspector).all()
 
     def frames(self) -> list[Frame]:
-        """The call stack where the machine stands."""
+        """Return the current call stack."""
         return self.inspector.frames()
 
 
-START: Final = Halt("entry", "start of recording")
+START_OF_RECORDING: Final = StopEvent("entry", "start of recording")
 
 
-def _meets(one: Breakpoint, touch: tuple[str, int, int]) -> bool:
+def _is_hit(one: Breakpoint, touch: tuple[str, int, int]) -> bool:
     kind, ea, size = touch
-    wanted = one.access == "readWrite" or one.access == kind
-    return wanted and ea < one.places[0] + one.size and one.places[0] < ea + size
+    matches = one.access == "readWrite" or one.access == kind
+    return matches and ea < one.addresses[0] + one.size and one.addresses[0] < ea + size

@@ -1,4 +1,4 @@
-"""Launch arguments of an editor's configuration: what they are called and of what kind they must be."""
+"""Launch arguments of an editor's configuration: names and types."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ KINDS: Final[dict[str, tuple[type, str]]] = {
     "stopOnEntry": (bool, "true or false"),
     "sourceRoots": (list, "a list of folders"),
 }
-"""By name. Editors send more that is theirs."""
+"""Type and description by name. Editors send further arguments of their own."""
 
 
-def checked(arguments: dict[str, Any]) -> dict[str, Any]:
-    """The arguments without those that are null. Raises ValueError for one of the wrong kind."""
+def validated(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments that are not null. Raises ValueError for one of the wrong type."""
     given = {name: value for name, value in arguments.items() if value is not None}
     for name, (kind, words) in KINDS.items():
         value = given.get(name)

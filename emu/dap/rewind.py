@@ -1,7 +1,8 @@
-"""Going back with what is around the machine: a trial of which it is one robot.
+"""Rewinding a machine together with its environment, the trial in which it is a robot.
 
-The machine finds the time by itself, in its own past; then the world is brought there (`Around.anew`) and the session
-goes on with it: in a copy of this process that was kept before, to which it leaves what it knows, or here.
+The machine first goes back alone, in its own recording. Then the environment goes to the same time
+(`Environment.rewind`). The session continues either in a checkpoint, a forked copy of this process to which it passes
+its `SessionState`, or in this process.
 """
 
 from __future__ import annotations
@@ -10,150 +11,156 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from emu.dap.breakpoint_requests import Stopping
+from emu.dap.breakpoint_requests import BreakpointRequests
 from emu.dap.breakpoints import Breakpoint
 from emu.dap.changes import Change
-from emu.dap.debuggee import Debuggee, Halt
-from emu.dap.state_requests import Refused
+from emu.dap.debuggee import Debuggee, StopEvent
+from emu.dap.state_requests import RequestRefusedError
 from emu.debug.history import History
 
 if TYPE_CHECKING:
     from emu.dap.wire import Message
     from emu.machine.machine import Machine
 
-HERE: Final = Halt("goto")
-"""Where it stands already."""
-INTERRUPTED: Final = Halt("pause", "on the way back")
+ALREADY_THERE: Final = StopEvent("goto")
+"""The machine is already at the requested time."""
+INTERRUPTED: Final = StopEvent("pause", "interrupted while rewinding")
 
 
-class Left(NamedTuple):
-    """What a session leaves to a copy of its process that is to go on from an earlier moment."""
+class SessionState(NamedTuple):
+    """State that a session passes to the checkpoint that continues it."""
 
     cycle: int
-    """To which it goes, and ..."""
-    halt: Halt
-    """... what is told of it there."""
+    """Cycle to which the checkpoint runs."""
+    event: StopEvent
+    """Event that the checkpoint reports at that cycle."""
     changes: list[tuple[int, Change]]
     breakpoints: dict[str, list[Breakpoint]]
     stops_at_faults: bool
     last_id: int
     last_reference: int
-    waiting: list[Message]
-    ends_all: bool
+    deferred: list[Message]
+    terminate_debuggee: bool
 
 
-class Returning(Stopping):
-    """Brings the world to where the machine stands. `_record` makes the recording by which that goes back."""
+class RewindingSession(BreakpointRequests):
+    """Session that rewinds the environment to the time of the machine. `_record` creates the machine's recording."""
 
     _record: Callable[[Machine], History]
-    _waiting: list[Message]
-    ends_all: bool
-    _over: bool
+    _deferred: list[Message]
+    terminate_debuggee: bool
+    _is_over: bool
     _pause: bool
-    _said: dict[int, bytearray]
+    _output: dict[int, bytearray]
 
     def __init__(self) -> None:
         self._changes: list[tuple[int, Change]] = []
-        """What was changed, and in which cycle."""
+        """Changes made by the client, each with its cycle."""
         self._is_muted = False
-        """What the firmware says on the way was said before."""
+        """Whether output is discarded, because the client has already received it in the original run."""
 
     @abstractmethod
-    def _wanted(self) -> bool:
-        """Whether the client wants the machine to stand."""
+    def _is_stop_requested(self) -> bool:
+        """Whether the client has requested a pause."""
 
     @abstractmethod
-    def _say(self, text: str, category: str = "console") -> None:
-        """Tell the user something."""
+    def _write_output(self, text: str, category: str = "console") -> None:
+        """Send text to the client."""
 
     @abstractmethod
-    def _listen(self, machine: Machine) -> None:
-        """Hear what the firmware says from now on."""
+    def _attach_output(self, machine: Machine) -> None:
+        """Forward the output of the machine's UARTs from now on."""
 
     @abstractmethod
-    def _stopped(self, halt: Halt) -> None:
-        """Tell where the machine stands."""
+    def _report_stop(self, event: StopEvent) -> None:
+        """Report to the client where the machine is paused."""
 
-    def _pass_by(self) -> None:
-        """Let a moment be kept, if the machine stands in its present. Raises WokenError in the copy."""
+    def _offer_checkpoint(self) -> None:
+        """Offer a checkpoint if the machine is in its present. Raises CheckpointResumedError in the checkpoint."""
         history = self._target.history if self._target is not None else None
-        if history is not None and history.around is not None and not history.is_past:
-            history.around.pass_by()
+        if history is not None and history.environment is not None and not history.is_past:
+            history.environment.offer_checkpoint()
 
-    def _followed(self, halt: Halt) -> Halt:
-        """The machine has gone somewhere; so does the world if moments of it are kept. What is to be told."""
+    def _rewind_if_followed(self, event: StopEvent) -> StopEvent:
+        """Rewind the environment to the machine if it has checkpoints. Return the event to report."""
         history = self._debuggee.history
-        follows = history.around is not None and history.around.keeps_moments and history.is_past
-        return self._brought(halt) if follows else halt
+        follows = history.environment is not None and history.environment.has_checkpoints and history.is_past
+        return self._rewound(event) if follows else event
 
-    def _bring(self) -> None:
-        """As `Looking._bring`."""
+    def _rewind_environment(self) -> None:
+        """Rewind the environment as `StateRequests` specifies."""
         history = self._debuggee.history
-        if history.around is None or not history.is_past:
+        if history.environment is None or not history.is_past:
             return
-        halt = self._brought(HERE)
-        if halt is not HERE:
-            self._go(lambda: halt)
-            raise Refused(f"interrupted on the way back, at cycle {self._debuggee.machine.cycle:,}")
+        event = self._rewound(ALREADY_THERE)
+        if event is not ALREADY_THERE:
+            self._run_action(lambda: event)
+            raise RequestRefusedError(f"interrupted while rewinding, at cycle {self._debuggee.machine.cycle:,}")
 
-    def _brought(self, halt: Halt) -> Halt:
-        """The world to where the machine stands now, in its past; `halt`, or where it was interrupted on the way."""
-        target, around = self._debuggee, self._debuggee.history.around
-        assert around is not None
+    def _rewound(self, event: StopEvent) -> StopEvent:
+        """Rewind the environment to the machine's cycle. Return `event`, or INTERRUPTED after a pause on the way."""
+        target, environment = self._debuggee, self._debuggee.history.environment
+        assert environment is not None
         cycle = target.machine.cycle
         changes = [one for one in self._changes if one[0] <= cycle]
-        left = Left(cycle, halt, changes, target.breakpoints, target.stops_at_faults, self._last_id,
-                    self._sights.last, self._waiting, self.ends_all)  # fmt: skip
+        session_state = SessionState(cycle, event, changes, target.breakpoints, target.stops_at_faults, self._last_id,
+                    self._references.last_reference, self._deferred, self.terminate_debuggee)  # fmt: skip
         self._pause = False
-        machine = around.anew(cycle, left)
-        self._say(f"the trial is run again up to cycle {cycle:,}\n")
-        fresh = Debuggee(machine, self._wanted, self._say, self._record(machine))
-        self._target, self._sights.inspector = fresh, fresh.inspector
-        self._listen(machine)
-        is_there = self._arrived(cycle, [], changes)
-        fresh.stop_at(target.breakpoints, target.stops_at_faults)
-        return halt if is_there else INTERRUPTED
+        machine = environment.rewind(cycle, session_state)
+        self._write_output(f"replaying the trial up to cycle {cycle:,}\n")
+        fresh = Debuggee(machine, self._is_stop_requested, self._write_output, self._record(machine))
+        self._target, self._references.inspector = fresh, fresh.inspector
+        self._attach_output(machine)
+        is_there = self._replay_changes(cycle, [], changes)
+        fresh.install_breakpoints(target.breakpoints, target.stops_at_faults)
+        return event if is_there else INTERRUPTED
 
-    def _take_over(self, left: Left) -> None:
-        """Go on, in a copy of the process that was woken, in place of that from which it was."""
+    def _resume_session(self, session_state: SessionState) -> None:
+        """Continue the session in a resumed checkpoint in place of the process that passed it `session_state`."""
         target = self._debuggee
-        target.stop_at({}, left.stops_at_faults)
-        self._last_id, self._sights.last = left.last_id, left.last_reference
-        self._waiting, self.ends_all, self._pause = left.waiting, left.ends_all, False
-        self._sights.forget()
-        self._said.clear()
-        is_there = self._arrived(left.cycle, self._changes, left.changes)
-        target.stop_at(left.breakpoints, left.stops_at_faults)
-        if not self._over:
-            self._stopped(left.halt if is_there else INTERRUPTED)
+        target.install_breakpoints({}, session_state.stops_at_faults)
+        self._last_id, self._references.last_reference = session_state.last_id, session_state.last_reference
+        self._deferred, self.terminate_debuggee, self._pause = (
+            session_state.deferred,
+            session_state.terminate_debuggee,
+            False,
+        )
+        self._references.clear()
+        self._output.clear()
+        is_there = self._replay_changes(session_state.cycle, self._changes, session_state.changes)
+        target.install_breakpoints(session_state.breakpoints, session_state.stops_at_faults)
+        if not self._is_over:
+            self._report_stop(session_state.event if is_there else INTERRUPTED)
 
-    def _arrived(self, cycle: int, done: list[tuple[int, Change]], changes: list[tuple[int, Change]]) -> bool:
-        """Run on to a cycle, no breakpoint asked, and change again what was changed, `done` is already; whether it got
-        there."""
+    def _replay_changes(self, cycle: int, done: list[tuple[int, Change]], changes: list[tuple[int, Change]]) -> bool:
+        """Run to a cycle past all breakpoints and repeat `changes`, of which `done` are already made.
+
+        Return whether the machine got there before a pause was requested.
+        """
         target = self._debuggee
         self._changes, self._is_muted = list(done), True
         try:
             for at, change in changes[len(done) :]:
-                if not self._goes_to(at, target):
+                if not self._run_to(at, target):
                     return False
-                change.do(target.inspector)
+                change.apply(target.inspector)
                 self._changes.append((at, change))
-            return self._goes_to(cycle, target)
+            return self._run_to(cycle, target)
         finally:
             self._is_muted = False
 
-    def _goes_to(self, cycle: int, target: Debuggee) -> bool:
-        around = target.history.around
-        if around is not None and around.keeps_moments:
-            return target.arrive(cycle, lambda: around.pass_by(cycle))
-        return target.arrive(cycle)
+    def _run_to(self, cycle: int, target: Debuggee) -> bool:
+        environment = target.history.environment
+        if environment is not None and environment.has_checkpoints:
+            return target.run_to_cycle(cycle, lambda: environment.offer_checkpoint(cycle))
+        return target.run_to_cycle(cycle)
 
-    def _change(self, change: Change) -> None:
-        """As `Looking._change`."""
-        frozen = self._debuggee.history.frozen
-        if frozen:
-            raise Refused(frozen)
-        self._bring()
-        change.do(self._debuggee.inspector)
-        if self._debuggee.history.around is not None:
+    def _apply(self, change: Change) -> None:
+        """Apply a change as `StateRequests` specifies."""
+        read_only_reason = self._debuggee.history.read_only_reason
+        if read_only_reason:
+            raise RequestRefusedError(read_only_reason)
+        self._rewind_environment()
+        change.apply(self._debuggee.inspector)
+        if self._debuggee.history.environment is not None:
             self._changes.append((self._debuggee.machine.cycle, change))

@@ -1,4 +1,4 @@
-"""Special function registers by peripheral, as the custom request `sfrs` tells them; looking has no side effect."""
+"""Special function registers by peripheral: the response to the custom request `sfrs`. Reads have no side effect."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ PERIPHERALS: Final = {
 """First address of each peripheral's registers in all dsPIC30F (chip reference, register map)."""
 
 
-def groups(machine: Machine) -> list[dict[str, Any]]:
-    """Peripherals, their registers, the fields of these, most significant first; each row has a name and a path, an
-    expression that names it to `evaluate`, a row with a value has that."""
+def sfr_groups(machine: Machine) -> list[dict[str, Any]]:
+    """Return peripherals with their registers, and registers with their fields, most significant first.
+
+    Each row has a name, and a path that `evaluate` accepts. Registers and fields also have a value.
+    """
     starts = list(PERIPHERALS)
     found: dict[str, list[dict[str, Any]]] = {}
     for sfr in sorted(machine.chip.sfrs.values(), key=lambda one: (one.address, -one.size)):

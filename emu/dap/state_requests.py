@@ -1,4 +1,4 @@
-"""Requests that look into a machine that stands, or change what is seen there: values, memory, instructions, names."""
+"""Requests that read or change a paused machine: values, memory, instructions, names."""
 
 from __future__ import annotations
 
@@ -7,120 +7,126 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Final
 
-from emu.dap.changes import Change, Poked, assigned
+from emu.dap.changes import Change, MemoryWrite, assignment
 from emu.dap.completions import completions
-from emu.dap.console import command
-from emu.dap.debuggee import Debuggee, Halt
-from emu.dap.sfrs import groups
-from emu.dap.variables import Row, Sights, Sources, disassembled
+from emu.dap.console import console_command
+from emu.dap.debuggee import Debuggee, StopEvent
+from emu.dap.sfrs import sfr_groups
+from emu.dap.variables import ReferenceTable, Row, Sources, disassembled
 from emu.debug.expressions.expression import evaluate
 from emu.debug.inspector import Value
 
-MOST_ROWS: Final = 1 << 16
-"""Instructions, or bytes of memory, that one request may ask for: as many as there are of either on a chip."""
+MAX_ROWS: Final = 1 << 16
+"""Maximum number of instructions or bytes in one request: as many as a chip has."""
 
 
-class Refused(Exception):
-    """A request that cannot be done; the text is for the user."""
+class RequestRefusedError(Exception):
+    """The request cannot be executed. The text is for the user."""
 
 
-class Looking(ABC):
-    """Answers by `_do_` and the request's name; what is being debugged is `_target` and `_views` once there is one."""
+class StateRequests(ABC):
+    """Handlers of requests: methods `_do_` followed by the name of the request.
+
+    `_target` and `_views` are the debuggee and its views, None before the launch.
+    """
 
     _target: Debuggee | None
-    _views: tuple[Sights, Sources] | None
+    _views: tuple[ReferenceTable, Sources] | None
 
     @abstractmethod
-    def _go(self, act: Callable[[], Halt]) -> None:
-        """Let the machine go, and tell where it halts."""
+    def _run_action(self, act: Callable[[], StopEvent]) -> None:
+        """Execute a function that moves the machine, and report where it stops."""
 
     @abstractmethod
-    def _bring(self) -> None:
-        """Bring what is around the machine to the time at which it stands. Raises Refused if it was interrupted."""
+    def _rewind_environment(self) -> None:
+        """Rewind the environment to the time of the machine. Raises RequestRefusedError if that is interrupted."""
 
     @abstractmethod
-    def _change(self, change: Change) -> None:
-        """Change the machine that stands here, and again whenever it is brought here anew. Raises Refused."""
+    def _apply(self, change: Change) -> None:
+        """Apply a change now, and again whenever the session returns to this time. Raises RequestRefusedError."""
 
-    def _world(self) -> list[tuple[str, str]]:
-        """What is around the machine, at the time at which it stands. Raises Refused."""
-        around = self._debuggee.history.around
-        if around is None:
-            raise Refused("there is nothing around this machine")
-        self._bring()
-        return around.seen()
+    def _environment_state(self) -> list[tuple[str, str]]:
+        """Return the state of the environment at the time of the machine. Raises RequestRefusedError."""
+        environment = self._debuggee.history.environment
+        if environment is None:
+            raise RequestRefusedError("this machine has no environment")
+        self._rewind_environment()
+        return environment.describe()
 
     @property
     def _debuggee(self) -> Debuggee:
         if self._target is None:
-            raise Refused("nothing is being debugged")
+            raise RequestRefusedError("no program has been launched")
         return self._target
 
     @property
-    def _sights(self) -> Sights:
+    def _references(self) -> ReferenceTable:
         if self._views is None:
-            raise Refused("nothing is being debugged")
+            raise RequestRefusedError("no program has been launched")
         return self._views[0]
 
     @property
     def _sources(self) -> Sources:
         if self._views is None:
-            raise Refused("nothing is being debugged")
+            raise RequestRefusedError("no program has been launched")
         return self._views[1]
 
     def _do_scopes(self, arguments: Row) -> Row:
-        frame = self._sights.frame(int(arguments["frameId"]))
-        return {"scopes": self._sights.scopes(frame) if frame is not None else []}
+        frame = self._references.frame(int(arguments["frameId"]))
+        return {"scopes": self._references.scopes(frame) if frame is not None else []}
 
     def _do_variables(self, arguments: Row) -> Row:
         start, count = int(arguments.get("start") or 0), int(arguments.get("count") or 0)
-        return {"variables": self._sights.variables(int(arguments["variablesReference"]), start, count)}
+        return {"variables": self._references.variables(int(arguments["variablesReference"]), start, count)}
 
     def _do_evaluate(self, arguments: Row) -> Any:
         text = str(arguments["expression"]).strip()
         if arguments.get("context") == "repl" and text.startswith("/"):
             if text == "/world":
-                return {"result": "\n".join(": ".join(one) for one in self._world()), "variablesReference": 0}
-            said = command(self._debuggee, text[1:])
+                return {
+                    "result": "\n".join(": ".join(one) for one in self._environment_state()),
+                    "variablesReference": 0,
+                }
+            said = console_command(self._debuggee, text[1:])
             if isinstance(said, str):
                 return {"result": said, "variablesReference": 0}
-            return {"result": "", "variablesReference": 0}, lambda: self._go(said)
+            return {"result": "", "variablesReference": 0}, lambda: self._run_action(said)
         name, equals, value = text.partition("=")
         if arguments.get("context") == "repl" and equals and not value.startswith("=") and name[-1:] not in "!<>=":
-            return self._assigned(name.strip(), value.strip(), arguments)
+            return self._assign(name.strip(), value.strip(), arguments)
         return self._result(text, arguments)
 
     def _result(self, text: str, arguments: Row) -> Row:
-        found = evaluate(self._debuggee.inspector, text, self._sights.frame(arguments.get("frameId")))
+        found = evaluate(self._debuggee.inspector, text, self._references.frame(arguments.get("frameId")))
         if not isinstance(found, Value):
             return {"result": str(found), "variablesReference": 0}
-        row = self._sights.shown(found, text)
+        row = self._references.row_of(found, text)
         if row["value"].startswith("<"):
-            raise Refused(row["value"][1:-1])
+            raise RequestRefusedError(row["value"][1:-1])
         return {"result": row.pop("value"), **row}
 
-    def _assigned(self, name: str, text: str, arguments: Row) -> Row:
-        inspector, frame = self._debuggee.inspector, self._sights.frame(arguments.get("frameId"))
+    def _assign(self, name: str, text: str, arguments: Row) -> Row:
+        inspector, frame = self._debuggee.inspector, self._references.frame(arguments.get("frameId"))
         place = evaluate(inspector, name, frame)
         if not isinstance(place, Value):
-            raise Refused(f"{name} is no place")
+            raise RequestRefusedError(f"{name} denotes no object")
         self._write(place, text, arguments)
         return self._result(name, arguments)
 
     def _write(self, place: Value, text: str, arguments: Row) -> None:
-        value = evaluate(self._debuggee.inspector, text, self._sights.frame(arguments.get("frameId")))
+        value = evaluate(self._debuggee.inspector, text, self._references.frame(arguments.get("frameId")))
         number = value.get() if isinstance(value, Value) else value
-        self._change(assigned(place, number))
+        self._apply(assignment(place, number))
 
     def _do_setVariable(self, arguments: Row) -> Row:
-        place = self._sights.find(int(arguments["variablesReference"]), str(arguments["name"]))
+        place = self._references.find(int(arguments["variablesReference"]), str(arguments["name"]))
         if place is None:
-            raise Refused(f"{arguments['name']} cannot be set")
+            raise RequestRefusedError(f"{arguments['name']} cannot be set")
         self._write(place, str(arguments["value"]), arguments)
-        return self._sights.shown(place.within(self._debuggee.inspector), str(arguments["name"]))
+        return self._references.row_of(place.rebind(self._debuggee.inspector), str(arguments["name"]))
 
     def _do_setExpression(self, arguments: Row) -> Row:
-        row = self._assigned(str(arguments["expression"]), str(arguments["value"]), arguments)
+        row = self._assign(str(arguments["expression"]), str(arguments["value"]), arguments)
         return {"value": row.pop("result"), **row}
 
     def _do_disassemble(self, arguments: Row) -> Row:
@@ -147,12 +153,12 @@ class Looking(ABC):
         data = base64.b64decode(arguments["data"], validate=True)
         if not data:
             return {"bytesWritten": 0}
-        self._change(Poked(address, data))
+        self._apply(MemoryWrite(address, data))
         return {"bytesWritten": len(data)}
 
     def _do_completions(self, arguments: Row) -> Row:
         text = str(arguments["text"])[: int(arguments["column"]) - 1]
-        names, replaced = completions(self._debuggee.inspector, self._sights.frame(arguments.get("frameId")), text)
+        names, replaced = completions(self._debuggee.inspector, self._references.frame(arguments.get("frameId")), text)
         start = len(text) - replaced
         return {"targets": [{"label": name, "type": kind, "start": start, "length": replaced} for name, kind in names]}
 
@@ -160,13 +166,13 @@ class Looking(ABC):
         return {"sources": self._sources.all()}
 
     def _do_sfrs(self, _arguments: Row) -> Row:
-        """Of our own: what the editor's view of registers shows."""
-        return {"groups": groups(self._debuggee.machine)}
+        """Handle the project's own request behind an editor's register view."""
+        return {"groups": sfr_groups(self._debuggee.machine)}
 
 
 def _size(arguments: Row, name: str) -> int:
-    """A number of rows or bytes. Raises Refused, KeyError, ValueError."""
+    """Return a number of rows or bytes. Raises RequestRefusedError, KeyError, ValueError."""
     count = int(arguments[name])
-    if not 0 <= count <= MOST_ROWS:
-        raise Refused(f"{name} {count} is not within 0 to {MOST_ROWS}")
+    if not 0 <= count <= MAX_ROWS:
+        raise RequestRefusedError(f"{name} {count} is not within 0 to {MAX_ROWS}")
     return count

@@ -1,6 +1,6 @@
-"""What a stopped machine shows: scopes, variables, registers, sources, disassembly, in the protocol's words.
+"""Responses about a stopped machine: scopes, variables, registers, sources, disassembly.
 
-References to variables and frames hold until the machine goes on; their numbers are never used again.
+References to variables and frames are valid until the machine continues. Their numbers are not reused.
 """
 
 from __future__ import annotations
@@ -20,49 +20,50 @@ from emu.instruments.disassembly import instruction
 REGISTERS: Final = 16
 FLAGS: Final = ("C", "Z", "OV", "N", "RA", "DC", "DA", "SAB", "OAB", "SB", "SA", "OB", "OA")
 POSTFIX: Final = re.compile(r"[\w$][\w$.\[\]>-]*|\(\*\(.*\)\)[\w.\[\]]*")
-"""Expressions whose parts can be named without brackets around them."""
+"""Expressions to which a member access can be appended without brackets."""
 Row = dict[str, Any]
 
 
-class Sights:
-    """References handed out since the machine stopped last. `world` tells what is around the machine, if anything."""
+class ReferenceTable:
+    """Variable and frame references of the current stop. `world` returns the state of the environment, if there is
+    one."""
 
     def __init__(
         self, inspector: Inspector, sources: Sources, world: Callable[[], list[tuple[str, str]]] | None = None
     ) -> None:
         self.inspector = inspector
-        """Of the machine that is looked into; references hold as well for another that stands where it did."""
+        """Inspector of the debugged machine. References remain valid for another machine in the same state."""
         self._sources: Final = sources
         self._world: Final = world
-        self.last = 0
-        """The last number that was handed out."""
+        self.last_reference = 0
+        """The last reference that was assigned."""
         self._frames: dict[int, Frame] = {}
         self._lists: dict[int, Callable[[], Iterator[tuple[str, Value | None, str]]]] = {}
 
-    def forget(self) -> None:
-        """The machine goes on."""
+    def clear(self) -> None:
+        """Invalidate all references, because the machine continues."""
         self._frames.clear()
         self._lists.clear()
 
     def frame(self, number: int | None) -> Frame | None:
-        """The frame of a reference; without one, the innermost. Raises ValueError for one that was never handed out, or
-        before the machine went on."""
+        """Return the frame of a reference, by default the innermost one. Raises ValueError for an invalid reference."""
         if number is not None:
             if number not in self._frames:
-                raise ValueError(f"frame {number} is none of where the machine stands")
+                raise ValueError(f"frame {number} is not valid at this stop")
             return self._frames[number]
         frames = self.inspector.frames()
         return frames[0] if frames else None
 
     def stack(self, frames: list[Frame]) -> list[Row]:
-        """Stack frames of the protocol."""
+        """Return frames in the form of the protocol."""
         rows = []
         for frame in frames:
-            self.last += 1
-            self._frames[self.last] = frame
+            self.last_reference += 1
+            self._frames[self.last_reference] = frame
             row: Row = {
-                "id": self.last, "name": frame.function + (" <interrupt>" if frame.kind == "interrupt" else ""),
-                "line": 0, "column": 0, "instructionPointerReference": f"{frame.pc:#08x}",
+                "id": self.last_reference,
+                "name": frame.function + (" <interrupt>" if frame.kind == "interrupt" else ""), "line": 0,
+                "column": 0, "instructionPointerReference": f"{frame.pc:#08x}",
             }  # fmt: skip
             if frame.line is not None and frame.line.line:
                 row |= {"line": frame.line.line, "column": 1, "source": self._sources.row(frame.line.file)}
@@ -72,7 +73,7 @@ class Sights:
         return rows
 
     def scopes(self, frame: Frame) -> list[Row]:
-        """Locals, statics and globals of the file, registers, SFRs, the world around the machine."""
+        """Return the scopes: locals, statics of the file, registers, SFRs, and the environment."""
         unit = frame.scopes[0].unit if frame.scopes else -1
 
         def of_variables(names: list[Any]) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
@@ -91,14 +92,14 @@ class Sights:
                       ("Registers", lambda: self._registers(frame), "registers", False),
                       ("SFRs", self._sfrs, "registers", True)]  # fmt: skip
         if self._world is not None:
-            everything.append(("World", self._around, "", True))
+            everything.append(("World", self._environment_rows, "", True))
         return [
-            {"name": name, "variablesReference": self._keep(rows), "expensive": slow}
+            {"name": name, "variablesReference": self._new_reference(rows), "expensive": slow}
             | ({"presentationHint": hint} if hint else {})
             for name, rows, hint, slow in everything
         ]
 
-    def _around(self) -> Iterator[tuple[str, Value | None, str]]:
+    def _environment_rows(self) -> Iterator[tuple[str, Value | None, str]]:
         for name, text in self._world() if self._world is not None else ():
             yield name, None, text
 
@@ -130,41 +131,41 @@ class Sights:
 
         return rows
 
-    def _keep(self, rows: Callable[[], Iterator[tuple[str, Value | None, str]]]) -> int:
-        self.last += 1
-        self._lists[self.last] = rows
-        return self.last
+    def _new_reference(self, rows: Callable[[], Iterator[tuple[str, Value | None, str]]]) -> int:
+        self.last_reference += 1
+        self._lists[self.last_reference] = rows
+        return self.last_reference
 
     def variables(self, reference: int, start: int = 0, count: int = 0) -> list[Row]:
-        """Members of a list; `count` 0 means all."""
+        """Return the members of a list from `start`; `count` 0 means all."""
         rows = self._list(reference)
         found = []
         for index, (name, value, path) in enumerate(rows()):
             if index < start or (count and index >= start + count):
                 continue
             found.append({"name": name, "value": path, "variablesReference": 0} if value is None
-                         else {"name": name, **self.shown(value, path)})  # fmt: skip
+                         else {"name": name, **self.row_of(value, path)})  # fmt: skip
         return found
 
     def find(self, reference: int, name: str) -> Value | None:
-        """The member called `name` of a list."""
+        """Return the member `name` of a list, None if there is none."""
         return next((value for one, value, _ in self._list(reference)() if one == name), None)
 
     def _list(self, reference: int) -> Callable[[], Iterator[tuple[str, Value | None, str]]]:
-        """Raises ValueError for a reference as `frame` does."""
+        """Return the list of a reference. Raises ValueError for an invalid reference."""
         if reference not in self._lists:
-            raise ValueError(f"reference {reference} is none of where the machine stands")
+            raise ValueError(f"reference {reference} is not valid at this stop")
         return self._lists[reference]
 
-    def shown(self, value: Value, path: str) -> Row:
-        """Text, type and references of a value; `path` is the expression that names it."""
+    def row_of(self, value: Value, path: str) -> Row:
+        """Return text, type and references of a value. `path` is an expression that denotes it."""
         row: Row = {"value": value.text(), "type": str(value.type), "variablesReference": 0, "evaluateName": path}
         if value.address is not None:
             row["memoryReference"] = f"{value.address:#06x}"
         sfr = self.inspector.image.chip.sfrs.get(value.name)
         if sfr is not None and sfr.fields and value.bits is None and value.address == sfr.address:
             row["value"] = f"{value.get():#06x}"
-            row["variablesReference"] = self._keep(self._fields(value))
+            row["variablesReference"] = self._new_reference(self._fields(value))
             row["namedVariables"] = len(sfr.fields)
         elif not value.text().startswith("<"):
             self._add_parts(row, value, path)
@@ -188,12 +189,12 @@ class Sights:
                 else:
                     yield part.name, part, f"{whole}.{part.name}"
 
-        row["variablesReference"] = self._keep(rows)
+        row["variablesReference"] = self._new_reference(rows)
         row["indexedVariables" if bare.kind == "array" else "namedVariables"] = len(members) or 1
 
 
 class Sources:
-    """Files of the line table and where they are on this machine."""
+    """Source files of the line table and their paths on this computer."""
 
     def __init__(self, inspector: Inspector, roots: list[Path]) -> None:
         self._inspector: Final = inspector
@@ -201,33 +202,33 @@ class Sources:
         self._paths: Final[dict[str, Path]] = {}
 
     def path(self, file: str) -> Path:
-        """Where `file` is: as it is written, or below one of the roots."""
+        """Return the path of `file`: as it is in the line table, or relative to one of the roots."""
         if file not in self._paths:
-            places = [Path(file), *(root / file for root in self._roots)]
-            found = next((place for place in places if place.exists()), places[0])
+            candidates = [Path(file), *(root / file for root in self._roots)]
+            found = next((one for one in candidates if one.exists()), candidates[0])
             self._paths[file] = found.resolve() if found.exists() else found
         return self._paths[file]
 
     def row(self, file: str) -> Row:
-        """A source of the protocol."""
+        """Return a source in the form of the protocol."""
         return {"name": Path(file).name, "path": str(self.path(file))}
 
     def all(self) -> list[Row]:
-        """Every file that code comes from."""
+        """Return all source files of the program."""
         return [self.row(file) for file in sorted({row.file for row in self._inspector.image.lines.rows})]
 
     def lines(self, path: str) -> list[Line]:
-        """Rows of the line table that come from the file a client calls `path`."""
+        """Return the rows of the line table for the file that a client calls `path`."""
         _, is_uri, rest = path.partition("://")
-        wanted = Path("/" + unquote(rest.partition("/")[2]) if is_uri else path)
-        wanted = wanted.resolve() if wanted.exists() else wanted
+        requested = Path("/" + unquote(rest.partition("/")[2]) if is_uri else path)
+        requested = requested.resolve() if requested.exists() else requested
         files = {row.file for row in self._inspector.image.lines.rows}
-        mine = {file for file in files if self.path(file) == wanted}
-        mine = mine or {file for file in files if Path(file).name == wanted.name}
+        mine = {file for file in files if self.path(file) == requested}
+        mine = mine or {file for file in files if Path(file).name == requested.name}
         return [row for row in self._inspector.image.lines.rows if row.file in mine]
 
-    def places(self, path: str, line: int) -> tuple[int, tuple[int, ...]]:
-        """The first line at or behind `line` that has code, and where in each function it begins; 0 if none has."""
+    def addresses(self, path: str, line: int) -> tuple[int, tuple[int, ...]]:
+        """Return the first line at or after `line` with code, and its address in each function; 0 if there is none."""
         rows = self.lines(path)
         behind = sorted({row.line for row in rows if row.line >= line})
         if not behind:
@@ -242,7 +243,7 @@ class Sources:
 
 
 def disassembled(inspector: Inspector, sources: Sources, address: int, count: int, symbols: bool) -> list[Row]:
-    """Exactly `count` rows of one word from `address`, with source lines where they begin."""
+    """Return exactly `count` rows of one program word each from `address`, with source lines at their starts."""
     rows: list[Row] = []
     program, end = inspector.machine.program, inspector.image.chip.program["flash"].end
     second = address >= 2 and _words(inspector, address - 2) == 2

@@ -15,35 +15,36 @@ from typing import Any, BinaryIO, Final, Protocol
 
 HEADER: Final = re.compile(rb"content-length:[ \t]*(\d{1,20})", re.IGNORECASE)
 READ_SIZE: Final = 1 << 16
-LOOK_SECONDS: Final = 0.1
-"""How long the reading thread may take to notice that it should end."""
-LONGEST: Final = 1 << 24
-"""Bytes of a message; a longer one is not one."""
-SHOWN: Final = 60
-"""Bytes of what is no message that are told."""
+POLL_SECONDS: Final = 0.1
+"""Interval at which the reader thread checks whether it must end."""
+MAX_MESSAGE_BYTES: Final = 1 << 24
+"""Maximum size of a message; a larger size is a protocol error."""
+EXCERPT_BYTES: Final = 60
+"""Bytes of an invalid message that are shown in the error."""
 
 Message = dict[str, Any]
 
 
-class _NoMessage(Exception):
-    """What came is none of the protocol's; the text says why."""
+class _ProtocolError(Exception):
+    """The received bytes are no valid message. The text gives the reason."""
 
 
 class Channel(Protocol):
-    """What a server talks over: messages that came, None at the end, and a way to send some."""
+    """Connection between a server and its client."""
 
     @property
     def inbox(self) -> SimpleQueue[Message | None]:
-        """What the client has sent."""
+        """Messages received from the client, then None at the end of the connection."""
 
     def send(self, message: Message) -> None:
-        """To the client."""
+        """Send a message to the client."""
 
 
 class Wire:
-    """Writes messages at once; reads them in a thread of its own into `inbox`, None at the end.
+    """Connection over byte streams. A reader thread puts received messages into `inbox`, then None at the end.
 
-    `source` is a file descriptor to read from."""
+    `source` is the file descriptor that it reads.
+    """
 
     def __init__(self, source: int, writer: BinaryIO) -> None:
         self._source: Final = source
@@ -52,18 +53,18 @@ class Wire:
         self._unread = bytearray()
         self._closed = False
         self.problem = ""
-        """What was wrong with what the client sent, so that nothing more was read; empty if it just ended."""
+        """Description of the protocol error that ended the connection; empty after a regular end."""
         self.inbox: Final[SimpleQueue[Message | None]] = SimpleQueue()
-        self._listener: Final = threading.Thread(target=self._listen, daemon=True)
+        self._listener: Final = threading.Thread(target=self._read_messages, daemon=True)
         self._listener.start()
 
     def close(self) -> None:
-        """Read no more; comes back when the reading thread has ended."""
+        """Stop reading and wait for the reader thread to end."""
         self._closed = True
         self._listener.join()
 
     def send(self, message: Message) -> None:
-        """Write one message; its `seq` is filled in. A client that has gone is not told."""
+        """Write one message and fill in its `seq`. If the client has disconnected, discard it and end the inbox."""
         self._seq += 1
         body = json.dumps({"seq": self._seq, **message}).encode()
         try:
@@ -72,19 +73,19 @@ class Wire:
         except (OSError, ValueError):
             self.inbox.put(None)
 
-    def _listen(self) -> None:
+    def _read_messages(self) -> None:
         try:
             while (message := self._read()) is not None:
                 self.inbox.put(message)
-        except _NoMessage as problem:  # what follows cannot be told apart any more
+        except _ProtocolError as problem:  # after an error the start of the next message is unknown
             self.problem = "" if self._closed else str(problem)
         self.inbox.put(None)
 
-    def _more(self) -> bool:
-        """Wait for bytes; false when there will be none."""
+    def _receive(self) -> bool:
+        """Wait for bytes. Return False at the end of the stream."""
         while not self._closed:
             try:
-                if select.select([self._source], [], [], LOOK_SECONDS)[0]:
+                if select.select([self._source], [], [], POLL_SECONDS)[0]:
                     data = os.read(self._source, READ_SIZE)
                     self._unread += data
                     return bool(data)
@@ -93,42 +94,42 @@ class Wire:
         return False
 
     def _read(self) -> Message | None:
-        """The next one, None at the end. Raises _NoMessage."""
+        """Return the next message, None at the end. Raises _ProtocolError."""
         while (end := self._unread.find(b"\r\n\r\n")) < 0:
-            if len(self._unread) > LONGEST:
-                raise _NoMessage(f"{LONGEST} bytes without an end of the header of a message")
-            if not self._more():
+            if len(self._unread) > MAX_MESSAGE_BYTES:
+                raise _ProtocolError(f"{MAX_MESSAGE_BYTES} bytes without the end of a message header")
+            if not self._receive():
                 if self._unread.strip():
-                    raise _NoMessage("it ends in the header of a message")
+                    raise _ProtocolError("the input ends in a message header")
                 return None
         header = HEADER.search(self._unread, 0, end)
         if header is None:
-            raise _NoMessage(f"expected `Content-Length: N` before a message, not {_shown(self._unread[:end])}")
+            raise _ProtocolError(f"expected `Content-Length: N` before a message, not {_excerpt(self._unread[:end])}")
         size = int(header[1])
-        if not 0 < size <= LONGEST:
-            raise _NoMessage(f"a message of {size} bytes; expected 1 to {LONGEST}")
+        if not 0 < size <= MAX_MESSAGE_BYTES:
+            raise _ProtocolError(f"a message of {size} bytes; expected 1 to {MAX_MESSAGE_BYTES}")
         while len(self._unread) < end + 4 + size:
-            if not self._more():
-                raise _NoMessage(f"it ends behind {len(self._unread) - end - 4} of {size} bytes of a message")
+            if not self._receive():
+                raise _ProtocolError(f"the input ends after {len(self._unread) - end - 4} of {size} bytes of a message")
         body = bytes(self._unread[end + 4 : end + 4 + size])
         del self._unread[: end + 4 + size]
         try:
             message = json.loads(body)
         except (ValueError, RecursionError):
-            raise _NoMessage(f"a message that is no JSON: {_shown(body)}") from None
+            raise _ProtocolError(f"a message is not valid JSON: {_excerpt(body)}") from None
         if not isinstance(message, dict):
-            raise _NoMessage(f"a message that is no object: {_shown(body)}")
+            raise _ProtocolError(f"a message is no JSON object: {_excerpt(body)}")
         return message
 
 
-def _shown(data: bytes | bytearray) -> str:
-    """Its beginning."""
-    return repr(bytes(data[:SHOWN]))[1:] + ("..." if len(data) > SHOWN else "")
+def _excerpt(data: bytes | bytearray) -> str:
+    """Return the first bytes as text."""
+    return repr(bytes(data[:EXCERPT_BYTES]))[1:] + ("..." if len(data) > EXCERPT_BYTES else "")
 
 
 @contextmanager
 def wire_over(connection: socket.socket) -> Iterator[Wire]:
-    """A wire over a connection, which is closed at the end, also if the client has gone before it was told all."""
+    """Context manager for a wire over `connection`. At exit both are closed, also if output is lost."""
     writer = connection.makefile("wb")
     wire = Wire(connection.fileno(), writer)
     try:

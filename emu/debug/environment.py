@@ -1,4 +1,4 @@
-"""What lives around a machine that is debugged, and can be brought back: the trial that a robot is part of."""
+"""The environment of a debugged machine (its trial), which can be rewound together with it."""
 
 from __future__ import annotations
 
@@ -8,30 +8,36 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
 
-class WokenError(Exception):
-    """In a copy of a process, kept at an earlier moment: it goes on in place of the one that has left it `left`."""
+class CheckpointResumedError(Exception):
+    """Raised in a checkpoint, a forked copy of the process, when it is resumed in place of the process that left it
+    `session_state`."""
 
-    def __init__(self, left: Any) -> None:
+    def __init__(self, session_state: Any) -> None:
         super().__init__("woken")
-        self.left = left
+        self.session_state = session_state
 
 
-class Around(Protocol):
-    """A world that goes on with the machine, never without it, and is the same every time it is begun."""
+class Environment(Protocol):
+    """The world around the machine. It runs only together with the machine, and every run of it is the same."""
 
     @property
-    def keeps_moments(self) -> bool:
-        """Whether it comes back from moments that are kept, so that it can follow every step back; otherwise it is
-        begun anew each time, which takes as long as it took to get there."""
+    def has_checkpoints(self) -> bool:
+        """Whether the environment takes checkpoints and can therefore follow every step back. Without checkpoints each
+        rewind repeats the run from its start."""
 
-    def seen(self) -> list[tuple[str, str]]:
-        """What there is to see in it now: names and values. The last is a digest of everything that lives in it."""
+    def describe(self) -> list[tuple[str, str]]:
+        """Return names and values of the environment's current state. The last value is a digest of the whole state."""
 
-    def anew(self, cycle: int, left: Any) -> Machine:
-        """Go back, so that `cycle` of the machine is yet to come. Either a copy of this process goes on, with what is
-        `left` to it, from the latest moment before, and this never comes back; or all begins again from its start, and
-        this is the machine that stands there now in place of the one before."""
+    def rewind(self, cycle: int, session_state: Any) -> Machine:
+        """Go back to a state before `cycle` of the machine.
 
-    def pass_by(self, near: int | None = None) -> None:
-        """The machine stands in its present, and a moment may be kept here: if one is due, or if the last is far from
-        `near`, a cycle to which it is about to go. Raises WokenError in the copy when that is to go on."""
+        If there is a checkpoint, the latest one before `cycle` is resumed with `session_state`, and this call does not
+        return. Otherwise the run starts again, and the result is the new machine at its start.
+        """
+
+    def offer_checkpoint(self, near: int | None = None) -> None:
+        """Give the environment an opportunity to take a checkpoint; the machine is in its present.
+
+        The environment takes one if it is due, or if the last one is far from `near`, the cycle that the machine will
+        run to. Raises CheckpointResumedError in the checkpoint when it is resumed.
+        """

@@ -1,8 +1,8 @@
-"""Calling one function of a firmware from outside, as a test of it does.
+"""Calls of single firmware functions from outside, for tests.
 
-What enters: a machine that stands, a function, arguments. What leaves: the function's result. What the function does
-to memory and devices stays; registers, stack pointer and priority are put back. Arguments go where the compiler's
-calls put them (abi-elf.md §2.2): each into the first free run of W0 to W7 that is aligned to its size.
+Inputs: a paused machine, a function, arguments. Output: the function's result. Effects on memory and peripherals
+persist; registers, stack pointer and priority are restored. Arguments are placed as the compiler's calls place them
+(abi-elf.md §2.2): each in the first free registers of W0 to W7 that are aligned to its size.
 """
 
 from __future__ import annotations
@@ -19,38 +19,40 @@ if TYPE_CHECKING:
 
 ARGUMENT_REGISTERS: Final = 8
 CALL_LEVEL: Final = 7
-"""No interrupt gets between: what the call does is the function's own doing."""
-ROOM: Final = 32
-"""Bytes left free above W15 for what an interrupted function was about to push."""
+"""CPU priority during the call: no interrupt is accepted."""
+SAFETY_MARGIN: Final = 32
+"""Bytes left free above W15, where the interrupted function may be about to push data."""
 POINTER: Final = Type("pointer", size=2)
 
 
 class CallError(RuntimeError):
-    """The function did not come back; the text says what happened."""
+    """The function did not return. The text gives the reason."""
 
 
 def call(machine: Machine, name: str, arguments: Sequence[Any], cycles: int) -> Any:
-    """The result of `name(*arguments)`: None for void, else as `Value.get` gives it.
+    """Return the result of `name(*arguments)`: None for void, else as `Value.get` returns it.
 
-    Numbers are converted to the parameters' types; bytes become a copy on the stack and a pointer to it. Raises
-    KeyError for an unknown function, ValueError for arguments that do not fit, CallError if it does not return within
-    `cycles`.
+    Numbers are converted to the parameters' types. Bytes are copied to the stack and passed as a pointer. Raises
+    KeyError for an unknown function, ValueError for unsuitable arguments, CallError if the function does not return
+    within `cycles`.
     """
     inspector = Inspector(machine)
     address = machine.program_address(name)
     function = inspector.debug.function(address)
-    types = _parameters(function, arguments)
-    kept = (machine.pc, [machine.w[n] for n in range(16)], machine.state.sr, machine.state.corcon)
+    types = _parameter_types(function, arguments)
+    saved = (machine.pc, [machine.w[n] for n in range(16)], machine.state.sr, machine.state.corcon)
     stall, repeat = machine.state.stall, machine.state.repeat
     end = machine.chip.program["flash"].end - 2
-    top = machine.w[15] + ROOM & 0xFFFE
+    top = machine.w[15] + SAFETY_MARGIN & 0xFFFE
     placed: list[int] = []
     for value in arguments:
         if isinstance(value, bytes | bytearray):
             machine.poke(top, int.from_bytes(value, "little"), max(len(value), 1))
             placed.append(top)
             top += len(value) + 1 & ~1
-    _pass(machine, types, [placed.pop(0) if isinstance(one, bytes | bytearray) else one for one in arguments])
+    _place_arguments(
+        machine, types, [placed.pop(0) if isinstance(one, bytes | bytearray) else one for one in arguments]
+    )
     machine.poke(top, end & 0xFFFF, 2)
     machine.poke(top + 2, end >> 16, 2)
     machine.w[15] = top + 4
@@ -65,7 +67,7 @@ def call(machine: Machine, name: str, arguments: Sequence[Any], cycles: int) -> 
     result = bytes(machine.record.bytes[0:8])
     if stop.reason != "breakpoint" or stop.pc != end:
         raise CallError(f"{name} did not return: {stop.fault.report() if stop.fault is not None else stop}")
-    machine.pc, registers, machine.state.sr, machine.state.corcon = kept
+    machine.pc, registers, machine.state.sr, machine.state.corcon = saved
     for number, value in enumerate(registers):
         machine.w[number] = value
     machine.state.stall, machine.state.repeat = stall, repeat
@@ -74,8 +76,8 @@ def call(machine: Machine, name: str, arguments: Sequence[Any], cycles: int) -> 
     return None if returned is None or not returned.bytes else decode(returned, result)
 
 
-def _parameters(function: Scope | None, arguments: Sequence[Any]) -> list[Type]:
-    """Types of the parameters; without debug information numbers are words."""
+def _parameter_types(function: Scope | None, arguments: Sequence[Any]) -> list[Type]:
+    """Return the types of the parameters. Without debug information, numbers are 16-bit words."""
     if function is None:
         return [POINTER if isinstance(one, bytes | bytearray) else UNSIGNED[2] for one in arguments]
     types = [one.type for one in function.variables if one.is_parameter]
@@ -86,8 +88,8 @@ def _parameters(function: Scope | None, arguments: Sequence[Any]) -> list[Type]:
     return types
 
 
-def _pass(machine: Machine, types: Sequence[Type], values: Sequence[Any]) -> None:
-    """Arguments into W0 to W7."""
+def _place_arguments(machine: Machine, types: Sequence[Type], values: Sequence[Any]) -> None:
+    """Put the arguments into W0 to W7. Raises ValueError if they do not fit."""
     free = [True] * ARGUMENT_REGISTERS
     for kind, value in zip(types, values, strict=True):
         if not kind.is_number:

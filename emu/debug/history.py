@@ -1,12 +1,12 @@
-"""Time travel: a machine that can be put back to any earlier instruction, to the bit.
+"""Time travel: restore a machine to any earlier instruction, bit for bit.
 
-What enters: a machine, and everything that is done to it between runs. What leaves: the same machine at another time.
-States are kept at intervals; any other is had by running again from the one before it. Runs repeat exactly, so only
-what comes from outside between two runs must be kept: it shows as a difference to where the last run ended, and the
-state with it is kept for good. What a listener does to the machine in the middle of a run is not known here.
+Inputs: a machine, and every change made to it between runs. Output: the same machine at another time. The history
+stores states at intervals and restores any other state by replaying from the one before it. Runs are deterministic, so
+only input between runs must be stored. The history detects input as a difference from the end of the last run, and
+never discards the state that contains it. Changes that a callback makes during a run are not recorded.
 
-Time is the cycle: no two states between two steps have the same. A step is an instruction, or the entry of an
-interrupt: whoever stands on the first instruction of a handler stands between two steps.
+Time is measured in cycles: no two states between steps have the same cycle. A step is an instruction or the entry of an
+interrupt. A machine at the first instruction of a handler is therefore between two steps.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from typing import TYPE_CHECKING, Final
 from emu.system.events import NEVER
 
 if TYPE_CHECKING:
-    from emu.debug.environment import Around
+    from emu.debug.environment import Environment
     from emu.machine.machine import Machine
     from emu.machine.stops import Stop
 
 PERIOD: Final = 1 << 20
-"""Cycles between kept states: 71 ms of an e-puck, so a step back takes what running that long takes."""
-MOST: Final = 4096
-"""Kept states; beyond, of the older half every other one goes."""
+"""Cycles between stored states: 71 ms of an e-puck. A step back takes as long as a run of this length."""
+MAX_STATES: Final = 4096
+"""Maximum number of stored states. Beyond it, every other state of the older half is discarded."""
 FIRST_WINDOW, WIDER, WIDEST = 64, 16, 1 << 26
-"""Cycles that are stepped to find the step before, and how they grow while the CPU sleeps."""
+"""Cycles that are stepped to find the previous step: initial value, growth factor while the CPU sleeps, and maximum."""
 STACK_POINTER: Final = 15
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """A state: packed without flash, and flash, which is shared as long as it does not change."""
+class StoredState:
+    """A state of the machine, compressed without flash. Consecutive states share the flash while it does not change."""
 
     cycle: int
     packed: bytes
     flash: bytes
     is_input: bool
-    """Something came from outside just before."""
+    """Whether the machine received input just before this state."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """An instruction that wrote to a place: it stands at `pc` and begins in `cycle`."""
+    """A write to the observed bytes by the instruction at `pc`, which begins in `cycle`."""
 
     cycle: int
     pc: int
@@ -55,196 +55,202 @@ class Write:
     new: bytes
 
 
-def place(machine: Machine) -> tuple[int, int]:
-    """PC and stack pointer: what changes when an interrupt is entered."""
+def position(machine: Machine) -> tuple[int, int]:
+    """Return PC and stack pointer, which change when an interrupt is entered."""
     return machine.pc, machine.w[STACK_POINTER]
 
 
 class History:
-    """Records `machine` from now on, if it is run with `advance` or `step` of this."""
+    """Records `machine` from now on, provided that `advance` and `step` of this class run it."""
 
-    def __init__(self, machine: Machine, *, period: int = PERIOD, most: int = MOST) -> None:
+    def __init__(self, machine: Machine, *, period: int = PERIOD, max_states: int = MAX_STATES) -> None:
         self.machine: Final = machine
-        self.around: Around | None = None
-        """What lives around the machine. It stands in the present while the machine alone goes back."""
+        self.environment: Environment | None = None
+        """The environment of the machine. It remains in the present while the machine alone goes back."""
         self.period: Final = period
-        self.most: Final = most
+        self.max_states: Final = max_states
         self._flash: Final = slice(
             machine.program.flash_offset, machine.program.flash_offset + machine.program.flash.nbytes
         )
-        self._kept: list[Kept] = []
+        self._states: list[StoredState] = []
         self._cycles: list[int] = []
-        self._ended = b""
-        self._behind: tuple[int, list[int]] = (-1, [])
-        """A cycle, and the cycles of the steps before it, oldest first: found by the last step back."""
+        self._last_state = b""
+        self._previous_steps: tuple[int, list[int]] = (-1, [])
+        """A cycle, and the cycles of the steps before it, oldest first, as the last step back found them."""
         self.end = machine.cycle
-        """The present: the latest cycle that was run to."""
-        self._keep(machine.snapshot(), is_input=True)
+        """The present: the latest cycle that the machine has reached."""
+        self._store(machine.snapshot(), is_input=True)
 
     @property
     def start(self) -> int:
-        """The earliest cycle one can go back to."""
+        """The earliest cycle of the recording."""
         return self._cycles[0]
 
     @property
     def is_past(self) -> bool:
-        """Whether the machine stands before `end`."""
+        """Whether the machine is at a cycle before `end`."""
         return self.machine.cycle < self.end
 
     @property
-    def frozen(self) -> str:
-        """Why the machine may not be changed now; empty if it may."""
+    def read_only_reason(self) -> str:
+        """Why the machine must not be changed now; empty if it may be changed."""
         return ""
 
     @property
     def size(self) -> int:
-        """Bytes kept."""
-        flash = {id(one.flash): len(one.flash) for one in self._kept}
-        return sum(len(one.packed) for one in self._kept) + sum(flash.values())
+        """Bytes used by the stored states."""
+        flash = {id(one.flash): len(one.flash) for one in self._states}
+        return sum(len(one.packed) for one in self._states) + sum(flash.values())
 
-    # Going on
+    # Forward
 
     def advance(self, cycle: int) -> Stop | None:
-        """As `Machine.advance`. In the past it is the same again, input included, and nobody is told; but if the
-        machine was changed, what came later is forgotten."""
+        """Run as `Machine.advance` does. In the past, replay the recording with its input and without observers.
+
+        If the machine was changed in the past, the recording after that point is discarded.
+        """
         machine = self.machine
-        self._notice()
+        self._detect_change()
         stop = None
         while stop is None and machine.cycle < cycle:
             place = bisect_right(self._cycles, machine.cycle)
             following = self._cycles[place] if place < len(self._cycles) else self._cycles[-1] + self.period
             target = min(cycle, max(following, machine.cycle + 1))
             if self.is_past:
-                with self._silence():
+                with self._replaying():
                     stop = machine.run_until(min(target, self.end))
-                self._take_input()
+                self._replay_input()
             else:
-                stop = self._run_on(target)
-                self._reached(following)
-        self._ended = machine.snapshot()
+                stop = self._advance_present(target)
+                self._record_progress(following)
+        self._last_state = machine.snapshot()
         return stop
 
     def step(self) -> Stop | None:
-        """As `Machine.step`, but that an interrupt is entered is a step of its own."""
-        self._notice()
+        """Step as `Machine.step` does, except that the entry of an interrupt is a separate step."""
+        self._detect_change()
         following = self._cycles[-1] + self.period
         if self.is_past:
-            with self._silence():
-                stop = self._single()
-            self._take_input()
+            with self._replaying():
+                stop = self._step_once()
+            self._replay_input()
         else:
-            stop = self._step_on()
-            self._reached(following)
-        self._ended = self.machine.snapshot()
+            stop = self._step_present()
+            self._record_progress(following)
+        self._last_state = self.machine.snapshot()
         return stop
 
-    def _run_on(self, cycle: int) -> Stop | None:
-        """Run beyond the present."""
+    def _advance_present(self, cycle: int) -> Stop | None:
+        """Run from the present to `cycle`."""
         return self.machine.advance(cycle)
 
-    def _step_on(self) -> Stop | None:
-        """Step beyond the present."""
-        return self._single()
+    def _step_present(self) -> Stop | None:
+        """Step from the present."""
+        return self._step_once()
 
-    def _single(self) -> Stop | None:
-        """One step. A sleeping CPU sleeps until something wakes it."""
+    def _step_once(self) -> Stop | None:
+        """Make one step. A sleeping CPU sleeps until an event wakes it."""
         machine = self.machine
-        before = place(machine)
+        start = position(machine)
         stop = machine.service_boundary(NEVER)
         if stop is not None:
             return stop
-        return machine.run_until(machine.cycle) if place(machine) != before else machine.step()
+        return machine.run_until(machine.cycle) if position(machine) != start else machine.step()
 
-    def _take_input(self) -> None:
-        """What came from outside at this cycle comes again."""
-        kept = self._kept[bisect_right(self._cycles, self.machine.cycle) - 1]
-        if kept.is_input and kept.cycle == self.machine.cycle:
-            with self._silence():
-                self.machine.restore_record(self._state(kept))
+    def _replay_input(self) -> None:
+        """Restore the input that the machine received at this cycle."""
+        stored = self._states[bisect_right(self._cycles, self.machine.cycle) - 1]
+        if stored.is_input and stored.cycle == self.machine.cycle:
+            with self._replaying():
+                self.machine.restore_record(self._unpacked(stored))
 
-    def _reached(self, following: int) -> None:
+    def _record_progress(self, following: int) -> None:
         cycle = self.machine.cycle
         if cycle > self.end:
             self.end = cycle
             if cycle >= following:
-                self._keep(self.machine.snapshot(), is_input=False)
+                self._store(self.machine.snapshot(), is_input=False)
 
-    def _notice(self) -> None:
-        """Whether the machine is as the last run left it; if not, this is a new present."""
+    def _detect_change(self) -> None:
+        """Store a new state if the machine was changed since the last run, and make this cycle the present."""
         state = self.machine.snapshot()
-        if state == self._ended:
+        if state == self._last_state:
             return
         cycle = self.machine.cycle
-        self._behind = (-1, [])
+        self._previous_steps = (-1, [])
         place = bisect_right(self._cycles, cycle)
-        if self._ended or cycle != self.start:
-            del self._kept[place:], self._cycles[place:]
+        if self._last_state or cycle != self.start:
+            del self._states[place:], self._cycles[place:]
             self.end = cycle
-            self._keep(state, is_input=True)
-        self._ended = state
+            self._store(state, is_input=True)
+        self._last_state = state
 
-    def _keep(self, state: bytes, is_input: bool) -> None:
+    def _store(self, state: bytes, is_input: bool) -> None:
         flash = state[self._flash]
-        if self._kept and self._kept[-1].flash == flash:
-            flash = self._kept[-1].flash
+        if self._states and self._states[-1].flash == flash:
+            flash = self._states[-1].flash
         packed = zlib.compress(state[: self._flash.start] + state[self._flash.stop :], 1)
-        self._kept.append(Kept(self.machine.cycle, packed, flash, is_input))
+        self._states.append(StoredState(self.machine.cycle, packed, flash, is_input))
         self._cycles.append(self.machine.cycle)
-        if len(self._kept) > self.most:
-            self._thin()
+        if len(self._states) > self.max_states:
+            self._discard_states()
 
-    def _thin(self) -> None:
-        half = len(self._kept) // 2
-        old = [one for number, one in enumerate(self._kept[:half]) if one.is_input or number % 2 == 0]
-        self._kept[:half] = old
-        self._cycles = [one.cycle for one in self._kept]
+    def _discard_states(self) -> None:
+        half = len(self._states) // 2
+        old = [one for number, one in enumerate(self._states[:half]) if one.is_input or number % 2 == 0]
+        self._states[:half] = old
+        self._cycles = [one.cycle for one in self._states]
 
-    def _state(self, kept: Kept) -> bytes:
-        rest = zlib.decompress(kept.packed)
-        return rest[: self._flash.start] + kept.flash + rest[self._flash.start :]
+    def _unpacked(self, stored: StoredState) -> bytes:
+        rest = zlib.decompress(stored.packed)
+        return rest[: self._flash.start] + stored.flash + rest[self._flash.start :]
 
-    # Going back
+    # Back
 
     def seek(self, cycle: int) -> None:
-        """Put the machine to `cycle`, which must be one it has stood in between two instructions, or to the first such
-        behind it. Raises ValueError for a time that was not recorded."""
+        """Restore the machine to `cycle`, or to the first instruction boundary after it.
+
+        Raises ValueError for a cycle that is not in the recording.
+        """
         if not self.start <= cycle <= self.end:
             raise ValueError(f"cycle {cycle:,} is not in the recording, {self.start:,} to {self.end:,}")
-        self._notice()
-        self._go(cycle)
+        self._detect_change()
+        self._goto(cycle)
 
-    def _go(self, cycle: int) -> None:
-        with self._silence():
+    def _goto(self, cycle: int) -> None:
+        with self._replaying():
             self._restore(cycle)
             if self.machine.cycle < cycle:
                 self.machine.run_until(cycle)
-        self._ended = self.machine.snapshot()
+        self._last_state = self.machine.snapshot()
 
     def step_back(self) -> bool:
-        """Go back by one step; false at the beginning of the recording."""
-        self._notice()
+        """Go back by one step. Return False at the start of the recording."""
+        self._detect_change()
         now = self.machine.cycle
         if now <= self.start:
             return False
-        behind = self._behind[1] if self._behind[0] == now else []
+        behind = self._previous_steps[1] if self._previous_steps[0] == now else []
         window = FIRST_WINDOW
         while not behind and window <= WIDEST:
             begin = max(self.start, now - window)
             behind = [cycle for cycle, _ in self._steps(begin, now)]
             if begin == self.start:
                 break
-            del behind[:1]  # `begin` may be where the CPU wakes to enter an interrupt: inside of a step
+            del behind[:1]  # the CPU may wake at `begin` to enter an interrupt, which is inside a step
             window *= WIDER
-        self._go(behind.pop() if behind else self.start)
-        self._behind = (self.machine.cycle, behind)
+        self._goto(behind.pop() if behind else self.start)
+        self._previous_steps = (self.machine.cycle, behind)
         return True
 
     def _steps(self, begin: int, now: int) -> Iterator[tuple[int, int]]:
-        """(cycle, PC) of the steps from `begin` to `now`, run again with their input. A sleep that began before `begin`
-        is no step of its own."""
+        """Replay from `begin` to `now` and yield (cycle, PC) of every step.
+
+        A sleep that began before `begin` is no step of its own.
+        """
         machine = self.machine
-        inputs = [kept for kept in self._kept if kept.is_input and begin < kept.cycle < now]
-        with self._silence():
+        inputs = [stored for stored in self._states if stored.is_input and begin < stored.cycle < now]
+        with self._replaying():
             base = self._restore(begin)
             if machine.cycle < begin:
                 machine.run_until(begin)
@@ -253,63 +259,69 @@ class History:
                 if not began_asleep:
                     yield machine.cycle, machine.pc
                 began_asleep = False
-                self._single()
+                self._step_once()
                 if inputs and inputs[0].cycle <= machine.cycle:  # between two steps, or while the CPU sleeps
-                    machine.restore_record(self._state(inputs.pop(0)))
+                    machine.restore_record(self._unpacked(inputs.pop(0)))
 
-    def before(self) -> Iterator[list[tuple[int, int]]]:
-        """(cycle, PC) of the steps before now, oldest first, in longer and longer lists; the last begins where the
-        recording does. The machine stands where it stood only after `seek`."""
+    def earlier_steps(self) -> Iterator[list[tuple[int, int]]]:
+        """Yield lists of (cycle, PC) of the steps before now, oldest first, each longer than the last.
+
+        The last list begins at the start of the recording. Only `seek` restores the machine afterwards.
+        """
         now = self.machine.cycle
-        self._notice()
+        self._detect_change()
         window = FIRST_WINDOW
         while True:
             begin = max(self.start, now - window)
             positions = list(self._steps(begin, now))
-            self._ended = self.machine.snapshot()
+            self._last_state = self.machine.snapshot()
             yield positions
             if begin <= self.start or window > WIDEST:
                 return
             window *= WIDER
 
     def run_back(self, places: Collection[int], condition: Callable[[], bool] | None = None) -> int | None:
-        """Go back to the last arrival before now at one of the program addresses where `condition` holds; its address.
-        None: there is none, and the machine stands at the beginning of the recording."""
+        """Go back to the last arrival at one of the program addresses `places` at which `condition` holds.
+
+        Return its address. Without such an arrival return None; the machine is then at the start of the recording.
+        """
         now = self.machine.cycle
-        self._notice()
+        self._detect_change()
         last: int | None = None
-        for begin, end in self._intervals(now):
+        for begin, end in self._intervals_before(now):
             last = self._last_arrival(begin, end, places, condition)
             if last is not None:
                 break
-        self._go(self.start if last is None else last)
+        self._goto(self.start if last is None else last)
         return None if last is None else self.machine.pc
 
     def last_write(self, address: int, size: int, *, changes: bool = True) -> Write | None:
-        """Go back to the instruction before now that wrote to one of the bytes last (with `changes`: other values), and
-        stand before it. None: there is none, and the machine stands where it stood.
+        """Go back to just before the last instruction that wrote to one of the bytes (with `changes`: that changed
+        one).
 
-        Every instruction on the way back is looked at, one by one.
+        Return None and leave the machine where it is if there is none. Every instruction of the replay is
+        single-stepped.
         """
         now = self.machine.cycle
-        self._notice()
-        for begin, end in self._intervals(now):
+        self._detect_change()
+        for begin, end in self._intervals_before(now):
             found = self._last_write(begin, end, address, size, changes)
             if found is not None:
-                self._go(found.cycle)
+                self._goto(found.cycle)
                 return found
-        self._go(now)
+        self._goto(now)
         return None
 
-    def _intervals(self, now: int) -> Iterator[tuple[Kept, int]]:
-        """Kept states from the latest before `now` back, each with the cycle up to which it is looked at."""
+    def _intervals_before(self, now: int) -> Iterator[tuple[StoredState, int]]:
+        """Yield stored states, from the latest before `now` backwards, each with the cycle at which its interval
+        ends."""
         end = now
-        for kept in reversed(self._kept[: bisect_right(self._cycles, max(now - 1, self.start))]):
-            yield kept, end
-            end = kept.cycle
+        for stored in reversed(self._states[: bisect_right(self._cycles, max(now - 1, self.start))]):
+            yield stored, end
+            end = stored.cycle
 
     def _last_arrival(
-        self, begin: Kept, end: int, places: Collection[int], condition: Callable[[], bool] | None
+        self, begin: StoredState, end: int, places: Collection[int], condition: Callable[[], bool] | None
     ) -> int | None:
         machine = self.machine
         last: int | None = None
@@ -322,8 +334,8 @@ class History:
 
         removals = [machine.hook_pc(place, lambda: False) for place in places]
         try:
-            with self._silence():
-                machine.restore_record(self._state(begin))
+            with self._replaying():
+                machine.restore_record(self._unpacked(begin))
                 machine.replay_condition = arrived
                 machine.run_until(end)
         finally:
@@ -332,7 +344,7 @@ class History:
                 remove()
         return last
 
-    def _last_write(self, begin: Kept, end: int, address: int, size: int, changes: bool) -> Write | None:
+    def _last_write(self, begin: StoredState, end: int, address: int, size: int, changes: bool) -> Write | None:
         machine, data = self.machine, self.machine.core.data
         found: Write | None = None
         hit = False
@@ -343,8 +355,8 @@ class History:
             hit = hit or (ea < address + size and address < ea + width)
             write(ea, value, width)
 
-        with self._silence():
-            machine.restore_record(self._state(begin))
+        with self._replaying():
+            machine.restore_record(self._unpacked(begin))
             vars(data)["write"] = noted
             try:
                 while machine.cycle < end:
@@ -363,14 +375,14 @@ class History:
         return found
 
     def _restore(self, cycle: int) -> int:
-        """Put the latest kept state at or before `cycle` back; returns its cycle."""
-        kept = self._kept[max(bisect_right(self._cycles, cycle) - 1, 0)]
-        self.machine.restore_record(self._state(kept))
-        return kept.cycle
+        """Restore the latest stored state at or before `cycle`, and return its cycle."""
+        stored = self._states[max(bisect_right(self._cycles, cycle) - 1, 0)]
+        self.machine.restore_record(self._unpacked(stored))
+        return stored.cycle
 
     @contextmanager
-    def _silence(self) -> Iterator[None]:
-        """Nobody hears what has been told already, nor are edges of pins that wait to be told taken for later ones."""
+    def _replaying(self) -> Iterator[None]:
+        """Replay without observers inside the block. Pending pin edges are reported before it."""
         self.machine.pins.flush()
         self.machine.peripherals.deliver_uart_output()
         events, held = self.machine.events, self.machine.save_host_state()

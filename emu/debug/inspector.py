@@ -1,7 +1,6 @@
-"""One program in one machine, seen from its source: frames of the call stack, what is in scope, values by name.
+"""View of a paused machine by its source: call stack, variables in scope, and values by name.
 
-What enters: a machine that stands between two instructions. What leaves: `Frame`s and `Value`s. Nothing is changed
-unless a value is set.
+Input: a machine between two instructions. Outputs: `Frame`s and `Value`s. Only `Value.set` changes the machine.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from emu.debug.dwarf import location
 from emu.debug.dwarf.types import UNSIGNED, Type, decode, decode_member, encode, parts_of, text_of
 from emu.debug.dwarf.units import DebugInfo, Scope, Variable, debug_of
-from emu.debug.unwind import Code, Raw, Unwinder
+from emu.debug.unwind import CodeAnalysis, RawFrame, Unwinder
 from emu.image.lines import Line
 from emu.image.model import Image
 
@@ -24,28 +23,28 @@ if TYPE_CHECKING:
 
 REGISTERS: Final = 16
 STACK_POINTER: Final = 15
-FRAME_BASED: Final = bytes([location.FBREG])
-"""What the location of a variable in a frame begins with."""
-ABSENT: Final = bytes(location.ADDR_0)
-"""Where the linker puts what it leaves out."""
+FRAME_BASE_OPERATION: Final = bytes([location.FBREG])
+"""First operation of the location of a variable in a frame."""
+REMOVED_BY_LINKER: Final = bytes(location.ADDR_0)
+"""Location expression that the linker writes for a variable it has removed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One entry of a call stack, innermost first in lists. Inlined functions have entries of their own."""
+    """One entry of a call stack; lists have the innermost first. An inlined function has an entry of its own."""
 
     pc: int
-    """Next instruction of the frame; of a caller, where it goes on."""
+    """Next instruction of the frame; for a caller, the return address."""
     function: str
-    """Its name in C or assembly; the bare address if it has none."""
+    """Name of the function in C or assembly; its address if it has no name."""
     line: Line | None
     kind: str
     """"call", "interrupt" (entered by an exception) or "inlined"."""
     scopes: tuple[Scope, ...]
-    """Blocks and functions around `pc` that belong to this entry, outermost first; empty without debug information."""
-    raw: Raw
+    """Blocks and functions around `pc` that belong to this entry, outermost first. Empty without debug information."""
+    raw: RawFrame
     at: int
-    """Where its variables are looked up: `pc`, but inside the call for a frame that waits for one."""
+    """Address at which variables are looked up: `pc`, or for a caller an address inside its call instruction."""
 
     def __str__(self) -> str:
         where = f" ({self.line})" if self.line is not None else ""
@@ -53,7 +52,7 @@ class Frame:
 
 
 class Inspector:
-    """Looks into `machine` as its loaded image's debug information tells. Raises ValueError if none is loaded."""
+    """Inspects `machine` by the debug information of its image. Raises ValueError if no image is loaded."""
 
     def __init__(self, machine: Machine) -> None:
         if machine.image is None:
@@ -71,12 +70,14 @@ class Inspector:
 
     @cached_property
     def unwinder(self) -> Unwinder:
-        """Call stacks of this image."""
-        return Unwinder(Code(self.machine.program.word, self.is_code), self.function_start, self._vector_targets)
+        """Unwinder for the call stacks of this image."""
+        return Unwinder(
+            CodeAnalysis(self.machine.program.word, self.is_code), self.function_start, self._vector_targets
+        )
 
     @cached_property
     def _vector_targets(self) -> frozenset[int]:
-        """Where the vectors lead."""
+        """Addresses that the interrupt vectors contain."""
         vectors = self.image.chip.vectors
         targets = {self.image.word(table) for vector in vectors for table in (vector.ivt, vector.aivt)}
         return frozenset(target for target in targets if target is not None)
@@ -87,7 +88,7 @@ class Inspector:
         return index >= 0 and pc < self._ends[index]
 
     def function_start(self, pc: int) -> int | None:
-        """First instruction of the function around `pc`."""
+        """Return the first instruction of the function that contains `pc`, None outside the program."""
         if not self.is_code(pc):
             return None
         function = self.debug.function(pc)
@@ -97,25 +98,27 @@ class Inspector:
         return symbol[0].address if symbol is not None else None
 
     def prologue_end(self, start: int) -> int:
-        """Where the function that begins at `start` has its frame, parameters stored; `start` if it needs none.
+        """Return the end of the prologue of the function at `start`, where its parameters are stored.
 
-        What makes a frame is a row of its own in the line table, that of the function's opening line."""
+        The prologue has its own row in the line table, that of the function's opening line. A function without frame
+        variables has no prologue; the result is then `start`.
+        """
         if start not in self._bodies:
             self._bodies[start] = self._find_prologue_end(start)
         return self._bodies[start]
 
     def _find_prologue_end(self, start: int) -> int:
         function, first = self.debug.function(start), self.image.lines.find(start)
-        if function is None or first is None or first.start != start or not has_frame(function):
+        if function is None or first is None or first.start != start or not has_frame_variables(function):
             return start
         return first.end if (start, first.end) not in function.ranges else start
 
     def is_handler(self, start: int | None) -> bool:
-        """Whether exceptions enter at `start`."""
+        """Whether `start` is the entry of an exception handler."""
         return start is not None and start in self._vector_targets
 
     def function_name(self, pc: int) -> str:
-        """The function around `pc` by its name in C."""
+        """Return the C name of the function that contains `pc`."""
         function = self.debug.function(pc)
         if function is not None and function.name:
             return function.name
@@ -123,7 +126,7 @@ class Inspector:
         return symbol[0].name.removeprefix("_") if symbol is not None else f"{pc:#08x}"
 
     def where(self, pc: int) -> str:
-        """`0x000124 (worker+0x4, main.c:12)`."""
+        """Return `pc` with function and source line: `0x000124 (worker+0x4, main.c:12)`."""
         start = self.function_start(pc)
         if start is None:
             return f"{pc:#08x}"
@@ -134,26 +137,26 @@ class Inspector:
     # Call stacks
 
     def registers(self) -> tuple[int | None, ...]:
-        """W0 to W15 now."""
+        """Return the current values of W0 to W15."""
         return tuple(self.machine.record.u16[:REGISTERS])
 
     def frames(self, pc: int | None = None, registers: tuple[int | None, ...] | None = None) -> list[Frame]:
-        """The call stack from `pc` with `registers`, by default where the machine stands."""
+        """Return the call stack from `pc` with `registers`; by default those of the machine."""
         if pc is None:
             pc = self.machine.pc
-        raws = self.unwinder.frames(pc, registers or self.registers(), self._word)
+        raws = self.unwinder.frames(pc, registers or self.registers(), self._ram_word)
         found: list[Frame] = []
         for number, raw in enumerate(raws):
             exact = number == 0 or raws[number - 1].is_handler
             found += self._entries(raw, raw.pc if exact else raw.pc - 2)
         return found
 
-    def _word(self, address: int) -> int | None:
+    def _ram_word(self, address: int) -> int | None:
         ram = self.image.chip.data["ram"]
         return self.machine.record.u16[address >> 1] if ram.start <= address < ram.end else None
 
-    def _entries(self, raw: Raw, at: int) -> Iterator[Frame]:
-        """The entries of one real frame: functions inlined at `at`, then the function itself."""
+    def _entries(self, raw: RawFrame, at: int) -> Iterator[Frame]:
+        """Yield the entries of one physical frame: the functions inlined at `at`, then the function itself."""
         line = self.image.lines.find(at)
         function = self.debug.function(at)
         kind = "interrupt" if raw.is_handler else "call"
@@ -175,11 +178,12 @@ class Inspector:
     # Variables
 
     def view(self, frame: Frame | None = None) -> FrameView:
-        """Registers and memory as `frame` has them; by default those of the machine."""
+        """Return registers and memory as seen in `frame`; by default those of the machine."""
         return FrameView(self, frame)
 
     def variables(self, frame: Frame) -> list[Variable]:
-        """Parameters and locals in scope, inner ones hiding outer ones of the same name, in order of declaration."""
+        """Return parameters and locals in scope in order of declaration. Inner ones hide outer ones of the same
+        name."""
         found: dict[str, Variable] = {}
         for scope in frame.scopes:
             for one in scope.variables:
@@ -188,7 +192,8 @@ class Inspector:
         return list(found.values())
 
     def variable(self, name: str, frame: Frame | None = None) -> Variable | None:
-        """What `name` means in `frame`: its own, its file's, then any global."""
+        """Return the variable called `name` in `frame`: a local, a static of its file, or a global; None if there is
+        none."""
         if frame is not None:
             for scope in reversed(frame.scopes):
                 for one in scope.variables:
@@ -198,11 +203,11 @@ class Inspector:
                 mine = self.debug.statics.get(frame.scopes[0].unit, {}).get(name)
                 if mine is not None:
                     return mine
-        everywhere = self.debug.globals.get(name)
-        return everywhere[0] if everywhere else None
+        same_name = self.debug.globals.get(name)
+        return same_name[0] if same_name else None
 
     def value(self, variable: Variable, frame: Frame | None = None) -> Value:
-        """Where `variable` is and what it holds. Raises locate.Unavailable ("optimised out", ...)."""
+        """Return the object that `variable` denotes. Raises Unavailable, for example if it was optimised out."""
         view = self.view(frame)
         if variable.location is None:
             if variable.constant is None:
@@ -214,10 +219,10 @@ class Inspector:
         code = variable.location.at(view.pc)
         if code is None:
             raise location.Unavailable("optimised out")
-        if code == ABSENT:
+        if code == REMOVED_BY_LINKER:
             raise location.Unavailable("not in the program: nothing uses it")
         if (
-            lives_in_frame(variable)
+            is_frame_variable(variable)
             and (start := self.function_start(view.pc)) is not None
             and view.pc < self.prologue_end(start)
         ):
@@ -240,7 +245,7 @@ class Inspector:
         return found
 
     def symbol(self, name: str) -> Value | None:
-        """A variable that only the symbol table knows, as an unsigned number of its size."""
+        """Return a variable that only the symbol table contains, as an unsigned number of its size."""
         found = self.image.symbols.find(name)
         if found is None or found.space not in ("data", "psv", "absolute"):
             return None
@@ -250,19 +255,19 @@ class Inspector:
         return Value(kind, (location.Piece("memory", found.address),), self.view(), name)
 
 
-def lives_in_frame(variable: Variable) -> bool:
-    """Whether its place is one of the function's frame, all the time."""
+def is_frame_variable(variable: Variable) -> bool:
+    """Whether the variable has one fixed place in the frame of its function."""
     entries = variable.location.entries if variable.location is not None else ()
-    return len(entries) == 1 and entries[0][0] is None and entries[0][2][:1] == FRAME_BASED
+    return len(entries) == 1 and entries[0][0] is None and entries[0][2][:1] == FRAME_BASE_OPERATION
 
 
-def has_frame(scope: Scope) -> bool:
-    """Whether some variable of a function lives in its frame."""
-    return any(map(lives_in_frame, scope.variables)) or any(map(has_frame, scope.inner))
+def has_frame_variables(scope: Scope) -> bool:
+    """Whether a function has a variable with a place in its frame."""
+    return any(map(is_frame_variable, scope.variables)) or any(map(has_frame_variables, scope.inner))
 
 
 class FrameView:
-    """`locate.View` of one frame: registers as it left them, memory as it is."""
+    """`location.View` of one frame: the registers saved in it and the current memory."""
 
     def __init__(self, inspector: Inspector, frame: Frame | None) -> None:
         self._machine: Final = inspector.machine
@@ -273,11 +278,11 @@ class FrameView:
 
     @property
     def pc(self) -> int:
-        """Where variables are looked up: inside the call of a frame that waits for one."""
+        """Address at which variables are looked up: inside the call instruction of a frame that waits for a return."""
         return self._machine.pc if self.frame is None else self.frame.at
 
     def register(self, number: int) -> int | None:
-        """Wn, None if it is not known in this frame."""
+        """Return Wn, None if it is unknown in this frame."""
         if number >= REGISTERS:
             return None
         if self.frame is None or self._is_innermost:
@@ -285,17 +290,17 @@ class FrameView:
         return self.frame.raw.registers[number]
 
     def set_register(self, number: int, value: int) -> None:
-        """Change Wn of the innermost frame. Raises ValueError for another."""
+        """Set Wn of the innermost frame. Raises ValueError for another frame."""
         if not self._is_innermost:
             raise ValueError("only registers of the innermost frame can be changed")
         self._machine.w[number] = value
 
     def memory(self, address: int, size: int) -> bytes:
-        """Bytes of data space. Raises ValueError."""
+        """Return bytes of data space. Raises ValueError."""
         return self._machine.peek_bytes(address, size)
 
     def set_memory(self, address: int, data: bytes) -> None:
-        """Change bytes of data space, registers as an instruction would. Raises ValueError."""
+        """Write bytes of data space; to registers as an instruction does. Raises ValueError."""
         value = int.from_bytes(data, "little")
         if address < self._machine.bus.end and len(data) <= 2:
             self._machine.write(address, value, len(data))
@@ -304,7 +309,7 @@ class FrameView:
 
 
 class Value:
-    """A typed value at its place."""
+    """A typed object with its place in memory, registers or debug information."""
 
     def __init__(
         self,
@@ -319,20 +324,21 @@ class Value:
         self.name: Final = name
         self._view: Final = view
         self.bits: Final = bits
-        """Of a bit field: number of bits and the lowest one."""
+        """Width and lowest bit of a bit field."""
 
     @property
     def address(self) -> int | None:
-        """Data address, None if it is not in memory as a whole."""
+        """Data address of the object, None if it is not in memory as a whole."""
         return location.address_of(self.pieces)
 
     @property
     def data(self) -> bytes:
-        """Its bytes. Raises locate.Unavailable."""
+        """Bytes of the object. Raises Unavailable."""
         return location.read(self.pieces, max(self.type.bytes, 1), self._view)
 
     def get(self) -> Any:
-        """As Python has it: int, float, bool, dict of members, list of elements. Raises locate.Unavailable."""
+        """Return the value as a Python object: int, float, bool, dict of members, list of elements. Raises
+        Unavailable."""
         if self.bits is not None:
             from emu.debug.dwarf.types import Member
 
@@ -340,7 +346,7 @@ class Value:
         return decode(self.type, self.data)
 
     def set(self, value: Any) -> None:
-        """Change it. Raises locate.Unavailable, ValueError for what does not fit, TypeError for aggregates."""
+        """Assign a number. Raises Unavailable, ValueError for a number that does not fit, TypeError for aggregates."""
         if self.bits is not None:
             count, lsb = self.bits
             number, mask = int(value), (1 << count) - 1 << lsb
@@ -353,22 +359,22 @@ class Value:
 
     @property
     def frame(self) -> Frame | None:
-        """The frame it is looked up in; none if that is the machine as it stands."""
+        """The frame in which the object was looked up, None for the machine itself."""
         return self._view.frame if isinstance(self._view, FrameView) else None
 
-    def within(self, inspector: Inspector) -> Value:
-        """The same place in another machine that stands where this one does."""
+    def rebind(self, inspector: Inspector) -> Value:
+        """Return the same object in another machine that is in the same state."""
         return Value(self.type, self.pieces, inspector.view(self.frame), self.name, self.bits)
 
     def text(self) -> str:
-        """For people, in one line; the reason if there is no value."""
+        """Return the value in one line of text, or the reason why there is none."""
         try:
             return text_of(self.type, self.get())
         except location.Unavailable as why:
             return f"<{why}>"
 
     def __getitem__(self, part: str | int) -> Value:
-        """A member by name, an element by number, or what a pointer points to (0). Raises KeyError, TypeError."""
+        """Return a member by name, an element by number, or the target of a pointer (0). Raises KeyError, TypeError."""
         bare = self.type.bare
         if isinstance(part, str):
             member = self.type.member(part)
@@ -387,7 +393,7 @@ class Value:
         return Value(target, self._slice(part * target.bytes, target.bytes), self._view, f"{self.name}[{part}]")
 
     def parts(self) -> Iterator[Value]:
-        """Members or elements; what a pointer points to."""
+        """Yield the members or elements, or the target of a pointer."""
         bare = self.type.bare
         if bare.kind == "pointer" and bare.target is not None and bare.target.bare.kind not in ("void", "function"):
             yield self[0]
@@ -396,7 +402,7 @@ class Value:
             yield Value(member.type, self._slice(member.offset, member.type.bytes), self._view, member.name, bits)
 
     def _slice(self, offset: int, size: int) -> tuple[location.Piece, ...]:
-        """The pieces `size` bytes from `offset` lie in."""
+        """Return the pieces that contain `size` bytes from `offset`."""
         found = []
         begin = 0
         for piece in self.pieces:

@@ -1,8 +1,8 @@
-"""The threads of an OpenSwarm firmware, read from the kernel's own variables by their debug information.
+"""The threads of an OpenSwarm firmware, read from the kernel's variables by their debug information.
 
-What enters: a machine whose image has the kernel's variables. What leaves: `Thread`s. No offset of a structure and no
-value of an enumeration is written down here: names are looked up, and how a thread that waits goes on is found by
-letting the kernel's own code resume it, aside.
+Input: a machine whose image contains the kernel's variables. Output: `Thread`s. The module contains no offset of a
+structure and no value of an enumeration: it looks up names. It finds the registers of a waiting thread by running the
+kernel's own code for resuming it in a sandbox.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ if TYPE_CHECKING:
     from emu.machine.machine import Machine
 
 RUNNING, RING, BLOCKED, PCB = "os_running", "os_ring", "os_blocked", "sys_pcb"
-"""Variables and type of the kernel (firmware/openswarm/kernel/kernel.h)."""
+"""Variables and a type of the kernel (firmware/openswarm/kernel/kernel.h)."""
 RESUME: Final = "resume"
-"""Where the port goes on with the thread in W0 (firmware/openswarm/port/dspic30f/switch.S)."""
+"""Label at which the port resumes the thread in W0 (firmware/openswarm/port/dspic30f/switch.S)."""
 THREAD_START: Final = "os_thread_start"
-"""What calls a thread's function (same file)."""
-PAINT: Final = 0xA5
-"""What a stack is filled with before its first use (firmware/openswarm/kernel/stack.c)."""
-MOST: Final = 256
-"""Threads and steps after which a list or a resumption is taken for broken."""
-BLOCKING_LEVEL: Final = 7
+"""Function that calls a thread's function (same file)."""
+STACK_FILL: Final = 0xA5
+"""Byte with which the kernel fills a stack before its first use (firmware/openswarm/kernel/stack.c)."""
+LIMIT: Final = 256
+"""Number of threads, or of steps, after which a list or a resumption counts as corrupt."""
+ALL_MASKED_LEVEL: Final = 7
 
 
 @dataclass(frozen=True, slots=True)
 class Thread:
-    """One thread. Byte counts are None where nothing tells them, as for the system thread's stack."""
+    """One thread. Byte counts are None where they are unknown, for example for the system thread's stack."""
 
     pid: int
     name: str
-    """The function it runs; "main" for the system thread."""
+    """The thread's function; "main" for the system thread."""
     state: str
     """"running", "ready", "sleeping" (for a time), "blocked" (on an event) or "zombie"."""
     priority: int
     address: int
-    """Of its process control block."""
+    """Address of the thread's control block."""
     stack: tuple[int, int] | None
-    """First address and end of its stack."""
+    """First address and end of the thread's stack."""
     free: int | None
     """Bytes of the stack that were never written."""
     frames: tuple[Frame, ...]
@@ -57,12 +57,12 @@ class Thread:
 
     @property
     def used(self) -> int | None:
-        """High-water mark: bytes of the stack that have been in use."""
+        """High-water mark: bytes of the stack that have been used."""
         return None if self.stack is None or self.free is None else self.stack[1] - self.stack[0] - self.free
 
 
 class Threads:
-    """The threads as they are now. Empty without an OpenSwarm kernel, or before it has begun."""
+    """The current threads. Empty without an OpenSwarm kernel, or before it has started."""
 
     def __init__(self, inspector: Inspector) -> None:
         self._inspector: Final = inspector
@@ -72,39 +72,39 @@ class Threads:
         self._pcb: Final = pcb if pcb is not None and pcb.bytes else None
 
     def all(self) -> list[Thread]:
-        """All threads: the ready ones in the order of their turns, then the blocked ones."""
-        return [self._thread(pcb, blocked) for pcb, blocked in self._blocks()]
+        """Return all threads: the ready ones in scheduling order, then the blocked ones."""
+        return [self._thread(pcb, blocked) for pcb, blocked in self._control_blocks()]
 
     def memory_of_others(self, address: int) -> list[range]:
-        """Stack and control block of every thread but the one whose control block is at `address`."""
+        """Return stack and control block of every thread except the one with the control block at `address`."""
         found = []
-        for pcb, _ in self._blocks():
+        for pcb, _ in self._control_blocks():
             first = _number(pcb, "block")
             if first and pcb.address is not None and pcb.address != address:
                 found.append(range(first, pcb.address + pcb.type.bytes))
         return found
 
     def running(self) -> str:
-        """`thread 1 (worker)`: who runs, or would if no interrupt did; empty if there are no threads."""
-        pcb = self._pointer(RUNNING)
+        """Return the running thread as `thread 1 (worker)`, also during an interrupt; empty if there are no threads."""
+        pcb = self._dereferenced(RUNNING)
         if pcb is None:
             return ""
         return str(self._thread(pcb, False))
 
-    def _pointer(self, name: str) -> Value | None:
-        """What a pointer variable of the kernel points to."""
+    def _dereferenced(self, name: str) -> Value | None:
+        """Return the target of a pointer variable of the kernel, None for a null pointer."""
         variable = self._inspector.variable(name) if self._pcb is not None else None
         if variable is None:
             return None
         value = self._inspector.value(variable)
         return value[0] if value.get() else None
 
-    def _blocks(self) -> Iterator[tuple[Value, bool]]:
-        """Process control blocks, and whether each is off the ring."""
+    def _control_blocks(self) -> Iterator[tuple[Value, bool]]:
+        """Yield the threads' control blocks, each with whether its thread is off the ready ring."""
         seen: set[int] = set()
         for name, blocked in ((RING, False), (BLOCKED, True)):
-            pcb = self._pointer(name)
-            while pcb is not None and pcb.address is not None and pcb.address not in seen and len(seen) < MOST:
+            pcb = self._dereferenced(name)
+            while pcb is not None and pcb.address is not None and pcb.address not in seen and len(seen) < LIMIT:
                 seen.add(pcb.address)
                 yield pcb, blocked
                 following = pcb["next"]
@@ -112,19 +112,19 @@ class Threads:
 
     def _thread(self, pcb: Value, blocked: bool) -> Thread:
         pid = _number(pcb, "pid")
-        runs = self._pointer(RUNNING)
+        runs = self._dereferenced(RUNNING)
         is_running = runs is not None and runs.address == pcb.address
-        is_zombie = _number(pcb, "block") == pcb.address  # its stack is given back
+        is_zombie = _number(pcb, "block") == pcb.address  # the kernel has freed its stack
         frames = () if is_zombie else tuple(self._frames(pcb, is_running))
         state = "running" if is_running and not blocked else "ready"
         if blocked:
-            state = "zombie" if is_zombie else "blocked" if pcb["on"]["awaited"].get() else "sleeping"
+            state = "zombie" if is_zombie else "blocked" if pcb["event_or_slice"]["awaited"].get() else "sleeping"
         stack, free = self._stack(pcb)
         name = self._name(pid, frames)
         return Thread(pid, name, state, _number(pcb, "priority"), pcb.address or 0, stack, free, frames)
 
     def _name(self, pid: int, frames: tuple[Frame, ...]) -> str:
-        """The function that the kernel's starting code calls."""
+        """Return the function that the kernel's start code calls."""
         names = [frame.function for frame in frames if frame.kind == "call"]
         if THREAD_START in names[1:]:
             return names[names.index(THREAD_START, 1) - 1]
@@ -133,14 +133,17 @@ class Threads:
         return names[-1] if names else "?"
 
     def _stack(self, pcb: Value) -> tuple[tuple[int, int] | None, int | None]:
-        """The stack lies between the start of the thread's block and its control block; what is above the limit is the
-        port's."""
+        """Return the bounds of the stack and its unused bytes.
+
+        The stack lies between the start of the thread's block and its control block. The port uses the part above the
+        limit.
+        """
         first, end = _number(pcb, "block"), _number(pcb, "limit") + 2
         ram = self._inspector.image.chip.data["ram"]
         if not first or not ram.start <= first < end <= ram.end:
             return None, None
         data = self._machine.peek_bytes(first, end - first)
-        return (first, end), len(data) - len(data.rstrip(bytes([PAINT])))
+        return (first, end), len(data) - len(data.rstrip(bytes([STACK_FILL])))
 
     def _frames(self, pcb: Value, is_running: bool) -> list[Frame]:
         if is_running and self._is_on_own_stack(pcb):
@@ -148,37 +151,38 @@ class Threads:
         place = self._inspector.image.symbols.find(RESUME)
         if place is None or pcb.address is None:
             return []
-        found = self._resumed(place.address, pcb.address)
+        found = self._resume_state(place.address, pcb.address)
         return self._inspector.frames(*found) if found is not None else []
 
     def _is_on_own_stack(self, pcb: Value) -> bool:
-        """Whether the call stack of the machine leads back to this thread: no switch has put it aside."""
+        """Whether the machine's call stack leads back to this thread, so that no context switch has suspended it."""
         first, end = _number(pcb, "block"), _number(pcb, "limit") + 2
         frames = self._inspector.frames()
         tops = [frame.raw.registers[REGISTERS - 1] for frame in frames]
-        if not first:  # the system thread: on no other thread's stack
+        if not first:  # the system thread, if the stack belongs to no other thread
             names = {frame.function for frame in frames}
             return "main" in names or not names & {"os_schedule", "os_slice_end", "hal_idle"}
-        return any(top is not None and first <= top <= end + MOST for top in tops)
+        return any(top is not None and first <= top <= end + LIMIT for top in tops)
 
-    def _resumed(self, resume: int, pcb: int) -> tuple[int, tuple[int | None, ...]] | None:
-        """PC and registers a thread that waits will go on with: the port's code runs up to its return, aside."""
+    def _resume_state(self, resume: int, pcb: int) -> tuple[int, tuple[int | None, ...]] | None:
+        """Return PC and registers with which a waiting thread will resume. The port's code runs to its return in a
+        sandbox."""
         machine = self._machine
         with sandboxed(machine):
             machine.pc = resume
             machine.w[0] = pcb
-            machine.state.ipl = BLOCKING_LEVEL
-            for _ in range(MOST):
+            machine.state.ipl = ALL_MASKED_LEVEL
+            for _ in range(LIMIT):
                 insn = decode_for_execution(machine.program.word(machine.pc), machine.program.word(machine.pc + 2))
                 if insn is None or machine.step() is not None or machine.state.intcon1 & machine.core.traps.flags:
-                    return None  # what was saved is no longer there: a thread that has given up its context
+                    return None  # the saved context is no longer there: the thread has discarded it
                 if facts_of(insn).flow is Return:
                     return machine.pc, self._inspector.registers()
         return None
 
 
 def _number(pcb: Value, name: str) -> Any:
-    """A member as a number, 0 if this kernel has none of that name."""
+    """Return a member as a number, 0 if this kernel has no member of that name."""
     try:
         return pcb[name].get()
     except (KeyError, Unavailable):

@@ -1,11 +1,10 @@
-"""Call stacks from the code itself: what a function has done to W15 and the saved registers, found by running it on
-symbols.
+"""Call stack unwinding by symbolic execution of the code.
 
-A function is walked from its first instruction to the place of interest with values that are "a register as it was at
-entry, plus a constant", a constant, or unknown. That says where W15 was at entry, and so where the return address lies,
-and where callee-saved registers were put. It needs no debug information and works for assembly, interrupt handlers
-that change to another stack, and any compiler. The stack grows upwards; CALL and exceptions push four bytes, whose
-high word carries the PC in bits 6:0 (isa.md §14.2).
+The analysis runs a function from its first instruction to the PC with symbolic values: "a register at function entry
+plus a constant", a constant, or unknown. The result says where W15 was at entry, hence where the return address lies,
+and where callee-saved registers were stored. It needs no debug information. It also works for assembly, for interrupt
+handlers that switch stacks, and for any compiler. The stack grows upwards. CALL and exceptions push four bytes; bits
+6:0 of the high word are the upper part of the PC (isa.md §14.2).
 """
 
 from __future__ import annotations
@@ -22,48 +21,51 @@ from emu.dspic30f.isa.row import Insn
 
 REGISTERS: Final = 16
 STACK_POINTER: Final = 15
-SAVED: Final = range(8, 16)
-"""W8 to W15 are what a function hands back as it found them (abi-elf.md §2)."""
+CALLEE_SAVED: Final = range(8, 16)
+"""W8 to W15: a function restores these registers before it returns (abi-elf.md §2)."""
 RETURN_BYTES: Final = 4
-LONGEST: Final = 6000
-"""Instructions of one function that are walked; longer ones are given up."""
-DEEPEST: Final = 64
-"""Frames of one stack."""
+MAX_INSTRUCTIONS: Final = 6000
+"""Maximum number of instructions of an analysed function."""
+MAX_FRAMES: Final = 64
+"""Maximum number of frames of a call stack."""
 
 Word = Callable[[int], int]
-"""The 24-bit program word at an even address."""
+"""Function that returns the 24-bit program word at an even address."""
 Memory = Callable[[int], int | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
-    """`base` plus `offset`. Base 0 to 15: that register at entry; CONSTANT: 0; JOINT + pc: W15 when `pc` was passed
-    last, where ways with different W15 meet."""
+class SymbolicValue:
+    """The sum of a base and `offset`. Bases 0 to 15 are the registers at function entry, CONSTANT is 0.
+
+    MERGED + pc is W15 at the last passage through `pc`, where paths with different values of W15 join.
+    """
 
     base: int
     offset: int
 
 
 CONSTANT: Final = -1
-JOINT: Final = 0x1000000
-Symbolic = Known | None
-"""None: nobody knows."""
+MERGED: Final = 0x1000000
+MaybeSymbolic = SymbolicValue | None
+"""None: the value is unknown."""
 
 
 @dataclass(slots=True)
-class Picture:
-    """Registers and memory by what is known of them. Memory is by the symbolic address of each word."""
+class FrameState:
+    """What is known about registers and memory at one instruction. Memory words have symbolic addresses."""
 
-    registers: list[Symbolic] = field(default_factory=lambda: [Known(n, 0) for n in range(REGISTERS)])
-    memory: dict[Known, Known] = field(default_factory=dict)
+    registers: list[MaybeSymbolic] = field(default_factory=lambda: [SymbolicValue(n, 0) for n in range(REGISTERS)])
+    memory: dict[SymbolicValue, SymbolicValue] = field(default_factory=dict)
 
-    def copy(self) -> Picture:
-        return Picture(list(self.registers), dict(self.memory))
+    def copy(self) -> FrameState:
+        return FrameState(list(self.registers), dict(self.memory))
 
-    def merge(self, other: Picture, pc: int) -> bool:
-        """Forget what differs from `other`, which leads to `pc` as well; whether anything was forgotten."""
+    def merge(self, other: FrameState, pc: int) -> bool:
+        """Remove all knowledge that does not hold in `other`, another predecessor of `pc`. Return whether anything
+        changed."""
         changed = False
-        joint = Known(JOINT + pc, 0)
+        joint = SymbolicValue(MERGED + pc, 0)
         for number, value in enumerate(self.registers):
             if value is not None and value != other.registers[number] and value != joint:
                 self.registers[number] = joint if number == STACK_POINTER else None
@@ -74,89 +76,89 @@ class Picture:
         return changed
 
 
-class _Value:
-    """A value on symbols: sums with constants are followed, all else is unknown."""
+class _Operand:
+    """Symbolic operand: sums with constants are evaluated, every other result is unknown."""
 
     __slots__ = ("known",)
 
-    def __init__(self, known: Symbolic) -> None:
+    def __init__(self, known: MaybeSymbolic) -> None:
         self.known = known
 
-    def _shifted(self, other: object, sign: int) -> _Value:
+    def _shifted(self, other: object, sign: int) -> _Operand:
         amount = other if isinstance(other, int) else None
-        if isinstance(other, _Value) and other.known is not None and other.known.base == CONSTANT:
+        if isinstance(other, _Operand) and other.known is not None and other.known.base == CONSTANT:
             amount = other.known.offset
         if self.known is None or amount is None:
             return _UNKNOWN
-        return _Value(Known(self.known.base, self.known.offset + sign * amount))
+        return _Operand(SymbolicValue(self.known.base, self.known.offset + sign * amount))
 
-    def __add__(self, other: object) -> _Value:
-        if isinstance(other, _Value) and self.known is not None and self.known.base == CONSTANT:
+    def __add__(self, other: object) -> _Operand:
+        if isinstance(other, _Operand) and self.known is not None and self.known.base == CONSTANT:
             return other._shifted(self.known.offset, 1)
         return self._shifted(other, 1)
 
-    def __radd__(self, other: object) -> _Value:
+    def __radd__(self, other: object) -> _Operand:
         return self._shifted(other, 1)
 
-    def __sub__(self, other: object) -> _Value:
+    def __sub__(self, other: object) -> _Operand:
         return self._shifted(other, -1)
 
-    def __and__(self, other: object) -> _Value:
-        """Masks that cut to 16 bits or clear bit 0 change no address."""
+    def __and__(self, other: object) -> _Operand:
+        """Return the operand itself for masks that keep 16 bits or clear bit 0: they do not change an address."""
         return self if other in (0xFFFF, 0xFFFE) else _UNKNOWN
 
-    def _lost(self, *_operands: object) -> _Value:
+    def _unknown_result(self, *_operands: object) -> _Operand:
         return _UNKNOWN
 
-    __rsub__ = __mul__ = __rmul__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = _lost
-    __lshift__ = __rlshift__ = __rshift__ = __rrshift__ = __invert__ = __neg__ = _lost
-    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _lost  # type: ignore[assignment]
+    __rsub__ = __mul__ = __rmul__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = _unknown_result
+    __lshift__ = __rlshift__ = __rshift__ = __rrshift__ = __invert__ = __neg__ = _unknown_result
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = _unknown_result  # type: ignore[assignment]
     __hash__ = None  # type: ignore[assignment]
 
 
-_UNKNOWN: Final = _Value(None)
+_UNKNOWN: Final = _Operand(None)
 
 
-def _symbolic(value: object) -> Symbolic:
-    if isinstance(value, _Value):
+def _symbolic(value: object) -> MaybeSymbolic:
+    if isinstance(value, _Operand):
         return value.known
-    return Known(CONSTANT, value) if isinstance(value, int) else None
+    return SymbolicValue(CONSTANT, value) if isinstance(value, int) else None
 
 
-class _Walker:
-    """A builder (isa/builder.py) that changes a `Picture`."""
+class _SymbolicBuilder:
+    """Builder (isa/builder.py) that updates a `FrameState`."""
 
     def __init__(self) -> None:
         self.context = Context()
         self.pc = 0
-        self.picture = Picture()
-        self.sure = True
-        """Whether what happens, happens: inside `when` it may not."""
+        self.state = FrameState()
+        self.is_unconditional = True
+        """Whether the current effect always happens; inside `when` it may not."""
 
     def _unknown(self, *_arguments: object, **_more: object) -> Any:
         return _UNKNOWN
 
     select = div_trunc = rem_trunc = clz16 = ctz16 = prog = flag = reg = acc = xload = yload = _unknown
 
-    def _nothing(self, *_arguments: object, **_more: object) -> None:
-        """Changes nothing that is followed."""
+    def _no_effect(self, *_arguments: object, **_more: object) -> None:
+        """Ignore an effect that the analysis does not need."""
 
-    table_write = set_flags = set_reg = set_acc = trap_math = _nothing
+    table_write = set_flags = set_reg = set_acc = trap_math = _no_effect
 
     def let(self, v: Any) -> Any:
         return v
 
     def w(self, n: int) -> Any:
-        return _Value(self.picture.registers[n])
+        return _Operand(self.state.registers[n])
 
     def ptr(self, n: int, side: Side) -> Any:
         return self.w(n)
 
     def set_w(self, n: int, v: Any) -> None:
-        self.picture.registers[n] = _symbolic(v) if self.sure else None
+        self.state.registers[n] = _symbolic(v) if self.is_unconditional else None
 
     def set_wb(self, n: int, v: Any) -> None:
-        self.picture.registers[n] = None
+        self.state.registers[n] = None
 
     def set_ptr(self, n: int, v: Any, side: Side) -> None:
         self.set_w(n, v)
@@ -167,25 +169,25 @@ class _Walker:
             return _UNKNOWN
         if place.base == CONSTANT and place.offset < 2 * REGISTERS:
             return self.w(place.offset >> 1)
-        return _Value(self.picture.memory.get(place))
+        return _Operand(self.state.memory.get(place))
 
     def store(self, ea: Any, v: Any, size: Size, ptr: int | None = None) -> None:
         place = _symbolic(ea)
         if place is None:
-            return  # through some pointer: the program's data, not its saved registers
+            return  # a store through an unknown pointer: to the program's data, not to saved registers
         if place.base == CONSTANT and place.offset < 2 * REGISTERS:
             self.set_w(place.offset >> 1, v if size == 2 else _UNKNOWN)
             return
         value = _symbolic(v)
-        if size == 2 and value is not None and self.sure:
-            self.picture.memory[place] = value
+        if size == 2 and value is not None and self.is_unconditional:
+            self.state.memory[place] = value
         else:
-            self.picture.memory.pop(place, None)
+            self.state.memory.pop(place, None)
 
     def when(self, c: Any, fn: Callable[[], None]) -> None:
-        sure, self.sure = self.sure, False
+        is_unconditional, self.is_unconditional = self.is_unconditional, False
         fn()
-        self.sure = sure
+        self.is_unconditional = is_unconditional
 
 
 @lru_cache(maxsize=65536)
@@ -193,51 +195,53 @@ def _decoded(word1: int, word2: int) -> Insn | None:
     return decode_for_execution(word1, word2)
 
 
-class Code:
-    """Pictures of all instructions of functions, remembered by first instruction."""
+class CodeAnalysis:
+    """States before every instruction of the functions analysed so far."""
 
-    def __init__(self, word: Word, exists: Callable[[int], bool]) -> None:
-        """`exists(pc)`: whether the program has anything at `pc`."""
+    def __init__(self, word: Word, has_code: Callable[[int], bool]) -> None:
+        """`has_code(pc)` says whether the program defines `pc`."""
         self._word: Final = word
-        self._exists: Final = exists
-        self._functions: Final[dict[int, dict[int, Picture]]] = {}
+        self._has_code: Final = has_code
+        self._functions: Final[dict[int, dict[int, FrameState]]] = {}
 
     def insn(self, pc: int) -> Insn | None:
-        """The instruction at `pc`, None where none is."""
-        return _decoded(self._word(pc), self._word(pc + 2)) if self._exists(pc) else None
+        """Return the instruction at `pc`, None if there is none."""
+        return _decoded(self._word(pc), self._word(pc + 2)) if self._has_code(pc) else None
 
-    def picture(self, start: int, pc: int) -> Picture | None:
-        """What holds before the instruction at `pc` in the function that begins at `start`; None if it is not reached
-        from there."""
+    def state_before(self, start: int, pc: int) -> FrameState | None:
+        """Return the state before the instruction at `pc` of the function that begins at `start`.
+
+        None if the function does not reach `pc`.
+        """
         if start not in self._functions:
-            self._functions[start] = self._walk(start)
+            self._functions[start] = self._analyse(start)
         return self._functions[start].get(pc)
 
-    def _walk(self, start: int) -> dict[int, Picture]:
-        pictures = {start: Picture()}
+    def _analyse(self, start: int) -> dict[int, FrameState]:
+        states = {start: FrameState()}
         work = [start]
         steps = 0
-        while work and steps < 4 * LONGEST and len(pictures) < LONGEST:
+        while work and steps < 4 * MAX_INSTRUCTIONS and len(states) < MAX_INSTRUCTIONS:
             steps += 1
             pc = work.pop()
-            for target, after in self._after(pc, pictures[pc]):
-                seen = pictures.get(target)
+            for target, after in self._successors(pc, states[pc]):
+                seen = states.get(target)
                 if seen is None:
-                    pictures[target] = after
+                    states[target] = after
                     work.append(target)
                 elif seen.merge(after, target):
                     work.append(target)
-        return pictures
+        return states
 
-    def _after(self, pc: int, before: Picture) -> list[tuple[int, Picture]]:
-        """The instructions that can follow inside the function, with what holds before them."""
+    def _successors(self, pc: int, before: FrameState) -> list[tuple[int, FrameState]]:
+        """Return the possible next instructions in the function, each with the state before it."""
         insn = self.insn(pc)
         if insn is None:
             return []
-        walker: Any = _Walker()
-        walker.pc, walker.picture = pc, before.copy()
-        flow = insn.row.does(walker, insn.x)
-        after: Picture = walker.picture
+        builder: Any = _SymbolicBuilder()
+        builder.pc, builder.state = pc, before.copy()
+        flow = insn.row.does(builder, insn.x)
+        after: FrameState = builder.state
         next_pc = pc + 2 * insn.words
         match flow:
             case Return():
@@ -245,7 +249,7 @@ class Code:
             case Goto(target):
                 return [(target, after)] if isinstance(target, int) else []
             case Call():
-                return [(next_pc, _returned(before, after))]
+                return [(next_pc, _after_call(before, after))]
             case Branch(_, target):
                 return [(target, after), (next_pc, after.copy())]
             case Skip():
@@ -256,52 +260,57 @@ class Code:
         return [(next_pc, after)]
 
 
-def _returned(before: Picture, called: Picture) -> Picture:
-    """After a call has come back: W8 to W15 and the memory as before it, W0 to W7 anything."""
+def _after_call(before: FrameState, called: FrameState) -> FrameState:
+    """Return the state after a call: W0 to W7 are unknown, W8 to W15 and memory are unchanged."""
     after = before.copy()
     for number in range(REGISTERS):
-        if number not in SAVED:
+        if number not in CALLEE_SAVED:
             after.registers[number] = None
     return after
 
 
 @dataclass(frozen=True, slots=True)
-class Raw:
-    """One frame: where it stands and what is known of its registers."""
+class RawFrame:
+    """One physical frame: its PC and what is known about its registers."""
 
     pc: int
-    """Next instruction of the frame; of a caller, where it goes on."""
+    """Next instruction of the frame; for a caller, the return address."""
     registers: tuple[int | None, ...]
     entry: int | None
-    """W15 at the function's first instruction: the return address lies in the four bytes below."""
+    """W15 at the function's first instruction. The return address lies in the four bytes below it."""
     start: int | None
     """First instruction of the function."""
     is_handler: bool = False
-    """Entered by an exception: the frame behind it was interrupted and did not call."""
+    """Whether an exception entered this frame: the next outer frame was interrupted and made no call."""
 
 
 class Unwinder:
-    """Call stacks of one program. `function_start(pc)`: first instruction of the function around, None outside the program;
-    `handlers`: where exceptions enter."""
+    """Unwinds call stacks of one program.
 
-    def __init__(self, code: Code, function_start: Callable[[int], int | None], handlers: frozenset[int]) -> None:
+    `function_start(pc)` returns the first instruction of the function that contains `pc`, None outside the program.
+    `handlers` are the entries of exception handlers.
+    """
+
+    def __init__(
+        self, code: CodeAnalysis, function_start: Callable[[int], int | None], handlers: frozenset[int]
+    ) -> None:
         self._code: Final = code
         self._function_start: Final = function_start
         self._handlers: Final = handlers
 
-    def frames(self, pc: int, registers: tuple[int | None, ...], memory: Memory) -> list[Raw]:
-        """Frames from the innermost out; `memory(address)` is the word of RAM there, None where none is."""
-        frames: list[Raw] = []
+    def frames(self, pc: int, registers: tuple[int | None, ...], memory: Memory) -> list[RawFrame]:
+        """Return the frames, innermost first. `memory(address)` returns a word of RAM, None outside RAM."""
+        frames: list[RawFrame] = []
         called = False
-        while len(frames) < DEEPEST:
-            start, picture = self._picture(pc, called)
-            if start is None or picture is None:
-                frames.append(Raw(pc, registers, None, start))
+        while len(frames) < MAX_FRAMES:
+            start, state = self._state_at(pc, called)
+            if start is None or state is None:
+                frames.append(RawFrame(pc, registers, None, start))
                 break
-            solved = _solved(picture, registers, memory)
+            solved = _solve(state, registers, memory)
             entry = solved.get(STACK_POINTER)
             handler = start in self._handlers
-            frames.append(Raw(pc, registers, entry, start, handler))
+            frames.append(RawFrame(pc, registers, entry, start, handler))
             if entry is None:
                 break
             low, high = memory(entry - RETURN_BYTES), memory(entry - 2)
@@ -309,30 +318,30 @@ class Unwinder:
                 break
             pc = (high & 0x7F) << 16 | low & 0xFFFE
             called = not handler
-            if not self._plausible(pc, called) or any(one.pc == pc and one.entry == entry for one in frames[:-1]):
+            if not self._is_plausible(pc, called) or any(one.pc == pc and one.entry == entry for one in frames[:-1]):
                 break
             registers = (*(solved.get(n) for n in range(STACK_POINTER)), entry - RETURN_BYTES & 0xFFFF)
         return frames
 
-    def _plausible(self, pc: int, called: bool) -> bool:
-        """Whether a function can have been called from, or interrupted, there."""
+    def _is_plausible(self, pc: int, called: bool) -> bool:
+        """Whether `pc` can be a return address, or for an interrupted frame any instruction of the program."""
         return _call_before(self._code, pc) is not None if called else self._function_start(pc) is not None
 
-    def _picture(self, pc: int, called: bool) -> tuple[int | None, Picture | None]:
-        """What the function around has done to registers and stack before it goes on at `pc`."""
+    def _state_at(self, pc: int, called: bool) -> tuple[int | None, FrameState | None]:
+        """Return the start of the function that contains `pc` and the state before `pc`."""
         call = _call_before(self._code, pc) if called else None
         start = self._function_start(pc if call is None else call)
         if start is None:
             return None, None
-        picture = self._code.picture(start, pc)
-        if picture is None and call is not None:  # a call that never comes back ends the function
-            before = self._code.picture(start, call)
-            picture = _returned(before, before) if before is not None else None
-        return start, picture
+        state = self._code.state_before(start, pc)
+        if state is None and call is not None:  # a call that never returns ends the function
+            before = self._code.state_before(start, call)
+            state = _after_call(before, before) if before is not None else None
+        return start, state
 
 
-def _call_before(code: Code, pc: int) -> int | None:
-    """Address of the call that returns to `pc`, None if there is none."""
+def _call_before(code: CodeAnalysis, pc: int) -> int | None:
+    """Return the address of the call that returns to `pc`, None if there is none."""
     for words in (2, 1):
         insn = code.insn(pc - 2 * words) if pc >= 2 * words else None
         if insn is not None and insn.words == words and insn.row.mnemonic in ("CALL", "RCALL"):
@@ -340,18 +349,20 @@ def _call_before(code: Code, pc: int) -> int | None:
     return None
 
 
-def _solved(picture: Picture, registers: tuple[int | None, ...], memory: Memory) -> dict[int, int]:
-    """What the symbols stand for: registers at entry by number, and W15 at joints, from what is in registers and memory
-    now."""
+def _solve(state: FrameState, registers: tuple[int | None, ...], memory: Memory) -> dict[int, int]:
+    """Return the values of the bases, computed from the registers and memory of the frame.
+
+    The bases are the registers at function entry, by number, and W15 at merge points.
+    """
     solved = {CONSTANT: 0}
     for number in (STACK_POINTER, *range(STACK_POINTER)):
-        known, value = picture.registers[number], registers[number]
+        known, value = state.registers[number], registers[number]
         if known is not None and value is not None:
             solved.setdefault(known.base, value - known.offset & 0xFFFF)
     changed = True
     while changed:
         changed = False
-        for place, known in picture.memory.items():
+        for place, known in state.memory.items():
             if known.base not in solved and place.base in solved:
                 value = memory(solved[place.base] + place.offset & 0xFFFF)
                 if value is not None:

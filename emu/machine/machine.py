@@ -149,7 +149,7 @@ class Machine(StateAccess):
         wires.end_run = self.interrupt
         power.signals.clear_watchdog = lambda: self.peripherals.clear_watchdog(self.events.now)
         power.signals.power = self._on_power_change
-        power.signals.idling, power.signals.clearing = (
+        power.signals.idle_rule, power.signals.clrwdt_rule = (
             self.peripherals.watchdog.idling,
             self.peripherals.watchdog.clearing,
         )

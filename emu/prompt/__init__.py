@@ -1,1 +1,1 @@
-"""The debugger in a terminal: a client of the debug server in the same process, with commands for people."""
+"""Debugger prompt in a terminal: a client of the debug server in the same process."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from emu.prompt.client import RefusedError
+from emu.prompt.client import CommandRefusedError
 from emu.prompt.session import Session
 from emu.prompt.table import command
 
@@ -13,10 +13,10 @@ IF: Final = re.compile(r"(?:^|\s+)if\s+")
 
 
 def _break(session: Session, text: str, is_temporary: bool, **more: str) -> None:
-    place, condition, *_ = [*IF.split(text, maxsplit=1), ""]
-    kind, row = session.place(place.strip())
+    location, condition, *_ = [*IF.split(text, maxsplit=1), ""]
+    kind, row = session.location(location.strip())
     row |= more | ({"condition": condition} if condition else {})
-    session.write(f"breakpoint {session.points.add(kind, row, place.strip(), is_temporary)}")
+    session.write(f"breakpoint {session.breakpoints.add(kind, row, location.strip(), is_temporary)}")
 
 
 @command("break LOCATION [if CONDITION]", "stop at FUNCTION, LINE, FILE:LINE or *ADDRESS", "b")
@@ -24,85 +24,85 @@ def break_(session: Session, text: str) -> None:
     _break(session, text, is_temporary=False)
 
 
-@command("tbreak LOCATION [if CONDITION]", "the same, once", "tb")
+@command("tbreak LOCATION [if CONDITION]", "stop there once", "tb")
 def tbreak_(session: Session, text: str) -> None:
     _break(session, text, is_temporary=True)
 
 
-@command("log LOCATION TEXT", "print TEXT with the values of {expressions} there, and go on", "dprintf")
+@command("log LOCATION TEXT", "print TEXT with the values of {expressions} there, and continue", "dprintf")
 def log_(session: Session, text: str) -> None:
-    place, _, message = text.partition(" ")
+    location, _, message = text.partition(" ")
     if not message:
-        raise RefusedError("expected LOCATION TEXT")
-    _break(session, place, is_temporary=False, logMessage=message.strip())
+        raise CommandRefusedError("expected LOCATION TEXT")
+    _break(session, location, is_temporary=False, logMessage=message.strip())
 
 
 def _watch(session: Session, text: str, access: str) -> None:
-    place, condition, *_ = [*IF.split(text, maxsplit=1), ""]
-    session.evaluated(place)
+    location, condition, *_ = [*IF.split(text, maxsplit=1), ""]
+    session.evaluate(location)
     frame = {"frameId": session.frame["id"]} if session.frame is not None else {}
-    found = session.client.ask("dataBreakpointInfo", name=place, **frame)
+    found = session.client.ask("dataBreakpointInfo", name=location, **frame)
     if found["dataId"] is None:
-        raise RefusedError(f"{place}: {found['description']}")
+        raise CommandRefusedError(f"{location}: {found['description']}")
     row = {"dataId": found["dataId"], "accessType": access} | ({"condition": condition} if condition else {})
-    session.write(f"watchpoint {session.points.add('data', row, found['description'])}")
+    session.write(f"watchpoint {session.breakpoints.add('data', row, found['description'])}")
 
 
-@command("watch PLACE [if CONDITION]", "stop when something writes to it")
+@command("watch PLACE [if CONDITION]", "stop at a write to PLACE")
 def watch_(session: Session, text: str) -> None:
     _watch(session, text, "write")
 
 
-@command("rwatch PLACE [if CONDITION]", "stop when something reads it")
+@command("rwatch PLACE [if CONDITION]", "stop at a read of PLACE")
 def rwatch_(session: Session, text: str) -> None:
     _watch(session, text, "read")
 
 
-@command("awatch PLACE [if CONDITION]", "stop at either")
+@command("awatch PLACE [if CONDITION]", "stop at a read or a write of PLACE")
 def awatch_(session: Session, text: str) -> None:
     _watch(session, text, "readWrite")
 
 
-def _amend(session: Session, text: str, name: str) -> None:
+def _change_attribute(session: Session, text: str, name: str) -> None:
     number, _, value = text.partition(" ")
-    point = session.points.numbered(number)
+    point = session.breakpoints.find(number)
     before = dict(point.row)
     point.row[name] = value.strip()
-    session.points.tell([point.list])
+    session.breakpoints.send([point.list])
     if not point.facts["verified"]:
         problem, point.row = point.facts["message"], before
-        session.points.tell([point.list])
-        raise RefusedError(problem)
+        session.breakpoints.send([point.list])
+        raise CommandRefusedError(problem)
     session.write(f"breakpoint {point}")
 
 
-@command("condition NUMBER [EXPRESSION]", "stop there only if it is true; without one, always", "cond")
+@command("condition NUMBER [EXPRESSION]", "set or remove the condition of a breakpoint", "cond")
 def condition_(session: Session, text: str) -> None:
-    _amend(session, text, "condition")
+    _change_attribute(session, text, "condition")
 
 
-@command("hits NUMBER [N, >=N, %N, ...]", "stop there only at those of its hits", "ignore")
+@command("hits NUMBER [N, >=N, %N, ...]", "stop only at the given hits of a breakpoint", "ignore")
 def hits_(session: Session, text: str) -> None:
-    _amend(session, text, "hitCondition")
+    _change_attribute(session, text, "hitCondition")
 
 
-def _switch(session: Session, text: str, is_on: bool) -> None:
-    chosen = [session.points.numbered(one) for one in text.split()] or list(session.points.all)
+def _switch(session: Session, text: str, is_enabled: bool) -> None:
+    chosen = [session.breakpoints.find(one) for one in text.split()] or list(session.breakpoints.all)
     for one in chosen:
-        one.is_on = is_on
-    session.points.tell(one.list for one in chosen)
+        one.is_enabled = is_enabled
+    session.breakpoints.send(one.list for one in chosen)
 
 
-@command("enable [NUMBER ...]", "let breakpoints stop again, all without a number")
+@command("enable [NUMBER ...]", "enable breakpoints (default: all)")
 def enable_(session: Session, text: str) -> None:
     _switch(session, text, True)
 
 
-@command("disable [NUMBER ...]", "let them pass")
+@command("disable [NUMBER ...]", "disable breakpoints (default: all)")
 def disable_(session: Session, text: str) -> None:
     _switch(session, text, False)
 
 
-@command("delete [NUMBER ...]", "forget them", "d")
+@command("delete [NUMBER ...]", "delete breakpoints (default: all)", "d")
 def delete_(session: Session, text: str) -> None:
-    session.points.drop([session.points.numbered(one) for one in text.split()] or list(session.points.all))
+    session.breakpoints.delete([session.breakpoints.find(one) for one in text.split()] or list(session.breakpoints.all))

@@ -1,4 +1,4 @@
-"""Breakpoints as a person at the prompt numbers them; the server gets whole lists of each kind, as it wants them."""
+"""Numbered breakpoints of a prompt. The server receives them as complete lists of each kind."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
-from emu.prompt.client import Client, RefusedError, Row
+from emu.prompt.client import Client, CommandRefusedError, Row
 
 REQUESTS: Final = {
     "function": "setFunctionBreakpoints", "instruction": "setInstructionBreakpoints", "data": "setDataBreakpoints",
@@ -14,18 +14,18 @@ REQUESTS: Final = {
 
 
 @dataclass(eq=False, slots=True)
-class Point:
-    """One breakpoint."""
+class Breakpoint:
+    """One breakpoint of the user."""
 
     number: int
     list: str
-    """Which list it is in: one of REQUESTS, or the path of a source."""
+    """Name of its list: a key of REQUESTS, or the path of a source file."""
     row: Row
-    """As the protocol has it."""
+    """The breakpoint in the form of the protocol."""
     text: str
-    """As the user wrote it."""
+    """The location as the user wrote it."""
     is_temporary: bool = False
-    is_on: bool = True
+    is_enabled: bool = True
     facts: Row = field(default_factory=dict)
 
     def __str__(self) -> str:
@@ -36,57 +36,57 @@ class Point:
             self.text + (f" (line {line})" if line and not self.text.endswith(line) else ""),
             *(f"{word} {text}" for word, text in words.items() if text),
             *(["once"] if self.is_temporary else []),
-            *([] if self.is_on else ["off"]),
+            *([] if self.is_enabled else ["off"]),
         ]
         return f"{self.number}: {', '.join(more)}"
 
 
-class Points:
+class BreakpointList:
     """All breakpoints of a session."""
 
     def __init__(self, client: Client) -> None:
-        self.all: Final[list[Point]] = []
+        self.all: Final[list[Breakpoint]] = []
         self._client: Final = client
         self._last = 0
 
-    def add(self, kind: str, row: Row, text: str, is_temporary: bool = False) -> Point:
-        """Set one. Raises RefusedError if it cannot be."""
+    def add(self, kind: str, row: Row, text: str, is_temporary: bool = False) -> Breakpoint:
+        """Set a breakpoint. Raises CommandRefusedError if the server refuses it."""
         self._last += 1
-        made = Point(self._last, kind, row, text, is_temporary)
+        made = Breakpoint(self._last, kind, row, text, is_temporary)
         self.all.append(made)
-        self.tell([made.list])
+        self.send([made.list])
         if not made.facts["verified"]:
             self.all.remove(made)
-            self.tell([made.list])
+            self.send([made.list])
             self._last -= 1
-            raise RefusedError(f"{text}: {made.facts['message']}")
+            raise CommandRefusedError(f"{text}: {made.facts['message']}")
         return made
 
-    def tell(self, kinds: Iterable[str]) -> None:
-        """Send lists to the server."""
+    def send(self, kinds: Iterable[str]) -> None:
+        """Send the lists of the given kinds to the server."""
         for kind in set(kinds):
-            mine = [one for one in self.all if one.list == kind and one.is_on]
+            mine = [one for one in self.all if one.list == kind and one.is_enabled]
             more = {} if kind in REQUESTS else {"source": {"path": kind}}
             request = REQUESTS.get(kind, "setBreakpoints")
             told = self._client.ask(request, breakpoints=[one.row for one in mine], **more)["breakpoints"]
             for one, facts in zip(mine, told, strict=True):
                 one.facts = facts
 
-    def numbered(self, text: str) -> Point:
-        """The one of that number. Raises RefusedError."""
+    def find(self, text: str) -> Breakpoint:
+        """Return the breakpoint with a number. Raises CommandRefusedError."""
         found = next((one for one in self.all if text == str(one.number)), None)
         if found is None:
-            raise RefusedError(f"there is no breakpoint {text or 'without a number'}")
+            raise CommandRefusedError(f"there is no breakpoint {text or 'without a number'}")
         return found
 
-    def drop(self, points: list[Point]) -> None:
-        """Delete some."""
-        for one in points:
+    def delete(self, breakpoints: list[Breakpoint]) -> None:
+        """Delete breakpoints."""
+        for one in breakpoints:
             self.all.remove(one)
-        self.tell(one.list for one in points)
+        self.send(one.list for one in breakpoints)
 
-    def met(self, ids: list[int]) -> list[Point]:
-        """Those that ended a run; the temporary ones go."""
-        hit = [one for one in self.all if one.is_on and one.facts.get("id") in ids]
-        self.drop([one for one in hit if one.is_temporary])
+    def take_hit(self, ids: list[int]) -> list[Breakpoint]:
+        """Return the breakpoints that ended a run, and delete the temporary ones among them."""
+        hit = [one for one in self.all if one.is_enabled and one.facts.get("id") in ids]
+        self.delete([one for one in hit if one.is_temporary])
         return hit

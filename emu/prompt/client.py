@@ -1,5 +1,4 @@
-"""A client of a debug server that waits for it: what is asked is answered, and what it lets go has halted, when a call
-comes back."""
+"""Synchronous client of a debug server: a call returns when the request is answered and the machine is paused."""
 
 from __future__ import annotations
 
@@ -16,66 +15,68 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 
-class RefusedError(Exception):
-    """What was asked for cannot be done; the text is for the user."""
+class CommandRefusedError(Exception):
+    """The server has refused a command. The text is for the user."""
 
 
-class Answering(Protocol):
-    """A server, here or in another process: `emu.dap.server.Server`."""
+class DebugServer(Protocol):
+    """A server in this or another process, for example `emu.dap.server.Server`."""
 
     @property
     def is_over(self) -> bool:
-        """The client has left."""
+        """Whether the client has disconnected."""
 
-    def answer(self, message: Message) -> None:
-        """Respond to one request; comes back when the machine stands again."""
+    def handle_request(self, message: Message) -> None:
+        """Respond to one request and return when the machine is paused."""
 
-    def leave(self) -> None:
-        """Give back what was debugged."""
+    def release(self) -> None:
+        """Detach from the debuggee."""
 
 
 class Client:
-    """Owns what `serving` makes, a server that talks to it; `say(text)` gets what the firmware and the server say."""
+    """Client of the server that `make_server` creates. `say(text)` prints output of the firmware and of the server."""
 
-    def __init__(self, serving: Callable[[Channel], Answering], say: Callable[[str], None]) -> None:
+    def __init__(self, make_server: Callable[[Channel], DebugServer], say: Callable[[str], None]) -> None:
         self.inbox: Final[SimpleQueue[Message | None]] = SimpleQueue()
-        self.server: Final = serving(self)
+        self.server: Final = make_server(self)
         self._say: Final = say
         self._seq = 0
         self._reply: Message = {}
-        self._halt: Row = {}
-        self.said = ""
-        """What the last of `go` was answered, if it was a text."""
+        self._stop_event: Row = {}
+        self.result_text = ""
+        """Text of the response to the last `resume`, empty if it had none."""
 
     def send(self, message: Message) -> None:
-        """What the server says."""
+        """Handle a message of the server."""
         if message["type"] == "response":
             if message["request_seq"] == self._seq:
                 self._reply = message
         elif message["event"] == "output":
             self._say(message["body"]["output"])
         elif message["event"] == "stopped":
-            self._halt = message["body"]
+            self._stop_event = message["body"]
 
     def ask(self, command: str, **arguments: Any) -> Row:
-        """The body of the response. Raises RefusedError."""
+        """Send a request and return the body of the response. Raises CommandRefusedError."""
         self._seq += 1
         with self._interruptible():
-            self.server.answer({"type": "request", "seq": self._seq, "command": command, "arguments": arguments})
+            self.server.handle_request(
+                {"type": "request", "seq": self._seq, "command": command, "arguments": arguments}
+            )
         if not self._reply["success"]:
-            raise RefusedError(self._reply["message"])
+            raise CommandRefusedError(self._reply["message"])
         body: Row = self._reply["body"]
         return body
 
-    def go(self, command: str, **arguments: Any) -> Row:
-        """Where a request that lets the machine go has led: the body of the halt. Raises RefusedError."""
-        self._halt = {}
-        self.said = str(self.ask(command, **arguments).get("result", ""))
-        return self._halt
+    def resume(self, command: str, **arguments: Any) -> Row:
+        """Send a request that moves the machine and return the body of the stop event. Raises CommandRefusedError."""
+        self._stop_event = {}
+        self.result_text = str(self.ask(command, **arguments).get("result", ""))
+        return self._stop_event
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """The key for an interrupt makes the machine stand, not the program end."""
+        """Let Ctrl-C pause the machine instead of ending the program."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -85,5 +86,5 @@ class Client:
             yield
         finally:
             signal.signal(signal.SIGINT, before)
-            while not self.inbox.empty():  # it halted by itself at that moment
+            while not self.inbox.empty():  # the machine may have stopped at the same moment
                 self.inbox.get()

@@ -1,4 +1,4 @@
-"""What the server answers, as text for a terminal."""
+"""Responses of the server formatted for a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final
 
-from emu.prompt.client import RefusedError, Row
+from emu.prompt.client import CommandRefusedError, Row
 
 PER_ROW: Final = 8
 """Registers or units of memory in one line."""
@@ -19,36 +19,38 @@ FORMATS: Final = "xdutca"
 
 
 def frame(row: Row) -> str:
-    """`add at program.c:12`."""
+    """Return a frame as text: `add at program.c:12`."""
     if row.get("source"):
         return f"{row['name']} at {row['source']['name']}:{row['line']}"
     return f"{row['name']} at {row['instructionPointerReference']}"
 
 
 def backtrace(frames: Sequence[Row], at: int) -> str:
-    """One line per frame, the selected one marked."""
+    """Return one line per frame and mark the selected frame."""
     return "\n".join(f"{'*' if n == at else ' '} #{n} {frame(row)}" for n, row in enumerate(frames)) or "no frames"
 
 
 def source(path: str, first: int, last: int, here: int = 0) -> str:
-    """Lines of a file with their numbers; `here` is marked. Raises RefusedError if there are none."""
+    """Return lines of a file with their numbers and mark line `here`. Raises CommandRefusedError if there are none."""
     try:
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
-        raise RefusedError(f"{path}: {error.strerror}") from None
+        raise CommandRefusedError(f"{path}: {error.strerror}") from None
     first = max(first, 1)
     if first > len(lines):
-        raise RefusedError(f"{Path(path).name} has {len(lines)} lines")
+        raise CommandRefusedError(f"{Path(path).name} has {len(lines)} lines")
     shown = enumerate(lines[first - 1 : last], first)
     return "\n".join(f"{'>' if n == here else ' '}{n:5} {text}".rstrip() for n, text in shown)
 
 
 def number(text: str, form: str) -> str:
-    """The number at the beginning of a value, hexadecimal (x), signed (d) or not (u) decimal, binary (t), as a
-    character (c) or an address (a). Raises RefusedError."""
+    """Return the number at the beginning of a value in format `form`. Raises CommandRefusedError.
+
+    The formats are hexadecimal (x), signed (d) and unsigned (u) decimal, binary (t), character (c) and address (a).
+    """
     match = INTEGER.match(text)
     if match is None:
-        raise RefusedError(f"{text} is no whole number")
+        raise CommandRefusedError(f"{text} is no whole number")
     value = int(match[0], 0)
     bits = next(bits for bits in (16, 32, 64, 4096) if -(1 << bits - 1) <= value < 1 << bits)
     plain = value & (1 << bits) - 1
@@ -65,7 +67,7 @@ def number(text: str, form: str) -> str:
 
 
 def registers(rows: Sequence[Row]) -> str:
-    """Working registers in lines of eight, then the others."""
+    """Return the working registers in lines of eight, then the others."""
     texts = [(one["name"], f"{int(one['value']):#06x}" if one["value"].isdecimal() else one["value"]) for one in rows]
     working = [f"{name}={value}" for name, value in texts if name.startswith("W")]
     lines = ["  ".join(f"{one:<11}" for one in working[at : at + PER_ROW]) for at in range(0, len(working), PER_ROW)]
@@ -74,8 +76,10 @@ def registers(rows: Sequence[Row]) -> str:
 
 
 def sfrs(groups: Sequence[Row], wanted: str) -> str:
-    """Registers whose name, or the name of whose peripheral, fits the pattern, with their fields; the peripherals
-    without one. Raises RefusedError if none fits."""
+    """Return the registers whose name or peripheral matches the pattern `wanted`, with their fields.
+
+    Without a pattern, list the peripherals. Raises CommandRefusedError if nothing matches.
+    """
     if not wanted:
         return "\n".join(f"{group['name']}: {' '.join(one['name'] for one in group['parts'])}" for group in groups)
     pattern = wanted.upper()
@@ -87,20 +91,20 @@ def sfrs(groups: Sequence[Row], wanted: str) -> str:
         if fnmatchcase(one["name"].upper(), pattern) or fnmatchcase(group["name"].upper(), pattern)
     ]
     if not found:
-        raise RefusedError(f"no register and no peripheral is called {wanted}")
+        raise CommandRefusedError(f"no register and no peripheral is called {wanted}")
     return "\n".join(line.rstrip() for line in found)
 
 
 def memory(row: Row, size: int, form: str) -> str:
-    """Units of `size` bytes in lines of 16 bytes; a string with form "s"."""
+    """Return units of `size` bytes in lines of 16 bytes; with form "s" a string."""
     data = base64.b64decode(row.get("data", ""))
     address = int(row["address"], 16)
     if form == "s":
         return f"{address:#06x}: {data.partition(bytes(1))[0].decode('latin-1')!r}"
 
     def units(at: int) -> Iterator[str]:
-        for place in range(at, min(at + ROW_BYTES, len(data) - size + 1), size):
-            value = int.from_bytes(data[place : place + size], "little", signed=form == "d")
+        for location in range(at, min(at + ROW_BYTES, len(data) - size + 1), size):
+            value = int.from_bytes(data[location : location + size], "little", signed=form == "d")
             yield f"{value:#0{2 * size + 2}x}" if form in "xa" else number(str(value), form)
 
     lines = [f"{address + at:#06x}: {' '.join(units(at))}" for at in range(0, len(data), ROW_BYTES)]
@@ -110,7 +114,7 @@ def memory(row: Row, size: int, form: str) -> str:
 
 
 def disassembly(rows: Sequence[Row], here: int) -> str:
-    """One instruction a line, source lines and functions where they begin."""
+    """Return one instruction per line, with source lines and function names where they begin."""
     lines = []
     for row in rows:
         if row.get("presentationHint") == "invalid":
@@ -126,5 +130,5 @@ def disassembly(rows: Sequence[Row], here: int) -> str:
 
 
 def variables(rows: Sequence[dict[str, Any]]) -> str:
-    """One variable a line."""
+    """Return one variable per line."""
     return "\n".join(f"{one['name']} = {one['value']}" for one in rows)

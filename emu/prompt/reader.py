@@ -1,4 +1,4 @@
-"""Where commands come from: a terminal with history and completion, or a script, one command a line."""
+"""Command input: from a terminal with history and completion, or from a script with one command per line."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 from emu.host.exit_status import BAD_INPUT, DONE, FAULT
 from emu.host.paths import history
 from emu.prompt import breakpoint_commands, run_commands, state_commands  # noqa: F401  they fill the table
-from emu.prompt.client import Answering, Client, RefusedError, Row
+from emu.prompt.client import Client, CommandRefusedError, DebugServer, Row
 from emu.prompt.session import Session
 from emu.prompt.state_commands import TOPICS
-from emu.prompt.table import TABLE, Command, called
+from emu.prompt.table import TABLE, Command, find_command
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession
@@ -21,47 +21,50 @@ if TYPE_CHECKING:
 
     from emu.dap.wire import Channel
 
-PLACES: Final = ("break", "tbreak", "until", "list", "log", "disassemble")
-"""Commands that take a location."""
+LOCATION_COMMANDS: Final = ("break", "tbreak", "until", "list", "log", "disassemble")
+"""Commands with a location as argument."""
 
 
 class Prompt:
-    """Debugs by what `serving` makes to the end. `program` is how the command line is called."""
+    """Prompt for the server that `make_server` creates. `program` is the command's name in error messages."""
 
-    def __init__(self, program: str, serving: Callable[[Channel], Answering]) -> None:
+    def __init__(self, program: str, make_server: Callable[[Channel], DebugServer]) -> None:
         self._program: Final = program
         self._column = 0
-        self.client: Final = Client(serving, self._said)
+        self.client: Final = Client(make_server, self._print_output)
         self.session: Final = Session(self.client, self._write)
 
     def serve(self, launch: Row, source: TextIO) -> int:
-        """Exit status: DONE; of a script also FAULT if it ends at a fault, BAD_INPUT if a command failed."""
+        """Execute commands to the end and return the exit status.
+
+        It is DONE; for a script also FAULT if the script ends at a fault, and BAD_INPUT if a command fails.
+        """
         at_terminal = source.isatty()
         try:
             self.session.start(launch)
-            return self._by_hand() if at_terminal else self._by_script(source)
-        except RefusedError as error:
+            return self._run_terminal() if at_terminal else self._run_script(source)
+        except CommandRefusedError as error:
             print(f"{self._program}: {error}", file=sys.stderr)
             return BAD_INPUT
         finally:
             if not self.client.server.is_over:
-                self.session.leave(ends_all=True)
-            self.client.server.leave()
+                self.session.disconnect(terminate_debuggee=True)
+            self.client.server.release()
 
-    def _by_script(self, lines: Iterable[str]) -> int:
+    def _run_script(self, lines: Iterable[str]) -> int:
         for number, line in enumerate(lines, 1):
             if not line.strip() or line.lstrip().startswith("#"):
                 continue
             try:
-                carry_out(self.session, line)
-            except RefusedError as error:
+                execute(self.session, line)
+            except CommandRefusedError as error:
                 sys.stdout.flush()
-                raise RefusedError(f"line {number}, {line.strip()}: {error}") from None
+                raise CommandRefusedError(f"line {number}, {line.strip()}: {error}") from None
             if self.client.server.is_over:
                 return DONE
         return FAULT if self.session.at_fault else DONE
 
-    def _by_hand(self) -> int:
+    def _run_terminal(self) -> int:
         editor = _editor(self.session)
         last = ""
         while not self.client.server.is_over:
@@ -75,13 +78,13 @@ class Prompt:
             if not line:
                 continue
             try:
-                last = line if carry_out(self.session, line).repeats else ""
-            except RefusedError as error:
+                last = line if execute(self.session, line).repeats else ""
+            except CommandRefusedError as error:
                 self._write(str(error))
         return DONE
 
-    def _said(self, text: str) -> None:
-        """What the firmware says comes as it is."""
+    def _print_output(self, text: str) -> None:
+        """Print output of the firmware unchanged."""
         sys.stdout.write(text)
         sys.stdout.flush()
         self._column = 0 if text.endswith("\n") else 1
@@ -92,16 +95,16 @@ class Prompt:
         self._column = 0
 
 
-def carry_out(session: Session, line: str) -> Command:
-    """Do what one line says. Raises RefusedError."""
+def execute(session: Session, line: str) -> Command:
+    """Execute one line and return its command. Raises CommandRefusedError."""
     word, rest = split(line)
-    found = called(word)
-    found.do(session, rest)
+    found = find_command(word)
+    found.handler(session, rest)
     return found
 
 
 def split(line: str) -> tuple[str, str]:
-    """A command and what follows, also in `x/8xb buffer`."""
+    """Divide a line into command and arguments, also in the form `x/8xb buffer`."""
     words = line.strip().split(maxsplit=1)
     word, rest = words[0], words[1] if len(words) > 1 else ""
     name, slash, form = word.partition("/")
@@ -109,37 +112,37 @@ def split(line: str) -> tuple[str, str]:
 
 
 def candidates(session: Session, text: str) -> Iterator[tuple[str, int, str]]:
-    """What a line may go on with: a name, how many of the last letters it replaces, its kind."""
+    """Yield completions of a line: the name, the number of last characters that it replaces, and its kind."""
     word, space, rest = text.lstrip().partition(" ")
     if not space:
         yield from ((one.name, len(word), "command") for one in TABLE if one.name.startswith(word))
         return
     try:
-        name = called(word.partition("/")[0]).name
-    except RefusedError:
+        name = find_command(word.partition("/")[0]).name
+    except CommandRefusedError:
         return
     if name == "help":
         yield from ((one.name, len(rest), "command") for one in TABLE if one.name.startswith(rest))
     elif name == "info" and " " not in rest:
         yield from ((topic, len(rest), "topic") for topic in TOPICS if topic.startswith(rest))
     else:
-        if name in PLACES and " " not in rest:
+        if name in LOCATION_COMMANDS and " " not in rest:
             names = [one["name"] for one in session.client.ask("loadedSources")["sources"]]
             yield from ((f"{one}:", len(rest), "file") for one in names if one.startswith(rest))
         frame: dict[str, Any] = {"frameId": session.frame["id"]} if session.frame is not None else {}
         for row in session.client.ask("completions", text=rest, column=len(rest) + 1, **frame)["targets"]:
-            if name not in PLACES or row["type"] == "function":
+            if name not in LOCATION_COMMANDS or row["type"] == "function":
                 yield row["label"], row["length"], row["type"]
 
 
 def _editor(session: Session) -> PromptSession[str]:
-    """A line editor with completion by Tab and the history of earlier sessions, if there is a place for it."""
+    """Return a line editor with completion by Tab. It keeps its history in a file if that can be written."""
     from prompt_toolkit import PromptSession
     from prompt_toolkit.completion import Completer, Completion
     from prompt_toolkit.history import FileHistory, InMemoryHistory
 
     class Names(Completer):
-        """Asks the session."""
+        """Completer that queries the session."""
 
         def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterator[Completion]:
             for name, replaced, kind in candidates(session, document.text_before_cursor):

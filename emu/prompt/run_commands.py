@@ -1,129 +1,129 @@
-"""Commands that let the machine go: forward, back, to a time."""
+"""Commands that move the machine: forward, back, to a cycle."""
 
 from __future__ import annotations
 
-from emu.prompt.client import RefusedError
+from emu.prompt.client import CommandRefusedError
 from emu.prompt.session import Session
 from emu.prompt.table import command
 
-FINE = {"granularity": "instruction"}
+BY_INSTRUCTION = {"granularity": "instruction"}
 
 
-def _times(text: str) -> int:
+def _count(text: str) -> int:
     if text and (not text.isdecimal() or not int(text)):
-        raise RefusedError(f"expected how many times, not {text!r}")
+        raise CommandRefusedError(f"expected a number of repetitions, not {text!r}")
     return int(text or "1")
 
 
 def _repeat(session: Session, text: str, request: str, **more: str) -> None:
-    """Let it go some times, until something else than a step stops it."""
-    for _ in range(_times(text)):
-        if session.go(request, **more) != "step":
+    """Send a step request several times, until a stop for another reason."""
+    for _ in range(_count(text)):
+        if session.resume(request, **more) != "step":
             return
 
 
-@command("run", "from the reset, until something stops it", "r")
+@command("run", "run from the reset to the next stop", "r")
 def run_(session: Session, _text: str) -> None:
-    if session.has_gone:
-        session.go("restart")
-    session.go("continue")
+    if session.has_run:
+        session.resume("restart")
+    session.resume("continue")
 
 
-@command("continue [N]", "go on until something stops it, N times", "c", repeats=True)
+@command("continue [N]", "continue to the next stop, N times", "c", repeats=True)
 def continue_(session: Session, text: str) -> None:
-    for _ in range(_times(text)):
-        session.go("continue")
+    for _ in range(_count(text)):
+        session.resume("continue")
         if session.at_fault:
             return
 
 
-@command("step [N]", "to the next line, into functions", "s", repeats=True)
+@command("step [N]", "step to the next line, into functions", "s", repeats=True)
 def step_(session: Session, text: str) -> None:
     _repeat(session, text, "stepIn")
 
 
-@command("next [N]", "to the next line, over functions", "n", repeats=True)
+@command("next [N]", "step to the next line, over functions", "n", repeats=True)
 def next_(session: Session, text: str) -> None:
     _repeat(session, text, "next")
 
 
-@command("stepi [N]", "one instruction", "si", repeats=True)
+@command("stepi [N]", "step one instruction", "si", repeats=True)
 def stepi_(session: Session, text: str) -> None:
-    _repeat(session, text, "stepIn", **FINE)
+    _repeat(session, text, "stepIn", **BY_INSTRUCTION)
 
 
-@command("nexti [N]", "one instruction, calls and interrupts as a whole", "ni", repeats=True)
+@command("nexti [N]", "step one instruction, over calls and interrupts", "ni", repeats=True)
 def nexti_(session: Session, text: str) -> None:
-    _repeat(session, text, "next", **FINE)
+    _repeat(session, text, "next", **BY_INSTRUCTION)
 
 
-@command("finish", "to where this function goes back to", "fin", repeats=True)
+@command("finish", "run to the return of this function", "fin", repeats=True)
 def finish_(session: Session, _text: str) -> None:
-    session.go("stepOut")
+    session.resume("stepOut")
 
 
-@command("until LOCATION", "go on to there, once", "advance")
+@command("until LOCATION", "run to a location, once", "advance")
 def until_(session: Session, text: str) -> None:
-    kind, row = session.place(text)
-    point = session.points.add(kind, row, text, is_temporary=True)
+    kind, row = session.location(text)
+    point = session.breakpoints.add(kind, row, text, is_temporary=True)
     try:
-        session.go("continue")
+        session.resume("continue")
     finally:
-        if point in session.points.all:
-            session.points.drop([point])
+        if point in session.breakpoints.all:
+            session.breakpoints.delete([point])
 
 
-@command("cycle [N]", "run for N cycles, one without a number", repeats=True)
+@command("cycle [N]", "run for N cycles (default 1)", repeats=True)
 def cycle_(session: Session, text: str) -> None:
-    session.console(f"/cycle {text}".rstrip())
+    session.run_console_command(f"/cycle {text}".rstrip())
 
 
-@command("goto CYCLE", "to a cycle of the recording, or on to one behind it")
+@command("goto CYCLE", "go to a cycle of the recording, or run on to a later one")
 def goto_(session: Session, text: str) -> None:
-    session.console(f"/goto {text}")
+    session.run_console_command(f"/goto {text}")
 
 
-@command("lastwrite PLACE", "back to the instruction that changed it last", "lw")
+@command("lastwrite PLACE", "go back to the last instruction that changed PLACE", "lw")
 def lastwrite_(session: Session, text: str) -> None:
-    session.console(f"/lastwrite {text}")
+    session.run_console_command(f"/lastwrite {text}")
 
 
-@command("reverse-continue", "back to the last breakpoint, or write to a watchpoint", "rc", repeats=True)
+@command("reverse-continue", "go back to the last breakpoint, or write to a watchpoint", "rc", repeats=True)
 def reverse_continue_(session: Session, _text: str) -> None:
-    session.go("reverseContinue")
+    session.resume("reverseContinue")
 
 
-@command("reverse-next [N]", "back to the line before, in this function or its caller", "rn", repeats=True)
+@command("reverse-next [N]", "go back to the previous line of this function or its caller", "rn", repeats=True)
 def reverse_next_(session: Session, text: str) -> None:
     _repeat(session, text, "stepBack")
 
 
-@command("reverse-step [N]", "back to the line before, into functions from their end", "rs", repeats=True)
+@command("reverse-step [N]", "go back to the previous line, also of a called function", "rs", repeats=True)
 def reverse_step_(session: Session, text: str) -> None:
-    for _ in range(_times(text)):
-        session.console("/reverse-step")
+    for _ in range(_count(text)):
+        session.run_console_command("/reverse-step")
 
 
-@command("reverse-stepi [N]", "back by one instruction", "rsi", repeats=True)
+@command("reverse-stepi [N]", "go back by one instruction", "rsi", repeats=True)
 def reverse_stepi_(session: Session, text: str) -> None:
-    _repeat(session, text, "stepBack", **FINE)
+    _repeat(session, text, "stepBack", **BY_INSTRUCTION)
 
 
-@command("reverse-finish", "back to the call of this function, or to before the interrupt", "rf", repeats=True)
+@command("reverse-finish", "go back to the call of this function, or to before the interrupt", "rf", repeats=True)
 def reverse_finish_(session: Session, _text: str) -> None:
-    session.console("/reverse-finish")
+    session.run_console_command("/reverse-finish")
 
 
-@command("restart", "back to where the recording began")
+@command("restart", "go back to the start of the recording")
 def restart_(session: Session, _text: str) -> None:
-    session.go("restart")
+    session.resume("restart")
 
 
-@command("quit", "end, and what is being debugged with it", "q", "exit")
+@command("quit", "end the session and the debuggee", "q", "exit")
 def quit_(session: Session, _text: str) -> None:
-    session.leave(ends_all=True)
+    session.disconnect(terminate_debuggee=True)
 
 
-@command("detach", "end; a trial that is recorded goes on without the debugger")
+@command("detach", "end the session; a recorded trial continues without the debugger")
 def detach_(session: Session, _text: str) -> None:
-    session.leave(ends_all=False)
+    session.disconnect(terminate_debuggee=False)

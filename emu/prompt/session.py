@@ -1,4 +1,4 @@
-"""A session at the prompt: where the machine stands, what is selected, and what places are called."""
+"""State of a prompt: the current stop, the selected thread and frame, and the meaning of locations."""
 
 from __future__ import annotations
 
@@ -7,84 +7,84 @@ from pathlib import Path
 from typing import Any, Final
 
 from emu.prompt import formatting
-from emu.prompt.breakpoint_list import Points
-from emu.prompt.client import Client, RefusedError, Row
+from emu.prompt.breakpoint_list import BreakpointList
+from emu.prompt.client import Client, CommandRefusedError, Row
 
-LISTED: Final = 10
+LISTING_LINES: Final = 10
 """Lines of a listing, and instructions of a disassembly."""
 
 
 class Session:
-    """What commands work on; `write(text)` prints a line."""
+    """The state that commands act on. `write(text)` prints a line."""
 
     def __init__(self, client: Client, write: Callable[[str], None]) -> None:
         self.client: Final = client
-        self.points: Final = Points(client)
+        self.breakpoints: Final = BreakpointList(client)
         self.at_fault = False
-        """The machine stands at a fault of the firmware."""
+        """Whether the machine is at a fault of the firmware."""
         self.write: Final = write
         self.frames: list[Row] = []
         self.at = 0
         self.thread = 1
-        self.listed: tuple[str, int] = ("", 0)
-        self.has_gone = False
+        self.list_position: tuple[str, int] = ("", 0)
+        self.has_run = False
 
     def start(self, launch: Row) -> None:
-        """Begin to debug; the machine stands. Raises RefusedError."""
+        """Launch the debuggee, which is then paused at its entry. Raises CommandRefusedError."""
         self.client.ask("initialize", clientID="prompt")
         self.client.ask("launch", **launch, stopOnEntry=True)
         self.client.ask("setExceptionBreakpoints", filters=["fault"])
-        self.stands(self.client.go("configurationDone"))
+        self.report_stop(self.client.resume("configurationDone"))
 
     @property
     def frame(self) -> Row | None:
-        """The selected frame."""
+        """The selected frame, None if there is none."""
         return self.frames[self.at] if self.frames else None
 
     def time(self) -> str:
-        """Cycle, seconds, how far in the past."""
+        """Return cycle, seconds, and the distance to the present as text."""
         return str(self.client.ask("evaluate", expression="/time", context="repl")["result"])
 
-    def go(self, request: str, **arguments: Any) -> str:
-        """Let the machine go, and tell where it stands then; why it does. Raises RefusedError."""
-        halt = self.client.go(request, threadId=self.thread, **arguments)
-        self.has_gone = request != "restart"
-        self.stands(halt)
-        return str(halt["reason"])
+    def resume(self, request: str, **arguments: Any) -> str:
+        """Send a request that moves the machine, report the stop, and return its reason. Raises CommandRefusedError."""
+        event = self.client.resume(request, threadId=self.thread, **arguments)
+        self.has_run = request != "restart"
+        self.report_stop(event)
+        return str(event["reason"])
 
-    def console(self, text: str) -> None:
-        """Say something to the server's console. Raises RefusedError."""
-        halt = self.client.go("evaluate", expression=text, context="repl")
-        if halt:
-            self.has_gone = True
-            self.stands(halt)
+    def run_console_command(self, text: str) -> None:
+        """Execute a command of the server's console. Raises CommandRefusedError."""
+        event = self.client.resume("evaluate", expression=text, context="repl")
+        if event:
+            self.has_run = True
+            self.report_stop(event)
         else:
-            self.write(self.client.said)
+            self.write(self.client.result_text)
 
-    def leave(self, ends_all: bool) -> None:
-        """End the session; with `ends_all` also what is being debugged."""
-        self.client.ask("disconnect", terminateDebuggee=ends_all)
+    def disconnect(self, terminate_debuggee: bool) -> None:
+        """End the session; with `terminate_debuggee` also the debuggee."""
+        self.client.ask("disconnect", terminateDebuggee=terminate_debuggee)
 
-    def stands(self, halt: Row) -> None:
-        """Tell where the machine stands now, and why."""
-        hit = self.points.met(halt.get("hitBreakpointIds", []))
-        self.at_fault = halt["reason"] == "exception"
-        self.select(int(halt["threadId"]))
-        why = " ".join([halt["reason"], *(str(one.number) for one in hit)])
-        text = halt.get("description", "")
+    def report_stop(self, event: Row) -> None:
+        """Print the reason and the location of a stop."""
+        hit = self.breakpoints.take_hit(event.get("hitBreakpointIds", []))
+        self.at_fault = event["reason"] == "exception"
+        self.select(int(event["threadId"]))
+        why = " ".join([event["reason"], *(str(one.number) for one in hit)])
+        text = event.get("description", "")
         if self.at_fault:
             self.write(self.client.ask("exceptionInfo", threadId=self.thread)["description"].rstrip())
-        elif text or halt["reason"] not in ("step", "goto"):
+        elif text or event["reason"] not in ("step", "goto"):
             self.write(why + (f": {text}" if text else ""))
-        self.where()
+        self.show_location()
 
     def select(self, thread: int) -> None:
-        """Look at the innermost frame of a thread."""
+        """Select the innermost frame of a thread."""
         self.thread, self.at = thread, 0
         self.frames = self.client.ask("stackTrace", threadId=thread)["stackFrames"]
 
-    def where(self) -> None:
-        """Tell where the selected frame stands."""
+    def show_location(self) -> None:
+        """Print the location of the selected frame."""
         frame = self.frame
         if frame is None:
             self.write(self.time())
@@ -92,52 +92,52 @@ class Session:
         self.write(f"{formatting.frame(frame)}, {self.time()}")
         if frame.get("source"):
             path, line = frame["source"]["path"], int(frame["line"])
-            self.listed = path, max(line - LISTED // 2, 1)
+            self.list_position = path, max(line - LISTING_LINES // 2, 1)
             try:
                 self.write(formatting.source(path, line, line, line))
-            except RefusedError as missing:
+            except CommandRefusedError as missing:
                 self.write(f"({missing})")
 
-    def evaluated(self, text: str) -> Row:
-        """An expression in the selected frame. Raises RefusedError."""
+    def evaluate(self, text: str) -> Row:
+        """Evaluate an expression in the selected frame. Raises CommandRefusedError."""
         if not text:
-            raise RefusedError("expected an expression of C")
+            raise CommandRefusedError("expected an expression of C")
         frame = {"frameId": self.frame["id"]} if self.frame is not None else {}
         return self.client.ask("evaluate", expression=text, context="watch", **frame)
 
     def number(self, text: str) -> int:
-        """The value of an expression; of an array its address. Raises RefusedError."""
-        found = self.evaluated(text)
+        """Return the value of an expression, for an array its address. Raises CommandRefusedError."""
+        found = self.evaluate(text)
         if found.get("type", "").endswith("]"):
             return int(found["memoryReference"], 16)
         return int(formatting.number(found["result"], "d"))
 
     def scope(self, name: str) -> list[Row]:
-        """Variables of a scope of the selected frame. Raises RefusedError."""
+        """Return the variables of a scope of the selected frame. Raises CommandRefusedError."""
         if self.frame is None:
-            raise RefusedError("there is no frame")
+            raise CommandRefusedError("there is no frame")
         scopes = self.client.ask("scopes", frameId=self.frame["id"])["scopes"]
         wanted = next(one["variablesReference"] for one in scopes if one["name"] == name)
         rows: list[Row] = self.client.ask("variables", variablesReference=wanted)["variables"]
         return rows
 
-    # Places
+    # Locations
 
-    def source_of(self, text: str) -> tuple[str, int]:
-        """Path and line of a location. Raises RefusedError."""
-        kind, row = self.place(text)
+    def source_location(self, text: str) -> tuple[str, int]:
+        """Return path and line of a location. Raises CommandRefusedError."""
+        kind, row = self.location(text)
         if kind not in ("function", "instruction"):
             return kind, int(row["line"])
         address = self.number(row["name"]) if kind == "function" else int(row["instructionReference"], 16)
         first = self.client.ask("disassemble", memoryReference=f"{address:#08x}", instructionCount=1)["instructions"][0]
         if not first.get("location"):
-            raise RefusedError(f"no source is known for {text}")
+            raise CommandRefusedError(f"no source is known for {text}")
         return first["location"]["path"], int(first["line"])
 
-    def place(self, text: str) -> tuple[str, Row]:
-        """Which list of breakpoints a location belongs to, and its row there. Raises RefusedError."""
+    def location(self, text: str) -> tuple[str, Row]:
+        """Return the breakpoint list of a location and its row there. Raises CommandRefusedError."""
         if not text:
-            raise RefusedError("expected FUNCTION, LINE, FILE:LINE or *ADDRESS")
+            raise CommandRefusedError("expected FUNCTION, LINE, FILE:LINE or *ADDRESS")
         if text.startswith("*"):
             return "instruction", {"instructionReference": f"{self.number(text[1:]):#08x}"}
         file, colon, line = text.rpartition(":")
@@ -146,14 +146,14 @@ class Session:
         return self.path(file if colon else ""), {"line": int(line)}
 
     def path(self, file: str) -> str:
-        """A source by its name, or the one of the selected frame. Raises RefusedError."""
+        """Return the path of a source by its name, or that of the selected frame. Raises CommandRefusedError."""
         if not file:
-            if self.listed[0]:
-                return self.listed[0]
-            raise RefusedError("there is no source here: say FILE:LINE")
+            if self.list_position[0]:
+                return self.list_position[0]
+            raise CommandRefusedError("there is no source here: say FILE:LINE")
         paths = [one["path"] for one in self.client.ask("loadedSources")["sources"]]
         parts = Path(file).parts
         found = [path for path in paths if Path(path).parts[-len(parts) :] == parts]
         if not found:
-            raise RefusedError(f"no code of this program comes from {file}")
+            raise CommandRefusedError(f"no code of this program comes from {file}")
         return str(found[0])

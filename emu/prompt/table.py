@@ -1,4 +1,4 @@
-"""The table of commands that the prompt knows."""
+"""Table of the prompt's commands."""
 
 from __future__ import annotations
 
@@ -6,44 +6,44 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from emu.prompt.client import RefusedError
+from emu.prompt.client import CommandRefusedError
 from emu.prompt.session import Session
 
-Doing = Callable[[Session, str], None]
+Handler = Callable[[Session, str], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One command: how it is written, what it does, other names for it."""
+    """One command: usage, help text, handler and aliases."""
 
     usage: str
     help: str
-    do: Doing
+    handler: Handler
     aliases: tuple[str, ...] = ()
     repeats: bool = False
-    """An empty line at a terminal does it again."""
+    """Whether an empty line at a terminal repeats it."""
 
     @property
     def name(self) -> str:
-        """Its first word."""
+        """First word of the usage."""
         return self.usage.split()[0].split("[")[0]
 
 
 TABLE: Final[list[Command]] = []
 
 
-def command(usage: str, text: str, *aliases: str, repeats: bool = False) -> Callable[[Doing], Doing]:
-    """Enter a function into TABLE."""
+def command(usage: str, text: str, *aliases: str, repeats: bool = False) -> Callable[[Handler], Handler]:
+    """Register a function as a command."""
 
-    def enter(do: Doing) -> Doing:
-        TABLE.append(Command(usage, text, do, aliases, repeats))
-        return do
+    def enter(handler: Handler) -> Handler:
+        TABLE.append(Command(usage, text, handler, aliases, repeats))
+        return handler
 
     return enter
 
 
-def called(word: str) -> Command:
-    """The command of that name, alias or unambiguous beginning. Raises RefusedError."""
+def find_command(word: str) -> Command:
+    """Return the command with a name, an alias or an unambiguous abbreviation. Raises CommandRefusedError."""
     for one in TABLE:
         if word == one.name or word in one.aliases:
             return one
@@ -51,5 +51,5 @@ def called(word: str) -> Command:
     if len(found) == 1:
         return found[0]
     if found:
-        raise RefusedError(f"{word} is ambiguous: {', '.join(one.name for one in found)}")
-    raise RefusedError(f"there is no command {word}: try help")
+        raise CommandRefusedError(f"{word} is ambiguous: {', '.join(one.name for one in found)}")
+    raise CommandRefusedError(f"there is no command {word}: try help")

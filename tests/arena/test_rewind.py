@@ -218,6 +218,6 @@ def test_it_can_be_told_to_stand_on_the_way_back(tmp_path: Path, image_of: Calla
 
         session.receive = heard  # type: ignore[method-assign]
         halt = debugger.resume("evaluate", expression="/goto 199000000", context="repl")
-        assert (halt["reason"], halt["description"]) == ("pause", "on the way back")
+        assert (halt["reason"], halt["description"]) == ("pause", "interrupted while rewinding")
         assert debugger.cycle < 199_000_000
         assert debugger.to(10_000_000) == early

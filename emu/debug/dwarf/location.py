@@ -1,6 +1,6 @@
-"""DWARF expressions: where a variable is, and its bytes (DWARF 2 §2.4, with the operations of later versions that fit).
+"""DWARF location expressions: where a variable is, and access to its bytes (DWARF 2 §2.4 and some later operations).
 
-What enters: an expression, a `View` of registers and memory. What leaves: pieces, and through them bytes.
+Inputs: an expression and a `View` of registers and memory. Output: pieces, through which the bytes are read.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Final, Protocol
 LIT0, REG0, BREG0 = 0x30, 0x50, 0x70
 FBREG: Final = 0x91
 ADDR_0: Final = (0x03, 0, 0, 0, 0)
-"""The expression that says address 0."""
+"""Expression for address 0."""
 REGISTERS: Final = 32
-"""Registers with operations of their own."""
+"""Number of registers that have an operation of their own."""
 _BINARY: Final[dict[int, Callable[[int, int], int]]] = {
     0x22: lambda a, b: a + b,  # plus
     0x1C: lambda a, b: a - b,  # minus
@@ -35,32 +35,32 @@ _FIXED: Final = {
     0x0C: (4, False),
     0x0D: (4, True),
 }
-"""Constants: size in bytes, whether signed."""
+"""Size in bytes and signedness of constant operands, by operation."""
 
 
 class View(Protocol):
-    """Registers and memory as one frame of a call stack has them."""
+    """Registers and memory as seen in one frame of a call stack."""
 
     def register(self, number: int) -> int | None:
-        """Wn, None if it cannot be known in this frame."""
+        """Return Wn, None if it is unknown in this frame."""
 
     def set_register(self, number: int, value: int) -> None:
-        """Change Wn. Raises ValueError where that cannot be."""
+        """Set Wn. Raises ValueError if the frame does not permit it."""
 
     def memory(self, address: int, size: int) -> bytes:
-        """Bytes of data space without side effects. Raises ValueError where nothing is."""
+        """Return bytes of data space without side effects. Raises ValueError for unimplemented addresses."""
 
     def set_memory(self, address: int, data: bytes) -> None:
-        """Change bytes of data space. Raises ValueError where nothing can be changed."""
+        """Write bytes of data space. Raises ValueError for addresses that cannot be written."""
 
 
 class Unavailable(Exception):
-    """The value cannot be had; the text says why."""
+    """The value is not available. The text gives the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Part of a variable: in memory, in a register, or known by value. `size` 0: all that is left."""
+    """Part of a variable: in memory, in a register, or a known value. Size 0 means the rest of the variable."""
 
     kind: str
     """"memory", "register", "value", or "gone" for a part that was optimised out."""
@@ -68,21 +68,21 @@ class Piece:
     size: int = 0
     data: bytes = b""
     skip: int = 0
-    """1: it begins with the upper byte of its register."""
+    """1 if the part begins with the upper byte of its register, else 0."""
 
 
 def pieces_of(code: bytes, view: View, frame_base: Callable[[], int]) -> tuple[Piece, ...]:
-    """What an expression describes. Raises Unavailable."""
+    """Return the pieces that a location expression describes. Raises Unavailable."""
     return _Evaluation(code, view, frame_base).run()
 
 
 def address_of(pieces: tuple[Piece, ...]) -> int | None:
-    """The address of what lies in memory as a whole, else None."""
+    """Return the data address of an object that is in memory as a whole, else None."""
     return pieces[0].at if len(pieces) == 1 and pieces[0].kind == "memory" else None
 
 
 def read(pieces: tuple[Piece, ...], size: int, view: View) -> bytes:
-    """`size` bytes. Raises Unavailable."""
+    """Read `size` bytes from the pieces. Raises Unavailable."""
     data = b""
     for piece in pieces:
         wanted = piece.size or size - len(data)
@@ -101,7 +101,7 @@ def read(pieces: tuple[Piece, ...], size: int, view: View) -> bytes:
 
 
 def _registers(number: int, size: int, view: View) -> bytes:
-    """A value that begins in Wn and goes on in the registers behind it."""
+    """Return `size` bytes from Wn and the registers after it."""
     data = b""
     while len(data) < size:
         value = view.register(number)
@@ -113,13 +113,13 @@ def _registers(number: int, size: int, view: View) -> bytes:
 
 
 def write(pieces: tuple[Piece, ...], data: bytes, view: View) -> None:
-    """Change what the pieces hold. Raises Unavailable, ValueError."""
+    """Write `data` to the pieces. Raises Unavailable, ValueError."""
     for piece in pieces:
         part, data = data[: piece.size or None], data[piece.size or len(data) :]
         if piece.kind == "memory":
             view.set_memory(piece.at, part)
         elif piece.kind == "register":
-            if piece.skip:  # the byte below stays
+            if piece.skip:  # the lower byte keeps its value
                 part = _registers(piece.at, 1, view) + part
             for index in range(0, len(part), 2):
                 number = piece.at + index // 2
@@ -133,7 +133,7 @@ def write(pieces: tuple[Piece, ...], data: bytes, view: View) -> None:
 
 
 class _Evaluation:
-    """One run of the stack machine."""
+    """One execution of the DWARF stack machine."""
 
     def __init__(self, code: bytes, view: View, frame_base: Callable[[], int]) -> None:
         self.code: Final = code
@@ -156,7 +156,7 @@ class _Evaluation:
         return tuple(self.pieces)
 
     def _part(self, size: int) -> Piece:
-        """What the operations since the last piece have led to."""
+        """Return the piece that the operations since the last piece describe."""
         if self.simple is not None:
             part, self.simple = self.simple, None
             return Piece(part.kind, part.at, size, part.data)

@@ -1,7 +1,6 @@
-"""C types as DWARF tells them, and numbers out of bytes and back.
+"""C types read from DWARF, and conversion between bytes and Python values.
 
-What enters: bytes in memory order, little endian. What leaves: ints, floats, dicts for structs and unions, lists for
-arrays, text for people.
+Bytes are in memory order, little endian. Values are ints, floats, dicts for structs and unions, and lists for arrays.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ TAGGED: Final = ("struct", "union", "enum")
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One member of a struct or union: byte `offset`; of a bit field also the bits above `lsb` of `type`'s bytes."""
+    """Member of a struct or union at byte `offset`. A bit field has `bits` bits from `lsb` of the bytes of `type`."""
 
     name: str
     type: Type
@@ -32,18 +31,18 @@ class Member:
 
 @dataclass(eq=False, slots=True)
 class Type:
-    """One type. Types that refer to themselves are filled in after they are made, so the fields can change."""
+    """A C type. Fields are mutable because a type that refers to itself is completed after its creation."""
 
     kind: str
     """"signed", "unsigned", "char" (signed or not), "bool", "float", "pointer", "array", "struct", "union", "enum",
     "function", "void", or one of QUALIFIERS."""
     name: str = ""
     size: int = 0
-    """Bytes; 0 for void, functions and types that are only declared."""
+    """Size in bytes; 0 for void, functions and incomplete types."""
     target: Type | None = None
-    """What a pointer points to, an array consists of, a function returns, a qualifier qualifies."""
+    """Target of a pointer, element of an array, result of a function, or the qualified type."""
     count: int = 0
-    """Elements of an array."""
+    """Number of elements of an array."""
     members: tuple[Member, ...] = ()
     names: dict[int, str] = field(default_factory=dict)
     """Enumerators by value."""
@@ -51,7 +50,7 @@ class Type:
 
     @property
     def bare(self) -> Type:
-        """Without typedefs and qualifiers."""
+        """The type without typedefs and qualifiers."""
         found = self
         while found.kind in QUALIFIERS and found.target is not None:
             found = found.target
@@ -59,7 +58,7 @@ class Type:
 
     @property
     def bytes(self) -> int:
-        """Size in bytes, through qualifiers."""
+        """Size in bytes, also of arrays and qualified types."""
         bare = self.bare
         if bare.kind == "array" and bare.target is not None:
             return bare.count * bare.target.bytes
@@ -67,11 +66,11 @@ class Type:
 
     @property
     def is_number(self) -> bool:
-        """Whether a value of it is one int or float."""
+        """Whether a value of the type is one int or float."""
         return self.bare.kind in ("signed", "unsigned", "char", "bool", "float", "enum", "pointer")
 
     def member(self, name: str) -> Member | None:
-        """The member called `name` of a struct or union; those of unnamed members count as its own."""
+        """Return the member `name` of a struct or union, also from its unnamed members; None if there is none."""
         for one in self.bare.members:
             if one.name == name:
                 return one
@@ -82,7 +81,7 @@ class Type:
         return None
 
     def __str__(self) -> str:
-        """As C writes it, nearly: `unsigned int`, `struct point *`, `char[8]`."""
+        """Return the type name approximately as C writes it: `unsigned int`, `struct point *`, `char[8]`."""
         match self.kind:
             case "pointer":
                 target = str(self.target) if self.target is not None else "void"
@@ -100,11 +99,11 @@ class Type:
 
 VOID: Final = Type("void", "void")
 UNSIGNED: Final = {size: Type("unsigned", f"uint{8 * size}", size) for size in (1, 2, 4, 8)}
-"""What a symbol without type is shown as, by size."""
+"""Types for symbols without debug information, by size."""
 
 
 def decode(kind: Type, data: bytes) -> Any:
-    """The value in `data`, which has at least as many bytes as the type."""
+    """Return the value of type `kind` in `data`, which has at least as many bytes as the type."""
     bare = kind.bare
     match bare.kind:
         case "float" if bare.size in FLOATS:
@@ -120,7 +119,7 @@ def decode(kind: Type, data: bytes) -> Any:
 
 
 def decode_member(one: Member, data: bytes) -> Any:
-    """The value of a member in the bytes of its struct."""
+    """Return the value of a member in the bytes of its struct."""
     inside = data[one.offset :]
     if not one.bits:
         return decode(one.type, inside)
@@ -131,7 +130,7 @@ def decode_member(one: Member, data: bytes) -> Any:
 
 
 def encode(kind: Type, value: Any) -> bytes:
-    """`value` as bytes of that type. Raises ValueError for a value it cannot hold, TypeError for aggregates."""
+    """Return `value` as bytes of type `kind`. Raises ValueError if it does not fit, TypeError for aggregates."""
     bare = kind.bare
     if bare.kind == "float" and bare.size in FLOATS:
         return struct.pack(FLOATS[bare.size], value)
@@ -145,7 +144,7 @@ def encode(kind: Type, value: Any) -> bytes:
 
 
 def text_of(kind: Type, value: Any) -> str:
-    """A value for people, in one line."""
+    """Return a value as one line of text."""
     bare = kind.bare
     match bare.kind:
         case "pointer":
@@ -176,7 +175,7 @@ def _array(target: Type, values: list[Any]) -> str:
 
 
 def parts_of(kind: Type) -> Iterator[Member]:
-    """Members of a struct or union, elements of an array as members called `[0]`, `[1]`, ...; else nothing."""
+    """Return the members of a struct or union, or the elements of an array as members `[0]`, `[1]`, ...; else none."""
     bare = kind.bare
     if bare.kind == "array" and bare.target is not None:
         step = bare.target.bytes

@@ -1,7 +1,7 @@
-"""Functions, variables and types of an image, from DWARF 2 to 5 (abi-elf.md §6.7).
+"""Functions, variables and types of an image from its DWARF 2 to 5 sections (abi-elf.md §6.7).
 
-What enters: an image with debug sections. What leaves: `DebugInfo`. Damaged entries are left out: what cannot be read
-is not there, and nothing here fails a run. Addresses: PC units for code, bytes for data.
+Input: an image with debug sections. Output: `DebugInfo`. Entries that cannot be read are omitted; damaged debug
+information never makes a run fail. Addresses are PC units for code and bytes for data.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from emu.image.lines import dwarf_of, file_names, remove_phantom_octets
 from emu.image.model import Image
 
 Ranges = tuple[tuple[int, int], ...]
-"""Half-open stretches of program addresses."""
+"""Half-open ranges of program addresses."""
 ENCODINGS: Final = {2: "bool", 4: "float", 5: "signed", 6: "char", 7: "unsigned", 8: "char"}
-"""Base types by DW_ATE code (DWARF 2 §7.8)."""
+"""Kinds of base types by DW_ATE code (DWARF 2 §7.8)."""
 SIGNED: Final = (5, 6)
 TYPE_KINDS: Final = {
     "DW_TAG_structure_type": "struct",
@@ -41,19 +41,19 @@ BASE_SELECTION: Final = 0xFFFFFFFF
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """Where a variable is: DWARF expressions, each for a stretch of program addresses or for all."""
+    """Location of a variable: DWARF expressions, each for a range of program addresses or for all."""
 
     entries: tuple[tuple[int | None, int, bytes], ...]
     """(start or None, end, expression)."""
 
     def at(self, pc: int) -> bytes | None:
-        """The expression that holds at `pc`, None where the variable has no place ("optimised out")."""
+        """Return the expression that is valid at `pc`, None if the variable is optimised out there."""
         return next((code for start, end, code in self.entries if start is None or start <= pc < end), None)
 
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """A variable or parameter. `constant` is its value if it has no place but a value."""
+    """A variable or parameter. `constant` is the value of a variable without a location."""
 
     name: str
     type: Type
@@ -66,7 +66,7 @@ class Variable:
 
 @dataclass(eq=False, slots=True)
 class Scope:
-    """A function, a block in it, or a function inlined into it."""
+    """A function, a block inside it, or a function inlined into it."""
 
     kind: str
     """"function", "block" or "inlined"."""
@@ -79,37 +79,37 @@ class Scope:
     line: int = 0
     call_file: str = ""
     call_line: int = 0
-    """Of an inlined function: where it is called."""
+    """Line of the call of an inlined function."""
     unit: int = 0
     returns: Type | None = None
     """Type of a function's result, None for void."""
 
-    def holds(self, pc: int) -> bool:
-        """Whether the instruction at `pc` belongs to it."""
+    def contains(self, pc: int) -> bool:
+        """Whether the scope contains the instruction at `pc`."""
         return any(start <= pc < end for start, end in self.ranges)
 
     def chain(self, pc: int) -> list[Scope]:
-        """This scope and those inside it that hold `pc`, outermost first."""
+        """Return this scope and its nested scopes that contain `pc`, outermost first."""
         found = [self]
         while True:
-            deeper = next((scope for scope in found[-1].inner if scope.holds(pc)), None)
+            deeper = next((scope for scope in found[-1].inner if scope.contains(pc)), None)
             if deeper is None:
                 return found
             found.append(deeper)
 
 
 class DebugInfo:
-    """What the debug sections of one image say."""
+    """Content of the debug sections of one image."""
 
     def __init__(self, image: Image) -> None:
         self.functions: Final[list[Scope]] = []
-        """Those with code, by address."""
+        """Functions with code, sorted by address."""
         self.globals: Final[dict[str, list[Variable]]] = {}
-        """Variables outside functions by name; several files may have one of the same name."""
+        """Variables outside functions, by name. Several files may have variables of the same name."""
         self.statics: Final[dict[int, dict[str, Variable]]] = {}
-        """The same by unit and name."""
+        """Variables outside functions, by compile unit and name."""
         self.types: Final[dict[str, dict[int, Type]]] = {}
-        """Base types and typedefs by name, tags as `struct node`, by unit; the complete ones."""
+        """Complete types by name and compile unit: base types, typedefs, and tags such as `struct node`."""
         self.constants: Final[dict[str, int]] = {}
         """Enumerators by name."""
         sections = remove_phantom_octets({s.name: s.octets for s in image.sections if s.name.startswith(".debug_")})
@@ -119,23 +119,23 @@ class DebugInfo:
         self._starts: Final = [one.ranges[0][0] for one in self.functions]
 
     def type(self, name: str, unit: int = -1) -> Type | None:
-        """What `name` names (`node`, `struct node`): in that unit, else in any."""
+        """Return the type `name` (`node`, `struct node`) of a compile unit, else of any unit; None if there is none."""
         known = self.types.get(name, {})
         return known.get(unit) or next(iter(known.values()), None)
 
     def function(self, pc: int) -> Scope | None:
-        """The function whose code `pc` is in."""
+        """Return the function that contains `pc`, None if there is none."""
         index = bisect_right(self._starts, pc) - 1
-        if index >= 0 and self.functions[index].holds(pc):
+        if index >= 0 and self.functions[index].contains(pc):
             return self.functions[index]
-        return next((one for one in self.functions if one.holds(pc)), None)
+        return next((one for one in self.functions if one.contains(pc)), None)
 
 
 _KNOWN: Final[WeakKeyDictionary[Image, DebugInfo]] = WeakKeyDictionary()
 
 
 def debug_of(image: Image) -> DebugInfo:
-    """What the debug sections of `image` say, read when first asked for."""
+    """Return the debug information of `image`. It is read at the first call."""
     found = _KNOWN.get(image)
     if found is None:
         found = _KNOWN[image] = DebugInfo(image)
@@ -143,7 +143,8 @@ def debug_of(image: Image) -> DebugInfo:
 
 
 class _Reader:
-    """One pass over all units. Damaged input makes pyelftools raise many kinds of exception; each unit stands alone."""
+    """Reader of all compile units. pyelftools raises many kinds of exceptions for damaged input; a damaged unit is
+    skipped."""
 
     def __init__(self, info: DebugInfo, sections: dict[str, bytes]) -> None:
         self.info: Final = info
@@ -190,10 +191,10 @@ class _Reader:
             if ranges:
                 self.info.functions.append(self._scope(die, "function", ranges))
         elif die.tag in TYPE_KINDS:
-            self._named(die)
+            self._register_type(die)
 
-    def _named(self, die: Any, is_local: bool = False) -> None:
-        """A type that may have a name. One of a function hides none of a file."""
+    def _register_type(self, die: Any, is_local: bool = False) -> None:
+        """Register a type by its name. A type local to a function does not replace one of the file."""
         made = self._type(die)
         if made.name and (made.bytes or made.members):
             known = self.info.types.setdefault(f"{made.kind} {made.name}" if made.kind in TAGGED else made.name, {})
@@ -222,7 +223,7 @@ class _Reader:
                 inside = self._ranges(child) or ranges
                 scope.inner.append(self._scope(child, "block" if "lexical" in child.tag else "inlined", inside))
             elif child.tag in TYPE_KINDS:
-                self._named(child, is_local=True)
+                self._register_type(child, is_local=True)
         return scope
 
     def _variable(self, die: Any) -> Variable | None:
@@ -251,13 +252,14 @@ class _Reader:
         return Location(tuple(self._location_list(found.value)))
 
     def _location_list(self, offset: int) -> Iterator[tuple[int, int, bytes]]:
-        """DWARF 2 §2.4.6: start and end relative to the unit's base, length, expression."""
+        """Yield start, end and expression of each entry of a location list (DWARF 2 §2.4.6)."""
         for start, end, place in self._pairs(self.loc, offset):
             size = int.from_bytes(self.loc[place : place + 2], "little")
             yield start, end, self.loc[place + 2 : place + 2 + size]
 
     def _pairs(self, section: bytes, offset: int) -> Iterator[tuple[int, int, int]]:
-        """(start, end, offset behind) of list entries up to the end mark; entries of a location list carry more."""
+        """Yield (start, end, offset after both) of every list entry. Entries of location lists have an expression after
+        them."""
         base = self.unit_base
         carries_more = section is self.loc
         while offset + 2 * ADDRESS <= len(section):
@@ -339,7 +341,7 @@ class _Reader:
 
 
 def _origin(die: Any) -> Any:
-    """The entry that has the name: of an inlined or specialised one, the abstract one."""
+    """Return the entry that has the name; for an inlined or specialised function, the abstract entry."""
     while "DW_AT_name" not in die.attributes and "DW_AT_type" not in die.attributes:
         if "DW_AT_abstract_origin" in die.attributes:
             die = die.get_DIE_from_attribute("DW_AT_abstract_origin")
@@ -369,7 +371,7 @@ def _count(die: Any) -> int:
 
 
 def _member_offset(die: Any) -> int:
-    """A number, or the expression `plus_uconst N` of DWARF 2."""
+    """Return the offset of a member: a number, or the operand of `plus_uconst N` in DWARF 2."""
     found = die.attributes.get("DW_AT_data_member_location")
     if found is None:
         return 0

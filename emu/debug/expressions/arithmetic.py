@@ -1,7 +1,7 @@
-"""Numbers as C computes them (C11 §6.3.1): promotion, the usual conversions, unsigned results modulo their width.
+"""Arithmetic of C (C11 §6.3.1): promotion, usual arithmetic conversions, unsigned results modulo their width.
 
-What enters: whole and floating numbers with their types. What leaves: the same. Where C leaves the result of a signed
-overflow undefined, it is the exact number as long as a type holds it.
+Inputs and outputs: integers and floating-point numbers with their types. Where C leaves the result of a signed overflow
+undefined, the result is the exact number as long as a type can represent it.
 """
 
 from __future__ import annotations
@@ -21,24 +21,28 @@ SIGNED: Final = {size: Type("signed", f"int{8 * size}", size, is_signed=True) fo
 FLOATING: Final = Type("float", "double", 8)
 FLOAT: Final = Type("float", "float", 4)
 WIDEST: Final = 64
-"""Bits of the longest type: a shift by as many means nothing in C, and one by 10^10 would fill the memory."""
+"""Bits of the longest type. C does not define a shift by as many bits, and a shift by 10^10 would exhaust the
+memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A value that has a type, but no place."""
+    """A value with a type and without a place in memory."""
 
     value: int | float
     kind: Type = SIGNED[INT]
 
     @property
-    def is_whole(self) -> bool:
-        """Whether it is none with a fraction."""
+    def is_integer(self) -> bool:
+        """Whether the value is an integer, not a floating-point number."""
         return isinstance(self.value, int)
 
 
-def whole(value: int, *, unsigned: bool = False, size: int = INT, may_be_unsigned: bool = False) -> Number:
-    """A constant: of the first type that holds it, from `size` bytes on. Raises ValueError for one too long."""
+def integer_constant(value: int, *, unsigned: bool = False, size: int = INT, may_be_unsigned: bool = False) -> Number:
+    """Return a constant in the first type of at least `size` bytes that can represent it.
+
+    Raises ValueError if no type can.
+    """
     for bytes_ in (one for one in (2, 4, 8) if one >= size):
         if not unsigned and -(1 << 8 * bytes_ - 1) <= value < 1 << 8 * bytes_ - 1:
             return Number(value, SIGNED[bytes_])
@@ -47,8 +51,8 @@ def whole(value: int, *, unsigned: bool = False, size: int = INT, may_be_unsigne
     raise ValueError(f"no type holds {value:#x}")
 
 
-def promoted(value: Any, kind: Type, bits: int = 0) -> Number:
-    """What is read from a place of that type; `bits` of a bit field."""
+def promote(value: Any, kind: Type, bits: int = 0) -> Number:
+    """Return a value read from an object of type `kind` after integer promotion. `bits` is the width of a bit field."""
     bare = kind.bare
     if isinstance(value, float):
         return Number(value, bare)
@@ -59,10 +63,10 @@ def promoted(value: Any, kind: Type, bits: int = 0) -> Number:
     return Number(int(value), SIGNED[size] if bare.is_signed else UNSIGNED.get(size, UNSIGNED[8]))
 
 
-def fitted(value: int | float, kind: Type) -> Number:
-    """A result of that type."""
+def wrap_result(value: int | float, kind: Type) -> Number:
+    """Return a result of type `kind`: unsigned modulo its width, signed in the first type that can represent it."""
     if isinstance(value, float):
-        return Number(_rounded(value, kind), kind)
+        return Number(_round_to(value, kind), kind)
     if kind.kind == "unsigned":
         return Number(value & (1 << 8 * kind.size) - 1, kind)
     for size in (2, 4, 8):
@@ -71,8 +75,8 @@ def fitted(value: int | float, kind: Type) -> Number:
     return Number((value + (1 << 63)) % (1 << 64) - (1 << 63), SIGNED[8])
 
 
-def _rounded(value: float, kind: Type) -> float:
-    """What a floating type of that size holds."""
+def _round_to(value: float, kind: Type) -> float:
+    """Return `value` rounded to a floating-point type."""
     if kind.size != FLOAT.size:
         return value
     try:
@@ -82,12 +86,14 @@ def _rounded(value: float, kind: Type) -> float:
     return found
 
 
-def converted(value: int | float, kind: Type) -> int | float:
-    """`value` as a number, pointer or enumerator of that type (C11 §6.3.1). Raises ValueError for NaN and infinity as
-    whole numbers."""
+def convert(value: int | float, kind: Type) -> int | float:
+    """Return `value` converted to a number, pointer or enumeration type (C11 §6.3.1).
+
+    Raises ValueError for NaN and infinity as integers.
+    """
     bare = kind.bare
     if bare.kind == "float":
-        return _rounded(float(value), bare)
+        return _round_to(float(value), bare)
     if bare.kind == "bool":
         return int(bool(value))
     if isinstance(value, float):
@@ -99,8 +105,8 @@ def converted(value: int | float, kind: Type) -> int | float:
     return value - (1 << bits) if bare.is_signed and value >> bits - 1 else value
 
 
-def common(one: Type, other: Type) -> Type:
-    """The type in which two are computed."""
+def common_type(one: Type, other: Type) -> Type:
+    """Return the common type of two operands (usual arithmetic conversions)."""
     if "float" in (one.kind, other.kind):
         return max((kind for kind in (one, other) if kind.kind == "float"), key=lambda kind: kind.size)
     if one.size != other.size:
@@ -108,16 +114,16 @@ def common(one: Type, other: Type) -> Type:
     return one if one.kind == "unsigned" else other
 
 
-def _divided(a: Any, b: Any) -> int | float:
-    """Towards zero, as C divides; exact for whole numbers of any size."""
+def _divide(a: Any, b: Any) -> int | float:
+    """Divide as C does: truncate towards zero. Exact for integers of any size."""
     if isinstance(a, float) or isinstance(b, float):
         return float(a / b)
     size: int = abs(a) // abs(b)
     return size if (a < 0) == (b < 0) else -size
 
 
-def _within(bits: int) -> int:
-    """A count of a shift. Raises ValueError."""
+def _shift_count(bits: int) -> int:
+    """Check a shift count. Raises ValueError for one outside 0 to 63."""
     if not 0 <= bits < WIDEST:
         raise ValueError(f"a shift by {bits} bits; expected 0 to {WIDEST - 1}")
     return bits
@@ -128,50 +134,50 @@ LOGIC: Final[dict[str, Rule]] = {
     "||": (1, lambda a, b: bool(a) or bool(b)),
     "&&": (2, lambda a, b: bool(a) and bool(b)),
 }
-COMPARING: Final[dict[str, Rule]] = {
+COMPARISONS: Final[dict[str, Rule]] = {
     "==": (6, operator.eq), "!=": (6, operator.ne), "<": (7, operator.lt), ">": (7, operator.gt),
     "<=": (7, operator.le), ">=": (7, operator.ge),
 }  # fmt: skip
 SHIFTS: Final[dict[str, Rule]] = {
-    "<<": (8, lambda a, b: operator.lshift(a, _within(b))),
-    ">>": (8, lambda a, b: operator.rshift(a, _within(b))),
+    "<<": (8, lambda a, b: operator.lshift(a, _shift_count(b))),
+    ">>": (8, lambda a, b: operator.rshift(a, _shift_count(b))),
 }
 ARITHMETIC: Final[dict[str, Rule]] = {
     "|": (3, operator.or_), "^": (4, operator.xor), "&": (5, operator.and_),
-    "+": (9, operator.add), "-": (9, operator.sub), "*": (10, operator.mul), "/": (10, _divided),
-    "%": (10, lambda a, b: a - b * _divided(a, b)),
+    "+": (9, operator.add), "-": (9, operator.sub), "*": (10, operator.mul), "/": (10, _divide),
+    "%": (10, lambda a, b: a - b * _divide(a, b)),
 }  # fmt: skip
-BINARY: Final = LOGIC | COMPARING | SHIFTS | ARITHMETIC
-"""Rank and meaning of operators with two operands."""
-WHOLE: Final = ("|", "^", "&", "<<", ">>", "%")
-"""Operators for whole numbers only."""
+BINARY: Final = LOGIC | COMPARISONS | SHIFTS | ARITHMETIC
+"""Precedence and function of each binary operator."""
+INTEGER_ONLY: Final = ("|", "^", "&", "<<", ">>", "%")
+"""Operators for integers only."""
 
 
-def computed(sign: str, one: Number, other: Number) -> Number:
-    """`one` `sign` `other`. Raises ValueError, ArithmeticError for what means nothing."""
+def apply_binary(sign: str, one: Number, other: Number) -> Number:
+    """Return the result of a binary operator. Raises ValueError or ArithmeticError for an undefined result."""
     compute = BINARY[sign][1]
-    if sign in WHOLE and not (one.is_whole and other.is_whole):
+    if sign in INTEGER_ONLY and not (one.is_integer and other.is_integer):
         raise ValueError(f"{sign} needs whole numbers")
     if sign in LOGIC:
         return Number(int(compute(one.value, other.value)))
     if sign in SHIFTS:
-        return fitted(compute(one.value, other.value), one.kind)
-    kind = common(one.kind, other.kind)
+        return wrap_result(compute(one.value, other.value), one.kind)
+    kind = common_type(one.kind, other.kind)
     if kind.kind == "float":
-        left, right = converted(one.value, kind), converted(other.value, kind)
+        left, right = convert(one.value, kind), convert(other.value, kind)
     else:
-        left, right = fitted(one.value, kind).value, fitted(other.value, kind).value
+        left, right = wrap_result(one.value, kind).value, wrap_result(other.value, kind).value
     result = compute(left, right)
-    return Number(int(result)) if sign in COMPARING else fitted(result, kind)
+    return Number(int(result)) if sign in COMPARISONS else wrap_result(result, kind)
 
 
-def negated(one: Number) -> Number:
-    """`-one`."""
-    return fitted(-one.value, one.kind)
+def negate(one: Number) -> Number:
+    """Return `-one`."""
+    return wrap_result(-one.value, one.kind)
 
 
-def complemented(one: Number) -> Number:
-    """`~one`. Raises ValueError for a floating number."""
+def complement(one: Number) -> Number:
+    """Return `~one`. Raises ValueError for a floating-point number."""
     if not isinstance(one.value, int):
         raise ValueError("~ needs whole numbers")
-    return fitted(~one.value, one.kind)
+    return wrap_result(~one.value, one.kind)

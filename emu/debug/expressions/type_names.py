@@ -1,7 +1,7 @@
-"""Names of types as casts and `sizeof` have them (C11 §6.7.7): `unsigned char`, `struct node *`, `int (*)[3]`.
+"""Type names of casts and `sizeof` (C11 §6.7.7): `unsigned char`, `struct node *`, `int (*)[3]`.
 
-What enters: tokens of an expression and a way to find what the program has named. What leaves: a `Type`. The sizes
-are those of the chip (int 16, long 32, pointers 16 bits); the program's own base types win, as for `double`.
+Inputs: tokens of an expression and a lookup of the program's own types. Output: a `Type`. Sizes are those of the chip
+(int 16, long 32, pointers 16 bits). Base types of the program take precedence, for example its `double`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import Final
 from emu.debug.dwarf.types import TAGGED, VOID, Type
 
 Find = Callable[[str], Type | None]
-"""What the program has named: `node` is a typedef or a base type, `struct node` a tag."""
+"""Lookup of the program's types: `node` is a typedef or a base type, `struct node` a tag."""
 QUALIFIERS: Final = ("const", "volatile", "restrict", "register")
 POINTER: Final = 2
 """Bytes of a pointer."""
-_WHOLE: Final = {("char",): 1, (): 2, ("short",): 2, ("long",): 4, ("long", "long"): 8}
-"""Bytes of whole numbers by their words, without `int`, `signed` and `unsigned`."""
+_INTEGER_SIZES: Final = {("char",): 1, (): 2, ("short",): 2, ("long",): 4, ("long", "long"): 8}
+"""Size in bytes of each integer type by its keywords without `int`, `signed` and `unsigned`."""
 _OTHERS: Final = {
     ("float",): Type("float", "float", 4),
     ("double",): Type("float", "double", 8),
@@ -25,7 +25,11 @@ _OTHERS: Final = {
     ("_Bool",): Type("bool", "_Bool", 1),
     ("void",): VOID,
 }
-_WORDS: Final = frozenset(word for words in (*_WHOLE, *_OTHERS) for word in words) | {"int", "signed", "unsigned"}
+_WORDS: Final = frozenset(word for words in (*_INTEGER_SIZES, *_OTHERS) for word in words) | {
+    "int",
+    "signed",
+    "unsigned",
+}
 _LIBRARY: Final = {
     **{f"int{8 * size}_t": Type("signed", f"int{8 * size}_t", size, is_signed=True) for size in (2, 4, 8)},
     **{f"uint{8 * size}_t": Type("unsigned", f"uint{8 * size}_t", size) for size in (2, 4, 8)},
@@ -37,15 +41,15 @@ _LIBRARY: Final = {
     "ptrdiff_t": Type("signed", "ptrdiff_t", POINTER, is_signed=True),
     "bool": Type("bool", "bool", 1),
 }
-"""Known even where the program does not use them, so that debug information leaves them out."""
+"""Types of the C library that a program without a use of them lacks in its debug information."""
 
 
 class TypeNameError(ValueError):
-    """Words that begin as the name of a type, but are none here."""
+    """Tokens that begin like a type name but name no type here."""
 
 
 def type_name(tokens: Sequence[tuple[str, str]], at: int, find: Find) -> tuple[Type, int] | None:
-    """The type whose name begins at token `at` and where it ends; None if none begins there. Raises TypeNameError."""
+    """Return the type named by the tokens from `at` and the position after it, or None. Raises TypeNameError."""
     reader = _Reader(tokens, at, find)
     kind = reader.specifiers()
     return (reader.declarator(kind), reader.at) if kind is not None else None
@@ -60,8 +64,8 @@ class _Reader:
     def _next(self) -> tuple[str, str]:
         return self.tokens[self.at] if self.at < len(self.tokens) else ("", "")
 
-    def _take(self, *texts: str) -> str:
-        """The next token if it is one of these."""
+    def _accept(self, *texts: str) -> str:
+        """Consume the next token if it is one of `texts`, and return it; else return ""."""
         text = self._next()[1] if self._next()[0] in ("name", "sign") else ""
         if text not in texts or not text:
             return ""
@@ -69,12 +73,12 @@ class _Reader:
         return text
 
     def specifiers(self) -> Type | None:
-        """What stands before stars and brackets."""
+        """Parse the type specifiers and qualifiers before the declarator."""
         words: list[str] = []
         named: Type | None = None
         while self._next()[0] == "name":
             word = self._next()[1]
-            if self._take(*QUALIFIERS):
+            if self._accept(*QUALIFIERS):
                 continue
             if word in TAGGED and named is None and not words:
                 named = self._tagged(word)
@@ -105,26 +109,26 @@ class _Reader:
         text = " ".join(words)
         if rest in _OTHERS and len(rest) == len(words):
             return self.find(" ".join(reversed(rest))) or _OTHERS[rest]
-        if rest not in _WHOLE or words.count("int") + (rest == ("char",)) > 1 or is_unsigned + is_signed > 1:
+        if rest not in _INTEGER_SIZES or words.count("int") + (rest == ("char",)) > 1 or is_unsigned + is_signed > 1:
             raise TypeNameError(f"{text!r} is no type")
-        size = _WHOLE[rest]
+        size = _INTEGER_SIZES[rest]
         if size == 1:
             plain = self.find("char") if not is_unsigned + is_signed else None
             return plain or Type("char", text, size, is_signed=not is_unsigned)
         return Type("unsigned" if is_unsigned else "signed", text, size, is_signed=not is_unsigned)
 
     def declarator(self, kind: Type) -> Type:
-        """Stars, brackets, and a bracketed part that belongs to what it stands in: `(*)[3]`."""
-        while self._take("*"):
+        """Parse the abstract declarator: stars, array bounds, and a parenthesised inner declarator as in `(*)[3]`."""
+        while self._accept("*"):
             kind = Type("pointer", size=POINTER, target=kind)
-            while self._take(*QUALIFIERS):
+            while self._accept(*QUALIFIERS):
                 pass
         inner: int | None = None
         if self._next()[1] == "(" and self.at + 1 < len(self.tokens) and self.tokens[self.at + 1][1] == "*":
             inner = self.at + 1
             self._skip()
         counts = []
-        while self._take("["):
+        while self._accept("["):
             counts.append(self._count())
         for count in reversed(counts):
             kind = Type("array", target=kind, count=count)
@@ -140,7 +144,7 @@ class _Reader:
         return kind
 
     def _skip(self) -> None:
-        """Over what stands in round brackets."""
+        """Skip a parenthesised group."""
         depth = 0
         while self.at < len(self.tokens):
             text = self.tokens[self.at][1] if self.tokens[self.at][0] == "sign" else ""
@@ -155,6 +159,6 @@ class _Reader:
         if kind != "number" or not text.isdecimal() or not 0 < int(text) < 1 << 16:
             raise TypeNameError("expected a number of elements, 1 to 65535")
         self.at += 1
-        if not self._take("]"):
+        if not self._accept("]"):
             raise TypeNameError("expected ']' in the name of a type")
         return int(text)

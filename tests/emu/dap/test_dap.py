@@ -328,7 +328,7 @@ def test_a_breakpoint_that_is_there_has_no_problem(client: Client, program: str)
 
 WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("scopes", {}, "scopes needs `frameId`"),
-    ("scopes", {"frameId": 4242}, "frame 4242 is none of where the machine stands"),
+    ("scopes", {"frameId": 4242}, "frame 4242 is not valid at this stop"),
     ("evaluate", {"expression": "total", "frameId": 4242}, "frame 4242 is none"),
     ("variables", {"variablesReference": 4242}, "reference 4242 is none"),
     ("stackTrace", {"threadId": 99}, "there is no thread 99 here"),
@@ -377,11 +377,11 @@ def framed(command: str, **arguments: Any) -> bytes:
         (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", 0, "expected `Content-Length: N` before a message, not 'GET /"),
         (framed("initialize") + b"Content-Length: 9999999999\r\n\r\n", 1, "a message of 9999999999 bytes"),
         (framed("initialize") + b"Content-Length: 0\r\n\r\n", 1, "a message of 0 bytes; expected 1 to 16777216"),
-        (framed("initialize")[:-5], 0, "it ends behind 66 of 71 bytes of a message"),
-        (framed("initialize") + b"Content-Length: 5\r\n\r\n{nope", 1, "a message that is no JSON: '{nope'"),
-        (b"Content-Length: 6\r\n\r\n[1, 2]", 0, "a message that is no object: '[1, 2]'"),
+        (framed("initialize")[:-5], 0, "the input ends after 66 of 71 bytes of a message"),
+        (framed("initialize") + b"Content-Length: 5\r\n\r\n{nope", 1, "a message is not valid JSON: '{nope'"),
+        (b"Content-Length: 6\r\n\r\n[1, 2]", 0, "a message is no JSON object: '[1, 2]'"),
         (b"Content-Length: 90000\r\n\r\n" + b"[" * 90000, 0, "no JSON: '[[[["),
-        (framed("initialize").replace(b"\r\n", b"\n"), 0, "it ends in the header of a message"),
+        (framed("initialize").replace(b"\r\n", b"\n"), 0, "the input ends in a message header"),
     ],
 )
 def test_what_is_no_message_is_told(sent: bytes, replies: int, words: str) -> None:

@@ -19,7 +19,7 @@ import emu
 from emu.cli import main
 from emu.dap.server import Server
 from emu.debug.history import History
-from emu.prompt.reader import Prompt, candidates, carry_out
+from emu.prompt.reader import Prompt, candidates, execute
 from emu.prompt.state_commands import TOPICS
 from emu.prompt.table import TABLE
 from tests.emu.dap.test_dap import SOURCE, line_of
@@ -104,8 +104,8 @@ def test_a_script_ends_with_the_first_command_that_fails(play: type) -> None:
         ("break", "expected FUNCTION, LINE, FILE:LINE or *ADDRESS"),
         ("break 3", "there is no source here: say FILE:LINE"),
         ("delete 7", "there is no breakpoint 7"),
-        ("watch 3 + 4", "it is not in memory"),
-        ("step many", "expected how many times, not 'many'"),
+        ("watch 3 + 4", "the object is not in memory"),
+        ("step many", "expected a number of repetitions, not 'many'"),
         ("print/q total", "the formats are /x /d /u /t /c /a, not /q"),
         ("x/8zz total", "/zz is no format"),
         ("frame 99", "the frames are 0 to 0, not 99"),
@@ -191,10 +191,10 @@ def test_reverse_finish_goes_to_the_call(program: str) -> None:
     prompt.session.write = said.append  # type: ignore[misc]
     prompt.session.start({})
     for line in ("break add if b == 2", "run", "next", "next", "reverse-finish"):
-        carry_out(prompt.session, line)
+        execute(prompt.session, line)
     calls = machine.pc
     assert prompt.session.frames[0]["name"] == "twice"
-    carry_out(prompt.session, "stepi")
+    execute(prompt.session, "stepi")
     assert machine.pc == machine.program_address("add") != calls
 
 
@@ -246,10 +246,10 @@ def test_reverse_step_passes_interrupts_by(tmp_path: Path) -> None:
     prompt.session.write = lambda _text: None  # type: ignore[misc]
     prompt.session.start({})
     for line in ("break ticking.c:19 if ticks == 3", "run"):
-        carry_out(prompt.session, line)
+        execute(prompt.session, line)
     lines = []
     for _ in range(90):
-        carry_out(prompt.session, "reverse-step")
+        execute(prompt.session, "reverse-step")
         frame = prompt.session.frames[0]
         assert frame["name"] == "main"
         lines.append(frame["line"])
